@@ -226,6 +226,7 @@ def test_a_name_in_place_of_names_is_told():
 
 @pytest.mark.parametrize("error", [RuntimeError("no more"), KeyError("x"), SystemExit(3), AssertionError()])
 @pytest.mark.parametrize("hook", ["on_iteration", "on_start", "on_step"])
+@pytest.mark.few(4)
 def test_an_error_in_a_hook_is_that_error(error, hook):
     def raising(*_):
         raise error

@@ -20,7 +20,7 @@ from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import kinds
 from loomopt.scenes.packaged import problems
-from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.certificate.certificate import Draft, certify
 from loomopt.solving.search import search
 
 KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "reached", "design", "figures"]
@@ -114,12 +114,11 @@ def test_an_infeasible_target_exits_3_with_the_json_object_and_the_least_relaxat
 
 
 def test_an_answer_that_is_not_certified_exits_4_and_says_why(cli, monkeypatch):
-    genuine = certify
-
     def failing(*arguments, **options):
-        return dataclasses.replace(genuine(*arguments, **options), passed=False, reasons=("the moon is wrong",))
+        refused = dataclasses.replace(certify(*arguments, **options), passed=False, reasons=("the moon is wrong",))
+        return Draft(refused, lambda cycle: refused)
 
-    monkeypatch.setattr(search, "certify", failing)
+    monkeypatch.setattr(search, "begun", failing)
     data = answered(cli, "beatup", status=4)
     check_contract(data)
     assert data["status"] == "uncertified"
@@ -194,13 +193,13 @@ def test_a_held_bound_stays_until_it_is_freed(cli):
 def test_effects_are_put_on_and_taken_off(cli):
     data = answered(cli, "beatup", "--with", "gravity", "--with", "centrifugal", "--without", "resistance")
     assert data["effects"] == ["inertia", "gravity", "centrifugal"]
-    assert is_number(data["figures"]["bearing_force"])
+    assert is_number(data["figures"]["reed_centrifugal"])
     assert data["figures"]["pulse_rms"] is None
 
 
 def test_a_limit_may_be_set_on_a_figure_of_an_effect_put_on(cli):
-    data = answered(cli, "beatup", "--set", "limits.bearing_force.max=500 N", "--with", "centrifugal")
-    limit = next(limit for limit in data["limits"] if limit["name"] == "bearing_force")
+    data = answered(cli, "beatup", "--set", "limits.reed_centrifugal.max=500 N", "--with", "centrifugal")
+    limit = next(limit for limit in data["limits"] if limit["name"] == "reed_centrifugal")
     assert (limit["max"], limit["ok"]) == (500.0, True)
 
 

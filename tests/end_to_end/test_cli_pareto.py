@@ -141,6 +141,7 @@ def test_no_admissible_design_is_exit_3(cli):
     assert data["message"] == "No front: an end has no certified design."
 
 
+@pytest.mark.slow
 def test_an_end_without_a_least_asks_for_a_range(cli, tmp_path):
     from loomopt.scenes import packaged
 
@@ -191,6 +192,7 @@ def test_bad_input_is_one_message_and_nothing_is_written(cli, tmp_path, argument
 DWELL = "--minimise", "peak_acceleration", "--against", "dwell", "--range", "dwell=36:37.5 deg", "--points", "3"
 
 
+@pytest.mark.slow
 def test_a_front_holds_what_the_default_target_demands_and_its_first_line_says_so(cli):
     status, out, _ = cli("rapier", *DWELL)
     assert status == 0
@@ -205,6 +207,7 @@ def test_a_front_holds_what_the_default_target_demands_and_its_first_line_says_s
     assert data["provenance"]["held"] == "the scene's limits, stroke 850 mm"
 
 
+@pytest.mark.slow
 def test_with_target_none_a_front_drops_demands_and_says_which(cli):
     status, out, _ = cli("rapier", *DWELL, "--target", "none")
     assert status == 0

@@ -16,7 +16,8 @@ FIGURES = ["stroke", "dwell_after", "dwell_before", "peak_acceleration", "peak_j
 UNITS = {"stroke": "m", "dwell_after": "rad", "peak_acceleration": "m/rad^2", "peak_jerk": "m/rad^3", "mu_min": "rad"}
 UNITS |= {"l4": "m", "alpha": "rad", "C0x": "m", "phi40": "rad", "phi_stroke": "rad"}
 OBJECTIVE = {"stroke-dwell": "peak_acceleration", "dwell": "dwell", "smooth": "rms_jerk", "match": "match_rms"}
-OUT_OF_REACH = ("--set", "operation.stroke=2000 mm", "--starts", "2")
+SOLVE = ("solve", "rapier", "--starts", "1")
+OUT_OF_REACH = (*SOLVE, "--set", "operation.stroke=2000 mm")
 
 
 @pytest.fixture
@@ -63,7 +64,7 @@ def check_contract(data, design=DESIGN):
 
 @pytest.mark.parametrize("target", OBJECTIVE)
 def test_solve_prints_one_object_by_the_contract(cli, target):
-    data = answered(cli, "solve", "rapier", "--target", target)
+    data = answered(cli, *SOLVE, "--target", target)
     check_contract(data)
     assert (data["problem"], data["target"], data["status"]) == ("rapier", target, "optimal")
     assert data["certificate"]["passed"]
@@ -75,23 +76,23 @@ def test_solve_prints_one_object_by_the_contract(cli, target):
 
 
 def test_stroke_dwell_is_the_default_target(cli):
-    assert answered(cli, "solve", "rapier")["target"] == "stroke-dwell"
+    assert answered(cli, *SOLVE)["target"] == "stroke-dwell"
 
 
 def test_prices_carry_the_units_of_the_objective_per_limit(cli):
-    prices = {price["limit"]: price for price in answered(cli, "solve", "rapier")["binding"]}
+    prices = {price["limit"]: price for price in answered(cli, *SOLVE)["binding"]}
     assert prices["stroke"]["unit"] == {"peak_acceleration": "m/rad^2/m"}
     assert prices["mu_min"]["unit"] == {"peak_acceleration": "m/rad^2/rad"}
     assert prices["l3p"]["text"] == "l3p <= 260 mm"
 
 
 def test_a_stroke_out_of_reach_exits_with_3_and_says_what_would_help(cli):
-    data = answered(cli, "solve", "rapier", *OUT_OF_REACH, status=3)
+    data = answered(cli, *OUT_OF_REACH, status=3)
     check_contract(data)
     assert data["status"] == "infeasible"
     assert data["relaxation"]
     assert any("stroke" in limit for limit in data["clash"])
-    status, out, _ = cli("solve", "rapier", *OUT_OF_REACH)
+    status, out, _ = cli(*OUT_OF_REACH)
     assert status == 3
     assert "2000 mm" in out
 
@@ -124,7 +125,7 @@ def test_evaluate_shows_todays_figures_and_an_answers(cli, tmp_path):
     assert today["figures"]["peak_acceleration"] == pytest.approx(0.879135, abs=1e-6)
     assert today["figures"]["stroke"] == pytest.approx(0.84923, abs=1e-5)
     assert today["figures"]["tape_force"] is None
-    answer = answered(cli, "solve", "rapier")
+    answer = answered(cli, *SOLVE)
     file = tmp_path / "answer.json"
     file.write_text(json.dumps(answer), encoding="utf-8")
     again = answered(cli, "evaluate", "rapier", "--design", file)
@@ -150,7 +151,7 @@ def test_a_new_rapier_scene_can_be_shown_and_solved(cli, tmp_path):
     status, out, _ = cli("show", file)
     assert status == 0
     assert "l3p" in out
-    data = answered(cli, "solve", file)
+    data = answered(cli, "solve", file, "--starts", "1")
     assert data["status"] == "optimal"
 
 
@@ -165,7 +166,7 @@ def test_show_names_targets_bounds_and_equations(cli):
 
 
 def test_free_sley_adds_the_four_bar_to_the_design_and_is_better(cli):
-    held, freed = answered(cli, "solve", "rapier"), answered(cli, "solve", "rapier", "--free", "sley", "--starts", "1")
+    held, freed = answered(cli, *SOLVE), answered(cli, *SOLVE, "--free", "sley")
     check_contract(freed, DESIGN + SLEY)
     assert freed["status"] == "optimal"
     assert freed["figures"]["peak_acceleration"] < 0.999 * held["figures"]["peak_acceleration"]
@@ -173,7 +174,7 @@ def test_free_sley_adds_the_four_bar_to_the_design_and_is_better(cli):
 
 def test_effects_put_on_are_named_and_give_force_and_torque(cli):
     arguments = ("--with", "head_inertia", "--with", "tape_friction")
-    loaded, plain = answered(cli, "solve", "rapier", *arguments), answered(cli, "solve", "rapier")
+    loaded, plain = answered(cli, *SOLVE, *arguments), answered(cli, *SOLVE)
     check_contract(loaded)
     assert loaded["effects"] == ["head_inertia", "tape_friction"]
     assert loaded["design"] == plain["design"]

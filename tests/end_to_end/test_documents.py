@@ -2,14 +2,19 @@
 
 import ast
 import importlib.util
+import os
 import re
+import shlex
 import sys
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
+import typer
 
 import loomopt as lo
+from loomopt.interface.cli.app import application
 from loomopt.jobs import registry
 
 ROOT = Path(__file__).parents[2]
@@ -18,17 +23,63 @@ write = importlib.util.module_from_spec(LOCATION)
 sys.modules[LOCATION.name] = write
 LOCATION.loader.exec_module(write)
 PAGES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in write.PAGES}
-README, PYTHON = PAGES["README.md"], PAGES["docs/python.md"]
+README, PYTHON = PAGES["README.md"], PAGES["docs/how-to/python.md"]
 BLOCKS = [block for text in PAGES.values() for block in write.BLOCK.findall(text)]
 TABLES = [match for text in PAGES.values() for match in write.TABLE.finditer(text)]
 WRITTEN = {**PAGES, **{name: (ROOT / name).read_text(encoding="utf-8") for name in ("CONTRIBUTING.md", "CHANGELOG.md")}}
 LONGEST_README = 120
 
 
-@pytest.mark.parametrize(("words", "told"), BLOCKS, ids=[words for words, _ in BLOCKS])
-def test_an_output_on_a_page_is_what_the_command_prints(words, told):
-    printed = write.output(words)
-    assert write.holds(told.rstrip("\n").split("\n"), printed), "\n".join(["make docs writes it anew:", *printed])
+OWN_TESTS = ("docs/development/", "docs/hard-cases.md")
+"""Pages whose code other tests run: test_extending.py, test_hard_chapter.py."""
+SLOW = ("docs/how-to/", "docs/ideas/effects.md")
+CARRIED_OUT = [
+    pytest.param(page, marks=[pytest.mark.slow] if page.startswith(SLOW) else [])
+    for page, text in PAGES.items()
+    if write.STEP.search(text) and not page.startswith(OWN_TESTS)
+]
+
+
+@pytest.mark.parametrize("page", CARRIED_OUT)
+def test_a_page_can_be_carried_out_and_its_outputs_are_what_commands_print(page, tmp_path, monkeypatch):
+    text = PAGES[page]
+    monkeypatch.chdir(tmp_path)
+    told = [(words, lines.rstrip("\n").split("\n")) for words, lines in write.BLOCK.findall(text)]
+    printed = list(write.carried_out(text))
+    assert [words for words, _ in told] == [words for words, _ in printed]
+    for (words, lines), (_, now) in zip(told, printed, strict=True):
+        assert write.holds(lines, now), "\n".join([f"make outputs writes it anew: {words}", *now])
+
+
+COMMANDS = [
+    (page, line)
+    for page, text in PAGES.items()
+    for block in re.findall(r"^```(?:sh|text|console)?\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    for line in re.findall(r"^(?:\$ )?(loomopt [a-z].*)$", block, re.MULTILINE)
+]
+
+
+@pytest.mark.parametrize("page", sorted({page for page, _ in COMMANDS} - {"docs/development/extending.md"}))
+def test_every_command_on_a_page_has_the_options_it_is_given(page):
+    for line in (line for where, line in COMMANDS if where == page):
+        _, name, *words = shlex.split(line.partition(" > ")[0], comments=True)
+        group: Any = typer.main.get_command(application([]))
+        assert name in group.commands, line
+        group.commands[name].make_context(name, words)  # raises for an option that is not known
+
+
+def test_nearly_all_commands_on_pages_are_run():
+    run = {
+        line
+        for text in PAGES.values()
+        for line in re.findall(
+            r"^(?:\$ )?(loomopt .*)$",
+            "".join(body for *_, kind, body in write.STEP.findall(text) if kind in ("sh", "console")),
+            re.MULTILINE,
+        )
+    }
+    assert len(run) > 40
+    assert len({line for _, line in COMMANDS} - run) < 20
 
 
 def test_a_stale_output_is_found_and_written_anew():
@@ -69,7 +120,7 @@ def test_each_symbol_of_the_first_table_is_explained_under_it():
 
 
 def test_the_glossary_is_what_the_program_says():
-    assert (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8") == write.glossary_text()
+    assert write.GLOSSARY.read_text(encoding="utf-8") == write.glossary_text()
 
 
 def test_the_sketches_are_there_and_name_what_the_glossary_marks():
@@ -81,13 +132,13 @@ def test_the_sketches_are_there_and_name_what_the_glossary_marks():
 
 
 def test_the_first_python_runs_as_it_stands_in_at_most_twelve_lines(tmp_path, monkeypatch):
-    (code,) = re.findall(r"^```python\n(.*?)^```", PYTHON, re.MULTILINE | re.DOTALL)
+    code, *_ = re.findall(r"^```python\n(.*?)^```", PYTHON, re.MULTILINE | re.DOTALL)
     assert len([line for line in code.splitlines() if line.strip()]) <= 12
     body = ast.parse(code).body
     names: dict[str, object] = {}
     monkeypatch.chdir(tmp_path)
-    exec(compile(ast.Module(body[:-1], []), "docs/python.md", "exec"), names)
-    frame = eval(compile(ast.Expression(body[-1].value), "docs/python.md", "eval"), names)
+    exec(compile(ast.Module(body[:-1], []), "docs/how-to/python.md", "exec"), names)
+    frame = eval(compile(ast.Expression(body[-1].value), "docs/how-to/python.md", "eval"), names)
     assert isinstance(names["answer"], lo.Answer)
     assert (tmp_path / "curves.png").stat().st_size > 10_000
     assert "AcDbEntity" in (tmp_path / "linkage.dxf").read_text() or "SECTION" in (tmp_path / "linkage.dxf").read_text()
@@ -97,6 +148,16 @@ def test_the_first_python_runs_as_it_stands_in_at_most_twelve_lines(tmp_path, mo
     assert not frame.isna().any(axis=None)
     today, best, wider = (abs(value) for value in frame["M3_fdc [N*m]"])
     assert wider <= best < today
+
+
+def test_every_public_name_stands_in_the_reference_a_function_with_an_example():
+    sections = re.split(r"^## lo\.", PAGES["docs/reference/python.md"], flags=re.MULTILINE)[1:]
+    told = {section.split("\n", 1)[0]: section for section in sections}
+    assert set(told) == {name for name in lo.__all__ if not name.startswith("_")}
+    for name, section in told.items():
+        assert f"<!-- generated function {name} -->" in section
+        example = re.search(r"^```\{code-cell\} python\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
+        assert name[0].isupper() or f"lo.{name}(" in example[1]
 
 
 def anchors(text):
@@ -118,13 +179,19 @@ def test_every_link_leads_somewhere(page):
 
 
 def test_every_page_is_reached_from_the_readme():
-    links = {target.partition("#")[0] for target in re.findall(r"\]\(([^)]+)\)", README)}
-    assert len(links) > 4
-    assert {*PAGES, "docs/glossary.md", "CONTRIBUTING.md", "CHANGELOG.md"} - {"README.md"} <= links
+    known, found, rest = {*WRITTEN, "docs/reference/glossary.md"}, set(), {"README.md"}
+    while rest:
+        page = rest.pop()
+        found.add(page)
+        text = (ROOT / page).read_text(encoding="utf-8")
+        targets = [target.partition("#")[0] for target in re.findall(r"\]\(([^)]+)\)", text)]
+        named = {os.path.normpath(Path(page).parent / target) for target in targets if "://" not in target}
+        rest |= (named & known) - found
+    assert found == known
 
 
 def test_the_architecture_names_folders_and_files_that_are_there():
-    text, package = PAGES["docs/architecture.md"], ROOT / "loomopt"
+    text, package = PAGES["docs/development/architecture.md"], ROOT / "loomopt"
     tree, order = (
         re.search(r"^loomopt/\n((?:  .*\n)*)", text, re.MULTILINE)[1],
         re.search(r"^ +base → .*$", text, re.MULTILINE),

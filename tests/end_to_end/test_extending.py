@@ -1,4 +1,4 @@
-"""docs/extending.md: its distribution installs, its commands end well, its excerpts are the press, its code runs."""
+"""extending.md: its distribution installs, its commands end well, its excerpts are the press, its code runs."""
 
 import importlib.util
 import json
@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-TEXT = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs" / "development" / "extending.md").read_text(encoding="utf-8")
 SECTIONS = {part.split("\n", 1)[0]: part for part in TEXT.split("\n## ")[1:]}
 PRESS = ROOT / "tests" / "plugin" / "press"
 FILE = re.compile(r"^`([\w./]+)`( of the press)?:\n\n```\w+\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -86,7 +86,7 @@ def test_the_files_that_are_told_are_the_press():
 @pytest.mark.parametrize("code", re.findall(r"^```python\n(.*?)^```", SECTIONS["A study"], re.MULTILINE | re.DOTALL))
 def test_the_code_of_a_study_runs(code):
     assert "assert" in code
-    exec(compile(code, "docs/extending.md", "exec"), {"__name__": "chapter"})
+    exec(compile(code, "docs/development/extending.md", "exec"), {"__name__": "chapter"})
 
 
 def test_every_section_stands_in_the_table():

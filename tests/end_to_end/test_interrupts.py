@@ -7,6 +7,7 @@ import sys
 import time
 
 import pytest
+from support import slow
 
 HIT = """
 import os, signal, sys
@@ -68,9 +69,10 @@ def is_stopped(done):
 
 @pytest.mark.parametrize(
     "module",
-    ["loomopt.interface.cli.app", "typer", "pydantic", "loomopt.base.errors", "loomopt.jobs.beatup.job",
-     "loomopt.scenes.scene", "numpy.linalg", "casadi", "numpy", "loomopt.solving.certificate.certificate",
-     "rich.table", "loomopt.solving.engine"],
+    slow.after(6, [
+     "loomopt.interface.cli.app", "pydantic", "loomopt.scenes.scene", "casadi", "numpy", "loomopt.solving.engine",
+     "typer", "loomopt.base.errors", "loomopt.jobs.beatup.job", "numpy.linalg",
+     "loomopt.solving.certificate.certificate", "rich.table"]),
 )  # fmt: skip
 def test_ctrl_c_during_an_import_stops_cleanly(module):
     assert is_stopped(called(sys.executable, "-c", HIT, module, "solve", "beatup"))
@@ -142,6 +144,7 @@ def test_a_stream_closed_from_the_start_is_bad_input(closed, words):
 
 
 @pytest.mark.parametrize("words", ["list", "solve beatup --json", "evaluate beatup", "simulate beatup", "--help"])
+@pytest.mark.few(3)
 def test_a_reader_that_leaves_is_no_error(words):
     reading, writing = os.pipe()
     os.close(reading)

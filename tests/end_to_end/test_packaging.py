@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
 from pathlib import Path
@@ -42,6 +43,14 @@ HOSTS = (
     "dev" + "pi",
 )
 REGISTRY = re.compile("|".join(HOSTS), re.IGNORECASE)
+
+PICTURES = {
+    f"docs/{path.name}": f"loomopt/pictures/{path.name}"
+    for path in (ROOT / "docs").iterdir()
+    if path.name.startswith("sketch-") or f"docs/{path.name}" in (ROOT / "README.md").read_text(encoding="utf-8")
+    if path.suffix in (".png", ".svg")
+}
+"""The sketches and what the README shows, and where the wheel has them."""
 
 wheel_needed = pytest.mark.skipif(importlib.util.find_spec("hatchling") is None, reason="hatchling builds the wheel")
 
@@ -83,7 +92,7 @@ def test_the_project_says_what_the_package_is():
     assert project["requires-python"] == ">=3.11"
     assert {"test", "notebook", "dask"} <= set(project["optional-dependencies"])
     included = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
-    assert included == {"problems": "loomopt/problems", "results": "loomopt/results"}
+    assert included == {"problems": "loomopt/problems", "results": "loomopt/results", **PICTURES}
     assert (ROOT / "LICENSE").is_file()
 
 
@@ -105,7 +114,8 @@ def test_the_lock_pins_every_dependency_and_nothing_but_versions():
     pinned = dict(line.split("==") for line in lines)
     assert [line for line in lines if not re.fullmatch(r"[A-Za-z0-9._-]+==[0-9][0-9a-z.]*", line)] == []
     locked = {canonicalize_name(name): Version(version) for name, version in pinned.items()}
-    wanted = [*PROJECT["project"]["dependencies"], *PROJECT["project"]["optional-dependencies"]["test"]]
+    extras = PROJECT["project"]["optional-dependencies"]
+    wanted = [*PROJECT["project"]["dependencies"], *extras["test"], *extras["docs"]]
     for requirement in map(Requirement, wanted):
         version = locked[canonicalize_name(requirement.name)]
         assert requirement.specifier.contains(version), requirement
@@ -119,8 +129,10 @@ def imported(tree):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             yield node.module
-        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
-            yield from (each.value for each in node.args if isinstance(each, ast.Constant))
+        elif isinstance(node, ast.Call):
+            called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            by_name = called.endswith("import_module")
+            yield from (each.value for each in node.args if by_name and isinstance(each, ast.Constant))
 
 
 def test_every_package_the_code_imports_is_a_declared_dependency():
@@ -129,7 +141,7 @@ def test_every_package_the_code_imports_is_a_declared_dependency():
     used = {name.split(".")[0] for tree in code for name in imported(tree)}
     assert used >= {"casadi", "flint", "matplotlib", "pydantic"}
     outside = used - set(sys.stdlib_module_names) - {"loomopt"}
-    named = {"flint": "python_flint"}
+    named = {"flint": "python_flint", "PIL": "pillow"}
     # The first is asked for by `--dask` alone, which says how to install it; where a cell runs the other is there.
     extra = {"distributed", "IPython"}
     assert all(entry.split(">")[0] in extra for entry in PROJECT["project"]["optional-dependencies"]["dask"])
@@ -142,9 +154,33 @@ def test_the_wheel_holds_scenes_results_types_and_nothing_else(wheel):
     for folder in ("problems", "results"):
         assert {f"loomopt/{folder}/{path.name}" for path in (ROOT / folder).iterdir()} <= names
     assert "loomopt/py.typed" in names
+    assert {f"loomopt/interface/report/{name}" for name in ("report.css", "report.js")} <= names
+    assert set(PICTURES.values()) <= names
     assert {f"loomopt/jobs/{job}/template.toml" for job in registry.own_names()} <= names
     assert {name.split("/")[0].split("-")[0] for name in names} == {"loomopt"}
     assert not [name for name in names if "test" in name.lower() or "__pycache__" in name]
+
+
+@wheel_needed
+def test_wheel_and_source_pass_twine(wheel, tmp_path):
+    pytest.importorskip("twine", reason="twine is not installed")
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(tmp_path)]
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
+    (source,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(source) as archive:
+        names = {name.split("/", 1)[-1] for name in archive.getnames()}
+    assert {"loomopt/py.typed", "problems/beatup.toml", "docs/sketch-beatup.svg", "Makefile"} <= names
+    checked = [sys.executable, "-m", "twine", "check", "--strict", str(wheel), str(source)]
+    done = subprocess.run(checked, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+def test_the_licence_of_every_dependency_is_noted():
+    lines = (ROOT / "docs" / "development" / "licences.md").read_text(encoding="utf-8").splitlines()
+    noted = {cells[1].strip() for cells in (line.split("|") for line in lines) if len(cells) > 3}
+    extras = PROJECT["project"]["optional-dependencies"].values()
+    wanted = [*PROJECT["project"]["dependencies"], *(entry for extra in extras for entry in extra)]
+    assert {Requirement(entry).name for entry in wanted} <= noted
 
 
 @wheel_needed

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PRESS = ROOT / "tests" / "plugin" / "press" / "loomopt_press"
-KEPT = ("loomopt", "problems", "results", "tests/reference", "tests/conftest.py")
+KEPT = ("loomopt", "problems", "results", "tests/reference", "tests/support", "tests/conftest.py")
 REFERENCE = "tests/physics/effects/test_effects_reference.py"
 EFFECT = '''"""Clock spring on the rocking shaft: output term T."""
 

@@ -33,10 +33,3 @@ def test_an_ipopt_that_does_not_tell_is_not_made_up(content, tmp_path, monkeypat
     assert app.ipopt() == app.UNTOLD
     header.write_text('#define IPOPT_VERSION "3.14.1"\n')
     assert app.ipopt() == "3.14.1"
-
-
-def test_no_completion_is_offered_that_is_not_there(capsys):
-    assert app.run(["--help"]) == 0
-    assert "completion" not in capsys.readouterr().out
-    assert app.run(["--install-completion"]) == 2
-    assert app.run(["--show-completion"]) == 2

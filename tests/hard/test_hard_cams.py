@@ -71,6 +71,7 @@ def least(case):
 
 
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.few(6)
 def test_the_least_spring_is_that_of_30_digits(name):
     """Certified, and to 1e-12 (worst found: 7e-16)."""
     answer = lo.solve(scene_of(CASES[name]))

@@ -21,7 +21,7 @@ def decorated(file, name):
 
 @pytest.mark.parametrize("title", SECTIONS)
 def test_the_code_of_a_case_runs_and_fails_where_it_says(title):
-    (code,) = re.findall(r"```python\n(.*?)```", SECTIONS[title], re.DOTALL)
+    (code,) = re.findall(r"```\{code-cell\} python\n(.*?)```", SECTIONS[title], re.DOTALL)
     assert "assert" in code or "raises" in code
     exec(compile(code, title, "exec"), {})
 

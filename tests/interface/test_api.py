@@ -16,14 +16,15 @@ import loomopt as lo
 from loomopt.interface.cli.app import run
 from loomopt.scenes.packaged import problems
 from loomopt.solving.answer import solution
-from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.certificate.certificate import Draft, certify
 from loomopt.solving.search import search
 
 SCENE = lo.load("beatup-light")
 
 
 def failing(*arguments):
-    return dataclasses.replace(certify(*arguments), passed=False, reasons=("the moon is wrong",))
+    refused = dataclasses.replace(certify(*arguments), passed=False, reasons=("the moon is wrong",))
+    return Draft(refused, lambda cycle: refused)
 
 
 @pytest.fixture(scope="module")
@@ -151,13 +152,27 @@ def test_an_answer_travels_between_processes(answer):
 
 
 PUBLIC = {
-    *("Answer", "BadInput", "DesignStudy", "EffectsStudy", "Evaluation", "Proofs", "Scene"),
-    *("effects", "evaluate", "load", "pareto", "prove", "scene", "simulate", "solve", "sweep"),
+    *("Answer", "BadInput", "Budget", "DesignStudy", "EffectsStudy", "Evaluation", "Proofs", "Scene", "ToleranceStudy"),
+    *("accuracy", "budget", "compare", "new", "problems", "schema", "sensitivity", "SensitivityStudy"),
+    *("effects", "evaluate", "load", "pareto", "prove", "scene", "simulate", "solve", "sweep", "tolerance"),
 }
 """What scripts rely on: a name more is an entry of the changelog, a name less one of "changes the interface"."""
 METHODS = {
     "Answer": {
-        *("admissible", "as_dict", "asked", "before", "binding", "certificate", "clash", "curves", "design", "draw"),
+        *(
+            "admissible",
+            "animate",
+            "as_dict",
+            "asked",
+            "before",
+            "binding",
+            "budget",
+            "certificate",
+            "clash",
+            "curves",
+            "design",
+            "draw",
+        ),
         *(
             "effects",
             "evaluate",
@@ -169,9 +184,11 @@ METHODS = {
             "message",
             "optima",
             "plot",
+            "plot_forces",
         ),
         *("point", "problem", "proofs", "prove", "reached", "relaxation", "scene", "simulate", "solver", "sought"),
         *("beside", "outcome", "status", "table", "target", "terms", "time", "to_frame", "today", "units"),
+        *("report", "robust", "rounded", "undefined", "members", "change"),
     },
     "Scene": {
         *("active", "bounds", "call", "called", "change", "document", "effects", "equations", "free", "full", "given"),
@@ -274,7 +291,7 @@ def test_no_message_speaks_of_the_command_line_to_python():
         lambda: lo.simulate(SCENE, accuracy=2.0),
         lambda: lo.evaluate(SCENE, no_design),
         lambda: lo.evaluate(SCENE, {"l9": 1.0}),
-        lambda: SCENE.set("limits.bearing_force.max", "1 N"),
+        lambda: SCENE.set("limits.reed_centrifugal.max", "1 N"),
         lambda: SCENE.set("operation.M0", 3),
         lambda: lo.scene({"problem": {"job": "beatup"}}),
         lambda: lo.load("shedding").set("mechanism.law", "spline"),
@@ -289,7 +306,7 @@ def test_no_message_speaks_of_the_command_line_to_python():
 
 def test_no_answer_speaks_of_the_command_line_to_python(monkeypatch):
     assert not [text for text in solution.ADVICE.values() if "--" in text]
-    monkeypatch.setattr(search, "certify", failing)
+    monkeypatch.setattr(search, "begun", failing)
     assert "--" not in lo.solve(SCENE).message
     law = lo.solve(lo.load("shedding").set("targets.law.intervals", 8), "law")
     assert "--" not in law._repr_html_().replace("-->", "").replace("<!--", "")

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from support import inch
+from support import inch, slow
 
 import loomopt as lo
 from loomopt.base.units import SI_UNIT, UNITS, factor, parse_unit
@@ -22,6 +22,7 @@ TABLE = {"targets__match__table": str(WISH)}
 SAID = re.compile(r"[A-Za-z]+(?:[*/^]\(?[A-Za-z0-9]+\)?)*|1/[a-z]+(?:\^\d)?")
 CASES = ["beatup-light balance", "rapier stroke-dwell", "shedding stiffness", "shedding force"]
 MIXED = {
+    "linkage": {"problem.title": "Lengths in inches, all else as written", "display.length": "in"},
     "beatup": {"mechanism.l1": "31 mm", "operation.M0": "76 kgf*m", "mechanism.m4e": "0 lb", "mechanism.m4": "56800 g"},
     "rapier": {"mechanism.l1": "3.00728346 in", "operation.stroke": "850 mm", "display.force": "lbf"},
     "shedding": {"effects.weight.G": "37.6836 kgf", "operation.N_min": "0 lbf", "mechanism.travel": "65.6 mm"},
@@ -174,9 +175,8 @@ def seen(scene):
     yield [scene.shown_in(kind) for kind in SI_UNIT]
 
 
-@pytest.mark.parametrize("written", ["own", "inches", "mixed"])
-@pytest.mark.parametrize("name", packaged.problems())
-def test_no_table_has_two_units_of_one_kind(name, written):
+@pytest.mark.parametrize(("written", "name"), slow.grid(["own", "inches", "mixed"], packaged.problems()))
+def test_no_table_has_two_units_of_one_kind(written, name):
     """Effects that have values are on; two units of one dimension are two units of one kind: energy is no torque."""
     scene = in_inches(name) if written == "inches" else lo.load(name)
     if written == "mixed":

@@ -38,6 +38,7 @@ def tree(html):
     return ElementTree.fromstring(html.replace("&nbsp;", " "))
 
 
+@pytest.mark.few(1)
 def test_a_plot_is_a_figure_that_shows_itself_and_is_written_where_asked(found, tmp_path):
     figure = found.plot(tmp_path / "curves.svg")
     assert isinstance(figure, Figure)

@@ -64,7 +64,7 @@ def test_the_table_of_an_answer_is_in_the_scenes_own_units(answer):
     for name, value in {**answer.design, **answer.figures}.items():
         if value is not None and name != "change":
             assert table.loc[name, "design"] * factor(table.loc[name, "unit"]) == pytest.approx(value, rel=1e-14)
-    assert "bearing_force" not in table.index
+    assert "reed_centrifugal" not in table.index
     assert table["ok"].all()
     assert (table.loc["mu_min", "min"], pd.isna(table.loc["mu_min", "max"])) == (pytest.approx(56.5), True)
 

@@ -1,11 +1,15 @@
 """A job that says its model and its objectives alone: all else of its program is said by the scene."""
 
+from dataclasses import replace
+
 import pytest
 
 from loomopt.base.errors import BadInput
 from loomopt.base.records import Frozen, lazy
 from loomopt.jobs import registry
 from loomopt.jobs.base import Task
+from loomopt.model import axes
+from loomopt.physics.schema import Axis, Sense
 
 SCENE = registry.load("beatup").update({"bounds.m4e.min": "0.5 kg", "limits.swing.min": "20 deg"})
 JOB = registry.of(SCENE)
@@ -67,3 +71,44 @@ def test_natural_sizes_are_those_of_variables_and_else_of_today():
 def test_a_limit_on_a_figure_that_nothing_gives_is_refused():
     with pytest.raises(BadInput, match="nothing in the scene gives the figure pulse_rms"):
         Plain(SCENE.without_effect("resistance").set("limits.pulse_rms.max", "400 N*m")).program()
+
+
+class Ordered(Plain):
+    """Two levels, of which the first comes before whatever is traded."""
+
+    def objectives(self):
+        return (*JOB.program(self.scene, "balance").objectives, *self.least())
+
+
+@pytest.mark.parametrize(
+    ("target", "traded", "held"),
+    [
+        ("balance", ("swing", "m4e"), ("M3_fdc",)),
+        ("balance", ("peak_torque", "m4e"), ("M3_fdc",)),
+        ("balance", ("M3_fdc", "m4e"), ()),
+        ("", ("peak_torque", "m4e"), ()),
+    ],
+)
+def test_a_target_s_earlier_levels_are_held_before_what_is_traded(target, traded, held):
+    """Of any job: the last one is what the axes take the place of."""
+    task = Ordered(SCENE, target, traded)
+    assert tuple(level.figure for level in task.program().objectives) == held
+    assert JOB.task(SCENE, target, traded).held() == task.held()
+
+
+def test_a_level_that_an_effect_adds_is_none_of_the_target_s_own():
+    shedding = registry.load("shedding").with_effect("coil")
+    task = registry.of(shedding).task(shedding, "stiffness", ("K1", "X0"))
+    assert [level.figure for level in task.objectives()] == ["K1", "spring_mass"]
+    assert task.held() == ()
+
+
+def test_an_axis_that_is_read_from_rows_of_other_names_has_their_size():
+    """Whatever its name: mu.x is read from two."""
+    own = {**SCENE.schema.own_axes, "mu.x": Axis("mu.x", "angle", ("mu_near", "mu_far"), senses=("most",))}
+    scene = replace(SCENE, schema=replace(SCENE.schema, own_axes=own))
+    asked: dict[str, Sense] = {"mu.x": "most", "l2": "least"}
+    task = Plain(scene, "torque", tuple(asked))
+    known = axes.requested_of(scene.schema.axes, scene.bounds, asked, "")
+    _, (first, _) = axes.with_axes(task.program(), known, asked, scene.full, task.size)
+    assert first.objective.scale == pytest.approx(abs(task.sampler.static["mu_near"]), rel=1e-15)

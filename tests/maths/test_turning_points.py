@@ -44,6 +44,32 @@ def test_a_hint_right_in_floats_gives_the_root_in_three_times_as_many_digits():
     assert abs(found - many.sqrt(many.number(2))) < 1e-47
 
 
+@pytest.mark.parametrize("at_zero", [0.0, -0.0, 1e-17, -1e-17, 3e-16, -3e-16])
+@pytest.mark.parametrize("at_end", [0.0, 1e-17, -1e-17, 3e-16, -3e-16])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_turn_at_the_cycle_s_own_beginning_is_found_once_however_its_slope_is_rounded(at_zero, at_end, sign):
+    """sin φ and −sin φ, of which rounding leaves this or that where they are 0."""
+
+    def slope(angles):
+        sine = sign * np.sin(angles)
+        return np.where(angles == 0.0, at_zero, np.where(angles == TURN, at_end, sine))
+
+    found = turns(slope)
+    assert len(found) == 2
+    outward, back = (found[0], found[1]) if sign > 0 else (found[1], found[0])
+    assert math.remainder(outward, TURN) == pytest.approx(0.0, abs=1e-14)
+    assert back == pytest.approx(math.pi, abs=1e-14)
+
+
+def test_a_slope_that_touches_zero_at_a_sample_turns_nothing():
+    """1 − cos φ touches 0 at φ = 0, sin φ passes it at a sample, π."""
+    assert turns(lambda phi: 1 - np.cos(phi)) == []
+    assert turns(lambda phi: np.cos(phi) - 1) == []
+    assert turns(np.zeros_like) == []
+    found = turns(lambda phi: np.where(np.abs(np.sin(phi)) < 1e-15, 0.0, np.sin(phi)))
+    assert found == pytest.approx([0.0, math.pi], abs=1e-14)
+
+
 @given(st.lists(st.floats(0, TURN), min_size=2, max_size=6, unique=True).filter(lambda zeros: len(zeros) % 2 == 0))
 @REPEATABLE
 def test_turns_are_where_the_slope_changes_its_sign_the_first_from_minus_to_plus(zeros):

@@ -7,7 +7,7 @@ import pytest
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.model.sampling import KEPT, SAMPLERS, Sampler, sampled
-from loomopt.model.session import current
+from loomopt.model.session import Session, current, working
 
 SCENE = lo.load("beatup")
 JOB = registry.of(SCENE)
@@ -55,3 +55,29 @@ def test_what_does_not_assemble_is_refused_each_time():
     for _ in range(2):
         with pytest.raises((ValueError, ZeroDivisionError)):
             sampled(MODEL, {**VALUES, "l1": 10.0})
+
+
+def test_extremes_are_shared_by_names_of_the_same_numbers_and_by_no_others():
+    """m4e and r4e say the same as s = m4e r4e²; another counterweight is another machine."""
+    program = JOB.program(SCENE, "balance")
+    x = {v.name: program.starts[0][v.name] for v in program.variables}
+    mass = x["s"] / x["r4e"] ** 2
+    x["s"] = mass * x["r4e"] ** 2
+    known = {**program.parameters, **{name: value for name, value in x.items() if name != "s"}}
+    with working(Session()):
+        first = sampled(program.model, {**program.parameters, **x})
+        first.search(("peak_torque",))
+        same, other = (sampled(program.model, {**known, "m4e": value}) for value in (mass, 2 * mass))
+        coarse = sampled(program.model, {**known, "m4e": mass}, 180)
+        for sampler in (same, other, coarse):
+            sampler.share()
+        assert [each.knows("peak_torque") for each in (same, other, coarse)] == [True, False, False]
+        shared = same.extremes("peak_torque")
+    with working(Session()):
+        assert Sampler(program.model, {**known, "m4e": mass}).extremes("peak_torque") == shared
+
+
+def test_one_figure_is_told_without_the_others():
+    sampler = Sampler(MODEL, VALUES)
+    assert {name: sampler.figure(name) for name in sampler.figures} == sampler.figures
+    assert sampler.figure("no such figure") is None

@@ -38,10 +38,30 @@ TORQUE = {"beatup": "Md [N*m]", "rapier": "Md [N*m]", "shedding": "cam_torque [N
 AFTER = {"shedding": "pressure_angle [rad], curvature [1/m], profile_curvature [1/m]"}
 ALWAYS = {"shedding": ["return_spring"]}
 COLUMN = {"resistance": "M_R"}
+
+
+def forces(*names):
+    """Return the columns of vectors: components, and size."""
+    return [f"{name}{part} [N]" for name in names for part in ("_x", "_y", "")]
+
+
 CHECKED = {
-    "centrifugal": ["bearing_force [N]", "shaking_force [N]"],
+    "centrifugal": ["reed_centrifugal [N]", *forces("shaking_force")],
+    "beatup joint_forces": forces("force_A", "force_B", "force_C", "force_D", "shaking_force"),
+    "rapier joint_forces": [
+        *forces(*(f"force_{joint}" for joint in ("A0", "A", "B0", "B1", "B2", "C0", "C", "D"))),
+        "gear_force [N]",
+    ],
+    "shedding joint_forces": [
+        *forces("roller_force"),
+        "roller_side [N]",
+        *forces("cam_shaft_force"),
+        "lever_couple [N*m]",
+    ],
     "speed_fluctuation": ["omega [rad/s]", "motor_torque [N*m]"],
 }
+BY_INERTIA = {"shedding": ["shaking_force [N]"], "beatup": ["shaking_moment [N*m]"]}
+"""What joint_forces tells only beside the effect inertia."""
 CORNERS = {"resistance 0": 2, "bearing_friction 0": 2, "tape_friction 0": 4, "warp_tension 0": 2}
 """Corners that an effect's example brings; the packaged head turns four times."""
 UNREAD = {
@@ -57,6 +77,9 @@ WITH = {
 """A job's own figures that effects give: with any of these."""
 PHI = (np.arange(97) + 0.37) * TURN / 97
 packaged = functools.cache(registry.load)
+
+JOBS = ("beatup", "rapier", "shedding")
+"""Those whose effects are on a machine of their own; those of a linkage described in a scene: its own tests."""
 
 
 class One(NamedTuple):
@@ -110,7 +133,7 @@ def matrix():
 
 def tried():
     """Yield nothing, all, each alone and every pair."""
-    for job in registry.own_names():
+    for job in JOBS:
         effects = packaged(job).schema.effects
         each = {name: [One(name, k) for k in range(len(effect.examples))] for name, effect in effects.items()}
         yield Combination(job, ())
@@ -224,7 +247,11 @@ def test_curves_have_columns_of_the_active_effects_only(combination):
     expected += [f"{name} [{unit}]" for name in names]
     expected += [f"{force} [{unit}]"] if output else []
     expected += ([TORQUE[job], "motor_power [W]"] if known else [TORQUE[job]]) if names else []
-    expected += [column for effect in effects_of(combination) for column in CHECKED.get(effect.name, [])]
+    names = [effect.name for effect in effects_of(combination)]
+    told = {f"{each} joint_forces": BY_INERTIA[each] for each in BY_INERTIA if "inertia" in names}
+    keys = [key for name in names for key in (name, f"{job} {name}")]
+    checked = [column for key in keys for column in (*CHECKED.get(key, []), *told.get(key, []))]
+    expected += dict.fromkeys(checked)
     assert list(table_of(combination)) == expected + (AFTER[job].split(", ") if job in AFTER else [])
 
 
@@ -282,6 +309,7 @@ def test_the_motor_gives_what_the_crank_and_the_flywheel_take(combination):
 
 
 @every
+@pytest.mark.few(40)
 def test_an_absent_effect_leaves_no_symbol_in_the_graph(combination):
     """All numbers of all effects are offered as symbols; only those of active effects are taken up."""
     active = effects_of(combination)
@@ -307,8 +335,11 @@ def test_figures_of_absent_effects_are_undefined(combination):
     job, scene = registry.find(combination.job), scene_of(combination)
     found = job.figures(scene, DESIGNS.get(combination.job, {}))
     for name, effect in scene.schema.effects.items():
-        given = {found[figure.name] is not None for figure in effect.figures}
-        assert given <= {name in combination.names and not isinstance(effect, Event)}
+        for figure in effect.figures:
+            givers = {of for of, other in scene.schema.effects.items() if figure in other.figures}
+            there = bool(givers & set(combination.names)) and not isinstance(effect, Event)
+            there = there and figure.name not in job.model(scene).undefined
+            assert (found[figure.name] is not None) == there, (name, figure.name)
     for figure, givers in WITH[combination.job].items():
         known = One("warp_tension", 2) not in combination.ones
         assert (found[figure] is not None) == (known and bool(givers & set(combination.names))), figure
@@ -335,5 +366,5 @@ def test_the_matrix_holds_none_all_each_and_every_pair():
     One that needs another is with it in each row: of the three on the rapier two pairs are rows already. The last in
     the shedding stands beside the six that it can be with, one of which it needs, and beside one shape of the seventh.
     """
-    count = {job: sum(each.job == job for each in COMBINATIONS) for job in registry.own_names()}
-    assert count == {"beatup": 1 + 2 + 10 + 44 + 7, "rapier": 1 + 1 + 3 + 1, "shedding": 1 + 3 + 9 + 33 + 7}
+    count = {job: sum(each.job == job for each in COMBINATIONS) for job in JOBS}
+    assert count == {"beatup": 1 + 2 + 11 + 54 + 8, "rapier": 1 + 1 + 4 + 5, "shedding": 1 + 3 + 10 + 42 + 8}

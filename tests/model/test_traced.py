@@ -269,7 +269,7 @@ def test_an_answer_does_not_hang_on_what_was_recorded(name, monkeypatch):
     for worth_it in (reading.WORTH_IT, 0, 10**9):
         monkeypatch.setattr(reading, "WORTH_IT", worth_it)
         with working(Session() if worth_it else None):
-            answers.append(lo.solve(lo.load(name)))
+            answers.append(lo.solve(lo.load(name), starts=1))
     for other in answers[1:]:
         assert other.design == answers[0].design
         assert other.figures == answers[0].figures

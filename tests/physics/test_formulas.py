@@ -51,32 +51,54 @@ def read(*path):
     return ast.parse(PACKAGE.joinpath(*path).read_text())
 
 
+def asks_the_scene(test):
+    """Say whether a condition asks how the scene is built: `X is None`, `"table" in own`, `X == "word"`, or several."""
+    if isinstance(test, ast.BoolOp):
+        return all(map(asks_the_scene, test.values))
+    if not isinstance(test, ast.Compare) or len(test.ops) != 1:
+        return False
+    (kind,), (right,), left = test.ops, test.comparators, test.left
+    if isinstance(kind, ast.Is | ast.IsNot):
+        return ast.unparse(right) == "None"
+    if isinstance(kind, ast.In | ast.NotIn) and ast.unparse(right) == "own":
+        return True
+    word = left if isinstance(kind, ast.In | ast.NotIn) else right
+    asked = isinstance(kind, ast.In | ast.NotIn | ast.Eq | ast.NotEq)
+    return asked and isinstance(getattr(word, "value", None), str)
+
+
 def without_structure(node):
-    """Return a function without what asks how the scene is built: `X is None`, `"table" in own`, `A if X == "word"`."""
+    """Return a function without what asks how the scene is built."""
 
     class Structure(ast.NodeTransformer):
         def visit_ImportFrom(self, found):
             return None  # of what only scenes that call for it import
 
+        def visit_Assert(self, found):
+            return None if asks_the_scene(found.test) else found
+
         def visit_If(self, found):
-            test = found.test
-            structural = isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.Is)
-            by_curve = ast.unparse(test) == "'table' in own"
-            none = structural and ast.unparse(test.comparators[0]) == "None"
-            return found.body if none or by_curve else found
+            self.generic_visit(found)
+            return [*found.body, *found.orelse] if asks_the_scene(found.test) else found
+
+        def visit_comprehension(self, found):
+            found.ifs = [test for test in found.ifs if not asks_the_scene(test)]
+            return self.generic_visit(found)
 
         def visit_IfExp(self, found):
-            test = found.test
-            structural = isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.Eq)
-            word = structural and isinstance(getattr(test.comparators[0], "value", None), str)
-            return ast.Tuple([found.body, found.orelse], ast.Load()) if word else found
+            self.generic_visit(found)
+            return ast.Tuple([found.body, found.orelse], ast.Load()) if asks_the_scene(found.test) else found
 
     return Structure().visit(node)
 
 
 def test_what_asks_how_the_scene_is_built_is_no_offence_and_what_asks_a_number_is():
     assert not offences(without_structure(ast.parse('f(x) if own["shape"] == "linear" else ()')))
-    for formula in ("x if y == 0 else 0", 'abs(x) if own["shape"] == "linear" else 0'):
+    assert not offences(without_structure(ast.parse('if a is None or "b" not in own:\n    f(x)\nelse:\n    g(x)')))
+    for formula in (
+        *("x if y == 0 else 0", 'abs(x) if own["shape"] == "linear" else 0', "x if own else 0"),
+        *("if a is None or b > 0:\n    f(x)", 'if "b" in own:\n    abs(x)'),
+    ):
         assert offences(without_structure(ast.parse(formula)))
 
 

@@ -259,6 +259,7 @@ def lagrange(names, rod):
     [(LOADS, "lumped"), (("rod_inertia",), "lumped"), (LOADS, "exact"), *(((name,), "exact") for name in LOADS)],
     ids=lambda value: value if isinstance(value, str) else "+".join(value),
 )
+@pytest.mark.few(5)
 def test_crank_torque_is_lagranges_also_when_the_speed_changes(names, rod):
     """At random crank angles, speeds and accelerations; Je is the coefficient of the acceleration."""
     reference, rng = lagrange(names, rod), np.random.default_rng(3)

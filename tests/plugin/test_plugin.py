@@ -271,7 +271,7 @@ EFFECT = dataclasses.replace(KNOWN, name="wind")
 """
     same = [distribution("same-figure", {"beatup.wind": "same_figure:EFFECT"}, code, "loomopt.effects")]
     told = loomopt("show", "beatup", "--set", "effects.wind.v=1 m", status=2, folders=same).stderr
-    assert "effect beatup.wind of same-figure brings bearing_force, which there is already" in told
+    assert "effect beatup.wind of same-figure brings reed_centrifugal, which there is already" in told
 
 
 def test_an_effect_of_two_distributions_is_refused(loomopt, distribution):

@@ -75,6 +75,7 @@ GROWS = ("operation.speed", "operation.N_min", "effects.inertia.M", "effects.wei
 @pytest.mark.parametrize("name", GROWS)
 @settings(max_examples=8)
 @given(st.data())
+@pytest.mark.few(2)
 def test_the_least_spring_grows_with_speed_demand_mass_weight_and_warp(name, data):
     changes, (less, more) = data.draw(frames(name))
     assert least_spring(changes, less) <= least_spring(changes, more) * (1 + ALIKE)
@@ -179,6 +180,7 @@ def worse(one, other, names):
 
 
 @pytest.mark.parametrize(("job", "target"), TASKS)
+@pytest.mark.few(3)
 def test_a_looser_limit_never_makes_an_optimum_worse(job, target):
     limits, figures = TASKS[job, target]
 

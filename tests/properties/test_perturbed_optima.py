@@ -52,6 +52,7 @@ def objectives(program, x):
 
 
 @pytest.mark.parametrize("name", OPTIMA)
+@pytest.mark.few(4)
 def test_an_optimum_moved_in_any_direction_is_refused(name):
     """By 1e-6 to 1e-2 of the variables' sizes; variables without room stay."""
     program, x = optimum(name)
@@ -87,6 +88,7 @@ TIGHTER: dict[str, dict[str, tuple[float, float, str]]] = {
 
 
 @pytest.mark.parametrize("name", TIGHTER)
+@pytest.mark.few(2)
 def test_the_optimum_of_a_tighter_task_is_no_optimum_of_this_one(name):
     """It keeps every limit; only that it can still be better is wrong with it."""
     program, x = optimum(name)

@@ -142,13 +142,19 @@ class Machine:
     def peaks(self, design, points=100_000):
         """Return whole-cycle peaks, SI, on a uniform grid."""
         phi = self.grid(design, points)
-        _, psi_1, psi_2, *_ = motion(design, phi)
+        psi, psi_1, psi_2, rod, rod_1, rod_2 = motion(design, phi)
         moment = self.m4 * self.r4 - design["m4e"] * design["r4e"]
         speed, acceleration = psi_1 * self.w, psi_2 * self.w**2
+        leaning = psi + self.own.get("gravity", {}).get("offset", 0.0)
+        shaking = moment * (1j * acceleration - speed**2) * np.exp(1j * leaning)
+        if "rod_inertia" in self.own:
+            s2 = self.own["rod_inertia"]["s2"] / self.today["l2"] * design["l2"]
+            middle = s2 * (1j * rod_2 - rod_1**2) * np.exp(1j * rod) - design["l1"] * np.exp(1j * phi)
+            shaking = shaking + self.own["rod_inertia"]["m2"] * middle * self.w**2
         return {
             "peak_torque": float(np.abs(self.torques(design, phi)[1]).max()),
-            "bearing_force": float(np.abs(moment * speed**2).max()),
-            "shaking_force": float(np.abs(moment * np.sqrt(speed**4 + acceleration**2)).max()),
+            "reed_centrifugal": float(np.abs(moment * speed**2).max()),
+            "shaking_force": float(np.abs(shaking).max()),
         }
 
     def figures(self, design, points=100_000):

@@ -15,7 +15,7 @@ from mpmath.calculus.quadrature import GaussLegendre
 MP = mpmath.MPContext()
 MP.dps = 50
 PI = MP.pi
-UNITS = {"MN*m/rad": "1e6", "mm": "1e-3", "kN/m": "1e3", "MPa": "1e6", "GPa": "1e9", "deg": PI / 180}
+UNITS = {"MN*m/rad": "1e6", "N/mm": "1e3", "mm": "1e-3", "kN/m": "1e3", "MPa": "1e6", "GPa": "1e9", "deg": PI / 180}
 """SI of a unit that is not one already."""
 BEATUP = {"l1": 31, "l2": 65, "l3": 155, "l4": 167, "today_l2": 65, "m4": 56800, "r4": 45, "m4e": 0, "r4e": 0}
 """[Yuan24] in g and mm; speed 600 rpm, M0 745 N·m."""
@@ -31,7 +31,20 @@ RAPIER = {
 PHI30, ALPHA, PHI40, SHAFT = 80.48, 30, 166.67588, 2 * PI
 HEAD = MP.mpf("0.35")
 SHEDDING = {"travel": "0.0656", "rise": 120, "far": 60, "back": 120, "K1": "8029.14", "X0": "0.08"}
+LEVER = {"arm": "0.13", "centre": "0.14", "base": "0.05", "swing": "12.4"}
+PACKAGED = {"G": "369.55", "T1": "124.545", "T2": "83.03", "M": "37.68361265059934"}
 """[Qiu21]: m, deg, N/m; cycloidal law, 600 rpm."""
+
+SIXBAR = {
+    "l1": "57.7", "l2": "125.5", "l3": "123.1", "l4": "166.8", "e": "121", "epsilon": "-74.8", "l5": "214.1",
+    "l6": "155.1", "Gx": "379.5", "Gy": "348.4",
+}  # fmt: skip
+"""The packaged six-bar sley: mm, deg; 400 rpm."""
+OTHER_SIXBAR = {"l1": "55", "l2": "130", "e": "118", "Gx": "385"}
+MASSES = (("rod", "1.5", "62.7"), ("rocker", "4", "60"), ("link", "2.5", "107"))
+"""Its links with mass: kg, and where the centre lies along them, mm."""
+MAIN = 40 * PI / 3
+"""rad/s: 400 rpm."""
 
 
 def number(text):
@@ -148,12 +161,64 @@ class Reed:
 
         return slope(energy, phi) / 2 * SPEED**2
 
-    def bearing_force(self, own, phi):
+    def reed_centrifugal(self, own, phi):
         return self.unbalanced() * self.motion(phi)[0] ** 2
 
     def shaking_force(self, own, phi):
         rate, change = self.motion(phi)
         return self.unbalanced() * MP.hypot(rate**2, change)
+
+    def shaking_moment(self, own, phi):
+        """Return what turns the frame about A: of the reed's mass in its centre, and of its inertia about that."""
+        v, inertia = self.v, MP.mpf(REED["J4"]) + self.v["m4e"] * self.v["r4e"] ** 2
+
+        def centre(at):
+            return v["l4"] + MP.expj(self.positions(at)[2])
+
+        push = -self.unbalanced() * slope(centre, phi, 2) * SPEED**2
+        return v["l4"] * push.imag + inertia * self.motion(phi)[1]
+
+    def pins(self, phi):
+        """Return the forces in A, B, C, D as complex numbers, N: every link's own equilibrium, in one matrix.
+
+        Of the packaged scene: only the reed has mass, and the cloth pushes as a couple.
+        """
+        v, (B, C, _) = self.v, self.positions(phi)
+        inertia = MP.mpf(REED["J4"]) + v["m4e"] * v["r4e"] ** 2
+        couple = inertia * self.motion(phi)[1] + self.resistance({"pulse": number(REED["pulse"])}, phi)
+
+        def centre(at):
+            return v["l4"] + MP.expj(self.positions(at)[2])
+
+        mass = -self.unbalanced() * slope(centre, phi, 2) * SPEED**2
+        matrix, right = MP.zeros(9, 9), MP.zeros(9, 1)
+
+        def entered(row, joint, sign, arm):
+            matrix[row, 2 * joint] = matrix[row + 1, 2 * joint + 1] = sign
+            matrix[row + 2, 2 * joint], matrix[row + 2, 2 * joint + 1] = -sign * arm.imag, sign * arm.real
+
+        for row, joint, sign, arm in (
+            *((0, 0, 1, MP.mpc(0)), (0, 1, -1, B)),
+            *((3, 1, 1, MP.mpc(0)), (3, 2, -1, C - B)),
+            *((6, 2, 1, C - v["l4"]), (6, 3, 1, MP.mpc(0))),
+        ):
+            entered(row, joint, sign, arm)
+        matrix[2, 8] = 1
+        right[6], right[7], right[8] = -mass.real, -mass.imag, -couple
+        found = MP.lu_solve(matrix, right)
+        return [MP.mpc(found[k], found[k + 1]) for k in (0, 2, 4, 6)]
+
+    def force_A(self, own, phi):
+        return abs(self.pins(phi)[0])
+
+    def force_B(self, own, phi):
+        return abs(self.pins(phi)[1])
+
+    def force_C(self, own, phi):
+        return abs(self.pins(phi)[2])
+
+    def force_D(self, own, phi):
+        return abs(self.pins(phi)[3])
 
 
 class Head:
@@ -225,6 +290,48 @@ class Frame:
     def inertia(self, own, theta):
         return own["M"] * slope(self.X, theta, 2) * SPEED**2
 
+    def couple(self, theta):
+        """Return N λ of the packaged frame: what works as N does over the lever's angle."""
+        own = {name: MP.mpf(value) for name, value in PACKAGED.items()} | {"shape": "linear"}
+        spring = self.v["K1"] * (self.X(theta) + self.v["X0"])
+        N = spring + self.inertia(own, theta) - own["G"] + self.warp_tension(own, theta)
+        return N * self.v["travel"] / (MP.mpf(LEVER["swing"]) * PI / 180)
+
+    def roller(self, theta):
+        """Return the roller's centre with a cam that stands, its pivot, the way of a rising arm, and the normal.
+
+        In the cam's own frame the normal stands across the way of the centre.
+        """
+        arm, centre, base = (MP.mpf(LEVER[name]) for name in ("arm", "centre", "base"))
+        start = MP.acos((centre**2 + arm**2 - base**2) / (2 * centre * arm))
+
+        def place(at):
+            b = start + MP.mpf(LEVER["swing"]) * PI / 180 * self.lowered(at)[0]
+            return MP.mpc(0, centre) - 1j * arm * MP.expj(-b)
+
+        along = slope(lambda at: place(at) * MP.expj(-at), theta) * MP.expj(theta)
+        normal = 1j * along / abs(along)
+        here, pivot = place(theta), MP.mpc(0, centre)
+        normal *= MP.sign((normal * MP.conj(here)).real)
+        return here, pivot, -1j * (here - pivot) / arm, normal
+
+    def roller_force(self, own, theta):
+        here, pivot, _, normal = self.roller(theta)
+        return self.couple(theta) / abs((MP.conj(here - pivot) * normal).imag)
+
+    def roller_side(self, own, theta):
+        _, _, way, normal = self.roller(theta)
+        return self.roller_force(own, theta) * (MP.conj(way) * normal).imag
+
+    def cam_shaft_force(self, own, theta):
+        return self.roller_force(own, theta)
+
+    def lever_couple(self, own, theta):
+        return self.couple(theta)
+
+    def shaking_force(self, own, theta):
+        return -MP.mpf(PACKAGED["M"]) * slope(self.X, theta, 2) * SPEED**2
+
     def damping(self, own, theta):
         return own["C"] * slope(self.X, theta) * SPEED
 
@@ -277,12 +384,111 @@ class Frame:
         }
 
 
-MACHINES = {"beatup": Reed, "rapier": Head, "shedding": Frame}
+class Linkage:
+    """The six-bar: q is the angle of the sley."""
+
+    def __init__(self, design):
+        known = {**SIXBAR, **(OTHER_SIXBAR if design == "other" else {})}
+        self.v = {
+            name: MP.mpf(value) * (PI / 180 if name == "epsilon" else MP.mpf("1e-3")) for name, value in known.items()
+        }
+        self.front, self.rear = (self.turn(MP.mpf(near) * PI / 180) for near in (41, 182))
+
+    def meet(self, a, b, r1, r2):
+        """Return where circles about a and b meet, to the left of a→b, by the law of cosines."""
+        d = abs(b - a)
+        angle = MP.acos((r1**2 + d**2 - r2**2) / (2 * r1 * d))
+        return a + r1 * (b - a) / d * MP.expj(angle)
+
+    def joints(self, phi):
+        """Return all joints as complex numbers."""
+        v = self.v
+        at = {"A": MP.mpc(0), "D": MP.mpc(v["l4"]), "G": MP.mpc(v["Gx"], v["Gy"]), "B": v["l1"] * MP.expj(phi)}
+        at["C"] = self.meet(at["B"], at["D"], v["l2"], v["l3"])
+        at["E"] = at["D"] + (at["C"] - at["D"]) / v["l3"] * v["e"] * MP.expj(v["epsilon"])
+        at["F"] = self.meet(at["E"], at["G"], v["l5"], v["l6"])
+        return at
+
+    def q(self, phi):
+        at = self.joints(phi)
+        return MP.arg(at["F"] - at["G"])
+
+    def turn(self, near):
+        """Return where the sley turns near a crank angle, by secants."""
+        return MP.findroot(lambda phi: slope(self.q, phi), (near, near + MP.mpf("0.01")), tol=MP.mpf(10) ** -50)
+
+    def link(self, name, phi):
+        """Return a link's first joint and direction."""
+        at = self.joints(phi)
+        a, b = {"rod": ("B", "C"), "rocker": ("D", "C"), "link": ("E", "F")}[name]
+        return at[a], (at[b] - at[a]) / abs(at[b] - at[a])
+
+    def acceleration(self, phi):
+        return slope(self.q, phi, 2) * MAIN**2
+
+    def inertia(self, own, phi):
+        return own["J"] * self.acceleration(phi)
+
+    def counterweight(self, own, phi):
+        return own["mass"] * own["radius"] ** 2 * self.acceleration(phi)
+
+    def resistance(self, own, phi):
+        away = phi - self.front
+        return own["torque"] * MP.cos(PI * away / own["pulse"]) if abs(away) <= own["pulse"] / 2 else MP.mpf(0)
+
+    def forming(self, own, phi):
+        """Return the torque from the rear over 0 to the front."""
+        return MP.mpf(0) if self.front <= phi < self.rear else own["torque"]
+
+    def mass(self, own, phi):
+        """Return the rise of the rod's kinetic energy by crank angle."""
+
+        def energy(at):
+            rate = slope(lambda p: self.centre("rod", own["along"], p), at)
+            turned = slope(lambda p: MP.arg(self.link("rod", p)[1]), at)
+            return (own["mass"] * abs(rate) ** 2 + own["J"] * turned**2) * MAIN**2 / 2
+
+        return slope(energy, phi)
+
+    def centre(self, name, along, phi):
+        origin, direction = self.link(name, phi)
+        return origin + along * direction
+
+    def gravity(self, own, phi):
+        """Return the rise of what the packaged scene's links weigh."""
+        down = MP.expj(own["down"])
+
+        def height(at):
+            return sum(
+                -MP.mpf(mass) * (self.centre(name, MP.mpf(along) / 1000, at) * down.conjugate()).real
+                for name, mass, along in MASSES
+            )
+
+        return MP.mpf("9.80665") * slope(height, phi)
+
+    def load(self, own, phi):
+        """Return the torque against a force on F."""
+        acts = "begins" not in own or not self.front <= phi < self.rear
+        force = MP.mpc(own.get("x", 0), own.get("y", 0)) if acts else 0
+        return -(force.conjugate() * slope(lambda p: self.joints(p)["F"], phi)).real if acts else MP.mpf(0)
+
+    def spring(self, own, phi):
+        """Return the rise of what the spring holds."""
+
+        def energy(at):
+            joints = self.joints(at)
+            return own["stiffness"] * (abs(joints[own["ends"]] - joints[own["begins"]]) - own["free"]) ** 2 / 2
+
+        return slope(energy, phi)
+
+
+MACHINES = {"beatup": Reed, "rapier": Head, "shedding": Frame, "linkage": Linkage}
 
 
 def knows(job, effect):
     """Say whether there are plain formulas of an effect."""
-    return effect == "centrifugal" or hasattr(MACHINES.get(job), effect)
+    plain = effect == "centrifugal" or (effect == "joint_forces" and job in ("beatup", "shedding"))
+    return plain or hasattr(MACHINES.get(job), effect)
 
 
 @functools.cache
@@ -298,6 +504,7 @@ def value(job, effect, example, design, angle, what):
     return float(getattr(machine, effect if what == "term" else what)(own, MP.mpf(angle) * PI / 180))
 
 
+CAM_FORCES = ("roller_force", "roller_side", "cam_shaft_force", "lever_couple", "shaking_force")
 CASES = {
     ("beatup", "inertia", "term"): "30 200",
     ("beatup", "resistance", "term"): "60 75 200",
@@ -307,10 +514,22 @@ CASES = {
     ("beatup", "gravity", "term"): "30",
     ("beatup", "bearing_friction", "term"): "30 200",
     ("beatup", "shaft_torsion", "term"): "30 75 195",
-    ("beatup", "centrifugal", "bearing_force"): "30",
+    ("beatup", "centrifugal", "reed_centrifugal"): "30",
     ("beatup", "centrifugal", "shaking_force"): "30",
+    **{("beatup", "joint_forces", f"force_{joint}"): "30 75" for joint in "ABCD"},
+    ("beatup", "joint_forces", "shaking_force"): "30",
+    ("beatup", "joint_forces", "shaking_moment"): "30",
+    **{("shedding", "joint_forces", name): "30 290" for name in CAM_FORCES},
     ("rapier", "head_inertia", "term"): "100 250",
     ("rapier", "tape_friction", "term"): "100 250",
+    ("linkage", "inertia", "term"): "30 200",
+    ("linkage", "counterweight", "term"): "30 200",
+    ("linkage", "resistance", "term"): "35 50 200",
+    ("linkage", "forming", "term"): "10 100 300",
+    ("linkage", "mass", "term"): "30 200",
+    ("linkage", "gravity", "term"): "30 200",
+    ("linkage", "load", "term"): "30 100 300",
+    ("linkage", "spring", "term"): "30 200",
     ("shedding", "weight", "term"): "30",
     ("shedding", "warp_tension", "term"): "30 90 150 200 290 330",
     ("shedding", "inertia", "term"): "30 200",

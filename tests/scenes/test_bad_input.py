@@ -147,7 +147,7 @@ NAMES = [
     (("limits", "swing", {}), "limits.swing", "empty", "min and max"),
     (("limits", "swing", "low", "20 deg"), "limits.swing.low", 'unknown key "low"', "min, max"),
     (("limits", "swng", {}), "limits.swng", 'unknown figure to limit "swng"', '"swing"'),
-    (("limits", "bearing_force", {"max": "1 kN"}), "limits.bearing_force",
+    (("limits", "reed_centrifugal", {"max": "1 kN"}), "limits.reed_centrifugal",
      "centrifugal is off", "Put centrifugal on"),
     (("targets", "balanced", {}), "targets.balanced", 'unknown target "balanced"', '"balance"'),
     (("targets", "balance", "tolerance", "1"), "targets.balance.tolerance",

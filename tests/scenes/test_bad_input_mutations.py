@@ -80,13 +80,13 @@ def read_or_refused(call, *arguments):
 
 
 @given(mutated())
-@settings(deadline=None, derandomize=True, max_examples=400)
+@settings(deadline=None, derandomize=True, max_examples=150)
 def test_mutated_tables_are_read_or_refused(document):
     read_or_refused(scene, document)
 
 
 @given(st.lists(st.sampled_from(paths(BEATUP.document)).map(".".join) | st.text(max_size=20), max_size=3), JUNK)
-@settings(deadline=None, derandomize=True, max_examples=200)
+@settings(deadline=None, derandomize=True, max_examples=100)
 def test_any_key_set_is_read_or_refused(keys, value):
     read_or_refused(BEATUP.update, dict.fromkeys(keys, value))
 
@@ -101,7 +101,7 @@ def test_any_key_set_is_read_or_refused(keys, value):
 @settings(
     deadline=None,
     derandomize=True,
-    max_examples=300,
+    max_examples=150,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 def test_mutated_bytes_are_read_or_refused(tmp_path, cuts):

@@ -1,10 +1,13 @@
 """[display] and the units a scene is seen in: the first of each kind that is written, else composed of the others."""
 
+import math
+
 import pytest
 from support import inch
 
 import loomopt as lo
-from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, fits
+from loomopt.base.quantities import read
+from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, fits
 from loomopt.scenes.display import KINDS
 
 SHEDDING = lo.load("shedding")
@@ -52,6 +55,16 @@ def test_a_bound_or_a_limit_names_the_unit_of_a_kind_that_nothing_else_is_writte
 def test_a_length_is_no_unit_of_an_acceleration_per_angle_and_a_torque_none_of_a_stiffness():
     """Read as quantities "m" and "m/rad^2" may stand for each other: as units of tables they never do."""
     assert units(RAPIER, "length", "travel acceleration", "travel jerk") == ["mm", "m/rad^2", "m/rad^3"]
+
+
+@pytest.mark.parametrize(("unit", "si"), [("m/rad", 1.0), ("mm/deg", 0.18 / math.pi), ("in/rad", 0.0254)])
+def test_a_velocity_per_radian_of_the_crank_is_a_kind_of_its_own(unit, si):
+    """As its acceleration and jerk are: of what slides, not of what swings."""
+    assert read(f"3 {unit}", "travel velocity") == pytest.approx(3 * si, rel=1e-15)
+    assert RAPIER.set("display.travel_velocity", unit).shown_in("travel velocity") == unit
+    assert RAPIER.set("display.length", "in").unit_for("m/rad") == "in/rad"
+    with pytest.raises(QuantityError, match="a unit of velocity"):
+        read("3 m/s", "travel velocity")
     assert units(BEATUP, "torque", "rotary stiffness", "rotary damping") == ["N*m", "N*m/rad", "N*m*s/rad"]
 
 

@@ -17,6 +17,7 @@ from loomopt.physics.effects.beatup import inertia, rocker_inertia
 from loomopt.physics.effects.kinds import EffectClash, Load, label, owned, ranked
 from loomopt.physics.schema import Figure, Table
 from loomopt.scenes import scene
+from loomopt.scenes.numbers import quantity
 from loomopt.scenes.tables import Bound, LimitRange
 
 BEATUP = load("beatup")
@@ -121,7 +122,7 @@ def test_labels_with_dots_may_be_bounded_freed_and_limited():
         ({"effects": {"mass": {"rod": "1 kg"}}}, "effects.mass.rod", "not a table"),
         ({"effects": {"mass": {"m": "1 kg"}}}, "effects.mass.m", "not a table"),
         ({"bounds": {"rod": {"m": "1 kg"}}}, "bounds.rod", "unknown number to bound"),
-        ({"limits": {"rod": {"tensoin": {"max": "1 N"}}}}, "limits.rod", "unknown figure to limit"),
+        ({"limits": {"rod": {"tensoin": {"max": "1 N"}}}}, "limits.rod.tensoin", "unknown figure to limit"),
         ({"limits": {"rod": {"tension": {"max": "1 mm"}}}}, "limits.rod.tension.max", "not of force"),
     ],
 )
@@ -148,9 +149,9 @@ class Shaped(Table):
     shape: str = "round"
 
 
-def apart(name, **declared):
+def apart(name, own=Table, **declared):
     """Return an effect without a term of its own worth, that says beside what it stands."""
-    return Load(name=name, summary="", own=Table, acts="drive", force=lambda *_: 0, **declared)
+    return Load(name=name, summary="", own=own, acts="drive", force=lambda *_: 0, **declared)
 
 
 def test_an_effect_that_another_needs_is_asked_for():
@@ -242,3 +243,47 @@ def test_of_several_changes_only_the_outcome_has_to_hold():
 def test_a_value_set_in_available_is_what_goes_on():
     changed = BEATUP.change({"available.rocker_inertia.J3": "0.07 kg*m^2"}, on=("rocker_inertia",))
     assert changed.own(rocker_inertia.Own).J3 == 0.07
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "meant"),
+    [
+        ({"limits": {"rod": {"tensoin": {"max": "3 N"}}}}, "limits.rod.tensoin", "rod.tension"),
+        ({"limits": {"rod.tensoin": {"max": "3 N"}}}, "limits.rod.tensoin", "rod.tension"),
+        ({"bounds": {"A": {"X": "3 mm"}}}, "bounds.A.X", "A.x"),
+        ({"limits": {"rod": {"tension": {"max": "3 N"}, "tensoin": {"max": "3 N"}}}}, "limits.rod.tensoin", ""),
+        ({"bounds": {"A": {"min": "3 mm", "max": "4 mm"}}}, "bounds.A", "A.x"),
+    ],
+)
+def test_a_slip_behind_a_dot_is_told_whole(changes, key, meant):
+    """TOML makes a table of what stands before it."""
+    with pytest.raises(BadInput) as caught:
+        built(changes, MASS)
+    (fault,) = caught.value.faults
+    assert fault.key == key
+    assert f'"{meant}"' in fault.remedy or not meant
+
+
+class Guessed(Table):
+    """k: what may be left out, or given."""
+
+    k: PositiveMass | None = None
+
+
+class Counted(Table):
+    """k: of another kind."""
+
+    k: Length | None = None
+
+
+def test_the_label_of_an_absent_key_hides_no_given_one():
+    first, second = apart("first", own=Guessed, rank=40), apart("second", own=Counted, rank=41)
+    given = {"effects": {"first": {}, "second": {"k": "3 mm"}}, "bounds": {"k": {"min": "1 mm", "max": "4 mm"}}}
+    scene = built(given, first, second)
+    assert scene.full("k") == "second.k"
+    assert quantity(scene, "bounds.k.min").kind == "length"
+    assert scene.bounds["k"].min == pytest.approx(0.001)
+    assert built({"effects": {"first": {"k": "2 kg"}, "second": {}}}, first, second).full("k") == "first.k"
+    both = built({"effects": {"first": {"k": "2 kg"}, "second": {"k": "3 mm"}}}, first, second)
+    assert both.full("k") == "first.k"
+    assert built({"effects": {"first": {}, "second": {}}}, first, second).full("k") == "first.k"

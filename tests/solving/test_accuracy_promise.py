@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from support import slow
 from support.shedding_cases import plain, programmed
 
 import loomopt as lo
@@ -122,6 +123,7 @@ FLAT = {("smooth", 1e-10), ("match", 1e-10)}
     ("name", "accuracy"),
     known([(name, accuracy) for name in OTHERS for accuracy in ASKED], FLAT, "a flat optimum's figures"),
 )
+@pytest.mark.few(12)
 def test_the_promise_holds_for_other_machines_and_targets(name, accuracy):
     kept(solved(name, accuracy), accuracy, solved(name, BEST).figures)
 
@@ -198,7 +200,7 @@ def test_the_rapiers_figures_are_those_of_the_drive_in_complex_numbers(accuracy)
     assert answer.figures["peak_jerk"] == pytest.approx(drive.peak(3), rel=accuracy + 1e-10)
 
 
-@pytest.mark.parametrize("name", JOBS)
+@pytest.mark.parametrize("name", slow.after(3, ["beatup", "shedding", "law", "rapier"]))
 def test_no_more_is_computed_than_it_takes(name):
     counts = [from_one_start(name, accuracy).solver["evaluations"] for accuracy in ACCURACIES]
     assert counts == sorted(counts)

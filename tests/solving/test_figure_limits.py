@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from support import slow
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
@@ -128,7 +129,7 @@ def test_a_stroke_apart_from_the_operations_clashes_with_it(rapier):
     assert {each.limit for each in answer.relaxation} == {"stroke"}
 
 
-@pytest.mark.parametrize("target", ["stroke-dwell", "dwell"])
+@pytest.mark.parametrize("target", slow.after(1, ["dwell", "stroke-dwell"]))
 def test_a_dwell_out_of_reach_tells_how_far_it_must_give_way(rapier, target):
     answer = lo.solve(rapier.set("limits.dwell.min", "55 deg"), target, starts=1)
     assert answer.status == "infeasible"

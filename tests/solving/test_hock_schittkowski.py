@@ -49,6 +49,7 @@ def test_an_optimum_with_multipliers_that_are_not_unique_is_unique_all_the_same(
 
 
 @pytest.mark.parametrize("name", sorted(set(PROBLEMS) - set(ANOTHER)))
+@pytest.mark.few(20)
 def test_the_known_optimum_is_found_from_the_books_start(name):
     answer = toy.solve(PROBLEMS[name].program())
     assert answer.status == "optimal", answer.message

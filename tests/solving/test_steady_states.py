@@ -78,6 +78,7 @@ def test_what_cannot_be_reached_is_said():
 
 
 @pytest.mark.parametrize(("limit", "side"), [("reed_front", "min"), ("shaft_peak", "max"), ("twist_peak", "max")])
+@pytest.mark.few(1)
 def test_its_figures_can_be_limited(limit, side):
     free = answer(operation__M0="800 N*m").figures[limit]
     unit, tight = (

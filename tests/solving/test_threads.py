@@ -18,7 +18,7 @@ from loomopt.solving.nlp.transcribe import NLPS
 HERE = Path(__file__).parent
 
 
-@pytest.mark.parametrize("times", [3, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("times", [1, pytest.param(100, marks=pytest.mark.slow)])
 def test_four_threads_find_the_digits_of_one(times):
     command = [sys.executable, str(HERE / "four_threads.py"), str(times)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=1200)
@@ -85,7 +85,9 @@ def test_a_session_of_ones_own_keeps_and_counts_apart():
     with working(own):
         again = lo.solve(scene, starts=1)
     assert again.time["build_s"] < answer.time["build_s"], "what it built is found again"
-    assert (again.design, again.solver) == (answer.design, answer.solver)
+    assert again.design == answer.design
+    assert again.solver["evaluations"] <= answer.solver["evaluations"], "today's machine is kept with its scene"
+    assert {**again.solver, "evaluations": 0} == {**answer.solver, "evaluations": 0}
 
 
 def test_what_is_kept_goes_by_use_and_when_it_is_let_go():

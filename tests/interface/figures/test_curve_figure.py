@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.text import Text
-from support import inch, overlaps
+from support import inch, overlaps, references, slow
 
 import loomopt as lo
 from loomopt.base.units import factor
@@ -26,8 +26,11 @@ EFFECTS = {
     "rapier": ("head_inertia", "tape_friction"),
     "shedding": ("damping", "dry_friction"),
 }
-CASES = [(name, kind) for name in packaged.problems() for kind in ("today", "solved")]
+CASES = [(name, "solved") for name in packaged.problems()] + [(name, "today") for name in JOBS]
 CASES += [(name, kind) for name in JOBS for kind in ("inch", "inch solved", "effects")]
+SIZED = [*((name, "effects") for name in JOBS), ("sixbar-sley", "solved")]
+"""At every size in each run: of each job what has the most curves."""
+SIZED += [case for case in CASES if case[1] == "solved" and case not in SIZED]
 
 
 @functools.cache
@@ -45,15 +48,7 @@ def drawn(name, kind):
     """Return the figure of a scene's curves: today's, or those of the reference design of its default target."""
     scene = scene_of(name, kind)
     target = scene.schema.default_target
-    design: dict[str, float] = {}
-    if kind not in ("today", "inch"):
-        table = pd.read_csv(registry.results(lo.load(name)) / f"{name}.{target}.csv", comment="#")
-        design = {
-            v: float(table[c].iloc[0])
-            for v in scene.schema.variables
-            for c in map(str, table)
-            if c.startswith(f"{v} [")
-        }
+    design = references.design(name) if kind not in ("today", "inch") else {}
     return outputs.plotted(
         tables.curves(scene, design), scene, design, outputs.DrawnSubject(f"design for {target}") if design else None
     )
@@ -73,10 +68,10 @@ def curves_of(axes):
 
 
 @pytest.mark.parametrize(("name", "kind"), CASES)
+@pytest.mark.few(12)
 def test_nothing_runs_into_anything_and_all_panels_show_the_turn(name, kind):
     figure = drawn(name, kind)
-    sought = overlaps.found_at_every_size if kind in ("solved", "effects") else overlaps.found
-    assert sought(figure) == []
+    assert overlaps.found(figure) == []
     for axes in figure.axes:
         assert axes.get_xlim() == pytest.approx((0, 360))
         assert all(line.get_xdata()[[0, -1]] == pytest.approx([0, 360], abs=1e-6) for line in curves_of(axes))
@@ -85,6 +80,11 @@ def test_nothing_runs_into_anything_and_all_panels_show_the_turn(name, kind):
     below = [tick.label1.get_text() for tick in figure.axes[-1].xaxis.get_major_ticks() if 0 <= tick.get_loc() <= 360]
     assert below[0] == "0"
     assert below[-1] == "360"
+
+
+@pytest.mark.parametrize(("name", "kind"), slow.after(4, SIZED))
+def test_nothing_runs_into_anything_at_any_size(name, kind):
+    assert overlaps.found_at_every_size(drawn(name, kind)) == []
 
 
 @pytest.mark.parametrize(("name", "kind"), [case for case in CASES if case[1] not in ("today", "inch")])
@@ -99,8 +99,7 @@ def test_today_stands_dashed_in_every_panel_beside_a_design(name, kind):
     assert [text.get_text() for text in legend.get_texts()] == ["design", "today, dashed"]
 
 
-@pytest.mark.parametrize("kind", ["today", "solved"])
-@pytest.mark.parametrize("name", packaged.problems())
+@pytest.mark.parametrize(("name", "kind"), [case for case in CASES if case[1] in ("today", "solved")])
 def test_titles_are_alike_and_names_plain(name, kind):
     figure = drawn(name, kind)
     subject = f"design for {lo.load(name).schema.default_target}" if kind == "solved" else "today's machine"

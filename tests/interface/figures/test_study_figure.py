@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 from matplotlib.text import Text
-from support import inch, overlaps
+from support import inch, overlaps, slow
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
@@ -146,6 +146,7 @@ def test_a_front_of_an_inch_machine_is_drawn_in_inches():
     assert overlaps.found_at_every_size(figure) == []
 
 
+@pytest.mark.slow
 def test_a_sweep_of_all_that_a_rapier_has_shows_all_of_it():
     scene = lo.load("rapier")
     plan = sweep.planned(scene, {"operation.s_dwell": "4:8:2 mm"})
@@ -182,7 +183,7 @@ def two_ways(first, second):
     return study.plot(plan, rows)
 
 
-@pytest.mark.parametrize(("first", "second"), [(2, 2), (5, 7), (3, 17), (1, 4)])
+@pytest.mark.parametrize(("first", "second"), slow.after(2, [(2, 2), (3, 17), (5, 7), (1, 4)]))
 def test_nothing_of_a_two_way_sweep_runs_into_anything(first, second):
     figure = two_ways(first, second)
     assert overlaps.found_at_every_size(figure) == []

@@ -48,7 +48,7 @@ def strokes(found):
     return [
         (e.dxf.layer, np.array(read[e.dxftype()](e)))
         for e in found.modelspace()
-        if e.dxftype() != "TEXT" and e.dxf.layer != "leaders"
+        if e.dxftype() not in ("TEXT", "DIMENSION") and e.dxf.layer != "leaders"
     ]
 
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from loomopt.interface.files import dxf
+import loomopt as lo
+from loomopt.interface.files import dxf, outputs
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.picture.shapes import LAYERS, Drawing, Line, Point
 
@@ -40,9 +41,30 @@ def test_it_is_r2010_in_mm_and_sound(document):
 
 def test_each_layer_drawn_on_has_its_colour_and_no_other_layer_is_there(document):
     drawn_on = {entity.dxf.layer for entity in document.modelspace()}
-    for name in drawn_on:
+    for name in drawn_on - {dxf.MEASURES}:
         assert document.layers.get(name).color == LAYERS[name].aci
     assert {layer.dxf.name for layer in document.layers} - {"0", "Defpoints"} == drawn_on
+
+
+def test_lengths_that_have_tolerances_tell_them(tmp_path):
+    made = {"l1": "0.06 mm", "l2": {"class": "IT7"}, "l3": "1 %"}
+    scene = lo.load("beatup").update({"tolerances": made})
+    outputs.linkage(tmp_path / "made.dxf", scene, lo.evaluate(scene).design)
+    texts = [each.dxf.text for each in ezdxf.readfile(tmp_path / "made.dxf").modelspace().query("DIMENSION")]
+    assert texts == ["l1 = <> %%p0.06", "l2 = <> %%p0.015", "l3 = <> %%p1.55", "l4 = <>"]
+
+
+def test_lengths_are_dimensions_on_a_layer_of_their_own(document):
+    space = document.modelspace()
+    found = {each.dxf.text: each for each in space.query("DIMENSION")}
+    assert {text: each.get_measurement() for text, each in found.items()} == {
+        f"{name} = <>": pytest.approx(1000 * length, abs=1e-9) for name, length in PAPER.items()
+    }
+    assert {each.dxf.layer for each in found.values()} == {dxf.MEASURES}
+    assert {each.dxftype() for each in space if each.dxf.layer == dxf.MEASURES} == {"DIMENSION"}
+    joints = [circle.dxf.center for circle in space.query('CIRCLE[layer=="joints" | layer=="frame"]')]
+    for each in found.values():  # which follow their points when these are moved
+        assert all(min(end.distance(at) for at in joints) < 1e-9 for end in (each.dxf.defpoint2, each.dxf.defpoint3))
 
 
 @pytest.mark.parametrize("layer", ["front dead centre", "rear dead centre"])

@@ -28,7 +28,7 @@ def by_rich(parts, columns):
     return re.sub(r"\n{3,}", "\n\n", "\n".join(line.rstrip() for line in text.split("\n"))).strip("\n")
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.lists(grids() | CELLS, max_size=3), st.sampled_from([None, 20, 40]))
 def test_text_is_what_rich_makes_of_it(parts, columns):
     assert layout.render(parts, columns) == by_rich(parts, columns)

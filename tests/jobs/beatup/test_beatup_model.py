@@ -196,9 +196,10 @@ def test_figures_without_their_numbers_are_undefined_not_invented():
     bare = BEATUP.without_effect("inertia").set("mechanism", {f"l{k}": f"{x} mm" for k, x in DIMENSIONS.items()})
     found = figures(bare.set("operation", {"M0": "745 N*m"}))
     assert {name for name, value in found.items() if value is None} == {
-        *("alpha_fdc", "J4", "r4", "peak_power", "bearing_force", "shaking_force"),
+        *("alpha_fdc", "J4", "r4", "peak_power", "reed_centrifugal", "shaking_force"),
         *("fluctuation", "speed_fdc", "no_load_speed", "motor_torque_max"),
         *("shaft_peak", "twist_peak", "reed_front"),
+        *("force_A", "force_B", "force_C", "force_D", "shaking_moment", "friction_loss"),
     }
     assert found["M3_fdc"] == 745.0
     assert all(math.isfinite(value) for value in found.values() if value is not None)
@@ -227,4 +228,4 @@ def test_a_model_is_plain_unchangeable_data():
     with pytest.raises(dataclasses.FrozenInstanceError):
         found.effects = ()  # type: ignore[misc]
     assert [load.name for load in found.loads] == [name for name in FULL.effects if name != "centrifugal"]
-    assert found.quantities == ("peak_torque", "peak_power", "bearing_force", "shaking_force")
+    assert found.quantities == ("peak_torque", "peak_power", "reed_centrifugal", "shaking_force")

@@ -43,7 +43,7 @@ def test_where_the_mass_matters_only_by_its_inertia_that_is_the_variable():
         (BEATUP, "retrofit"),
         (BEATUP.with_effect("gravity"), "balance"),
         (BEATUP.set("limits.r4.max", "50 mm"), "balance"),
-        (BEATUP.with_effect("centrifugal").set("limits.bearing_force.max", "1 kN"), "balance"),
+        (BEATUP.with_effect("centrifugal").set("limits.reed_centrifugal.max", "1 kN"), "balance"),
         (BEATUP.update({"bounds.m4e": "3 kg", "bounds.r4e": "70 mm"}), "balance"),
         (BEATUP.set("bounds.r4e", "0 mm"), "balance"),
     ],

@@ -18,7 +18,7 @@ from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Arc, Circle, Line, Point, Text
 from reference import crank_rocker_synthesis
 
-few = settings(max_examples=30, deadline=None, database=None)
+few = settings(max_examples=12, deadline=None, database=None)
 PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
 BALANCED = PAPER | {"m4": 56.8, "r4": 0.045, "m4e": 3.0, "r4e": 0.05}
 

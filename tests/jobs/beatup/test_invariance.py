@@ -10,6 +10,7 @@ import sys
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import slow
 
 import loomopt as lo
 from reference.beatup import LENGTHS
@@ -69,6 +70,7 @@ def same(one, other, rel=1e-9, scale=None):
 
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("length", ["m", "km", "inch", "ft"])
+@pytest.mark.few(6)
 def test_units_of_length_do_not_matter(target, length):
     scene = lo.load("beatup-heavy")
     same(lo.solve(scene, target, starts=1), lo.solve(changed(scene, in_units(length)), target, starts=1))
@@ -117,8 +119,7 @@ def told(answer):
     return json.dumps(answer.as_dict() | {"time": None}, sort_keys=True)
 
 
-@pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("problem", ["beatup", "beatup-light"])
+@pytest.mark.parametrize(("problem", "target"), slow.grid(["beatup", "beatup-light"], TARGETS))
 def test_the_same_scene_gives_the_same_digits_twice(problem, target):
     first = told(lo.solve(lo.load(problem), target))
     lo.solve(lo.load("beatup-heavy").with_effect("gravity"), starts=2)

@@ -5,14 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import slow
 
 import loomopt as lo
 from reference.beatup import DESIGN, LENGTHS, Machine, dead_centres, least, least_peak, motion, random_designs
 
 TARGETS = ("balance", "pulse", "torque", "retrofit")
-each_draw = pytest.mark.parametrize(
-    "seed", [*range(5), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(5, 10))]
-)
+each_draw = pytest.mark.parametrize("seed", slow.after(3, range(10)))
 INCHES = {
     "l1": ("1.5 in", "1.3 in", "1.7 in"),
     "l2": ("3.25 in", "2.9 in", "3.6 in"),
@@ -50,7 +49,7 @@ def assert_right(scene, answer):
         "mu_min",
         "alpha_fdc",
         "pulse_rms",
-        "bearing_force",
+        "reed_centrifugal",
         "shaking_force",
     ):
         if answer.figures.get(name) is not None:
@@ -66,9 +65,8 @@ def test_a_loom_in_inches_without_counterweight(target):
     assert "in" in answer.table()["unit"].to_list()
 
 
-@pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("how", ["one value", "equal ends", "left out", "not freed"])
-def test_a_frame_that_is_fixed_stays(target, how):
+@pytest.mark.parametrize(("how", "target"), slow.grid(["one value", "equal ends", "left out", "not freed"], TARGETS))
+def test_a_frame_that_is_fixed_stays(how, target):
     scene, today = lo.load("beatup"), "165 mm"
     scene = scene.set("mechanism.l4", today)
     if how == "one value":
@@ -110,8 +108,8 @@ FREED = {
 }
 
 
-@pytest.mark.parametrize("name", FREED)
-@pytest.mark.parametrize("target", ["balance", "torque"])
+@pytest.mark.parametrize(("target", "name"), slow.grid(["balance", "torque"], FREED))
+@pytest.mark.few(10)
 def test_any_number_of_the_scene_may_be_bounded(name, target):
     scene = lo.load("beatup").with_effect("gravity").with_effect("rod_inertia").with_effect("bearing_friction")
     low, high = FREED[name]
@@ -139,20 +137,25 @@ def limited(scene, name, share):
     return scene.set(f"limits.{name}.max", f"{lo.evaluate(scene).figures[name] * share!r} {unit}")
 
 
-@pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize(
-    ("name", "share"), [("bearing_force", 0.9), ("shaking_force", 0.95), ("shaking_force", 0.7), ("peak_torque", 0.97)]
+    ("limit", "target"),
+    slow.grid(
+        [("reed_centrifugal", 0.9), ("shaking_force", 0.95), ("shaking_force", 0.7), ("peak_torque", 0.97)], TARGETS
+    ),
 )
-def test_whole_cycle_limits_hold_at_every_angle(name, share, target):
+def test_whole_cycle_limits_hold_at_every_angle(limit, target):
+    name, share = limit
     scene = limited(lo.load("beatup").with_effect("centrifugal"), name, share)
     answer = lo.solve(scene, target, starts=1)
     machine = assert_right(scene, answer)
     assert machine.peaks(answer.design)[name] <= scene.limits[name].max * (1 + 1e-9)
 
 
-@pytest.mark.parametrize(("low", "high"), [(40, 46), (30, 36), (38, 39)])
-@pytest.mark.parametrize("target", ["balance", "torque", "retrofit"])
-def test_a_limit_on_the_reeds_eccentricity_parts_mass_and_radius(low, high, target):
+@pytest.mark.parametrize(
+    ("ends", "target"), slow.grid([(40, 46), (30, 36), (38, 39)], ["balance", "torque", "retrofit"])
+)
+def test_a_limit_on_the_reeds_eccentricity_parts_mass_and_radius(ends, target):
+    low, high = ends
     scene = lo.load("beatup").set("limits.r4", {"min": f"{low} mm", "max": f"{high} mm"})
     assert_right(scene, lo.solve(scene, target, starts=1))
 
@@ -160,9 +163,10 @@ def test_a_limit_on_the_reeds_eccentricity_parts_mass_and_radius(low, high, targ
 EFFECTS = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
 
 
-@pytest.mark.parametrize("effects", [*((name,) for name in EFFECTS), EFFECTS], ids="+".join)
-@pytest.mark.parametrize("target", ["balance", "torque"])
-def test_effects_of_the_balance(effects, target):
+@pytest.mark.parametrize(
+    ("target", "effects"), slow.grid(["balance", "torque"], [*((name,) for name in EFFECTS), EFFECTS])
+)
+def test_effects_of_the_balance(target, effects):
     scene = lo.load("beatup")
     for name in effects:
         scene = scene.with_effect(name)
@@ -177,17 +181,20 @@ def test_the_rod_as_a_rigid_body(target):
 
 @pytest.mark.parametrize(
     "changes",
-    [
-        {"operation.speed": "100 rpm"},
-        {"operation.M0": "1000000 N*m"},
-        {"operation.M0": "0 N*m"},
-        {"operation.speed": "1 rpm"},
-        {"operation.speed": "6000 rpm"},
-        {"effects.resistance.pulse": "120 deg"},
-        {"effects.resistance.pulse": "1 deg"},
-        {"limits.theta": {"min": "-20 deg", "max": "20 deg"}, "limits.mu_min.min": "30 deg"},
-        {"bounds.l1": {"min": "10 mm", "max": "60 mm"}},
-    ],
+    slow.after(
+        4,
+        [
+            {"operation.M0": "0 N*m"},
+            {"operation.speed": "6000 rpm"},
+            {"effects.resistance.pulse": "1 deg"},
+            {"bounds.l1": {"min": "10 mm", "max": "60 mm"}},
+            {"operation.M0": "1000000 N*m"},
+            {"operation.speed": "1 rpm"},
+            {"operation.speed": "100 rpm"},
+            {"effects.resistance.pulse": "120 deg"},
+            {"limits.theta": {"min": "-20 deg", "max": "20 deg"}, "limits.mu_min.min": "30 deg"},
+        ],
+    ),
     ids=str,
 )
 def test_the_first_level_is_never_traded_for_the_second(changes):

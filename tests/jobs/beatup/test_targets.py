@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import scipy.integrate
+from support import slow
 
 import loomopt as lo
 from loomopt.jobs import registry
@@ -75,9 +76,8 @@ def test_torque_is_the_best_slsqp_finds(answer_of, M0):
     assert machine.excess(ours.design) <= 1e-9
 
 
-@pytest.mark.parametrize("M0", [745, 800])
-@pytest.mark.parametrize("weights", [{}, {"l1": 50.0, "m4e": 0.1}], ids=["equal", "weighted"])
-def test_retrofit_is_the_best_slsqp_finds(M0, weights):
+@pytest.mark.parametrize(("weights", "M0"), slow.grid([{}, {"l1": 50.0, "m4e": 0.1}], [745, 800]))
+def test_retrofit_is_the_best_slsqp_finds(weights, M0):
     scene = scene_of(M0).update({f"targets.retrofit.weights.{name}": value for name, value in weights.items()})
     machine, ours = Machine(scene), lo.solve(scene, "retrofit", starts=1)
     squares, balanced = change(machine, weights), [lambda d: machine.static(d)["M3_fdc"] / 100]
@@ -155,6 +155,7 @@ def program_value(program, name, sign, value):
 
 
 @pytest.mark.parametrize(("M0", "target"), OPTIMAL)
+@pytest.mark.few(5)
 def test_every_worth_is_confirmed_by_solving_again(answer_of, M0, target):
     scene, answer = scene_of(M0), answer_of(M0, target)
     prices = [price for price in answer.binding if price.value != 0.0]

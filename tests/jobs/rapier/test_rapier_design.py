@@ -54,7 +54,8 @@ def test_figures_without_their_numbers_are_undefined():
     found = JOB.figures(registry.scene(document), TODAY)
     assert {name for name, value in found.items() if value is None} == {
         *("dwell_after", "dwell_before", "dwell", "tape_force", "peak_torque", "peak_power", "match_rms"),
-        "head_overrun",
+        *("head_overrun", "gear_force", "friction_loss"),
+        *(f"force_{joint}" for joint in ("A0", "A", "B0", "B1", "B2", "C0", "C", "D")),
     }
 
 

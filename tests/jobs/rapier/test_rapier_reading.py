@@ -7,6 +7,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from support import slow
 
 import loomopt as lo
 from loomopt.jobs import registry
@@ -105,7 +106,7 @@ def bisect(function, low, high):
 
 
 def designs():
-    return [pytest.param(None, id="packaged"), *(pytest.param(k, id=f"random {k}") for k in range(20))]
+    return [pytest.param(None, id="packaged"), *slow.after(6, range(20))]
 
 
 def design_of(which):

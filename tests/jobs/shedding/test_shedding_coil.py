@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support import slow
 from support.shedding_cases import plain, product
 
 import loomopt as lo
@@ -61,6 +62,7 @@ def test_the_coils_of_the_printed_travel_are_the_softest_of_all_that_are_sold():
 
 
 @pytest.mark.parametrize("wire", [size for size in SOLD if size >= 0.0056])
+@pytest.mark.few(4)
 def test_every_size_by_itself_is_as_soft_as_by_hand(wire):
     known = softest(STEEL, Contact(plain.PRINTED), wire)
     answer = coiled(effects__coil__sizes="any", bounds__wire=f"{wire!r} m")
@@ -218,6 +220,7 @@ PRICED = {
 
 
 @pytest.mark.parametrize("name", PRICED)
+@pytest.mark.few(3)
 def test_prices_of_the_coils_are_those_of_solving_again(name):
     changes, key, now, unit, loosen = PRICED[name]
     price = next(price for price in coiled(**changes).binding if price.limit == name)
@@ -299,7 +302,7 @@ def machine(seed):
     )
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", slow.after(4, range(12)))
 def test_coils_of_random_machines_are_the_softest_and_then_the_lightest_that_are_sold(seed):
     case = machine(seed)
     answer, contact = lo.solve(product(case).with_effect("coil"), starts=1), Contact(case)

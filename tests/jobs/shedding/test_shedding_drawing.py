@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from support import slow
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
@@ -49,14 +50,14 @@ CAMS = {
     "packaged": ({}, {}, CYCLOIDAL),
     "harmonic": ({"mechanism.law": "harmonic"} | angles(100, 70, 130, 60), {}, HARMONIC),
     "undercut": ({"mechanism.roller_radius": "20 mm"} | angles(40, 20, 30, 270), {}, CYCLOIDAL),
-    "no dwell": (angles(150, 0, 210, 0), {}, CYCLOIDAL),
     "free law": ({}, {"law": knots()}, plain_cam.spline(knots())),
+    "no dwell": (angles(150, 0, 210, 0), {}, CYCLOIDAL),
     "narrow": ({"mechanism.base_radius": "90 mm"} | angles(170, 10, 8, 172), {}, HARMONIC),
 }
 CAMS["narrow"][0]["mechanism.law"] = "harmonic"
 
 
-@pytest.fixture(params=CAMS, scope="module")
+@pytest.fixture(params=slow.after(4, CAMS), scope="module")
 def made(request):
     """Return a scene, a design and the plain law it means."""
     changes, design, law = CAMS[request.param]

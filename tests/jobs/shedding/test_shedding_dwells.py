@@ -19,6 +19,7 @@ def least(dwells, n_min):
 @pytest.mark.parametrize("n_min", [0.0, 5.0])
 @pytest.mark.parametrize("length", ["0", "1e-12", "5e-11", "3e-10", "1e-8", "1e-3"])
 @pytest.mark.parametrize("gone", ["near_dwell", "far_dwell"])
+@pytest.mark.few(8)
 def test_a_dwell_counts_from_the_least_length_that_floats_tell_from_none(gone, length, n_min):
     kept = "far_dwell" if gone == "near_dwell" else "near_dwell"
     turned = {f"mechanism.{gone}": f"{length} deg", "mechanism.return": f"{180 - float(length)!r} deg"}

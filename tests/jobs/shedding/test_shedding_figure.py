@@ -130,7 +130,7 @@ def test_dwells_are_shaded_and_named(name):
 @pytest.mark.parametrize(
     ("name", "ending"),
     [
-        pytest.param(name, ending, marks=[pytest.mark.slow] * (name != "shedding" and ending != ".svg"))
+        pytest.param(name, ending, marks=[pytest.mark.slow] * (ending != ".svg"))
         for name in PACKAGED
         for ending in figure.SUFFIXES
     ],

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import slow
 from support.shedding_cases import CYCLOID, TRAVELS, flat, freed, lowest, plain, product, programmed
 
 import loomopt as lo
@@ -59,6 +60,7 @@ EXACT = replace(systems.FLOAT, number=Fraction)
 
 
 @pytest.mark.parametrize(("travel", "n", "symmetric"), DIGITS)
+@pytest.mark.few(4)
 def test_the_least_spring_is_that_of_the_linear_programmes(travel, n, symmetric):
     case, known = TRAVELS[travel], DIGITS[travel, n, symmetric]
     answer = freed(case, n, symmetric)
@@ -70,8 +72,7 @@ def test_the_least_spring_is_that_of_the_linear_programmes(travel, n, symmetric)
 
 
 @pytest.mark.parametrize("symmetric", [False, True])
-@pytest.mark.parametrize("name", OTHERS)
-@pytest.mark.parametrize("travel", TRAVELS)
+@pytest.mark.parametrize(("travel", "name"), slow.grid(TRAVELS, OTHERS))
 def test_it_is_so_with_every_effect_and_uneven_segments(travel, name, symmetric):
     case = replace(TRAVELS[travel], **OTHERS[name])
     answer = freed(case, 8, symmetric)
@@ -94,6 +95,7 @@ LARGE = {
 
 
 @pytest.mark.parametrize(("travel", "n", "symmetric"), LARGE)
+@pytest.mark.few(1)
 def test_laws_of_many_intervals_are_those_of_the_linear_programmes_too(travel, n, symmetric):
     answer = freed(TRAVELS[travel], n, symmetric)
     assert (answer.status, answer.certificate.whole_cycle) == ("optimal", "bounded")
@@ -103,6 +105,7 @@ def test_laws_of_many_intervals_are_those_of_the_linear_programmes_too(travel, n
 
 
 @pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.few(3)
 def test_they_are_with_every_effect(name):
     case = replace(PRINTED, **OTHERS[name])
     answer = freed(case, 64)

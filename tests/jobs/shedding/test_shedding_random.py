@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import slow
 from support.shedding_cases import framed
 
 import loomopt as lo
@@ -43,7 +44,7 @@ def drawn(seed):
     )
 
 
-@pytest.mark.parametrize("seed", range(FRAMES))
+@pytest.mark.parametrize("seed", slow.after(12, range(FRAMES)))
 def test_the_least_spring_of_any_frame_is_the_references(seed):
     reference = drawn(seed)
     expected = max(0.0, float(plain.least_stiffness(reference)[0]))

@@ -56,6 +56,7 @@ def turned(scene, *degrees):
 
 
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.few(4)
 def test_at_the_contact_speed_the_spring_is_the_least_one(name):
     reference, K1 = CASES[name]
     found = JOB.figures(product(reference), {"K1": float(K1)})["contact_speed"] / RPM

@@ -109,6 +109,7 @@ def test_equal_points_all_get_it_wrong():
 
 @pytest.mark.parametrize("law", plain.LAWS)
 @pytest.mark.parametrize("shape", ["linear", "step"])
+@pytest.mark.few(6)
 def test_every_law_with_uneven_rise_and_return(law, shape):
     more = {"C": 35, "F": 20, "N_min": 60} if shape == "linear" else {}
     assert_least(replace(PAPER, law=law, shape=shape, angles=(100, 70, 130, 60), **more))
@@ -118,6 +119,7 @@ def test_every_law_with_uneven_rise_and_return(law, shape):
 @pytest.mark.parametrize(
     "angles", [(120, 60, 5, 175), (10, 173.5, 120, 56.5)], ids=["return of 5 deg", "rise of 10 deg"]
 )
+@pytest.mark.few(6)
 def test_narrow_lobes(law, angles):
     assert_least(replace(PAPER, law=law, angles=angles))
 

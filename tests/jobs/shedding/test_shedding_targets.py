@@ -98,6 +98,7 @@ def test_prices_of_the_least_stiffness_are_confirmed_by_solving_again(reference)
     ],
     ids=["paper", "printed travel", "pressed", "much", "modified sine", "spline", "step"],
 )
+@pytest.mark.few(3)
 def test_the_least_peak_force_is_that_of_a_search_over_preload_and_stiffness(reference, known):
     """Known values: the linear programme in K1 and K1 X0 of tests/reference/shedding.py."""
     force, K1, X0 = least_peak(reference, reference.X0)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from loomopt.jobs.beatup.model import ReedMotion
 from loomopt.maths import systems
-from loomopt.physics.balance import Pose
+from loomopt.physics.balance import Given, Loaded, Pose
 from loomopt.physics.effects.beatup import bearing_friction, centrifugal, gravity, resistance, rod_inertia
 from loomopt.physics.mechanisms import crank_rocker
 
@@ -113,16 +113,18 @@ def test_a_rod_whose_inertia_is_that_of_its_point_masses_has_one_model_only():
 @REPEATABLE
 def test_centrifugal_forces_are_those_of_the_centres_of_mass(phi, omega_dot):
     moving, own = pose(phi, omega_dot), dict[str, float]()
-    moment = centrifugal.moment(GIVEN)
-    assert moment == pytest.approx(56.8 * 0.045 - 3.0 * 0.05, rel=1e-15)
+    moment = 56.8 * 0.045 - 3.0 * 0.05
     phi_mp = MP.mpf(phi)
     rate = slope(lambda p: joints(p)[2], phi_mp) * SPEED
     bend = slope(lambda p: slope(lambda r: joints(r)[2], p), phi_mp, MP.mpf(10) ** -10) * SPEED**2
     bend += slope(lambda p: joints(p)[2], phi_mp) * omega_dot
-    found = centrifugal.bearing_force(systems.FLOAT, moving, GIVEN, own)
+    found = centrifugal.reed_centrifugal(systems.FLOAT, moving, GIVEN, own)
     assert found == pytest.approx(float(moment * rate**2), rel=1e-11, abs=1e-12)
     inertia = moment * MP.hypot(rate**2, bend)
-    assert centrifugal.shaking_force(systems.FLOAT, moving, GIVEN, own) == pytest.approx(float(inertia), rel=1e-12)
+    loaded = Loaded(systems.FLOAT, (), moving, Given(GIVEN, {}), {})
+    assert centrifugal.EFFECT.joints is not None
+    force = centrifugal.EFFECT.joints(systems.FLOAT, moving, GIVEN, own, loaded).shaking_force
+    assert math.hypot(*force) == pytest.approx(float(inertia), rel=1e-12)
 
 
 def test_the_pulse_is_a_half_cosine_of_height_M0_and_area_two_over_pi():

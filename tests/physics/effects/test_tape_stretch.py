@@ -60,4 +60,4 @@ def test_a_head_that_swings_too_slowly_is_remarked_upon(stiffness, remarked):
 
 def test_its_equation_is_written():
     told = dict(text.split("\n    ", 1) for text in scenes.equations(ON))
-    assert told["tape_stretch"] == "head_overrun = -S''_stroke*head_inertia.mass*omega^2/stiffness"
+    assert told["tape_stretch"] == "head_overrun = -S''_stroke*head_inertia_mass*omega^2/stiffness"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from loomopt.physics.mechanisms.crank_rocker import Lengths, assembly_margins, fault
 
-REPEATABLE = settings(derandomize=True, deadline=None, max_examples=300)
+REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100)
 lengths = st.floats(0.02, 1.0)
 BEYOND = re.compile(r"beyond crank angle (\S+) deg")
 WITHIN = re.compile(r"within (\S+) deg of crank angle 0")

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,9 @@ from support import toy
 
 import loomopt as lo
 from loomopt.jobs import registry
+from loomopt.solving.certificate import certificate as certificates
 from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.certificate.taylor_bounds import between_points
 from reference.beatup import DESIGN, Machine, least, random_designs
 
 JOB = registry.find("beatup")
@@ -65,6 +68,7 @@ def test_a_figure_exceeded_by_a_millionth_is_seen(best):
 @pytest.mark.parametrize("M0", [600, 745, 800, 900])
 @pytest.mark.parametrize("size", [1e-6, 1e-4, 1e-2])
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.few(18)
 def test_a_perturbed_optimum_never_passes(best, M0, size, seed):
     """All lengths and the counterweight moved at random, by no common factor: outside, or off the limits that bind."""
     steps = np.random.default_rng(seed).uniform(0.3, 1.0, 5) * [1, -1, 1, -1, 1] * (-1) ** seed
@@ -97,6 +101,7 @@ def test_a_common_factor_of_the_lengths_within_its_bounds_is_no_perturbation(bes
         (600, "bounds.l1", "30.001 mm"),
     ],
 )
+@pytest.mark.few(4)
 def test_the_best_of_a_tighter_limit_is_not_the_best(M0, key, value):
     """The optimum moved along all other active limits, each of them still held exactly."""
     held = {"min": value, "max": value} if key.startswith("limits") and key.count(".") == 1 else value
@@ -322,3 +327,23 @@ def test_a_slope_of_a_millionth_is_none(slope, passes):
 @pytest.mark.parametrize(("price", "binds"), [(0.9e-8, False), (1.1e-8, True)])
 def test_a_limit_with_next_to_no_price_does_not_bind(price, binds):
     assert bool(certify(leaning(price), {"x": 0.0, "y": 0.0}, ACCURACY).binding) == binds
+
+
+def test_a_draft_is_the_certificate_but_for_what_lies_between_the_points(best, monkeypatch):
+    """The dense scan is made when the whole certificate is asked for, once."""
+    program, scans, scan = JOB.program(scene_of(745), "balance"), [], between_points
+    x = JOB.values(program, best[745])
+
+    def counted(*arguments):
+        scans.append(1)
+        return scan(*arguments)
+
+    monkeypatch.setattr(certificates, between_points.__name__, counted)
+    draft = certificates.begun(program, x, ACCURACY)
+    assert (scans, draft.judged.passed, draft.judged.violation) == ([], True, 0.0)
+    assert draft.settled(()) is draft
+    said = draft.settled(("a rule",))
+    assert (said.judged.settled, said.whole.settled) == (("a rule",), ("a rule",))
+    assert draft.whole is draft.whole
+    assert len(scans) == 2
+    assert replace(said.whole, settled=()) == draft.whole == certify(program, x, ACCURACY)

@@ -13,6 +13,7 @@ from support import toy
 from loomopt.solving.certificate.certificate import certified, certify
 from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
+from loomopt.solving.certificate.together import certify_together
 
 ACCURACY = 1e-8
 FALLS, CURVES, EXCEEDED, PRICED = "can still fall", "second order fails", " is exceeded by ", "carries a price"
@@ -27,6 +28,9 @@ def judged(program, x):
         assert verdict(quick) == verdict(slow)
     found = certify(program, x, ACCURACY)
     assert found == (quick if quick.clear else slow)
+    alone, *several = [each for count in (1, 9) for each in certify_together([(program, x)] * count, ACCURACY)]
+    assert verdict(alone) == verdict(found)
+    assert all(each == alone for each in several)
     return found
 
 

@@ -243,6 +243,7 @@ TURNED = {
 """Where pulse_rms is least, then peak_torque: m4e r4e² is held by the curvature of the first."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [lo.load, inch.scene])
 def test_a_counterweight_of_which_only_its_inertia_counts_is_no_saddle(make):
     """Along m4e r4e² both levels are level, while either's straight line bends by 0.15: differences left −4e-5."""

@@ -43,7 +43,11 @@ def expected_rows(program, sampler, nodes, extra):
     for family, chosen in zip(families(program), nodes, strict=True):
         owner = owner_of(program, family)
         bound = extra[family.epigraph] if family.epigraph >= 0 else owner.value / owner.scale
-        rows += [abs(e.value) / owner.scale - bound for e in chosen] + [0.0] * (6 - len(chosen))
+        if family.square:
+            size = owner.scale * (owner.value + owner.scale)
+            rows += [(e.value**2 - owner.value**2) / size for e in chosen] + [0.0] * (6 - len(chosen))
+        else:
+            rows += [abs(e.value) / owner.scale - bound for e in chosen] + [0.0] * (6 - len(chosen))
     return np.array(rows)
 
 

@@ -18,7 +18,7 @@ CASES: list[tuple[tuple[str, ...], str, tuple[tuple[str, str], ...]]]
 CASES = [((), target, ()) for target in TARGETS]
 CASES += [((name,), "balance", ()) for name in EFFECTS] + [(EFFECTS, target, ()) for target in TARGETS]
 CASES += [
-    (("centrifugal",), "torque", (("limits.bearing_force.max", "400 N"),)),
+    (("centrifugal",), "torque", (("limits.reed_centrifugal.max", "400 N"),)),
     (EFFECTS, "balance", (("limits.shaking_force.max", "2500 N"), ("limits.r4.max", "44 mm"))),
     (("rod_inertia",), "balance", (("effects.rod_inertia.model", "exact"),)),
 ]
@@ -45,8 +45,9 @@ def test_slopes_are_those_of_40_digits(effects, target, changes):
     begin = len(slopes) - 6 * len(nodes)
     for place, (family, chosen) in enumerate(zip(families(program), nodes, strict=True)):
         ours = slopes[begin + 6 * place : begin + 6 * place + len(chosen)]
-        size = owner_of(program, family).scale
-        exact = differences(program, sampler, functools.partial(at_nodes, family.row, size, chosen))
+        owner = owner_of(program, family)
+        size = owner.scale * (owner.value + owner.scale) if family.square else owner.scale
+        exact = differences(program, sampler, functools.partial(at_nodes, family.square or family.row, size, chosen))
         assert ours == pytest.approx(exact, rel=1e-9, abs=1e-9 * np.abs(exact).max())
 
 

@@ -1,12 +1,14 @@
 """NLPs are built once for each structure, and kept while there is room."""
 
+import casadi as ca
+import numpy as np
 import pytest
 from beatup_nlps import DESIGN, program_of, put
 
 from loomopt.model.session import current
 from loomopt.solving.nlp import transcribe as built
 from loomopt.solving.nlp.point import sampler_at
-from loomopt.solving.nlp.transcribe import transcribe
+from loomopt.solving.nlp.transcribe import Buffered, transcribe
 
 
 def test_numbers_are_parameters_and_only_structure_is_built():
@@ -40,3 +42,18 @@ def test_no_more_programs_are_kept_than_there_is_room_for():
         program = program_of((), "torque")
         transcribe(program, sampler_at(program, DESIGN), slots)
     assert current().count(built.NLPS) == built.CACHE_SIZE
+
+
+def test_a_buffered_function_is_the_function():
+    """Sparse results are dense arrays of their shape; the next call leaves what the last one returned as it is."""
+    x, p = ca.SX.sym("x", 3), ca.SX.sym("p", 2)
+    g = ca.vertcat(x[0] * p[0], x[2] ** 2)
+    for outputs in ([g, ca.jacobian(g, x)], [ca.triu(ca.hessian(g[1] * p[1], x)[0])], [ca.SX(2, 3)]):
+        function = ca.Function("f", [x, p], outputs)
+        buffered, kept = Buffered(function), []
+        for seed in range(3):
+            rng = np.random.default_rng(seed)
+            given = rng.normal(size=3), rng.normal(size=2)
+            wanted = function(*given) if len(outputs) > 1 else [function(*given)]
+            kept += [(np.array(want.full()), each) for want, each in zip(wanted, buffered(*given), strict=True)]
+        assert all(want.shape == each.shape and np.array_equal(want, each) for want, each in kept)

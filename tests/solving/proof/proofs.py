@@ -14,8 +14,12 @@ CLAIMED = {
     "beatup": {"peak_torque", "mu_min"},
     "rapier": {"peak_acceleration", "peak_jerk", "stroke", "mu_min"},
     "shedding": {"contact_max", "law_acceleration", "pressure_angle_max", "curvature_min", "curvature_max"},
+    "knuckle-press": {"peak_torque", "peak_power", "mu.knuckle", "mu.ram"},
+    "path-18": {"peak_velocity", "peak_acceleration", "mu.close"},
+    "shaper": {"peak_torque", "peak_jerk", "mu.ram"},
+    "sixbar-sley": {"peak_torque", "peak_acceleration", "mu.drive", "mu.beat"},
 }
-"""Figures that are peaks over the cycle."""
+"""Figures that are peaks over the cycle, by job; of linkages by scene."""
 DWELL = "head within s_dwell {} front dead centre"
 EFFECTS = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
 FULL = functools.reduce(lambda scene, name: scene.with_effect(name), EFFECTS, lo.load("beatup"))

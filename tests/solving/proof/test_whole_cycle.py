@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from proofs import CLAIMED, DWELL, JOBS, SLACK, proofs_of, solved, violated
+from support import slow
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
@@ -15,7 +16,11 @@ from loomopt.scenes.packaged import problems
 from loomopt.solving.certificate import taylor_bounds
 from loomopt.studies.check import served
 
-PAIRS = [(name, target) for name in problems() for target in served(lo.load(name))]
+PAIRS = [
+    *((name, target) for name in problems() for target in served(lo.load(name)) if lo.load(name).job in JOBS),
+    *(("path-18", "path"), ("knuckle-press", "torque"), ("shaper", "torque"), ("sixbar-sley", "balance")),
+]
+each_pair = pytest.mark.parametrize(("name", "target"), slow.after(len(PAIRS) - 2, PAIRS))
 CLOSED = {
     "beatup": {"B to D < l2 + l3", "B to D > |l2 - l3|"},
     "rapier": {
@@ -23,8 +28,19 @@ CLOSED = {
         *("sley: A to B0 < l2 + l3", "sley: A to B0 > |l2 - l3|"),
     },
     "shedding": {"the arm stays below 180 deg", "the cam law never falls"},
+    "knuckle-press": {
+        "knuckle: B to D < pitman + arm",
+        "knuckle: B to D > |pitman - arm|",
+        "ram: strut reaches its guide",
+    },
+    "path-18": {"close: B to D < coupler + rocker", "close: B to D > |coupler - rocker|"},
+    "shaper": {"swing: B keeps away from O", "ram: rod reaches its guide"},
+    "sixbar-sley": {
+        *("drive: B to D < rod + rocker", "drive: B to D > |rod - rocker|"),
+        *("beat: E to G < link + sley", "beat: E to G > |link - sley|"),
+    },
 }
-"""What says that a mechanism assembles."""
+"""What says that a mechanism assembles, by job; of linkages by scene."""
 KEPT = {
     "stroke-dwell": {"stroke is reached", DWELL.format("before"), DWELL.format("after")},
     "dwell": {"stroke is reached", DWELL.format("before"), DWELL.format("after")},
@@ -40,16 +56,19 @@ ROUNDS = 6
 # Every packaged scene ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("name", "target"), PAIRS)
+@each_pair
 def test_every_packaged_answer_is_proven_and_no_entry_is_missing(name, target):
     scene, answer = lo.load(name), solved(name, target)
     proofs = proofs_of(name, target)
     assert (proofs.problem, proofs.target) == (name, target)
-    assert all(min(proof.boxes, proof.slack) > 0 for proof in proofs.proofs)
+    # Of two links of one length nothing is near: no distance is below their difference.
+    assert all(proof.boxes > 0 and (proof.slack > 0 or proof.margin == 1.0) for proof in proofs.proofs)
     named = {proof.limit for proof in proofs.proofs}
-    wanted = {*scene.limits, *CLOSED[scene.job], *(f"peak {each}" for each in CLAIMED[scene.job])}
+    known = name if name in CLOSED else scene.job
+    wanted = {*scene.limits, *CLOSED[known], *(f"peak {each}" for each in CLAIMED[known])}
     free = {"swing", "theta", "sley_mu_min"} if scene.job == "rapier" else set()
-    assert named >= (wanted | KEPT.get(target, set())) - free
+    kept = KEPT.get(target, set()) if scene.job in JOBS else set()
+    assert named >= (wanted | kept) - free
     if answer.status == "optimal":
         assert proofs.passed, violated(proofs)
         assert {(proof.status, proof.angle) for proof in proofs.proofs} == {("proven", None)}
@@ -58,7 +77,7 @@ def test_every_packaged_answer_is_proven_and_no_entry_is_missing(name, target):
         assert {each.name for each in answer.limits if not each.ok} >= {"swing"}
 
 
-@pytest.mark.parametrize(("name", "target"), PAIRS)
+@each_pair
 def test_margins_are_those_of_the_refined_figures(name, target):
     answer = solved(name, target)
     limits = {limit.name: limit for limit in answer.limits}
@@ -70,7 +89,7 @@ def test_margins_are_those_of_the_refined_figures(name, target):
         margin = limit.max - limit.value if "<=" in proof.text or limit.min is None else limit.value - limit.min
         assert proof.margin == pytest.approx(margin, abs=proof.slack), proof.text
         compared += 1
-    assert compared >= 1
+    assert compared or not lo.load(name).limits
 
 
 def test_the_margin_of_the_counterweights_mass_is_a_mass():

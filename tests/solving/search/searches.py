@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from support import toy
 
+from loomopt.solving.certificate.certificate import Draft
 from loomopt.solving.certificate.verdict import Certificate, Level
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
@@ -32,12 +33,13 @@ def certified(monkeypatch):
     """Return what is put before the certificate, and a way to say what it answers: by x, or for all."""
     seen, answers = [], dict[float | str, Any]()
 
-    def certify(program, x, accuracy, shown):
+    def begun(program, x, accuracy, shown):
         seen.append(x["x"])
         answer = answers.get(x["x"], answers.get("all", GOOD))
-        return answer(len(seen)) if callable(answer) else answer
+        judged = answer(len(seen)) if callable(answer) else answer
+        return Draft(judged, lambda cycle: judged)
 
-    monkeypatch.setattr(searching, "certify", certify)
+    monkeypatch.setattr(searching, "begun", begun)
     return seen, answers
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from searches import BAD, certified, empty, solved
-from support import toy
+from support import slow, toy
 
 import loomopt as lo
 from loomopt.solving.nlp.point import Point, Settings
@@ -172,17 +172,12 @@ SMALL_BASIN = {
 }
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", slow.after(1, range(3)))
 def test_a_basin_that_random_starts_miss_is_found_whatever_the_seed(seed):
     answer = lo.solve(lo.load("rapier").update(SMALL_BASIN), seed=seed)
     assert answer.status == "optimal", answer.message
     assert answer.figures["peak_acceleration"] == pytest.approx(0.84455731, abs=5e-9)
     assert answer.solver["basins"] >= 2
-
-
-def test_the_packaged_drive_is_as_before():
-    answer = lo.solve(lo.load("rapier"))
-    assert answer.figures["peak_acceleration"] == pytest.approx(0.694984753570, abs=1e-11)
 
 
 def scene_of(generator):
@@ -194,7 +189,8 @@ def scene_of(generator):
     return lo.load("beatup").update(dict(sorted(changes.items(), reverse=True)))
 
 
-def test_random_beat_ups_are_as_good_as_from_sixteen_random_starts():
+@pytest.mark.parametrize("count", slow.after(1, [3, 6]))
+def test_random_beat_ups_are_as_good_as_from_sixteen_random_starts(count):
     generator, seen = random.Random(3), 0
     for _ in range(30):
         scene = scene_of(generator)
@@ -206,9 +202,9 @@ def test_random_beat_ups_are_as_good_as_from_sixteen_random_starts():
         ours, theirs = ([abs(one.figures["M3_fdc"]), one.figures["peak_torque"]] for one in (found, others))
         assert ours[0] <= theirs[0] + 1e-4
         assert ours[0] < theirs[0] - 1e-4 or ours[1] <= theirs[1] * (1 + 1e-6)
-        if seen == 6:
+        if seen == count:
             break
-    assert seen == 6
+    assert seen == count
 
 
 def test_of_several_neighbours_the_better_basin_counts():
@@ -242,7 +238,7 @@ TWO_VALLEYS = {
 """Two basins 2e-4 apart, C0y at either of its bounds: a third of random starts ends in the better one."""
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 5, 6, 7])
+@pytest.mark.parametrize("seed", slow.after(2, range(8)))
 def test_starts_are_not_led_into_the_basin_that_is_known(seed):
     answer = lo.solve(lo.load("rapier").update(TWO_VALLEYS), seed=seed)
     assert answer.status == "optimal", answer.message

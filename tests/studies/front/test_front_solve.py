@@ -52,7 +52,9 @@ def test_of_designs_of_the_least_power_an_end_has_the_least_radius():
     assert plan.value(least, "r4") == pytest.approx(mass * radius / (mass + 12.4), rel=1e-8)
 
 
-@pytest.mark.parametrize("axes", [("l6", "peak_acceleration"), ("peak_acceleration", "l6")])
+@pytest.mark.parametrize(
+    "axes", [pytest.param(("l6", "peak_acceleration"), marks=pytest.mark.slow), ("peak_acceleration", "l6")]
+)
 def test_an_end_is_sought_in_every_basin_at_its_second_level_too(axes):
     shortest = ends("rapier", axes)[axes.index("l6")]
     assert shortest.certified
@@ -84,7 +86,13 @@ def test_stiffness_against_the_speed_up_to_which_contact_holds():
     assert found.changes[0].kind == "kink"
 
 
-@pytest.mark.parametrize("axes", [("contact_max", "contact_speed"), ("contact_speed", "peak_power")])
+@pytest.mark.parametrize(
+    "axes",
+    [
+        ("contact_max", "contact_speed"),
+        pytest.param(("contact_speed", "peak_power"), marks=pytest.mark.slow),
+    ],
+)
 def test_a_contact_speed_that_is_traded_is_the_rows_figure_and_the_others_are_read_at_the_scenes_speed(axes):
     scene = lo.load("shedding")
     trade = front.trade(scene, axes, points=4)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from made_up_study import Chain
+from support import slow
 
 from loomopt.base.errors import BadInput
 from loomopt.studies.run import run
@@ -38,6 +39,7 @@ def test_rows_come_in_the_order_of_points_each_after_its_parent(chain):
     assert chain.solves() == list(range(24))
 
 
+@pytest.mark.slow
 def test_threads_and_processes_give_the_same_digest(chain):
     expected = digest(run.run(chain))
     with ThreadPoolExecutor(3) as threads:
@@ -73,6 +75,7 @@ def test_a_point_that_fails_is_a_row_with_its_reason_and_the_others_go_on(chain)
     assert rows[11].parent == 3
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_costs_a_new_pool_and_no_row(chain):
     expected = digest(run.run(replace(chain, log=chain.log.with_name("other"))))
     dying = replace(chain, kills_once=(2, 13))
@@ -114,7 +117,9 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize(("deaths", "said"), [(1, "7"), (2, "7"), (9, "BrokenExecutor worker processes were killed 3")])
+@pytest.mark.parametrize(
+    ("deaths", "said"), slow.after(1, [(2, "7"), (9, "BrokenExecutor worker processes were killed 3"), (1, "7")])
+)
 def test_a_worker_that_is_killed_while_it_starts_costs_a_new_pool(tmp_path, deaths, said):
     script = tmp_path / "dying.py"
     script.write_text(DYING)

@@ -1,0 +1,129 @@
+"""What a page shows beside an answer: the terminal's tables and a chart of each study, forces, a family's members."""
+
+import re
+from html import unescape
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import loomopt as lo
+from loomopt.interface.cli.app import run
+from loomopt.interface.report import charts, document, markup
+from loomopt.interface.text import budget, effects, scenes, sensitivity, tolerance
+from loomopt.interface.text.layout import Grid
+
+MADE = {f"tolerances.{name}": {"plus_minus": "0.06 mm", "sigmas": 3} for name in ("l1", "l3")}
+
+
+@pytest.fixture(scope="module")
+def answer():
+    return lo.solve(lo.load("beatup").update(MADE), starts=1)
+
+
+@pytest.fixture(scope="module")
+def studies(answer):
+    return {
+        budget: answer.budget(fluctuation=0.02),
+        tolerance: lo.tolerance(answer.scene, answer, samples=2048, worst=False),
+        sensitivity: lo.sensitivity("shedding-static"),
+        effects: lo.effects("shedding-static"),
+    }
+
+
+def plain(html):
+    """Return the text of a page."""
+    return unescape(re.sub(r"<(?!br).*?>", "", html.replace("<br>", "\n")))
+
+
+def drawn(html):
+    """Return the drawings of a page's charts, read."""
+    found = re.findall(r'<figure class="chart">.*?(<svg .*?</svg>)', html, re.DOTALL)
+    return [ElementTree.fromstring(each) for each in found]
+
+
+def test_a_page_shows_the_terminals_tables_of_each_study(answer, studies, tmp_path):
+    shown = plain(answer.report(tmp_path / "all.html", *studies.values()).read_text(encoding="utf-8"))
+    assert len(shown.encode()) < 300_000
+    for how, found in studies.items():
+        parts = how.parts(found)
+        grids = [part for part in parts if isinstance(part, Grid)]
+        assert grids
+        for cell in (cell for grid in grids for line in grid.lines for cell in line):
+            assert cell.replace("\ue000", "\xa0") in shown, (how.__name__, cell)
+
+
+def test_each_study_has_a_chart_of_its_numbers(studies):
+    pages = {how: "".join(map(markup.part, found.report_parts())) for how, found in studies.items()}
+    found = studies[budget]
+    (shares,) = drawn(pages[budget])
+    curves = [each for each in shares.iter() if each.get("class", "").startswith("curve")]
+    assert len(curves) == len(found.rows) + 1
+    points = np.array([each.split(",") for each in curves[-1].get("points").split()], dtype=float)
+    left, right, first, last, bottom, top, least, most = map(float, shares.get("data-ends").split())
+    peak = points[np.argmax(np.abs(least + (bottom - points[:, 1]) / (bottom - top) * (most - least)))]
+    at = first + (peak[0] - left) / (right - left) * (last - first)
+    assert at == pytest.approx(np.degrees(found.found.angle), abs=2.0)
+    told = [each.get("aria-label") for each in drawn(pages[tolerance])]
+    assert told == [
+        f"machines [%] over {name}"
+        for name in ("swing [deg]", "theta [deg]", "mu_min [deg]", "M3_fdc [N*m]", "peak_torque [N*m]")
+    ]
+    assert f"{100 * studies[tolerance].yields['swing'].value:.4g} % hold" in plain(pages[tolerance])
+    for how, count in ((sensitivity, len(sensitivity.sought(studies[sensitivity]))), (effects, 1)):
+        assert len(drawn(pages[how])) == count
+
+
+def test_bars_reach_from_0_to_their_values():
+    made = charts.Bars("b", [("up", (2.0, None)), ("down", (-1.0, 0.5)), ("none", (None, float("nan")))], ("a", "b"))
+    (picture,) = drawn(charts.bars(made))
+    ends = [
+        re.fullmatch(r"M([\d.]+) [\d.]+H([\d.]+)", each.get("d")).groups()
+        for each in picture.iter("path")
+        if each.get("class").startswith("bar")
+    ]
+    long = [float(end) - float(begin) for begin, end in ends]
+    assert len({begin for begin, _ in ends}) == 1
+    assert np.array(long) / long[0] * 2.0 == pytest.approx([2.0, -1.0, 0.5], abs=2e-3)
+
+
+def test_forces_in_the_joints_are_told_where_an_effect_tells_them():
+    own = lo.load("beatup").with_effect("joint_forces")
+    found = lo.evaluate(own)
+    (part,) = [each for each in document.of_design(found).parts if each.title == "Forces in the joints"]
+    assert part.blocks == tuple(scenes.forces(own, found.simulate(), found.design))
+    shown = markup.part(part)
+    assert all(f"force_<wbr>{joint}</td>" in shown for joint in "ABCD")
+    titles = [each.title for each in document.of_design(lo.evaluate("beatup")).parts]
+    assert "Forces in the joints" not in titles
+
+
+def test_a_family_has_a_chapter_of_its_own_for_each_member(tmp_path):
+    speeds = {"targets.family.members": [{"speed": "500 rpm"}, {"speed": "600 rpm"}]}
+    found = lo.solve(lo.load("shedding").update(speeds), "family", starts=1)
+    html = found.report(tmp_path / "family.html").read_text(encoding="utf-8")
+    heads = re.findall('<p class="verdict">(.*?)</p><h2>(.*?)</h2>', html)
+    assert heads == [
+        ("Optimal and certified", "shedding, family"),
+        ("Member 1: all limits held", "shedding, family, member 1: speed 500 rpm"),
+        ("Member 2: all limits held", "shedding, family, member 2: speed 600 rpm"),
+    ]
+    whole, *own = html.split("<article")[1:]
+    assert "Curves over the turn" not in whole
+    assert all(each.count('<figure class="machine"') == 1 for each in own)
+    assert f"{found.members[0].figures['contact_min']:.6g}" in plain(own[0])
+
+
+def test_the_command_adds_studies_to_each_answer(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(["report", "shedding", "--study", "budget", "--study", "proof", "--out", "a.html"]) == 0
+    titles = re.findall("<h3>(.*?)</h3>", (tmp_path / "a.html").read_text(encoding="utf-8"))
+    assert titles[-2:] == ["Where the crank torque comes from", "Proof at every crank angle"]
+    capsys.readouterr()
+    assert run(["report", "shedding", "--study", "front", "--out", "b.html"]) == 2
+    assert "budget, tolerance, sensitivity, effects, accuracy, proof" in capsys.readouterr().err
+    assert run(["report", "shedding", "--study", "tolerance", "--out", "b.html"]) == 2
+    told = capsys.readouterr().err
+    assert "no number of the scene has a tolerance" in told
+    assert "solving" not in told
+    assert not (tmp_path / "b.html").exists()

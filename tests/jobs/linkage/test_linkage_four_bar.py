@@ -1,0 +1,78 @@
+"""The beat-up four-bar as a chain of parts: another kernel, another job, the same figures, optima and prices."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from support.linkage_scenes import four_bar
+
+import loomopt as lo
+from loomopt.jobs import registry
+
+BEATUP = lo.load("beatup").update(
+    {
+        "bounds.r4e": "80 mm",
+        "targets.balance.indifference": 0,
+        "mechanism.r4e": "80 mm",
+    }
+)
+SAME = {
+    "M3_fdc": "force.front",
+    "peak_torque": "peak_torque",
+    "peak_power": "peak_power",
+    "swing": "swing",
+    "beta": "angle.front",
+    "mu_min": "mu.beat",
+}
+"""Figures of the beat-up and what they are called of the chain."""
+SIZES = {"M3_fdc": 745.0}
+"""N·m that a figure which is made zero is measured by."""
+LIMITS = {"m4e": "mass", "theta": "sweep", "mu_min": "mu.beat"}
+DESIGN = {"m4e": "mass"}
+TORQUES = (600, 745, 800, 900)
+
+
+@functools.cache
+def solved(M0):
+    """Return both jobs' optima at a resistance, N·m."""
+    chain = four_bar(effects={"resistance": {"torque": f"{M0} N*m"}})
+    return lo.solve(BEATUP.set("operation.M0", f"{M0} N*m")), lo.solve(chain)
+
+
+@pytest.mark.parametrize("M0", TORQUES)
+def test_the_optimum_is_that_of_the_beat_up(M0):
+    beatup, chain = solved(M0)
+    assert (beatup.status, chain.status) == ("optimal", "optimal")
+    for name, other in SAME.items():
+        size = SIZES.get(name, abs(beatup.figures[name]))
+        assert chain.figures[other] == pytest.approx(beatup.figures[name], rel=1e-12, abs=1e-12 * size), name
+    assert math.pi - chain.figures["sweep"] == pytest.approx(beatup.figures["theta"], abs=1e-12)
+    for name in ("l1", "l2", "l3", "l4", "m4e"):
+        assert chain.design[DESIGN.get(name, name)] == pytest.approx(beatup.design[name], rel=1e-10), name
+
+
+@pytest.mark.parametrize("M0", TORQUES)
+def test_prices_are_those_of_the_beat_up(M0):
+    beatup, chain = solved(M0)
+    prices = {price.limit: price for price in chain.binding}
+    for price in beatup.binding:
+        if price.limit == "r4e":  # no number that the chain bounds
+            continue
+        other = prices.pop(LIMITS.get(price.limit, price.limit))
+        ((figure, worth),) = price.worth.items()
+        # θ is a half turn less the sweep: the least of one is the most of the other.
+        assert other.side == ({"min": "max", "max": "min"}[price.side] if price.limit == "theta" else price.side)
+        assert other.worth == {SAME[figure]: pytest.approx(worth, rel=1e-10)}
+    assert not prices
+
+
+@pytest.mark.parametrize("design", [{}, {"l1": 0.032, "l2": 0.083, "l3": 0.149, "l4": 0.161}])
+def test_curves_are_those_of_the_beat_up(design):
+    other = registry.find("linkage").sampler(four_bar(), design)
+    own = registry.find("beatup").sampler(BEATUP, design)
+    phi = np.linspace(0.0, 2 * math.pi, 97)
+    for cycle_of, name in ((own, "peak_torque"), (other, "peak_torque")):
+        assert cycle_of.cycle.pieces == 2, name
+    torque, chained = (each.at("peak_torque", *each.cycle.located(phi)) for each in (own, other))
+    assert np.max(np.abs(torque - chained)) <= 1e-12 * np.max(np.abs(torque))

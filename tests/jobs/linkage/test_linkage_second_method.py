@@ -1,0 +1,103 @@
+"""Optima of the packaged linkages found again: plain NumPy formulas and SLSQP, from today's machine.
+
+With the rest held, SLSQP gets nowhere from there: it starts beside the optimum that loomopt tells.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+import loomopt as lo
+from reference.planar_linkages import Press, SixBar, least, tops
+
+SIX, PRESS = lo.load("sixbar-sley"), lo.load("knuckle-press")
+FLATTEST, QUARTER, REST = math.cos(math.radians(48)), math.radians(0.25), math.radians(246)
+PART = 0.05
+"""Of the width of the bounds, how far a start is drawn from where it is drawn about, either way."""
+
+
+def peak(six):
+    return tops(abs(six.torque))
+
+
+def bending(six):
+    return tops(abs(six.q.over(2)))
+
+
+def early(six):
+    return -six.v["end"]
+
+
+def six_bar(sought, *, balanced=False, resting=False):
+    """Return what `least` asks of the sley: what is sought, the scene's limits, the balance at front dead centre."""
+
+    def formulas(v):
+        six = SixBar(v)
+        if not six.closes:
+            return None
+        swing = [six.swing - math.radians(24), math.radians(23) - six.swing]
+        limits = [swing, tops(six.drive) - FLATTEST, tops(six.beat) - FLATTEST, peak(six) / 400 - 1]
+        if resting:
+            travel = six.travel(v.get("end", REST))
+            limits += [tops(sign * travel, closed=False) - QUARTER for sign in (1, -1)]
+        return sought(six), np.concatenate(limits), [six.balance / six.CLOTH] if balanced else []
+
+    return formulas
+
+
+def press(v):
+    """Return what `least` asks of the press: its torque with and without the sheet, the scene's limits."""
+    machine = Press(v)
+    if not machine.closes:
+        return None
+    torque = np.concatenate([tops(abs(machine.idle)), tops(abs(machine.forming), closed=False)])
+    return torque, [0.02 - machine.swing, *(tops(machine.knuckle) - math.cos(math.radians(40)))], []
+
+
+CASES = {
+    "balanced": (SIX, six_bar(peak, balanced=True), (), 150.0, 153.4170077),
+    "least torque": (SIX, six_bar(peak), (), 150.0, 81.09726086),
+    "smooth": (SIX, six_bar(bending), (), 0.5, 0.3712768937),
+    "at rest": (SIX, six_bar(peak, balanced=True, resting=True), (), 150.0, 164.4383316),
+    "longest rest": (SIX, six_bar(early, resting=True), ("end",), 1.0, -math.radians(256.8786297)),
+    "press": (PRESS, press, (), 8000.0, 6764.154280),
+}
+"""Scene, formulas, held numbers that are freed, natural size and what loomopt comes to."""
+
+
+def box(scene, freed):
+    """Return the free numbers with both their ends, and today's values."""
+    bounds = {name: (b.min, b.max) for name, b in scene.bounds.items() if b.free or name in freed}
+    today = dict(scene.mechanism) | {"mass": 0.0}
+    return bounds, {name: today[name] for name in bounds}
+
+
+@pytest.mark.slow
+def test_plain_formulas_have_the_figures_of_the_packaged_optima():
+    found = lo.solve(SIX)
+    six = SixBar(dict(found.design))
+    assert max(peak(six)) == pytest.approx(found.figures["peak_torque"], rel=1e-7)
+    assert max(bending(six)) == pytest.approx(found.figures["peak_acceleration"], rel=1e-7)
+    assert six.swing == pytest.approx(found.figures["swing"], abs=1e-12)
+    assert six.balance == pytest.approx(0.0, abs=1e-7)
+    assert math.acos(max(tops(six.beat))) == pytest.approx(found.figures["mu.beat"], abs=1e-7)
+    assert max(tops(six.travel(REST), closed=False)) == pytest.approx(found.figures["travel.rest"], rel=1e-6)
+    machine, found = Press(dict((answer := lo.solve(PRESS)).design)), answer
+    assert max(abs(machine.forming)) == pytest.approx(found.figures["peak_torque"], rel=1e-9)
+    assert machine.swing == pytest.approx(found.figures["swing"], rel=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_another_solver_on_other_formulas_comes_to_the_same_optimum(name):
+    scene, formulas, freed, size, value = CASES[name]
+    bounds, today = box(scene, freed)
+    if name == "at rest":
+        best = lo.solve(scene).design
+        drawn = np.random.default_rng(1).uniform(-PART, PART, len(bounds))
+        pairs = zip(bounds.items(), drawn, strict=True)
+        today = {key: best[key] + share * (high - low) for (key, (low, high)), share in pairs}
+    reached, _, excess = least(formulas, bounds, today, size)
+    assert excess <= 1e-8
+    assert reached == pytest.approx(value, rel=1e-6)

@@ -1,0 +1,59 @@
+"""What joint_forces costs: nothing where it is off, figures alone where it is on, at most half as much time again."""
+
+import gc
+import time
+
+import pytest
+
+import loomopt as lo
+from loomopt.jobs import registry
+from loomopt.model.sampling import Sampler
+
+SCENES = {"beatup": (), "rapier": ("head_inertia",), "shedding": (), "knuckle-press": ()}
+"""Packaged scene → effects put on."""
+MOST = 1.5
+"""Times the processor's time of the same certified answer without the effect."""
+
+
+def with_and_without(name):
+    scene = lo.load(name)
+    scene = scene.with_effect(*SCENES[name]) if SCENES[name] else scene
+    return scene, scene.with_effect("joint_forces")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_it_adds_quantities_and_changes_no_digit_of_another(name):
+    off, on = with_and_without(name)
+    job = registry.of(off)
+    without, beside = (job.sampler(scene, job.today(scene)) for scene in (off, on))
+    own = {*beside.model._quantities} - {*without.model._quantities}
+    assert not [name for name in without.model._quantities if name.startswith(("force_", "roller_", "direction of"))]
+    assert own
+    for quantity in without.model.quantities:
+        one, other = (Sampler(each.model, each.values).peak(quantity) for each in (without, beside))
+        assert one == other, quantity
+    programs = [job.task(scene, scene.schema.default_target).program() for scene in (off, on)]
+    assert [each.name for each in programs[0].variables] == [each.name for each in programs[1].variables]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["beatup", "shedding", "knuckle-press"])
+def test_a_certified_answer_costs_at_most_half_as_much_again(name):
+    off, on = with_and_without(name)
+    times = []
+    for scene in (off, on):
+        lo.solve(scene, starts=1)  # built once
+        runs = []
+        for _ in range(3):
+            gc.collect()
+            begun = time.process_time()
+            answer = lo.solve(scene, starts=1)
+            runs.append(time.process_time() - begun)
+        assert answer.certificate.passed
+        times.append((min(runs), answer.figures))
+    (plain, figures), (told, others) = times
+    print(f"{name}: {plain:.3f} s, with joint_forces {told:.3f} s, {told / plain:.2f} times")
+    assert told <= MOST * plain
+    assert {each: others[each] for each in figures if figures[each] is not None} == {
+        each: value for each, value in figures.items() if value is not None
+    }

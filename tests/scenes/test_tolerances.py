@@ -1,0 +1,94 @@
+"""[tolerances] and [accept]: read by the names of numbers, refused in one line each."""
+
+import pytest
+
+from loomopt.base.errors import BadInput, Faults
+from loomopt.jobs import registry
+from loomopt.scenes import tables, tolerances
+from loomopt.scenes.tolerance_classes import plus_minus
+
+BEATUP = registry.load("beatup")
+
+
+def made(**given):
+    scene = BEATUP.update({"tolerances": given})
+    on = dict(zip(scene.active, scene.effects.values(), strict=True))
+    known = list(tables.places(scene.schema, scene.tables, on, {}))
+    return {e.number: e for e in tolerances.read(scene.document["tolerances"], scene.schema, known, "", Faults())}
+
+
+def test_half_widths_and_standard_deviations():
+    found = made(
+        l1={"plus_minus": "0.06 mm", "sigmas": 2},
+        l2="0.06 mm",
+        l3={"plus_minus": "0.06 mm", "spread": "uniform"},
+        M0="5 %",
+        J4={"plus_minus": "2 %", "group": "reed", "correlation": 0.5},
+    )
+    assert found["l1"].sigma(0.03) == pytest.approx(3e-5, rel=1e-15)
+    assert found["l2"].sigma(0.08) == pytest.approx(2e-5, rel=1e-15)
+    assert found["l3"].sigma(0.15) == pytest.approx(6e-5 / 3**0.5, rel=1e-15)
+    assert found["M0"].plus_minus(745.0) == pytest.approx(37.25, rel=1e-15)
+    assert (found["J4"].group, found["J4"].correlation) == ("reed", 0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "nominal", "half"),
+    [
+        ("IT7", 0.03, 10.5e-6),  # 30 mm is in 18 to 30
+        ("IT7", 0.0300001, 12.5e-6),
+        ("IT5", 0.003, 2e-6),
+        ("IT14", 3.15, 2700e-6),
+        ("ISO 2768-m", 0.151, 0.5e-3),
+        ("ISO 2768-f", 0.120, 0.15e-3),
+        ("ISO 2768-v", 0.0035, 0.5e-3),
+    ],
+)
+def test_classes_go_by_the_nominal(name, nominal, half):
+    assert plus_minus(name, nominal) == pytest.approx(half, rel=1e-12)
+    assert made(l1={"class": name})["l1"].plus_minus(nominal) == pytest.approx(half, rel=1e-12)
+
+
+@pytest.mark.parametrize(("name", "nominal"), [("IT7", 4.0), ("ISO 2768-f", 2.5), ("ISO 2768-v", 0.002)])
+def test_a_class_that_says_nothing_of_a_size_is_refused(name, nominal):
+    with pytest.raises(BadInput, match="says nothing of"):
+        made(l1={"class": name})["l1"].plus_minus(nominal)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("tolerances", {"l9": "1 mm"}, "l9"),
+        ("tolerances", {"l1": "1 kg"}, "kg"),
+        ("tolerances", {"l1": "-1 mm"}, "out of range"),
+        ("tolerances", {"l1": {"plus_minus": "1 mm", "class": "IT7"}}, "twice"),
+        ("tolerances", {"l1": {"sigmas": 3}}, "plus_minus is missing"),
+        ("tolerances", {"l1": {"class": "IT77"}}, "IT7"),
+        ("tolerances", {"M0": {"class": "IT7"}}, "classes are of lengths"),
+        ("tolerances", {"l1": {"plus_minus": "1 mm", "spread": "uniform", "sigmas": 3}}, "no sigmas"),
+        ("tolerances", {"l1": {"plus_minus": "1 mm", "spread": "flat"}}, "normal, uniform"),
+        ("tolerances", {"l1": {"plus_minus": "1 mm", "group": "machine"}}, "correlation is missing"),
+        ("tolerances", {"l1": {"plus_minus": "1 mm", "correlation": 0.5}}, "group is missing"),
+        ("tolerances", {"l1": {"plus_minus": "1 mm", "group": "machine", "correlation": 1.5}}, "more than 1"),
+        ("tolerances", {"l1": {"plus_minus": "1 mm", "sigma": 3}}, "sigmas"),
+        ("tolerances", {"l1": 3}, "unit"),
+        ("tolerances", "l1", "not a table"),
+        ("accept", {"M3": "1 N*m"}, "M3_fdc"),
+        ("accept", {"M3_fdc": "0 N*m"}, "out of range"),
+    ],
+)
+def test_what_is_wrong_is_said(key, value, said):
+    with pytest.raises(BadInput, match=said.replace("*", r"\*")) as error:
+        BEATUP.update({key: value})
+    assert key in str(error.value)
+
+
+def test_neither_table_decides_an_answer():
+    assert BEATUP.update({"tolerances": {"l1": "1 mm"}, "accept": {"M3_fdc": "1 N*m"}}).hash == BEATUP.hash
+
+
+def test_that_of_an_effect_that_is_off_waits_for_it():
+    waiting = BEATUP.without_effect("resistance").update({"tolerances": {"pulse": "2 deg"}})
+    assert waiting.with_effect("resistance").given("tolerances.pulse") == "2 deg"
+    with pytest.raises(BadInput, match="pulse"):
+        BEATUP.without_effect("resistance").update({"tolerances": {"pulse": "2 mm"}})

@@ -1,0 +1,96 @@
+"""Certificates of many designs: each is what it would be alone, whoever stands beside it."""
+
+import itertools
+import re
+
+import numpy as np
+import pytest
+
+from loomopt.jobs import registry
+from loomopt.scenes import designs
+from loomopt.solving import engine
+from loomopt.solving.certificate import together
+from loomopt.solving.certificate.certificate import certify, prepared
+from loomopt.solving.certificate.derivatives import JetDerivatives
+
+ACCURACY, ROUNDED = 1e-8, 1e-12
+TASKS = [
+    ("beatup", "balance"),
+    ("beatup", "pulse"),
+    ("shedding", "force"),
+    ("rapier", "stroke-dwell"),
+    pytest.param("rapier", "dwell", marks=pytest.mark.slow),
+    pytest.param("shedding", "law", marks=pytest.mark.slow),
+]
+
+
+def optimum(job, target):
+    scene = registry.load(job)
+    program = registry.find(job).program(scene, target)
+    answer = engine.solve(scene, target, starts=1)
+    full = {scene.full(name): value for name, value in designs.flat(answer.design).items()}
+    return program, registry.find(job).values(program, full)
+
+
+def beside(program, x, share, count):
+    """Return an optimum and designs around it, all off by a share of natural sizes."""
+    drawn = np.random.default_rng(1).standard_normal((count, len(program.variables)))
+    moved = [
+        {
+            v.name: x[v.name] + share * v.scale * d * (v.lower < v.upper)
+            for v, d in zip(program.variables, row, strict=True)
+        }
+        for row in drawn
+    ]
+    return [dict(x), *({**x, **each} for each in moved)]
+
+
+@pytest.mark.parametrize(("job", "target"), TASKS)
+def test_derivatives_are_those_of_each_design_alone(job, target):
+    program, x = optimum(job, target)
+    places = [(each, prepared(program, each, ACCURACY)) for each in beside(program, x, 1e-9, 4)]
+    asked = [together.DesignAt(program, each, sampler, active.rows) for each, (sampler, active) in places]
+    for of, found in zip(asked, together.derivatives(asked), strict=True):
+        alone = JetDerivatives(program, of.x, of.sampler, of.rows)
+        basis = np.linalg.qr(np.random.default_rng(2).standard_normal((len(alone.names), 3)))[0]
+        for mine, own in ((found.gradients(), alone.gradients()), (found.curvatures(basis), alone.curvatures(basis))):
+            assert np.abs(mine - own).max() <= ROUNDED * max(1.0, np.abs(own).max())
+
+
+@pytest.mark.parametrize(("job", "target"), TASKS)
+def test_derivatives_are_the_same_bits_in_batches_of_any_size(job, target):
+    program, x = optimum(job, target)
+    places = [(each, prepared(program, each, ACCURACY)) for each in beside(program, x, 1e-9, 10)]
+    asked = [together.DesignAt(program, each, sampler, active.rows) for each, (sampler, active) in places]
+    whole = together.derivatives(list(itertools.islice(itertools.cycle(asked), 200)))
+    for size in (1, 8):
+        parts = [together.derivatives(asked[begin : begin + size]) for begin in range(0, len(asked), size)]
+        for one, other in zip(itertools.chain(*parts), whole[: len(asked)], strict=True):
+            assert one.gradients().tobytes() == other.gradients().tobytes()
+            assert one.bends.tobytes() == other.bends.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("job", "target", "count"),
+    [("beatup", "balance", 8), ("shedding", "force", 8)]
+    + [
+        pytest.param(*task, 200, marks=pytest.mark.slow) for task in (("beatup", "balance"), ("rapier", "stroke-dwell"))
+    ],
+)
+def test_adversaries_are_refused_in_batches_as_they_are_alone(job, target, count):
+    """The optimum, and designs a millionth and a ten-thousandth off it: the same digits in batches of 1 and more."""
+    program, x = optimum(job, target)
+    asked = [(program, each) for share in (1e-6, 1e-4) for each in beside(program, x, share, 2)]
+    several = list(itertools.islice(itertools.cycle(asked), count))
+    whole = together.certify_together(several, ACCURACY)
+    for k, (_, each) in enumerate(asked):
+        assert verdict(whole[k]) == verdict(certify(program, each, ACCURACY))
+        assert whole[k].passed == (each == x)
+        assert whole[k] == together.certify_together([asked[k]], ACCURACY)[0]
+    assert all(whole[k] == whole[k % len(asked)] for k in range(count))
+
+
+def verdict(certificate):
+    """Return what a certificate says, without its numbers."""
+    said = [re.sub(r"[0-9][-+0-9.e]*", "#", reason) for reason in certificate.reasons]
+    return certificate.passed, certificate.minimum, certificate.unique, certificate.by, said

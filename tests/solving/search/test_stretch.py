@@ -1,0 +1,82 @@
+"""Between two neighbours' optima: the same rows as alone, the same bits in any company, nothing where in doubt."""
+
+import numpy as np
+import pytest
+
+import loomopt as lo
+from loomopt.jobs import registry
+from loomopt.solving import between, engine
+from loomopt.solving.search import stretch
+
+ENDS, CLOSE = (750.0, 780.0), 1e-12
+"""N*m: the same limits bind all the way."""
+
+
+def ended(resistance, target="balance"):
+    scene = lo.load("beatup").set("operation.M0", f"{resistance!r} N*m")
+    answer = engine.solve(scene, target)
+    program = registry.of(scene).program(scene, target)
+    return answer, between.optimum(scene, program, answer)
+
+
+def asked(resistance, ends, optima, target="balance"):
+    scene = lo.load("beatup").set("operation.M0", f"{resistance!r} N*m")
+    share = (resistance - ends[0]) / (ends[1] - ends[0])
+    return between.begun(scene, target, 1e-8, [*(each.as_dict() for each in optima), share])
+
+
+@pytest.fixture(scope="module")
+def optima():
+    return [ended(resistance)[1] for resistance in ENDS]
+
+
+def digits(found):
+    return [(dict(each.best.x), each.best.certificate) for each in found]
+
+
+def test_what_comes_of_it_is_what_a_solve_alone_comes_to(optima):
+    resistances = 755.0, 771.0
+    made = stretch.solved([asked(resistance, ENDS, optima) for resistance in resistances])
+    for found, resistance in zip(made, resistances, strict=True):
+        alone, _ = ended(resistance)
+        best = found.best
+        assert best.certificate.passed
+        design = found.job.design(found.program, best.x)
+        for name, value in alone.design.items():
+            assert design[name] == pytest.approx(value, rel=CLOSE, abs=CLOSE), name
+        prices = {each.limit.name: each.worth for each in best.certificate.binding}
+        for each in alone.binding:
+            assert prices[each.limit] == pytest.approx(sum(each.worth.values()), rel=1e-9)
+
+
+def test_it_is_the_same_bits_in_batches_of_any_size(optima):
+    several = [asked(float(m), ENDS, optima) for m in np.linspace(*ENDS, 12)[1:-1]]
+    whole = stretch.solved(several * 20)
+    assert len(whole) == 200
+    for size in (1, 8):
+        parts = [stretch.solved(several[begin : begin + size]) for begin in range(0, len(several), size)]
+        assert digits(whole[:10]) == digits([each for part in parts for each in part]) == digits(whole[-10:])
+
+
+def test_beyond_a_change_of_what_binds_the_other_neighbours_rows_are_tried():
+    """At 700 N*m other limits begin to stop it: on either side it is what stops the neighbour there."""
+    ends = 695.0, 705.0
+    optima = [ended(resistance)[1] for resistance in ends]
+    kinds = [{row.kind for row in of.frame} for of in optima]
+    assert kinds[0] != kinds[1]
+    for resistance, kind in ((697.0, kinds[0]), (704.0, kinds[1])):
+        (found,) = stretch.solved([asked(resistance, ends, optima)])
+        assert found.passed
+        assert {row.kind for row in found.best.certificate.frame} == kind
+
+
+def test_a_way_that_ends_at_no_optimum_is_left(optima):
+    """Rows of another stretch: their Newton's method ends where a limit breaks, or no price is right."""
+    assert stretch.solved([asked(880.0, ENDS, optima), asked(620.0, ENDS, optima)]) == [None, None]
+
+
+def test_an_optimum_is_read_as_it_was_written(optima):
+    import json
+
+    for each in optima:
+        assert stretch.read_optimum(json.loads(json.dumps(each.as_dict()))) == each

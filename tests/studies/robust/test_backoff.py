@@ -1,0 +1,265 @@
+"""Back-off: optima whose limits keep clear by sigmas of their own figures, beside those computed apart.
+
+Reference values: by Newton's method on the KKT system with standard deviations of the optimum itself, in 40 digits;
+yields by 16 scrambles of 2^20 Sobol points, their standard errors in brackets beside them.
+"""
+
+import functools
+import math
+
+import pytest
+
+import loomopt as lo
+from loomopt.base.errors import BadInput
+from loomopt.interface.text import answers, layout
+from loomopt.jobs import registry
+from loomopt.solving import engine
+from loomopt.studies.robust import backoff
+from loomopt.studies.robust.margins import margins
+
+LINKS = dict.fromkeys(("l1", "l2", "l3", "l4"), "0.06 mm")
+DIGITS = 2e-10
+"""Of an optimum, relative: a solve is right to 1e-11, its standard deviations to 3e-11."""
+SE = 3.0
+
+
+@functools.cache
+def beatup():
+    return registry.load("beatup").update({"tolerances": LINKS})
+
+
+def solved(scene, sigmas=None, least=None, target=None, starts=None):
+    solve = functools.partial(engine.solve, scene, target, starts=starts)
+    return backoff.solved(backoff.asked(scene, target, sigmas, least), solve)
+
+
+@functools.cache
+def of_beatup(sigmas):
+    return solved(beatup(), sigmas)
+
+
+def close(found, value, se):
+    return abs(found.value - value) <= SE * math.hypot(found.se, se)
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "peak", "share", "se"),
+    [
+        (1.0, 88.6988394545, 0.732227, 32e-6),
+        (2.0, 88.7086810764, 0.956830, 7e-6),
+        (3.0, 88.7189424554, 0.997301, 2e-6),
+    ],
+)
+def test_backed_off_beatup(sigmas, peak, share, se):
+    found = of_beatup(sigmas)
+    assert found.status == "optimal"
+    assert found.figures["peak_torque"] == pytest.approx(peak, rel=DIGITS)
+    assert abs(found.figures["M3_fdc"]) < 1e-9
+    assert close(found.robust.yields["all"], share, se)
+    assert close(found.robust.nominal_yields["all"], 0.307458, 16e-6)
+    assert found.certificate.passed
+
+
+def test_limits_and_backoff_stay_apart():
+    found = of_beatup(3.0)
+    swing = next(each for each in found.limits if each.name == "swing")
+    assert swing.max == pytest.approx(math.radians(23.4), rel=1e-15)
+    assert swing.value == pytest.approx(swing.max - swing.backed_off, abs=1e-12)
+    price = next(each for each in found.binding if each.limit == "swing")
+    assert price.value == pytest.approx(swing.max, rel=1e-15)
+    assert price.backed_off == swing.backed_off
+    assert price.text == "swing <= 23.4 deg, backed off by 0.04872 deg"
+    free = next(each for each in found.limits if each.name == "l1")
+    assert free.backed_off == 0.0
+    assert "backed_off" not in free.as_dict()
+    told = found.as_dict()
+    assert told["yield"]["all"]["value"] == found.robust.yields["all"].value
+    assert told["robust"]["kept"] == ["M3_fdc"]
+    assert told["robust"]["cost"]["peak_torque"] == pytest.approx(88.7189424554 - 88.6894134918, abs=3e-8)
+    text = layout.render(answers.solution(found, found.scene), 120)
+    assert "22.9 ... 23.4, 0.04872 deg apart" in text
+    assert "+0.0333 %" in text
+
+
+def test_standard_deviations_are_those_of_the_optimum():
+    # One pass alone, with those of the optimum without back-off, ends elsewhere.
+    scene = beatup()
+    own = backoff.asked(scene, None, 3.0, None)
+    nominal = engine.solve(scene)
+    plan = own.plan(nominal, {})
+    start = backoff.Pass(nominal, plan, margins(plan), 3.0)
+    once = engine.solve(scene, backed_off=backoff.tightened(start))
+    assert once.figures["peak_torque"] == pytest.approx(88.7187953646, rel=DIGITS)
+
+
+@pytest.mark.parametrize(
+    ("least", "sigmas", "peak"),
+    [
+        pytest.param(0.90, 1.600450433, 88.704698739, marks=pytest.mark.slow),
+        pytest.param(0.95, 1.933943238, 88.708018068, marks=pytest.mark.slow),
+        (0.99, 2.567193473, 88.714449476),
+        pytest.param(0.995, 2.801474734, 88.716871720, marks=pytest.mark.slow),
+    ],
+)
+def test_yield_of_the_beatup(least, sigmas, peak):
+    found = solved(beatup(), least=least)
+    robust = found.robust
+    assert robust.linear == pytest.approx(sigmas, abs=6e-10)
+    assert least <= robust.yields["all"].value <= least + robust.yields["all"].se + 1e-4
+    assert robust.sigmas == pytest.approx(sigmas, abs=0.02)
+    assert found.figures["peak_torque"] == pytest.approx(peak, abs=2e-4)
+    assert solved(beatup(), robust.linear).figures["peak_torque"] == pytest.approx(peak, abs=6e-10)
+
+
+@pytest.mark.parametrize(
+    ("standard", "peak"), [("IT7", 88.698245993), ("ISO 2768-f", 88.781426524), ("ISO 2768-m", 88.920745742)]
+)
+def test_classes_of_the_links(standard, peak):
+    scene = registry.load("beatup").update({"tolerances": {key: {"class": standard} for key in LINKS}})
+    assert solved(scene, 3.0).figures["peak_torque"] == pytest.approx(peak, abs=6e-10)
+
+
+def test_a_band_under_twice_the_backoff_is_infeasible():
+    found = solved(beatup().set("tolerances.l1", "5 mm"), 3.0)
+    assert found.status == "infeasible"
+    assert "the band of swing, 0.5 deg, is no wider than" in found.message
+    assert found.certificate is None
+
+
+def test_a_goal_whose_band_loses_machines_leaves_a_yield_out_of_reach():
+    found = solved(beatup().set("accept.M3_fdc", "1 N*m"), least=0.99)
+    assert found.status == "infeasible"
+    assert "nothing backs off M3_fdc" in found.message
+
+
+def test_what_cannot_be_asked_is_refused_in_one_line():
+    with pytest.raises(BadInput, match="no number of the scene has a tolerance"):
+        lo.solve("beatup", robust=3)
+    with pytest.raises(BadInput, match="say the same twice"):
+        lo.solve(beatup(), robust=3, yield_=0.99)
+    with pytest.raises(BadInput, match="no such yield"):
+        lo.solve(beatup(), yield_=99)
+    with pytest.raises(BadInput, match="nothing to back off"):
+        lo.solve(registry.load("beatup").update({"tolerances": {"M0": "5 %"}}), robust=3)
+
+
+def test_from_python():
+    found = lo.solve(beatup(), robust=1)
+    assert found.figures["peak_torque"] == of_beatup(1.0).figures["peak_torque"]
+    assert found.robust.yields == of_beatup(1.0).robust.yields
+    assert found.evaluate().admissible
+
+
+# Other jobs.
+
+DRIVE = dict.fromkeys(("l4", "l5", "l6", "l3p", "C0x", "C0y"), "0.06 mm") | dict.fromkeys(
+    ("alpha", "phi40"), "0.03 deg"
+)
+OF_A_FREE_DIRECTION = 2e-11
+"""Of an optimum along which a free direction is settled to 1e-8, relative."""
+
+
+def rapier(**changes):
+    return registry.load("rapier").update({"tolerances": DRIVE, **changes})
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "peak", "share", "se"),
+    [
+        pytest.param(1.0, 0.696181197104, 0.664421, 631e-6, marks=pytest.mark.slow),
+        pytest.param(2.0, 0.697384484445, 0.947025, 146e-6, marks=pytest.mark.slow),
+        pytest.param(3.0, 0.698593917703, 0.996754, 64e-6, marks=pytest.mark.slow),
+    ],
+)
+def test_backed_off_rapier_keeps_its_stroke(sigmas, peak, share, se):
+    found = solved(rapier(), sigmas, starts=1)
+    assert found.figures["peak_acceleration"] == pytest.approx(peak, rel=OF_A_FREE_DIRECTION)
+    assert found.figures["stroke"] == pytest.approx(0.85, rel=1e-12)
+    assert close(found.robust.yields["all"], share, se)
+    assert found.robust.kept == ("stroke",)
+    dwell = next(each for each in found.limits if each.name == "dwell_after")
+    assert dwell.min == pytest.approx(math.radians(30.0), rel=1e-14)
+    assert dwell.value == pytest.approx(dwell.min + dwell.backed_off, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "peak", "stroke"),
+    [
+        pytest.param(1.0, 0.695649333904, 849.315997950, marks=pytest.mark.slow),
+        pytest.param(2.0, 0.697096694557, 849.630518356, marks=pytest.mark.slow),
+        pytest.param(3.0, 0.698549837905, 849.943504005, marks=pytest.mark.slow),
+    ],
+)
+def test_stroke_as_a_limit_is_backed_off(sigmas, peak, stroke):
+    limits = {"limits.stroke": {"min": "849 mm", "max": "851 mm"}}
+    found = solved(rapier(**limits, **{"bounds.stroke": {"min": "800 mm", "max": "900 mm"}}), sigmas, starts=1)
+    assert found.figures["peak_acceleration"] == pytest.approx(peak, rel=OF_A_FREE_DIRECTION)
+    assert 1e3 * found.figures["stroke"] == pytest.approx(stroke, abs=2e-7)
+    assert close(found.robust.nominal_yields["all"], 0.0037, 5e-5)
+    assert found.robust.kept == ()
+
+
+@pytest.mark.slow
+def test_a_dwell_that_jumps_is_refused():
+    with pytest.raises(BadInput, match="dwell_before jumps on some machines"):
+        solved(rapier(**{"operation.s_dwell": "1 mm"}), 3.0, starts=1)
+
+
+SPRING = {"K1": "5 %", "X0": "1 mm"}
+FIXED = {"K1": "5130.13 N/m", "X0": "1 mm"}
+EVEN = {name: {"plus_minus": half, "spread": "uniform"} for name, half in SPRING.items()}
+ALL = SPRING | {"F": "10 N", "T1": "10 %", "T2": "10 %", "M": "2 %", "speed": "1 %", "travel": "0.2 mm"}
+
+
+@pytest.mark.parametrize(
+    ("problem", "made", "stiffness"),
+    [
+        pytest.param("shedding", FIXED, (104330.830438, 106060.058976, 107790.324104), marks=pytest.mark.slow),
+        ("shedding", SPRING, (104359.819061, 106178.031854, 108060.465231)),
+        pytest.param("shedding", EVEN, (105684.682012, 108956.876939, 112437.251345), marks=pytest.mark.slow),
+        pytest.param("shedding", ALL, (104749.537761, 106813.263575, 108941.206235), marks=pytest.mark.slow),
+        pytest.param(
+            "shedding-printed-travel", SPRING, (37049.731348, 37703.596814, 38380.947151), marks=pytest.mark.slow
+        ),
+    ],
+)
+def test_backed_off_spring(problem, made, stiffness):
+    scene = registry.load(problem)
+    scene = (scene.with_effect("dry_friction") if made is ALL else scene).update({"tolerances": made})
+    for sigmas, expected in zip((1.0, 2.0, 3.0), stiffness, strict=True):
+        found = solved(scene, sigmas)
+        assert found.figures["K1"] == pytest.approx(expected, abs=6e-7)
+    force = next(each for each in found.limits if each.name == "N_min")
+    assert force.min == scene.operation["N_min"]
+    assert found.figures["contact_min"] == pytest.approx(force.min + force.backed_off, abs=1e-6)
+    if made is SPRING and problem == "shedding":
+        assert close(found.robust.yields["all"], 0.998655, 1e-5)
+    if made is ALL:
+        assert found.robust.nominal.figures["K1"] == pytest.approx(102746.793970, abs=6e-7)
+
+
+def test_a_number_that_is_its_own_limit_is_not_backed_off():
+    found = solved(registry.load("shedding").update({"tolerances": {"K1": "5 %", "speed": "1 %"}}), 3.0)
+    speed = next(each for each in found.limits if each.name == "speed")
+    assert speed.backed_off == 0.0
+    assert "backed off" not in next(price.text for price in found.binding if price.limit == "speed")
+
+
+def test_a_limit_of_a_target_is_backed_off():
+    # |M3| at front dead centre within 1 % of M0: the target's own demand, which no table of limits holds.
+    found = solved(beatup(), 2.0, target="torque")
+    force = next(each for each in found.limits if each.name == "M3_fdc")
+    assert force.max == pytest.approx(7.45, rel=1e-12)
+    assert abs(force.value) == pytest.approx(force.max - force.backed_off, rel=1e-9)
+    assert found.robust.kept == ()
+
+
+@pytest.mark.slow
+def test_a_figure_that_bends_takes_the_steeper_slope():
+    # The dwell's largest travel stands at both of its ends: the mean of their slopes leaves 32 % of the machines.
+    scene = registry.load("sixbar-sley")
+    links = ("l1", "l2", "l3", "e", "l5", "l6", "Gx", "Gy")
+    found = solved(scene.update({"tolerances": dict.fromkeys(links, "0.06 mm")}), 3.0, starts=1)
+    assert found.robust.corners == ("travel.rest",)
+    assert found.robust.yields["all"].value > 0.99
+    assert found.robust.nominal_yields["all"].value < 0.01

@@ -1,0 +1,136 @@
+"""Rounding: the best of a whole lattice of sizes beside one computed apart, and beside solves of every point.
+
+Reference values: all 1 197 735 points read apart, each with the counterweight that balances it.
+"""
+
+import json
+
+import pytest
+
+import loomopt as lo
+from loomopt.base.errors import BadInput
+from loomopt.interface.files import answer_file
+from loomopt.interface.text import answers
+from loomopt.jobs import registry
+from loomopt.solving import engine
+from loomopt.studies.rounding import lattice
+
+
+def rounded(problem, steps, target=None, **changes):
+    scene = registry.load(problem).update(changes)
+    return lattice.solved(lattice.asked(scene, target, steps), lambda of, **how: engine.solve(of, target, **how))
+
+
+@pytest.mark.parametrize(
+    ("step", "points", "reaching", "links", "peak"),
+    [
+        ("0.5 mm", 1_197_735, 5220, (30.0, 75.5, 149.0, 167.0), 88.717207368),
+        ("1 mm", 87_048, 487, (30.0, 76.0, 149.0, 167.0), 88.795301023),
+    ],
+)
+def test_the_whole_lattice_of_links(step, points, reaching, links, peak):
+    found = rounded("beatup", {"l*": step})
+    assert (found.status, found.rounded.points, found.rounded.reaching) == ("optimal", points, reaching)
+    assert [1e3 * found.design[name] for name in ("l1", "l2", "l3", "l4")] == pytest.approx(links, abs=1e-12)
+    assert found.figures["peak_torque"] == pytest.approx(peak, abs=6e-10)
+    assert found.certificate.passed
+    assert found.rounded.boxes == 0
+    assert f"None of the {points} points of the lattice is better" in found.message
+    if step == "0.5 mm":
+        assert found.design["m4e"] == pytest.approx(6.34638663, abs=6e-9)
+        assert found.as_dict()["rounded"]["cost"]["peak_torque"] == pytest.approx(0.0277938762, abs=2e-9)
+    bound = next(each for each in found.limits if each.name == "l1")
+    assert (bound.min, bound.max) == (0.03, 0.035)
+
+
+def test_boxes_of_sizes_find_what_solving_every_point_finds():
+    scene = registry.load("beatup").update({"bounds.l2": {"min": "75 mm", "max": "77 mm"}})
+    found = lattice.solved(lattice.asked(scene, "pulse", {"l2": "1 mm"}), lambda of, **how: engine.solve(of, "pulse"))
+    each = [engine.solve(scene.set("bounds.l2", f"{size} mm"), "pulse") for size in (75, 76, 77)]
+    best = min(each, key=lambda one: one.figures["pulse_rms"] if one.status == "optimal" else float("inf"))
+    assert found.rounded.boxes > 0
+    assert found.rounded.gap == 0.0
+    assert found.design["l2"] == best.design["l2"]
+    assert found.figures["pulse_rms"] == pytest.approx(best.figures["pulse_rms"], rel=1e-9)
+
+
+def test_sizes_that_are_sold():
+    found = rounded("shedding", None, stock={"X0": ["30 mm", "70 mm"]})
+    assert found.design["X0"] == 0.07
+    alone = engine.solve(registry.load("shedding").set("bounds.X0", "70 mm"))
+    assert found.figures["K1"] == pytest.approx(alone.figures["K1"], rel=1e-9)
+    assert found.rounded.cost(found)["K1"] > 0.0
+
+
+def test_from_python_and_the_scene():
+    scene = registry.load("beatup").update({"steps": dict.fromkeys(("l1", "l2", "l3", "l4"), "1 mm")})
+    found = lo.solve(scene, steps=True)
+    assert found.figures["peak_torque"] == pytest.approx(88.795301023, abs=6e-10)
+    assert found.evaluate().admissible
+
+
+@pytest.mark.parametrize(
+    ("steps", "said"),
+    [
+        ({"q": "1 mm"}, "q is no number that is free"),
+        ({"l1": "20 mm"}, "no size of l1 lies within its bounds"),
+        ({"l1": "1 kg"}, "l1"),
+        ({"l1": "-1 mm"}, "out of range"),
+        (True, "nothing says which sizes there are"),
+    ],
+)
+def test_what_cannot_be_rounded_is_refused(steps, said):
+    with pytest.raises(BadInput, match=said):
+        lo.solve("beatup", steps=steps)
+
+
+def test_sizes_and_backoff_are_not_sought_together():
+    scene = registry.load("beatup").update({"tolerances": {"l1": "0.06 mm"}})
+    with pytest.raises(BadInput, match="not sought together"):
+        lo.solve(scene, steps={"l1": "1 mm"}, robust=3)
+
+
+def test_a_proof_of_all_designs_is_none_of_those_in_sizes():
+    with pytest.raises(BadInput, match="not of those in sizes"):
+        lo.solve("beatup", steps={"l*": "0.5 mm"}, everywhere=True)
+
+
+def test_a_lattice_without_an_admissible_point():
+    found = rounded("beatup", {"l1": "15 mm", "l2": "1 mm", "l3": "70 mm", "l4": "1 mm"})
+    assert found.status == "infeasible"
+    assert "keeps all limits" in found.message
+    assert "the design told is the optimum without sizes" in found.message
+
+
+def test_sizes_that_leave_a_goal_out_of_reach_ask_for_a_band():
+    links = {"bounds.l1": "30 mm", "bounds.l2": "75.5 mm", "bounds.l3": "149 mm", "bounds.l4": "167 mm"}
+    steps = {"m4e": "2 kg", "r4e": "40 mm"}
+    with pytest.raises(BadInput, match=r"no sizes meet M3_fdc exactly.*\[accept\] M3_fdc"):
+        rounded("beatup", steps, **links)
+    found = rounded("beatup", steps, **links, **{"accept.M3_fdc": "50 N*m"})
+    assert found.status == "optimal"
+    assert (found.design["m4e"], found.design["r4e"]) == (6.0, 0.08)
+
+
+def test_sizes_are_no_limits_and_the_file_agrees_with_its_design(tmp_path):
+    links = {"bounds.l1": "30 mm", "bounds.l3": "149 mm", "bounds.l4": "167 mm"}
+    found = rounded("beatup", {"l2": "0.5 mm"}, **links)
+    assert "l2" not in {price.limit for price in found.binding}
+    assert "m4e, r4e chosen so that M3_fdc is least" in found.message
+    path = tmp_path / "rounded.json"
+    path.write_text(json.dumps(found.as_dict()))
+    assert answer_file.recalled(path).doubts == ()
+
+
+def test_without_a_limit_beside_the_sizes():
+    found = rounded("shedding", {"K1": "500 N/m", "X0": "10 mm"})
+    assert found.binding == ()
+    assert answers.binding(found) == "No limit binds beside the sizes."
+
+
+def test_a_pattern_leaves_what_is_held():
+    scene = registry.load("rapier")
+    assert not scene.bounds["l1"].free
+    assert set(lattice.asked(scene, None, {"l*": "1 mm"}).sizes) == {"l4", "l5", "l6", "l3p"}
+    with pytest.raises(BadInput, match="l1 is not free"):
+        lattice.asked(scene, None, {"l1": "1 mm"})

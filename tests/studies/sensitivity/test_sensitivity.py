@@ -1,0 +1,243 @@
+"""Derivatives of optima beside those computed apart: by complex steps and by Newton on the KKT system, in 40 digits."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+
+from loomopt.base.errors import BadInput
+from loomopt.jobs import registry
+from loomopt.solving import engine
+from loomopt.studies.sensitivity import study
+from loomopt.studies.sensitivity.active import least
+
+DIGITS = 2e-9
+"""Of a derivative with ten digits: differences of the fourth order."""
+RANGE = 2e-5
+"""Of a range with five digits."""
+
+
+@functools.cache
+def found(problem, **changes):
+    scene = registry.load(problem)
+    scene = scene.update(dict(changes)) if changes else scene
+    return study.conducted(study.planned(scene, engine.solve(scene)))
+
+
+def derivative(problem, number, of):
+    (row,) = [row for row in found(problem).rows if (row.number, row.of) == (number, of)]
+    return row
+
+
+@pytest.mark.parametrize(
+    ("number", "of", "value"),
+    [
+        ("operation.M0", "peak_torque", 0.1190461926),
+        ("operation.speed", "peak_torque", 0.0),
+        ("effects.inertia.J4", "peak_torque", 0.0),
+        ("bounds.l1.min", "peak_torque", 4155.219051),
+        ("bounds.l4.max", "peak_torque", -746.4465361),
+        ("limits.theta.max", "peak_torque", -22.22556929),
+        ("limits.swing.max", "peak_torque", -0.07175383),
+        ("operation.M0", "m4e", 0.1384711942),
+        ("operation.speed", "m4e", -3.28371788),
+        ("effects.inertia.J4", "m4e", -156.25),
+        ("bounds.l1.min", "m4e", -3949.046864),
+        ("bounds.l4.max", "m4e", 709.4096163),
+        ("bounds.r4e.max", "m4e", -157.1509923),
+    ],
+)
+def test_the_balanced_beatup(number, of, value):
+    row = derivative("beatup", number, of)
+    assert row.side is None
+    assert row.value == pytest.approx(value, rel=DIGITS if number != "limits.swing.max" else 5e-8, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("limit", "low", "high", "ends"),
+    [
+        ("l1", -0.00067636e-3, 0.22428683e-3, ("swing's price is 0", "the price moves by +10 %")),
+        ("l4", -1.0762886e-3, 0.0037651e-3, ("the price moves by +10 %", "swing's price is 0")),
+        (
+            "theta",
+            math.radians(-0.0043482),
+            math.radians(0.6901386),
+            ("swing's price is 0", "the price moves by -10 %"),
+        ),
+        (
+            "swing",
+            math.radians(-5.8636e-5),
+            math.radians(5.8636e-5),
+            ("the price moves by +10 %", "the price moves by -10 %"),
+        ),
+    ],
+)
+def test_how_far_prices_of_the_beatup_hold_and_why_not_farther(limit, low, high, ends):
+    (price,) = [price for price in found("beatup").prices if price.limit == limit]
+    assert price.range == pytest.approx((low, high), rel=5e-5 if limit == "swing" else RANGE)
+    assert price.ends == ends
+
+
+@pytest.mark.parametrize(
+    ("number", "value"),
+    [
+        ("bounds.X0.max", -739681.681482),
+        ("mechanism.travel", 868647.149558),
+        ("operation.speed", 3196.191836),
+        ("effects.inertia.M", 2664.588686),
+        ("effects.weight.G", 7.209189763),
+        ("effects.warp_tension.T1", 0.0),
+        ("effects.warp_tension.T2", -5.695225451),
+        ("operation.N_min", 7.209189763),
+    ],
+)
+def test_rise_and_return_bind_together_and_nothing_is_refused(number, value):
+    row = derivative("shedding", number, "K1")
+    assert row.value == pytest.approx(value, rel=DIGITS, abs=1e-9)
+    assert row.side == ("up" if number == "operation.N_min" else None)
+
+
+def test_how_far_the_cloth_may_change_until_other_limits_bind():
+    (held,) = found("beatup").holds
+    assert held.number == "operation.M0"
+    assert held.range == pytest.approx((699.603990, 789.153301), abs=6e-7)
+    assert held.ends == ("m4e is reached", "m4e is reached")
+    assert found("shedding").holds == ()
+
+
+def test_a_weight_that_has_its_mass_and_a_spring_that_has_one():
+    """The weight with its mass M = G/g; a spring's mass moves with a third of itself."""
+    assert derivative("shedding", "effects.weight.G", "K1").value + derivative(
+        "shedding", "effects.inertia.M", "K1"
+    ).value / 9.80665 == pytest.approx(278.921618, abs=6e-7)
+    scene = registry.load("shedding").with_effect("spring_inertia").set("effects.spring_inertia.mass", "0 kg")
+    here = study.conducted(study.planned(scene, engine.solve(scene)))
+    (row,) = [row for row in here.rows if (row.number, row.of) == ("effects.spring_inertia.mass", "K1")]
+    assert row.side == "up"
+    assert row.value == pytest.approx(888.196229, rel=1e-8)
+
+
+def test_effects_that_begin_have_derivatives_on_one_side():
+    """Damping and friction part rise from return: each side has its own active set; less than none there is not."""
+    here = found("shedding", **{"effects.damping.C": "0 N*s/m", "effects.dry_friction.F": "0 N"})
+    rows = {row.number: row for row in here.rows if row.of == "K1"}
+    for number, value in (("effects.damping.C", 15.396653420), ("effects.dry_friction.F", 7.209189763)):
+        assert rows[number].side == "up"
+        assert rows[number].value == pytest.approx(value, rel=1e-8)
+
+
+def test_how_far_prices_of_the_shedding_hold():
+    ranges = {price.limit: price.range for price in found("shedding").prices}
+    ends = {price.limit: price.ends for price in found("shedding").prices}
+    more, less = "the price moves by +10 %", "the price moves by -10 %"
+    assert {name: ends[name] for name in ("X0", "travel", "speed")} == {
+        "X0": (more, less),
+        "travel": (more, less),
+        "speed": (less, more),
+    }
+    assert ranges["X0"] == pytest.approx((-6.4296e-3, 7.4779e-3), rel=1e-5)
+    assert ranges["travel"] == pytest.approx((-7.2410e-3, 8.4256e-3), rel=1e-5)
+    rpm = 2 * math.pi / 60
+    assert ranges["speed"] == pytest.approx((-59.998 * rpm, 59.998 * rpm), rel=1e-5)
+
+
+@pytest.mark.slow
+def test_resolving_confirms_a_derivative():
+    scene = registry.load("beatup-light")
+    row = {row.number: row for row in found("beatup-light").rows if row.of == "M3_fdc"}["bounds.l1.min"]
+    ends = [engine.solve(scene.set("bounds.l1.min", f"{30 + d} mm")).figures["M3_fdc"] for d in (1e-3, -1e-3)]
+    assert row.value == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-4)
+
+
+def test_a_free_cam_law_which_more_rows_hold_than_it_has_knots():
+    """Confirmed by solving again on both sides; N_min may only grow, and counts as the weight does."""
+    scene = registry.load("shedding")
+    answer = engine.solve(scene, "law")
+    found = study.conducted(study.planned(scene, answer))
+    assert found.refused is None
+    rows = {row.number: row for row in found.rows if row.of == "K1"}
+    for key, unit, here, step, si in (
+        ("bounds.X0.max", "mm", 80.0, 0.01, 1e-3),
+        ("operation.speed", "rpm", 600.0, 0.1, math.pi / 30),
+    ):
+        up, down = (
+            engine.solve(scene.set(key, f"{here + sign * step} {unit}"), "law").design["K1"] for sign in (1, -1)
+        )
+        assert rows[key].side is None
+        assert rows[key].value == pytest.approx((up - down) / (2 * step * si), rel=1e-6)
+    assert rows["operation.N_min"].side == "up"
+    assert rows["operation.N_min"].value == pytest.approx(rows["effects.weight.G"].value, rel=1e-8)
+
+
+def test_the_least_of_a_linear_program_is_its_vertex_or_nothing():
+    square = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 1.0]])
+    sides, none, nothing = np.array([1.0, 1.0, 0.0, 0.0, 2.0]), np.zeros((0, 2)), np.zeros(0)
+    assert least(np.array([-1.0, -2.0]), square, sides, none, nothing) == pytest.approx([1.0, 1.0])
+    assert least(np.array([1.0, -2.0]), square, sides, none, nothing) == pytest.approx([0.0, 1.0])
+    held = np.array([[1.0, -1.0]])
+    assert least(np.array([1.0, 1.0]), square, sides, held, np.array([0.25])) == pytest.approx([0.25, 0.0])
+    assert least(np.array([1.0, 0.0]), square[:1], sides[:1], none, nothing) is None
+
+
+def test_an_answer_that_is_not_certified_is_refused():
+    scene = registry.load("beatup").update({"limits.swing.max": "23 deg", "limits.swing.min": "22.99 deg"})
+    answer = engine.solve(scene.update({"bounds.l1.min": "34.9 mm"}))
+    if answer.status == "optimal":
+        pytest.skip("the scene has an answer after all")
+    with pytest.raises(BadInput, match="only a certified optimum has derivatives"):
+        study.planned(scene, answer)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("number", "value"),
+    [
+        ("mechanism.l1", 0.244453501),
+        ("mechanism.l2", 0.038980951),
+        ("mechanism.l3", -0.113138535),
+        ("mechanism.l71", 0.062052955),
+        ("mechanism.phi30", -0.014286049),
+        ("mechanism.i1", 0.004153223),
+        ("mechanism.i2", 0.069220389),
+        ("mechanism.wheel", 0.288418286),
+        ("operation.stroke", 0.776179298),
+        ("operation.s_dwell", -5.664673020),
+        ("operation.dwell_after", 0.108213340),
+        ("operation.dwell_before", 0.122005456),
+        ("limits.mu_min.min", 0.253158269),
+        ("bounds.l3p.max", -0.023617436),
+        ("bounds.alpha.max", -0.014286049),
+        ("bounds.C0y.min", 0.035246404),
+        ("operation.speed", 0.0),
+    ],
+)
+def test_the_rapier_with_its_free_direction(number, value):
+    row = derivative("rapier", number, "peak_acceleration")
+    assert row.value == pytest.approx(value, rel=1e-9, abs=2e-9)
+    assert row.side is None
+
+
+@pytest.mark.slow
+def test_how_far_prices_of_the_rapier_hold():
+    prices = {price.limit: price for price in found("rapier").prices}
+    assert prices["stroke"].range[0] == pytest.approx(-6.730e-3, abs=6e-7)
+    reached, more, less = "C0x is reached", "the price moves by +10 %", "the price moves by -10 %"
+    assert {name: prices[name].ends for name in ("stroke", "s_dwell", "dwell_after", "dwell_before")} == {
+        "stroke": (reached, reached),
+        "s_dwell": (reached, reached),
+        "dwell_after": (reached, more),
+        "dwell_before": (more, reached),
+    }
+    assert {name: prices[name].ends for name in ("l3p", "alpha", "C0y")} == {
+        "l3p": (reached, less),
+        "alpha": (more, reached),
+        "C0y": (reached, less),
+    }
+    assert prices["s_dwell"].range[0] == pytest.approx(-0.5437e-3, abs=6e-8)
+    assert [math.degrees(x) for x in prices["dwell_after"].range] == pytest.approx([-2.056, 5.553], abs=6e-4)
+    assert [math.degrees(x) for x in prices["dwell_before"].range] == pytest.approx([-8.02, 3.028], abs=6e-3)
+    assert [math.degrees(x) for x in prices["mu_min"].range] == pytest.approx([-3.107, 3.535], abs=6e-4)
+    assert [1e3 * x for x in prices["l3p"].range] == pytest.approx([-4.329, 18.92], abs=6e-3)
+    assert [math.degrees(x) for x in prices["alpha"].range] == pytest.approx([-12.33, 1.051], abs=6e-3)
+    assert [1e3 * x for x in prices["C0y"].range] == pytest.approx([-4.982, 41.9], abs=6e-2)
