@@ -1,6 +1,9 @@
 """Write what the documents take from the program: glossary, sketches, and the outputs and words of all pages.
 
-    python docs/write.py            (or: make docs)
+    python docs/write.py            (or: make outputs)
+
+A page is carried out from top to bottom in a folder of its own. A block after "`NAME`:" is a file, after "Add to
+`NAME`:" its end; of ```console the command is run and its output compared, ```sh and ```python are run.
 
 The suite compares all of it with what stands there (tests/end_to_end/test_documents.py).
 """
@@ -10,7 +13,8 @@ import io
 import os
 import re
 import shlex
-from collections.abc import Callable, Iterator
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from unittest import mock
 
@@ -24,13 +28,18 @@ from loomopt.jobs import registry
 from loomopt.solving.answer.solution import Words
 
 DOCS = Path(__file__).parent
-GLOSSARY = DOCS / "glossary.md"
-PAGES = (DOCS.parent / "README.md", *sorted(set(DOCS.glob("*.md")) - {GLOSSARY}))
+GLOSSARY = DOCS / "reference" / "glossary.md"
+PAGES = (DOCS.parent / "README.md", *sorted(set(DOCS.rglob("*.md")) - {GLOSSARY}))
 """What is written by hand, but for outputs and tables."""
 WIDTH = "100"
 """Columns of the outputs that pages show."""
 BLOCK = re.compile(r"^```console\n\$ loomopt (.*)\n((?:.*\n)*?)```$", re.MULTILINE)
+STEP = re.compile(r"(?:^(Add to )?`([\w.-]+)`:\n\n)?^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+NOT_HERE = "# needs "
+"""Begins Python that is only compiled."""
 TABLE = re.compile(r"(<!-- (symbols|effects) of (\S+) -->\n)(?:.*\n)*?(<!-- end -->)")
+SHOWN = {"linkage": "sixbar-sley"}
+"""Jobs without a packaged scene of their own name → the one that pages show."""
 LEFT_OUT = "..."
 CHANGES = re.compile(
     r"(?<=limits )\S+(?=, stat)|(?<=stationarity )[^,]+|(?<=cycle )[^;]+|\(\d+$|\b\d+\.\d+ s\b|Time: .*"
@@ -44,12 +53,14 @@ def glossary_text() -> str:
         "# Glossary\n",
         "Every symbol that a table shows. `loomopt show PROBLEM --symbols` prints it for any scene, in its own\n"
         "units; here they are those of the packaged ones. An x marks what the sketch names. Joints are the sketch's.\n",
-        "This page is written by `make docs`; its words stand in the program.\n",
+        "This page is written by `make outputs`; its words stand in the program.\n",
     ]
     for job in registry.own_names():
-        scene = registry.load(job)
+        scene = registry.load(SHOWN.get(job, job))
         title, *grids = glossary.parts(scene)
-        parts.append(f"## {str(title).removeprefix(f'{job}: ').capitalize()}\n\n![Sketch](sketch-{job}.svg)\n")
+        parts.append(
+            f"## {str(title).removeprefix(f'{scene.name}: ').capitalize()}\n\n![Sketch](../sketch-{job}.svg)\n"
+        )
         parts += [f"### {grid.title}\n\n{table(grid)}" for grid in grids if isinstance(grid, Grid)]
     return "\n".join(parts)
 
@@ -64,7 +75,7 @@ def sketches() -> dict[str, str]:
     """Return the drawing of each job's packaged machine, by file name, as SVG."""
     found = {}
     for name in registry.own_names():
-        scene = registry.load(name)
+        scene = registry.load(SHOWN.get(name, name))
         found[f"sketch-{name}.svg"] = svg.render(
             outputs.drawing(scene, glossary.sketched(scene), outputs.DrawnSubject("sketch"))
         )
@@ -72,13 +83,35 @@ def sketches() -> dict[str, str]:
 
 
 def output(words: str) -> list[str]:
-    """Return what a command prints, line by line."""
+    """Return what a command prints, line by line; `> FILE` writes it there too."""
     printed = io.StringIO()
+    command, _, file = words.partition(" > ")
     with contextlib.redirect_stdout(printed), mock.patch.dict(os.environ, COLUMNS=WIDTH):
-        status = run(shlex.split(words))
+        status = run(shlex.split(command, comments=True))
     if status:
         raise SystemExit(f"loomopt {words} ends with exit status {status}")
+    if file:
+        Path(file.split()[0]).write_text(printed.getvalue(), encoding="utf-8")
     return printed.getvalue().rstrip("\n").split("\n")
+
+
+def carried_out(text: str) -> Iterator[tuple[str, list[str]]]:
+    """Carry out a page in the folder at hand; yield each command whose output it tells, with what it prints now."""
+    names: dict[str, object] = {"__name__": "page"}
+    for more, file, kind, body in STEP.findall(text):
+        if file:
+            with Path(file).open("a" if more else "w", encoding="utf-8") as opened:
+                opened.write(body)
+        elif kind == "console" and body.startswith("$ loomopt "):
+            words = body.partition("\n")[0].removeprefix("$ loomopt ")
+            yield words, output(words)
+        elif kind == "sh":
+            for line in body.splitlines():
+                output(line.removeprefix("loomopt "))
+        elif kind == "python":
+            code = compile(body, "page", "exec")
+            if not body.startswith(NOT_HERE):
+                exec(code, names)
 
 
 def masked(line: str) -> str:
@@ -117,7 +150,7 @@ def symbols(name: str) -> str:
 
 def effects(name: str) -> str:
     """Return the effects that scenes of a job may call for, as Markdown."""
-    known = registry.load(name).schema.effects.values()
+    known = registry.load(SHOWN.get(name, name)).schema.effects.values()
     lines = tuple((f"`{each.name}`", type(each).__name__.lower(), each.summary) for each in known)
     return table(Grid("", ("effect", "kind", "what it is"), lines))
 
@@ -128,11 +161,13 @@ def rewritten(match: re.Match[str]) -> str:
     return f"{match[1]}{made(match[3])}{match[4]}"
 
 
-def page_text(text: str, run: Callable[[str], list[str]] = output) -> str:
+def page_text(text: str) -> str:
     """Return a page with its outputs and tables as they are now."""
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        printed = iter(list(carried_out(text)) if BLOCK.search(text) else ())
 
     def block(match: re.Match[str]) -> str:
-        lines = updated(match[2].rstrip("\n").split("\n") if match[2] else [], run(match[1]))
+        lines = updated(match[2].rstrip("\n").split("\n") if match[2] else [], next(printed)[1])
         return "```console\n$ loomopt " + match[1] + "\n" + "\n".join(lines) + "\n```"
 
     return TABLE.sub(rewritten, BLOCK.sub(block, text))

@@ -7,6 +7,7 @@ with what stands there (tests/end_to_end/test_notebooks.py).
 """
 
 import base64
+import hashlib
 import io
 import math
 import os
@@ -22,6 +23,8 @@ from nbformat import NotebookNode
 from PIL import Image
 
 FOLDER = Path(__file__).parent
+ROOT = FOLDER.parent
+KEPT = ROOT / "build" / "executed"
 LONGEST = 600
 """Seconds that a cell may take."""
 CLOSE, NOTHING = 1e-5, 1e-8
@@ -55,7 +58,7 @@ def executed(path: Path) -> NotebookNode:
     """Return a notebook run from a clean kernel, without what differs from run to run. Raises what a cell raises."""
     notebook = read(path)
     with tempfile.TemporaryDirectory() as own:  # no start-up files and no history of the user's
-        environment = os.environ | {"PYTHONPATH": str(FOLDER.parent), "IPYTHONDIR": own}
+        environment = os.environ | {"PYTHONPATH": str(ROOT), "IPYTHONDIR": own}
         client = NotebookClient(
             notebook,
             timeout=LONGEST,
@@ -71,9 +74,33 @@ def executed(path: Path) -> NotebookNode:
         if "outputs" in cell:  # progress is an empty line in the end, and there where a cell has taken a second
             cell.outputs = [each for each in cell.outputs if each.get("data") != {"text/plain": ""}]
         for output in cell.get("outputs", ()):
-            output.metadata = {}
+            if "data" in output:
+                output.metadata = {}
             _clean(output.get("data", {}))
     return notebook
+
+
+def program() -> str:
+    """Return what all that notebooks say depends on: a digest of the program, its problems and this file."""
+    found = hashlib.sha256()
+    for path in sorted([*ROOT.glob("loomopt/**/*"), *ROOT.glob("problems/*"), Path(__file__)]):
+        if path.is_file() and path.suffix != ".pyc":
+            found.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    return found.hexdigest()
+
+
+def kept(path: Path) -> NotebookNode:
+    """Return `executed`; of a notebook and a program that were run before what came of it then, from build/executed."""
+    sources = "\0".join(f"{cell.cell_type} {cell.source}" for cell in read(path).cells)
+    digest = hashlib.sha256(f"{program()}\0{sources}".encode()).hexdigest()[:16]
+    place = KEPT / f"{path.stem}-{digest}.ipynb"
+    if not place.exists():
+        found = executed(path)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = place.with_suffix(f".{os.getpid()}")
+        nbformat.write(found, unfinished)
+        unfinished.replace(place)
+    return read(place)
 
 
 def _clean(data: NotebookNode) -> None:
