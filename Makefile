@@ -6,9 +6,11 @@ SUITE := $(BIN)/python -m pytest -n auto --dist loadfile --durations 10
 COVERED ?= tests
 COVER ?=
 COVERING := --cov loomopt --cov-report=
+# make docs-open: where the site is served.
+PORT ?= 8000
 TOTAL = @echo "Coverage by $(1): $$($(BIN)/python -m coverage report --format=total) % of the lines of loomopt"
 
-.PHONY: solve test slow coverage lint types docs notebooks benchmark locked clean
+.PHONY: solve test slow coverage lint types docs docs-open outputs notebooks benchmark locked clean
 
 solve: .venv/installed
 	$(BIN)/loomopt solve beatup --target balance
@@ -18,7 +20,7 @@ test: .venv/installed-test
 	$(if $(COVER),$(call TOTAL,make test))
 
 slow: .venv/installed-test
-	$(SUITE) -m slow
+	$(SUITE) -m slow -rs
 
 coverage: .venv/installed-test
 	$(SUITE) -m "not slow" $(COVERING) $(COVERED)
@@ -31,7 +33,16 @@ lint: .venv/installed-test
 types: .venv/installed-test
 	$(BIN)/mypy
 
-docs: .venv/installed
+# Warnings are errors; nothing is fetched. What was run is kept in build/executed.
+docs: .venv/installed-docs
+	$(BIN)/python -m sphinx -W --keep-going -q -j 2 -c docs . build/site
+	@echo "build/site/index.html"
+
+docs-open: docs
+	@echo "http://127.0.0.1:$(PORT)/ until Ctrl-C"
+	$(BIN)/python -m http.server $(PORT) --bind 127.0.0.1 --directory build/site
+
+outputs: .venv/installed
 	$(BIN)/python docs/write.py
 
 notebooks: .venv/installed-test
@@ -43,7 +54,10 @@ benchmark: .venv/installed-test
 	$(BIN)/python benchmarks/peers/balance_peers.py
 	$(BIN)/python benchmarks/peers/rapier_peers.py
 	$(BIN)/python benchmarks/peers/shedding_peers.py
+	$(BIN)/python benchmarks/measure/answers.py
+	$(BIN)/python benchmarks/measure/fronts.py
 	$(BIN)/python benchmarks/measure/startup.py
+	$(BIN)/python benchmarks/measure/stretches.py
 
 .venv/installed: pyproject.toml
 	$(PYTHON) -m venv .venv
@@ -55,13 +69,18 @@ benchmark: .venv/installed-test
 	$(BIN)/pip install -q -e '.[test]'
 	touch $@
 
+.venv/installed-docs: .venv/installed-test
+	$(BIN)/pip install -q -e '.[docs]'
+	touch $@
+
 # In the place of the newest versions those of requirements.lock, with which the suite has passed.
 locked:
 	$(PYTHON) -m venv .venv
-	$(BIN)/pip install -q -c requirements.lock -e '.[test]'
+	$(BIN)/pip install -q -c requirements.lock -e '.[test,docs]'
 	$(BIN)/python -m compileall -q loomopt
 	touch .venv/installed
 	touch .venv/installed-test
+	touch .venv/installed-docs
 
 clean:
-	rm -rf .venv
+	rm -rf .venv build/site build/executed

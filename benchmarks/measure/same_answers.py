@@ -26,6 +26,10 @@ SCENES = {
     "shedding": ("stiffness", "law", "force", "speed"),
     "shedding-printed-travel": ("stiffness", "law", "force", "speed"),
     "shedding-static": ("stiffness", "force", "speed"),
+    "knuckle-press": ("torque",),
+    "path-18": ("path",),
+    "shaper": ("torque",),
+    "sixbar-sley": ("balance", "torque", "rms", "smooth", "dwell"),
 }
 REED = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
 TAPE = ("head_inertia", "tape_friction")
