@@ -6,7 +6,6 @@ import importlib
 import math
 import sys
 from collections.abc import Callable, Collection, Container, Iterator, Mapping, Sequence
-from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -172,7 +171,7 @@ class Task(abc.ABC):
                 remedy = f"Correct the limit, or the bounds of {held.called}."
                 raise BadInput(f"{held.called} cannot be as large", key=f"limits.{each[0][0]}.min", remedy=remedy)
             upper, around = (held.upper, held.range) if room else (least, (least, least))
-            found[name] = replace(held, lower=max(least, held.lower) if room else least, upper=upper, range=around)
+            found[name] = held._replace(lower=max(least, held.lower) if room else least, upper=upper, range=around)
         return tuple(found.values())
 
     def _asked_of(self, name: str) -> Variable:

@@ -9,8 +9,7 @@ import functools
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.maths.systems import Maths, Number, within_half_turn
 
@@ -32,8 +31,7 @@ BESIDE = 8
 """Samples on each side of one that is left out: what lies beyond moves the curve there by less than 3e-5 of its own."""
 
 
-@dataclass(frozen=True)
-class PeriodicCubic:
+class PeriodicCubic(NamedTuple):
     """Cubics c0 + c1 t + c2 t² + c3 t³, t counted from each interval's middle, rad.
 
     begins: angles where intervals begin, rad, ascending within one turn; middles: theirs; cubics: c0 … c3 by interval;
@@ -83,8 +81,7 @@ class PeriodicCubic:
         return within_half_turn(maths, angle - maths.choose(interval, [maths.number(value) for value in self.middles]))
 
 
-@dataclass(frozen=True)
-class PeriodicCubics:
+class PeriodicCubics(NamedTuple):
     """The components of a vector, through samples at the same angles: `PeriodicCubic` says what each word means."""
 
     curves: tuple[PeriodicCubic, ...]

@@ -2,7 +2,8 @@
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 from loomopt.base.errors import BadInput, unknown
 from loomopt.maths.systems import Number
@@ -18,8 +19,7 @@ FORMS: Mapping[str, type[Objective]] = {"value": Value, "magnitude": Magnitude, 
 """How an axis says that it is read → the kind of objective that it is."""
 
 
-@dataclass(frozen=True)
-class Traded:
+class Traded(NamedTuple):
     """An axis and the end of it that is sought: the least value, of which figure = offset + sign · value^(1/power)."""
 
     axis: Axis

@@ -481,9 +481,9 @@ class _Combining:
         each = [program.variables[place] for program in self.programs]
         own = each[member]
         if own.name in self.apart:
-            return replace(own, name=of_member(own.name, member), label=of_member(own.called, member))
+            return own._replace(name=of_member(own.name, member), label=of_member(own.called, member))
         lower, upper = max(v.lower for v in each), min(v.upper for v in each)
-        return replace(own, lower=lower, upper=max(lower, upper))
+        return own._replace(lower=lower, upper=max(lower, upper))
 
     def limit(self, member: int, limit: Limit) -> Limit:
         """Return a limit of a member as one of the whole."""

@@ -148,8 +148,7 @@ class ScaleMove(Move):
         return max(low for low, _ in scales), min(high for _, high in scales)
 
 
-@dataclass(frozen=True)
-class Variable:
+class Variable(NamedTuple):
     """A design variable of the NLP, SI: name among the model's values, bounds, scale, range of random starts.
 
     label: what a designer calls it, its name without one.
@@ -284,7 +283,7 @@ class Program:
             if variable.lower == variable.upper:
                 low = high = next(each.value for each in own if each.row in moved)
             around = (low, high) if variable.lower == variable.upper else variable.range
-            return replace(variable, lower=low, upper=high, range=around)
+            return variable._replace(lower=low, upper=high, range=around)
 
         return replace(self, limits=limits, variables=tuple(map(within, self.variables)))
 

@@ -5,7 +5,7 @@ import functools
 import importlib
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from loomopt.base.records import lazy
 from loomopt.maths import systems
@@ -49,8 +49,7 @@ class Symbols(dict[str, Expression]):
         return symbol(name)
 
 
-@dataclass(frozen=True)
-class Angle:
+class Angle(NamedTuple):
     """An angle of a loop with its first two derivatives, symbols or numbers."""
 
     name: str

@@ -128,7 +128,7 @@ def _limits(job: FamilyJob, members: tuple[Evaluated, ...]) -> tuple[Finding, ..
         for limit in member.limits:
             name = part.limits.get(limit.name, limit.name)
             if name not in found or _room(limit) < _room(found[name]):
-                found[name] = replace(limit, name=name)
+                found[name] = limit._replace(name=name)
     return tuple(found.values())
 
 

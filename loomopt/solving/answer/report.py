@@ -150,7 +150,7 @@ def _with_rounding(found: Evaluated, scene: Scene, design: Mapping[str, float], 
             changes = [abs(values[k] - limit.value) for values in moved if values]
             reach[k] += max((change for change in changes if math.isfinite(change)), default=0.0)
     pairs = zip(found.limits, reach, strict=True)
-    limits = tuple(replace(each, rounding=not each.ok and _excess(each) <= most) for each, most in pairs)
+    limits = tuple(each._replace(rounding=not each.ok and _excess(each) <= most) for each, most in pairs)
     return replace(found, limits=limits)
 
 

@@ -19,8 +19,7 @@ from loomopt.scenes.tables import FAMILY
 from loomopt.solving.certificate.verdict import Binding, Certificate, GlobalBound, worth_of
 
 
-@dataclass(frozen=True)
-class Proof:
+class Proof(NamedTuple):
     """What is shown of one limit, SI.
 
     name: of the limit, or of the figure whose claimed peak it is. margin: by how much the refined value stays clear of
@@ -50,7 +49,7 @@ class Proof:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON data."""
-        return {"limit": self.limit} | {key: value for key, value in vars(self).items() if key not in ("name", "kind")}
+        return {"limit": self.limit} | {key: value for key, value in self._asdict().items() if key not in ("name", "kind")}
 
 
 @dataclass(frozen=True, repr=False)
@@ -100,8 +99,7 @@ ADVICE = {
 """What each of IPOPT's statuses means to a designer."""
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """One limit beside its figure, SI; min or max is None where the limit has no such side.
 
     rounding: of one that is exceeded, whether by less than the rounding of the digits in which the design was given.
@@ -118,11 +116,10 @@ class Finding:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON data; what is not exceeded says nothing of rounding, nor a limit as it stands of more."""
-        return {name: value for name, value in vars(self).items() if value or name not in ("rounding", "backed_off")}
+        return {name: value for name, value in self._asdict().items() if value or name not in ("rounding", "backed_off")}
 
 
-@dataclass(frozen=True)
-class Price:
+class Price(NamedTuple):
     """A limit that binds; worth: objective figure → its fall per unit the limit is loosened, SI.
 
     backed_off: how far from its value it binds already, SI.
@@ -140,12 +137,11 @@ class Price:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON data; a limit that binds where it stands says no more."""
-        told = {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in vars(self).items() if k != "reading"}
+        told = {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in self._asdict().items() if k != "reading"}
         return {k: v for k, v in told.items() if v or k != "backed_off"}
 
 
-@dataclass(frozen=True)
-class Relaxation:
+class Relaxation(NamedTuple):
     """How far a limit must be loosened to make a design possible, SI.
 
     alone: this one limit suffices; in_proportion: it gives way by no more than a designer may think of.
@@ -264,8 +260,7 @@ def _member_dict(member: Evaluated) -> dict[str, Any]:
     return {"change": dict(member.change), **told}
 
 
-@dataclass(frozen=True)
-class Beside:
+class Beside(NamedTuple):
     """Another design, with more or less added mass, beside which an answer makes little difference.
 
     added: what differs; share: of each figure, what counts as little; chosen: whether the answer is the one with less.
@@ -297,8 +292,7 @@ class Yield(NamedTuple):
     se: float
 
 
-@dataclass(frozen=True)
-class Robust:
+class Robust(NamedTuple):
     """How limits were backed off, so that machines hold them as they are made.
 
     sigmas: standard deviations of its own figure by which each keeps clear; asked: the yield that was asked for, if
@@ -346,8 +340,7 @@ class Robust:
         }
 
 
-@dataclass(frozen=True)
-class Rounded:
+class Rounded(NamedTuple):
     """How numbers were put to sizes that can be ordered.
 
     sizes: least and largest of each number's sizes, SI, and how many; points: of the lattice; admissible: those that
@@ -474,7 +467,7 @@ class Solution(Evaluated):
             tail["indifference"] = self.beside.as_dict(self)
         if self.relaxation:
             tail["clash"] = list(self.clash)
-            tail["relaxation"] = [vars(relaxation) for relaxation in self.relaxation]
+            tail["relaxation"] = [relaxation._asdict() for relaxation in self.relaxation]
         if len(self.optima) > 1:
             tail["optima"] = [
                 {"figures": {k: _finite(v) for k, v in figures.items()}, "starts": n} for figures, n in self.optima

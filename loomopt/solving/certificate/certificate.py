@@ -8,6 +8,7 @@ figure that decides is too near its threshold for floats, all is judged again in
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,8 +39,7 @@ SECOND_ORDER_OPEN = "second order open"
 """The reason of a certificate that neither curvature nor higher orders decide."""
 
 
-@dataclass(frozen=True)
-class JudgedLevel:
+class JudgedLevel(NamedTuple):
     """One level: its residuals, the multipliers they are of, and its curvature (None where there was none to judge)."""
 
     level: Level
@@ -47,8 +47,7 @@ class JudgedLevel:
     curvature: Curvature | None = None
 
 
-@dataclass(frozen=True)
-class WholeCycle:
+class WholeCycle(NamedTuple):
     """What holds over the whole cycle: by how much a refined value is exceeded, and what boxes say."""
 
     violation: float
@@ -182,7 +181,7 @@ def judged_levels(local: Local) -> list[JudgedLevel]:
 
 def _judged_level(whole: Local, place: int, earlier: Sequence[JudgedLevel]) -> JudgedLevel:
     """Solve one level's KKT system, along what earlier levels leave open, and judge its curvature."""
-    local = replace(whole, closed=tuple(c for each in earlier if each.curvature and (c := each.curvature.closed)))
+    local = whole._replace(closed=tuple(c for each in earlier if each.curvature and (c := each.curvature.closed)))
     system = kkt.system(local.active, place, [each.multipliers for each in earlier], local.program.fixed)
     first = _met(local, system)
     alone = JudgedLevel(_residuals(local, place, system, first, first.residual), first)

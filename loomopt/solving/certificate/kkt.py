@@ -7,7 +7,8 @@ an earlier objective that binds is an equality of free sign at later levels.
 import math
 import sys
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +25,7 @@ MOVED = 100 * SAME_NODE
 """How far, in u, an extreme may move with a design: what is farther is another."""
 
 
-@dataclass(frozen=True)
-class ActiveRow:
+class ActiveRow(NamedTuple):
     """One smooth function of the design, in its natural size.
 
     A limit's residual or an objective's piece, either of them maybe at an extreme of the cycle (`node`). reads: the
@@ -43,8 +43,7 @@ class ActiveRow:
     node: Extreme | None = None
 
 
-@dataclass(frozen=True)
-class ActiveSet:
+class ActiveSet(NamedTuple):
     """Rows of a program at one design: those of limits first, then the pieces of each objective.
 
     limits: how many rows limits have; levels: places of each objective's pieces; zero: whether an objective is a
@@ -103,9 +102,9 @@ def _moved(row: ActiveRow, sampler: Sampler) -> ActiveRow | None:
     piece, u = row.node.piece, row.node.u
     if u in (0.0, 1.0):
         value = float(sampler.at(row.reads, np.array([piece]), np.array([u]))[0])
-        return replace(row, node=row.node._replace(value=value))
+        return row._replace(node=row.node._replace(value=value))
     own = [each for each in sampler.extremes(row.reads) if each.piece == piece and abs(each.u - u) <= MOVED]
-    return replace(row, node=min(own, key=lambda each: abs(each.u - u))) if own else None
+    return row._replace(node=min(own, key=lambda each: abs(each.u - u))) if own else None
 
 
 def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: float) -> Binding:
@@ -122,8 +121,7 @@ def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: flo
     return Binding(limit, side, objective, worth)
 
 
-@dataclass(frozen=True)
-class System:
+class System(NamedTuple):
     """What one level's slopes are balanced from, as places of rows.
 
     pieces: of the objective; inequalities: of limits, and of earlier objectives' pieces that must not rise; equalities:
@@ -150,8 +148,7 @@ class System:
         return System(self.pieces, self.inequalities, self.equalities, self.held[:0])
 
 
-@dataclass(frozen=True)
-class LevelMultipliers:
+class LevelMultipliers(NamedTuple):
     """Multipliers of all rows, in natural sizes, and the slope they leave."""
 
     of: Floats

@@ -370,8 +370,7 @@ FOLLOWED = 3
 along a straight line."""
 
 
-@dataclass(frozen=True)
-class Local:
+class Local(NamedTuple):
     """A program around one design x (SI): its active set with slopes (rows, variables), and what curves them.
 
     closed: by each earlier level; shown: of how many first levels it is known that none falls to higher order.

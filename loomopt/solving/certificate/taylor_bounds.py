@@ -8,7 +8,6 @@ inside the balls.
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -34,8 +33,7 @@ CycleRow = tuple[str, float, Where | None]
 """A whole-cycle quantity, its natural size, and the pieces where it counts."""
 
 
-@dataclass(frozen=True)
-class CycleBound:
+class CycleBound(NamedTuple):
     """What the boxes show of one row: proven, violated at `angle` (rad), or neither within the boxes allowed."""
 
     status: str

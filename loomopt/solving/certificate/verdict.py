@@ -10,8 +10,7 @@ from loomopt.model.objectives import Objective, Sought
 from loomopt.physics.tolerances import ROUNDED
 
 
-@dataclass(frozen=True)
-class Level:
+class Level(NamedTuple):
     """The KKT residuals of one objective; held: the multiplier of the objectives before it.
 
     price: the largest multiplier of a limit, dearest: that limit's name.
@@ -25,8 +24,7 @@ class Level:
     dearest: str = ""
 
 
-@dataclass(frozen=True)
-class Binding:
+class Binding(NamedTuple):
     """A limit that binds, and the fall of the first objective it moves per unit it is loosened (SI)."""
 
     limit: Limit
@@ -125,8 +123,7 @@ class Certificate:
         return max((max(level.stationarity, level.complementarity) for level in self.levels), default=0.0)
 
 
-@dataclass(frozen=True)
-class GlobalLevel:
+class GlobalLevel(NamedTuple):
     """What is shown of one objective at all admissible designs that are as good at the levels before it.
 
     objective: its figure; sense: what of it is sought; best: the answer's, bound: what no design is below, or above
@@ -143,8 +140,7 @@ class GlobalLevel:
     proven: bool
 
 
-@dataclass(frozen=True)
-class GlobalBound:
+class GlobalBound(NamedTuple):
     """What is proven of all admissible designs; boxes, seconds: what it took; why: why it is not proven."""
 
     levels: tuple[GlobalLevel, ...]

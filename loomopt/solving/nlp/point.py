@@ -113,8 +113,7 @@ class Point:
     """The NLP's objective."""
 
 
-@dataclass(frozen=True)
-class Elastic:
+class Elastic(NamedTuple):
     """How limits give way in an elastic solve: the least weighted sum of their excesses is sought.
 
     costs: of each excess, in its natural size, in order of `Program.excess_places`; infinite where the limit is firm,

@@ -1,8 +1,8 @@
 """From a program's structure to one parametric NLP: built once, solved for any numbers."""
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,8 +48,7 @@ class Entries:
         return found
 
 
-@dataclass(frozen=True)
-class _Local:
+class _Local(NamedTuple):
     """An NLP at one point: values and entries of all rows' slopes, and how the lifted variables follow, Z."""
 
     full: Floats

@@ -57,7 +57,7 @@ def prove(
     reads = _readings(own, job, program, full, slack)
     words = Words(own)
     found = tuple(
-        replace(each, unit=words.si(each.name)) for each in _merged(list(_proofs(program, job, words, *reads)))
+        each._replace(unit=words.si(each.name)) for each in _merged(list(_proofs(program, job, words, *reads)))
     )
     whole = reads[1].sampler
     return Proofs(scene.name, name, found, scene, model.uncovered(whole.model.effects, whole.given.own))
@@ -70,7 +70,7 @@ def _merged(found: list[Proof]) -> Iterator[Proof]:
         groups.setdefault((proof.limit, proof.text), []).append(proof)
     for rows in groups.values():
         worst = max(rows, key=lambda proof: (RANK[proof.status], -proof.margin))
-        yield replace(worst, boxes=sum(proof.boxes for proof in rows))
+        yield worst._replace(boxes=sum(proof.boxes for proof in rows))
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ def settled(search: Search) -> Search:
         spared = least_change.with_least_change(spared)
     if spared.best is None or search.best is None:
         return search
-    own = replace(spared.best, point=search.best.point)
+    own = spared.best._replace(point=search.best.point)
     return replace(spared, program=search.program, best=own)
 
 
@@ -67,7 +67,7 @@ def _without(search: Search, best: Candidate, added: Added) -> Search | None:
     levels = zip(worths(program, best.x), worths(program, {**best.x, **gone}), strict=True)
     if any(there - here > LOOKED_AT * share * max(1.0, abs(here)) for here, there in levels):
         return None
-    variables = (replace(v, lower=gone[v.name], upper=gone[v.name]) if v.name in gone else v for v in program.variables)
+    variables = (v._replace(lower=gone[v.name], upper=gone[v.name]) if v.name in gone else v for v in program.variables)
     limits = tuple(limit for limit in program.limits if limit.row not in gone)
     task = replace(program, variables=tuple(variables), limits=limits)
     ended = _solved(search, task, {**best.x, **gone}, _most(program, best.x, share))
@@ -77,7 +77,7 @@ def _without(search: Search, best: Candidate, added: Added) -> Search | None:
         return replace(search, spared=Spared(added, ended.x, share, chosen=False))
     none = Level(added.least.figure, 0.0, 0.0, 0.0)
     certificate = replace(ended.certificate, levels=(*ended.certificate.levels, none))
-    return _taken(search, task, replace(ended, certificate=certificate), Spared(added, best.x, share, chosen=True))
+    return _taken(search, task, ended._replace(certificate=certificate), Spared(added, best.x, share, chosen=True))
 
 
 def _with_less(search: Search, best: Candidate, added: Added) -> Search | None:
@@ -91,7 +91,7 @@ def _with_less(search: Search, best: Candidate, added: Added) -> Search | None:
         return None
     first, *levels = ended.certificate.levels
     certificate = replace(ended.certificate, levels=(*levels, first))
-    return _taken(search, task, replace(ended, certificate=certificate), Spared(added, best.x, added.share, True))
+    return _taken(search, task, ended._replace(certificate=certificate), Spared(added, best.x, added.share, True))
 
 
 def _taken(search: Search, task: Program, ended: Candidate, spared: Spared) -> Search:
@@ -100,7 +100,7 @@ def _taken(search: Search, task: Program, ended: Candidate, spared: Spared) -> S
     certificate = replace(ended.certificate, settled=(*ended.certificate.settled, said))
     best = search.best
     assert best is not None
-    own = replace(ended, objectives=best.objectives, value=best.value, certificate=certificate)
+    own = ended._replace(objectives=best.objectives, value=best.value, certificate=certificate)
     return replace(search, program=task, best=own, spared=spared)
 
 

@@ -51,7 +51,7 @@ def with_least_change(search: Search) -> Search:
     search.settings.at(f"looking for the {LEAST_CHANGE}")
     moved = _moved(search, best, kept, ways)
     if moved is None and not unique:
-        moved = replace(best, certificate=replace(best.certificate, open=_called(program, ways, best)))
+        moved = best._replace(certificate=replace(best.certificate, open=_called(program, ways, best)))
     elif moved and unique and not _differ(program, moved.x, best.x):
         moved = None
     return replace(search, best=moved or best, tie_broken=search.tie_broken + time.perf_counter() - began)
@@ -90,7 +90,7 @@ def _moved(search: Search, best: Candidate, kept: Collection[str], ways: Floats)
             continue
         warm = candidate.point
         if not _differ(program, warm.x, best.x, ROUNDING):
-            candidate = replace(candidate, point=replace(warm, x=dict(best.x)))
+            candidate = candidate._replace(point=replace(warm, x=dict(best.x)))
         found = _held(search, best, task, candidate) if _as_good(program, warm.x, best.x) else None
         if found:
             return _named(found, best, task, ways)
@@ -129,7 +129,7 @@ def _named(found: tuple[Candidate, Certificate], best: Candidate, task: Program,
         change=moved.certificate.levels[-1],
         open=() if moved.certificate.unique else _called(task, left(task, moved.x, moved.certificate, ()), moved),
     )
-    return replace(best, moved=moved.x, certificate=certificate)
+    return best._replace(moved=moved.x, certificate=certificate)
 
 
 def changing(
@@ -149,7 +149,7 @@ def changing(
         return None
     given = {_today(name): known[name] for name in free} | {_wide(name): widths[name] for name in free}
     bounds = program.bound_limits
-    held = tuple(replace(v, lower=x[v.name], upper=x[v.name]) if v.name in kept else v for v in program.variables)
+    held = tuple(v._replace(lower=x[v.name], upper=x[v.name]) if v.name in kept else v for v in program.variables)
     return replace(
         program,
         model=_measuring(program.model, tuple(free)),

@@ -7,6 +7,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from loomopt.jobs.base import Job
 from loomopt.model.program import Added, Program
@@ -39,8 +40,7 @@ OnStart = Callable[[int, int], None]
 NOT_JUDGED = Certificate(False, ("it has not been judged",), (), math.inf, math.inf, False, False)
 
 
-@dataclass(frozen=True)
-class Candidate:
+class Candidate(NamedTuple):
     """Where a solve ended, and the objectives there, in natural sizes, true over the whole cycle.
 
     value: of the NLP's objective there, in which each level weighs far more than the next; that of the NLP itself
@@ -64,8 +64,7 @@ class Candidate:
         return self.point.status not in SUCCESS
 
 
-@dataclass(frozen=True)
-class Spared:
+class Spared(NamedTuple):
     """Two designs between which what is added makes little difference; chosen: whether the one with less was taken.
 
     other: the program's variables, SI, of the one that was not; share: of each figure, what counts as little.
@@ -191,7 +190,7 @@ def _is_same(candidate: Candidate, best: Candidate) -> bool:
 
 def _dropped(candidate: Candidate) -> Candidate:
     """Return a candidate as one that has not reached a design."""
-    return replace(candidate, point=replace(candidate.point, reached=False), objectives=())
+    return candidate._replace(point=replace(candidate.point, reached=False), objectives=())
 
 
 def _judged(search: Search) -> Search:
@@ -237,7 +236,7 @@ def _met_farther(search: Search, best: Candidate) -> Search:
             return replace(again, settings=search.settings)
     if any(level.stationarity > STATIONARY for level in best.certificate.levels):
         closer = exchange.brought_closer(search.program, best.point, farther.settings)
-        found = _certified(search, replace(best, point=closer)) if closer else search
+        found = _certified(search, best._replace(point=closer)) if closer else search
         if found.passed:
             return found
     return search
@@ -270,7 +269,7 @@ def _certified(search: Search, candidate: Candidate) -> Search:
             break
         x, draft = moved, better
     began = time.perf_counter()
-    best = replace(candidate, moved=x, certificate=draft.whole)
+    best = candidate._replace(moved=x, certificate=draft.whole)
     return replace(search, best=best, certified=search.certified + time.perf_counter() - began)
 
 
@@ -302,7 +301,7 @@ def judged_as_is(search: Search, candidate: Candidate, known: Mapping[str, float
     known: where (SI) all levels but the last have a certificate, if anywhere.
     """
     _, x, draft = _judged_at(search, candidate.point.x, known)
-    return replace(candidate, moved=x, certificate=draft.whole)
+    return candidate._replace(moved=x, certificate=draft.whole)
 
 
 def corrected(search: Search, found: Candidate) -> Candidate:
@@ -313,7 +312,7 @@ def corrected(search: Search, found: Candidate) -> Candidate:
     _, x, draft = _judged_at(search, x)
     certificate = draft.whole
     ranks = [(not of.passed, of.residual) for of in (certificate, found.certificate)]
-    return replace(found, moved=x, certificate=certificate) if ranks[0] <= ranks[1] else found
+    return found._replace(moved=x, certificate=certificate) if ranks[0] <= ranks[1] else found
 
 
 def _stepped(program: Program, x: Mapping[str, float], step: Mapping[str, float]) -> dict[str, float]:

@@ -36,7 +36,7 @@ def held(search: Search, unread: Mapping[str, Apart]) -> Program | None:
     if not fixed:
         return None
     variables = (
-        replace(v, lower=fixed[v.name], upper=fixed[v.name], range=(fixed[v.name],) * 2) if v.name in fixed else v
+        v._replace(lower=fixed[v.name], upper=fixed[v.name], range=(fixed[v.name],) * 2) if v.name in fixed else v
         for v in search.program.variables
     )
     return replace(search.program, variables=tuple(variables))
@@ -76,7 +76,7 @@ def freed(search: Search, program: Program) -> Search:
         certificate = certify(search.program, as_read(search, x), search.settings.accuracy)
         if certificate.passed:
             certificate = replace(certificate, settled=(*best.certificate.settled, said))
-            return replace(search, best=replace(best, moved=x, certificate=certificate))
+            return replace(search, best=best._replace(moved=x, certificate=certificate))
     return search
 
 

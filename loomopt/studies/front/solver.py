@@ -361,7 +361,7 @@ def _tightest(one: Finding, *others: Finding) -> Finding:
     for other in others:
         low = max((end for end in (one.min, other.min) if end is not None), default=None)
         high = min((end for end in (one.max, other.max) if end is not None), default=None)
-        one = replace(one, min=low, max=high, ok=one.ok and other.ok)
+        one = one._replace(min=low, max=high, ok=one.ok and other.ok)
     return one
 
 
@@ -451,7 +451,7 @@ def _explicit(terms: FrontTerms, certificate: Certificate) -> Iterator[Binding]:
         if not axis.objective.is_magnitude:
             limit = replace(limit, sign=axis.sign, value=figure)
         worth = each.worth * abs(axis.slope(figure))
-        yield replace(each, limit=replace(limit, name=name), side=limit.sign, worth=worth)
+        yield each._replace(limit=replace(limit, name=name), side=limit.sign, worth=worth)
 
 
 def _sought(words: Words, terms: FrontTerms, asking: Asking) -> str:

@@ -336,7 +336,7 @@ def _told(
         asked.seed,
     )
     by_name = {name: by for (name, _), by in off.items()}
-    limits = tuple(replace(each, backed_off=by_name.get(each.name, 0.0)) for each in here.limits)
+    limits = tuple(each._replace(backed_off=by_name.get(each.name, 0.0)) for each in here.limits)
     binding = tuple(_priced(words, price, off) for price in answer.binding)
     found = replace(answer, limits=limits, reached=here.reached, scene=scene, binding=binding, robust=robust)
     said = " ".join(_said(scene, found, robust))
@@ -355,7 +355,7 @@ def _priced(words: Words, price: Price, off: Mapping[tuple[str, int], float]) ->
     value = price.value + sign * by
     stands = f"{price.limit} {SIGNS[sign]} {words.shown(price.limit, value)}"
     text = f"{stands}, backed off by {words.shown(price.limit, by, 4)}"
-    return replace(price, value=value, text=text, backed_off=by)
+    return price._replace(value=value, text=text, backed_off=by)
 
 
 def _said(scene: Scene, answer: Solution, robust: Robust) -> list[str]:

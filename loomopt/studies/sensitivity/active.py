@@ -195,7 +195,7 @@ class Optimum:
         limit = next((each for each in program.limits if identity(each) == own), None)
         if limit is None:
             raise LostError(f"{row.name} is no limit there")
-        return replace(row, limit=replace(row.limit, value=limit.value))
+        return row._replace(limit=replace(row.limit, value=limit.value))
 
     def moved(self, x: Mapping[str, float], step: Floats) -> dict[str, float]:
         """Return a design moved by a step, (variables,) in natural sizes."""

@@ -91,5 +91,5 @@ def test_an_answer_says_what_its_design_is(nearest, status, said):
     assert outputs.what(held).text == said
     broken = Finding("swing", 0.5, None, 0.4, ok=False)
     assert outputs.what(dataclasses.replace(held, limits=(broken,))).text == f"{said}; limits not held: swing"
-    rounding = dataclasses.replace(broken, rounding=True)
+    rounding = broken._replace(rounding=True)
     assert outputs.what(dataclasses.replace(held, limits=(rounding,))).text == said

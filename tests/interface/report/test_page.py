@@ -124,7 +124,7 @@ def test_every_number_of_the_answer_stands_there(answers, pages):
 def test_the_true_status_stands_first(answers):
     good = answers["shedding"]
     bad = replace(good.certificate, passed=False, reasons=("K1 can still fall: stationarity 0.1",))
-    broken = (replace(good.limits[0], ok=False), *good.limits[1:])
+    broken = (good.limits[0]._replace(ok=False), *good.limits[1:])
     said = {
         "Optimal and certified": good,
         "NOT CERTIFIED": replace(good, status="uncertified", message="it is not"),
@@ -154,7 +154,7 @@ def test_what_is_not_proven_or_not_reached_is_no_plain_optimum(answers):
     assert missed.reached == {"M3_fdc": False}
     assert status(missed).verdict == "Optimal and certified; M3_fdc not reached"
     proofs = answers["shedding"].prove()
-    open_ = replace(proofs, proofs=(replace(proofs.proofs[0], status="undecided"), *proofs.proofs[1:]))
+    open_ = replace(proofs, proofs=(proofs.proofs[0]._replace(status="undecided"), *proofs.proofs[1:]))
     assert (
         status(replace(answers["shedding"], proofs=open_)).verdict
         == "Optimal and certified; NOT PROVEN at every crank angle"

@@ -27,7 +27,7 @@ def test_what_helps_is_told_only_where_limits_clash():
     assert "clash" not in solution(clash=("p",)).as_dict()
     relaxation = Relaxation("p", "max", 1.0, 2.0, True, "p <= 1 -> 2")
     told = solution(clash=("p <= 1",), relaxation=(relaxation,)).as_dict()
-    assert (told["clash"], told["relaxation"]) == (["p <= 1"], [vars(relaxation)])
+    assert (told["clash"], told["relaxation"]) == (["p <= 1"], [relaxation._asdict()])
 
 
 @pytest.mark.parametrize(("limits", "admissible"), [((), True), ((HELD,), True), ((HELD, BROKEN), False)])

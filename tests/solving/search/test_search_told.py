@@ -9,7 +9,7 @@ from loomopt.solving.answer import report
 from loomopt.solving.nlp.point import Point
 from loomopt.solving.search.search import Candidate
 
-BEST = replace(candidate(1, 2, x=1.0), value=1002.0)
+BEST = candidate(1, 2, x=1.0)._replace(value=1002.0)
 
 
 def search(*candidates, **more):

@@ -60,7 +60,7 @@ def test_a_point_whose_second_level_is_not_certified_keeps_what_the_first_came_t
     def refused(search):
         found = judged(search)
         two = len(found.program.objectives) == len(solver.base.objectives)
-        return replace(found, best=replace(found.best, certificate=NOT_JUDGED)) if found.best and two else found
+        return replace(found, best=found.best._replace(certificate=NOT_JUDGED)) if found.best and two else found
 
     monkeypatch.setattr(solving, "judged", refused)
     found = solver.solve(Asking(1, (None, None)), [], False)
