@@ -49,7 +49,9 @@ class Proof(NamedTuple):
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON data."""
-        return {"limit": self.limit} | {key: value for key, value in self._asdict().items() if key not in ("name", "kind")}
+        return {"limit": self.limit} | {
+            key: value for key, value in self._asdict().items() if key not in ("name", "kind")
+        }
 
 
 @dataclass(frozen=True, repr=False)
@@ -116,7 +118,9 @@ class Finding(NamedTuple):
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON data; what is not exceeded says nothing of rounding, nor a limit as it stands of more."""
-        return {name: value for name, value in self._asdict().items() if value or name not in ("rounding", "backed_off")}
+        return {
+            name: value for name, value in self._asdict().items() if value or name not in ("rounding", "backed_off")
+        }
 
 
 class Price(NamedTuple):

@@ -58,7 +58,7 @@ def test_derivatives_are_in_natural_sizes_and_along_the_basis():
 
 def test_a_variable_that_is_held_without_a_limit_has_no_column():
     program = toy.program("xy", BENT)
-    y = replace(program.variables[1], lower=2.0, upper=2.0)
+    y = program.variables[1]._replace(lower=2.0, upper=2.0)
     exact, _ = exact_at(replace(program, variables=(program.variables[0], y)), {"x": 1.0, "y": 2.0})
     assert exact.names == ["x"]
     assert exact.gradients().shape[1] == 1

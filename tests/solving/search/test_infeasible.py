@@ -1,6 +1,5 @@
 """Where nothing is admissible: said so, with relaxations that help when granted and do not help when cut short."""
 
-import dataclasses
 import json
 import math
 
@@ -132,7 +131,7 @@ def test_the_least_relaxation_helps_as_it_is_printed(answer_of, name):
 def as_printed(relaxation):
     """Return the relaxation with the number its text shows."""
     value, unit = relaxation.text.partition(" -> ")[2].partition(" (by")[0].split()
-    return dataclasses.replace(relaxation, needed=float(value) * {"mm": 1e-3, "deg": math.radians(1)}.get(unit, 1.0))
+    return relaxation._replace(needed=float(value) * {"mm": 1e-3, "deg": math.radians(1)}.get(unit, 1.0))
 
 
 @pytest.mark.parametrize(

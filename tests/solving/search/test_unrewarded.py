@@ -91,7 +91,7 @@ def test_a_wrong_guess_costs_a_second_search_and_no_answer():
     own = program(("room", 1, 0.25))
 
     def worst(search, unread):
-        fixed = (replace(v, lower=9.0, upper=9.0, range=(9.0, 9.0)) if v.name == "z" else v for v in own.variables)
+        fixed = (v._replace(lower=9.0, upper=9.0, range=(9.0, 9.0)) if v.name == "z" else v for v in own.variables)
         return replace(search.program, variables=tuple(fixed))
 
     with pytest.MonkeyPatch.context() as patch:
