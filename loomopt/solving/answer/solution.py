@@ -49,7 +49,8 @@ class Proof(NamedTuple):
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON data."""
-        return {"limit": self.limit} | {
+        told = {key: value for key, value in self._asdict().items() if key not in ("name", "kind")}
+        return {"limit": self.limit} | told
             key: value for key, value in self._asdict().items() if key not in ("name", "kind")
         }
 
