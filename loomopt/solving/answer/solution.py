@@ -49,8 +49,7 @@ class Proof(NamedTuple):
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON data."""
-        told = {key: value for key, value in self._asdict().items() if key not in ("name", "kind")}
-        return {"limit": self.limit} | told
+        return {"limit": self.limit} | {
             key: value for key, value in self._asdict().items() if key not in ("name", "kind")
         }
 
