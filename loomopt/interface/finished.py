@@ -219,7 +219,23 @@ def study_identity(study: SceneStudy) -> Mapping[str, object]:
     return {**study.settings, "name": study.scene.name, "document": copied(study.scene.document, study.scene.origin)}
 
 
-class EffectsStudy(study.Found):
+class Printed:
+    """A study that prints as in a terminal, and shows the same in Jupyter."""
+
+    def parts(self) -> "list[str | Grid]":
+        """Return what a terminal shows of it."""
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        return printed(self.parts())
+
+    def _repr_html_(self) -> str:
+        from loomopt.interface.text import notebook
+
+        return notebook.page(self.parts())
+
+
+class EffectsStudy(Printed, study.Found):
     """What each effect of a scene is worth for a target; shares of natural sizes inside, units for a reader."""
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
@@ -245,10 +261,11 @@ class EffectsStudy(study.Found):
 
         return beside.effects(self)
 
-    def __str__(self) -> str:
+    def parts(self) -> "list[str | Grid]":
+        """Return what a terminal shows of it."""
         from loomopt.interface.text import effects
 
-        return printed(effects.parts(self))
+        return effects.parts(self)
 
     def __repr__(self) -> str:
         left = ", ".join(self.left_out) or "nothing"
@@ -260,7 +277,7 @@ class EffectsStudy(study.Found):
         return notebook.page(effects.parts(self, timed=False))
 
 
-class AccuracyFound(AccuracyStudy):
+class AccuracyFound(Printed, AccuracyStudy):
     """What accuracy costs in time, method by method; in Jupyter it shows itself."""
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
@@ -289,16 +306,8 @@ class AccuracyFound(AccuracyStudy):
 
         return [Part("What accuracy costs", tuple(self.parts()))]
 
-    def __str__(self) -> str:
-        return printed(self.parts())
-
     def __repr__(self) -> str:
         return f"<AccuracyFound {self.problem}: {len(self.rows)} rows; {self.advice}>"
-
-    def _repr_html_(self) -> str:
-        from loomopt.interface.text import notebook
-
-        return notebook.page(self.parts())
 
 
 def accuracy_found(scene: Scene, full: bool, on_step: Callable[[str], None] | None) -> AccuracyFound:
@@ -319,7 +328,7 @@ def printed(parts: "Sequence[str | Grid]") -> str:
     return layout.render(parts, layout.width())
 
 
-class ToleranceStudy(tolerance.Found):
+class ToleranceStudy(Printed, tolerance.Found):
     """Machines as they are made: how figures spread, how often limits hold; SI inside."""
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
@@ -349,14 +358,14 @@ class ToleranceStudy(tolerance.Found):
         share = self.yields[tolerance.ALL].value
         return f"<ToleranceStudy {self.plan.scene.name}, {self.plan.target}: all limits hold on {100 * share:.4g} %>"
 
-    def _repr_html_(self) -> str:
-        from loomopt.interface.text import notebook
+    def parts(self) -> "list[str | Grid]":
+        """Return what a terminal shows of it."""
         from loomopt.interface.text import tolerance as text
 
-        return notebook.page(text.parts(self))
+        return text.parts(self)
 
 
-class SensitivityStudy(sensitivity.Found):
+class SensitivityStudy(Printed, sensitivity.Found):
     """How an optimum moves with every number of its scene, and how far its prices hold; SI inside."""
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
@@ -386,11 +395,11 @@ class SensitivityStudy(sensitivity.Found):
         told = self.refused or f"{len(self.rows)} derivatives, {len(self.prices)} prices"
         return f"<SensitivityStudy {self.scene.name}, {self.target}: {told}>"
 
-    def _repr_html_(self) -> str:
-        from loomopt.interface.text import notebook
+    def parts(self) -> "list[str | Grid]":
+        """Return what a terminal shows of it."""
         from loomopt.interface.text import sensitivity as text
 
-        return notebook.page(text.parts(self))
+        return text.parts(self)
 
 
 def conducted_sensitivity(study: sensitivity.Study, on_step: Callable[[str], None] | None = None) -> SensitivityStudy:

@@ -98,6 +98,20 @@ def test_a_study_prints_its_table(capsys):
     assert repr(study).startswith("<DesignStudy")
 
 
+def test_a_study_of_one_answer_prints_what_its_command_prints(capsys):
+    source = packaged.problems()["shedding-static"].read_text(encoding="utf-8")
+    Path("made.toml").write_text(f'{source}\n[tolerances]\nN_min = "1 N"\n', encoding="utf-8")
+    scene = lo.load("made.toml")
+    for study, words in (
+        (lo.sensitivity(lo.solve(scene)), ["sensitivity", "made.toml"]),
+        (lo.tolerance(scene, samples=1024, worst=False), ["tolerance", "made.toml", "--samples", "1024", "--no-worst"]),
+    ):
+        assert run(words) == 0
+        assert str(study) == capsys.readouterr().out.strip("\n")
+        assert str(study).splitlines()[0] in study._repr_html_()
+        assert repr(study).startswith(f"<{type(study).__name__}")
+
+
 @pytest.mark.parametrize("name", app.COMMANDS)
 def test_each_help_ends_in_an_example_of_its_own_options(name, capsys):
     assert run([name, "--help"]) == 0
