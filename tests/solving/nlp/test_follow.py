@@ -178,7 +178,7 @@ def test_multipliers_of_bounds_keep_their_signs():
 
     def bounded(least):
         task = program((), PEAK)
-        return replace(task, variables=(task.variables[0], replace(task.variables[1], lower=least)))
+        return replace(task, variables=(task.variables[0], task.variables[1]._replace(lower=least)))
 
     near, cold = solved(bounded(2.0)), solved(bounded(2.1))
     found = followed(bounded(2.1), near)
