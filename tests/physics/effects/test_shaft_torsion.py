@@ -218,7 +218,7 @@ def traced(found):
     numbers = [found.values[name] for name in symbols]
     angles = [float(found.cycle.angles(np.array([p]), np.array([u]))[0]) for p, u in NODES]
     switches = [float(found.cycle.switch(p)["resistance"]) for p, _ in NODES]
-    return np.array([np.ravel(function(numbers, a, s)) for a, s in zip(angles, switches, strict=True)]).T
+    return np.array([np.ravel(function(numbers, a, s).full()) for a, s in zip(angles, switches, strict=True)]).T
 
 
 def test_every_number_system_gives_the_same():
