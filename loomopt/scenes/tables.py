@@ -388,7 +388,7 @@ def flat(raw: Mapping[str, Any], known: Iterable[str]) -> dict[str, Any]:
     known ones that begin alike is one too: of rod.m a slip is rod.n, not rod.
     """
     names, found = set(known), dict[str, Any]()
-    begun = {name[:place] for name in names for place, sign in enumerate(name) if sign == "."}
+    begun = {name[:place] for name in names if "." in name for place, sign in enumerate(name) if sign == "."}
     for name, value in raw.items():
         for called, each in _parted(name, value, names, begun):
             found[called] = _together(found.get(called), each)
