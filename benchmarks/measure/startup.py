@@ -6,8 +6,8 @@ takes in that process; the rest is start-up: Python, imports, words, scene, tabl
 is made is no start-up (benchmarks/measure/answers.py).
 
 Importing CasADi and NumPy is mostly loading shared libraries, a command is mostly running Python: their ratio differs
-by machine. "The same, with Typer and pydantic at work" is both, and so the fairer measure between machines. Other work
-on the machine only ever adds: the least of all turns beside the libraries' least is what it disturbs least.
+by machine. "The same, with Typer and pydantic at work" is both, and so the fairer measure between machines. Two
+processes of one turn are not disturbed alike: the median of all turns beside the libraries' median is steadier.
 
     python benchmarks/measure/startup.py [--quick] [--json]
 """
@@ -36,7 +36,8 @@ def start() -> None: ...
 @app.command()
 def solve(problem: str, target: str = "balance") -> None: ...
 app()"""
-COMMANDS = ("--version", "list", "evaluate beatup", "solve beatup --starts 1", "solve beatup")
+FEW = ("--version", "evaluate beatup", "solve beatup --starts 1")
+COMMANDS = (*FEW, "list", "solve beatup")
 SOLVE, REST = "loomopt solve beatup --starts 1", "loomopt solve beatup, less the solve"
 TOLD = """import sys, time
 from loomopt.interface import api; from loomopt.interface.cli import app as cli
@@ -49,7 +50,7 @@ def timed(*arguments, **options):
     return answer
 api.solve = timed
 cli.main()"""
-ROUNDS, FEW = 21, 9
+ROUNDS = 21
 
 
 def spent(code, words, cache):
@@ -67,13 +68,14 @@ def spent(code, words, cache):
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stderr
 
 
-def one_round(cache):
+def one_round(cache, commands):
     """Return the processor's milliseconds of each command, run once."""
     found = {ALONE: spent(ALONE, (), cache)[0], FLOOR: spent(LIBRARIES, ("solve", "beatup"), cache)[0]}
-    for words in COMMANDS:
+    for words in commands:
         found[f"loomopt {words}"] = spent("from loomopt.interface.cli.app import main; main()", words.split(), cache)[0]
-    whole, solved = spent(TOLD, SOLVE.split()[1:], cache)
-    found[REST] = whole - float(solved)
+    if commands == COMMANDS:
+        whole, solved = spent(TOLD, SOLVE.split()[1:], cache)
+        found[REST] = whole - float(solved)
     return {name: 1e3 * seconds for name, seconds in found.items()}
 
 
@@ -83,9 +85,10 @@ def main():
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as cache:
-        one_round(cache)
-        rounds = [one_round(cache) for _ in range(FEW if asked.quick else ROUNDS)]
-    rows = []
+        commands = FEW if asked.quick else COMMANDS
+        one_round(cache, commands)
+        rounds = [one_round(cache, commands) for _ in range(ROUNDS)]
+    floor, rows = statistics.median(one[FLOOR] for one in rounds), []
     for name in rounds[0]:
         times, ratios = [one[name] for one in rounds], [one[name] / one[ALONE] for one in rounds]
         rows.append(
@@ -94,7 +97,7 @@ def main():
                 "median [ms]": statistics.median(times),
                 "beside the import": harness.spread(ratios),
                 "beside the libraries at work": harness.spread([one[name] / one[FLOOR] for one in rounds]),
-                "least beside their least": min(times) / min(one[FLOOR] for one in rounds),
+                "median beside their median": statistics.median(times) / floor,
             }
         )
     harness.show(rows, asked.json)
