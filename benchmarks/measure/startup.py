@@ -9,6 +9,9 @@ Importing CasADi and NumPy is mostly loading shared libraries, a command is most
 by machine. "The same, with Typer and pydantic at work" is both, and so the fairer measure between machines. Two
 processes of one turn are not disturbed alike: the median of all turns beside the libraries' median is steadier.
 
+What no machine and no other work changes is how many calls Python makes in a command (`calls` of the same, by
+`sys.setprofile`): imports, classes, words, scene and tables, but neither loading libraries nor what CasADi computes.
+
     python benchmarks/measure/startup.py [--quick] [--json]
 """
 
@@ -50,12 +53,27 @@ def timed(*arguments, **options):
     return answer
 api.solve = timed
 cli.main()"""
-ROUNDS = 21
+LEFT_OUT = ("COLUMNS", "PYTHONDONTWRITEBYTECODE")
+COUNTED = """import atexit, os, sys
+events, leave = [0], os._exit
+def counted(frame, event, argument):
+    events[0] += 1
+def told(status=0):
+    sys.setprofile(None)
+    print(events[0], file=sys.stderr, flush=True)
+    leave(status)
+os._exit = told
+atexit.register(told)
+sys.setprofile(counted)
+"""
+MAIN = "from loomopt.interface.cli.app import main; main()"
+ROUNDS, QUICK = 21, 9
 
 
 def spent(code, words, cache):
     """Return the processor's seconds of one process, and the line it says on stderr."""
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    # A width that is asked for makes a command draw its tables with Rich: here its output is piped.
+    environment = {name: value for name, value in os.environ.items() if name not in LEFT_OUT}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
         [sys.executable, "-c", code, *words],
@@ -72,11 +90,17 @@ def one_round(cache, commands):
     """Return the processor's milliseconds of each command, run once."""
     found = {ALONE: spent(ALONE, (), cache)[0], FLOOR: spent(LIBRARIES, ("solve", "beatup"), cache)[0]}
     for words in commands:
-        found[f"loomopt {words}"] = spent("from loomopt.interface.cli.app import main; main()", words.split(), cache)[0]
+        found[f"loomopt {words}"] = spent(MAIN, words.split(), cache)[0]
     if commands == COMMANDS:
         whole, solved = spent(TOLD, SOLVE.split()[1:], cache)
         found[REST] = whole - float(solved)
     return {name: 1e3 * seconds for name, seconds in found.items()}
+
+
+def calls(cache):
+    """Return how many calls and returns Python makes in each command of `FEW`, and in the libraries at work."""
+    made = {FLOOR: (LIBRARIES, ["solve", "beatup"])} | {f"loomopt {words}": (MAIN, words.split()) for words in FEW}
+    return {name: int(spent(COUNTED + code, words, cache)[1].split()[-1]) for name, (code, words) in made.items()}
 
 
 def main():
@@ -87,7 +111,8 @@ def main():
     with tempfile.TemporaryDirectory() as cache:
         commands = FEW if asked.quick else COMMANDS
         one_round(cache, commands)
-        rounds = [one_round(cache, commands) for _ in range(ROUNDS)]
+        rounds = [one_round(cache, commands) for _ in range(QUICK if asked.quick else ROUNDS)]
+        counted = calls(cache)
     floor, rows = statistics.median(one[FLOOR] for one in rounds), []
     for name in rounds[0]:
         times, ratios = [one[name] for one in rounds], [one[name] / one[ALONE] for one in rounds]
@@ -100,7 +125,7 @@ def main():
                 "median beside their median": statistics.median(times) / floor,
             }
         )
-    harness.show(rows, asked.json)
+    harness.show(rows, asked.json, calls=[{"command": name, "calls": made} for name, made in counted.items()])
 
 
 if __name__ == "__main__":
