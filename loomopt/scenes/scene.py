@@ -240,10 +240,11 @@ class Scene(Shown):
 
     def called(self, call: Call, own: Iterable[str] = ()) -> "Scene":
         """Return the scene with what a call changes; own: keys whose paths are the caller's, not the scene's."""
-        document = self._off(self._on(self._set(call.set), call.on), call.off)
-        told = self.call.then(replace(call, set=Frozen(copied(call.set, self.origin)), free=()))
+        values = Frozen(copied(call.set, self.origin))
+        document = self._off(self._on(self._set(values), call.on), call.off)
+        told = self.call.then(replace(call, set=values, free=()))
         if document is not self.document:
-            changed = build(document, self.jobs, self.origin, self.paths.set_by_caller(own), told)
+            changed = _built(document, self.jobs, self.origin, self.paths.set_by_caller(own), told)
         else:
             changed = self if told == self.call else replace(self, call=told)
         return changed.free(call.free) if call.free else changed
@@ -418,7 +419,14 @@ def build(
     paths: where the files lie that it names; without, they are the caller's own. call: what made these tables of those
     that were read. Raises BadInput that names all that is wrong, the worst first.
     """
-    original, faults = copied(document, origin), Faults()
+    return _built(copied(document, origin), jobs, origin, paths, call)
+
+
+def _built(
+    original: Mapping[str, Any], jobs: Jobs, origin: str, paths: Paths | None = None, call: Call | None = None
+) -> Scene:
+    """Return the scene that raw tables describe, which nobody else changes."""
+    faults = Faults()
     raw = _meant(original, TABLES)
     problem = read.problem(raw["problem"], jobs, origin, faults)
     named = [name for table in ("effects", "available") if isinstance(raw[table], Mapping) for name in raw[table]]

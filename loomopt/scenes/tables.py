@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from loomopt.base.errors import (
     GAP,
+    NAME,
     SAME,
     WHOLE,
     BadInput,
@@ -498,7 +499,11 @@ def limits(
     with faults:
         given_limits = flat(table(raw, origin, "limits"), schema.figures)
     limitable = [name for name, figure in schema.figures.items() if figure.sides]
-    _all_known(given_limits, limitable, "figure to limit", origin, "limits", faults)
+    for name in (name for name in given_limits if name in schema.figures and name not in limitable):
+        problem, remedy = "this figure is told of a design, and no limit holds it", "Limit another, or take it out"
+        faults.add(refusal(problem, origin, f"limits.{name}", allowed=", ".join(limitable), remedy=remedy, grade=NAME))
+    strange = [name for name in given_limits if name not in schema.figures]
+    _all_known(strange, limitable, "figure to limit", origin, "limits", faults)
     on = {effect.name for effect in active}
     found = {}
     for name in (name for name in given_limits if name in limitable):

@@ -1,5 +1,7 @@
 """Constant resistance at the output between two events: output term M, or F of one that slides, else 0."""
 
+from dataclasses import replace
+
 from pydantic import Field
 
 from loomopt.base.quantities import Force, Torque
@@ -49,15 +51,4 @@ EFFECT = Load(
     told={1.0: "from where it begins to where it ends", 0.0: "elsewhere"},
     examples=({"torque": "50 N*m", "begins": "rear", "ends": "front"},),
 )
-SLIDING = Load(
-    name="forming",
-    summary="constant resistance at the output between two events",
-    own=Sliding,
-    rank=21,
-    acts="output",
-    force=force,
-    corners=corners,
-    switch=between,
-    told={1.0: "from where it begins to where it ends", 0.0: "elsewhere"},
-    examples=({"force": "500 kN", "begins": "touch", "ends": "bottom"},),
-)
+SLIDING = replace(EFFECT, own=Sliding, examples=({"force": "500 kN", "begins": "touch", "ends": "bottom"},))

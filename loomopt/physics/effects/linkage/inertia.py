@@ -1,5 +1,7 @@
 """Inertia of what moves with the output: output term J q¨, or m q¨ of one that slides."""
 
+from dataclasses import replace
+
 from pydantic import Field
 
 from loomopt.base.quantities import Mass, PositiveInertia
@@ -42,14 +44,4 @@ EFFECT = Load(
     needs=("operation.speed",),
     examples=({"J": "0.62 kg*m^2"},),
 )
-SLIDING = Load(
-    name="inertia",
-    summary="inertia of what slides with the output",
-    own=Sliding,
-    rank=10,
-    acts="output",
-    force=force,
-    moved=moved,
-    needs=("operation.speed",),
-    examples=({"mass": "400 kg"},),
-)
+SLIDING = replace(EFFECT, summary="inertia of what slides with the output", own=Sliding, examples=({"mass": "400 kg"},))

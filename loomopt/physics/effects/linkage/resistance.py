@@ -4,6 +4,8 @@ Output term M cos(π (φ − φ_event)/δ) for |φ − φ_event| ≤ δ/2, else 
 M(φ − φ_event) through the samples of a table. The corners move with the event.
 """
 
+from dataclasses import replace
+
 from pydantic import Field
 
 from loomopt.base.quantities import Force, PulseAngle, Torque
@@ -79,16 +81,9 @@ EFFECT = Load(
     tabulated=LoadTable("M", "torque", "counted from the event", ("torque", "pulse")),
     examples=({"torque": "745 N*m", "pulse": "29.8 deg", "at": "front"},),
 )
-SLIDING = Load(
-    name="resistance",
-    summary="resistance at the output about an event",
+SLIDING = replace(
+    EFFECT,
     own=Sliding,
-    letters={"pulse": "delta"},
-    rank=20,
-    acts="output",
-    force=force,
-    corners=corners,
-    switch=switch,
     tabulated=LoadTable("F", "force", "counted from the event", ("force", "pulse")),
     examples=({"force": "5 kN", "pulse": "60 deg", "at": "front"},),
 )

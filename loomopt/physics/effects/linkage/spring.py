@@ -4,6 +4,8 @@ On the output it pushes against q: output term P + k (q − q_event), P its prel
 pulls them together: drive term k (L − L0) L', L their distance.
 """
 
+from dataclasses import replace
+
 from pydantic import Field
 
 from loomopt.base.quantities import Force, Length, RotaryStiffness, Stiffness, Torque
@@ -81,17 +83,7 @@ TURNING = Load(
     reads=(PLACES,),
     examples=({"stiffness": "50 N*m/rad", "at": "rear"},),
 )
-PUSHED = Load(
-    name="spring",
-    summary="spring on the output",
-    own=Sliding,
-    rank=65,
-    acts="output",
-    force=pushed,
-    reads=(PLACES,),
-    examples=({"stiffness": "5 N/mm", "at": "top"},),
-)
-JOINED = {"begins": "G", "ends": "E", "stiffness": "2 N/mm", "free": "120 mm"}
+PUSHED = replace(TURNING, own=Sliding, examples=({"stiffness": "5 N/mm", "at": "top"},))
 EFFECT = Load(
     name="spring",
     summary="spring between two joints, or on the output",
@@ -102,17 +94,6 @@ EFFECT = Load(
     applied=pulls,
     many=True,
     alone=TURNING,
-    examples=(JOINED,),
+    examples=({"begins": "G", "ends": "E", "stiffness": "2 N/mm", "free": "120 mm"},),
 )
-SLIDING = Load(
-    name="spring",
-    summary="spring between two joints, or on the output",
-    own=Joining,
-    rank=65,
-    acts="drive",
-    force=stretched,
-    applied=pulls,
-    many=True,
-    alone=PUSHED,
-    examples=(JOINED,),
-)
+SLIDING = replace(EFFECT, alone=PUSHED)
