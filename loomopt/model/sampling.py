@@ -219,9 +219,14 @@ class Sampler:
 
         What they were read from are numbers that are the same here, to the last bit and the sign of a zero.
         """
+        own = self._numbers
         for other in self.session.every(SAMPLERS):
-            if isinstance(other, Sampler) and other is not self and self._holds(other):
+            if isinstance(other, Sampler) and other is not self and other._numbers <= own and self._holds(other):
                 self._extremes = {**other._extremes, **self._extremes}
+
+    @lazy
+    def _numbers(self) -> frozenset[tuple[str, Number]]:
+        return frozenset(self.given.values.items())
 
     def _holds(self, other: "Sampler") -> bool:
         """Say whether all that another sampler knows of its design is known here, and is the same."""
@@ -378,7 +383,7 @@ def _is_same(one: Number, other: Number) -> bool:
     return floats and one == other and math.copysign(1.0, one) == math.copysign(1.0, other)
 
 
-SAMPLERS, KEPT = "samplers", 128
+SAMPLERS, KEPT = "samplers", 256
 """What a session calls samplers, and how many it keeps: more than the designs that one start, its silent levels and its
 certificate look at, and those of all designs that are certified together."""
 

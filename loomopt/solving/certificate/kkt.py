@@ -227,7 +227,8 @@ def _equations(gradients: Floats, system: System) -> tuple[Floats, Floats, int]:
     Those of free sign come last: equalities, then what earlier levels hold.
     """
     count, size = gradients.shape
-    norm = np.isin(np.arange(count), system.pieces).astype(float)
+    norm = np.zeros(count)
+    norm[list(system.pieces)] = 1.0
     slopes = np.vstack([gradients.T, norm])
     one_sided = [*system.pieces, *system.inequalities]
     columns = np.hstack([slopes[:, one_sided], slopes[:, list(system.equalities)], slopes @ system.held.T])

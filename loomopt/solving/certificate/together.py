@@ -1,7 +1,7 @@
 """Certificates of many designs: slopes and curvatures of all in one pass, each design judged as it would be alone.
 
-Only the derivatives are taken together. What a design comes to does not depend on those beside it, to the last bit:
-they are read `LANES` at a time, the last one repeated where there are fewer, and no sum runs over designs.
+Only the derivatives are taken together. What a design comes to does not depend on those beside it, nor on how many
+these are, to the last bit: no sum runs over designs, and a matrix is factored by itself.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,10 +15,11 @@ from loomopt.maths import systems
 from loomopt.maths.jets import Jet
 from loomopt.maths.systems import Number
 from loomopt.model.limits import SingleLimit
-from loomopt.model.model import Integral
+from loomopt.model.model import Integral, JobModel
 from loomopt.model.program import Program
 from loomopt.model.reading import DATUM, Reading, quadrature
 from loomopt.model.sampling import Sampler
+from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Floats, Node, Pieces
 from loomopt.physics.tolerances import JET_ERROR, NEWTON_SHIFT
 from loomopt.solving.certificate.certificate import NUMBERLESS, certified, certify, drafted, prepared
@@ -26,16 +27,20 @@ from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet
 from loomopt.solving.certificate.verdict import Certificate
 
-LANES = 8
-"""Designs that are read at once, always so many: then each is computed alike, whoever stands beside it."""
+MOST = 16
+"""Designs that are read at once, at most: of more each takes no less, and what is kept of them grows."""
 
 
 class DesignsReading(Reading):
-    """Several designs read at once: their numbers are (designs, 1), whole-cycle quantities (designs, nodes)."""
+    """So many designs read at once: their numbers are (designs, 1), whole-cycle quantities (designs, nodes)."""
+
+    def __init__(self, model: JobModel, given: Given, of: Sampler, count: int) -> None:
+        super().__init__(model, systems.jets(), given, of.cycle, of.stills)
+        self.count = count
 
     @lazy
     def _begins(self) -> Number:
-        return _beside(self.starts)
+        return _beside(self.starts, self.count)
 
     def along(self, name: str, pieces: Pieces, u: Number) -> Number:
         """Return a whole-cycle quantity at nodes of each design, their pieces (nodes,), u (designs, nodes), SI."""
@@ -49,7 +54,7 @@ class DesignsReading(Reading):
             return _total(values, len(integral.angles)) / len(integral.angles)
         pieces, u, weights = quadrature(self.cycle, integral)
         widths = weights * (self._begins[:, pieces + 1] - self._begins[:, pieces])
-        values = self.along(integral.quantity, pieces, np.tile(u, (LANES, 1)))
+        values = self.along(integral.quantity, pieces, np.tile(u, (self.count, 1)))
         return _total(widths * values, len(u)) / _total(widths, len(u))
 
 
@@ -57,16 +62,16 @@ def _plain(value: Number) -> Number:
     return value.v if isinstance(value, Jet) else value
 
 
-def _beside(values: Sequence[Number]) -> Number:
+def _beside(values: Sequence[Number], designs: int) -> Number:
     """Return numbers (designs, 1) side by side, (designs, count); a jet where one of them is."""
-    plain = np.concatenate([np.broadcast_to(_plain(value), (LANES, 1)) for value in values], axis=1)
+    plain = np.concatenate([np.broadcast_to(_plain(value), (designs, 1)) for value in values], axis=1)
     own = next((value for value in values if isinstance(value, Jet)), None)
     if own is None:
         return plain
     width = own.g.shape[-1]
     jets = [_jet(value, width) for value in values]
-    slopes = np.concatenate([np.broadcast_to(jet.g, (LANES, 1, width)) for jet in jets], axis=1)
-    bends = np.concatenate([np.broadcast_to(jet.curvature, (LANES, 1, width, width)) for jet in jets], axis=1)
+    slopes = np.concatenate([np.broadcast_to(jet.g, (designs, 1, width)) for jet in jets], axis=1)
+    bends = np.concatenate([np.broadcast_to(jet.curvature, (designs, 1, width, width)) for jet in jets], axis=1)
     return Jet(plain, slopes, bends)
 
 
@@ -164,11 +169,10 @@ def kind(row: ActiveRow) -> tuple[object, ...]:
 
 
 class Designs:
-    """Up to `LANES` designs of one kind (`DesignAt.alike`), to be read at any variables near their own."""
+    """Designs of one kind (`DesignAt.alike`), to be read at any variables near their own."""
 
     def __init__(self, designs: Sequence[DesignAt]) -> None:
-        self.count, self.first = len(designs), designs[0]
-        self.each = (*designs, *([designs[-1]] * (LANES - len(designs))))
+        self.each, self.first = tuple(designs), designs[0]
         self.names, self.model = self.first.names, self.first.program.model
         sizes = [{v.name: v.scale for v in of.program.variables} for of in self.each]
         self.sizes = np.array([[own[name] for name in self.names] for own in sizes])
@@ -221,17 +225,18 @@ class Designs:
 
     def _read(self, x: Floats, u: Floats, directions: int) -> Bent:
         """Return rows along so many variables, all or none of them, and each row's own u."""
-        width, shape = directions + 1, (LANES, len(self.first.rows))
+        count, width = len(self.each), directions + 1
+        shape = count, len(self.first.rows)
         columns: list[Number] = [column[:, None] for column in x.T]
         if directions:
             jets = []
             for k, column in enumerate(columns):
-                slopes = np.zeros((LANES, 1, width))
+                slopes = np.zeros((count, 1, width))
                 slopes[:, 0, k] = self.sizes[:, k]
                 jets.append(Jet(column, slopes, np.zeros((1, 1, width, width))))
             columns = jets
         given = self.model.given(systems.jets(), {**self.known, **dict(zip(self.names, columns, strict=True))})
-        reading = DesignsReading(self.model, systems.jets(), given, self.first.sampler.cycle, self.first.sampler.stills)
+        reading = DesignsReading(self.model, given, self.first.sampler, count)
         values, slopes, bends = np.zeros(shape), np.zeros((*shape, width)), np.zeros((*shape, width, width))
 
         def put(place: Number, jet: Jet, factor: Floats, less: Floats) -> None:
@@ -242,9 +247,9 @@ class Designs:
         for k, row in enumerate(self.first.rows):
             if row.node is None and directions:
                 one = slice(k, k + 1)
-                put(one, _jet(self._static(reading, k, row), width), 1 / self.scales[:, one], np.zeros((LANES, 1)))
+                put(one, _jet(self._static(reading, k, row), width), 1 / self.scales[:, one], np.zeros((count, 1)))
         for name, places in self.groups.items():
-            moving = np.zeros((LANES, len(places), width))
+            moving = np.zeros((count, len(places), width))
             moving[:, :, -1] = 1.0
             at = Jet(u[:, places], moving, np.zeros((1, 1, width, width)))
             jet = _jet(reading.along(name, self.pieces[places], at), width)
@@ -299,11 +304,11 @@ def derivatives(designs: Sequence[DesignAt]) -> list[DerivativesTogether | None]
 
 
 def grouped(kinds: Sequence[object]) -> list[list[int]]:
-    """Return the places of equal kinds, at most `LANES` of them together."""
+    """Return the places of equal kinds, at most `MOST` of them together."""
     groups: dict[object, list[int]] = {}
     for k, own in enumerate(kinds):
         groups.setdefault(own, []).append(k)
-    return [of[begin : begin + LANES] for of in groups.values() for begin in range(0, len(of), LANES)]
+    return [of[begin : begin + MOST] for of in groups.values() for begin in range(0, len(of), MOST)]
 
 
 def certify_together(asked: Sequence[tuple[Program, Mapping[str, float]]], accuracy: float) -> list[Certificate]:

@@ -21,7 +21,6 @@ from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE, POSITIVE, PRECISE, ROUNDING
 from loomopt.solving.certificate.kkt import ActiveRow
 from loomopt.solving.certificate.together import (
-    LANES,
     Bent,
     DesignAt,
     Designs,
@@ -172,11 +171,11 @@ def _newton(begun: Sequence[_Begun]) -> list[dict[str, float] | None]:
     own = Designs([each.design for each in begun])
     pieces = _chosen(begun[0].frame)
     x, u, begin = own.x, own.u, own.x
-    weights = np.zeros((LANES, len(begun[0].frame)))
-    settled, lost = np.zeros(LANES, dtype=bool), np.zeros(LANES, dtype=bool)
+    weights = np.zeros((len(begun), len(begun[0].frame)))
+    settled, lost = np.zeros(len(begun), dtype=bool), np.zeros(len(begun), dtype=bool)
     for step in range(STEPS):
         bent = own.bent(x, u)
-        lost |= ~np.array([all(np.isfinite(part[lane]).all() for part in bent) for lane in range(LANES)])
+        lost |= ~np.array([all(np.isfinite(part[lane]).all() for part in bent) for lane in range(len(begun))])
         moving = ~(settled | lost)
         if not moving.any():
             break
