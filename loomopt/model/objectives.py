@@ -15,9 +15,9 @@ import numpy as np
 
 from loomopt.maths.systems import Number
 from loomopt.model.limits import CycleLimit, DesignLimit, Limit
-from loomopt.model.reading import Rows
+from loomopt.model.reading import BatchReading, Rows, wide
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.physics.cycle import Floats, Pieces
+from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE
 
 Sought = Literal["least", "least magnitude", "most"]
@@ -105,9 +105,9 @@ class Objective(abc.ABC):
         """Return what lower bounds of the variables alone leave it to be at least, SI."""
         return -math.inf
 
-    def watched(self, sampler: Sampler, pieces: Pieces, u: Floats) -> Floats:
-        """Return what changes where it does, SI: itself; of a peak the quantity at nodes (pieces, u)."""
-        return np.array([self.merit(sampler)])
+    def watched(self, designs: BatchReading) -> Floats:
+        """Return what changes where it does, SI, (values, designs), of designs whose cycles are looked at."""
+        return np.asarray(wide(self.worth(designs), designs.count))[None]
 
     def pieces(self, sampler: Sampler) -> list[Piece]:
         """Return the smooth functions the largest of which it is at a design."""
@@ -211,9 +211,9 @@ class Peak(Objective):
         """Return the figure of a design, SI: of the peak itself."""
         return float(self.merit(sampler) ** (1 / self.power))
 
-    def watched(self, sampler: Sampler, pieces: Pieces, u: Floats) -> Floats:
-        """Return the quantity at nodes (pieces, u), SI."""
-        return sampler.at(self.row, pieces, u)
+    def watched(self, designs: BatchReading) -> Floats:
+        """Return the quantity at the nodes looked at, SI, (nodes, designs)."""
+        return np.asarray(designs.looked(self.row))
 
     def limits(self, name: str, most: float) -> list[Limit]:
         """Return the limit of the quantity at `most`, SI."""

@@ -285,10 +285,13 @@ class BatchReading(Reading):
         """Look at quantities at nodes (pieces, u) of the whole cycle, their poses computed once for all."""
         self._looked = pieces, self.quantities(names, self.node(pieces, u))
 
+    def looked(self, name: str) -> Number:
+        """Return a quantity at the nodes looked at, (nodes, designs)."""
+        return self._looked[1][name]
+
     def highest(self, name: str, where: Where | None = None) -> Number:
         """Return the largest |quantity| (of a signed one, value) of each design at the nodes looked at, (designs,)."""
-        pieces, looked = self._looked
-        values, signed = looked[name], name in self.model.signed
+        pieces, values, signed = self._looked[0], self.looked(name), name in self.model.signed
         on = np.flatnonzero(self.model.counted(self.cycle, name, where)[pieces])
         known = plain(values)[on]
         heights = known if signed else np.abs(known)

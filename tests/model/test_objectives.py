@@ -7,8 +7,10 @@ import pytest
 from support import toy
 from support.worst import WorstMagnitude, WorstPeak
 
+from loomopt.maths import systems
 from loomopt.model.limits import CycleLimit, DesignLimit
 from loomopt.model.objectives import Magnitude, Peak, Value, Worst
+from loomopt.model.reading import BatchReading
 from loomopt.model.sampling import Sampler
 
 ROWS = {"p": lambda v: v["x"] - 5, "q": lambda v: v["y"]}
@@ -100,5 +102,9 @@ def test_a_figure_is_sought_least_or_most_and_worsens_the_other_way():
 
 def test_a_peak_is_watched_by_its_whole_curve_and_all_else_by_itself():
     pieces, u = HERE.grid(16)
-    assert Peak("top", "wave", 4.0).watched(HERE, pieces, u) == pytest.approx(HERE.at("wave", pieces, u))
-    assert Magnitude("p", "p", 4.0).watched(HERE, pieces, u) == pytest.approx(np.array([2.0]))
+    both = {name: np.array([value, value]) for name, value in HERE.values.items()}
+    designs = BatchReading(HERE.model, systems.numpy(), both, HERE.cycle, HERE.stills)
+    designs.look(["wave"], pieces, u)
+    curve = np.tile(HERE.at("wave", pieces, u)[:, None], 2)
+    assert Peak("top", "wave", 4.0).watched(designs) == pytest.approx(curve)
+    assert Magnitude("p", "p", 4.0).watched(designs) == pytest.approx(np.array([[2.0, 2.0]]))

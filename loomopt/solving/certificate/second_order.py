@@ -509,6 +509,9 @@ def judged(local: Local, level: int, system: System, multipliers: LevelMultiplie
     lagrangian = _lagrangian(local, level, multipliers)
     curve = _curve(local, cone, vectors[:, bent], values[bent], next(iter(_pulled(local, slope)), None))
     faint = vectors.T[~bent]
+    if not bent.any():
+        # A whole line along which nothing changes, and beside which nothing curves, need not be looked along.
+        faint = _beside(_moves(local, cone.basis, FALLEN / (1.0 + float(np.abs(multipliers.of).sum())))).T
     ways = [way for line in _lines(faint) for way in cone.ways(line)]
     higher = _higher(lagrangian, curve, ways, multipliers.residual, len(faint) <= FOLLOWED)
     if higher == "falls" and curve.valley:
@@ -573,20 +576,32 @@ def _settled_but_for_moves(local: Local, level: int, basis: Floats, hessian: Flo
     if level == len(local.program.objectives) - 1:
         return False
 
+    moves = _moves(local, basis)
+    if not moves.size:
+        return False
+    rest = _beside(moves)
+    return bool(np.linalg.eigvalsh(rest.T @ hessian @ rest).min(initial=np.inf) > flat)
+
+
+def _moves(local: Local, basis: Floats, most: float = tie_break.UNCHANGED) -> Floats:
+    """Return the directions (k, m), in a basis, of the moves that it leaves open and that change `most` at most."""
+
     def along(move: Mapping[str, float]) -> Floats:
         way = np.array([move.get(name, 0.0) for name in local.derivatives.names]) / local.scales
         return np.asarray(way / (np.linalg.norm(way) or 1.0))
 
-    # What moves may be held: there is no direction then.
-    moves = tie_break.unchanging(
-        local.program, local.x, lambda move: bool(np.any(along(move))) and _is_open(basis, along(move))
-    )
-    inside = [basis.T @ along(move) for move in moves]
-    if not inside:
-        return False
-    left, sizes, _ = np.linalg.svd(np.array(inside).T)
-    rest = left[:, int(np.sum(sizes > RANK)) :]
-    return bool(np.linalg.eigvalsh(rest.T @ hessian @ rest).min(initial=np.inf) > flat)
+    def asked(move: Mapping[str, float]) -> bool:
+        # What moves may be held: there is no direction then.
+        return bool(np.any(along(move))) and _is_open(basis, along(move))
+
+    moves = tie_break.unchanging(local.program, local.x, asked, most)
+    return np.array([basis.T @ along(move) for move in moves]).reshape(len(moves), basis.shape[1]).T
+
+
+def _beside(moves: Floats) -> Floats:
+    """Return an orthonormal basis (k, rest) of what directions (k, m) leave."""
+    turned, sizes, _ = np.linalg.svd(moves)
+    return np.asarray(turned[:, int(np.sum(sizes > RANK)) :])
 
 
 def _is_open(basis: Floats, way: Floats) -> bool:

@@ -4,15 +4,17 @@ It goes only along moves verified flat at this design: objectives unchanged to 1
 """
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from loomopt.maths import systems
 from loomopt.model.program import Move, Program
-from loomopt.model.sampling import sampled
+from loomopt.model.reading import BatchReading, wide
+from loomopt.model.sampling import Sampler, sampled
 from loomopt.model.session import current
-from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ACTIVE, GIVES_WAY, MOVED
 
 UNCHANGED = 1e-10
@@ -44,51 +46,56 @@ def moved(program: Program, x: Numbers) -> tuple[dict[str, float], tuple[str, ..
 
 
 def unchanging(
-    program: Program, x: Numbers, asked: Callable[[Numbers], bool] = lambda way: True
+    program: Program, x: Numbers, asked: Callable[[Numbers], bool] = lambda way: True, most: float = UNCHANGED
 ) -> list[dict[str, float]]:
     """Return the directions, SI, of the moves along which nothing changes at x (SI) as far as bounds allow.
 
     Neither an objective, nor a limit that is touched, but for the bounds of what moves. asked: says of a direction
-    whether it is of interest, every one without it.
+    whether it is of interest, every one without it; most: what may change, in natural sizes, at most UNCHANGED.
     """
     ways = ((move, way) for move in program.moves for way in move.directions(x) if asked(way))
-    return [way for move, way in ways if _judged(program, x, move, way).same]
+    return [way for move, way in ways if _judged(program, x, move, way).change <= most]
 
 
-JUDGED, KEPT = "judged moves", 16
+JUDGED, KEPT = "judged moves", 64
 """What a session calls them, and how many it keeps: curvature and least change ask for the same."""
 
 
 class _Judged(NamedTuple):
-    """Whether nothing changes along a move; program: held as long as this is kept, so that no other has its id."""
+    """What changes along a move, in natural sizes, ∞ for more than UNCHANGED.
+
+    program: held as long as this is kept, so that no other has its id.
+    """
 
     program: Program
-    same: bool
+    change: float
 
 
 def _judged(program: Program, x: Numbers, move: Move, way: Numbers) -> _Judged:
     key = id(program), tuple(x.items()), tuple(way.items())
-    make = functools.partial(_is_same, program, x, list(move.ends(way, x)))
+    make = functools.partial(_changed, program, x, list(move.ends(way, x)))
     return current().kept(JUDGED, KEPT, key, lambda: _Judged(program, make()))
 
 
-def _is_same(program: Program, x: Numbers, ends: Sequence[Numbers]) -> bool:
-    """Say whether neither the objectives nor a limit that is touched changes on the way to either end."""
+def _changed(program: Program, x: Numbers, ends: Sequence[Numbers]) -> float:
+    """Return by how much objectives and limits that are touched change on the way to either end, in natural sizes."""
     try:
         before = _excesses(program, x)
         there = [_excesses(program, {**x, **end}) for end in ends]
-        if not is_flat(program, x, *ends):
-            return False
+        change = _objectives_change(program, x, *ends)
     except (ValueError, ZeroDivisionError):
-        return False
+        return math.inf
     # The bounds of what moves may be touched on the way.
     bounds = program.bound_limits
-    return all(
-        abs(other - one) <= UNCHANGED
+    touched = (
+        abs(other - one)
         for end, after in zip(ends, there, strict=True)
         for k, (one, other) in enumerate(zip(before, after, strict=True))
         if one >= -ACTIVE and not (k in bounds and bounds[k].row in end)
     )
+    # What is no number has changed.
+    largest = float(np.max([change, *touched]))
+    return largest if largest <= UNCHANGED else math.inf
 
 
 def part_way(x: Numbers, goal: Numbers, share: float) -> dict[str, float]:
@@ -100,19 +107,37 @@ def part_way(x: Numbers, goal: Numbers, share: float) -> dict[str, float]:
 
 def is_flat(program: Program, x: Numbers, *goals: Numbers) -> bool:
     """Say whether the objectives stay the same along the way to each goal (of the same variables), and beyond x."""
-    before = _objectives(program, x)
+    return _objectives_change(program, x, *goals) <= UNCHANGED
+
+
+def _objectives_change(program: Program, x: Numbers, *goals: Numbers) -> float:
+    """Return by how much the objectives change along the way to each goal, and beyond x, in natural sizes.
+
+    For a peak, its whole curve at nodes that move with the design. ∞ where it is more than UNCHANGED.
+    """
     nearby = {name: x[name] * (1 + BEYOND) for goal in goals for name in goal}
     trials = [part_way(x, goal, share) for goal in goals for share in (1.0, 0.5)] + [part_way(x, nearby, 1.0)]
-    changed = (_objectives(program, trial) for trial in trials)
-    # Where two corners of the cycle pass each other a turn has other nodes: something changes along such a move.
-    return all(now.shape == before.shape and np.abs(now - before).max() <= UNCHANGED for now in changed)
+    here = sampled(program.model, {**program.parameters, **x})
+    designs = _together(program, here, [x, *trials], nearby)
+    with np.errstate(all="ignore"):
+        begins = np.array([wide(start, designs.count) for start in designs.starts])
+        designs.look([name for each in program.objectives for name in each.quantities], *here.grid(NODES))
+        curves = np.concatenate([each.watched(designs) / each.scale for each in program.objectives])
+        change = float(np.abs(curves[:, 1:] - curves[:, :1]).max())
+    current().positions += curves.size
+    # Where two corners of the cycle pass each other nodes are elsewhere: something changes along such a move.
+    return change if change <= UNCHANGED and np.all(np.diff(begins, axis=0) >= 0.0) else math.inf
 
 
-def _objectives(program: Program, x: Numbers) -> Floats:
-    """Return the objectives in their natural sizes; for a peak, the whole curve at nodes that move with the design."""
-    sampler = sampled(program.model, {**program.parameters, **x})
-    pieces, u = sampler.grid(NODES)
-    return np.concatenate([each.watched(sampler, pieces, u) / each.scale for each in program.objectives])
+def _together(program: Program, here: Sampler, designs: Sequence[Numbers], differ: Collection[str]) -> BatchReading:
+    """Return designs (SI) read at once; here: one of them; differ: the names of numbers in which they do."""
+    own = {name: np.array([x[name] for x in designs]) for name in differ}
+    if here.hints:
+        known = [{**program.parameters, **x} for x in designs]
+        hints = [program.model.hints(program.model.given(systems.FLOAT, values)) for values in known]
+        own |= {name: np.array([of[name] for of in hints]) for name in here.hints}
+    values = {**program.parameters, **designs[0], **here.hints, **own}
+    return BatchReading(program.model, systems.numpy(), values, here.cycle, here.stills)
 
 
 def reach(program: Program, x: Numbers, goal: Numbers) -> float:

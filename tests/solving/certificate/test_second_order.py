@@ -165,3 +165,25 @@ def test_a_common_scale_that_changes_nothing_is_settled_too():
     assert curvature(moved(ratio, ("x", "y"), ScaleMove, least=0.5), x=2.0, y=1.0).settled
     tilted = ratio | {"g": lambda v: v["x"]}
     assert not curvature(moved(tilted, ("x", "y"), ScaleMove, least=0.5), x=2.0, y=1.0).settled
+
+
+@pytest.mark.parametrize(
+    ("formula", "shut", "looks"),
+    [
+        (lambda v: v["x"], True, False),
+        (lambda v: v["x"] - 1e-14 * v["y"] ** 3, True, True),
+        (lambda v: v["x"] ** 2, False, True),
+    ],
+    ids=["a line without change", "less than a change that counts", "something curves beside it"],
+)
+def test_a_move_that_changes_nothing_is_looked_along_only_beside_what_curves(monkeypatch, formula, shut, looks):
+    looked = []
+
+    def counted(self, lagrangian, way, slope):
+        looked.append(way)
+        return "holds"
+
+    monkeypatch.setattr(second_order.FeasibleCurve, "judged", counted)
+    program = moved({"f": formula}, limits=(("x", -1, 0.0),) if shut else (), objectives=("f",))
+    assert curvature(program, x=0.0, y=1.0).higher == "holds"
+    assert bool(looked) == looks

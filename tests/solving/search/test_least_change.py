@@ -178,9 +178,9 @@ def test_only_moves_along_the_level_are_looked_at(monkeypatch):
 
     def counted(program, x, ends):
         asked.append(set(ends[0]))
-        return True
+        return 0.0
 
-    monkeypatch.setattr(tie_break, "_is_same", counted)
+    monkeypatch.setattr(tie_break, "_changed", counted)
     axes = [AxisMove(n, (n,), (Preference("today", "tidy"),), {n: 0.0}, {n: (-9.0, 9.0)}) for n in "xyz"]
     program = toy.program("xyz", {"f": lambda v: v["x"] ** 2 + (v["y"] - v["z"]) ** 2}, moves=tuple(axes))
     certificate = certify(program, {"x": 0.0, "y": 1.0, "z": 1.0}, 1e-8)

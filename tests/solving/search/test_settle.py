@@ -249,8 +249,19 @@ def test_a_limit_that_is_touched_and_stays_where_it_is_does_not_change():
 
 @pytest.mark.parametrize(("end", "flat"), [(0.5, False), (0.5004, False), (0.5006, True), (0.6, True)])
 def test_a_way_must_be_flat_a_thousandth_beyond_the_design_and_no_farther(end, flat):
-    rows = {"f": lambda v: v["x"] ** 2 + max(0.0, v["y"] - end)}
+    rows = {"f": lambda v: v["x"] ** 2 + np.maximum(0.0, v["y"] - end)}
     assert slid(rows, 0.25)[0] == (0.25 if flat else 0.5)
+
+
+def test_what_is_no_number_on_the_way_has_changed():
+    """An objective after one that stays the same, and a limit that is touched, as roots of what becomes negative."""
+    there, move = {"x": 1.0, "y": 1.0}, (slide(1.0, 0.5, 9.0),)
+    root = {"g": lambda v: 0.0 * np.sqrt(np.maximum(v["y"], 2.0 - v["y"]) * (2.0 - v["y"]))}
+    both = toy.program("xy", FLAT | root, objectives=("f", "g"), moves=move)
+    limit = toy.program("xy", FLAT | root, limits=(("g", 1, 0.0),), moves=move)
+    with np.errstate(invalid="ignore"):
+        assert unchanging(toy.program("xy", FLAT, moves=move), there) == [{"y": 1.0}]
+        assert unchanging(both, there) == unchanging(limit, there) == []
 
 
 def test_a_bound_of_what_moves_is_no_limit_that_changes_and_any_other_is():
