@@ -277,7 +277,7 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
         extra = calls.first_extra(nlp, here.sampler)
         answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, Multipliers())
         iterations += answer.iterations
-    beaten = answer.status in SUCCESS and calls.is_beaten(answer.value, answer.extra)
+    beaten = answer.status in SUCCESS and calls.is_beaten(answer)
     beaten_as = Point(answer.x, "Beaten", False, iterations, built=calls.built, value=answer.value)
     if beaten and not here.sampler.hints:
         return beaten_as

@@ -14,6 +14,7 @@ from loomopt.base import interrupts
 from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
+from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solving.nlp.point import Elastic, Known, Settings, sampler_at
 from loomopt.solving.nlp.rows import HeldStations, Multipliers, RowFamily, chained, epigraphs, families, held, stations
 from loomopt.solving.nlp.transcribe import Transcription, transcribe
@@ -171,12 +172,25 @@ class Calls:
         bound += extra[ways[family.limit][0]] if self.elastic and family.limit in ways else 0.0
         return float(extreme.height / limit.scale - bound)
 
-    def is_beaten(self, value: float, extra: Floats) -> bool:
-        """Say whether a solve at some nodes, objective and excesses as told, is already no better than is known."""
+    def is_beaten(self, answer: "IpoptAnswer") -> bool:
+        """Say whether a solve at some nodes is already no better than is known."""
         if self.ways is not None:
-            costs = np.array(self.ways.costs or np.ones(len(extra)))
-            value = float(np.sum(extra[costs == 1.0]))
-        return value > self.known.most
+            costs = np.array(self.ways.costs or np.ones(len(answer.extra)))
+            return float(np.sum(answer.extra[costs == 1.0])) > self.known.most
+        return answer.value > self.known.most and not self._falls_earlier(answer)
+
+    def _falls_earlier(self, answer: "IpoptAnswer") -> bool:
+        """Say whether an objective before the last is lower at some nodes than is known, those before it the same."""
+        sampler = self.sampler(answer.x) if len(self.known.levels) > 1 else None
+        if sampler is None:
+            return False
+        heights = {epigraph.objective: answer.extra[k] for k, epigraph in enumerate(self.epigraphs)}
+        for k, known in enumerate(self.known.levels[:-1]):
+            objective = self.program.objectives[k]
+            here = heights[k] if k in heights else objective.merit(sampler) / objective.scale
+            if abs(here - known) > SAME_OBJECTIVE:
+                return bool(here < known)
+        return False
 
     def first_nodes(self, loose: Sequence[Sequence[Extreme]]) -> tuple[tuple[Extreme, ...], ...]:
         """Return a start's nodes: its own largest extremes."""

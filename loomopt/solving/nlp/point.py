@@ -129,11 +129,13 @@ class Known(NamedTuple):
 
     nodes: of each family, where its rows bind, beside a solve's own from its second round on: what a round gives is
     less than its basin has, so that it is left as soon as it cannot come below `most`, in the NLP's objective (elastic:
-    in the sum of the excesses of cost 1).
+    in the sum of the excesses of cost 1). levels: objectives of the best, in natural sizes; what falls below an earlier
+    one is not left, for the NLP's objective weighs a small fall there against a large rise of the next.
     """
 
     nodes: tuple[tuple[Extreme, ...], ...] = ()
     most: float = math.inf
+    levels: tuple[float, ...] = ()
 
 
 def sampler_at(program: Program, x: Mapping[str, float], samples: int = SAMPLES) -> Sampler | None:

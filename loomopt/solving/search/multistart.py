@@ -436,7 +436,7 @@ class _Steps:
         if not search.reached:
             return tried(search, start)
         best = search.ranked[0]
-        return tried(search, start, known=Known(best.point.binding, best.value - BETTER))
+        return tried(search, start, known=Known(best.point.binding, best.value - BETTER, best.objectives))
 
 
 def tied(search: Search) -> bool:

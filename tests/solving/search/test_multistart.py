@@ -245,6 +245,36 @@ def test_starts_are_not_led_into_the_basin_that_is_known(seed):
     assert answer.figures["peak_acceleration"] == pytest.approx(0.7493152, abs=5e-8)
 
 
+LESS_FIRST_FOR_MORE_SECOND = {
+    "bounds.l1": {"min": "27.34 mm", "max": "33.68 mm"},
+    "bounds.l2": {"min": "57.63 mm", "max": "67.92 mm"},
+    "bounds.l3": {"min": "161.68 mm", "max": "163.47 mm"},
+    "bounds.l4": {"min": "158.29 mm", "max": "164.06 mm"},
+    "bounds.m4e.max": "1.9 kg",
+    "bounds.r4e.max": "47.9 mm",
+    "limits.swing": {"min": "21.671 deg", "max": "22.734 deg"},
+    "limits.theta": {"min": "-14.611 deg", "max": "-10.942 deg"},
+    "limits.mu_min.min": "48.109 deg",
+    "operation.M0": "560.2 N*m",
+    "operation.speed": "683.7 rpm",
+    "effects.counterweight_inertia": {"JS": "0.0106 kg*m^2"},
+    "effects.rocker_inertia": {"J3": "0.05 kg*m^2"},
+    "targets.balance.indifference": 0.0,
+}
+"""Of two basins 0.7 mm apart one has 2.4e-5 less of the first objective, and 1 % more of the second."""
+
+
+def test_a_little_less_of_the_first_objective_counts_more_than_much_of_the_second():
+    scene = lo.load("beatup").update(LESS_FIRST_FOR_MORE_SECOND)
+    answer = lo.solve(scene, "balance")
+    assert answer.status == "optimal", answer.message
+    assert answer.figures["M3_fdc"] == pytest.approx(-407.819780383, abs=1e-6)
+    # The other one has its own certificate: what decides is the order of the objectives alone.
+    beside = lo.solve(scene.update({"bounds.l3.max": "161.9 mm"}), "balance")
+    assert beside.figures["M3_fdc"] == pytest.approx(-407.829786578, abs=1e-6)
+    assert beside.figures["peak_torque"] < 0.99 * answer.figures["peak_torque"]
+
+
 def test_a_flip_changes_one_variable_alone():
     program = hills()
     screening = multistart._screening(Search(toy.ToyJob(program), program, Settings()), program.starts)
