@@ -170,10 +170,10 @@ def compared(one: Candidate, other: Candidate) -> int:
 def judged(search: Search) -> Search:
     """Return the search with its best candidate tie-broken and certified.
 
-    Where the solver gave up at the best, and its limits cannot be met nearby, that is no design: the others count.
+    Where the limits of the best cannot be met nearby, that is no design, whatever the solver said: the others count.
     """
     found = _judged(search)
-    while (best := found.best) and best.is_left and best.certificate.feasibility > FEASIBLE:
+    while (best := found.best) and best.certificate.feasibility > FEASIBLE:
         kept = tuple(c if not _is_same(c, best) else _dropped(c) for c in found.candidates)
         rest = replace(found, candidates=kept, best=None)
         if not rest.reached:

@@ -15,6 +15,7 @@ from loomopt.model.program import Move, Program
 from loomopt.model.reading import BatchReading, wide
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.model.session import current
+from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ACTIVE, GIVES_WAY, MOVED
 
 UNCHANGED = 1e-10
@@ -22,6 +23,9 @@ UNCHANGED = 1e-10
 
 BEYOND = 1e-3
 """Share of a variable by which a flat move is tried beyond the design too: a bump at both ends of it would show."""
+
+ROSE = 0.1
+"""Share of what a limit may give way that it has given half-way, if it rises by no more than the third power."""
 
 BISECTIONS, NODES = 60, 64
 """Halvings of a move's way (to a float's last bit), and nodes of a turn on which a curve must not change."""
@@ -141,20 +145,25 @@ def _together(program: Program, here: Sampler, designs: Sequence[Numbers], diffe
 
 
 def reach(program: Program, x: Numbers, goal: Numbers) -> float:
-    """Return the largest share of the way along which no limit gets worse than it is allowed."""
-    allowed = [max(0.0, excess) + GIVES_WAY for excess in _excesses(program, x)]
+    """Return the largest share of the way along which no limit gets worse than it is allowed.
 
-    def holds(share: float) -> bool:
-        now = _excesses(program, part_way(x, goal, share))
-        return all(excess <= most for excess, most in zip(now, allowed, strict=True))
+    None where a limit that is met already stops it by rising from the first: what it may give way there is room for
+    rounding, and a step into it would leave the bounds that stop the design.
+    """
+    before = np.maximum(0.0, _excesses(program, x))
 
-    if holds(1.0):
+    def rises(share: float, room: float) -> Floats:
+        # What is no number holds nothing.
+        return np.asarray(~(np.array(_excesses(program, part_way(x, goal, share))) <= before + room))
+
+    if not rises(1.0, GIVES_WAY).any():
         return 1.0
     low, high = 0.0, 1.0
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low
+        low, high = (low, middle) if rises(middle, GIVES_WAY).any() else (middle, high)
+    closed = rises(high, GIVES_WAY) & rises(low / 2, ROSE * GIVES_WAY)
+    return 0.0 if closed.any() else low
 
 
 def _excesses(program: Program, x: Numbers) -> list[float]:
