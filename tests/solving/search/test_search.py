@@ -92,6 +92,16 @@ def test_a_few_of_them_are_tried_and_then_the_best_stays(certified):
     assert (found.passed, found.best.point) == (False, points[0].point)
 
 
+def test_what_breaks_a_limit_is_no_design_whatever_the_solver_said(certified):
+    seen, answers = certified
+    answers[1.0] = replace(BAD, feasibility=2 * FEASIBLE)
+    found = judged(empty(candidates=(candidate(1, x=1.0), candidate(1.1, x=2.0))))
+    assert (seen, found.passed, found.best.point.x["x"]) == ([1.0, 2.0], True, 2.0)
+    assert [c.point.x["x"] for c in found.reached] == [2.0]
+    alone = judged(empty(candidates=(candidate(1, x=1.0),)))
+    assert (alone.passed, alone.best.certificate.feasibility) == (False, 2 * FEASIBLE), "what there is to tell"
+
+
 def test_worse_candidates_do_not_stand_for_the_best(certified):
     seen, answers = certified
     answers[1.0] = BAD

@@ -128,6 +128,19 @@ def test_a_limit_already_met_stops_the_move_at_once():
     assert slid(FLAT, 3.0, limits=(("y", 1, 0.5),))[0] == pytest.approx(0.5, abs=1e-11)
 
 
+@pytest.mark.parametrize("power", [1, 2, 3])
+def test_a_met_limit_that_hardly_rises_is_not_stepped_into(power):
+    """What it gives way for rounding would be a step of 1e-6 and more, away from the bounds that stop a design."""
+    slow = FLAT | {"h": lambda v: 1e-6 * (v["y"] - 0.5) ** power}
+    assert slid(slow, 3.0, limits=(("h", 1, 0.0),)) == (0.5, ())
+
+
+def test_a_met_limit_that_falls_first_stops_where_it_is_met_again():
+    hollow = FLAT | {"h": lambda v: (v["y"] - 0.5) * (v["y"] - 2.0)}
+    y, said = slid(hollow, 3.0, limits=(("h", 1, 0.0),))
+    assert (y, said) == (pytest.approx(2.0, abs=1e-11), ("slide: tidier",))
+
+
 def test_nothing_is_said_to_be_settled_where_nothing_moved():
     assert slid(FLAT, 0.5) == (0.5, ())
     program = toy.program("xy", FLAT)
