@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from loomopt.maths import systems
 from loomopt.model.program import Move, Program
@@ -152,7 +153,7 @@ def reach(program: Program, x: Numbers, goal: Numbers) -> float:
     """
     before = np.maximum(0.0, _excesses(program, x))
 
-    def rises(share: float, room: float) -> Floats:
+    def rises(share: float, room: float) -> NDArray[np.bool_]:
         # What is no number holds nothing.
         return np.asarray(~(np.array(_excesses(program, part_way(x, goal, share))) <= before + room))
 

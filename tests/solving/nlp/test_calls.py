@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support import toy
 from support.worst import WorstPeak
 from waves import model, objective, program
 
@@ -12,9 +13,9 @@ from loomopt.model.limits import BoundLimit
 from loomopt.model.objectives import Magnitude, Peak, Worst
 from loomopt.model.program import Variable
 from loomopt.model.sampling import Extreme
-from loomopt.solving.nlp.ipopt import Calls
+from loomopt.solving.nlp.ipopt import Calls, IpoptAnswer
 from loomopt.solving.nlp.point import Elastic, Known, Settings
-from loomopt.solving.nlp.rows import RowFamily
+from loomopt.solving.nlp.rows import Multipliers, RowFamily
 
 X = {"x": 0.5, "y": -2.0}
 
@@ -127,14 +128,29 @@ def test_an_excess_of_infinite_cost_is_firm():
     assert float(value) == pytest.approx(0.25 * 2.0, rel=1e-14)
 
 
+def answered(value, extra=(), x=None):
+    return IpoptAnswer("Solve_Succeeded", x or {}, np.array(extra), Multipliers(), 1, value)
+
+
 def test_a_solve_is_beaten_once_it_is_no_better_than_what_is_known():
     task = program([("sum", 1, -5.0), ("wave", 1, 1.0)])
     plain = Calls(task, Settings(), known=Known(most=3.0))
-    assert [plain.is_beaten(value, np.zeros(0)) for value in (2.999, 3.0, 3.001)] == [False, False, True]
+    assert [plain.is_beaten(answered(value)) for value in (2.999, 3.0, 3.001)] == [False, False, True]
     elastic = Calls(task, Settings(), Elastic((1e-9, 1.0)), Known(most=3.0))
-    assert not elastic.is_beaten(9.0, np.array([99.0, 3.0])), "what is all but free does not count"
-    assert elastic.is_beaten(0.0, np.array([0.0, 3.001]))
-    assert not Calls(task, Settings()).is_beaten(1e300, np.zeros(0))
+    assert not elastic.is_beaten(answered(9.0, (99.0, 3.0))), "what is all but free does not count"
+    assert elastic.is_beaten(answered(0.0, (0.0, 3.001)))
+    assert not Calls(task, Settings()).is_beaten(answered(1e300))
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "beaten"),
+    [(1.0, 9.0, True), (1.0 - 0.9e-7, 9.0, True), (1.0 - 1.1e-7, 9.0, False), (1.1, 0.0, True)],
+)
+def test_a_solve_that_falls_at_an_earlier_level_is_not_beaten_by_what_the_next_one_weighs(first, second, beaten):
+    task = toy.program("xy", {"f": lambda v: 2 * v["x"]}, objectives=("f", "y"), sizes={"f": 2.0})
+    calls = Calls(task, Settings(), known=Known(most=1000.0, levels=(1.0, 0.0)))
+    assert calls.is_beaten(answered(1001.0, x={"x": first, "y": second})) == beaten
+    assert not calls.is_beaten(answered(999.0, x={"x": 1.1, "y": 0.0})), "it is still below what is known"
 
 
 def test_nodes_known_to_bind_come_after_a_starts_own():
