@@ -16,7 +16,6 @@ from loomopt.model.program import Move, Program
 from loomopt.model.reading import BatchReading, wide
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.model.session import current
-from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ACTIVE, GIVES_WAY, MOVED
 
 UNCHANGED = 1e-10
@@ -148,7 +147,7 @@ def _together(program: Program, here: Sampler, designs: Sequence[Numbers], diffe
 def reach(program: Program, x: Numbers, goal: Numbers) -> float:
     """Return the largest share of the way along which no limit gets worse than it is allowed.
 
-    None where a limit that is met already stops it by rising from the first: what it may give way there is room for
+    0 where a limit that is met already stops it by rising from the first: what it may give way there is room for
     rounding, and a step into it would leave the bounds that stop the design.
     """
     before = np.maximum(0.0, _excesses(program, x))
