@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from loomopt.maths import systems
 from loomopt.model.program import Move, Program
-from loomopt.model.reading import BatchReading, wide
+from loomopt.model.reading import BatchReading, plain, wide
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.model.session import current
+from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ACTIVE, GIVES_WAY, MOVED
 
 UNCHANGED = 1e-10
@@ -39,9 +40,12 @@ def moved(program: Program, x: Numbers) -> tuple[dict[str, float], tuple[str, ..
     for move in program.moves:
         wish = move.wished({**program.parameters, **x})
         goal = move.goal(wish, x) if wish else {}
-        if wish is None or all(x[name] == end for name, end in goal.items()) or not is_flat(program, x, goal):
+        if wish is None or all(x[name] == end for name, end in goal.items()):
             continue
-        share = reach(program, x, goal)
+        way = _read(program, x, [goal])
+        if way.change > UNCHANGED:
+            continue
+        share = _reached(program, x, goal, *way.excesses)
         sizes = [share * abs(goal[v.name] - x[v.name]) / v.scale for v in program.variables if v.name in goal]
         if max(sizes, default=0.0) > MOVED:
             settled.append(f"{move.name}: {wish.reason}")
@@ -84,22 +88,17 @@ def _judged(program: Program, x: Numbers, move: Move, way: Numbers) -> _Judged:
 def _changed(program: Program, x: Numbers, ends: Sequence[Numbers]) -> float:
     """Return by how much objectives and limits that are touched change on the way to either end, in natural sizes."""
     try:
-        before = _excesses(program, x)
-        there = [_excesses(program, {**x, **end}) for end in ends]
-        change = _objectives_change(program, x, *ends)
+        way = _read(program, x, ends)
     except (ValueError, ZeroDivisionError):
         return math.inf
-    # The bounds of what moves may be touched on the way.
-    bounds = program.bound_limits
-    touched = (
-        abs(other - one)
-        for end, after in zip(ends, there, strict=True)
-        for k, (one, other) in enumerate(zip(before, after, strict=True))
-        if one >= -ACTIVE and not (k in bounds and bounds[k].row in end)
-    )
-    # What is no number has changed.
-    largest = float(np.max([change, *touched]))
-    return largest if largest <= UNCHANGED else math.inf
+    before, change = way.excesses[0], way.change
+    for end, after in zip(ends, way.excesses[1:], strict=True):
+        # The bounds of what moves may be touched on the way.
+        own = [k for k, limit in program.bound_limits.items() if limit.row in end]
+        touched = np.delete(np.abs(after - before), own)[np.delete(before, own) >= -ACTIVE]
+        # What is no number has changed.
+        change = float(np.max(touched, initial=change))
+    return change if change <= UNCHANGED else math.inf
 
 
 def part_way(x: Numbers, goal: Numbers, share: float) -> dict[str, float]:
@@ -109,18 +108,23 @@ def part_way(x: Numbers, goal: Numbers, share: float) -> dict[str, float]:
     return {**x, **{name: x[name] + share * (end - x[name]) for name, end in goal.items()}}
 
 
-def is_flat(program: Program, x: Numbers, *goals: Numbers) -> bool:
-    """Say whether the objectives stay the same along the way to each goal (of the same variables), and beyond x."""
-    return _objectives_change(program, x, *goals) <= UNCHANGED
+class _Way(NamedTuple):
+    """What is read along a move: change of the objectives, in natural sizes, ∞ for more than UNCHANGED.
+
+    excesses: (1 + goals, limits), by how much limits are exceeded at the design and at each goal, in natural sizes.
+    """
+
+    change: float
+    excesses: Floats
 
 
-def _objectives_change(program: Program, x: Numbers, *goals: Numbers) -> float:
-    """Return by how much the objectives change along the way to each goal, and beyond x, in natural sizes.
+def _read(program: Program, x: Numbers, goals: Sequence[Numbers]) -> _Way:
+    """Return what is read at x (SI), along the way to each goal (of the same variables), and beyond x, all at once.
 
-    For a peak, its whole curve at nodes that move with the design. ∞ where it is more than UNCHANGED.
+    Of a peak the whole curve must stay, at nodes that move with the design.
     """
     nearby = {name: x[name] * (1 + BEYOND) for goal in goals for name in goal}
-    trials = [part_way(x, goal, share) for goal in goals for share in (1.0, 0.5)] + [part_way(x, nearby, 1.0)]
+    trials = [part_way(x, goal, share) for share in (1.0, 0.5) for goal in goals] + [part_way(x, nearby, 1.0)]
     here = sampled(program.model, {**program.parameters, **x})
     designs = _together(program, here, [x, *trials], nearby)
     with np.errstate(all="ignore"):
@@ -128,9 +132,19 @@ def _objectives_change(program: Program, x: Numbers, *goals: Numbers) -> float:
         designs.look([name for each in program.objectives for name in each.quantities], *here.grid(NODES))
         curves = np.concatenate([each.watched(designs) / each.scale for each in program.objectives])
         change = float(np.abs(curves[:, 1:] - curves[:, :1]).max())
+        at = 1 + len(goals)
+        excesses = np.empty((at, len(program.limits)))
+        for k, limit in enumerate(program.limits):
+            if k not in program.cycle_limits:
+                excess = plain(limit.residual(designs)) / limit.scale
+                excesses[:, k] = np.broadcast_to(np.abs(excess) if limit.sign == 0 else excess, designs.count)[:at]
+    whole = list(program.cycle_limits)
+    for row, design in zip(excesses, [x, *trials] if whole else (), strict=False):
+        row[whole] = _excesses(program, design)[whole]
     current().positions += curves.size
     # Where two corners of the cycle pass each other nodes are elsewhere: something changes along such a move.
-    return change if change <= UNCHANGED and np.all(np.diff(begins, axis=0) >= 0.0) else math.inf
+    same = change <= UNCHANGED and bool(np.all(np.diff(begins, axis=0) >= 0.0))
+    return _Way(change if same else math.inf, excesses)
 
 
 def _together(program: Program, here: Sampler, designs: Sequence[Numbers], differ: Collection[str]) -> BatchReading:
@@ -145,29 +159,37 @@ def _together(program: Program, here: Sampler, designs: Sequence[Numbers], diffe
 
 
 def reach(program: Program, x: Numbers, goal: Numbers) -> float:
-    """Return the largest share of the way along which no limit gets worse than it is allowed.
+    """Return the largest share of the way along which no limit gets worse than it is allowed."""
+    return _reached(program, x, goal, _excesses(program, x), _excesses(program, {**x, **goal}))
+
+
+def _reached(program: Program, x: Numbers, goal: Numbers, here: Floats, there: Floats) -> float:
+    """Return that share; here, there: what limits are exceeded by at x and at the goal, in natural sizes.
 
     0 where a limit that is met already stops it by rising from the first: what it may give way there is room for
     rounding, and a step into it would leave the bounds that stop the design.
     """
-    before = np.maximum(0.0, _excesses(program, x))
+    before = np.maximum(0.0, here)
 
-    def rises(share: float, room: float) -> NDArray[np.bool_]:
+    def rises(excesses: Floats, room: float) -> NDArray[np.bool_]:
         # What is no number holds nothing.
-        return np.asarray(~(np.array(_excesses(program, part_way(x, goal, share))) <= before + room))
+        return np.asarray(~(excesses <= before + room))
 
-    if not rises(1.0, GIVES_WAY).any():
+    def at(share: float) -> Floats:
+        return _excesses(program, part_way(x, goal, share))
+
+    if not rises(there, GIVES_WAY).any():
         return 1.0
     low, high = 0.0, 1.0
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
-        low, high = (low, middle) if rises(middle, GIVES_WAY).any() else (middle, high)
-    closed = rises(high, GIVES_WAY) & rises(low / 2, ROSE * GIVES_WAY)
+        low, high = (low, middle) if rises(at(middle), GIVES_WAY).any() else (middle, high)
+    closed = rises(at(high), GIVES_WAY) & rises(at(low / 2), ROSE * GIVES_WAY)
     return 0.0 if closed.any() else low
 
 
-def _excesses(program: Program, x: Numbers) -> list[float]:
+def _excesses(program: Program, x: Numbers) -> Floats:
     """Return by how much every limit is exceeded, in its natural size; an equality how far it is missed."""
     sampler = sampled(program.model, {**program.parameters, **x})
     sampler.search(limit.row for limit in program.cycle_limits.values())
-    return [limit.violation(sampler) for limit in program.limits]
+    return np.array([limit.violation(sampler) for limit in program.limits])

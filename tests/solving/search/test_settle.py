@@ -284,7 +284,7 @@ def test_a_bound_of_what_moves_is_no_limit_that_changes_and_any_other_is():
 
 
 def test_a_way_is_followed_to_its_wish_and_not_to_where_limits_hold_again_beyond_it():
-    rows = FLAT | {"h": lambda v: float(2.0 < v["y"] < 50.0)}
+    rows = FLAT | {"h": lambda v: 1.0 * ((v["y"] > 2.0) & (v["y"] < 50.0))}
     assert slid(rows, 3.0, limits=(("h", 1, 0.5),))[0] == pytest.approx(2.0, abs=1e-11)
 
 
