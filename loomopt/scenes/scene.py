@@ -244,7 +244,7 @@ class Scene(Shown):
         document = self._off(self._on(self._set(values), call.on), call.off)
         told = self.call.then(replace(call, set=values, free=()))
         if document is not self.document:
-            changed = _built(document, self.jobs, self.origin, self.paths.set_by_caller(own), told)
+            changed = _built(document, self.jobs, self.origin, self.paths.set_by_caller(own), told, self)
         else:
             changed = self if told == self.call else replace(self, call=told)
         return changed.free(call.free) if call.free else changed
@@ -423,9 +423,17 @@ def build(
 
 
 def _built(
-    original: Mapping[str, Any], jobs: Jobs, origin: str, paths: Paths | None = None, call: Call | None = None
+    original: Mapping[str, Any],
+    jobs: Jobs,
+    origin: str,
+    paths: Paths | None = None,
+    call: Call | None = None,
+    before: Scene | None = None,
 ) -> Scene:
-    """Return the scene that raw tables describe, which nobody else changes."""
+    """Return the scene that raw tables describe, which nobody else changes.
+
+    before: a scene whose tables are read again where these are not the very same.
+    """
     faults = Faults()
     raw = _meant(original, TABLES)
     problem = read.problem(raw["problem"], jobs, origin, faults)
@@ -440,11 +448,19 @@ def _built(
     for name in original:
         if name not in known:
             faults.add(unknown("table", name, known, origin, name, given=original))
+    last = before if before is not None and before.schema is schema else None
+
+    def stays(*names: str) -> bool:
+        return last is not None and all(original.get(name) is last.document.get(name) for name in names)
+
     tables = {
-        "operation": read.checked(schema.operation, raw["operation"], origin, "operation", faults),
-        "mechanism": read.checked(schema.mechanism, raw["mechanism"], origin, "mechanism", faults),
+        name: last.tables[name] if last and stays(name) else read.checked(model, raw[name], origin, name, faults)
+        for name, model in (("operation", schema.operation), ("mechanism", schema.mechanism))
     }
-    active = read.effects(raw["effects"], schema, origin, "effects", faults)
+    if last and stays("effects"):
+        active = dict(zip(last.active, last.effects.values(), strict=True))
+    else:
+        active = read.effects(raw["effects"], schema, origin, "effects", faults)
     available = read.effects(raw["available"], schema, origin, "available", faults)
     read.demand(schema, tables, active, origin, faults)
     places = list(read.places(schema, tables, active, available))
@@ -465,9 +481,15 @@ def _built(
         tables=tables,
         effects={effect.name: own for effect, own in active.items()},
         active=tuple(active),
-        bounds=read.bounds(raw["bounds"], schema, places, origin, faults),
-        limits=read.limits(raw["limits"], schema, tuple(active), origin, faults),
-        targets=read.named(raw["targets"], targets, "target", origin, "targets", faults),
+        bounds=last.bounds
+        if last and stays("bounds", "effects", "available") and _keys(tables) == _keys(last.tables)
+        else read.bounds(raw["bounds"], schema, places, origin, faults),
+        limits=last.limits
+        if last and stays("limits", "effects")
+        else read.limits(raw["limits"], schema, tuple(active), origin, faults),
+        targets=last.targets
+        if last and stays("targets")
+        else read.named(raw["targets"], targets, "target", origin, "targets", faults),
         paths=paths or Paths(),
         call=call or Call(),
     )
@@ -519,6 +541,15 @@ def _judged(scene: Scene, faults: Faults) -> bool:
 def given(table: Table) -> dict[str, Any]:
     """Return the values of a table that are given or defaulted, words and lists too."""
     return {name: value for name, value in table if value is not None}
+
+
+def _keys(tables: Mapping[str, Table]) -> list[str]:
+    """Return the keys of tables that are given or defaulted, those of tables inside them too."""
+    found = []
+    for name, own in tables.items():
+        inner = {key: value for key, value in own if isinstance(value, Table)}
+        found += [f"{name}.{key}" for key in (*given(own), *_keys(inner))]
+    return found
 
 
 def _numbers(table: Table) -> dict[str, float]:
