@@ -88,6 +88,9 @@ def _moved(search: Search, best: Candidate, kept: Collection[str], ways: Floats)
         (candidate,) = tried(Search(search.job, solved, settings), warm.x, warm).candidates
         if not candidate.point.reached:
             continue
+        if candidate.point.violation > settings.excess:
+            # The exchange came to no end: at a larger weight it comes to none either.
+            break
         warm = candidate.point
         if not _differ(program, warm.x, best.x, ROUNDING):
             candidate = candidate._replace(point=replace(warm, x=dict(best.x)))

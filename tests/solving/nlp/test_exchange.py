@@ -34,6 +34,21 @@ def highest(task, point, name):
     return np.abs(Sampler(task.model, point.x).at(name, pieces, np.linspace(0, 1, 100_001))).max()
 
 
+@pytest.mark.parametrize(
+    ("excesses", "creeps"),
+    [
+        ((1e-8,) * 4, False),
+        ((1e-8, 6e-9, 9e-9, 6e-9, 7e-9), True),
+        ((1e-8, 6e-9, 9e-9, 4e-9, 7e-9), False),
+        ((1e-5, 6e-9, 9e-9, 6e-9, 7e-9), False),
+        ((1e-8, 6e-7, 9e-9, 6e-9, 7e-9), False),
+        ((1e-8, 1e-8, 6e-9, 9e-9, 6e-9, 7e-9), True),
+    ],
+)
+def test_an_exchange_creeps_where_four_rounds_do_not_halve_what_little_is_exceeded(excesses, creeps):
+    assert exchange._creeps(excesses) == creeps
+
+
 def test_the_least_peak_is_half_the_range():
     """cos φ + cos 2φ / 2 runs from −3/4 to 3/2: the best shift is −3/8, the peak 9/8."""
     task = program(objectives=(objective("wave", "peak"),))

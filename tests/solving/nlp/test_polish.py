@@ -76,6 +76,18 @@ def test_what_binds_at_its_bound_is_put_on_it():
     assert list(holds(row(-1.0), arguments, (1e-7, 0.5), (-1e-6, 0.0))) == [1e-7, 0.5], "no multiplier to speak of"
 
 
+def test_a_row_that_is_touched_without_a_multiplier_is_met_where_the_step_would_break_it():
+    arguments = bare((0.0, -9.0), (1.0, 9.0))
+
+    def below(x, p):
+        return np.array([x[0] - x[1]]), np.array([[1.0, -1.0]])
+
+    before = 1.0 - 1e-7
+    assert list(holds(below, arguments, (before, before), (1.0, 0.0))) == pytest.approx([1.0, 1.0], abs=1e-15)
+    assert list(holds(below, arguments, (before, 1.5), (1.0, 0.0))) == [1.0, 1.5], "kept clear of, it stays"
+    assert holds(below, arguments, (before, before - 1e-3), (1.0, 0.0)) is None, "too far"
+
+
 def test_rounding_beyond_a_bound_is_cut_and_more_is_refused():
     arguments = bare((0.0, -9.0), (9.0, 0.0))
     assert list(holds(row(-1.0), arguments, (-1e-12, 1e-12))) == [0.0, 0.0]
