@@ -173,7 +173,7 @@ creep (tests/solving/search/test_infeasible.py)."""
 
 CREEPING = 4
 """Rounds in a row that do not halve an excess of less than STANDS. A law whose curvature touches its limit along a
-whole stretch has added 90 nodes by the sixteenth round, each round taking ten seconds, and none since the fifth helped."""
+whole stretch has added 90 nodes by the sixteenth round, each takes ten seconds, and none since the fifth has helped."""
 
 STANDS = 1e-7
 """Largest excess of a row at a point that the certificate should look at though IPOPT gave up: ACTIVE."""
