@@ -85,13 +85,14 @@ def met(
 ) -> Floats | None:
     """Return x (scaled) on its binding rows and bounds, or None where that is not a clear, small step.
 
-    What the step breaks is met too: a row that is touched without a multiplier. jacobian: CasADi function (x, p) →
-    (g, dg/dx); arguments: the solver's bounds lbx, ubx, lbg, ubg and parameters p.
+    Equalities are met whatever their multipliers, and what the step breaks: rows that are touched without one.
+    jacobian: CasADi function (x, p) → (g, dg/dx); arguments: the solver's bounds lbx, ubx, lbg, ubg and parameters p.
     """
     lower, upper, p = arguments["lbx"], arguments["ubx"], arguments["p"]
     start = np.where(bound.at_lower, lower, np.where(bound.at_upper, upper, x))
     used = arguments["ubg"] == 0.0
-    rows, free = bound.rows & used, ~(bound.at_lower | bound.at_upper) & (lower < upper)
+    rows = (bound.rows | (arguments["lbg"] == 0.0)) & used
+    free = ~(bound.at_lower | bound.at_upper) & (lower < upper)
     if not np.all(np.isfinite(start)):
         return None
     while True:

@@ -15,7 +15,7 @@ from loomopt.model.axes import Requested, Traded, opposite
 from loomopt.model.limits import Limit
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
-from loomopt.physics.tolerances import FEASIBLE, SHOWN_AS_ZERO
+from loomopt.physics.tolerances import ACTIVE, FEASIBLE, SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Clash, Evaluated, Finding, Solution, Words
@@ -96,6 +96,15 @@ class Solver:
         """Return which variable without a bound is out of all proportion at x (SI); "" for none."""
         loose = (v for v in self.base.variables if not math.isfinite(v.upper if x[v.name] > 0 else v.lower))
         return next((v.called for v in loose if abs(x[v.name]) > RUNAWAY * v.scale), "")
+
+    def unstopped(self, x: Mapping[str, float]) -> str:
+        """Return which variable is at x (SI) at an end of what it can be that no limit gives it; "" for none."""
+        limits = {(limit.row, limit.sign) for limit in self.base.limits}
+        for v in (v for v in self.base.variables if v.lower < v.upper):
+            ends = {side for side, end in ((-1, v.lower), (1, v.upper)) if abs(x[v.name] - end) <= ACTIVE * v.scale}
+            if any({(v.name, side), (v.name, 0)}.isdisjoint(limits) for side in ends):
+                return v.called
+        return ""
 
     def program(self, asking: Asking) -> Program:
         """Return a program of the front: caps are limits whose values are parameters of what is built."""

@@ -209,9 +209,12 @@ class Trade:
         """Raise BadInput where an end has no least value: then a number without a bound runs away from its size."""
         for end, name, other in zip(ENDS, self.axes, self.axes[::-1], strict=True):
             row, sense = rows[end], self.senses[end]
-            away = self.solver.runaway(row.warm["point"]["x"]) if "point" in row.warm else ""
+            x = row.warm["point"]["x"] if "point" in row.warm else {}
+            away = self.solver.runaway(x) if x else ""
+            why = f"{away} grows without end towards it" if away else "the search runs away from any design"
+            if x and not away and not row.certified and (away := self.solver.unstopped(x)):
+                why = f"{away} goes as far towards it as it may be, and no limit stops it"
             if away or row.reason == DIVERGED:
-                why = f"{away} grows without end towards it" if away else "the search runs away from any design"
                 raise BadInput(
                     f"the {sense} {name} is not reached: {why}",
                     file=self.scene.origin,

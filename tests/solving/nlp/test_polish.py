@@ -88,6 +88,16 @@ def test_a_row_that_is_touched_without_a_multiplier_is_met_where_the_step_would_
     assert holds(below, arguments, (before, before - 1e-3), (1.0, 0.0)) is None, "too far"
 
 
+def test_an_equality_without_a_multiplier_is_met_too():
+    arguments = bare((0.0, -9.0), (1.0, 9.0)) | {"lbg": np.zeros(1)}
+
+    def equal(x, p):
+        return np.array([x[1] - x[0]]), np.array([[-1.0, 1.0]])
+
+    before = 1.0 - 1e-7
+    assert list(holds(equal, arguments, (before, before), (1.0, 0.0))) == pytest.approx([1.0, 1.0], abs=1e-15)
+
+
 def test_rounding_beyond_a_bound_is_cut_and_more_is_refused():
     arguments = bare((0.0, -9.0), (9.0, 0.0))
     assert list(holds(row(-1.0), arguments, (-1e-12, 1e-12))) == [0.0, 0.0]

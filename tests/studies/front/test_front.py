@@ -315,6 +315,13 @@ def test_an_end_without_a_least_asks_for_a_range():
         trade.batch(ends(trade))
 
 
+def test_an_end_that_no_limit_stops_is_told():
+    """With the dwell sought, nothing reads how long it is to last after front dead centre."""
+    trade = front.trade(lo.load("rapier"), ("dwell", "dwell_after"), maximise=("dwell", "dwell_after"), points=3)
+    with pytest.raises(BadInput, match=r"most dwell_after is not reached: dwell_after goes as far.*no limit stops it"):
+        trade.batch(ends(trade))
+
+
 @pytest.mark.parametrize(
     ("ranges", "axis", "reached"),
     [
