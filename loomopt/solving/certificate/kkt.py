@@ -92,19 +92,33 @@ def _pieces(sampler: Sampler, place: int, objective: Objective) -> list[ActiveRo
 
 def moved(rows: Sequence[ActiveRow], sampler: Sampler) -> tuple[ActiveRow, ...] | None:
     """Return rows with their extremes as they are at another design; None where one is gone."""
-    found = [_moved(row, sampler) for row in rows]
-    return None if None in found else tuple(row for row in found if row)
+    ends = _at_ends(rows, sampler)
+    found = list[ActiveRow]()
+    for k, row in enumerate(rows):
+        node = row.node
+        if node:
+            node = node._replace(value=ends[k]) if k in ends else _moved(node, sampler.extremes(row.reads))
+            if node is None:
+                return None
+        found.append(row._replace(node=node))
+    return tuple(found)
 
 
-def _moved(row: ActiveRow, sampler: Sampler) -> ActiveRow | None:
-    if row.node is None:
-        return row
-    piece, u = row.node.piece, row.node.u
-    if u in (0.0, 1.0):
-        value = float(sampler.at(row.reads, np.array([piece]), np.array([u]))[0])
-        return row._replace(node=row.node._replace(value=value))
-    own = [each for each in sampler.extremes(row.reads) if each.piece == piece and abs(each.u - u) <= MOVED]
-    return row._replace(node=min(own, key=lambda each: abs(each.u - u))) if own else None
+def _at_ends(rows: Sequence[ActiveRow], sampler: Sampler) -> dict[int, float]:
+    """Return the value, SI, of each row that stands at a piece's end, by place; those of one quantity in one pass."""
+    ends = {k: (row.reads, row.node) for k, row in enumerate(rows) if row.node and row.node.u in (0.0, 1.0)}
+    found: dict[int, float] = {}
+    for name in {name: None for name, _ in ends.values()}:
+        own = {k: node for k, (reads, node) in ends.items() if reads == name}
+        pieces, u = np.array([node.piece for node in own.values()]), np.array([node.u for node in own.values()])
+        found |= dict(zip(own, sampler.at(name, pieces, u).tolist(), strict=True))
+    return found
+
+
+def _moved(node: Extreme, extremes: Sequence[Extreme]) -> Extreme | None:
+    """Return the extreme that a node has become; None where it is gone."""
+    own = [each for each in extremes if each.piece == node.piece and abs(each.u - node.u) <= MOVED]
+    return min(own, key=lambda each: abs(each.u - node.u)) if own else None
 
 
 def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: float) -> Binding:
