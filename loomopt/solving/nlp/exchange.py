@@ -123,6 +123,11 @@ def _on_rows(jacobian: Any, start: Floats, p: Floats, rows: NDArray[np.bool_], f
     return trial
 
 
+CLOSER = 1e-7
+"""Multiplier above which a row is put on its bound where what is left of a slope, or of a curvature, refuses a design:
+IPOPT leaves it up to 5e-5 away, more than POLISH_FARTHER. A row wrongly held is told by the certificate."""
+
+
 def brought_closer(program: Program, point: Point, settings: Settings) -> Point | None:
     """Return a solved point put on all that carries a slope, however far from it the solver stopped.
 
@@ -144,7 +149,7 @@ def brought_closer(program: Program, point: Point, settings: Settings) -> Point 
         own[:] = np.pad([price for _, price in of], (0, len(own) - len(of)))
     slopes = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[1])
     carried *= np.maximum(np.abs(slopes).max(axis=1, initial=0.0), 1.0)
-    flat = met(nlp.jacobian, arguments, arguments["x0"], binding(before.lam_x, carried), settings.farthest)
+    flat = met(nlp.jacobian, arguments, arguments["x0"], binding(before.lam_x, carried, CLOSER), settings.farthest)
     if flat is None:
         return None
     design, extra = nlp.rows.parted(flat)

@@ -347,9 +347,9 @@ class BindingRows(NamedTuple):
     at_upper: Flags
 
 
-def binding(lam_x: Floats, lam_g: Floats) -> BindingRows:
-    """Return what binds at multipliers: of variables positive at an upper bound, negative at a lower one."""
-    return BindingRows(np.abs(lam_g) > BINDING, lam_x < -BINDING, lam_x > BINDING)
+def binding(lam_x: Floats, lam_g: Floats, least: float = BINDING) -> BindingRows:
+    """Return what binds at multipliers of more than `least`: of variables positive at an upper bound, else negative."""
+    return BindingRows(np.abs(lam_g) > least, lam_x < -least, lam_x > least)
 
 
 @dataclass(frozen=True, eq=False)

@@ -234,7 +234,7 @@ def _met_farther(search: Search, best: Candidate) -> Search:
             again = _certified(again, again.candidates[-1])
         if again.passed:
             return replace(again, settings=search.settings)
-    if any(level.stationarity > STATIONARY for level in best.certificate.levels):
+    if not best.certificate.minimum or any(level.stationarity > STATIONARY for level in best.certificate.levels):
         closer = exchange.brought_closer(search.program, best.point, farther.settings)
         found = _certified(search, best._replace(point=closer)) if closer else search
         if found.passed:

@@ -10,6 +10,7 @@ from support import toy
 
 from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
 from loomopt.solving.certificate.verdict import Certificate, Level
+from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.search import search as searching
 from loomopt.solving.search.search import MOST_ALIKE, Search, compared, judged, objectives
@@ -100,6 +101,25 @@ def test_what_breaks_a_limit_is_no_design_whatever_the_solver_said(certified):
     assert [c.point.x["x"] for c in found.reached] == [2.0]
     alone = judged(empty(candidates=(candidate(1, x=1.0),)))
     assert (alone.passed, alone.best.certificate.feasibility) == (False, 2 * FEASIBLE), "what there is to tell"
+
+
+@pytest.mark.parametrize(
+    ("why", "closer"),
+    [
+        ({}, False),
+        ({"minimum": False}, True),
+        ({"levels": (Level("f", 2e-6, 0.0, 0.0), Level("g", 0.0, 0.0, 0.0))}, True),
+    ],
+)
+def test_where_a_slope_or_a_curvature_refuses_the_best_it_is_brought_closer_to_what_binds(
+    certified, monkeypatch, why, closer
+):
+    seen, answers = certified
+    answers[1.0] = replace(BAD, **why)
+    beside = replace(candidate(1, x=5.0).point, x={"x": 5.0, "y": 0.0})
+    monkeypatch.setattr(exchange, "brought_closer", lambda *asked: beside)
+    found = judged(replace(empty(candidates=(candidate(1, x=1.0),)), settings=Settings(penalty=1e7)))
+    assert (seen, found.passed) == (([1.0, 5.0], True) if closer else ([1.0], False))
 
 
 def test_worse_candidates_do_not_stand_for_the_best(certified):
