@@ -621,6 +621,11 @@ class Job(abc.ABC):
         """Return the NLP's variables of a design."""
         return program.completed({**program.parameters, **design})
 
+    def start(self, program: Program, scene: Scene) -> dict[str, float]:
+        """Return today's machine by the NLP's variables."""
+        # What it has not, such as a free law, stands in the task: others may follow from that.
+        return {**self.values(program, {**self.today(scene), **program.today}), **program.today}
+
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
         """Return the NLP's variables without what is only rounding."""
         return dict(x)

@@ -28,7 +28,7 @@ def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> 
     first, second = map(stretch.read_optimum, beside[:2])
     if not (first.serves(program) and second.serves(program)):
         return None
-    search = Search(job, program, Settings(accuracy), {**job.values(program, job.today(scene)), **program.today})
+    search = Search(job, program, Settings(accuracy), job.start(program, scene))
     return stretch.Between(search, first, second, beside[2])
 
 

@@ -59,7 +59,7 @@ def solve(
             program = job.program(scene, target).backed_off(backed_off or {})
             if not wholly and program.added and program.added.wholly:
                 program = replace(program, added=None)
-        today = {**job.values(program, job.today(scene)), **program.today}
+        today = job.start(program, scene)
         # How many positions a solve evaluates does not depend on the one before.
         own.forget(SAMPLERS, tie_break.JUDGED)
         begun = own.positions

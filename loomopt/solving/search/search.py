@@ -247,8 +247,11 @@ def _too_weak(settings: Settings, certificate: Certificate) -> bool:
     if settings.penalty * STRONGER > STRONGEST_PENALTY:
         return False
     held = max((level.held for level in certificate.levels[1:]), default=0.0)
-    earlier = any(level.stationarity > STATIONARY for level in certificate.levels[:-1])
-    return earlier or settings.penalty <= HELD_MARGIN * held
+    earlier = certificate.levels[:-1]
+    # A level may also give way along a direction in which it falls by its curvature alone.
+    falls = bool(earlier) and not certificate.minimum
+    falls = falls or any(level.stationarity > STATIONARY for level in earlier)
+    return falls or settings.penalty <= HELD_MARGIN * held
 
 
 def _certified(search: Search, candidate: Candidate) -> Search:

@@ -168,7 +168,7 @@ class Solver:
     @lazy
     def _today(self) -> Mapping[str, float]:
         """Today's machine by variable, SI."""
-        return {**self.job.values(self.base, self.job.today(self.scene)), **self.base.today}
+        return self.job.start(self.base, self.scene)
 
     def _searched(
         self,
@@ -419,7 +419,7 @@ def _without(solver: Solver, terms: FrontTerms, found: Reached) -> Solution:
 def clashing(solver: Solver, program: Program) -> Clash:
     """Return the limits of a program that cannot all be kept, and what helps; nothing where that is not found."""
     job, scene = solver.job, solver.scene
-    today = {**job.values(program, job.today(scene)), **program.today}
+    today = job.start(program, scene)
     search = multistart.resolved(Search(job, program, Settings(solver.accuracy), today))
     return elastic.clash(search, Words(scene))
 

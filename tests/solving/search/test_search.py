@@ -144,6 +144,7 @@ def gave_way(stationarity=0.0, held=0.0):
         (gave_way(stationarity=1e-6), False),
         (gave_way(held=501.0), True),
         (gave_way(held=499.0), False),
+        (replace(gave_way(), minimum=False), True),
         (replace(GOOD, levels=(Level("f", 0.0, 0.0, 0.0), Level("g", 2e-6, 0.0, 0.0))), False),
     ],
 )

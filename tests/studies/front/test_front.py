@@ -315,6 +315,18 @@ def test_an_end_without_a_least_asks_for_a_range():
         trade.batch(ends(trade))
 
 
+def test_a_free_law_whose_middle_counts_is_traded_against_the_speed_that_keeps_contact():
+    """Today's machine has no such law: what follows from one is read from the law that the task begins with."""
+    scene = lo.load("shedding").set("effects.warp_tension.shape", "step")
+    trade = front.trade(scene, ("K1", "contact_speed"), "law", maximise=("contact_speed",), points=3)
+    found = read_front(trade, run.run(trade))
+    assert [row.status for row in found.rows] == ["optimal"] * len(found.rows)
+    stiff, fast = plan.values(found.rows, "K1"), plan.values(found.rows, "contact_speed")
+    assert len(stiff) > 2
+    assert sorted(stiff) == list(stiff)
+    assert sorted(fast) == list(fast)
+
+
 def test_an_end_that_no_limit_stops_is_told():
     """With the dwell sought, nothing reads how long it is to last after front dead centre."""
     trade = front.trade(lo.load("rapier"), ("dwell", "dwell_after"), maximise=("dwell", "dwell_after"), points=3)
