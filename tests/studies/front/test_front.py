@@ -5,6 +5,7 @@ import json
 import math
 import pickle
 import re
+from types import SimpleNamespace
 
 import pytest
 from support import slow
@@ -327,11 +328,20 @@ def test_a_free_law_whose_middle_counts_is_traded_against_the_speed_that_keeps_c
     assert sorted(fast) == list(fast)
 
 
-def test_an_end_that_no_limit_stops_is_told():
-    """With the dwell sought, nothing reads how long it is to last after front dead centre."""
+@pytest.mark.parametrize(
+    ("certified", "angle", "told"), [(False, math.pi, True), (True, math.pi, False), (False, 3.0, False)]
+)
+def test_an_end_that_no_limit_stops_is_told(certified, angle, told):
+    """With the dwell sought, nothing reads how long it is to last after front dead centre: at most half a turn."""
     trade = front.trade(lo.load("rapier"), ("dwell", "dwell_after"), maximise=("dwell", "dwell_after"), points=3)
-    with pytest.raises(BadInput, match=r"most dwell_after is not reached: dwell_after goes as far.*no limit stops it"):
-        trade.batch(ends(trade))
+    program = trade.solver.base
+    x = {v.name: v.lower for v in program.variables} | {"dwell": 1.0, "dwell_after": angle, "phi_stroke": 3.0}
+    row = SimpleNamespace(certified=certified, reason=None, warm={"point": {"x": x}})
+    if not told:
+        trade._refuse({0: row, 1: row})
+        return
+    with pytest.raises(BadInput, match="dwell_after goes as far towards it as it may be, and no limit stops it"):
+        trade._refuse({0: row, 1: row})
 
 
 @pytest.mark.parametrize(
