@@ -1,11 +1,11 @@
 """Fronts of the packaged machines against known points, slopes and ends; rows do not depend on who solves them."""
 
+import contextlib
 import itertools
 import json
 import math
 import pickle
 import re
-from types import SimpleNamespace
 
 import pytest
 from support import slow
@@ -336,11 +336,9 @@ def test_an_end_that_no_limit_stops_is_told(certified, angle, told):
     trade = front.trade(lo.load("rapier"), ("dwell", "dwell_after"), maximise=("dwell", "dwell_after"), points=3)
     program = trade.solver.base
     x = {v.name: v.lower for v in program.variables} | {"dwell": 1.0, "dwell_after": angle, "phi_stroke": 3.0}
-    row = SimpleNamespace(certified=certified, reason=None, warm={"point": {"x": x}})
-    if not told:
-        trade._refuse({0: row, 1: row})
-        return
-    with pytest.raises(BadInput, match="dwell_after goes as far towards it as it may be, and no limit stops it"):
+    row = Row(0, {}, None, "", None, {}, {}, {}, {}, certified, 0.0, {"point": {"x": x}})
+    wrong = "dwell_after goes as far towards it as it may be, and no limit stops it"
+    with pytest.raises(BadInput, match=wrong) if told else contextlib.nullcontext():
         trade._refuse({0: row, 1: row})
 
 
