@@ -239,6 +239,22 @@ def _met_farther(search: Search, best: Candidate) -> Search:
         found = _certified(search, best._replace(point=closer)) if closer else search
         if found.passed:
             return found
+    return search if best.certificate.minimum else _held_harder(search, best)
+
+
+def _held_harder(search: Search, best: Candidate) -> Search:
+    """Return the search from its best with stronger weights between levels, if that passes.
+
+    Along a direction without a slope an earlier level may fall by its curvature alone, and a later one outweigh that.
+    """
+    again, weight = search, search.settings.penalty * STRONGER
+    while len(search.program.objectives) > 1 and weight <= STRONGEST_PENALTY:
+        again = tried(replace(again, settings=replace(search.settings, penalty=weight)), best.point.x)
+        if again.candidates[-1].point.reached:
+            found = _certified(again, again.candidates[-1])
+            if found.passed:
+                return replace(found, settings=search.settings)
+        weight *= STRONGER
     return search
 
 
@@ -247,11 +263,8 @@ def _too_weak(settings: Settings, certificate: Certificate) -> bool:
     if settings.penalty * STRONGER > STRONGEST_PENALTY:
         return False
     held = max((level.held for level in certificate.levels[1:]), default=0.0)
-    earlier = certificate.levels[:-1]
-    # A level may also give way along a direction in which it falls by its curvature alone.
-    falls = bool(earlier) and not certificate.minimum
-    falls = falls or any(level.stationarity > STATIONARY for level in earlier)
-    return falls or settings.penalty <= HELD_MARGIN * held
+    earlier = any(level.stationarity > STATIONARY for level in certificate.levels[:-1])
+    return earlier or settings.penalty <= HELD_MARGIN * held
 
 
 def _certified(search: Search, candidate: Candidate) -> Search:

@@ -103,6 +103,17 @@ def test_what_breaks_a_limit_is_no_design_whatever_the_solver_said(certified):
     assert (alone.passed, alone.best.certificate.feasibility) == (False, 2 * FEASIBLE), "what there is to tell"
 
 
+@pytest.mark.parametrize(("second", "weights"), [(GOOD, [1e5]), (BAD, [1e5, 1e7])])
+def test_where_a_level_falls_by_its_curvature_it_is_held_harder_from_there(certified, solved, second, weights):
+    answers, (calls, points) = certified[1], solved
+    answers |= {1.0: replace(BAD, minimum=False), 0.0: second, -1.0: BAD}
+    points += [Point({"x": x, "y": 0.0}, "Solve_Succeeded", True) for x in (0.0, -1.0)]
+    found = judged(empty(candidates=(candidate(1, x=1.0),)))
+    assert [(start["x"], weight) for start, weight, _ in calls] == [(1.0, weight) for weight in weights]
+    assert (found.passed, found.best.point.x["x"]) == ((True, 0.0) if second.passed else (False, 1.0))
+    assert found.settings.penalty == 1e3, "other starts are weighed as before"
+
+
 @pytest.mark.parametrize(
     ("why", "closer"),
     [
@@ -144,7 +155,6 @@ def gave_way(stationarity=0.0, held=0.0):
         (gave_way(stationarity=1e-6), False),
         (gave_way(held=501.0), True),
         (gave_way(held=499.0), False),
-        (replace(gave_way(), minimum=False), True),
         (replace(GOOD, levels=(Level("f", 0.0, 0.0, 0.0), Level("g", 2e-6, 0.0, 0.0))), False),
     ],
 )
