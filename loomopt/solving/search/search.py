@@ -222,7 +222,8 @@ def _another(search: Search) -> Search:
         search = _certified(search, candidate)
         if search.passed:
             return search
-    return _met_farther(replace(search, best=best), best)
+    found = _met_farther(replace(search, best=best), best)
+    return found if found.passed or best.certificate.minimum else _held_harder(found, best)
 
 
 def _met_farther(search: Search, best: Candidate) -> Search:
@@ -239,7 +240,7 @@ def _met_farther(search: Search, best: Candidate) -> Search:
         found = _certified(search, best._replace(point=closer)) if closer else search
         if found.passed:
             return found
-    return search if best.certificate.minimum else _held_harder(search, best)
+    return search
 
 
 def _held_harder(search: Search, best: Candidate) -> Search:
