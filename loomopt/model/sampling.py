@@ -215,14 +215,16 @@ class Sampler:
             self._extremes[name] = sorted(found, key=lambda extreme: -extreme.height)
 
     def share(self) -> None:
-        """Take the extremes that were found of this design just now under fewer or other names of its numbers.
+        """Take the extremes that were found of this design last under fewer or other names of its numbers.
 
         What they were read from are numbers that are the same here, to the last bit and the sign of a zero.
         """
         own = self._numbers
-        for other in self.session.every(SAMPLERS):
-            if isinstance(other, Sampler) and other is not self and other._numbers <= own and self._holds(other):
-                self._extremes = {**other._extremes, **self._extremes}
+        for other in self.session.latest(SAMPLERS):
+            if isinstance(other, Sampler) and other._extremes and other is not self:
+                if other._numbers <= own and self._holds(other):
+                    self._extremes = {**other._extremes, **self._extremes}
+                    return
 
     @lazy
     def _numbers(self) -> frozenset[tuple[str, Number]]:

@@ -50,9 +50,9 @@ class Session:
                 found[key] = make()
             return cast(Made, found[key])
 
-    def every(self, what: str) -> list[object]:
-        """Return all that are kept of one sort, the one used least recently first."""
-        return list(self._kept.get(what, {}).values())
+    def latest(self, what: str) -> Iterator[object]:
+        """Yield all that are kept of one sort, the one used last first."""
+        return reversed(self._kept.get(what, OrderedDict()).values())
 
     def count(self, what: str) -> int:
         """Return how many are kept."""

@@ -24,12 +24,13 @@ from loomopt.physics.tolerances import (
     POLISH_RANK,
     POLISH_STEPS,
     SAME_NODE,
+    SAME_OBJECTIVE,
     SETTLED,
     TOUCHING,
 )
 from loomopt.solving.nlp.follow import follow
 from loomopt.solving.nlp.ipopt import Calls, IpoptAnswer, run
-from loomopt.solving.nlp.point import SUCCESS, Elastic, Known, Point, Settings, sampler_at
+from loomopt.solving.nlp.point import BEATEN, SUCCESS, Elastic, Known, Point, Settings, sampler_at
 from loomopt.solving.nlp.rows import BindingRows, Multipliers, RowFamily, binding
 from loomopt.solving.nlp.transcribe import Transcription
 
@@ -184,6 +185,10 @@ whole stretch has added 90 nodes by the sixteenth round, each takes ten seconds,
 STANDS = 1e-7
 """Largest excess of a row at a point that the certificate should look at though IPOPT gave up: ACTIVE."""
 
+LED = 1e-2
+"""Largest excess from which pivots are tried before a second solve. They take 104 of 119 starts below it to the known
+design and 7 of 78 above it (all packaged targets, and fronts of three), in 4 ms where that solve takes 11."""
+
 HINTED = 1e-8
 """Change of a slope, as events are found anew, that counts as none: a hundredth of STATIONARY."""
 
@@ -254,7 +259,7 @@ def solve(
     begin = _begin(calls, x, sampler, warm)
     result = _round(calls, begin, 0)
     if not _is_done(result, settings):
-        result = _compared(calls, begin, result)
+        result = _led(calls, result) or _compared(calls, begin, result)
     excesses = list[float]()
     for more in range((ELASTIC_ROUNDS if elastic else EXCHANGE_ROUNDS) - 1, -1, -1):
         if isinstance(result, Point) or _is_done(result, settings):
@@ -312,7 +317,7 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
         answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, Multipliers())
         iterations += answer.iterations
     beaten = answer.status in SUCCESS and calls.is_beaten(answer)
-    beaten_as = Point(answer.x, "Beaten", False, iterations, built=calls.built, value=answer.value)
+    beaten_as = Point(answer.x, BEATEN, False, iterations, built=calls.built, value=answer.value)
     if beaten and not here.sampler.hints:
         return beaten_as
     sampler = calls.sampler(answer.x)
@@ -356,6 +361,24 @@ def _moved(
     pairs = [*zip(*rows, strict=True), *zip(*worth, strict=True)]
     most = (calls.settings.excess, HINTED, calls.settings.excess * max(calls.weights), HINTED)
     return any(not np.abs(np.asarray(a - b)).max(initial=0.0) <= m for (a, b), m in zip(pairs, most, strict=True))
+
+
+def _led(calls: Calls, result: _Round | Point) -> Point | None:
+    """Return what pivots make of a first round that ended near its basin's least, where that is no worse than is known.
+
+    As good as the best that is known it is beaten, without a second solve. A worse end is left to the solver: pivots
+    stop wherever slopes balance.
+    """
+    if isinstance(result, Point) or not calls.known.nodes or not result.steady or result.violation > LED:
+        return None
+    followed = _followed(calls, result)
+    if followed is None:
+        return None
+    end = result.answer._replace(x=followed.x, extra=followed.extra, value=calls.worth(followed))
+    if not calls.is_beaten(end):
+        return replace(followed, value=end.value)
+    alike = end.value <= calls.known.most + SAME_OBJECTIVE
+    return Point(end.x, BEATEN, False, result.iterations, built=calls.built, value=end.value) if alike else None
 
 
 def _compared(calls: Calls, begin: _Place, result: _Round | Point) -> _Round | Point:

@@ -15,7 +15,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import SAME_OBJECTIVE
-from loomopt.solving.nlp.point import Elastic, Known, Settings, sampler_at
+from loomopt.solving.nlp.point import Elastic, Known, Point, Settings, sampler_at
 from loomopt.solving.nlp.rows import HeldStations, Multipliers, RowFamily, chained, epigraphs, families, held, stations
 from loomopt.solving.nlp.transcribe import Transcription, transcribe
 
@@ -172,6 +172,10 @@ class Calls:
         bound += extra[ways[family.limit][0]] if self.elastic and family.limit in ways else 0.0
         return float(extreme.height / limit.scale - bound)
 
+    def worth(self, point: Point) -> float:
+        """Return the NLP's objective at a point that has its epigraph variables."""
+        return math.fsum(w * h for w, h in zip(self.weights, self._heights(point.x, point.extra), strict=True))
+
     def is_beaten(self, answer: "IpoptAnswer") -> bool:
         """Say whether a solve at some nodes is already no better than is known."""
         if self.ways is not None:
@@ -181,16 +185,22 @@ class Calls:
 
     def _falls_earlier(self, answer: "IpoptAnswer") -> bool:
         """Say whether an objective before the last is lower at some nodes than is known, those before it the same."""
-        sampler = self.sampler(answer.x) if len(self.known.levels) > 1 else None
-        if sampler is None:
+        if len(self.known.levels) < 2:
             return False
-        heights = {epigraph.objective: answer.extra[k] for k, epigraph in enumerate(self.epigraphs)}
-        for k, known in enumerate(self.known.levels[:-1]):
-            objective = self.program.objectives[k]
-            here = heights[k] if k in heights else objective.merit(sampler) / objective.scale
+        for here, known in zip(self._heights(answer.x, answer.extra), self.known.levels[:-1], strict=False):
             if abs(here - known) > SAME_OBJECTIVE:
                 return bool(here < known)
         return False
+
+    def _heights(self, x: Mapping[str, float], extra: Floats) -> Iterator[float]:
+        """Yield the objectives as the NLP has them, in natural sizes: of an epigraph variable its own value.
+
+        Nothing where the linkage has no real position.
+        """
+        heights = {epigraph.objective: float(extra[k]) for k, epigraph in enumerate(self.epigraphs)}
+        sampler = self.sampler(x)
+        for k, objective in enumerate(self.program.objectives if sampler else ()):
+            yield heights[k] if k in heights else objective.merit(sampler) / objective.scale
 
     def first_nodes(self, loose: Sequence[Sequence[Extreme]]) -> tuple[tuple[Extreme, ...], ...]:
         """Return a start's nodes: its own largest extremes."""

@@ -28,6 +28,9 @@ with their square. 16384 for the usual accuracy, where a curve that bends by its
 
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
 
+BEATEN = "Beaten"
+"""The status of a solve that was left where its basin's least is no better than is known."""
+
 
 @dataclass(frozen=True)
 class Settings:

@@ -20,7 +20,7 @@ from loomopt.model.session import working
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solving.nlp import exchange
-from loomopt.solving.nlp.point import Known, Point, sampler_at
+from loomopt.solving.nlp.point import BEATEN, SUCCESS, Known, Point, sampler_at
 from loomopt.solving.nlp.rows import chain_roots
 from loomopt.solving.search.search import Candidate, OnStart, Search, at, judged, tried
 
@@ -447,7 +447,9 @@ def tied(search: Search) -> bool:
         x = candidate.point.x
         return any(abs(x.get(name, value) - value) > ELSEWHERE * sizes[name] for name, value in best.point.x.items())
 
-    alike = (each for each in search.candidates if each.value <= best.value + SAME_OBJECTIVE)
+    # Where the solver gave up its value says nothing.
+    ended = (each for each in search.candidates if each.point.status in {*SUCCESS, BEATEN})
+    alike = (each for each in ended if each.value <= best.value + SAME_OBJECTIVE)
     return unbeatable(search) or any(map(apart, alike))
 
 

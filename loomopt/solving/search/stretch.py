@@ -20,6 +20,7 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE, POSITIVE, PRECISE, ROUNDING
 from loomopt.solving.certificate.kkt import ActiveRow
+from loomopt.solving.certificate.taylor_bounds import cycle_rows
 from loomopt.solving.certificate.together import (
     Bent,
     DesignAt,
@@ -272,7 +273,7 @@ def _judged(ended: Sequence[tuple[Search, dict[str, float]]]) -> Iterator[Search
 
     broken = [tie_break.moved(search.program, search.job.tidy(search.program, x)) for search, x in ended]
     there = [as_read(search, x) for (search, _), (x, _) in zip(ended, broken, strict=True)]
-    places = [k for k, (search, _) in enumerate(ended) if _holds(search.program, there[k])]
+    places = [k for k, (search, _) in enumerate(ended) if _holds(search, there[k])]
     wanted = [(ended[k][0].program, there[k]) for k in places]
     accuracies = {search.settings.accuracy for search, _ in ended}
     certificates = dict(zip(places, certify_together(wanted, min(accuracies, default=1.0)), strict=True))
@@ -293,10 +294,18 @@ def _judged(ended: Sequence[tuple[Search, dict[str, float]]]) -> Iterator[Search
         yield after if not open_still and indifference.simpler(after) is after else None
 
 
-def _holds(program: Program, x: Mapping[str, float]) -> bool:
-    """Say whether every limit holds at variables x (SI)."""
+def _holds(search: Search, x: Mapping[str, float]) -> bool:
+    """Say whether every limit holds at variables x (SI).
+
+    Extremes that the certificate and the figures read are looked for at once.
+    """
+    program = search.program
     sampler = sampler_at(program, x)
-    return sampler is not None and all(limit.violation(sampler) <= FEASIBLE for limit in program.limits)
+    if sampler is None:
+        return False
+    told = (*(name for name, _, _ in cycle_rows(program)), *search.job.peaks(program.model).values())
+    sampler.search(name for name in told if program.model.has_quantity(name))
+    return all(limit.violation(sampler) <= FEASIBLE for limit in program.limits)
 
 
 def optimum(job: Job, program: Program, x: Mapping[str, float], certificate: Certificate) -> Optimum | None:

@@ -9,10 +9,11 @@ from searches import BAD, certified, empty, solved
 from support import slow, toy
 
 import loomopt as lo
+from loomopt.solving.nlp import exchange, ipopt
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.search import elastic, multistart
 from loomopt.solving.search.multistart import BETTER, DESIGNS, MORE_STARTS, searched
-from loomopt.solving.search.search import Search
+from loomopt.solving.search.search import Candidate, Search
 
 __all__ = ["certified", "solved"]
 
@@ -280,3 +281,37 @@ def test_a_flip_changes_one_variable_alone():
     screening = multistart._screening(Search(toy.ToyJob(program), program, Settings()), program.starts)
     flipped = screening.flipped({"x": 3.0, "y": 0.5})
     assert [(round(each["x"], 2), round(each["y"], 2)) for each in flipped] == [(-2.88, 0.5), (3.0, -0.96)]
+
+
+# Starts that end in what is known -------------------------------------------------------------------------------------
+
+TWINS = {"f": lambda v: (v["x"] ** 2 - 4) ** 2 / 16 + v["y"] ** 2}
+"""Two designs that are equally good, x = ±2."""
+
+
+def test_other_designs_may_be_as_good_where_solves_ended_there_but_not_where_they_failed():
+    program = toy.program("xy", TWINS, bounds={"x": (-3.0, 3.0), "y": (-1.0, 1.0)}, start={"x": 2.5, "y": 0.1})
+    found = wide(program)
+    found = replace(found, candidates=(found.ranked[0],))
+    lost = Point({"x": 0.5, "y": 0.5}, "Maximum_Iterations_Exceeded", False)
+    assert not multistart.tied(replace(found, candidates=(*found.candidates, Candidate(lost, (), -1.0))))
+    beaten = Candidate(replace(lost, status="Beaten"), (), found.best.value)
+    assert multistart.tied(replace(found, candidates=(*found.candidates, beaten)))
+
+
+def test_a_start_that_ends_beside_the_known_design_is_not_solved_again(monkeypatch):
+    runs = []
+
+    def counted(*arguments):
+        runs.append(1)
+        return ipopt.run(*arguments)
+
+    monkeypatch.setattr(exchange, "run", counted)
+    answer, count = lo.solve("beatup"), len(runs)
+    monkeypatch.setattr(exchange, "LED", -1.0)
+    again = lo.solve("beatup")
+    assert answer.solver["starts"] == again.solver["starts"]
+    assert answer.solver["starts_at_best"] == again.solver["starts_at_best"]
+    assert count <= answer.solver["starts"] + 2
+    assert len(runs) - count >= count + 5
+    assert answer.figures["peak_torque"] == pytest.approx(again.figures["peak_torque"], rel=1e-12)
