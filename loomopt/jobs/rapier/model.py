@@ -242,6 +242,7 @@ ROWS: dict[str, DesignRow] = {
     "theta": DesignRow(lambda at: linked(at.given).centres.theta),
     "phi_stroke": DesignRow(lambda at: at.values["phi_stroke"], ("phi_stroke",)),
     "rest": DesignRow(lambda at: _at_stroke(at).q1, ("phi_stroke",)),
+    "turning": DesignRow(lambda at: _at_stroke(at).q2, ("phi_stroke",)),
     "stroke_short": DesignRow(lambda at: _at_stroke(at).q - at.values["stroke"], ("phi_stroke", "stroke")),
     "reach": DesignRow(lambda at: _at_stroke(at).q, ("phi_stroke",)),
     "dwell": DesignRow(lambda at: at.values["dwell"], ("dwell",)),

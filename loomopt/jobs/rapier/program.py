@@ -219,13 +219,21 @@ class RapierTask(Task):
         return (limit.sign > 0 or own.lower >= limit.value) and (limit.sign < 0 or own.upper <= limit.value)
 
     def meant(self) -> list[Limit]:
-        """Return what stroke and dwells mean: the head at rest at its stroke, and within s_dwell on the arcs."""
+        """Return what stroke and dwells mean: the head at rest at its stroke, and within s_dwell on the arcs.
+
+        Where no stroke is kept, the hand-over that is traded or limited might be another rest, such as front dead
+        centre: it is one at which the head turns back, outside its dwells.
+        """
         reached = {*self.kept, *self.demanded, *(name for name in self.sought if name in LOOSE)}
         size, rows = 1.0, {"head at rest at phi_stroke": "rest"}
         if "stroke" in reached:
             size, rows = self.known["stroke"], rows | {"stroke is reached": "stroke_short"}
         firm = {"relaxable": False, "hidden": True}
         found: list[Limit] = [DesignLimit(name, 0, row, 0.0, size, **firm) for name, row in rows.items()]
+        if "stroke" not in reached and "phi_stroke" in {*self.sought, *self.scene.limits}:
+            least = self.known.get("s_dwell", S_DWELL * self.reading.stroke)
+            found.append(DesignLimit("head turns back at phi_stroke", 1, "turning", 0.0, size, **firm))
+            found.append(DesignLimit("phi_stroke lies outside the dwells", -1, "reach", least, size, **firm))
         for side, name in dwell_arcs(self.sought, self.dwelt):
             if name in reached or name == DWELL:
                 text = f"head within s_dwell {'after' if side == AFTER else 'before'} front dead centre"

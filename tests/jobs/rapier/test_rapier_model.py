@@ -152,4 +152,5 @@ def test_the_hand_over_is_read_only_where_a_target_speaks_of_it():
     given = sampled.given._replace(values={**sampled.given.values, "phi_stroke": 3.0})
     rows, at = model.static(systems.FLOAT, given, {}), pose(systems.FLOAT, sampled.given, 3.0)
     assert (rows["phi_stroke"], rows["rest"], rows["stroke_short"]) == (3.0, at.q1, at.q - 0.85)
-    assert not {"phi_stroke", "rest", "stroke_short"} & set(sampled.static)
+    assert rows["turning"] == at.q2
+    assert not {"phi_stroke", "rest", "stroke_short", "turning"} & set(sampled.static)

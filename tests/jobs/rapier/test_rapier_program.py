@@ -133,3 +133,17 @@ def test_what_a_target_lacks_is_named(change, target, key):
 def test_a_limit_on_a_force_that_nothing_makes_is_refused():
     with pytest.raises(BadInput, match="no effect in the scene makes a tape force"):
         JOB.program(SCENE.set("limits.tape_force.max", "1 kN"), "stroke-dwell")
+
+
+@pytest.mark.parametrize(
+    ("axes", "alone"),
+    [(("phi_stroke", "dwell_before"), True), (("phi_stroke", "stroke"), False), (("mu_min", "dwell_before"), False)],
+)
+def test_a_hand_over_that_is_traded_without_a_stroke_is_a_top_outside_the_dwells(axes, alone):
+    """Front dead centre is a rest too, and there the head may turn back as well."""
+    asked = {name: next(iter(SCENE.schema.axes[name].senses)) for name in axes}
+    found, _ = JOB.traded(SCENE, None, asked)
+    told = limits(found, "head turns back at phi_stroke") + limits(found, "phi_stroke lies outside the dwells")
+    assert told == ([(1, "turning", DesignLimit, None), (-1, "reach", DesignLimit, None)] if alone else [])
+    least = [each.value for each in found.limits if each.row == "reach"]
+    assert least == ([SCENE.operation["s_dwell"]] if alone else [])
