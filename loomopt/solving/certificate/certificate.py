@@ -183,10 +183,11 @@ def _judged_level(whole: Local, place: int, earlier: Sequence[JudgedLevel]) -> J
     """Solve one level's KKT system, along what earlier levels leave open, and judge its curvature."""
     local = whole._replace(closed=tuple(c for each in earlier if each.curvature and (c := each.curvature.closed)))
     system = kkt.system(local.active, place, [each.multipliers for each in earlier], local.program.fixed)
+    if local.active.zero[place]:
+        first = kkt.vanishing(system, len(local.active.rows))
+        return JudgedLevel(_residuals(local, place, system, first, first.residual), first)
     first = _met(local, system)
     alone = JudgedLevel(_residuals(local, place, system, first, first.residual), first)
-    if local.active.zero[place]:
-        return alone
     try:
         multipliers, curvature = _best(local, place, system, first)
     except (ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError):

@@ -203,6 +203,13 @@ def _held(active: ActiveSet, level: int, bound: set[int]) -> list[Floats]:
     return [unit[k] for k in active.levels[level] if active.zero[level] or k in bound]
 
 
+def vanishing(system: System, rows: int) -> LevelMultipliers:
+    """Return the multipliers of a magnitude that vanishes, of so many rows in all: its two pieces balance each other."""
+    found = np.zeros(rows)
+    found[list(system.pieces)] = 1 / len(system.pieces)
+    return LevelMultipliers(found, 0.0)
+
+
 def solved(gradients: Floats, system: System) -> LevelMultipliers:
     """Return one level's multipliers by non-negative least squares; gradients: (rows, variables)."""
     slopes, target, one_sided = _equations(gradients, system)

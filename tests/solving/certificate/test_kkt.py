@@ -143,3 +143,11 @@ def test_a_piece_of_an_earlier_level_that_nothing_holds_may_not_rise():
     assert beside in system.inequalities
     assert found.residual < 1e-14
     assert found.of[beside] == pytest.approx(1.0)
+
+
+def test_a_magnitude_that_vanishes_is_balanced_by_its_own_pieces():
+    slope, beside = np.array([0.3, -2.0, 0.5]), np.array([0.3, -2.0, 0.4])
+    pieces = kkt.System((1, 2), (0,), (), np.zeros((0, 3)))
+    found, least = kkt.vanishing(pieces, 3), kkt.solved(np.array([beside, slope, -slope]), pieces)
+    assert found.of == pytest.approx(least.of, abs=1e-15)
+    assert least.residual == pytest.approx(found.residual, abs=1e-15)
