@@ -9,7 +9,7 @@ from loomopt.base.errors import BadInput, unknown
 from loomopt.maths.systems import Number
 from loomopt.model.limits import Limit
 from loomopt.model.model import DesignRow, Formula, Instant, JobModel
-from loomopt.model.objectives import Magnitude, Objective, Peak, Value, Worst
+from loomopt.model.objectives import Magnitude, Objective, Peak, Value, Worst, opposite
 from loomopt.model.program import Program
 from loomopt.physics.schema import Axis, Sense
 
@@ -116,11 +116,6 @@ def _demand(program: Program, name: str, rows: Sequence[str]) -> None:
         remedy = "Trade another axis, or add the numbers and effects that it needs."
         problem = model.undefined.get(name) or f"nothing in the scene gives {name}"
         raise BadInput(problem, key=name, remedy=remedy)
-
-
-def opposite(row: str) -> str:
-    """Return the name of a row's opposite, the least of which is the row's most."""
-    return f"-{row}"
 
 
 @functools.lru_cache(maxsize=64)

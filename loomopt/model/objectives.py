@@ -218,3 +218,8 @@ class Peak(Objective):
     def limits(self, name: str, most: float) -> list[Limit]:
         """Return the limit of the quantity at `most`, SI."""
         return [CycleLimit(name, 1, self.row, most, self.scale)]
+
+
+def opposite(row: str) -> str:
+    """Return the name of a row's opposite, the least of which is the row's most."""
+    return f"-{row}"

@@ -219,12 +219,11 @@ class Sampler:
 
         What they were read from are numbers that are the same here, to the last bit and the sign of a zero.
         """
-        own = self._numbers
-        for other in self.session.latest(SAMPLERS):
-            if isinstance(other, Sampler) and other._extremes and other is not self:
-                if other._numbers <= own and self._holds(other):
-                    self._extremes = {**other._extremes, **self._extremes}
-                    return
+        found = (each for each in self.session.latest(SAMPLERS) if isinstance(each, Sampler) and each is not self)
+        for other in found:
+            if other._extremes and other._numbers <= self._numbers and self._holds(other):
+                self._extremes = {**other._extremes, **self._extremes}
+                return
 
     @lazy
     def _numbers(self) -> frozenset[tuple[str, Number]]:

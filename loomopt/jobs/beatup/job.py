@@ -12,9 +12,9 @@ from loomopt.jobs.beatup.model import FRONT, LENGTHS
 from loomopt.jobs.beatup.program import BALANCE, BeatupTask, balanced_by, model, served
 from loomopt.jobs.beatup.scene import RESISTED, SCHEMA, VARIABLES, RetrofitTarget, TorqueTarget, fault
 from loomopt.maths.systems import Number
-from loomopt.model.axes import opposite
 from loomopt.model.curves import Columns
 from loomopt.model.model import JobModel
+from loomopt.model.objectives import opposite
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.effects.kinds import Load

@@ -22,11 +22,11 @@ from loomopt.jobs.linkage.model import (
 )
 from loomopt.jobs.linkage.scene import TargetTable, path, reaches, reading
 from loomopt.maths.systems import FLOAT
-from loomopt.model.axes import opposing, opposite
+from loomopt.model.axes import opposing
 from loomopt.model.limits import CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
 from loomopt.model.numbers import bounds, numbers, words
-from loomopt.model.objectives import Magnitude, Objective, Peak, Value
+from loomopt.model.objectives import Magnitude, Objective, Peak, Value, opposite
 from loomopt.model.program import Move
 from loomopt.physics.cycle import Node
 from loomopt.scenes.scene import Scene

@@ -204,9 +204,9 @@ def _held(active: ActiveSet, level: int, bound: set[int]) -> list[Floats]:
 
 
 def vanishing(system: System, rows: int) -> LevelMultipliers:
-    """Return the multipliers of a magnitude that vanishes, of so many rows in all: its two pieces balance each other."""
+    """Return the multipliers, of so many rows, of a magnitude that vanishes: its two pieces balance each other."""
     found = np.zeros(rows)
-    found[list(system.pieces)] = 1 / len(system.pieces)
+    found[list(system.pieces)] = 1.0 / len(system.pieces)
     return LevelMultipliers(found, 0.0)
 
 

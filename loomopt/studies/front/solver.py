@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from loomopt.base.records import lazy
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
-from loomopt.model.axes import Requested, Traded, opposite
+from loomopt.model.axes import Requested, Traded
 from loomopt.model.limits import Limit
+from loomopt.model.objectives import opposite
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import ACTIVE, FEASIBLE, SHOWN_AS_ZERO

@@ -11,7 +11,7 @@ from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
 from loomopt.jobs.linkage.program import linkage_of
 from loomopt.maths.systems import FLOAT
-from loomopt.model import axes
+from loomopt.model.objectives import opposite
 from loomopt.picture.job_views import Span
 from loomopt.picture.motion import crank_angles
 from loomopt.picture.shapes import Line
@@ -107,7 +107,7 @@ def test_a_front_holds_the_levels_before_what_is_traded():
     assert [level.figure for level in program.objectives] == ["force.front", "peak_torque", "mass"]
     program, traded = JOB.traded(SIX.free(["end"]), "balance", {"peak_torque": "least", "end": "most"})
     assert [level.figure for level in program.objectives] == ["force.front", "peak_torque", "end"]
-    assert traded[1].objective.row == axes.opposite("end")
+    assert traded[1].objective.row == opposite("end")
 
 
 def test_what_is_sought_may_be_a_transmission_angle():
