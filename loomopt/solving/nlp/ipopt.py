@@ -199,7 +199,9 @@ class Calls:
         """
         heights = {epigraph.objective: float(extra[k]) for k, epigraph in enumerate(self.epigraphs)}
         sampler = self.sampler(x)
-        for k, objective in enumerate(self.program.objectives if sampler else ()):
+        if sampler is None:
+            return
+        for k, objective in enumerate(self.program.objectives):
             yield heights[k] if k in heights else objective.merit(sampler) / objective.scale
 
     def first_nodes(self, loose: Sequence[Sequence[Extreme]]) -> tuple[tuple[Extreme, ...], ...]:
