@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from loomopt.jobs import registry
+from loomopt.jobs.base import Job
 from loomopt.model.program import Program
 from loomopt.model.session import working
 from loomopt.scenes import designs
@@ -29,7 +30,13 @@ def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> 
     if not (first.serves(program) and second.serves(program)):
         return None
     search = Search(job, program, Settings(accuracy), job.start(program, scene))
-    return stretch.Between(search, first, second, beside[2])
+    return stretch.Between(search, first, second, beside[2], told_peaks(scene, job, program))
+
+
+def told_peaks(scene: Scene, job: Job, program: Program) -> tuple[str, ...]:
+    """Return the quantities whose extremes are figures, where a program reads the very model that figures are of."""
+    known = program.model if job.model(scene) is program.model else None
+    return tuple(name for name in job.peaks(known).values() if known.has_quantity(name)) if known else ()
 
 
 @working()

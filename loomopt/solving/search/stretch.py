@@ -74,12 +74,16 @@ def read_optimum(data: Mapping[str, Any]) -> Optimum:
 
 
 class Between(NamedTuple):
-    """A program to be solved between two neighbours' optima: a share of the way from the first to the second."""
+    """A program to be solved between two neighbours' optima: a share of the way from the first to the second.
+
+    told: quantities of its model whose extremes are figures of its design, looked for with the certificate's own.
+    """
 
     search: Search
     first: Optimum
     second: Optimum
     share: float
+    told: tuple[str, ...] = ()
 
     @property
     def frames(self) -> tuple[Frame, ...]:
@@ -261,23 +265,25 @@ def _certified(
     known = [place for place, x in enumerate(ended) if x is not None]
     for group in grouped([tuple(row.kind for row in tried[place][1]) for place in known]):
         places = [known[k] for k in group]
-        own = [(asked[tried[place][0]].search, x) for place in places if (x := ended[place]) is not None]
+        own = [(asked[tried[place][0]], x) for place in places if (x := ended[place]) is not None]
         for place, search in zip(places, _judged(own), strict=True):
             found[place] = search
     return found
 
 
-def _judged(ended: Sequence[tuple[Search, dict[str, float]]]) -> Iterator[Search | None]:
-    """Yield each search with the optimum that it ended at, variables SI, or None where that is not known to be one."""
+def _judged(ended: Sequence[tuple[Between, dict[str, float]]]) -> Iterator[Search | None]:
+    """Yield the search of each with the optimum that it ended at, variables SI, or None where that is not shown."""
     from loomopt.solving.search import indifference, least_change
 
-    broken = [tie_break.moved(search.program, search.job.tidy(search.program, x)) for search, x in ended]
-    there = [as_read(search, x) for (search, _), (x, _) in zip(ended, broken, strict=True)]
-    places = [k for k, (search, _) in enumerate(ended) if _holds(search, there[k])]
-    wanted = [(ended[k][0].program, there[k]) for k in places]
-    accuracies = {search.settings.accuracy for search, _ in ended}
+    searches = [asked.search for asked, _ in ended]
+    tidied = [search.job.tidy(search.program, x) for search, (_, x) in zip(searches, ended, strict=True)]
+    broken = [tie_break.moved(search.program, x) for search, x in zip(searches, tidied, strict=True)]
+    there = [as_read(search, x) for search, (x, _) in zip(searches, broken, strict=True)]
+    places = [k for k, (asked, _) in enumerate(ended) if _holds(asked.search.program, there[k], asked.told)]
+    wanted = [(searches[k].program, there[k]) for k in places]
+    accuracies = {search.settings.accuracy for search in searches}
     certificates = dict(zip(places, certify_together(wanted, min(accuracies, default=1.0)), strict=True))
-    for k, (search, x) in enumerate(ended):
+    for k, ((_, x), search) in enumerate(zip(ended, searches, strict=True)):
         program, accuracy, certificate = search.program, search.settings.accuracy, certificates.get(k)
         precise = max(min(PRECISE, accuracy), ROUNDING)
         if certificate is None or not (
@@ -294,17 +300,15 @@ def _judged(ended: Sequence[tuple[Search, dict[str, float]]]) -> Iterator[Search
         yield after if not open_still and indifference.simpler(after) is after else None
 
 
-def _holds(search: Search, x: Mapping[str, float]) -> bool:
+def _holds(program: Program, x: Mapping[str, float], told: Sequence[str]) -> bool:
     """Say whether every limit holds at variables x (SI).
 
-    Extremes that the certificate and the figures read are looked for at once.
+    Extremes that the certificate reads, and those of quantities that are told, are looked for at once.
     """
-    program = search.program
     sampler = sampler_at(program, x)
     if sampler is None:
         return False
-    told = (*(name for name, _, _ in cycle_rows(program)), *search.job.peaks(program.model).values())
-    sampler.search(name for name in told if program.model.has_quantity(name))
+    sampler.search((*(name for name, _, _ in cycle_rows(program)), *told))
     return all(limit.violation(sampler) <= FEASIBLE for limit in program.limits)
 
 

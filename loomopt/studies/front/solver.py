@@ -18,6 +18,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import ACTIVE, FEASIBLE, SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
+from loomopt.solving import between
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Clash, Evaluated, Finding, Solution, Words
 from loomopt.solving.certificate.certificate import certify
@@ -156,12 +157,16 @@ class Solver:
 
         ends: both optima as JSON data, and how far a program lies from the first to the second.
         """
-        begun = [
-            stretch.Between(self._begun(asking), stretch.read_optimum(first), stretch.read_optimum(second), share)
-            for asking, (first, second, share) in zip(asked, ends, strict=True)
-        ]
+        begun = []
+        for asking, (*optima, share) in zip(asked, ends, strict=True):
+            first, second = map(stretch.read_optimum, optima)
+            begun.append(stretch.Between(self._begun(asking), first, second, share, self._peaks))
         searches = zip(asked, stretch.solved(begun), strict=True)
         return [self._told(search, of) if search and self._priced(search, of) else None for of, search in searches]
+
+    @lazy
+    def _peaks(self) -> tuple[str, ...]:
+        return between.told_peaks(self.scene, self.job, self.base)
 
     def _begun(self, asking: Asking) -> Search:
         return Search(self.job, self.program(asking), Settings(self.accuracy), self._today)

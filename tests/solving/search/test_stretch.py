@@ -5,6 +5,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
+from loomopt.model.sampling import Sampler
 from loomopt.solving import between, engine
 from loomopt.solving.search import stretch
 
@@ -56,6 +57,30 @@ def test_it_is_the_same_bits_in_batches_of_any_size(optima):
     for size in (1, 8):
         parts = [stretch.solved(several[begin : begin + size]) for begin in range(0, len(several), size)]
         assert digits(whole[:10]) == digits([each for part in parts for each in part]) == digits(whole[-10:])
+
+
+def test_extremes_that_figures_read_are_found_with_the_certificates_and_not_again(optima, monkeypatch):
+    sampled, read = [], Sampler._sampled
+
+    def counted(sampler, name):
+        sampled.append(name)
+        return read(sampler, name)
+
+    scene, task = lo.load("beatup").set("operation.M0", "755.0 N*m"), asked(755.0, ENDS, optima)
+    assert set(task.told) == {"peak_torque", "peak_power", "obliquity"}
+    (search,) = stretch.solved([task])
+    monkeypatch.setattr(Sampler, "_sampled", counted)
+    here = between.evaluated(scene, search)
+    assert sampled == []
+    peaks = {"peak_torque", "peak_power", "mu_min"}
+    alone = lo.evaluate(scene, here.design).figures
+    assert {name: here.figures[name] for name in peaks} == pytest.approx({n: alone[n] for n in peaks}, rel=CLOSE)
+
+
+def test_what_a_target_reads_in_a_model_of_its_own_tells_no_figures():
+    scene = lo.load("rapier")
+    job = registry.of(scene)
+    assert between.told_peaks(scene, job, job.program(scene, "stroke-dwell")) == ()
 
 
 def test_beyond_a_change_of_what_binds_the_other_neighbours_rows_are_tried():
