@@ -1,6 +1,6 @@
 """A scene's numbers by one name each, whatever table they stand in."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from loomopt.base.errors import refusal
@@ -9,7 +9,7 @@ from loomopt.maths.periodic_cubic import PeriodicCubic, PeriodicCubics
 from loomopt.physics.effects.kinds import Load, keys, label, owned, value_at
 from loomopt.physics.schema import Table
 from loomopt.scenes import csv_tables
-from loomopt.scenes.scene import Scene
+from loomopt.scenes.scene import Scene, kept
 
 CORNER = "corner"
 """The column that marks corners of a curve."""
@@ -31,13 +31,15 @@ def words(scene: Scene) -> tuple[tuple[str, str, Any], ...]:
 
     Raises BadInput.
     """
+    return kept(scene, "words", lambda: tuple(_words(scene)))
+
+
+def _words(scene: Scene) -> Iterator[tuple[str, str, Any]]:
     known = curves(scene)
-    return tuple(
-        (name, key, known.get((name, key), value))
-        for name, own in scene.effects.items()
-        for key, value in own.model_dump().items()
-        if isinstance(value, str)
-    )
+    for name, own in scene.effects.items():
+        for key, value in own.model_dump().items():
+            if isinstance(value, str):
+                yield name, key, known.get((name, key), value)
 
 
 def curves(scene: Scene) -> dict[tuple[str, str], PeriodicCubic | PeriodicCubics]:
