@@ -115,8 +115,8 @@ class BeatupTask(Task):
     @lazy
     def direct(self) -> bool:
         """Whether m4e and r4e matter apart from s = m4e r4e², or leave no room for s."""
-        asked = set(self.scene.limits)
-        read = bool(self.traded) or self.target == "retrofit" or "r4" in asked
+        asked = {*self.scene.limits, *self.traded}
+        read = self.changes or bool(asked & {"r4", *COUNTERWEIGHT})
         for effect in self.scene.active:
             judged = isinstance(effect, Check) and (effect.demands or asked & {*effect.over_cycle, *effect.rows})
             reads = {*effect.reads, *model_of(effect, self.scene.effects[effect.name]).reads}

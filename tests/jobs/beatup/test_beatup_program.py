@@ -54,6 +54,24 @@ def test_where_mass_or_radius_matters_by_itself_both_are_variables(scene, target
     assert "s" not in named(JOB.program(scene, target))
 
 
+@pytest.mark.parametrize(
+    ("scene", "axes", "both"),
+    [
+        (BEATUP, ("peak_torque", "M3_fdc"), False),
+        (BEATUP, ("J4", "swing"), False),
+        (BEATUP, ("peak_torque", "m4e"), True),
+        (BEATUP, ("peak_torque", "r4"), True),
+        (BEATUP, ("change", "peak_torque"), True),
+        (BEATUP.with_effect("centrifugal"), ("peak_torque", "M3_fdc"), False),
+        (BEATUP.with_effect("centrifugal"), ("peak_torque", "shaking_force"), True),
+    ],
+)
+def test_axes_that_read_neither_mass_nor_radius_leave_them_to_their_product(scene, axes, both):
+    """So that of equally good designs the one with the least added mass is taken, as by every target."""
+    found, _ = JOB.traded(scene, None, dict.fromkeys(axes, "least"))
+    assert ("s" in named(found), "m4e" in named(found)) == (not both, both)
+
+
 def test_a_check_that_nothing_limits_leaves_the_variables_alone():
     assert "s" in named(JOB.program(BEATUP.with_effect("centrifugal"), "balance"))
 

@@ -172,6 +172,14 @@ def test_peak_torque_against_reed_torque(torque, reed, peak):
     assert read(row, "peak_torque") == pytest.approx(peak, rel=1e-9)
 
 
+def test_of_equally_good_counterweights_the_lightest_is_taken(torque):
+    trade, (_, balanced) = torque
+    row = at(trade, 20.0, balanced)
+    assert (row.design["r4e"], balanced.design["r4e"]) == (0.08, 0.08)
+    assert balanced.design["m4e"] == pytest.approx(6.286039692, abs=1e-8)
+    assert 0.0 < row.design["m4e"] < balanced.design["m4e"]
+
+
 def test_slopes_against_reed_torque(torque):
     trade, (least, balanced) = torque
     slopes = [
