@@ -231,7 +231,9 @@ WIDE = {
     "bounds.l4": {"min": "37.5 mm", "max": "668 mm"},
     "operation.M0": "800 N*m",
     "limits.swing": {"min": "22.9 deg", "max": "30 deg"},
+    "limits.r4.max": "1 m",
 }
+"""The limit on r4, far off, makes mass and radius variables apart."""
 TURNED = {
     "l1": 0.0075,
     "l2": 0.10112106326180603,
