@@ -145,13 +145,13 @@ def following(rows: Sequence[Row], scale: FrontScale, points: int) -> list[Next]
     if len(rows) >= MOST_MORE * points:
         return []
     by_point = {row.point: row for row in rows}
-    redone = {(row.warm["again"], row.parent) for row in rows}
+    redone = _redone(rows)
     missed = [scale.position(1, row.place[scale.names[1]]) for row in rows if not row.certified and row.place]
     # Each row is redone from one that dominates it once, and from each neighbour that touches others once.
     done = {point for point, _ in redone}
     pairs = [(row.point, by) for row, by in worse if row.point not in done]
     room = points - len(front) - len(missed)
-    if room <= 0 and not pairs and not any(row.warm["fine"] for row in rows):
+    if room <= 0 and not pairs and not any(row.warm.get("fine") for row in rows):
         pairs = [
             (point, by)
             for point, by in _crossed(front)
@@ -163,6 +163,16 @@ def following(rows: Sequence[Row], scale: FrontScale, points: int) -> list[Next]
     if room > 0 and len(found) < BATCH:
         found += [_between(front, b) for b in _halved(front, missed, min(BATCH - len(found), room))]
     return found or [_between(front, b)._replace(fine=True) for b in _narrowed(front, missed)]
+
+
+def _redone(rows: Sequence[Row]) -> set[tuple[int | None, int | None]]:
+    """Return which rows have been redone, each with from which; what was lost with its process stands at its place."""
+    found = set[tuple[int | None, int | None]]()
+    for row in rows:
+        lost = "again" not in row.warm
+        alike = (other.point for other in rows if other is not row and other.place == row.place)
+        found |= {(point, row.parent) for point in (alike if lost else (row.warm["again"],))}
+    return found
 
 
 def _again(row: Row, by: int, scale: FrontScale) -> Next:

@@ -70,6 +70,15 @@ def test_what_another_dominates_is_solved_again_from_it_once():
     assert [spot.point for spot in plan.spots(rows, SCALE)[0]] == [1, 2, 4, 0]
 
 
+def test_a_row_that_was_lost_with_its_process_is_a_failed_row_and_not_asked_for_again():
+    rows = [*ENDS, row(2, 0.5, 0.4), row(3, 0.6, 0.45)]
+    rows.append(Row(4, {"b": 0.6}, 2, "failed", "the process that solved it died"))
+    found = plan.following(rows, SCALE, 40)
+    assert all(each.again is None for each in found)
+    assert 0.6 not in [each.b for each in found]
+    assert plan.following([*ENDS, Row(2, {"b": 0.5}, 0, "failed", "it died")], SCALE, 3) == []
+
+
 def test_a_point_that_was_missed_is_not_asked_for_again():
     rows = [*ENDS, row(2, 0.5, 0.5, certified=False)]
     assert 0.5 not in planned(rows)
