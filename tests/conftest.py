@@ -21,7 +21,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # before NumPy is imported: afterwards 
 import pytest
 from hypothesis import settings
 
-from loomopt.interface.cli import shell
+from loomopt.interface import progress
 
 settings.register_profile("ci", derandomize=True, deadline=None, database=None, max_examples=100)
 settings.register_profile("thorough", deadline=None, database=None, max_examples=2000)
@@ -33,7 +33,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 @pytest.fixture(autouse=True)
 def no_line_of_progress(monkeypatch):
     """Keep commands that are called here from saying what they are doing, however slow the machine is."""
-    monkeypatch.setattr(shell, "APART", 600.0)
+    monkeypatch.setattr(progress, "LINE_INTERVAL", 600.0)
 
 
 def pytest_collection_modifyitems(items):

@@ -106,7 +106,7 @@ def solve(
     "0.5 mm", beside [steps] and [stock] of the scene; True for these alone (`answer.rounded`). on_iteration(number),
     on_start(number, of), on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
-    from loomopt.interface.cli.shell import below_cell
+    from loomopt.interface.progress import cell_progress
     from loomopt.solving import engine
 
     own = _scene(scene)
@@ -119,7 +119,7 @@ def solve(
     arguments.flag(everywhere, "everywhere")
     if not isinstance(steps, bool):
         steps = arguments.table(steps, "steps", "numbers and their steps", "Write {'l1': '0.5 mm'}, or True")
-    with below_cell() as say:
+    with cell_progress() as say:
         told = on_step or say
         proof = GlobalProof(gap, seconds, told or (lambda text: None)) if everywhere else None
         hooks: dict[str, Any] = {"on_iteration": on_iteration, "on_start": on_start, "on_step": told}
@@ -176,11 +176,11 @@ def prove(
     the job's default without one. slack: what binding limits leave open, relative to each quantity's largest magnitude
     over the cycle. Raises BadInput.
     """
-    from loomopt.interface.cli.shell import below_cell
+    from loomopt.interface.progress import cell_progress
     from loomopt.solving.proof import whole_cycle
 
     own, given = _request(scene, design)
-    with below_cell() as say:
+    with cell_progress() as say:
         if say:
             say("proving")
         return whole_cycle.prove(own, given, target, slack)

@@ -14,8 +14,8 @@ from loomopt.base.errors import refusal
 from loomopt.base.files import suffix
 from loomopt.base.records import lazy
 from loomopt.interface import study_table
-from loomopt.interface.cli.shell import below_cell
 from loomopt.interface.files import outputs
+from loomopt.interface.progress import cell_progress
 from loomopt.interface.results import PICTURE, Answer, solved
 from loomopt.scenes.scene import Scene
 from loomopt.studies.accuracy.accuracy import AccuracyStudy
@@ -181,7 +181,7 @@ def conducted(
 @contextlib.contextmanager
 def _told(said: Callable[[int], str], on_row: run.OnRow | None) -> Iterator[run.OnRow | None]:
     """Yield what is called with each row: `on_row`, and in Jupyter what says below the cell how many there are."""
-    with below_cell() as say:
+    with cell_progress() as say:
         if say is None:
             yield on_row
             return
@@ -316,7 +316,7 @@ def accuracy_found(scene: Scene, full: bool, on_step: Callable[[str], None] | No
 
     if on_step is not None:
         arguments.called(on_step, "on_step", "a function of a text", "Give a function, or leave it out")
-    with below_cell() as say:
+    with cell_progress() as say:
         found = accuracy.study(scene, full, on_step or say)
     return AccuracyFound(**{each.name: getattr(found, each.name) for each in fields(found)})
 
@@ -404,7 +404,7 @@ class SensitivityStudy(Printed, sensitivity.Found):
 
 def conducted_sensitivity(study: sensitivity.Study, on_step: Callable[[str], None] | None = None) -> SensitivityStudy:
     """Return a study of sensitivity. Raises BadInput, and KeyboardInterrupt on Ctrl-C."""
-    with below_cell() as cell:
+    with cell_progress() as cell:
         found = sensitivity.conducted(study, on_step or cell)
     return SensitivityStudy(**{each.name: getattr(found, each.name) for each in fields(found)})
 
@@ -424,7 +424,7 @@ def conducted_tolerance(
     Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
     made = who(executor, count)
-    with below_cell() as cell, contextlib.ExitStack() as opened:
+    with cell_progress() as cell, contextlib.ExitStack() as opened:
         say = on_step or cell or (lambda text: None)
         kept = opened.enter_context(_stored(plan, store, resume))
         crew = made if isinstance(made, Executor) or made is None else opened.enter_context(made())

@@ -82,6 +82,18 @@ def test_every_module_has_a_room():
     assert {room(name) for name in modules()} == set(FLOOR)
 
 
+def test_the_library_imports_nothing_of_the_command_line():
+    own = ("interface.cli", "__main__")
+    outside = {name: path for name, path in modules().items() if not name.startswith(own)}
+    spots = [
+        f"{name}:{line}"
+        for name, path in outside.items()
+        for other, line in imports(path.read_text(encoding="utf-8"))
+        if other.startswith("interface.cli")
+    ]
+    assert spots == []
+
+
 def test_imports_run_one_way():
     sources = {name: path.read_text(encoding="utf-8") for name, path in modules().items()}
     assert [line for name, source in sources.items() for line in climbing(name, source)] == []

@@ -15,7 +15,7 @@ import pytest
 from loomopt.base.quantities import read
 from loomopt.interface import api
 from loomopt.interface.cli.app import run
-from loomopt.interface.cli.shell import Progress
+from loomopt.interface.progress import Progress
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import kinds

@@ -41,7 +41,7 @@ raise SystemExit(interrupts.stoppable(run))
 """
 ENDED = """
 import os, signal, sys
-from loomopt.interface.cli import app as cli; from loomopt.interface.cli import shell
+from loomopt.interface.cli import app as cli; from loomopt.interface import progress
 
 def say(self, text):
     if text.startswith("2 of"):
@@ -49,7 +49,7 @@ def say(self, text):
         len(text)
 
 if __name__ == "__main__":
-    shell.Progress.say = say
+    progress.Progress.say = say
     cli.main()
 """
 """A study that is asked to end once two rows are there."""

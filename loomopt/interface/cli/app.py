@@ -32,7 +32,6 @@ from loomopt.interface.cli.commands import (
 )
 from loomopt.interface.cli.shell import (
     DIFFERS,
-    Progress,
     mistake,
     only,
     read_number,
@@ -41,6 +40,7 @@ from loomopt.interface.cli.shell import (
     remark,
     worded,
 )
+from loomopt.interface.progress import Progress
 
 HEADER = Path("include", "coin-or", "IpoptConfig.h")
 """Where IPOPT says its version: beside CasADi's library in its wheel, below the prefix where both were built apart."""

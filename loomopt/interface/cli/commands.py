@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from loomopt.interface.cli.shell import DIFFERS, Progress, read_number, read_request, remark
+from loomopt.interface.cli.shell import DIFFERS, read_number, read_request, remark
+from loomopt.interface.progress import Progress
 
 if TYPE_CHECKING:
     from loomopt.interface.text.layout import Grid

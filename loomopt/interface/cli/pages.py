@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from loomopt.interface.cli.commands import Decimal, Free, Json, Set, With, Without, checked, remarked, tell, write
-from loomopt.interface.cli.shell import Progress, only, read_scene, remark
+from loomopt.interface.cli.shell import only, read_scene, remark
+from loomopt.interface.progress import Progress
 
 if TYPE_CHECKING:
     from loomopt.interface.report.page import Chapter

@@ -1,15 +1,9 @@
-"""What the commands share: reading their arguments, progress, remarks."""
+"""What the commands share: reading their arguments, remarks."""
 
 import contextlib
-import contextvars
-import shutil
 import sys
-import threading
-import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from loomopt.base.errors import BadInput, clean
 
@@ -35,151 +29,6 @@ OPTIONS = (
     "yield_",
 )
 """Arguments of the Python functions that are options of the same name here."""
-
-SILENT = 1.0
-"""Seconds without a word of progress: what takes no longer needs none."""
-APART = 5.0
-"""Seconds from one line to the next where each line stays: rare enough for a log, often enough to be missed."""
-
-
-class Line(Protocol):
-    """Where progress is told. pause: s, before the first word; stays: whether what was told remains."""
-
-    pause: float
-    stays: bool
-
-    def show(self, text: str, seconds: float) -> None:
-        """Tell what is being done, so many seconds after the beginning."""
-
-    def clear(self) -> None:
-        """Take back what does not stay."""
-
-
-class TerminalLine:
-    """One line of a terminal's stderr."""
-
-    stays = False
-
-    def __init__(self) -> None:
-        self.pause = SILENT
-
-    def show(self, text: str, seconds: float) -> None:
-        """Write the line over what stood there."""
-        line = text[: shutil.get_terminal_size().columns - 1]
-        print(f"\r{line}\x1b[K", end="", file=sys.stderr, flush=True)
-
-    def clear(self) -> None:
-        """Leave an empty line."""
-        print("\r\x1b[K", end="", file=sys.stderr, flush=True)
-
-
-class PipeLine:
-    """Lines of stderr where it is no terminal: a pipe, a file, the log of a batch job."""
-
-    stays = True
-
-    def __init__(self) -> None:
-        self.pause = APART
-
-    def show(self, text: str, seconds: float) -> None:
-        """Write one more line; where nobody can hear it, the exit status still tells."""
-        with contextlib.suppress(OSError, ValueError):
-            print(f"loomopt: {text or 'at work'} ({seconds:.0f} s)", file=sys.stderr, flush=True)
-
-    def clear(self) -> None:
-        """Leave what was told."""
-
-
-class CellLine:
-    """One line below a cell of Jupyter, empty in the end."""
-
-    stays = False
-
-    def __init__(self) -> None:
-        self.pause = SILENT
-        self.handle: Any = None
-
-    def show(self, text: str, seconds: float) -> None:
-        """Show the line in place of what stood there."""
-        from IPython.display import display
-
-        told: dict[str, Any] = {"text/plain": text}
-        if self.handle is None:
-            self.handle = display(told, raw=True, display_id=True)  # type: ignore[no-untyped-call]
-        else:
-            self.handle.update(told, raw=True)
-
-    def clear(self) -> None:
-        """Leave an empty line."""
-        self.show("", 0.0)
-
-
-class Progress:
-    """What is being done, from the first pause until the end; line: where, stderr without one."""
-
-    def __init__(self, line: Line | None = None) -> None:
-        self.line = line
-        self.began, self.text = time.monotonic(), ""
-        self.open = self.over = False
-        self.timer: threading.Timer | None = None
-        self.lock = threading.RLock()
-
-    def __enter__(self) -> "Progress":
-        if self.line is None and sys.stderr is not None:
-            self.line = TerminalLine() if sys.stderr.isatty() else PipeLine()
-        self._wait()
-        return self
-
-    def _wait(self) -> None:
-        """Have the line shown after a pause: a step that began early says so too, for solvers let other threads run."""
-        if self.line:
-            own = contextvars.copy_context()  # by which Jupyter knows the cell
-            self.timer = threading.Timer(self.line.pause, own.run, (self._told,))
-            self.timer.daemon = True
-            self.timer.start()
-
-    def _told(self) -> None:
-        """Show the line; where lines stay, again after each pause."""
-        self._show()
-        if self.line and self.line.stays and not self.over:
-            self._wait()
-
-    def say(self, text: str) -> None:
-        """Tell what is being done from now on."""
-        self.text = text
-        if self.line and not self.line.stays and time.monotonic() - self.began > self.line.pause:
-            self._show()
-
-    def _show(self) -> None:
-        with self.lock:
-            if self.line and not self.over and (self.text or self.line.stays):
-                self.open = True
-                self.line.show(self.text, time.monotonic() - self.began)
-
-    def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
-        with self.lock:
-            self.over = True
-            if self.line and self.open:
-                self.line.clear()
-        if self.timer:
-            self.timer.cancel()
-
-
-@contextlib.contextmanager
-def below_cell() -> Iterator[Callable[[str], None] | None]:
-    """Yield what tells progress below the cell of Jupyter that is being run; None anywhere else."""
-    if not _in_jupyter():
-        yield None
-        return
-    with Progress(CellLine()) as progress:
-        yield progress.say
-
-
-def _in_jupyter() -> bool:
-    """Say whether this process runs the cells of a notebook, in a kernel of Jupyter's."""
-    shell = sys.modules.get("IPython")
-    running = shell.get_ipython() if shell else None
-    return getattr(running, "kernel", None) is not None
 
 
 def read_scene(

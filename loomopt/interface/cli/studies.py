@@ -20,7 +20,8 @@ from loomopt.interface.cli.commands import (
     tell,
     write,
 )
-from loomopt.interface.cli.shell import Progress, read_number, read_scene, remark
+from loomopt.interface.cli.shell import read_number, read_scene, remark
+from loomopt.interface.progress import Progress
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -11,10 +11,10 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
-from loomopt.interface.cli import shell as told
+from loomopt.interface import progress as module
 
 CLEARED = "\x1b[K"
-APART = told.APART
+INTERVAL = module.LINE_INTERVAL
 
 
 class Terminal:
@@ -38,8 +38,8 @@ class Terminal:
 
 def test_a_step_that_began_early_says_so_while_it_lasts(monkeypatch):
     terminal = Terminal(monkeypatch)
-    monkeypatch.setattr(told, "SILENT", 0.05)
-    with told.Progress() as progress:
+    monkeypatch.setattr(module, "FIRST_PAUSE", 0.05)
+    with module.Progress() as progress:
         progress.say("building the law")
         assert terminal.shown() == "\rbuilding the law\x1b[K", "though nothing was said after the first second"
         progress.say("start 3 of 8")
@@ -49,8 +49,8 @@ def test_a_step_that_began_early_says_so_while_it_lasts(monkeypatch):
 
 def test_what_takes_no_longer_than_a_second_says_nothing_not_even_later(monkeypatch):
     terminal = Terminal(monkeypatch)
-    monkeypatch.setattr(told, "SILENT", 0.05)
-    with told.Progress() as progress:
+    monkeypatch.setattr(module, "FIRST_PAUSE", 0.05)
+    with module.Progress() as progress:
         progress.say("proving")
     assert terminal.shown(patience=0.3) == ""
 
@@ -58,8 +58,8 @@ def test_what_takes_no_longer_than_a_second_says_nothing_not_even_later(monkeypa
 def test_a_line_longer_than_the_terminal_is_cut_so_that_it_can_be_taken_back(monkeypatch):
     terminal = Terminal(monkeypatch)
     monkeypatch.setenv("COLUMNS", "40")
-    monkeypatch.setattr(told, "SILENT", 0.0)
-    with told.Progress() as progress:
+    monkeypatch.setattr(module, "FIRST_PAUSE", 0.0)
+    with module.Progress() as progress:
         progress.say("long " * 100)
         text = terminal.shown()
     assert text == "\r" + ("long " * 100)[:39] + CLEARED
@@ -67,12 +67,12 @@ def test_a_line_longer_than_the_terminal_is_cut_so_that_it_can_be_taken_back(mon
 
 @pytest.fixture
 def pauses(monkeypatch):
-    monkeypatch.setattr(told, "SILENT", 0.1)
-    monkeypatch.setattr(told, "APART", 0.1)
+    monkeypatch.setattr(module, "FIRST_PAUSE", 0.1)
+    monkeypatch.setattr(module, "LINE_INTERVAL", 0.1)
 
 
 def test_in_a_pipe_a_line_every_few_seconds_says_what_is_being_done(capsys, pauses):
-    with told.Progress() as progress:
+    with module.Progress() as progress:
         time.sleep(0.15)
         progress.say("start 1 of 8")
         time.sleep(0.2)
@@ -86,8 +86,8 @@ def test_in_a_pipe_a_line_every_few_seconds_says_what_is_being_done(capsys, paus
 
 
 def test_what_takes_a_few_seconds_says_nothing_in_a_pipe(capsys):
-    assert 3.0 <= APART <= 10.0
-    with told.Progress() as progress:
+    assert 3.0 <= INTERVAL <= 10.0
+    with module.Progress() as progress:
         for step in range(3):
             progress.say(f"start {step} of 3")
     assert capsys.readouterr() == ("", "")
@@ -98,7 +98,7 @@ def test_a_reader_that_has_left_does_not_stop_the_work(monkeypatch, pauses):
     reading, writing = os.pipe()
     os.close(reading)
     monkeypatch.setattr(sys, "stderr", os.fdopen(writing, "w", closefd=False))
-    with told.Progress() as progress:
+    with module.Progress() as progress:
         progress.say("start 1 of 8")
         time.sleep(0.25)
         assert progress.timer.is_alive(), "it is tried again"
@@ -108,7 +108,7 @@ def test_a_reader_that_has_left_does_not_stop_the_work(monkeypatch, pauses):
 
 LONG_COMMAND = """
 import time
-from loomopt.interface.cli import shell
+from loomopt.interface import progress
 from loomopt.interface.cli import app
 from loomopt.studies import sweep
 
@@ -116,7 +116,7 @@ def slow(self, task, parent, genuine=sweep.Sweep.solved):
     time.sleep(0.4)
     return genuine(self, task, parent)
 
-shell.APART, sweep.Sweep.solved = 0.3, slow
+progress.LINE_INTERVAL, sweep.Sweep.solved = 0.3, slow
 raise SystemExit(app.run(["sweep", "beatup", "--over", "operation.M0=700:720:10 N*m", "--json"]))
 """
 
@@ -135,16 +135,16 @@ def cells(monkeypatch, *sources):
     """Return what cells of a notebook leave when they are run one after the other."""
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(textwrap.dedent(each)) for each in sources])
     client = NotebookClient(notebook, timeout=120, kernel_name="python3", allow_errors=True)
-    told_meanwhile = []
+    received = []
     genuine = client.process_message
 
     def heard(message, *arguments):
-        told_meanwhile.append(message)
+        received.append(message)
         return genuine(message, *arguments)
 
     monkeypatch.setattr(client, "process_message", heard)
     client.execute()
-    return notebook.cells, told_meanwhile
+    return notebook.cells, received
 
 
 def test_in_jupyter_progress_stands_below_the_cell_and_a_wrong_unit_is_one_sentence(monkeypatch):
@@ -152,8 +152,8 @@ def test_in_jupyter_progress_stands_below_the_cell_and_a_wrong_unit_is_one_sente
         monkeypatch,
         """
         import loomopt as lo
-        from loomopt.interface.cli import shell
-        shell.SILENT = 0.0
+        from loomopt.interface import progress
+        progress.FIRST_PAUSE = 0.0
         lo.solve("rapier")
         study = lo.sweep("beatup", {"operation.M0": "700:720:10 N*m"})
         """,
@@ -177,5 +177,5 @@ def test_in_jupyter_progress_stands_below_the_cell_and_a_wrong_unit_is_one_sente
 
 
 def test_a_script_is_told_nothing():
-    with told.below_cell() as say:
+    with module.cell_progress() as say:
         assert say is None
