@@ -239,7 +239,23 @@ def _call(found: Callable[..., Any]) -> str:
 
 
 def _paragraphs(text: str) -> str:
-    return "\n\n".join(_plain(" ".join(part.split("\n"))) for part in text.split("\n\n"))
+    return "\n\n".join(_section(part) for part in text.split("\n\n"))
+
+
+def _section(part: str) -> str:
+    """Return a paragraph of a docstring; of a NumPy section its title and a list of its entries, examples as code."""
+    title, *rest = part.split("\n")
+    if not rest or not rest[0].startswith("---"):
+        return _plain(" ".join(part.split("\n")))
+    if title == "Examples":
+        return "**Examples**\n\n```text\n" + "\n".join(rest[1:]) + "\n```"
+    entries = list[str]()
+    for line in rest[1:]:
+        if line.startswith(" "):
+            entries[-1] += f" {line.strip()}"
+        else:
+            entries.append(line)
+    return "\n".join([f"**{title}**", "", *(f"- {_plain(entry)}" for entry in entries)])
 
 
 def _members(found: type) -> Iterator[tuple[str, str]]:

@@ -30,7 +30,13 @@ if TYPE_CHECKING:
         sweep,
         tolerance,
     )
-    from loomopt.interface.finished import DesignStudy, EffectsStudy, SensitivityStudy, ToleranceStudy
+    from loomopt.interface.finished import (
+        AccuracyStudy,
+        EffectsStudy,
+        SensitivityStudy,
+        StudyTable,
+        ToleranceStudy,
+    )
     from loomopt.interface.torque_budget import Budget
     from loomopt.scenes.scene import Scene
     from loomopt.solving.answer.solution import Proofs
@@ -39,14 +45,15 @@ _HOMES = {
     "Answer": "loomopt.interface.api",
     "BadInput": "loomopt.base.errors",
     "Budget": "loomopt.interface.torque_budget",
-    "DesignStudy": "loomopt.interface.finished",
     "EffectsStudy": "loomopt.interface.finished",
     "Evaluation": "loomopt.interface.api",
     "Proofs": "loomopt.solving.proof.whole_cycle",
     "Scene": "loomopt.scenes.scene",
     "accuracy": "loomopt.interface.api",
     "compare": "loomopt.interface.api",
+    "AccuracyStudy": "loomopt.interface.finished",
     "SensitivityStudy": "loomopt.interface.finished",
+    "StudyTable": "loomopt.interface.finished",
     "ToleranceStudy": "loomopt.interface.finished",
     "budget": "loomopt.interface.api",
     "effects": "loomopt.interface.api",
@@ -65,16 +72,20 @@ _HOMES = {
     "tolerance": "loomopt.interface.api",
 }
 
+_FORMER_NAMES = {"DesignStudy": "StudyTable", "AccuracyFound": "AccuracyStudy"}
+"""Today's name of each renamed class; the former ones go in the next version."""
+
 __all__ = [
+    "AccuracyStudy",
     "Answer",
     "BadInput",
     "Budget",
-    "DesignStudy",
     "EffectsStudy",
     "Evaluation",
     "Proofs",
     "Scene",
     "SensitivityStudy",
+    "StudyTable",
     "ToleranceStudy",
     "accuracy",
     "budget",
@@ -97,9 +108,15 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Import the public names when they are first asked for: the command line starts without what it does not use."""
+    """Import a public name when it is first used: the command line starts without what it does not use."""
     from importlib import import_module
 
+    if name in _FORMER_NAMES:
+        from warnings import warn
+
+        now = _FORMER_NAMES[name]
+        warn(f"loomopt.{name} is now loomopt.{now}; the old name goes in the next version", DeprecationWarning, 2)
+        name = now
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)

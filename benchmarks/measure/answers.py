@@ -48,7 +48,7 @@ def answers(name: str, count: int) -> dict[str, Any]:
     taken, spent, certified, by = [], dict.fromkeys(STEPS, 0.0), 0, set()
     for scene in itertools.islice(ahead, count):
         began = time.process_time()
-        answer = lo.solve(scene, target, near=answer)
+        answer = lo.solve(scene, target, warm_start=answer)
         taken.append(time.process_time() - began)
         certified += answer.status == "optimal" and answer.certificate.passed
         by.add(answer.certificate.by if answer.certificate else "")
@@ -67,7 +67,7 @@ def memory(count: int) -> dict[str, float]:
     found, ahead = {}, scenes("beatup balance")
     answer = lo.solve(next(ahead))
     for k, scene in enumerate(itertools.islice(ahead, count), 1):
-        answer = lo.solve(scene, near=answer)
+        answer = lo.solve(scene, warm_start=answer)
         if k in (max(1, count // 10), count):
             found[f"MB after {k}"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return found

@@ -14,6 +14,7 @@ that by all that is told: medians, least times, and three quarters of the rounds
 
 import functools
 import gc
+import inspect
 import math
 import statistics
 import sys
@@ -66,6 +67,8 @@ def work(name: str, what: str) -> Callable[[], Any]:
 
     scene, target, neighbour = case(name)
 
+    warm_start = "warm_start" if "warm_start" in inspect.signature(lo.solve).parameters else "near"  # older checkouts
+
     def built() -> Any:
         from loomopt.model import session
         from loomopt.solving.nlp import transcribe
@@ -76,7 +79,7 @@ def work(name: str, what: str) -> Callable[[], Any]:
     calls: dict[str, Callable[[], Any]] = {
         "built": built,
         "cold": lambda: lo.solve(scene, target),
-        "warm": lambda: lo.solve(scene, target, near=neighbour),
+        "warm": lambda: lo.solve(scene, target, **{warm_start: neighbour}),
         "evaluate": lambda: lo.evaluate(scene, neighbour.design),
         "simulate": lambda: lo.simulate(scene, neighbour.design),
         "read": lambda: lo.load(CASES[name][0]),

@@ -114,7 +114,7 @@ class Loomopt:
         """Sweep by the public call."""
         answer, self.answers = self.first, {}
         for M0, given in self.scenes.items():
-            answer = self.answers[M0] = lo.solve(given, near=answer)
+            answer = self.answers[M0] = lo.solve(given, warm_start=answer)
         for name, part in (("certificate", "certify_s"), ("call", "total_s")):
             self.times[name].append([answer.time[part] for answer in self.answers.values()])
 

@@ -27,7 +27,7 @@ COLUMNS = ("method", "status", "best", "bound", "boxes", "seconds")
 def ours(name, gap):
     """Return what loomopt proves, with the processor's seconds."""
     began = time.process_time()
-    answer = lo.solve(lo.load(name), everywhere=True, gap=gap)
+    answer = lo.solve(lo.load(name), global_proof=True, gap=gap)
     found = answer.global_bound
     assert found is not None
     first = found.levels[0]

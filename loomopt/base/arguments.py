@@ -1,14 +1,45 @@
-"""What a Python caller gives a function: taken where it is of the kind asked for, else one message that says so."""
+"""Arguments of the public functions: checks of their kind, and former names of renamed ones."""
 
+import functools
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral, Real
-from typing import Any, TypeGuard
+from typing import Any, ParamSpec, TypeGuard, TypeVar
 
 from loomopt.base.errors import refusal
 
 PICTURE = "a path that ends in .png, .svg or .pdf", "Name a file, or leave it out"
 """What a figure may be written to, and what to do where it is none."""
+
+
+Arguments = ParamSpec("Arguments")
+Returned = TypeVar("Returned")
+
+
+def renamed(**names: str) -> Callable[[Callable[Arguments, Returned]], Callable[Arguments, Returned]]:
+    """Decorator that accepts former names of keyword arguments for one version, with a DeprecationWarning.
+
+    names: today's name of each argument by its former name. The function raises BadInput where both are given.
+    """
+
+    def decorate(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
+        @functools.wraps(function)
+        def accept(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Returned:
+            for former in names.keys() & kwargs.keys():
+                name = names[former]
+                if name in kwargs:
+                    raise refusal(f"{former} is the former name of {name}; both are given", "", name, remedy="Give one")
+                text = (
+                    f"the argument {former} of {function.__name__} is now {name}; the old name goes in the next version"
+                )
+                warnings.warn(text, DeprecationWarning, stacklevel=2)
+                kwargs[name] = kwargs.pop(former)
+            return function(*args, **kwargs)
+
+        return accept
+
+    return decorate
 
 
 def number(given: object, key: str, allowed: str, remedy: str) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from loomopt.base import arguments
+from loomopt.base.arguments import renamed
 from loomopt.base.errors import refusal
 from loomopt.interface import results
 from loomopt.interface.results import Answer, Evaluation
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from loomopt.interface.comparison import Comparison
-    from loomopt.interface.finished import AccuracyFound, DesignStudy, EffectsStudy, SensitivityStudy, ToleranceStudy
+    from loomopt.interface.finished import AccuracyStudy, EffectsStudy, SensitivityStudy, StudyTable, ToleranceStudy
     from loomopt.interface.torque_budget import Budget
     from loomopt.scenes.packaged import Head
     from loomopt.solving.answer.solution import Proofs
@@ -75,6 +76,7 @@ def load(name_or_path: str | os.PathLike[str]) -> Loaded:
     return own if design is None else results.evaluated(own, design, None)
 
 
+@renamed(near="warm_start", everywhere="global_proof", yield_="min_yield", steps="round_to")
 def solve(
     scene: Given,
     target: str | None = None,
@@ -82,29 +84,48 @@ def solve(
     accuracy: float = ACCURACY,
     starts: int | None = None,
     seed: int = 0,
-    near: solution.Solution | None = None,
+    warm_start: solution.Solution | None = None,
     prove: bool = False,
-    everywhere: bool = False,
+    global_proof: bool = False,
     gap: float = GAP,
     seconds: float = SECONDS,
     robust: float | None = None,
-    yield_: float | None = None,
-    steps: Mapping[str, object] | bool = False,
+    min_yield: float | None = None,
+    round_to: Mapping[str, object] | bool = False,
     on_iteration: Callable[[int], None] | None = None,
     on_start: Callable[[int, int], None] | None = None,
     on_step: Callable[[str], None] | None = None,
 ) -> Answer:
-    """Return the certified optimum of a scene's target (the job's default without one), or why there is none.
+    """Certified optimum of a scene's target, or the limits that clash.
 
-    scene: itself, or its packaged name or path. accuracy: relative, of every whole-cycle value, 1e-11 to 0.1. starts:
-    so many, the job's own first, then random ones drawn with `seed`; without it a search for the best basin. near: an
-    answer to the same structure, from which the solve starts warm. prove: whether every limit is proven at every crank
-    angle too. everywhere: whether it is proven that no admissible design is better by more than `gap`, relative to each
-    objective, in at most so many seconds (`answer.global_bound`). robust: standard deviations of its own figure by
-    which every limit is backed off, as [tolerances] has machines made; yield_: the share of machines that is to hold
-    all limits, instead (`answer.robust`). steps: number, or a pattern such as "l*", → the step of its sizes, such as
-    "0.5 mm", beside [steps] and [stock] of the scene; True for these alone (`answer.rounded`). on_iteration(number),
-    on_start(number, of), on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    Parameters
+    ----------
+    scene : Scene, answer, packaged name or path.
+    target : name of a target of the scene; the job's default without it.
+    accuracy : relative accuracy of every whole-cycle value, 1e-11 to 0.1.
+    starts : number of starts, the job's own first, then random ones; without it a search for the best basin.
+    seed : seed of the random starts.
+    warm_start : answer of a scene of the same structure; the solve starts there and stays in its basin.
+    prove : prove every limit at every crank angle (`answer.proofs`).
+    global_proof : prove that no admissible design is better by more than `gap` (`answer.global_bound`).
+    gap : gap of the global proof, relative to each objective.
+    seconds : time limit of the global proof, s.
+    robust : standard deviations of its own figure by which every limit is backed off, by [tolerances] of the scene.
+    min_yield : share of the machines made to [tolerances] that hold all limits, in place of `robust`.
+    round_to : steps of sizes by number or pattern, such as {"l*": "0.5 mm"}, beside [steps] and [stock] of the scene;
+        True for those of the scene alone (`answer.rounded`).
+    on_iteration, on_start, on_step : functions of (number), (number, total) and (text) that report progress.
+
+    Raises
+    ------
+    BadInput : an argument or the scene is wrong.
+    KeyboardInterrupt : Ctrl-C.
+
+    Examples
+    --------
+    >>> answer = solve("beatup-light")
+    >>> round(answer.figures["M3_fdc"], 4)
+    -76.9811
     """
     from loomopt.interface.progress import cell_progress
     from loomopt.solving import engine
@@ -114,14 +135,14 @@ def solve(
         if hook is not None:
             arguments.called(hook, key, "a function", "Give a function, or leave it out")
     arguments.flag(prove, "prove")
-    if near is not None and not isinstance(near, solution.Solution):
-        raise refusal("it is no answer", "", "near", near, "what `solve` has returned", "Give one, or leave it out")
-    arguments.flag(everywhere, "everywhere")
-    if not isinstance(steps, bool):
-        steps = arguments.table(steps, "steps", "numbers and their steps", "Write {'l1': '0.5 mm'}, or True")
+    if warm_start is not None and not isinstance(warm_start, solution.Solution):
+        raise refusal("it is no answer", "", "warm_start", warm_start, "what `solve` returned", "Give one or none")
+    arguments.flag(global_proof, "global_proof")
+    if not isinstance(round_to, bool):
+        round_to = arguments.table(round_to, "round_to", "numbers and their steps", "Write {'l1': '0.5 mm'}, or True")
     with cell_progress() as say:
         told = on_step or say
-        proof = GlobalProof(gap, seconds, told or (lambda text: None)) if everywhere else None
+        proof = GlobalProof(gap, seconds, told or (lambda text: None)) if global_proof else None
         hooks: dict[str, Any] = {"on_iteration": on_iteration, "on_start": on_start, "on_step": told}
         anywhere = functools.partial(
             engine.solve,
@@ -129,28 +150,28 @@ def solve(
             accuracy=accuracy,
             starts=starts,
             seed=seed,
-            near=[near.point] if near and near.point else [],
+            near=[warm_start.point] if warm_start and warm_start.point else [],
             **hooks,
         )
         once = functools.partial(anywhere, own)
-        if steps:
+        if round_to:
             from loomopt.studies.rounding import lattice
 
-            if robust is not None or yield_ is not None:
+            if robust is not None or min_yield is not None:
                 remedy = "Round first, then back off with the sizes set as bounds"
-                raise refusal("sizes and back-off are not sought together", "", "steps", remedy=remedy)
+                raise refusal("sizes and back-off cannot be combined", "", "round_to", remedy=remedy)
             if proof:
                 remedy = "Leave out the proof: an answer in sizes says what of the lattice was read"
-                raise refusal("what is proven of all designs is not of those in sizes", "", "steps", remedy=remedy)
-            rounding = lattice.asked(own, target, None if steps is True else steps)
+                raise refusal("sizes and the global proof cannot be combined", "", "round_to", remedy=remedy)
+            rounding = lattice.asked(own, target, None if round_to is True else round_to)
             told_last = functools.partial(anywhere, prove=prove)
             found = lattice.solved(rounding, anywhere, told_last, told)
-        elif robust is None and yield_ is None:
+        elif robust is None and min_yield is None:
             found = once(prove=prove, global_proof=proof)
         else:
             from loomopt.studies.robust import backoff
 
-            asked = backoff.asked(own, target, robust, yield_, seed)
+            asked = backoff.asked(own, target, robust, min_yield, seed)
             check_global_proof(proof)
             last = functools.partial(once, prove=prove, global_proof=proof)
             found = backoff.solved(asked, once, last, told)
@@ -186,20 +207,21 @@ def prove(
         return whole_cycle.prove(own, given, target, slack)
 
 
+@renamed(beside="measured")
 def simulate(
     scene: Given,
     design: Design | solution.Evaluated | None = None,
     target: str | None = None,
     *,
     accuracy: float | None = None,
-    beside: str | os.PathLike[str] | None = None,
+    measured: str | os.PathLike[str] | None = None,
 ) -> "pd.DataFrame":
     """Return the curves of a design (SI; today's without one) over the cycle, units in the column names.
 
     design: a mapping, or an answer, of which the design alone is taken. target: what it was found for, to be named in
     the table's provenance. accuracy: as few rows as show each column's largest magnitude to it; every half degree
-    without. beside: a CSV file of what was measured, `phi [deg]` and columns named as the curves: it stands in columns
-    of its own, NAME_measured, and the table's `attrs` tell the rms difference of each. Raises BadInput.
+    without. measured: a CSV file of measured curves, `phi [deg]` and columns named as the curves; they become columns
+    NAME_measured, and the table's `attrs` hold the rms difference of each. Raises BadInput.
     """
     from loomopt.interface import tables
 
@@ -207,7 +229,7 @@ def simulate(
         check_numbers(accuracy, 1)
     own, given = _request(scene, design)
     name = None if target is None and own.call.target is None else target_name(own, target)
-    return tables.curves(own, given, accuracy, name, beside)
+    return tables.curves(own, given, accuracy, name, measured)
 
 
 def budget(
@@ -236,7 +258,7 @@ def sweep(
     accuracy: float = ACCURACY,
     seed: int = 0,
     on_row: "Callable[[Row], None] | None" = None,
-) -> "DesignStudy":
+) -> "StudyTable":
     """Return a row for every combination of scene numbers, solved for a target (the job's default without one).
 
     over: dotted key → its values as a scene gives them, or "LO:HI:STEP UNIT". executor: any of `concurrent.futures`, or
@@ -341,7 +363,7 @@ def pareto(
     resume: bool = False,
     accuracy: float = ACCURACY,
     on_row: "Callable[[Row], None] | None" = None,
-) -> "DesignStudy":
+) -> "StudyTable":
     """Return the front of two axes: what the first costs of the second, every point certified.
 
     axes: figures or numbers that the scene bounds, freed where it holds them; M3_fdc counts by magnitude. target: whose
@@ -362,7 +384,7 @@ def pareto(
     return conducted(study, executor, workers, store, resume, on_row)
 
 
-def accuracy(scene: Given, *, full: bool = False, on_step: Callable[[str], None] | None = None) -> "AccuracyFound":
+def accuracy(scene: Given, *, full: bool = False, on_step: Callable[[str], None] | None = None) -> "AccuracyStudy":
     """Return what accuracy costs in time, method by method; full: more settings and repeats, which take minutes.
 
     on_step(what): called before each step. Raises BadInput, and KeyboardInterrupt on Ctrl-C.

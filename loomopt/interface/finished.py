@@ -18,7 +18,7 @@ from loomopt.interface.files import outputs
 from loomopt.interface.progress import cell_progress
 from loomopt.interface.results import PICTURE, Answer, solved
 from loomopt.scenes.scene import Scene
-from loomopt.studies.accuracy.accuracy import AccuracyStudy
+from loomopt.studies.accuracy.accuracy import AccuracyResult
 from loomopt.studies.effects import study
 from loomopt.studies.effects.study import Effects, concluded
 from loomopt.studies.run import run
@@ -40,7 +40,7 @@ EXECUTORS = "an executor of concurrent.futures, or a function that makes one"
 
 
 @dataclass(frozen=True, repr=False)
-class DesignStudy:
+class StudyTable:
     """A study with what came of it; SI inside, the units of its scene where a person reads it.
 
     solved: the rows of all points that were solved, in their order; of a front some are dominated by others.
@@ -145,7 +145,7 @@ class DesignStudy:
         certified = sum(row.certified for row in self.rows)
         narrowing = sum(row.narrows for row in self.rows)
         count = counted(self.study, len(self.rows) - narrowing) + (f" and {narrowing} that narrow" if narrowing else "")
-        return f"<DesignStudy {self.study.name} of {self.study.heading}: {count}, {certified} certified>"
+        return f"<StudyTable {self.study.name} of {self.study.heading}: {count}, {certified} certified>"
 
     def _repr_html_(self) -> str | None:
         table = self.table()
@@ -159,7 +159,7 @@ def conducted(
     store: str | os.PathLike[str] | None = None,
     resume: bool = False,
     on_row: run.OnRow | None = None,
-) -> DesignStudy:
+) -> StudyTable:
     """Return a study after running what is left of it.
 
     count: of worker processes, where there is no executor; store: file that each row is written to as it comes; resume:
@@ -170,12 +170,12 @@ def conducted(
     if store is None:
         _check_resume(resume)
         with _told(lambda count: counted(study, count), on_row) as kept:
-            return DesignStudy(study, run.run(study, executor, None, kept))
+            return StudyTable(study, run.run(study, executor, None, kept))
     with Store(Path(arguments.path(store, "store", "a path", "Name a file"))) as opened:
         _check_known(opened, study.key, resume, lambda known: counted(study, known, "of the"))
         opened.begin(study.key, study_identity(study))
         with _told(lambda count: counted(study, count), on_row) as kept:
-            return DesignStudy(study, run.run(study, executor, opened, kept))
+            return StudyTable(study, run.run(study, executor, opened, kept))
 
 
 @contextlib.contextmanager
@@ -277,7 +277,7 @@ class EffectsStudy(Printed, study.Found):
         return notebook.page(effects.parts(self, timed=False))
 
 
-class AccuracyFound(Printed, AccuracyStudy):
+class AccuracyStudy(Printed, AccuracyResult):
     """What accuracy costs in time, method by method; in Jupyter it shows itself."""
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
@@ -307,10 +307,10 @@ class AccuracyFound(Printed, AccuracyStudy):
         return [Part("What accuracy costs", tuple(self.parts()))]
 
     def __repr__(self) -> str:
-        return f"<AccuracyFound {self.problem}: {len(self.rows)} rows; {self.advice}>"
+        return f"<AccuracyStudy {self.problem}: {len(self.rows)} rows; {self.advice}>"
 
 
-def accuracy_found(scene: Scene, full: bool, on_step: Callable[[str], None] | None) -> AccuracyFound:
+def accuracy_found(scene: Scene, full: bool, on_step: Callable[[str], None] | None) -> AccuracyStudy:
     """Return what accuracy costs for a scene; on_step(what): called before each step. Raises BadInput."""
     from loomopt.studies.accuracy import accuracy
 
@@ -318,7 +318,7 @@ def accuracy_found(scene: Scene, full: bool, on_step: Callable[[str], None] | No
         arguments.called(on_step, "on_step", "a function of a text", "Give a function, or leave it out")
     with cell_progress() as say:
         found = accuracy.study(scene, full, on_step or say)
-    return AccuracyFound(**{each.name: getattr(found, each.name) for each in fields(found)})
+    return AccuracyStudy(**{each.name: getattr(found, each.name) for each in fields(found)})
 
 
 def printed(parts: "Sequence[str | Grid]") -> str:

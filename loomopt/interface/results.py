@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from loomopt.base import arguments, records
+from loomopt.base.arguments import renamed
 from loomopt.base.records import lazy
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
 from loomopt.scenes import designs
@@ -57,18 +58,19 @@ class Evaluation(solution.Evaluated, records.Shown):
         """Return the curves of the design over the cycle, SI, units in the column names."""
         return self.simulate()
 
+    @renamed(beside="measured")
     def plot(
-        self, path: str | os.PathLike[str] | None = None, *, beside: str | os.PathLike[str] | None = None
+        self, path: str | os.PathLike[str] | None = None, *, measured: str | os.PathLike[str] | None = None
     ) -> "Figure":
         """Return the curves over the cycle as a figure, which shows itself in Jupyter.
 
-        path: a file to write it to as well: .png, .svg or .pdf. beside: as in `loomopt.simulate`. Raises BadInput.
+        path: a file to write it to as well: .png, .svg or .pdf. measured: as in `loomopt.simulate`. Raises BadInput.
         """
         solution.demand_single(self, "curves")
         from loomopt.interface.files import outputs
 
         place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
-        return outputs.plot(self, self.scene, self.target, place, beside)
+        return outputs.plot(self, self.scene, self.target, place, measured)
 
     def plot_forces(self, path: str | os.PathLike[str] | None = None) -> "Figure":
         """Return the forces that an effect tells by components: size over the turn, and each one's polar diagram.
@@ -134,16 +136,17 @@ class Evaluation(solution.Evaluated, records.Shown):
             return _judged(self.terms.evaluation(design), self.scene, self.target)
         return evaluated(self.scene, design, self.target)
 
+    @renamed(beside="measured")
     def simulate(
-        self, *, accuracy: float | None = None, beside: str | os.PathLike[str] | None = None
+        self, *, accuracy: float | None = None, measured: str | os.PathLike[str] | None = None
     ) -> "pd.DataFrame":
-        """Return the curves of the design in its own scene; accuracy, beside: as in `loomopt.simulate`."""
+        """Return the curves of the design in its own scene; accuracy, measured: as in `loomopt.simulate`."""
         solution.demand_single(self, "curves")
         from loomopt.interface import tables
 
         if accuracy is not None:
             check_numbers(accuracy, 1)
-        return tables.curves(self.scene, self.design, accuracy, self.target, beside)
+        return tables.curves(self.scene, self.design, accuracy, self.target, measured)
 
     def budget(self, *, fluctuation: float | None = None) -> "Budget":
         """Return where the crank torque of the design comes from; fluctuation: as in `loomopt.budget`."""

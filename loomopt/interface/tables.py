@@ -186,13 +186,13 @@ def curves(
     design: designs.Design,
     accuracy: float | None = None,
     target: str | None = None,
-    beside: str | os.PathLike[str] | None = None,
+    measured: str | os.PathLike[str] | None = None,
 ) -> "pd.DataFrame":
     """Return the curves of a design (SI; what it does not name stays today's) over one turn, SI.
 
     Every half degree; or, with an accuracy, as few rows as show each column's largest magnitude to it, relative.
-    target: what the design was found for, where that is known. beside: a CSV file of what was measured, `phi [deg]` and
-    columns named as the curves: each stands beside its own as NAME_measured, in rows at the angles measured.
+    target: what the design was found for, where that is known. measured: a CSV file of measured curves, `phi [deg]` and
+    columns named as the curves; they become columns NAME_measured, in rows at the measured angles.
     """
     import pandas as pd
 
@@ -202,10 +202,12 @@ def curves(
     if accuracy is not None and any(isinstance(effect, Event) for effect in scene.active):
         problem = "what is simulated has no curves in as few rows as show their peaks"
         raise refusal(problem, scene.origin, "accuracy", remedy="Leave the accuracy out, or take the effect off")
-    measured: dict[str, tuple[float, ...]] = {}
-    if beside is not None:
-        measured = csv_tables.measured(Path(arguments.path(beside, "beside", "a CSV file", "Name one")), _kinds(rows()))
-        angles = [angle % TURN for angle in measured.pop(PHI)]
+    given: dict[str, tuple[float, ...]] = {}
+    if measured is not None:
+        given = csv_tables.measured(
+            Path(arguments.path(measured, "measured", "a CSV file", "Name one")), _kinds(rows())
+        )
+        angles = [angle % TURN for angle in given.pop(PHI)]
         rows = functools.partial(rows, also=angles)
     if accuracy is None:
         columns = rows()
@@ -214,8 +216,8 @@ def curves(
 
         columns, error = curves.sparse_curves(job.sampler(scene, designs.flat(design)), rows, accuracy)
         more |= {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
-    if measured:
-        more |= {"beside": str(beside), **_put_beside(columns, angles, measured)}
+    if given:
+        more |= {"measured": str(measured), **_put_beside(columns, angles, given)}
     frame = pd.DataFrame(columns)
     frame.attrs.update(provenance(scene, **more))
     return frame

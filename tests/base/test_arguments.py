@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -235,3 +235,18 @@ def test_an_error_in_a_hook_is_that_error(error, hook):
         lo.solve(SCENE, **{hook: raising})  # type: ignore[arg-type]
     assert caught.value is error
     assert lo.solve(SCENE).status == "optimal"
+
+
+def test_a_renamed_argument_keeps_its_former_name_for_one_version():
+    light, solve = lo.load("beatup-light"), cast("Any", lo.solve)
+    with pytest.warns(DeprecationWarning, match="argument steps of solve is now round_to"):
+        former = solve(light, steps={"l1": "1 mm"})
+    assert former.design == solve(light, round_to={"l1": "1 mm"}).design
+    with pytest.raises(lo.BadInput, match="both are given"):
+        solve(light, near=former, warm_start=former)
+
+
+@pytest.mark.parametrize(("former", "name"), [("DesignStudy", "StudyTable"), ("AccuracyFound", "AccuracyStudy")])
+def test_a_renamed_class_keeps_its_former_name_for_one_version(former, name):
+    with pytest.warns(DeprecationWarning, match=name):
+        assert getattr(lo, former) is getattr(lo, name)

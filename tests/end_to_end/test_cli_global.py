@@ -70,7 +70,7 @@ def test_a_gap_or_a_time_out_of_range_is_refused_by_name(capsys, words, named):
 
 
 def test_sizes_that_are_sold_are_not_told_by_boxes():
-    answer = lo.solve(lo.load("shedding").with_effect("coil"), everywhere=True)
+    answer = lo.solve(lo.load("shedding").with_effect("coil"), global_proof=True)
     assert answer.global_bound is not None
     assert not answer.global_bound.proven
     assert "sizes" in answer.global_bound.why
@@ -78,7 +78,7 @@ def test_sizes_that_are_sold_are_not_told_by_boxes():
 
 def test_python_has_the_same_proof():
     said: list[str] = []
-    answer = lo.solve(lo.load("beatup-light"), everywhere=True, gap=1e-2, seconds=30.0, on_step=said.append)
+    answer = lo.solve(lo.load("beatup-light"), global_proof=True, gap=1e-2, seconds=30.0, on_step=said.append)
     assert answer.global_bound is not None
     assert answer.global_bound.proven
     assert [level.objective for level in answer.global_bound.levels] == ["M3_fdc", "peak_torque"]

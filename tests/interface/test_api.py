@@ -125,7 +125,7 @@ def test_bad_settings_are_bad_input(arguments):
 
 def test_a_neighbours_answer_is_a_warm_start_to_the_same_design(answer):
     scene = SCENE.set("operation.M0", "610 N*m")
-    cold, warm = lo.solve(scene), lo.solve(scene, near=answer)
+    cold, warm = lo.solve(scene), lo.solve(scene, warm_start=answer)
     assert warm.status == cold.status == "optimal"
     assert warm.figures["M3_fdc"] == pytest.approx(cold.figures["M3_fdc"], rel=1e-9)
     for name, value in cold.design.items():
@@ -152,7 +152,8 @@ def test_an_answer_travels_between_processes(answer):
 
 
 PUBLIC = {
-    *("Answer", "BadInput", "Budget", "DesignStudy", "EffectsStudy", "Evaluation", "Proofs", "Scene", "ToleranceStudy"),
+    *("Answer", "BadInput", "Budget", "StudyTable", "EffectsStudy", "Evaluation", "Proofs", "Scene", "ToleranceStudy"),
+    "AccuracyStudy",
     *("accuracy", "budget", "compare", "new", "problems", "schema", "sensitivity", "SensitivityStudy"),
     *("effects", "evaluate", "load", "pareto", "prove", "scene", "simulate", "solve", "sweep", "tolerance"),
 }

@@ -25,30 +25,30 @@ def measured(tmp_path):
 
 
 def test_what_was_measured_stands_in_a_column_of_its_own_with_its_rms(measured):
-    frame = lo.simulate("beatup", beside=measured)
+    frame = lo.simulate("beatup", measured=measured)
     there = frame["psi_measured [rad]"].dropna()
     assert len(there) == 24
     off = (frame["psi [rad]"] - frame["psi_measured [rad]"]).dropna()
     assert off.abs().to_numpy() == pytest.approx(math.radians(0.1), rel=1e-9)
     assert float(frame.attrs["rms_psi [rad]"]) == pytest.approx(math.radians(0.1), rel=1e-9)
-    assert frame.attrs["beside"] == str(measured)
+    assert frame.attrs["measured"] == str(measured)
 
 
 def test_angles_between_the_rows_of_curves_have_rows_of_their_own(tmp_path):
     path = tmp_path / "one.csv"
     path.write_text("phi [deg],psi [deg]\n12.345,150\n")
-    frame = lo.simulate("beatup", beside=path)
+    frame = lo.simulate("beatup", measured=path)
     at = frame["psi_measured [rad]"].first_valid_index()
     assert frame["phi [rad]"][at] == pytest.approx(math.radians(12.345), abs=1e-15)
 
 
 def test_an_answer_is_drawn_beside_what_was_measured(measured):
     answer = lo.evaluate("beatup")
-    figure = answer.plot(beside=measured)
+    figure = answer.plot(measured=measured)
     lines = [line for axes in figure.axes for line in axes.lines if line.get_fillstyle() == "none"]
     assert len(lines) == 1
     assert np.isfinite(np.asarray(lines[0].get_ydata(), dtype=float)).sum() in (24, 25)
-    assert answer.simulate(beside=measured)["psi_measured [rad]"].notna().sum() == 24
+    assert answer.simulate(measured=measured)["psi_measured [rad]"].notna().sum() == 24
 
 
 def test_the_command_tells_the_rms_and_writes_both(measured, tmp_path):
@@ -78,10 +78,10 @@ def test_a_file_that_measures_nothing_is_refused_in_one_line(tmp_path, rows, tol
     path = tmp_path / "bad.csv"
     path.write_text(rows)
     with pytest.raises(BadInput, match=told):
-        lo.simulate("beatup", beside=path)
+        lo.simulate("beatup", measured=path)
 
 
 @pytest.mark.parametrize("wrong", [5, "none.csv", b"x", True])
 def test_what_is_no_file_is_refused(wrong):
     with pytest.raises(BadInput):
-        lo.simulate("beatup", beside=wrong)
+        lo.simulate("beatup", measured=wrong)

@@ -95,7 +95,7 @@ def test_a_study_prints_its_table(capsys):
     study = lo.sweep("shedding-static", over)
     assert run(["sweep", "shedding-static", "--over", "operation.N_min=0:10:10 N"]) == 0
     assert str(study) == capsys.readouterr().out.strip("\n")
-    assert repr(study).startswith("<DesignStudy")
+    assert repr(study).startswith("<StudyTable")
 
 
 def test_a_study_of_one_answer_prints_what_its_command_prints(capsys):

@@ -110,7 +110,7 @@ def test_a_stroke_that_the_target_leaves_open_is_limited_and_priced(rapier):
     answer = lo.solve(scenes[0], "match", starts=1)
     assert answer.status == "optimal"
     assert answer.figures["stroke"] == pytest.approx(0.84, rel=1e-9)
-    tight, loose = (lo.solve(scene, "match", near=answer) for scene in scenes[1:])
+    tight, loose = (lo.solve(scene, "match", warm_start=answer) for scene in scenes[1:])
     slope = (tight.figures["match_rms"] - loose.figures["match_rms"]) / (2 * step)
     assert price(answer, "stroke") == pytest.approx(slope, rel=1e-4)
     assert {"stroke <= 840 mm"} <= {each.text for each in answer.prove().proofs if each.status == "proven"}

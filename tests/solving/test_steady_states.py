@@ -54,7 +54,7 @@ def test_prices_are_those_of_solving_again():
 
 def test_a_neighbour_s_answer_is_solved_again_warm():
     near = SCENE.set("operation.M0", "746 N*m")
-    warm, cold = lo.solve(near, near=answer()), answer(operation__M0="746 N*m")
+    warm, cold = lo.solve(near, warm_start=answer()), answer(operation__M0="746 N*m")
     assert warm.certificate.passed
     assert warm.solver["starts"] == 1
     assert warm.figures["M3_fdc"] == pytest.approx(cold.figures["M3_fdc"], abs=1e-9)
@@ -150,7 +150,7 @@ def test_words_of_a_state_are_structure_and_numbers_are_not():
 
 
 def test_no_claim_about_all_designs_is_made():
-    found = lo.solve(SCENE, starts=1, everywhere=True, seconds=5.0)
+    found = lo.solve(SCENE, starts=1, global_proof=True, seconds=5.0)
     assert not found.global_bound.proven
     assert "the steady state of shaft_torsion is not bounded by boxes of designs" in found.global_bound.why
 

@@ -132,7 +132,7 @@ def test_the_table_is_in_the_scenes_units_or_in_si_and_says_once_where_it_comes_
     assert table.attrs["over"] == "operation.M0 = 600 N*m ... 900 N*m, 21 values"
     assert "peak_torque [N*m]" in table._repr_html_()
     assert "peak_torque [N*m]" in serial._repr_html_()
-    assert repr(serial) == "<DesignStudy sweep of beatup, balance: 21 of 21 points, 21 certified>"
+    assert repr(serial) == "<StudyTable sweep of beatup, balance: 21 of 21 points, 21 certified>"
 
 
 def test_a_row_that_misses_its_goal_is_nowhere_called_optimal_alone(serial):

@@ -128,10 +128,10 @@ def solve(
     settings: dict[str, Any] = {"accuracy": read_number("--accuracy", accuracy, float)}
     settings["starts"] = None if starts is None else read_number("--starts", starts, int)
     settings |= {"gap": read_number("--gap", gap, float), "seconds": read_number("--time", seconds, float)}
-    settings |= {"prove": proven, "everywhere": everywhere}
+    settings |= {"prove": proven, "global_proof": everywhere}
     settings["robust"] = None if robust is None else read_number("--robust", robust, float)
-    settings["yield_"] = None if least is None else read_number("--yield", least, float)
-    settings["steps"] = steps is not None and (steps == "scene" or read_steps(steps))
+    settings["min_yield"] = None if least is None else read_number("--yield", least, float)
+    settings["round_to"] = steps is not None and (steps == "scene" or read_steps(steps))
     out = only("--out", outs)
     if out:
         from loomopt.interface.files import outputs, sheets

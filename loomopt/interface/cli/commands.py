@@ -253,7 +253,7 @@ def simulate(
     if asked is not None:
         check_numbers(asked, 1)
     told = scenes.forces(scene, api.simulate(scene, given, name), given) if forces else ()
-    compared = [scenes.beside(scene, api.simulate(scene, given, name, beside=beside))] if beside else []
+    compared = [scenes.beside(scene, api.simulate(scene, given, name, measured=beside))] if beside else []
     said = outputs.what(api.evaluate(scene, given, name), name, status) if given and out else None
     for path in out or ():
         if forces and path.suffix.lower() in outputs.PICTURES:

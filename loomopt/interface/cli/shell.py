@@ -13,22 +13,15 @@ if TYPE_CHECKING:
 DIFFERS = 1
 """Exit status where a comparison or a proof does not come out as it should."""
 
-OPTIONS = (
-    "accuracy",
-    "fluctuation",
-    "over",
-    "points",
-    "resume",
-    "robust",
-    "slack",
-    "starts",
-    "store",
-    "target",
-    "tolerance",
-    "workers",
-    "yield_",
-)
-"""Arguments of the Python functions that are options of the same name here."""
+_SAME_NAME = ("accuracy", "fluctuation", "over", "points", "resume", "robust", "slack", "starts", "store", "target")
+OPTIONS = {
+    **{name: f"--{name}" for name in (*_SAME_NAME, "tolerance", "workers")},
+    "min_yield": "--yield",
+    "round_to": "--round",
+    "global_proof": "--global",
+    "measured": "--beside",
+}
+"""Option of each argument of the Python functions."""
 
 
 def read_scene(
@@ -165,13 +158,13 @@ def remark(text: str) -> None:
 
 
 def worded(error: BadInput) -> BadInput:
-    """Return an error as the command line words it: what Python calls an argument is an option here."""
+    """Error that names the option of an argument, as the command line calls it."""
     if error.key not in OPTIONS:
         return error
     return BadInput(
         error.problem,
         file=error.file,
-        key=f"--{error.key.rstrip('_')}",
+        key=OPTIONS[error.key],
         value=error.value,
         allowed=error.allowed,
         remedy=error.remedy,

@@ -26,7 +26,7 @@ from loomopt.interface.progress import Progress
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from loomopt.interface.finished import DesignStudy
+    from loomopt.interface.finished import StudyTable
     from loomopt.studies.run.rows import Row, SceneStudy
 
 Target = Annotated[str | None, typer.Option(help="What to optimise; the job's default without it.")]
@@ -179,7 +179,7 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
     from concurrent.futures import BrokenExecutor
 
     from loomopt.interface.files import sheets
-    from loomopt.interface.finished import DesignStudy, conducted
+    from loomopt.interface.finished import StudyTable, conducted
     from loomopt.studies.run.rows import counted
 
     sheets.decimal_comma(how.decimal)
@@ -203,7 +203,7 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
             found = conducted(study, executor, count, how.store, how.resume, kept)
     except (KeyboardInterrupt, BrokenExecutor):
         if rows:
-            done = DesignStudy(study, tuple(rows[point] for point in sorted(rows)))
+            done = StudyTable(study, tuple(rows[point] for point in sorted(rows)))
             _print(done, how)
             _write(done, how, f", {counted(study, len(rows), 'of the')}, as far as they were finished")
         raise
@@ -212,7 +212,7 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
     return status(found.rows)
 
 
-def _write(found: "DesignStudy", how: Run, more: str = "") -> None:
+def _write(found: "StudyTable", how: Run, more: str = "") -> None:
     """Write tables and figures; more: what is said of them beside their name."""
     from loomopt.interface.files import sheets
     from loomopt.interface.text import studies
@@ -255,7 +255,7 @@ def _executor(dask: str | None, count: int | None) -> "Iterator[Executor | None]
         yield executor
 
 
-def _print(found: "DesignStudy", how: Run) -> None:
+def _print(found: "StudyTable", how: Run) -> None:
     from loomopt.interface.text import studies
 
     tell(how.as_json, found.as_dict, lambda: studies.parts(found.study, found.solved, how.si))

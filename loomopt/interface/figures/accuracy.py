@@ -11,7 +11,7 @@ from loomopt.base.files import check as check_file
 from loomopt.interface.figures.figure import COLOURS, STYLES, Entry, frame, head, own_style, page, save
 from loomopt.interface.files import sheets
 from loomopt.interface.text.layout import Grid, joined
-from loomopt.studies.accuracy.accuracy import AccuracyStudy, in_time
+from loomopt.studies.accuracy.accuracy import AccuracyResult, in_time
 from loomopt.studies.accuracy.readings import NUMBERS
 from loomopt.studies.accuracy.subject import LadderRow, grouped, setting_text
 
@@ -22,7 +22,7 @@ COLUMNS = 2
 MARKS = "os^Dv"
 
 
-def parts(study: AccuracyStudy) -> list[str | Grid]:
+def parts(study: AccuracyResult) -> list[str | Grid]:
     """Return the parts of a study in a terminal: a table of rows, the measured orders, the advice."""
     lines = []
     for rows in grouped(study.rows).values():
@@ -48,11 +48,11 @@ def _words(row: LadderRow) -> str:
     return "" if row.status in ("done", "optimal") else row.status.removeprefix("Solve_Succeeded, ")
 
 
-def _order(study: AccuracyStudy, name: str) -> str:
+def _order(study: AccuracyResult, name: str) -> str:
     return f"{study.orders[name]:.2f}" if name in study.orders else ""
 
 
-def _knee(study: AccuracyStudy, name: str) -> str:
+def _knee(study: AccuracyResult, name: str) -> str:
     return setting_text(study.knees[name]) if name in study.knees else ""
 
 
@@ -62,7 +62,7 @@ def check(path: Path) -> None:
     check_file(path)
 
 
-def write(study: AccuracyStudy, path: Path, comma: bool = False) -> None:
+def write(study: AccuracyResult, path: Path, comma: bool = False) -> None:
     """Write a study's table or its figure, by the file's ending; comma: whether CSV has decimal commas."""
     if suffix(path, FORMATS) in sheets.ENDINGS:
         sheets.write(path, {"accuracy": study.table()}, comma)
@@ -70,12 +70,12 @@ def write(study: AccuracyStudy, path: Path, comma: bool = False) -> None:
         atomically(path, functools.partial(draw, study))
 
 
-def draw(study: AccuracyStudy, path: Path) -> None:
+def draw(study: AccuracyResult, path: Path) -> None:
     """Write the figure as PNG, PDF or SVG."""
     save(drawn(study), path)
 
 
-def drawn(study: AccuracyStudy) -> Any:
+def drawn(study: AccuracyResult) -> Any:
     """Return the figure: a panel per quantity, error over time, or over the method's own setting."""
     panels = _panels(study)
     with own_style(study.problem, *panels):
@@ -92,7 +92,7 @@ def drawn(study: AccuracyStudy) -> Any:
     return figure
 
 
-def _panels(study: AccuracyStudy) -> dict[str, list[list[LadderRow]]]:
+def _panels(study: AccuracyResult) -> dict[str, list[list[LadderRow]]]:
     """Return quantity → its ladders' rows that have an error; only quantities that some method tells at sizes."""
     found: dict[str, list[list[LadderRow]]] = {}
     for rows in grouped(study.rows).values():
@@ -106,7 +106,7 @@ def _sized(rows: Sequence[LadderRow]) -> bool:
     return len(rows) > 1 and not isinstance(rows[0].setting, str)
 
 
-def _panel(axes: Any, study: AccuracyStudy, quantity: str, ladders: Sequence[Sequence[LadderRow]]) -> list[Entry]:
+def _panel(axes: Any, study: AccuracyResult, quantity: str, ladders: Sequence[Sequence[LadderRow]]) -> list[Entry]:
     """Draw one quantity's methods, over the setting where all of one cost alike; return what its legend says."""
     from matplotlib.ticker import NullFormatter
 

@@ -224,14 +224,14 @@ def plot(
     scene: Scene,
     target: str,
     path: Path | None,
-    beside: str | os.PathLike[str] | None = None,
+    measured: str | os.PathLike[str] | None = None,
 ) -> "Figure":
     """Return the curves of an evaluated design as a figure; path: a file to write it to as well. Raises BadInput."""
     from loomopt.interface.figures import figure
 
     if path:
         suffix(path, PICTURES)
-    frame = tables.curves(scene, found.design, target=target, beside=beside)
+    frame = tables.curves(scene, found.design, target=target, measured=measured)
     drawn = plotted(frame, scene, flat(found.design), what(found))
     if path:
         atomically(path, functools.partial(figure.save, drawn))

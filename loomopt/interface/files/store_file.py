@@ -6,7 +6,7 @@ from typing import Any
 
 from loomopt.base.errors import BadInput, refusal
 from loomopt.base.units import factor
-from loomopt.interface.finished import DesignStudy
+from loomopt.interface.finished import StudyTable
 from loomopt.jobs.registry import REGISTERED
 from loomopt.scenes.document import Paths
 from loomopt.scenes.numbers import quantity
@@ -28,14 +28,14 @@ def is_store(path: Path) -> bool:
         return False
 
 
-def recalled(path: Path) -> list[DesignStudy]:
+def recalled(path: Path) -> list[StudyTable]:
     """Return every study of a store with the rows that are there, in the order they were begun. Raises BadInput.
 
     Machines as they are made are no designs, and left out.
     """
     with Store(path) as store:
         told = {key: (about, tuple(store.rows(key))) for key, about in store.studies().items()}
-    found = [DesignStudy(_study(about, path), rows) for about, rows in told.values() if rows and "samples" not in about]
+    found = [StudyTable(_study(about, path), rows) for about, rows in told.values() if rows and "samples" not in about]
     if not found:
         raise refusal("the store holds no row yet", str(path), "store", remedy="Run its study first")
     return found

@@ -166,7 +166,7 @@ def beside(scene: Scene, frame: "pd.DataFrame") -> Grid:
             rms = math.sqrt(float(np.mean(off[there] ** 2)))
             lines.append((name, shown, str(len(there)), f"{rms:.4g}", f"{off[worst]:.4g}", angle))
     heads = ("curve", "unit", "samples", "rms", "largest", "at")
-    return Grid(f"Curves less what was measured ({frame.attrs['beside']})", heads, tuple(lines), right=(2, 3, 4, 5))
+    return Grid(f"Curves less what was measured ({frame.attrs['measured']})", heads, tuple(lines), right=(2, 3, 4, 5))
 
 
 def _angles(marks: Marks) -> dict[str, float]:

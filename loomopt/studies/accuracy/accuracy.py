@@ -53,7 +53,7 @@ LADDERS: tuple[Ladders, ...] = (_solved, _read)
 
 
 @dataclass(frozen=True)
-class AccuracyStudy:
+class AccuracyResult:
     """The rows of a study, and what they come to.
 
     orders, knees: "quantity, method" → measured order, and the setting from which on the error stops falling.
@@ -87,7 +87,7 @@ def study(
     full: bool = False,
     on_run: Callable[[str], None] | None = None,
     ladders: Sequence[Ladders] = LADDERS,
-) -> AccuracyStudy:
+) -> AccuracyResult:
     """Return the study of a scene; full: more settings and repeats; on_run: called with each run's name."""
     return concluded(scene, list(climbs(scene, full, on_run, ladders)), full)
 
@@ -108,7 +108,7 @@ def climbs(
             yield ladder, rows
 
 
-def concluded(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> AccuracyStudy:
+def concluded(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> AccuracyResult:
     """Return what ladders and their rows come to."""
     orders: dict[str, float] = {}
     knees: dict[str, Setting] = {}
@@ -121,7 +121,7 @@ def concluded(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> Accu
     told = provenance.provenance(scene, study="full" if full else "quick")
     sampler = registry.of(scene).sampler(scene, {})
     left = [f" Not covered: {text}." for text in model.uncovered(sampler.model.effects, sampler.given.own)]
-    return AccuracyStudy(scene.name, rows, orders, knees, "".join([advice(rows), *left]), told)
+    return AccuracyResult(scene.name, rows, orders, knees, "".join([advice(rows), *left]), told)
 
 
 def advice(rows: Sequence[LadderRow]) -> str:

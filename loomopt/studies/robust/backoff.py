@@ -96,8 +96,8 @@ def asked(scene: Scene, target: str | None, sigmas: float | None, least: float |
             raise refusal("there is no such back-off", "", "robust", sigmas, allowed, "Write --robust 3")
     if least is not None:
         allowed = "a share of all machines between 0 and 1"
-        if not 0.0 < arguments.number(least, "yield_", allowed, "Write --yield 0.99") < 1.0:
-            raise refusal("there is no such yield", "", "yield_", least, allowed, "Write --yield 0.99")
+        if not 0.0 < arguments.number(least, "min_yield", allowed, "Write --yield 0.99") < 1.0:
+            raise refusal("there is no such yield", "", "min_yield", least, allowed, "Write --yield 0.99")
     planned(scene, None, name)
     return Asked(scene, name, sigmas, least, seed=seed)
 

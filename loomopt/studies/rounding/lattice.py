@@ -92,7 +92,7 @@ def asked(scene: Scene, target: str | None, given: Mapping[str, object] | None) 
     steps, stock = numbers.sizes(own)
     if not steps and not stock:
         remedy = "Write --round l1=0.5mm, or add [steps] to the scene"
-        raise refusal("nothing says which sizes there are", own.origin, "steps", remedy=remedy)
+        raise refusal("nothing says which sizes there are", own.origin, "round_to", remedy=remedy)
     found: dict[str, tuple[float, ...]] = {}
     for number in dict.fromkeys((*steps, *stock)):
         key = f"steps.{number}" if number in steps else f"stock.{number}"

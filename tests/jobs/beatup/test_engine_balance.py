@@ -96,7 +96,7 @@ def test_many_starts_in_one_call_say_how_many_were_best():
 
 
 def test_the_start_itself_may_be_the_optimum(answers):
-    again = lo.solve(scene_of(745), near=answers[745])
+    again = lo.solve(scene_of(745), warm_start=answers[745])
     assert again.status == "optimal"
     assert again.figures["peak_torque"] == pytest.approx(answers[745].figures["peak_torque"], rel=1e-11)
 
@@ -104,7 +104,7 @@ def test_the_start_itself_may_be_the_optimum(answers):
 @each_resistance
 def test_a_warm_start_from_a_neighbour_ends_where_a_cold_one_does(answers, M0):
     neighbour = lo.solve(scene_of(M0 + 30), starts=1)
-    warm = lo.solve(scene_of(M0), near=neighbour)
+    warm = lo.solve(scene_of(M0), warm_start=neighbour)
     assert warm.status == "optimal"
     assert warm.figures["peak_torque"] == pytest.approx(BEST[M0][1], rel=1e-9)
     for name in DESIGN:

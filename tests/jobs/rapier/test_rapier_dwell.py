@@ -54,7 +54,7 @@ def test_what_loosening_is_worth_to_the_dwell_is_confirmed_by_solving_again(scen
     key = "limits.mu_min.min" if name == "mu_min" else f"operation.{name}"
     outward = step if price.side == "max" else -step
     values = [price.value + k * outward for k in (-1, 1)]
-    tight, loose = (lo.solve(scene.set(key, f"{value!r} {unit}"), "dwell", near=longest) for value in values)
+    tight, loose = (lo.solve(scene.set(key, f"{value!r} {unit}"), "dwell", warm_start=longest) for value in values)
     assert tight.status == loose.status == "optimal"
     gain = (loose.figures["dwell"] - tight.figures["dwell"]) / (2 * step)
     assert abs(price.worth["dwell"]) == pytest.approx(gain, rel=1e-3)
@@ -65,7 +65,7 @@ def table(scene):
     """Return the answers of eleven dwells, each solved near the one before."""
     near, answers = None, []
     for degrees in TABLE:
-        near = lo.solve(dwelling(scene, math.radians(degrees)), near=near)
+        near = lo.solve(dwelling(scene, math.radians(degrees)), warm_start=near)
         answers.append(near)
     return answers
 

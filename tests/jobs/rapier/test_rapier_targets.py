@@ -81,7 +81,7 @@ def test_every_worth_is_confirmed_by_solving_again(scene, best):
         price, step = prices[name], STEP.get(name, 2e-3)
         outward = step if price.side == "max" else -step
         ends = [moved(scene, name, price.side, price.value + k * outward) for k in (-1, 1)]
-        tight, loose = (lo.solve(end, near=best) for end in ends)
+        tight, loose = (lo.solve(end, warm_start=best) for end in ends)
         assert tight.status == loose.status == "optimal", price.text
         slope = (tight.figures["peak_acceleration"] - loose.figures["peak_acceleration"]) / (2 * step)
         assert price.worth["peak_acceleration"] == pytest.approx(slope, rel=1e-3), price.text
@@ -122,7 +122,7 @@ def test_a_limit_on_jerk_force_or_torque_is_held_and_priced(scene, best, name):
     limit = float(text)
     asked = [loaded.set(f"limits.{name}.max", f"{limit * share!r} {unit}") for share in (1.0, 1 - 1e-5, 1 + 1e-5)]
     answer = lo.solve(asked[0], starts=1)
-    tight, loose = (lo.solve(each, near=answer) for each in asked[1:])
+    tight, loose = (lo.solve(each, warm_start=answer) for each in asked[1:])
     assert [each.status for each in (tight, answer, loose)] == ["optimal"] * 3
     drive = Drive(loaded, answer.design)
     size = {"peak_jerk": lambda: drive.peak(3), "peak_torque": drive.peak_torque, "tape_force": drive.peak_force}[
@@ -140,7 +140,7 @@ def test_a_limit_on_jerk_force_or_torque_is_held_and_priced(scene, best, name):
 def test_starting_at_an_answer_gives_it_again(scene, target):
     """Objectives to 1e-9; designs to 1e-7, as an objective is flat at its optimum and its rounding shows as a root."""
     cold = lo.solve(scene, target, starts=1)
-    warm = lo.solve(scene, target, near=cold)
+    warm = lo.solve(scene, target, warm_start=cold)
     assert warm.status == cold.status == "optimal"
     figure = {"stroke-dwell": "peak_acceleration", "dwell": "dwell", "smooth": "rms_jerk", "match": "match_rms"}[target]
     assert warm.figures[figure] == pytest.approx(cold.figures[figure], rel=1e-9)
@@ -148,14 +148,14 @@ def test_starting_at_an_answer_gives_it_again(scene, target):
 
 
 def test_a_neighbours_answer_does_not_keep_an_optimum_from_its_certificate(scene, best):
-    assert lo.solve(scene.set("bounds.C0y.min", "173.2173 mm"), near=best).status == "optimal"
+    assert lo.solve(scene.set("bounds.C0y.min", "173.2173 mm"), warm_start=best).status == "optimal"
 
 
 def test_a_limit_on_the_torque_of_the_head_alone_is_held_and_priced(scene, best):
     loaded, limit = scene.with_effect("head_inertia"), 2.95
     asked = [loaded.set("limits.peak_torque.max", f"{limit * share!r} N*m") for share in (1.0, 1 - 1e-5, 1 + 1e-5)]
     answer = lo.solve(asked[0], starts=1)
-    tight, loose = (lo.solve(each, near=answer) for each in asked[1:])
+    tight, loose = (lo.solve(each, warm_start=answer) for each in asked[1:])
     assert [each.status for each in (tight, answer, loose)] == ["optimal"] * 3
     assert Drive(loaded, answer.design).peak_torque() == pytest.approx(limit, rel=1e-9)
     assert_held(loaded, answer)
@@ -167,7 +167,7 @@ def test_a_limit_on_the_torque_of_the_head_alone_is_held_and_priced(scene, best)
 def test_the_neighbours_answer_is_no_trap(scene, best):
     """Warm from a neighbour is what cold gives."""
     asked = scene.update({"operation.stroke": "820 mm", "operation.dwell_after": "34 deg"})
-    warm, cold = lo.solve(asked, near=best), lo.solve(asked, starts=1)
+    warm, cold = lo.solve(asked, warm_start=best), lo.solve(asked, starts=1)
     assert warm.status == cold.status == "optimal"
     assert warm.figures["peak_acceleration"] == pytest.approx(cold.figures["peak_acceleration"], rel=1e-9)
 

@@ -194,7 +194,7 @@ def test_prices_of_the_highest_speed_are_those_of_the_least_stiffness_turned_rou
 def test_starting_at_an_answer_gives_it_again(target):
     scene = lo.load("shedding")
     cold = solved(scene, target)
-    warm = lo.solve(scene, target, near=cold)
+    warm = lo.solve(scene, target, warm_start=cold)
     assert warm.status == "optimal"
     assert warm.design == pytest.approx(cold.design, rel=1e-8)
 

@@ -42,7 +42,9 @@ def test_prices_of_the_dwell_follow_the_arcs_ends_as_well():
     worth = {price.limit: price.worth["peak_acceleration"] for price in best.binding}
     step = 0.05
     for name in ("dwell_after", "dwell_before"):
-        ends = [lo.solve(scene.set(f"operation.{name}", f"{30 + sign * step} deg"), near=best) for sign in (-1, 1)]
+        ends = [
+            lo.solve(scene.set(f"operation.{name}", f"{30 + sign * step} deg"), warm_start=best) for sign in (-1, 1)
+        ]
         peaks = [end.figures["peak_acceleration"] for end in ends]
         assert (peaks[1] - peaks[0]) / math.radians(2 * step) == pytest.approx(worth[name], rel=1e-3)
 

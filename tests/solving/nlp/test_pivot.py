@@ -279,7 +279,7 @@ def test_answers_followed_over_changes_of_what_binds_are_those_found_afresh():
     limits = set()
     for resistance in (670, 680, 690, 700, 740, 780, 790, 800, 840, 850, 880):
         scene = lo.load("beatup").set("operation.M0", f"{resistance} N*m")
-        near, fresh = lo.solve(scene, near=near), lo.solve(scene, starts=1)
+        near, fresh = lo.solve(scene, warm_start=near), lo.solve(scene, starts=1)
         assert near.status == fresh.status == "optimal"
         assert near.solver["iterations"] == 0 < fresh.solver["iterations"]
         assert near.design == pytest.approx(fresh.design, rel=1e-8, abs=1e-12)

@@ -15,7 +15,7 @@ from support import inch
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface import results
-from loomopt.interface.finished import DesignStudy
+from loomopt.interface.finished import StudyTable
 from loomopt.jobs import registry
 from loomopt.studies.front import front, plan
 from loomopt.studies.run.store import Store
@@ -204,7 +204,7 @@ def test_the_table_names_the_axes_first_and_the_slope_with_its_unit(reed):
     assert (table.attrs["study"], table.attrs["target"]) == ("pareto", "balance")
     assert (table.attrs["held"], table.attrs["not held"]) == ("the scene's limits", "M3_fdc 0 N*m")
     assert "|M3_fdc| [N*m]" in reed._repr_html_()
-    assert repr(reed) == "<DesignStudy pareto of beatup, balance, peak_torque against |M3_fdc|: 3 points, 3 certified>"
+    assert repr(reed) == "<StudyTable pareto of beatup, balance, peak_torque against |M3_fdc|: 3 points, 3 certified>"
 
 
 @pytest.mark.slow
@@ -219,7 +219,7 @@ def test_failures_stay_rows_with_their_reason_and_dominated_ones_are_left_out(se
     failed = replace(
         serial.solved[2], point=99, status="failed", reason="it died", certified=False, design={}, figures={}, warm={}
     )
-    found = DesignStudy(serial.study, (*serial.solved, failed))
+    found = StudyTable(serial.study, (*serial.solved, failed))
     assert found.rows[-1] == failed
     table = found.table()
     assert table.loc[99, "reason"] == "it died"
@@ -228,7 +228,7 @@ def test_failures_stay_rows_with_their_reason_and_dominated_ones_are_left_out(se
 
 
 def test_a_front_that_has_only_begun_shows_what_there_is(serial):
-    found = DesignStudy(serial.study, serial.solved[:1])
+    found = StudyTable(serial.study, serial.solved[:1])
     assert found.findings.message == "No front yet: an end is not solved."
     assert found.rows == serial.solved[:1]
 

@@ -136,9 +136,9 @@ def test_what_cannot_be_asked_is_refused_in_one_line():
     with pytest.raises(BadInput, match="no number of the scene has a tolerance"):
         lo.solve("beatup", robust=3)
     with pytest.raises(BadInput, match="say the same twice"):
-        lo.solve(beatup(), robust=3, yield_=0.99)
+        lo.solve(beatup(), robust=3, min_yield=0.99)
     with pytest.raises(BadInput, match="no such yield"):
-        lo.solve(beatup(), yield_=99)
+        lo.solve(beatup(), min_yield=99)
     with pytest.raises(BadInput, match="nothing to back off"):
         lo.solve(registry.load("beatup").update({"tolerances": {"M0": "5 %"}}), robust=3)
 

@@ -64,7 +64,7 @@ def test_sizes_that_are_sold():
 
 def test_from_python_and_the_scene():
     scene = registry.load("beatup").update({"steps": dict.fromkeys(("l1", "l2", "l3", "l4"), "1 mm")})
-    found = lo.solve(scene, steps=True)
+    found = lo.solve(scene, round_to=True)
     assert found.figures["peak_torque"] == pytest.approx(88.795301023, abs=6e-10)
     assert found.evaluate().admissible
 
@@ -81,18 +81,18 @@ def test_from_python_and_the_scene():
 )
 def test_what_cannot_be_rounded_is_refused(steps, said):
     with pytest.raises(BadInput, match=said):
-        lo.solve("beatup", steps=steps)
+        lo.solve("beatup", round_to=steps)
 
 
 def test_sizes_and_backoff_are_not_sought_together():
     scene = registry.load("beatup").update({"tolerances": {"l1": "0.06 mm"}})
-    with pytest.raises(BadInput, match="not sought together"):
-        lo.solve(scene, steps={"l1": "1 mm"}, robust=3)
+    with pytest.raises(BadInput, match="sizes and back-off cannot be combined"):
+        lo.solve(scene, round_to={"l1": "1 mm"}, robust=3)
 
 
 def test_a_proof_of_all_designs_is_none_of_those_in_sizes():
-    with pytest.raises(BadInput, match="not of those in sizes"):
-        lo.solve("beatup", steps={"l*": "0.5 mm"}, everywhere=True)
+    with pytest.raises(BadInput, match="sizes and the global proof cannot be combined"):
+        lo.solve("beatup", round_to={"l*": "0.5 mm"}, global_proof=True)
 
 
 def test_a_lattice_without_an_admissible_point():
