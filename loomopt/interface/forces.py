@@ -92,7 +92,7 @@ def found(scene: Scene, curves: "pd.DataFrame", design: Mapping[str, float] = TO
 
 def tells(scene: Scene) -> bool:
     """Say whether an effect that is on tells forces by their components."""
-    return any(_tells_forces(scene.schema.effects[name]) for name in scene.effects)
+    return any(map(_tells_forces, scene.active))
 
 
 def _tells_forces(effect: object) -> bool:

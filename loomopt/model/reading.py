@@ -145,6 +145,15 @@ def _enough(width: float) -> int:
     return math.ceil(math.log(ROUNDING) / (2 * math.log(width / 2))) if 0.0 < width < NARROW else GAUSS_NODES
 
 
+def fixed_nodes(cycle: Cycle, integral: Integral) -> Node:
+    """Return the nodes of a mean at its own angles, each with its number as the switch "datum".
+
+    A cycle of another design, whose corners lie elsewhere, names the formulas that hold in its own pieces.
+    """
+    angles = np.asarray(integral.angles)
+    return Node(angles, {**cycle.switch(cycle.located(angles)[0]), DATUM: np.asarray(integral.data)})
+
+
 def quadrature(cycle: Cycle, integral: Integral) -> tuple[Pieces, Floats, Floats]:
     """Return nodes (pieces, u) and weights in u of a mean over pieces of the cycle."""
     active = np.flatnonzero(cycle.on(integral.where))
@@ -222,8 +231,9 @@ class Reading(Rows):
         """Return a mean by its rule, node by node, SI."""
         if integral.angles:
             number = self.maths.number
-            fixed = zip(integral.angles, integral.data, strict=True)
-            values = [self.quantity(integral.quantity, number(a), {DATUM: number(d)}) for a, d in fixed]
+            pieces = self.cycle.located(np.asarray(integral.angles))[0].tolist()
+            fixed = zip(integral.angles, integral.data, map(self.cycle.switch, pieces), strict=True)
+            values = [self.quantity(integral.quantity, number(a), {**s, DATUM: number(d)}) for a, d, s in fixed]
             return total(values) / len(values)
         weighted, widths = [], []
         for piece, u, weight in zip(*quadrature(self.cycle, integral), strict=True):
@@ -303,7 +313,8 @@ class BatchReading(Reading):
         """Return a mean by its rule, all nodes of all designs at once, (designs,), SI."""
         name = integral.quantity
         if integral.angles:
-            node = Node(np.array(integral.angles)[:, None], {DATUM: np.array(integral.data)[:, None]})
+            fixed = fixed_nodes(self.cycle, integral)
+            node = Node(fixed.phi[:, None], {name: column[:, None] for name, column in fixed.switch.items()})
             return _total(self.quantities((name,), node)[name]) / len(integral.angles)
         pieces, u, weights = quadrature(self.cycle, integral)
         widths = weights[:, None] * (self._begun(pieces + 1) - self._begun(pieces))

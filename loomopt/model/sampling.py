@@ -15,7 +15,7 @@ from loomopt.maths import systems, turning_points
 from loomopt.maths.systems import Number
 from loomopt.maths.turning_points import inside_samples, vertex
 from loomopt.model.model import Integral, JobModel, Stills
-from loomopt.model.reading import DATUM, Quantities, Reading, Rows, quadrature
+from loomopt.model.reading import Quantities, Reading, Rows, fixed_nodes, quadrature
 from loomopt.model.session import current
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Cycle, Floats, Node, Pieces, Where
@@ -152,9 +152,9 @@ class Sampler:
         return found
 
     def at_angle(self, names: tuple[str, ...], phi: float) -> tuple[float, ...]:
-        """Return quantities that no switch changes at one crank angle, rad, SI; raises where there is no real value."""
+        """Return quantities that no load's switch changes at one crank angle, rad, SI; raises without a real value."""
         self.session.positions += 1
-        return self._floats(names, Node(phi, {}))
+        return self._floats(names, Node(phi, self.cycle.switch(self.cycle.place(phi)[0])))
 
     @lazy
     def _floats(self) -> Quantities:
@@ -163,6 +163,14 @@ class Sampler:
     def node(self, pieces: Pieces, u: Floats) -> Node:
         """Return nodes (pieces, u) with their crank angles, rad, and switches."""
         return Node(self.cycle.angles(pieces, u), self.cycle.switch(pieces))
+
+    def node_at(self, angles: Floats) -> Node:
+        """Return nodes at crank angles, rad, with the switches there.
+
+        Those of another turn are told as of the cycle's own: a cam's formulas hold on the turn that it begins.
+        """
+        angles = angles - TURN * np.floor((angles - self.cycle.starts[0]) / TURN)
+        return Node(angles, self.cycle.switch(self.cycle.located(angles)[0]))
 
     def grid(self, samples: int = 0) -> tuple[Pieces, Floats]:
         """Return nodes spread evenly over the turn, the sampler's own number without one; ends of pieces included."""
@@ -264,7 +272,7 @@ class Sampler:
         """Crank angles, rad, where the mechanism comes very near to a singular position."""
 
         def squares(names: tuple[str, ...], phi: Floats) -> Sequence[Floats]:
-            return [np.zeros(phi.shape) + values for values in self.quantities(names, Node(phi, {}))]
+            return [np.zeros(phi.shape) + values for values in self.quantities(names, self.node_at(phi))]
 
         return self.model.singular(squares)
 
@@ -281,15 +289,10 @@ class Sampler:
         return found
 
     def at_angles(self, name: str, angles: Floats) -> Floats:
-        """Return a quantity at crank angles, rad, as they are: a spike may be narrower than u resolves.
-
-        Those of another turn are told as of the cycle's own: a cam's formulas hold on the turn that it begins.
-        """
+        """Return a quantity at crank angles, rad, as they are: a spike may be narrower than u resolves."""
         self.session.positions += len(angles)
-        angles = angles - TURN * np.floor((angles - self.cycle.starts[0]) / TURN)
-        node = Node(angles, self.cycle.switch(self.cycle.located(angles)[0]))
         with np.errstate(invalid="ignore", divide="ignore"):
-            (values,) = self.quantities((name,), node)
+            (values,) = self.quantities((name,), self.node_at(angles))
         return np.broadcast_to(np.asarray(values, dtype=np.float64), angles.shape)
 
     def heights(self, name: str, values: Floats) -> Floats:
@@ -363,8 +366,7 @@ class Sampler:
     def mean(self, integral: Integral) -> float:
         """Return the mean of an integral's quantity over its pieces, or at its own angles, SI."""
         if integral.angles:
-            node = Node(np.asarray(integral.angles), {DATUM: np.asarray(integral.data)})
-            return float(np.mean(self.quantities((integral.quantity,), node)[0]))
+            return float(np.mean(self.quantities((integral.quantity,), fixed_nodes(self.cycle, integral))[0]))
         pieces, u, weights = quadrature(self.cycle, integral)
         widths = np.diff(self.cycle.starts)[pieces] * weights
         values = self.at(integral.quantity, pieces, u)

@@ -171,6 +171,8 @@ def pieces(load: Acting, pose: Motion, known: Given) -> list[Piece]:
     if not isinstance(load, Load) or load.corners is None:
         return [(force(load, pose, known, 0), (0, whole_turn))]
     corners = tuple(map(sympy().sympify, load.corners(systems.sympy(), known.values, known.own[load.name])))
+    if not corners:
+        return [(force(load, pose, known, 0), (0, whole_turn))]
     numbers = tuple(float(corner.subs(dict.fromkeys(corner.free_symbols, 1))) for corner in corners)
     ends, number_ends = (*corners[1:], corners[0] + whole_turn), (*numbers[1:], numbers[0] + 2 * math.pi)
     middles = [(begin + end) / 2 for begin, end in zip(numbers, number_ends, strict=True)]

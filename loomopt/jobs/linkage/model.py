@@ -353,9 +353,10 @@ class Linkage(Kinematics):
                 place = maths.number(path.x[k]), maths.number(path.y[k])
 
                 def rates(
-                    phi: Number, place: tuple[Number, Number] = place, point: str = path.point
+                    phi: Number, name: str = name, place: tuple[Number, Number] = place, point: str = path.point
                 ) -> tuple[Number, Number, Number]:
-                    return nearest_rates(self.pose(maths, given, Node(phi, {})).joints.joints[point], place)
+                    pose = self.pose(maths, given, self._there(given, name, phi))
+                    return nearest_rates(pose.joints.joints[point], place)
 
                 found[name] = turning_points.followed(rates, given.values[hint_of(name)])
         return found
@@ -380,10 +381,10 @@ class Linkage(Kinematics):
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
         """Return where the events lie, rad, found by a scan of the whole turn. Raises UnfoundError."""
         found = self._times(given)
+        angles = {name: found[hint_of(name)] for name in self.path.times} if self.path else {}
         if all(place.angle is not None for place in self.places) and not self.chain.cams:
             return found
-        turns = self.turns(given)
-        angles: dict[str, float] = {}
+        turns = self.turns(given) if any(place.angle is None for place in self.places) else ()
         for place in self.places:
             if place.angle is not None:
                 angles[place.name] = float(number(FLOAT, given.values, place.angle))
@@ -483,8 +484,12 @@ class Linkage(Kinematics):
         """Return the pose at an event."""
         return self.pose(maths, given, self._there(given, event, given.values[event_value(event)]))
 
+    def at_place(self, maths: Maths, given: Given, name: str) -> LinkagePose:
+        """Return the pose at a place of the path that has no timing; name: of its crank angle."""
+        return self.pose(maths, given, self._there(given, name, given.values[name]))
+
     def _there(self, given: Given, event: str, phi: Number) -> Node:
-        """Return the node at or beside an event, with the cams' stretches there."""
+        """Return the node at or beside an event, or a place of a path, with the cams' stretches there."""
         cams = (cam_switch(cam) for cam in self.chain.cams)
         return Node(phi, {cam: given.values[f"{cam} at {event}"] for cam in cams})
 
@@ -538,9 +543,12 @@ def _obliquity(group: str, m: Maths, given: Given, phi: Number, pose: Callable[[
 
 def _at(at: Instant, event: str) -> LinkagePose:
     """Return the pose at an event."""
-    linkage = at.model.kinematics
-    assert isinstance(linkage, Linkage)
-    return linkage.at_event(at.maths, at.given, event)
+    return _linkage(at).at_event(at.maths, at.given, event)
+
+
+def _linkage(at: Instant) -> Linkage:
+    assert isinstance(at.model.kinematics, Linkage)
+    return at.model.kinematics
 
 
 def _swing(high: str, low: str, at: Instant) -> Number:
@@ -599,8 +607,8 @@ def _nearest(path: Path, at: Instant) -> Number:
     """Return the mean square of the distances at crank angles of the design's own, m²."""
     found = 0
     for name, x, y in zip(path.times, path.x, path.y, strict=True):
-        pose = at.model.kinematics.pose(at.maths, at.given, Node(at.values[name], {}))
-        found = found + _square(pose.joints.joints[path.point].place, at.maths.number(x), at.maths.number(y))  # type: ignore[attr-defined]
+        pose = _linkage(at).at_place(at.maths, at.given, name)
+        found = found + _square(pose.joints.joints[path.point].place, at.maths.number(x), at.maths.number(y))
     return found / len(path.x)
 
 

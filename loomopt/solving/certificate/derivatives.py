@@ -13,7 +13,7 @@ from loomopt.maths.jets import Jet, stacked, variables
 from loomopt.maths.systems import Number
 from loomopt.model.model import Integral
 from loomopt.model.program import Program
-from loomopt.model.reading import DATUM, Reading, quadrature
+from loomopt.model.reading import Reading, fixed_nodes, quadrature
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats, Node, Pieces
 from loomopt.physics.tolerances import JET_ERROR, NEWTON_SHIFT, ROUNDED, THIRD_STEPS
@@ -81,7 +81,7 @@ class JetReading(Reading):
     def mean(self, integral: Integral) -> Number:
         """Return a mean by its rule, all nodes at once, SI."""
         if integral.angles:
-            values = self.quantity(integral.quantity, np.array(integral.angles), {DATUM: np.array(integral.data)})
+            values = self.quantity(integral.quantity, *fixed_nodes(self.cycle, integral))
             return _total(values, len(integral.angles)) / len(integral.angles)
         pieces, u, weights = quadrature(self.cycle, integral)
         widths = weights * (self._begins[pieces + 1] - self._begins[pieces])

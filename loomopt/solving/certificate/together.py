@@ -17,7 +17,7 @@ from loomopt.maths.systems import Number
 from loomopt.model.limits import SingleLimit
 from loomopt.model.model import Integral, JobModel
 from loomopt.model.program import Program
-from loomopt.model.reading import DATUM, Reading, quadrature
+from loomopt.model.reading import Reading, fixed_nodes, quadrature
 from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Floats, Node, Pieces
@@ -50,7 +50,10 @@ class DesignsReading(Reading):
     def mean(self, integral: Integral) -> Number:
         """Return a mean by its rule, all nodes at once, (designs, 1), SI."""
         if integral.angles:
-            values = self.quantity(integral.quantity, np.array([integral.angles]), {DATUM: np.array([integral.data])})
+            phi, switch = fixed_nodes(self.cycle, integral)
+            values = self.quantity(
+                integral.quantity, phi[None], {name: column[None] for name, column in switch.items()}
+            )
             return _total(values, len(integral.angles)) / len(integral.angles)
         pieces, u, weights = quadrature(self.cycle, integral)
         widths = weights * (self._begins[:, pieces + 1] - self._begins[:, pieces])

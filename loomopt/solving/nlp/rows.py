@@ -21,7 +21,7 @@ from loomopt.model.kinematics import Chain
 from loomopt.model.limits import CycleLimit
 from loomopt.model.model import Integral, JobModel
 from loomopt.model.program import Program
-from loomopt.model.reading import DATUM, quadrature
+from loomopt.model.reading import DATUM, fixed_nodes, quadrature
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Cycle, Floats, Node, Where, node_angle
@@ -456,9 +456,12 @@ class NodeParameters(NamedTuple):
         switches = [*cycle.switches[piece], *[0.0] * (len(self.switches) - len(cycle.names))]
         return [width[0], offset, *coefficients, *width[1:], *switches]
 
-    def write_fixed(self, angle: float, datum: float) -> list[float]:
-        """Return the parameters of a node of width 1 at a crank angle, rad, that no corner moves."""
-        return [1.0, angle, *[0.0] * (2 * self.corners), *(datum if name == DATUM else 0.0 for name in self.switches)]
+    def write_fixed(self, cycle: Cycle, mean: Integral) -> list[list[float]]:
+        """Return the parameters of a mean's nodes at its own angles, of width 1, which no corner moves."""
+        phi, switch = fixed_nodes(cycle, mean)
+        columns = [np.broadcast_to(switch[name], phi.shape) for name in self.switches]
+        still = [0.0] * (2 * self.corners)
+        return [[1.0, float(angle), *still, *map(float, own)] for angle, *own in zip(phi, *columns, strict=True)]
 
     def read(self, row: Sequence[Number], corners: Sequence[Number]) -> Node:
         """Return the node that parameters say; corners: their crank angles, rad."""
@@ -601,7 +604,7 @@ class Structure:
     def _rule(self, cycle: Cycle, mean: Integral) -> list[list[float]]:
         """Return the parameters of a mean's nodes."""
         if mean.angles:
-            return [self.node.write_fixed(angle, datum) for angle, datum in zip(mean.angles, mean.data, strict=True)]
+            return self.node.write_fixed(cycle, mean)
         rule = zip(*quadrature(cycle, mean), strict=True)
         return [self.node.write(cycle, int(piece), float(u), float(weight)) for piece, u, weight in rule]
 

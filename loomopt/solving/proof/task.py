@@ -56,6 +56,10 @@ class BoxRows(Rows):
     def mean(self, integral: Integral) -> Number:
         """Return a mean at its own angles, or over its pieces, SI. Raises OpenError without a cycle."""
         if integral.angles:
+            if self.model.kinematics.arcs:
+                raise OpenError(
+                    f"{integral.name} is read at crank angles that may lie in several stretches of the motion"
+                )
             fixed = zip(integral.angles, integral.data, strict=True)
             number = self.maths.number
             values = [self.quantity(integral.quantity, number(a), {DATUM: number(d)}) for a, d in fixed]

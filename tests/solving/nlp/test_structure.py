@@ -61,10 +61,13 @@ def test_a_node_is_read_as_it_was_written(corners, piece, u):
 
 
 def test_a_fixed_node_has_its_datum_and_no_corner_moves_it():
-    node = NodeParameters(2, ("half", "datum"))
-    row = node.write_fixed(1.25, 7.0)
-    assert len(row) == node.size
-    assert (read_width(node, row, (9.0, 9.0)), *node.read(row, (9.0, 9.0))) == (1.0, 1.25, {"half": 0.0, "datum": 7.0})
+    node, cycle = NodeParameters(2, ("half", "datum")), split((0.4, 5.9), ("half",), lambda angle: (angle,))
+    mean = Integral("miss", "rms", "square", angles=(1.25, 6.0), data=(7.0, 8.0))
+    for row, piece, angle, datum in zip(node.write_fixed(cycle, mean), (0, 1), mean.angles, mean.data, strict=True):
+        assert len(row) == node.size
+        read = node.read(row, (9.0, 9.0))
+        assert (read_width(node, row, (9.0, 9.0)), read.phi) == (1.0, angle)
+        assert read.switch == {"half": cycle.switch(piece)["half"], "datum": datum}
 
 
 def of_datum(at):
