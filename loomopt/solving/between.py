@@ -34,9 +34,16 @@ def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> 
 
 
 def told_peaks(scene: Scene, job: Job, program: Program) -> tuple[str, ...]:
-    """Return the quantities whose extremes are figures, where a program reads the very model that figures are of."""
-    known = program.model if job.model(scene) is program.model else None
-    return tuple(name for name in job.peaks(known).values() if known.has_quantity(name)) if known else ()
+    """Return the quantities whose extremes are figures, where a program reads the very model that figures are of.
+
+    Of a check that reads numbers which the program solves in another form there is none: only the design has them.
+    """
+    model = program.model
+    if job.model(scene) is not model:
+        return ()
+    known = {*program.parameters, *(v.name for v in program.variables)}
+    others = {name for check in model.checks if not known.issuperset(check.reads) for name in check.over_cycle}
+    return tuple(name for name in job.peaks(model).values() if model.has_quantity(name) and name not in others)
 
 
 @working()

@@ -281,7 +281,9 @@ class EffectsCourse:
         self.base, self.wanted = self._referred()
         self.reference = None if self.base is None else self.rows[self.base]
         if self.base is not None and self.reference and self.reference.status in DESIGNED:
-            self.judge = Judge(study.scene, study.without(self.base), study.target, self.reference)
+            reference = study.without(self.base)
+            given = with_only(study.scene, [name for name in study.scene.effects if name in reference.effects])
+            self.judge = Judge(given, reference, study.target, self.reference)
             self.wanted = self._measure(self.judge, self.base) or self._verify(self.judge, self.base)
 
     def _referred(self) -> tuple[Off | None, list[Off]]:

@@ -91,7 +91,8 @@ def _size(what: str, name: str, value: float) -> float:
 class Judge:
     """The reference: its design is what shifts are read at, its scene what the designs of others are judged in.
 
-    given: the scene as it was asked for, whose natural sizes count; row: that of the reference's solve.
+    given: the scene as it was asked for, with its effects that the reference has on, whose natural sizes count; row:
+    that of the reference's solve.
     """
 
     def __init__(self, given: Scene, scene: Scene, target: str, row: Row) -> None:
@@ -236,7 +237,7 @@ def _limit_sizes(program: Program) -> dict[str, float]:
 
 
 def _scales(objectives: Mapping[str, Objective], given: Scene, target: str) -> dict[str, float]:
-    """Return the natural size, SI, of each objective's figure, as the scene has it that was given."""
+    """Return the natural size, SI, of each objective's figure, as the machine has it that was given."""
     job, own = registry.of(given), dict(objectives)
     try:
         job.demand(given, target)

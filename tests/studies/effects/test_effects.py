@@ -82,6 +82,27 @@ def test_shift_and_regret_of_the_reference_table(beatup, name):
     assert row.excess == 0.0
 
 
+@pytest.mark.parametrize("name", ["shaft_torsion", "speed_fluctuation"])
+def test_an_effect_that_the_reference_leaves_off_changes_no_share(beatup, rows, name):
+    """Shares are of the machine that is weighed: the same as with the effect in [available]."""
+    found = finished.concluded_effects(study.planned(lo.load("beatup").with_effect(name)), rows)
+    assert name not in found.reference.effects
+    assert found.reference.scales == pytest.approx(SCALES, abs=6e-4)
+    assert alike(found) == alike(beatup)
+
+
+@pytest.mark.slow
+def test_an_effect_with_which_no_design_is_admissible_changes_no_size():
+    """The coil of the packaged shedding: no design keeps its limits."""
+    for scene in (lo.load("shedding"), lo.load("shedding").with_effect("coil")):
+        plan = study.planned(scene)
+        rows = [plan.solved(task, None) for task in plan.batch([])]
+        while not (course := study.EffectsCourse(plan, rows)).judge:
+            rows += [plan.solved(task, None) for task in plan.batch(rows)]
+        assert course.aside == {"coil"}
+        assert course.judge.scales == pytest.approx({"K1": 102601.180602}, rel=1e-9)
+
+
 def test_at_one_percent_two_effects_may_be_left_out_together(beatup):
     assert beatup.left_out == ("bearing_friction", "centrifugal")
     assert beatup.kept == tuple(name for name in beatup.reference.effects if name not in beatup.left_out)

@@ -1,0 +1,113 @@
+"""Sweeps with each effect on, alone and together: every row is what a solve of its own gives."""
+
+import functools
+import math
+from pathlib import Path
+
+import pytest
+from support import uncoiled
+
+import loomopt as lo
+from loomopt.jobs import linkage
+from loomopt.studies import sweep
+from loomopt.studies.effects import study
+
+ALL = "all that combine"
+MACHINES: dict[str, tuple[str | Path, dict[str, str]]] = {
+    "beatup": ("beatup", {"operation.M0": "700:800:5 N*m", "operation.speed": "560:620:3 rpm"}),
+    "rapier": ("rapier", {"operation.stroke": "830:870:2 mm", "mechanism.l3": "680:690:0.5 mm"}),
+    "shedding": ("shedding", {"operation.speed": "500:600:5 rpm", "mechanism.travel": "60:70:0.5 mm"}),
+    "linkage": (
+        Path(linkage.__file__).parent / "template.toml",
+        {"operation.speed": "560:620:3 rpm", "effects.resistance.torque": "700:800:5 N*m"},
+    ),
+}
+"""The scene of each job, and two numbers to sweep over, 21 values of each."""
+
+
+@functools.cache
+def machine(job):
+    """Return the scene of a job with the effects that take no values in [available]."""
+    scene = lo.load(MACHINES[job][0])
+    bare = [
+        name for name, said in study.without_values(scene, study.known(scene)).items() if "no values to set" in said
+    ]
+    for name in bare:
+        scene = scene.with_effect(name).without_effect(name)
+    return scene
+
+
+def choices(job):
+    """Return what is put on: each effect with what it needs, and all that combine together."""
+    scene = machine(job)
+    known = study.known(scene)
+    alone = {e.name: (*(b for b in e.beside if b not in scene.effects), e.name) for e in known}
+    found = {name: own for name, own in alone.items() if name not in scene.effects}
+    together = study.combined(known, uncoiled.scene(scene) if job == "shedding" else scene).effects
+    return found | {ALL: tuple(e.name for e in together if e.name not in scene.effects)}
+
+
+CASES = [pytest.param(job, name, id=f"{job}-{name}") for job in MACHINES for name in choices(job)]
+QUICK = [("shedding", "joint_forces"), ("linkage", "mass.rod")]
+
+
+def rows_that_differ(scene, over, target=None):
+    """Return the rows of a sweep that are not what a solve of their own gives, each with what differs."""
+    found = lo.sweep(scene, over, target=target)
+    assert len(found.rows) == found.study.size
+    return {row.point: said for row in found.rows if (said := differences(row, found.study))}
+
+
+def differences(row, plan):
+    """Return what of a row a solve of its own gives otherwise."""
+    answer = lo.solve(plan.scene_at(row.point), plan.target)
+    if row.status != answer.status:
+        return [f"{row.status} ({row.reason}), and not {answer.status} ({answer.message})"]
+    said = []
+    passed = answer.certificate is not None and answer.certificate.passed
+    if row.certified != passed:
+        said.append(f"certified: {row.certified}, and not {passed}")
+    if (binds := set(row.multipliers)) != (own := set(sweep.multipliers(answer))):
+        said.append(f"what binds: {binds ^ own}")
+    if row.figures.keys() != answer.figures.keys():
+        return [*said, f"figures: {row.figures.keys() ^ answer.figures.keys()}"]
+    for name, value in answer.figures.items():
+        if not alike(row.figures[name], value, 1e-6 if name in plan.shown else 1e-5):
+            said.append(f"{name}: {row.figures[name]}, and not {value}")
+    return said
+
+
+def alike(one, other, share):
+    """Say whether two figures agree; those that are sought do to the accuracy of a solve, others to its root."""
+    if one is None or other is None or not math.isfinite(other):
+        return (one is None) == (other is None or not math.isfinite(other))
+    return abs(one - other) <= share * max(1.0, abs(other))
+
+
+def test_torques_with_joint_forces_on_are_those_without_them():
+    """A figure that reads mass and radius of the counterweight, where the solve knows their product alone."""
+    over = {"operation.M0": "720:760:10 N*m"}
+    scene = lo.load("beatup")
+    bare, found = lo.sweep(scene, over), lo.sweep(scene.with_effect("joint_forces"), over)
+    assert [row.status for row in found.rows] == ["optimal"] * 5
+    for row, other in zip(found.rows, bare.rows, strict=True):
+        assert row.parent == other.parent
+        assert all(row.figures[name] == value for name, value in other.figures.items() if value is not None)
+        assert row.figures["force_A"] > 0.0
+
+
+@pytest.mark.parametrize(("job", "name"), QUICK)
+def test_five_rows_with_an_effect_on_are_what_solves_give(job, name):
+    key, values = next(iter(MACHINES[job][1].items()))
+    span, unit = values.split(" ")
+    first, last, step = map(float, span.split(":"))
+    scene = machine(job).with_effect(*choices(job)[name])
+    assert rows_that_differ(scene, {key: f"{first}:{last}:{5 * step} {unit}"}) == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize(("job", "name"), CASES)
+def test_every_row_with_an_effect_on_is_what_a_solve_gives(job, name, axis):
+    key = list(MACHINES[job][1])[axis]
+    assert rows_that_differ(machine(job).with_effect(*choices(job)[name]), {key: MACHINES[job][1][key]}) == {}
