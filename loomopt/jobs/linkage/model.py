@@ -21,12 +21,13 @@ from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Floats, Node
 from loomopt.physics.effects.kinds import Effect, Load, Motion
 from loomopt.physics.mechanisms import chain
+from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.chain import Chain, Part, Ref, cam_switch
 from loomopt.physics.mechanisms.dwell_cam import stretch
 from loomopt.physics.mechanisms.dyad import Vector, dot
 from loomopt.physics.mechanisms.moving import Joint, cross
 from loomopt.physics.schema import Values
-from loomopt.physics.tolerances import ASSEMBLY_MARGIN
+from loomopt.physics.tolerances import ASSEMBLY_MARGIN, SAME_ANGLE
 
 OBLIQUITY = "obliquity"
 """What the quantity of a part's transmission angle is called, after the part."""
@@ -34,6 +35,8 @@ SCAN = 720
 """Samples of one turn between which turns of the output are sought."""
 BESIDE = 0.0123
 """rad; where the samples begin: a linkage drawn in line turns at 0 exactly, where they would see no change of sign."""
+STILL, FEWEST_NODES = 1e-12, 9
+"""Share of the largest |q'| below which the output rests, where rounding leaves a cam's ends; nodes of a stretch."""
 NEWTONS = 8
 """Newton's steps from between two samples to a turn: the third is right to rounding."""
 FLAT = 1e-7
@@ -64,7 +67,8 @@ class Place(NamedTuple):
     """An event: an extreme of q ("max", "min"), that nearest to a crank angle, rad, or the farthest of all without.
 
     Or where q is `travel` short of its value at another event, `beside`, before (side −1) or after (+1) it; or a crank
-    angle of the scene's.
+    angle of the scene's. rest: of an output that rests at its extreme, whether the event is where the rest "begins" or
+    "ends"; the end nearer to `near` without it, and where it begins without both.
     """
 
     name: str
@@ -74,6 +78,17 @@ class Place(NamedTuple):
     beside: str = ""
     side: int = -1
     angle: Ref | None = None
+    rest: str = ""
+
+    @property
+    def corner(self) -> str:
+        """The name of the value that says at which corner of a cam it stands, counted from 1; 0 at none."""
+        return f"corner of {self.name}"
+
+    @property
+    def turned(self) -> str:
+        """The name of the value that says how many turns its crank angle is beyond that corner's."""
+        return f"turns of {self.name}"
 
     @property
     def hint(self) -> str:
@@ -258,13 +273,33 @@ class LinkagePose(Motion):
         return self.order(3)
 
 
+class Corner(NamedTuple):
+    """A corner of the cams: its place among all of them, and its crank angle, rad, of the turn in question."""
+
+    place: int
+    angle: float
+
+
 class Turn(NamedTuple):
-    """Where the output turns: the crank angle, rad, which way, the output there, and q'' over its largest."""
+    """Where the output turns: the crank angle, rad, which way, the output there, and q'' over its largest.
+
+    rest: the corners of cams at which it comes to rest and leaves it; one twice where it turns at once.
+    """
 
     angle: float
     extreme: str
     q: float
     bend: float
+    rest: tuple[Corner, ...] = ()
+
+    @property
+    def rests(self) -> bool:
+        """Whether the output stands still there for a while."""
+        return bool(self.rest) and abs(apart(self.rest[1].angle, self.rest[0].angle)) > SAME_ANGLE
+
+    def away(self, near: float) -> float:
+        """Return how far it is from a crank angle, rad."""
+        return min(abs(apart(angle, near)) for angle in (self.angle, *(corner.angle for corner in self.rest)))
 
 
 class UnfoundError(ValueError):
@@ -336,8 +371,7 @@ class Linkage(Kinematics):
                 found[place.value] = number(maths, given.values, place.angle)
             elif place.hint in given.values:
                 here = given._replace(values={**given.values, **found})
-                rates = functools.partial(self._rates, maths, here, place)
-                found[place.value] = turning_points.followed(rates, given.values[place.hint])
+                found[place.value] = self._followed(maths, here, place)
         found |= self._nearest(maths, given)
         if OUTPUT_PLACES in called:
             for place in self.places:
@@ -369,6 +403,26 @@ class Linkage(Kinematics):
         seen = pose.direction
         return {output_value(place.name, "x"): seen.x, output_value(place.name, "y"): seen.y}
 
+    def _followed(self, maths: Maths, given: Given, place: Place) -> Number:
+        """Return the crank angle of an event from near which it is: a root, or a corner of a cam."""
+        values, rates = given.values, functools.partial(self._rates, maths, given, place)
+        if place.corner not in values:
+            return turning_points.followed(rates, values[place.hint])
+        which, corners = values[place.corner], self._corners(maths, given)
+        stands = maths.choose(which, [0.0, *[1.0] * len(corners)])
+
+        def apart_from_corners(phi: Number) -> tuple[Number, Number, Number]:
+            # At a corner q' and q'' may both vanish: the root that is not chosen there must still be a number.
+            value, slope, bend = rates(phi)
+            return value, slope * (1 - stands) + stands, bend
+
+        root = turning_points.followed(apart_from_corners, values[place.hint])
+        return maths.choose(which, [root, *corners]) + 2 * maths.pi * values[place.turned]
+
+    def _corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
+        """Return the crank angles, rad, of the corners of all cams, one cam after the other."""
+        return tuple(angle for cam in self.chain.cams for angle in self.chain.corners(cam, maths, given.values))
+
     def _rates(self, maths: Maths, given: Given, place: Place, phi: Number) -> tuple[Number, Number, Number]:
         """Return what vanishes at an event, with its first two derivatives."""
         pose = self.pose(maths, given, self._there(given, place.name, phi))
@@ -389,8 +443,19 @@ class Linkage(Kinematics):
             if place.angle is not None:
                 angles[place.name] = float(number(FLOAT, given.values, place.angle))
                 continue
-            crossed = None if place.extreme else self._crossing(given, place, angles[place.beside])
-            angles[place.name] = found[place.hint] = chosen(turns, place).angle if crossed is None else crossed
+            if not place.extreme:
+                angles[place.name] = found[place.hint] = self._crossing(given, place, angles[place.beside])
+                continue
+            turn = chosen(turns, place)
+            angles[place.name] = found[place.hint] = turn.angle
+            if self.chain.cams:
+                corner, turns_beyond = end_of_rest(turn, place), 0
+                if corner is not None:
+                    own = float(self._corners(FLOAT, given)[corner.place])
+                    turns_beyond = round((turn.angle - own) / TURN)
+                    angles[place.name] = own + TURN * turns_beyond
+                found[place.corner] = 0.0 if corner is None else corner.place + 1.0
+                found[place.turned] = float(turns_beyond)
         high, low = extremes(self.places)
         if high and low:
             found[SWEPT] = 0.0 if angles[low] > angles[high] else TURN
@@ -420,21 +485,71 @@ class Linkage(Kinematics):
 
         Raises UnfoundError where it has no real position somewhere.
         """
-        angles = BESIDE + np.linspace(0.0, TURN, SCAN + 1)
+        nodes, corners = self._scan(given)
         with np.errstate(all="ignore"):
-            pose = self.at(systems.numpy(), given, angles)
-            slopes, bends = (np.broadcast_to(np.asarray(each, float), angles.shape) for each in (pose.q1, pose.q2))
+            pose = self.pose(systems.numpy(), given, nodes)
+            slopes, bends = (np.broadcast_to(np.asarray(e, float), nodes.phi.shape) for e in (pose.q1, pose.q2))
         if not np.all(np.isfinite(slopes)):
             raise UnfoundError("", "the linkage does not assemble all round")
         largest = float(np.max(np.abs(bends))) or 1.0
+        still = np.abs(slopes) <= STILL * np.max(np.abs(slopes))
+        moving = np.flatnonzero(~still)
         found = []
-        for k in np.flatnonzero((slopes[:-1] > 0) != (slopes[1:] > 0)):
-            ends = float(angles[k]), float(angles[k + 1])
-            angle = self._settled(given, ends, (float(slopes[k]), float(slopes[k + 1])))
+        for k, after in zip(moving, np.roll(moving, -1), strict=True):
+            if (slopes[k] > 0) == (slopes[after] > 0):
+                continue
+            extreme = "min" if slopes[after] > slopes[k] else "max"
+            between = (np.arange(k + 1, after) if after > k else np.r_[k + 1 : len(still), 0:after]).tolist()
+            rest = [corners[node] for node in (between[:1] + between[-1:]) if node in corners]
+            if len(rest) == 2:
+                at = Node(rest[0].angle, {name: float(each[between[0]]) for name, each in nodes.switch.items()})
+                here = self.pose(FLOAT, given, at)
+                found.append(Turn(rest[0].angle, extreme, float(here.q), abs(float(here.q2)) / largest, tuple(rest)))
+                continue
+            ends = float(nodes.phi[k]), float(nodes.phi[after]) + (TURN if after < k else 0.0)
+            angle = self._settled(given, ends, (float(slopes[k]), float(slopes[after])))
             here = self.at(FLOAT, given, angle)
-            extreme = "min" if slopes[k + 1] > slopes[k] else "max"
             found.append(Turn(angle, extreme, float(here.q), abs(float(here.q2)) / largest))
         return tuple(found)
+
+    def turn(self, given: Given, place: Place) -> Turn:
+        """Return the turn of the output that an extreme means. Raises UnfoundError."""
+        return chosen(self.turns(given), place)
+
+    def corner_words(self, corner: Corner) -> str:
+        """Return what happens at a corner of the cams: the return of follower begins."""
+        place = corner.place
+        for cam in self.chain.cams:
+            pieces = len(LAWS[cam.word("law")].breaks) + 1
+            if place < 2 * (pieces + 1):
+                motion, own = ("rise", place) if place <= pieces else ("return", place - pieces - 1)
+                does = {0: "begins", pieces: "ends"}.get(own, "goes over into its next piece")
+                return f"the {motion} of {cam.name} {does}"
+            place -= 2 * (pieces + 1)
+        raise ValueError(f"the cams have no corner {corner.place}")
+
+    def _scan(self, given: Given) -> tuple[Node, dict[int, Corner]]:
+        """Return nodes over one turn, in order, and which of them are corners of cams: the ends of their stretches."""
+        places = sorted(
+            (BESIDE + (float(angle) - BESIDE) % TURN, place) for place, angle in enumerate(self._corners(FLOAT, given))
+        )
+        if not places:
+            return Node(BESIDE + TURN / SCAN * np.arange(SCAN), {}), {}
+        begins = np.array([angle for angle, _ in places])
+        angles, middles, corners = list[Floats](), list[Floats](), dict[int, Corner]()
+        count = 0
+        for k, begin in enumerate(begins):
+            end = float(begins[k + 1]) if k + 1 < len(begins) else float(begins[0]) + TURN
+            if end - begin <= SAME_ANGLE:
+                continue
+            own = np.linspace(begin, end, max(math.ceil(SCAN * (end - begin) / TURN), FEWEST_NODES))
+            after = places[(k + 1) % len(places)][1]
+            corners |= {count: Corner(places[k][1], float(begin)), count + len(own) - 1: Corner(after, end)}
+            angles.append(own)
+            middles.append(np.full(len(own), (begin + end) / 2))
+            count += len(own)
+        switch = self.chain.switch(given.values, np.concatenate(middles))
+        return Node(np.concatenate(angles), switch), corners
 
     def _settled(self, given: Given, ends: tuple[float, float], slopes: tuple[float, float]) -> float:
         """Return where the output turns between two crank angles, rad, at which it has slopes of other signs."""
@@ -510,14 +625,27 @@ def chosen(turns: tuple[Turn, ...], place: Place) -> Turn:
     if place.near is None:
         sign = 1 if place.extreme == "max" else -1
         found = max(own, key=lambda turn: sign * turn.q)
-        found = found._replace(angle=found.angle % TURN)
     else:
         near = place.near
-        found = min(own, key=lambda turn: abs(apart(turn.angle, near)))
-        found = found._replace(angle=near + apart(found.angle, near))
-    if found.bend < FLAT:
+        found = min(own, key=lambda turn: turn.away(near))
+    corner = end_of_rest(found, place)
+    if corner is None and found.bend < FLAT:
         raise UnfoundError(place.name, f"at event {place.name} the output only touches a standstill")
-    return found
+    angle = found.angle if corner is None else corner.angle
+    if place.near is None:
+        return found._replace(angle=(angle + SAME_ANGLE) % TURN - SAME_ANGLE)
+    return found._replace(angle=place.near + apart(angle, place.near))
+
+
+def end_of_rest(turn: Turn, place: Place) -> Corner | None:
+    """Return the corner of a cam at which an extreme stands, by the end of the rest that is meant; None at none."""
+    if not turn.rest:
+        return None
+    begin, end = turn.rest
+    if place.rest or place.near is None:
+        return end if place.rest == "ends" else begin
+    near = place.near
+    return min(turn.rest, key=lambda corner: abs(apart(corner.angle, near)))
 
 
 def apart(angle: float, other: float) -> float:

@@ -27,7 +27,6 @@ from loomopt.jobs.linkage.model import (
     Turn,
     UnfoundError,
     Window,
-    apart,
     chosen,
     extremes,
 )
@@ -160,7 +159,9 @@ def _scale(raw: object, form: str, names: Mapping[str, Any]) -> tuple[Any, bool]
     return PositiveLength, True
 
 
-EVENT_KEYS = {"extreme": ("extreme", "near"), "travel": ("travel", "before", "after"), "angle": ("angle",)}
+RESTS = ("begins", "ends")
+"""Where an event stands that is an extreme at which the output rests."""
+EVENT_KEYS = {"extreme": ("extreme", "near", "rest"), "travel": ("travel", "before", "after"), "angle": ("angle",)}
 
 
 def _places(raw: Mapping[str, Any], names: Mapping[str, Any], output: Output, used: Used) -> tuple[Place, ...]:
@@ -183,9 +184,11 @@ def _places(raw: Mapping[str, Any], names: Mapping[str, Any], output: Output, us
 def _extreme(name: str, table: Mapping[str, Any], names: Names, output: Output, known: Known, used: Used) -> Place:
     if table["extreme"] not in ("max", "min"):
         raise unknown("extreme", str(table["extreme"]), ("max", "min"), "", f"events.{name}.extreme")
-    near = table.get("near")
+    near, rest = table.get("near"), table.get("rest", "")
+    if rest and rest not in RESTS:
+        raise unknown("end of a rest", str(rest), RESTS, "", f"events.{name}.rest")
     try:
-        return Place(name, table["extreme"], None if near is None else read(str(near), "angle"))
+        return Place(name, table["extreme"], None if near is None else read(str(near), "angle"), rest=rest)
     except QuantityError as error:
         raise misread(error, "", f"events.{name}.near", near) from None
 
@@ -612,21 +615,21 @@ def _check_events(scene: Scene, linkage: Linkage) -> None:
 
 def _check_extreme(scene: Scene, turns: Sequence[Turn], place: Place) -> None:
     """Raise BadInput for an extreme that is another, or that a small change of the design would exchange."""
-    key, told = (
-        f"events.{place.name}",
-        ", ".join(f"{turn.extreme} at {scene.show(turn.angle % (2 * math.pi), 'angle', 4)}" for turn in turns),
-    )
-    found = chosen(tuple(turns), place)
+    key, found = f"events.{place.name}", chosen(tuple(turns), place)
     own = [turn for turn in turns if turn.extreme == place.extreme]
+    word = "highest" if place.extreme == "max" else "lowest"
+
+    def at(few: Sequence[Turn]) -> str:
+        return ", ".join(scene.show(turn.angle % (2 * math.pi), "angle", 4) for turn in few)
+
     if place.near is None:
         swing = max(turn.q for turn in turns) - min(turn.q for turn in turns)
         alike = [turn for turn in own if abs(turn.q - found.q) <= LEVEL * swing]
         if len(alike) > 1:
-            problem = f"several extremes are as far out, so that {place.name} would jump between them: {told}"
+            problem = f"the output is {word}, within {LEVEL:.1%} of its swing, at {at(alike)}: {place.name} may be any"
             raise refusal(problem, scene.origin, key, remedy='Say which: near = "60 deg"')
         return
-    far = [abs(apart(turn.angle, place.near)) for turn in own]
-    other = [abs(apart(turn.angle, place.near)) for turn in turns if turn.extreme != place.extreme]
-    if min(other) < min(far):
-        problem = f"near {scene.show(place.near, 'angle')} the output has no {place.extreme}: {told}"
+    other = [turn.away(place.near) for turn in turns if turn.extreme != place.extreme]
+    if min(other) < min(turn.away(place.near) for turn in own):
+        problem = f"near {scene.show(place.near, 'angle')} the output has no {place.extreme}: it is {word} at {at(own)}"
         raise refusal(problem, scene.origin, f"{key}.near", remedy="Correct near, or name the other extreme")

@@ -5,12 +5,12 @@ that slides has the place along its guide under its own name.
 """
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
-from loomopt.jobs.linkage.model import LinkagePose, Output, event_value
+from loomopt.jobs.linkage.model import LinkagePose, Output, end_of_rest, event_value
 from loomopt.jobs.linkage.program import linkage_of
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT, Number
@@ -292,7 +292,20 @@ class LinkageViews(JobViews):
         """Return what to know beside the numbers: curves, and events that stand elsewhere than today's."""
         found = told(scene)
         moved = self._moved(scene, design)
-        return (*found, moved) if moved else found
+        return (*found, *self._rests(scene, design), *((moved,) if moved else ()))
+
+    def _rests(self, scene: Scene, design: Mapping[str, float]) -> Iterator[str]:
+        """Yield for each event at which the output rests which end of the rest it is."""
+        given = registry.of(scene).sampler(scene, design).given
+        linkage = linkage_of(registry.of(scene).model(scene))
+        for place in linkage.places:
+            turn = linkage.turn(given, place) if place.extreme and linkage.chain.cams else None
+            if turn is None or not turn.rests:
+                continue
+            begin, end = (scene.show(corner.angle % TURN, "angle", 5) for corner in turn.rest)
+            standing = end_of_rest(turn, place)
+            assert standing is not None
+            yield f"{place.name} is where {linkage.corner_words(standing)}: the output rests from {begin} to {end}"
 
     def _moved(self, scene: Scene, design: Mapping[str, float]) -> str:
         """Say where a design turns more or less often than today's: its events may be others."""
