@@ -88,7 +88,7 @@ def scene(job: str) -> str:
     """Return the tables of a job's scenes, key by key, as the JSON Schema for editors has them."""
     schema = _scene(job).schema
     own = bool(schema.tables)
-    full = json_schema.scene(dataclasses.replace(schema, tables=()) if own else schema)
+    full = json_schema.scene(dataclasses.replace(schema, tables={}) if own else schema)
     tables, known = full["properties"], full["$defs"] | {NEEDED: _needed(schema)}
     parts = [OWN_NAMES.format(_listed(schema.tables))] if own else []
     parts += [

@@ -62,7 +62,7 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
         shown = f" (given: {value})" if value else ""
         sentences = [f"{problem}{shown}", f"Allowed: {allowed}" if allowed else "", remedy]
         text = " ".join(sentence.rstrip(".") + "." for sentence in sentences if sentence)
-        self.text = f"{place}: {text}" if place else text
+        self.line = self.text = f"{place}: {text}" if place else text
         self.others: tuple[BadInput, ...] = ()
         super().__init__(self.text)
 
@@ -76,16 +76,19 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
     @property
     def faults(self) -> "tuple[BadInput, ...]":
         """Each mistake as an error of its own, the worst first."""
-        return (self, *self.others)
+        return (self._in(self.file) if self.others else self, *self.others)
 
     def placed(self, file: str, tables: Collection[str]) -> "BadInput":
         """Return the same mistakes, those in one of these tables as mistakes of a file, where they name none."""
-        first, *others = (each._in(file) if each.key.split(".")[0] in tables else each for each in self.faults)
+        first, *others = (
+            each._in(file) if not each.file and each.key.split(".")[0] in tables else each for each in self.faults
+        )
         return first.together(others) if others else first
 
     def _in(self, file: str) -> "BadInput":
+        """Return this mistake alone, as one of a file."""
         more = {name: getattr(self, name) for name in ("key", "value", "allowed", "remedy", "grade")}
-        return self if self.file else type(self)(self.problem, file=file, **more)
+        return type(self)(self.problem, file=file, **more)
 
     def together(self, others: "Sequence[BadInput]") -> "BadInput":
         """Return one error of this mistake and of others, a line each."""
@@ -93,7 +96,7 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
         found.others = tuple(others)
         told, more = others[: _MOST_TOLD - 1], len(others) - _MOST_TOLD + 1
         rest = [f"and {more} more: correct these first"] if more > 0 else []
-        found.text = "\n".join([*(each.text for each in (self, *told)), *rest])
+        found.text = "\n".join([*(each.line for each in (self, *told)), *rest])
         return found
 
 
@@ -187,19 +190,25 @@ NEAR, SAME = 0.5, 0.75
 """Share of letters that two names have in common: of which one may be meant, and of which one surely is."""
 _NOTHING = object()
 _PROBLEMS = {
-    "dict_type": "it is not a table",
-    "tuple_type": "it is not a list",
-    "string_type": "it is not text",
-    "bool_type": "it is neither true nor false",
-    "bool_parsing": "it is neither true nor false",
-    "int_type": "it is not a whole number",
-    "int_parsing": "it is not a whole number",
-    "int_from_float": "it is not a whole number",
-    "greater_than": "it is out of range",
-    "greater_than_equal": "it is out of range",
-    "less_than": "it is out of range",
-    "less_than_equal": "it is out of range",
+    "dict_type": ("it is not a table", "a table"),
+    "model_type": ("it is not a table", "a table"),
+    "tuple_type": ("it is not a list", "a list"),
+    "list_type": ("it is not a list", "a list"),
+    "string_type": ("it is not text", "text in quotes"),
+    "bool_type": ("it is neither true nor false", "true, false"),
+    "bool_parsing": ("it is neither true nor false", "true, false"),
+    "int_type": ("it is not a whole number", "a whole number"),
+    "int_parsing": ("it is not a whole number", "a whole number"),
+    "int_parsing_size": ("it is not a whole number", "a whole number"),
+    "int_from_float": ("it is not a whole number", "a whole number"),
+    "greater_than": ("it is out of range", ""),
+    "greater_than_equal": ("it is out of range", ""),
+    "less_than": ("it is out of range", ""),
+    "less_than_equal": ("it is out of range", ""),
+    "string_pattern_mismatch": ("it is empty", "a name in quotes"),
+    "extra_forbidden": ("unknown key", ""),
 }
+"""What pydantic finds wrong → it in words, and what is allowed."""
 _BOUNDS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
 """How pydantic names the bounds of a field → in words."""
 
@@ -213,7 +222,7 @@ def shown(value: object) -> str:
     if isinstance(value, int) and value.bit_length() > 256:
         return "a huge whole number"
     if isinstance(value, dict | list | tuple):
-        return "a table" if isinstance(value, dict) else "a list"
+        return "a table" if isinstance(value, dict) else "a list" if value else "an empty list"
     return clean(str(value), _LONGEST_VALUE) if isinstance(value, int | float) else type(value).__name__
 
 
@@ -309,9 +318,12 @@ def invalid(error: ErrorDetails, model: type[BaseModel], origin: str, table: str
     cause = error.get("ctx", {}).get("error")
     if isinstance(cause, QuantityError):
         return misread(cause, origin, key, value)
-    allowed = str(error.get("ctx", {}).get("expected", "")).replace("'", '"')
-    problem = "it is none of the known choices" if allowed else _PROBLEMS.get(error["type"], error["msg"])
-    return refusal(problem, origin, key, value, allowed or _bounds(model, names), "Correct the value")
+    choices = str(error.get("ctx", {}).get("expected", "")).replace("'", '"')
+    if choices:
+        return refusal("it is none of the known choices", origin, key, value, choices, "Correct the value")
+    problem, allowed = _PROBLEMS.get(error["type"], (error["msg"], ""))
+    remedy = f"Write [{shown(value)}]" if allowed == "a list" and isinstance(value, str) else "Correct the value"
+    return refusal(problem, origin, key, value, _bounds(model, names) or allowed, remedy)
 
 
 def _bounds(model: type[BaseModel], names: Sequence[str]) -> str:

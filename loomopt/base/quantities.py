@@ -302,6 +302,10 @@ class Quantity(NamedTuple):
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Return what an editor may check of it."""
+        return self.schema()
+
+    def schema(self) -> dict[str, Any]:
+        """Return the JSON Schema of its raw value."""
         kind, least, above, below = self
         said = f"{described(kind)}, {self.range}" if self.range else described(kind)
         return pattern_schema(kind, least, above, below, said)

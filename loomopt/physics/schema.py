@@ -1,7 +1,7 @@
 """What tables of a scene are made of, and what a designer reads and asks: figures and targets."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -12,6 +12,10 @@ class Table(BaseModel):
     """One table of a scene: unknown keys are errors, values never change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+
+Name = Annotated[str, Field(pattern=r"\S")]
+"""Text of a table that names something: not empty."""
 
 
 class TargetTable(Table):

@@ -18,6 +18,8 @@ _DOTS = 2 * _DEEPEST
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+"""
 _DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*+(?:{_PART}\.[ \t]*+){{{_DOTS}}}")
 _MOST_REMEMBERED = 16
+_LONGEST_NUMBER = 4096
+"""Bits of a whole number that is read."""
 
 
 def read_document(path: Path | str) -> Mapping[str, Any]:
@@ -40,6 +42,17 @@ def read_document(path: Path | str) -> Mapping[str, Any]:
 @functools.lru_cache(maxsize=_MOST_REMEMBERED)
 def _tables(text: str) -> dict[str, Any]:
     return tomllib.loads(text)
+
+
+def read_list_or_table(text: str) -> list[Any] | dict[str, Any] | None:
+    """Return the list or table that text is as TOML writes it in one line; None for anything else."""
+    if text[:1] not in ("[", "{") or "\n" in text or _DEEP_KEY.search(text):
+        return None
+    try:
+        found: list[Any] | dict[str, Any] = tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        return None
+    return found
 
 
 def _read_text(path: Path, origin: str) -> str:
@@ -72,27 +85,38 @@ def _read_text(path: Path, origin: str) -> str:
 
 
 def copied(table: object, origin: str, path: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return a copy of nested tables. Raises BadInput for a name that is not text and for endless nesting."""
+    """Return a copy of nested tables and lists.
+
+    Raises BadInput for a name that is no text or empty, for endless nesting and for a number of thousands of digits.
+    """
     if not isinstance(table, Mapping):
         remedy = "Give the tables of a scene: names and their values"
         raise refusal("it is not a mapping", origin, value=table, remedy=remedy)
-    if len(path) > _DEEPEST:
-        remedy = "Write a scene as `loomopt new` does"
-        raise refusal("its tables are nested too deep", origin, ".".join(path[:3]) + "...", remedy=remedy)
     for name in table:
         if not isinstance(name, str):
             remedy = "Write names as text"
             raise refusal(f"a name is not text: {shown(name)}", origin, ".".join(path), remedy=remedy)
-    return {
-        name: copied(value, origin, (*path, name)) if isinstance(value, Mapping) else _copied_value(value)
-        for name, value in table.items()
-    }
+        if path and not name.strip():
+            remedy = "Write a name, or take it out"
+            raise refusal(f"a name is empty: {shown(name)}", origin, ".".join(path), remedy=remedy)
+    return {name: _copied_value(value, origin, (*path, name)) for name, value in table.items()}
 
 
-def _copied_value(value: object) -> object:
-    if not isinstance(value, list):
-        return value
-    return [dict(each) if isinstance(each, Mapping) else each for each in value]
+def _copied_value(value: object, origin: str, path: tuple[str, ...]) -> object:
+    """Return a copy of one value; path: where it stands, of a list counted from 1."""
+    if len(path) > _DEEPEST and isinstance(value, Mapping | list | tuple):
+        key, remedy = ".".join(path[:3]) + "...", "Write a scene as `loomopt new` does"
+        raise refusal("its tables or lists are nested too deep", origin, key, remedy=remedy)
+    if isinstance(value, Mapping):
+        return copied(value, origin, path)
+    if isinstance(value, list | tuple):
+        found = [_copied_value(each, origin, (*path, str(k))) for k, each in enumerate(value, 1)]
+        return found if isinstance(value, list) else tuple(found)
+    if isinstance(value, int) and value.bit_length() > _LONGEST_NUMBER:
+        raise refusal(
+            "it is a whole number of thousands of digits", origin, ".".join(path), remedy="Correct the number"
+        )
+    return value
 
 
 def looked_up(document: Mapping[str, Any], parts: Sequence[str]) -> object:

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from loomopt.base.errors import BadInput, refusal, unknown
 from loomopt.base.records import Frozen
-from loomopt.physics.schema import Target, TargetTable
+from loomopt.physics.schema import Name, Target, TargetTable
 from loomopt.scenes import tables
 from loomopt.scenes.document import removed
 from loomopt.scenes.scene import TABLES, Scene, build, kept
@@ -21,14 +21,14 @@ MOST_MEMBERS = 50
 class FamilyTarget(TargetTable):
     """Values of the target family."""
 
-    of: str | None = Field(None, description="the target of each member; the job's default without it")
+    of: Name | None = Field(None, description="the target of each member; the job's default without it")
     combine: Literal["worst", "sum"] = Field(
         "worst", description="what of the members' figures is sought the least of: the worst, or the sum"
     )
     members: list[dict[str, Any]] = Field(
         [], description='what each member changes of the scene: { M0 = "600 N*m" }, or dotted keys'
     )
-    own: list[str] = Field([], description="design variables of which each member has its own")
+    own: list[Name] = Field([], description="design variables of which each member has its own")
 
 
 TARGET = Target(FAMILY, "one machine for several sets of numbers: the least worst of its members", FamilyTarget)

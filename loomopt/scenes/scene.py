@@ -535,7 +535,7 @@ def _judged(scene: Scene, faults: Faults) -> bool:
         for key, others in scene.schema.instead.items()
         if getattr(own, key) is None and not {*others} <= scene.mechanism.keys()
     ]
-    return wrong == optional and not lacking and not faults.within("operation", "effects")
+    return wrong == optional and not lacking and not faults.within("operation", "effects", "targets")
 
 
 def given(table: Table) -> dict[str, Any]:

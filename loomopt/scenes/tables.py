@@ -47,7 +47,8 @@ class SceneSchema:
     partly_known: whether the job honours loads that are known on some pieces of the cycle only.
     parts: whether the job honours effects by which the output may part from the mechanism.
     lists: parts of a design that are lists of numbers → their kind of quantity; inside, NAME_0, NAME_1 ...
-    tables: names of further tables, which the job reads and checks itself, in its `schema` of the raw scene.
+    tables: further tables, which the job reads and checks itself, in its `schema` of the raw scene, each with what
+    returns its JSON Schema.
     instead: keys of [mechanism] → those that each stands for: a scene gives it, or them.
     own_axes: axes that are read otherwise than under their own name.
     conflict: the two axes whose front stands among the reference results, for the scene that is named after its job.
@@ -70,7 +71,7 @@ class SceneSchema:
     partly_known: bool = False
     parts: bool = False
     own_axes: Mapping[str, Axis] = field(default_factory=dict)
-    tables: tuple[str, ...] = ()
+    tables: Mapping[str, Callable[[], dict[str, Any]]] = field(default_factory=dict)
     instead: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     conflict: Conflict | None = None
 
@@ -162,7 +163,7 @@ class Place(NamedTuple):
 def table(raw: object, origin: str, path: str) -> Mapping[str, Any]:
     """Return raw if it is a table."""
     if not isinstance(raw, Mapping):
-        raise refusal("it is not a table", origin, path, raw, remedy=f"Write a table [{path}]", grade=WHOLE)
+        raise refusal("it is not a table", origin, path, raw, "a table", f"Write a table [{path}]", WHOLE)
     return raw
 
 

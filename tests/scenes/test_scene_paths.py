@@ -70,7 +70,12 @@ def test_what_lies_in_the_folder_or_below_is_read_links_too(place, table):
     assert match_table(rapier(place, table)) == match_table(lo.load("rapier"))
 
 
-@pytest.mark.parametrize("table", ["loop", "no\0thing", "x" * 5000, "", "below"])
+def test_an_empty_file_name_is_refused(place):
+    with pytest.raises(BadInput, match=r"targets\.match\.table: it is empty"):
+        rapier(place, "")
+
+
+@pytest.mark.parametrize("table", ["loop", "no\0thing", "x" * 5000, "below"])
 def test_what_can_be_no_file_is_refused(place, table):
     scene = lo.load("rapier").set("targets.match.table", table)
     for own in (scene, lo.scene(scene.document)):

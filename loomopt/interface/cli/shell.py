@@ -52,12 +52,22 @@ def read_call(
         if not equals:
             remedy = 'Write --set operation.M0="800 N*m"'
             raise refusal("it is not KEY=VALUE", scene.origin, "--set", item, remedy=remedy)
-        value = value.strip()
-        if len(value) > 1 and value[0] == value[-1] and value[0] in "\"'":  # quotes that the shell has kept
-            value = value[1:-1]
-        values[key.strip()] = value
+        values[key.strip()] = read_value(value)
     freed = (name for names in free or () for name in names.replace(",", " ").split())
     return Call(values, tuple(on or ()), tuple(off or ()), tuple(freed))
+
+
+def read_value(text: str) -> object:
+    """Return the value of KEY=VALUE: a list or a table as TOML writes it, anything else as text without its quotes."""
+    from loomopt.scenes.document import read_list_or_table
+
+    text = text.strip()
+    found = read_list_or_table(text)
+    if found is not None:
+        return found
+    if len(text) > 1 and text[0] == text[-1] and text[0] in "\"'":  # quotes that the shell has kept
+        return text[1:-1]
+    return text
 
 
 class DesignRequest(NamedTuple):

@@ -2,9 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any
-
-from pydantic import TypeAdapter
+from typing import Any
 
 from loomopt.base.quantities import NUMBER_PATTERN, QUANTITY_PATTERN, Quantity, foreign, quantity_of, told
 from loomopt.base.units import DISPLAY_UNIT
@@ -12,7 +10,7 @@ from loomopt.physics.effects.kinds import Effect, Load, required
 from loomopt.physics.schema import Table
 from loomopt.scenes.display import KINDS
 from loomopt.scenes.scene import TABLES
-from loomopt.scenes.tables import Problem, SceneSchema
+from loomopt.scenes.tables import FAMILY, Problem, SceneSchema
 from loomopt.scenes.tolerance_classes import CLASSES
 from loomopt.scenes.tolerances import SPREADS
 
@@ -22,8 +20,21 @@ _NAME = r"^[^\s!-,./:-@\[-`{-~_-][^\s!-,./:-@\[-^`{-~]{0,63}$"
 """A scene's name: as its reader has it, in words that every dialect of patterns understands alike."""
 
 
-NAMED_BY_SCENE = ("mechanism", "effects", "available", "bounds", "limits", "targets")
-"""Tables whose keys follow from the scene where its job reads further tables."""
+_VALUE: Json = {"type": ["number", "string"]}
+"""A quantity whose kind follows from the scene, in text with its unit, or a pure number."""
+_TABLES: Json = {"type": "object", "additionalProperties": {"type": "object"}}
+NAMED_BY_SCENE: Mapping[str, Json] = {
+    "mechanism": {"type": "object", "additionalProperties": _VALUE},
+    "effects": _TABLES,
+    "available": _TABLES,
+    "bounds": {"type": "object", "additionalProperties": {"type": ["number", "string", "object"]}},
+    "limits": {"type": "object", "additionalProperties": {"type": "object", "minProperties": 1}},
+    "tolerances": {"type": "object", "additionalProperties": {"type": ["number", "string", "object"]}},
+    "accept": {"type": "object", "additionalProperties": {"type": ["number", "string", "object"]}},
+    "steps": {"type": "object", "additionalProperties": {"type": ["number", "string", "object"]}},
+    "stock": {"type": "object", "additionalProperties": {"type": ["array", "object"], "minItems": 1}},
+}
+"""Tables whose keys follow from the scene where its job reads further tables; those of effects may be inside others."""
 
 
 def scene(schema: SceneSchema) -> Json:
@@ -44,9 +55,9 @@ def scene(schema: SceneSchema) -> Json:
         "targets": lambda of: _closed({name: _model(target.own, target.text) for name, target in of.targets.items()}),
     }
     tables = {name: makers[name](schema) for name in TABLES}
-    # What a job reads of further tables it checks itself; numbers, figures and targets are then named by the scene.
-    open_tables = (*schema.tables, *(NAMED_BY_SCENE if schema.tables else ()))
-    tables |= {name: {"type": "object"} for name in open_tables}
+    if schema.tables:  # numbers, figures and targets are then named by the scene
+        tables |= {**NAMED_BY_SCENE, "targets": _own_targets(schema)}
+    tables |= {name: described() for name, described in schema.tables.items()}
     whole = _closed(tables, [name for name, table in tables.items() if table.get("required")])
     rules = [_given(each) for each in schema.needs]
     rules += [_given(key, effect) for effect in schema.effects.values() for key in effect.needs]
@@ -181,6 +192,13 @@ def _given(key: str, effect: Effect | None = None) -> Json:
     return {"if": {"required": ["effects"], "properties": {"effects": on}}, "then": then}
 
 
+def _own_targets(schema: SceneSchema) -> Json:
+    """Return [targets] where the scene names them: each by the models that targets of the job have."""
+    own = _any([_model(target.own) for name, target in schema.targets.items() if name != FAMILY])
+    family = {FAMILY: _model(schema.targets[FAMILY].own)} if FAMILY in schema.targets else {}
+    return {"type": "object", "properties": family, "additionalProperties": own}
+
+
 def _closed(properties: Mapping[str, Json], required: list[str] | None = None) -> Json:
     """Return a table that holds nothing else."""
     found: Json = {"type": "object", "additionalProperties": False, "properties": dict(properties)}
@@ -193,7 +211,7 @@ def _any(schemas: list[Json]) -> Json:
 
 
 def _quantity(quantity: Quantity) -> Json:
-    return TypeAdapter(Annotated[float, quantity]).json_schema()
+    return quantity.schema()
 
 
 def _model(model: type[Table], summary: str = "") -> Json:

@@ -9,8 +9,8 @@ import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
-from loomopt.base.errors import GAP, WHOLE, BadInput, Faults, misread, nearest, refusal, unknown
-from loomopt.base.quantities import Angle, Coordinate, PositiveLength, Quantity
+from loomopt.base.errors import GAP, WHOLE, BadInput, Faults, misread, nearest, refusal, shown, unknown
+from loomopt.base.quantities import Angle, Coordinate, PositiveLength, Quantity, described
 from loomopt.base.units import QuantityError
 from loomopt.physics.mechanisms import chain
 from loomopt.physics.mechanisms.cam_laws import LAWS
@@ -19,6 +19,7 @@ from loomopt.physics.mechanisms.chain import FRAME_NAME, Chain, Part, Ref
 PositiveAngle = Annotated[float, Quantity("angle", above=0, below=2 * math.pi)]
 DwellAngle = Annotated[float, Quantity("angle", least=0, below=2 * math.pi)]
 
+Json = dict[str, Any]
 Kind = Any
 """What a number may be: an annotated float of `base.quantities`."""
 Used = dict[str, tuple[Kind, str]]
@@ -30,7 +31,10 @@ _NAME = re.compile(r"[^\W\d_]\w*")
 
 
 class Number(NamedTuple):
-    """A number of a part; kind: what it may be; text: what it is in words, {} for the part; needed: always."""
+    """A number of a table; kind: what it may be; needed: always.
+
+    text: what it is in words, {} for the table's name, {key} for another word of the table.
+    """
 
     kind: Kind
     text: str
@@ -38,7 +42,7 @@ class Number(NamedTuple):
 
 
 class Word(NamedTuple):
-    """A word of a part; sort: what it names, a key of _WORDS; needed: always."""
+    """A word of a part; sort: what it names, a key of _SORTS; needed: always."""
 
     sort: str
     needed: bool = False
@@ -47,13 +51,18 @@ class Word(NamedTuple):
 JOINT, LINK, NEW_JOINT, NEW_LINK = "joint", "link", "new joint", "new link"
 RATIO, WHOLE_RATIO, LAW, PAIR = "ratio", "whole ratio", "law", "two joints"
 ONE_LINK, TWO_LINKS, LEFT_RIGHT, AHEAD_BEHIND = "one link", "two links", "left or right", "ahead or behind"
+SLIDE, EVENT, ANGLE = "slider or slot", "event", "angle"
+SENSE, EXTREME, REST = "sense", "extreme", "end of a rest"
+SENSES = {"forward": 1, "backward": -1, "counter-clockwise": 1, "clockwise": -1}
+Keys = Mapping[str, Word | Number]
+"""What a table may hold, in the order shown."""
 
-_TURNING: Mapping[str, Word | Number] = {
+_TURNING: Keys = {
     "at": Word(JOINT, True),
     "pin": Word(NEW_JOINT),
     "length": Number(PositiveLength, "length of {}"),
 }
-KEYS: Mapping[str, Mapping[str, Word | Number]] = {
+KEYS: Mapping[str, Keys] = {
     "pivot": {"x": Number(Coordinate, "x of pivot {}"), "y": Number(Coordinate, "y of pivot {}")},
     "crank": {
         **_TURNING,
@@ -115,11 +124,13 @@ KEYS: Mapping[str, Mapping[str, Word | Number]] = {
 # Names and numbers, for the scene's other tables too.
 
 
+NAME_ALLOWED = f"up to {LONGEST_NAME} letters, digits and _, a letter first"
+
+
 def check_name(name: str, key: str, taken: Mapping[str, str] | None = None) -> None:
     """Raise BadInput for what can be no name; key: where it stands; taken: what else is called so, by name."""
     if not _NAME.fullmatch(name) or len(name) > LONGEST_NAME:
-        allowed = f"up to {LONGEST_NAME} letters, digits and _, a letter first"
-        raise refusal("it is not a name", "", key, name, allowed, "Give it another name")
+        raise refusal("it is not a name", "", key, name, NAME_ALLOWED, "Give it another name")
     if taken and name in taken:
         raise refusal(f"{name} is the name of {taken[name]}", "", key, remedy="Give it another name")
 
@@ -128,8 +139,11 @@ def reference(raw: object, key: str, kind: Kind, names: Collection[str]) -> Ref:
     """Return the number that a part or event names, or a literal with its unit; names: those of [mechanism]."""
     quantity: Quantity = kind.__metadata__[0]
     if not isinstance(raw, str):
-        remedy = 'Name a number of [mechanism], such as "l1", or write one with its unit, such as "25 mm"'
-        raise refusal("it is neither the name of a number nor a quantity", "", key, raw, remedy=remedy)
+        if quantity.kind == "number" and isinstance(raw, int | float) and not isinstance(raw, bool):
+            return Ref("", 1, _validated(quantity, raw, key))
+        allowed = f"the name of a number of [mechanism], or {described(quantity.kind)}"
+        problem = "it is neither the name of a number nor a quantity"
+        raise refusal(problem, "", key, raw, allowed, "Write either, in quotes")
     text = raw.strip()
     name = text.removeprefix("-").strip()
     if name in names:
@@ -138,11 +152,15 @@ def reference(raw: object, key: str, kind: Kind, names: Collection[str]) -> Ref:
             raise refusal("it cannot be negative", "", key, raw, remedy=f'Write "{name}"')
         return Ref(name, 1 if name == text else -1)
     if name[:1] in (*"+.0123456789", ""):
-        try:
-            return Ref("", 1, quantity.validate(text))
-        except QuantityError as error:
-            raise misread(error, "", key, raw) from None
+        return Ref("", 1, _validated(quantity, text, key))
     raise unknown("number of [mechanism]", name, names, "", key, remedy="Add it to [mechanism], or correct the name")
+
+
+def _validated(quantity: Quantity, raw: object, key: str) -> float:
+    try:
+        return quantity.validate(raw)
+    except QuantityError as error:
+        raise misread(error, "", key, raw) from None
 
 
 def use(used: Used, ref: Ref, kind: Kind, text: str, key: str) -> None:
@@ -161,25 +179,38 @@ def use(used: Used, ref: Ref, kind: Kind, text: str, key: str) -> None:
     used[ref.name] = narrower, f"{said}; {text}"
 
 
-# One part.
+# What one key holds: how it is read, and how an editor checks it.
 
 
-def _sorts(*names: str) -> Callable[[object, str], str]:
+class Sort(NamedTuple):
+    """What a word may be: read(raw, key) returns it or raises BadInput; schema() returns its JSON Schema."""
+
+    read: Callable[[object, str], Any]
+    schema: Callable[[], Json]
+
+
+NAME_SCHEMA: Json = {"type": "string", "pattern": rf"^[^\s!-@\[-`{{-~][^\s!-/:-@\[-^`{{-~]{{0,{LONGEST_NAME - 1}}}$"}
+"""A name of the scene's own, as `check_name` reads it."""
+
+
+def text_of(raw: object) -> str:
+    """Return a raw word as a message shows it."""
+    return raw if isinstance(raw, str) else shown(raw)
+
+
+def _choice(*names: str, what: str = "choice") -> Sort:
     def read(raw: object, key: str) -> str:
-        if raw not in names or not isinstance(raw, str):
-            raise unknown("choice", _text(raw), names, "", key)
+        if not isinstance(raw, str) or raw not in names:
+            raise unknown(what, text_of(raw), names, "", key)
         return raw
 
-    return read
-
-
-def _text(raw: object) -> str:
-    return raw if isinstance(raw, str) else str(raw)[:LONGEST_NAME]
+    return Sort(read, lambda: {"enum": list(names)})
 
 
 def _called(raw: object, key: str) -> str:
     if not isinstance(raw, str):
-        raise refusal("it is not a name", "", key, raw, remedy='Write a name in quotes, such as "B"')
+        raise refusal("it is not a name", "", key, raw, NAME_ALLOWED, 'Write a name in quotes, such as "B"')
+    check_name(raw, key)
     return raw
 
 
@@ -191,28 +222,31 @@ def _new(raw: object, key: str) -> str:
 
 def _pair(raw: object, key: str) -> tuple[str, ...]:
     if not isinstance(raw, list | tuple) or len(raw) != 2:
-        raise refusal("a dyad joins two joints", "", key, raw, remedy='Write two, such as ["B", "D"]')
-    first, second = (_called(each, key) for each in raw)
+        remedy, allowed = 'Write two, such as ["B", "D"]', "a list of two joints"
+        raise refusal("a dyad joins two joints", "", key, raw, allowed, remedy)
+    first, second = (_called(each, f"{key}.{place}") for place, each in enumerate(raw, 1))
     if first == second:
         raise refusal(f"both ends of the dyad hang on {first}", "", key, remedy="Name two joints")
     return first, second
 
 
-def _links(count: int, such_as: str) -> Callable[[object, str], tuple[str, ...]]:
+def _links(count: int, such_as: str) -> Sort:
     def read(raw: object, key: str) -> tuple[str, ...]:
         if not isinstance(raw, Mapping) or len(raw) != count:
             wanted = f"it has {count} link{'s' * (count > 1)}, each with its length"
-            raise refusal(wanted, "", key, raw, remedy=f"Such as {such_as}")
+            raise refusal(wanted, "", key, raw, f"a table such as {such_as}", "Write one")
         return tuple(_new(name, f"{key}.{name}") for name in raw)
 
-    return read
+    def schema() -> Json:
+        lengths = number_schema(Number(PositiveLength, "its length"))
+        ends: Json = {"minProperties": count, "maxProperties": count}
+        return {"type": "object", "additionalProperties": lengths, "propertyNames": NAME_SCHEMA, **ends}
+
+    return Sort(read, schema)
 
 
 def _ratio(raw: object, key: str) -> int | float:
-    try:
-        value = Quantity("number").validate(raw)
-    except QuantityError as error:
-        raise misread(error, "", key, raw) from None
+    value = _validated(Quantity("number"), raw, key)
     if value == 0 or abs(value) > MOST_PARTS:
         allowed = f"a number but 0, at most {MOST_PARTS} in size; negative where it turns the other way"
         raise refusal("it is no ratio", "", key, raw, allowed, "Correct it")
@@ -227,20 +261,117 @@ def _whole_ratio(raw: object, key: str) -> int:
     return found
 
 
-_WORDS: Mapping[str, Callable[[object, str], Any]] = {
-    JOINT: _called,
-    LINK: _called,
-    NEW_JOINT: _new,
-    NEW_LINK: _new,
-    RATIO: _ratio,
-    WHOLE_RATIO: _whole_ratio,
-    LAW: _sorts(*LAWS),
-    PAIR: _pair,
+def _angle(raw: object, key: str) -> float:
+    return _validated(Quantity("angle"), raw, key)
+
+
+def number_schema(number: Number) -> Json:
+    """Return the JSON Schema of a number of the linkage: a quantity, or the name of a number of [mechanism]."""
+    quantity = number.kind.__metadata__[0].schema()
+    name: Json = {"type": "string", "pattern": r"^[ \t]*-?[ \t]*[^\s\d+.-]"}
+    said = re.sub(r" (?:of|from|between|and) (?:\{\w*\})+| \{\w*\}", "", number.text)
+    return {"if": name, "else": quantity, "description": f"{said}: a number of [mechanism], or a quantity"}
+
+
+def _name_schema() -> Json:
+    return NAME_SCHEMA
+
+
+def _pair_schema() -> Json:
+    return {"type": "array", "items": NAME_SCHEMA, "minItems": 2, "maxItems": 2, "uniqueItems": True}
+
+
+_NAMED, _OWN_NAME = Sort(_called, _name_schema), Sort(_new, _name_schema)
+_SORTS: Mapping[str, Sort] = {
+    JOINT: _NAMED,
+    LINK: _NAMED,
+    SLIDE: _NAMED,
+    EVENT: _NAMED,
+    NEW_JOINT: _OWN_NAME,
+    NEW_LINK: _OWN_NAME,
+    RATIO: Sort(_ratio, Quantity("number").schema),
+    WHOLE_RATIO: Sort(_whole_ratio, Quantity("number").schema),
+    ANGLE: Sort(_angle, Quantity("angle").schema),
+    LAW: _choice(*LAWS),
+    PAIR: Sort(_pair, _pair_schema),
     ONE_LINK: _links(1, '{ rod = "l2" }'),
     TWO_LINKS: _links(2, '{ rod = "l2", rocker = "l3" }'),
-    LEFT_RIGHT: _sorts("left", "right"),
-    AHEAD_BEHIND: _sorts("ahead", "behind"),
+    LEFT_RIGHT: _choice("left", "right"),
+    AHEAD_BEHIND: _choice("ahead", "behind"),
+    SENSE: _choice(*SENSES, what=SENSE),
+    EXTREME: _choice("max", "min", what=EXTREME),
+    REST: _choice("begins", "ends", what=REST),
 }
+
+
+def keys_schema(known: Keys, kind: str = "") -> Json:
+    """Return the JSON Schema of a table that holds these keys and no others; kind: of a part."""
+    found = {
+        key: number_schema(each) if isinstance(each, Number) else _SORTS[each.sort].schema()
+        for key, each in known.items()
+    }
+    own: Json = {"kind": {"const": kind}, **found} if kind else found
+    needed = [key for key in own if key == "kind" or known[key].needed]
+    return {"type": "object", "properties": own, "required": needed, "additionalProperties": False}
+
+
+def schema() -> Json:
+    """Return the JSON Schema of [parts]."""
+    rules: list[Json] = [
+        {"if": {"properties": {"kind": {"const": kind}}}, "then": keys_schema(known, kind)}
+        for kind, known in KEYS.items()
+    ]
+    part: Json = {
+        "type": "object",
+        "required": ["kind"],
+        "properties": {"kind": {"enum": list(KEYS)}},
+        "allOf": rules,
+    }
+    names: Json = {"propertyNames": NAME_SCHEMA, "minProperties": 1, "maxProperties": MOST_PARTS}
+    return {"type": "object", "additionalProperties": part, **names}
+
+
+class Entries(NamedTuple):
+    """What a table holds: its words by key, and its numbers by key (of a link by its name), both in its order."""
+
+    words: Mapping[str, Any]
+    numbers: Mapping[str, Ref]
+
+
+def entries(
+    table: Mapping[str, Any], known: Keys, path: str, names: Collection[str], used: Used, of: str = "", name: str = ""
+) -> Entries:
+    """Return what a table holds that may hold these keys. Raises BadInput with all mistakes.
+
+    names: the numbers of [mechanism], whose uses `used` notes; of: what the table is, in words, and its name.
+    """
+    faults, words, numbers = Faults(), dict[str, Any](), dict[str, Ref]()
+    strange = [key for key in table if key not in known and key != "kind"]
+    for key in strange:
+        faults.add(unknown(f"key of {of}" if of else "key", key, known, "", f"{path}.{key}", given=table))
+    meant = {nearest(key, known, table) for key in strange}
+    said = {key: text_of(table.get(key, "")) for key, each in known.items() if isinstance(each, Word)}
+    for key, each in known.items():
+        where = f"{path}.{key}"
+        if key not in table:
+            if each.needed and key not in meant:
+                faults.add(refusal(f"{of or 'the table'} needs {key}", "", where, remedy="Add it", grade=GAP))
+            continue
+        with faults:
+            if isinstance(each, Number):
+                numbers[key] = _noted(table[key], where, each.kind, each.text.format(name, **said), names, used)
+            else:
+                words[key] = _SORTS[each.sort].read(table[key], where)
+        if key == "links" and isinstance(table[key], Mapping):
+            for link, length in table[key].items():
+                with faults:
+                    text = f"length of {link}"
+                    numbers[link] = _noted(length, f"{where}.{link}", PositiveLength, text, names, used)
+    faults.tell()
+    return Entries(words, numbers)
+
+
+# One part.
 
 
 def _part(name: str, raw: object, names: Collection[str], used: Used, faults: Faults) -> Part | None:
@@ -251,30 +382,8 @@ def _part(name: str, raw: object, names: Collection[str], used: Used, faults: Fa
         check_name(name, path, {FRAME_NAME: "what does not move"})
     with faults:
         kind, table = _kind(raw, path)
-        known = KEYS[kind]
-        words: list[tuple[str, Any]] = []
-        refs: list[tuple[str, Ref]] = []
-        strange = [key for key in table if key != "kind" and key not in known]
-        for key in strange:
-            faults.add(unknown(f"key of a {kind}", str(key), known, "", f"{path}.{key}", given=table))
-        meant = {nearest(str(key), known, table) for key in strange}
-        for key, each in known.items():
-            where = f"{path}.{key}"
-            if key not in table:
-                if each.needed and key not in meant:
-                    faults.add(refusal(f"a {kind} needs {key}", "", where, remedy="Add it", grade=GAP))
-                continue
-            with faults:
-                if isinstance(each, Number):
-                    refs.append((key, _noted(table[key], where, each.kind, each.text.format(name), names, used)))
-                else:
-                    words.append((key, _WORDS[each.sort](table[key], where)))
-            if key == "links" and isinstance(table[key], Mapping):
-                for link, length in table[key].items():
-                    with faults:
-                        text = f"length of {link}"
-                        refs.append((link, _noted(length, f"{where}.{link}", PositiveLength, text, names, used)))
-        found = Part(kind, name, tuple(words), tuple(refs))
+        words, numbers = entries(table, KEYS[kind], path, names, used, f"a {kind}", name)
+        found = Part(kind, name, tuple(words.items()), tuple(numbers.items()))
         if len(faults.found) == before:
             _sense(found, path)
             return found
@@ -290,14 +399,14 @@ def _noted(raw: object, key: str, kind: Kind, text: str, names: Collection[str],
 def _kind(raw: object, path: str) -> tuple[str, Mapping[str, Any]]:
     """Return a part's kind and its table. Raises BadInput."""
     if not isinstance(raw, Mapping):
-        remedy = 'Write a table, such as { kind = "pivot" }'
-        raise refusal("a part is a table", "", path, raw, remedy=remedy)
+        allowed = 'a table, such as { kind = "pivot" }'
+        raise refusal("a part is a table", "", path, raw, allowed, "Write one")
     if "kind" not in raw:
         allowed = ", ".join(KEYS)
         raise refusal("the part has no kind", "", f"{path}.kind", allowed=allowed, remedy="Add it", grade=GAP)
     kind = raw["kind"]
     if not isinstance(kind, str) or kind not in KEYS:
-        raise unknown("kind of part", _text(kind), KEYS, "", f"{path}.kind")
+        raise unknown("kind of part", text_of(kind), KEYS, "", f"{path}.kind")
     return kind, raw
 
 

@@ -3,13 +3,13 @@
 import functools
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import Field, create_model
 
-from loomopt.base.errors import Faults, misread, refusal, unknown
+from loomopt.base.errors import WHOLE, Faults, refusal, unknown
 from loomopt.base.quantities import Angle, PositiveLength, PositiveNumber, Speed, read
 from loomopt.base.units import QuantityError, ShowValue, usual
 from loomopt.jobs.linkage import parts
@@ -29,7 +29,9 @@ from loomopt.jobs.linkage.model import (
     Window,
     chosen,
     extremes,
+    number,
 )
+from loomopt.jobs.linkage.parts import KEYS, SENSES, Json, Number, Used, Word
 from loomopt.maths import systems
 from loomopt.model import drive
 from loomopt.physics.balance import Given
@@ -37,7 +39,7 @@ from loomopt.physics.cycle import Node
 from loomopt.physics.effects import kinds
 from loomopt.physics.mechanisms import chain
 from loomopt.physics.mechanisms.chain import Chain
-from loomopt.physics.schema import Axis, Figure, Table, Target
+from loomopt.physics.schema import Axis, Figure, Name, Table, Target
 from loomopt.physics.schema import TargetTable as AnyTarget
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
@@ -53,10 +55,10 @@ class Operation(Table):
 class TargetTable(AnyTarget):
     """A target of the scene's own: figures that are sought one after the other, or a path."""
 
-    least: tuple[str, ...] = Field((), description="figures or numbers of which the least is sought, in order")
-    most: tuple[str, ...] = Field((), description="figures or numbers of which the most is sought, after those")
-    point: str | None = Field(None, description="joint that should follow a path")
-    table: str | None = Field(
+    least: tuple[Name, ...] = Field((), description="figures or numbers of which the least is sought, in order")
+    most: tuple[Name, ...] = Field((), description="figures or numbers of which the most is sought, after those")
+    point: Name | None = Field(None, description="joint that should follow a path")
+    table: Name | None = Field(
         None, description="CSV file of the path: x [mm], y [mm], and phi [deg] where its timing is given"
     )
 
@@ -69,17 +71,72 @@ class TargetTable(AnyTarget):
 
 DEFAULT = {"torque": {"least": ["peak_torque"]}}
 """The target of a scene that has none of its own."""
-TABLES = {
-    "parts": "the parts of the linkage by name: pivot, crank, dyad, slider, slot, point, gear or cam",
-    "output": "what of the linkage is its output: angle, slide, x or y of a link, part or joint",
-    "events": "named crank angles: extremes of the output, travels from them, or angles",
-    "windows": "stretches of crank angles after an event",
-}
-OWN = ("mechanism", *TABLES)
 REACHES = ("x_max", "x_min", "y_max", "y_min")
 FEWEST = 2
 """Points of a path."""
-SENSES = {"forward": 1, "backward": -1, "counter-clockwise": 1, "clockwise": -1}
+FORMS = {"angle": "link", "slide": "slider or slot", "x": "joint", "y": "joint"}
+"""Key of [output] → what it measures."""
+SCALE, TRAVEL = "what the output is multiplied by", "travel between {} and {before}{after}"
+OUTPUT_KEYS: parts.Keys = {
+    **{form: Word(what) for form, what in FORMS.items()},
+    "against": Word(parts.LINK),
+    "sense": Word(parts.SENSE),
+    "scale": Number(PositiveNumber, SCALE),
+    "zero": Number(Angle, "direction from which the output counts"),
+}
+EVENT_KEYS: Mapping[str, parts.Keys] = {
+    "extreme": {"extreme": Word(parts.EXTREME, True), "near": Word(parts.ANGLE), "rest": Word(parts.REST)},
+    "travel": {
+        "travel": Number(parts.PositiveAngle, TRAVEL, True),
+        "before": Word(parts.EVENT),
+        "after": Word(parts.EVENT),
+    },
+    "angle": {"angle": Number(Angle, "crank angle of {}", True)},
+}
+"""What an event may hold, by the key that says what it is."""
+WINDOW_KEYS: parts.Keys = {
+    "after": Word(parts.EVENT, True),
+    "begins": Number(Angle, "crank angle from {after} where window {} begins", True),
+    "ends": Number(Angle, "crank angle from {after} where window {} ends", True),
+    "level": Word(parts.EVENT, True),
+}
+
+
+def _output_schema() -> Json:
+    """Return the JSON Schema of [output]."""
+    one: Json = {"oneOf": [{"required": [form]} for form in FORMS]}
+    found = parts.keys_schema(OUTPUT_KEYS)
+    scale = [parts.number_schema(Number(kind, SCALE)) for kind in (PositiveNumber, PositiveLength)]
+    return found | one | {"properties": found["properties"] | {"scale": {"anyOf": scale}}}
+
+
+def _events_schema() -> Json:
+    """Return the JSON Schema of [events]."""
+    lengths = {**EVENT_KEYS["travel"], "travel": Number(PositiveLength, TRAVEL, True)}
+    forms = [parts.keys_schema(keys) for keys in (*EVENT_KEYS.values(), lengths)]
+    return {"type": "object", "propertyNames": parts.NAME_SCHEMA, "additionalProperties": {"anyOf": forms}}
+
+
+def _windows_schema() -> Json:
+    """Return the JSON Schema of [windows]."""
+    own = parts.keys_schema(WINDOW_KEYS)
+    return {"type": "object", "propertyNames": parts.NAME_SCHEMA, "additionalProperties": own}
+
+
+TABLES: Mapping[str, tuple[str, Callable[[], Json]]] = {
+    "parts": (f"the parts of the linkage by name: {', '.join(list(KEYS)[:-1])} or {list(KEYS)[-1]}", parts.schema),
+    "output": ("what of the linkage is its output: angle, slide, x or y of a link, part or joint", _output_schema),
+    "events": ("named crank angles: extremes of the output, travels from them, or angles", _events_schema),
+    "windows": ("stretches of crank angles after an event", _windows_schema),
+}
+"""The scene's own tables: what each holds, and its JSON Schema."""
+OWN = ("mechanism", *TABLES)
+
+
+def _table_schema(name: str) -> Json:
+    """Return the JSON Schema of one of the scene's own tables."""
+    text, schema = TABLES[name]
+    return {"description": text, **schema()}
 
 
 class Reading(NamedTuple):
@@ -90,61 +147,40 @@ class Reading(NamedTuple):
     windows: tuple[Window, ...] = ()
 
 
-Used = dict[str, tuple[Any, str]]
-Names = Mapping[str, Any]
 Known = Mapping[str, Place]
 
 
 def _given(raw: object, path: str) -> Mapping[str, Any]:
     if not isinstance(raw, Mapping):
-        raise refusal("it is not a table", "", path, raw, remedy=f"Write a table [{path}]")
+        raise refusal("it is not a table", "", path, raw, "a table", f"Write a table [{path}]", WHOLE)
     return raw
 
 
-def _known_keys(table: Mapping[str, Any], known: Sequence[str], path: str) -> None:
-    for each in table:
-        if each not in known:
-            raise unknown("key", each, known, "", f"{path}.{each}")
-
-
 def _output(raw: Mapping[str, Any], linked: Chain, names: Mapping[str, Any], used: Used) -> Output:
-    joints, links, slides = parts.kinds_of(linked)
-    forms = {
-        "angle": (links, "link"),
-        "slide": (slides, "slider or slot"),
-        "x": (joints, "joint"),
-        "y": (joints, "joint"),
-    }
-    _known_keys(raw, (*forms, "against", "sense", "scale", "zero"), "output")
-    own = [form for form in forms if form in raw]
+    own = [form for form in FORMS if form in raw]
     if len(own) != 1:
-        problem = f"the output is one of {', '.join(forms)}: {'none' if not own else ' and '.join(own)} is given"
+        problem = f"the output is one of {', '.join(FORMS)}: {'none' if not own else ' and '.join(own)} is given"
         raise refusal(problem, "", "output", remedy='Such as angle = "rocker", slide = "ram" or y = "P"')
     form = own[0]
-    name = _word(raw, form, forms[form][0], forms[form][1], "output")
-    angular = [key for key in ("against", "zero") if key in raw and form != "angle"]
-    if angular:
-        raise refusal(f"{angular[0]} is for an angle alone", "", f"output.{angular[0]}", remedy="Take it out")
-    against = _word(raw, "against", links, "link", "output") if "against" in raw else ""
-    sense = raw.get("sense", "forward")
-    if sense not in SENSES:
-        raise unknown("sense", str(sense), SENSES, "", "output.sense")
-    scale, slides_now = None, form != "angle"
-    if "scale" in raw:
-        kind, slides_now = _scale(raw["scale"], form, names)
-        scale = parts.reference(raw["scale"], "output.scale", kind, names)
-        parts.use(used, scale, kind, "what the output is multiplied by", "output.scale")
-    zero = None
-    if "zero" in raw:
-        zero = parts.reference(raw["zero"], "output.zero", Angle, names)
-        parts.use(used, zero, Angle, "direction from which the output counts", "output.zero")
-    return Output(form, name, against, SENSES[sense], scale, zero, slides_now)
+    kind, slides_now = _scale(raw.get("scale", ""), form, names)
+    found = parts.entries(raw, {**OUTPUT_KEYS, "scale": Number(kind, SCALE)}, "output", names, used)
+    joints, links, slides = parts.kinds_of(linked)
+    known = {"angle": links, "slide": slides}.get(form, joints)
+    name = _one_of(found, form, known, FORMS[form], "output")
+    for key in ("against", "zero"):
+        if key in raw and form != "angle":
+            raise refusal(f"{key} is for an angle alone", "", f"output.{key}", remedy="Take it out")
+    against = _one_of(found, "against", links, "link", "output") if "against" in raw else ""
+    sense = SENSES[found.words.get("sense", "forward")]
+    return Output(form, name, against, sense, found.numbers.get("scale"), found.numbers.get("zero"), slides_now)
 
 
-def _word(raw: Mapping[str, Any], key: str, known: Iterable[str], what: str, path: str) -> str:
-    if raw[key] not in (names := sorted(known)):
-        raise unknown(what, str(raw[key]), names, "", f"{path}.{key}")
-    return str(raw[key])
+def _one_of(found: parts.Entries, key: str, known: Iterable[str], what: str, path: str) -> str:
+    """Return a word that names one of those that are known. Raises BadInput."""
+    name = str(found.words[key])
+    if name not in (names := sorted(known)):
+        raise unknown(what, name, names, "", f"{path}.{key}")
+    return name
 
 
 def _scale(raw: object, form: str, names: Mapping[str, Any]) -> tuple[Any, bool]:
@@ -159,86 +195,51 @@ def _scale(raw: object, form: str, names: Mapping[str, Any]) -> tuple[Any, bool]
     return PositiveLength, True
 
 
-RESTS = ("begins", "ends")
-"""Where an event stands that is an extreme at which the output rests."""
-EVENT_KEYS = {"extreme": ("extreme", "near", "rest"), "travel": ("travel", "before", "after"), "angle": ("angle",)}
-
-
 def _places(raw: Mapping[str, Any], names: Mapping[str, Any], output: Output, used: Used) -> tuple[Place, ...]:
     found: dict[str, Place] = {}
-    for name, table in raw.items():
+    travel = Number(PositiveLength if output.slides else parts.PositiveAngle, TRAVEL, True)
+    forms = {**EVENT_KEYS, "travel": {**EVENT_KEYS["travel"], "travel": travel}}
+    for name, each in raw.items():
         key = f"events.{name}"
-        table = _given(table, key)
+        table = _given(each, key)
         parts.check_name(name, key)
-        own = [kind for kind in EVENT_KEYS if kind in table]
+        own = [form for form in forms if form in table]
         if len(own) != 1:
             problem = "an event is one of an extreme, a travel from another event, and an angle"
             raise refusal(problem, "", key, remedy='Such as { extreme = "max", near = "60 deg" }')
-        _known_keys(table, EVENT_KEYS[own[0]], key)
-        found[name] = {"extreme": _extreme, "travel": _travel, "angle": _angle}[own[0]](
-            name, table, names, output, found, used
-        )
+        held = parts.entries(table, forms[own[0]], key, names, used, name=name)
+        if own[0] == "travel":
+            found[name] = _travel(name, held, found)
+        else:
+            extreme = held.words.get("extreme", "")
+            rest, near = held.words.get("rest", ""), held.words.get("near")
+            found[name] = Place(name, extreme, near, angle=held.numbers.get("angle"), rest=rest)
     return tuple(found.values())
 
 
-def _extreme(name: str, table: Mapping[str, Any], names: Names, output: Output, known: Known, used: Used) -> Place:
-    if table["extreme"] not in ("max", "min"):
-        raise unknown("extreme", str(table["extreme"]), ("max", "min"), "", f"events.{name}.extreme")
-    near, rest = table.get("near"), table.get("rest", "")
-    if rest and rest not in RESTS:
-        raise unknown("end of a rest", str(rest), RESTS, "", f"events.{name}.rest")
-    try:
-        return Place(name, table["extreme"], None if near is None else read(str(near), "angle"), rest=rest)
-    except QuantityError as error:
-        raise misread(error, "", f"events.{name}.near", near) from None
-
-
-def _travel(
-    name: str,
-    table: Mapping[str, Any],
-    names: Names,
-    output: Output,
-    known: Known,
-    used: Used,
-) -> Place:
+def _travel(name: str, held: parts.Entries, known: Known) -> Place:
     key = f"events.{name}"
-    sides = [side for side in ("before", "after") if side in table]
+    sides = [side for side in ("before", "after") if side in held.words]
     if len(sides) != 1:
         raise refusal("a travel lies before or after another event", "", key, remedy='Such as before = "bottom"')
-    beside = _word(table, sides[0], known, "event above it", key)
+    beside = _one_of(held, sides[0], known, "event above it", key)
     if known[beside].extreme != "max":
         problem = f"a travel is short of a maximum of the output, and {beside} is none"
         raise refusal(problem, "", f"{key}.{sides[0]}", remedy="Name an event with extreme = max")
-    kind = PositiveLength if output.slides else parts.PositiveAngle
-    ref = parts.reference(table["travel"], f"{key}.travel", kind, names)
-    parts.use(used, ref, kind, f"travel between {name} and {beside}", f"{key}.travel")
-    return Place(name, travel=ref, beside=beside, side=-1 if sides[0] == "before" else 1)
-
-
-def _angle(name: str, table: Mapping[str, Any], names: Names, output: Output, known: Known, used: Used) -> Place:
-    ref = parts.reference(table["angle"], f"events.{name}.angle", Angle, names)
-    parts.use(used, ref, Angle, f"crank angle of {name}", f"events.{name}.angle")
-    return Place(name, angle=ref)
+    return Place(name, travel=held.numbers["travel"], beside=beside, side=-1 if sides[0] == "before" else 1)
 
 
 def _windows(
     raw: Mapping[str, Any], names: Mapping[str, Any], places: Sequence[Place], used: Used
 ) -> tuple[Window, ...]:
     known, found = [place.name for place in places], []
-    for name, table in raw.items():
+    for name, each in raw.items():
         key = f"windows.{name}"
-        table = _given(table, key)
+        table = _given(each, key)
         parts.check_name(name, key)
-        keys = ("after", "begins", "ends", "level")
-        _known_keys(table, keys, key)
-        for each in keys:
-            if each not in table:
-                raise refusal(f"a window needs {each}", "", f"{key}.{each}", remedy="Give it")
-        after, level = (_word(table, each, known, "event", key) for each in ("after", "level"))
-        begins, ends = (parts.reference(table[each], f"{key}.{each}", Angle, names) for each in ("begins", "ends"))
-        for ref, each in ((begins, "begins"), (ends, "ends")):
-            parts.use(used, ref, Angle, f"crank angle from {after} where window {name} {each}", f"{key}.{each}")
-        found.append(Window(name, after, begins, ends, level))
+        held = parts.entries(table, WINDOW_KEYS, key, names, used, "a window", name)
+        after, level = (_one_of(held, word, known, "event", key) for word in ("after", "level"))
+        found.append(Window(name, after, held.numbers["begins"], held.numbers["ends"], level))
     return tuple(found)
 
 
@@ -259,7 +260,7 @@ def _read(text: str) -> Reading:
 
 def reading(document: Mapping[str, Any]) -> Reading:
     """Return what a scene's own tables say. Raises BadInput."""
-    return _read(json.dumps({name: document.get(name, {}) for name in OWN}, default=str))
+    return _read(json.dumps({name: document.get(name, {}) for name in OWN}, default=repr))
 
 
 # Figures, targets and axes.
@@ -381,7 +382,7 @@ def schema(document: Mapping[str, Any]) -> SceneSchema:
     tables = {name: document.get(name, {}) for name in (*OWN, "limits", "targets")}
     if "parts" not in document:
         tables |= {**{name: {} for name in OWN}, **EMPTY}
-    return _schema(json.dumps(tables, default=str))
+    return _schema(json.dumps(tables, default=repr))
 
 
 @functools.lru_cache(maxsize=64)
@@ -405,7 +406,7 @@ def _schema(text: str) -> SceneSchema:
         fault=functools.partial(fault, known.linkage),
         own_margins={said: "number" for group in known.linkage.groups.values() for said in group.closes},
         own_axes=axes(known, document),
-        tables=tuple(TABLES),
+        tables={name: functools.partial(_table_schema, name) for name in TABLES},
     )
 
 
@@ -580,7 +581,9 @@ def _check_output(scene: Scene, linkage: Linkage) -> None:
     if np.ptp(q) == 0.0:
         problem = f"the output {form} of {name} stands still"
         raise refusal(problem, scene.origin, f"output.{form}", remedy="Name what moves")
-    jumps = np.abs(np.diff(q)) > JUMP * (1.0 if linkage.output.scale is None else 0.0)
+    scale = 1.0 if linkage.output.scale is None else number(systems.numpy(), scene.mechanism, linkage.output.scale)
+    q = q / scale  # rad, of an angle
+    jumps = np.abs(np.diff(q)) > JUMP
     if form != "angle" or not np.any(jumps):
         return
     at = scene.show(float(phi[int(np.argmax(jumps))]), "angle")

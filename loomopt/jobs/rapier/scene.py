@@ -10,7 +10,7 @@ from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
 from loomopt.model import drive
 from loomopt.physics.effects import kinds
 from loomopt.physics.mechanisms import rapier_drive
-from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target, TargetTable
+from loomopt.physics.schema import Axis, Conflict, Figure, Name, Table, Target, TargetTable
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import SceneSchema
@@ -62,7 +62,9 @@ class Mechanism(Table):
 class MatchTarget(TargetTable):
     """Values of the target match."""
 
-    table: str | None = Field(None, description="CSV file with the columns `phi1 [deg]` and `S [mm]`, beside the scene")
+    table: Name | None = Field(
+        None, description="CSV file with the columns `phi1 [deg]` and `S [mm]`, beside the scene"
+    )
 
 
 VARIABLES = {

@@ -26,7 +26,8 @@ KNOWN = {
         "anyOf",
     ),
     *("allOf", "if", "then", "else", "properties", "required", "additionalProperties", "items", "minItems", "maxItems"),
-    *("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum", "minProperties"),
+    *("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum", "minProperties", "maxProperties"),
+    *("oneOf", "propertyNames", "uniqueItems"),
 }
 
 
@@ -43,8 +44,12 @@ def valid(schema, data, root=None):
 
     if "$ref" in schema and not keeps(root["$defs"][schema["$ref"].removeprefix("#/$defs/")]):
         return False
+    if isinstance(schema.get("type"), list):
+        return any(valid({**schema, "type": each}, data, root) for each in schema["type"])
     kind = TYPES.get(schema.get("type", ""), object)
     if not isinstance(data, kind) or (isinstance(data, bool) and schema.get("type") in ("integer", "number")):
+        return False
+    if "oneOf" in schema and sum(map(keeps, schema["oneOf"])) != 1:
         return False
     if "enum" in schema and data not in schema["enum"]:
         return False
@@ -65,13 +70,15 @@ def _inside(schema, data, root):
         return re.search(schema.get("pattern", ""), data) is not None
     if isinstance(data, list):
         size = schema.get("minItems", 0) <= len(data) <= schema.get("maxItems", len(data))
+        size = size and not (schema.get("uniqueItems") and any(each in data[:k] for k, each in enumerate(data)))
         return size and all(valid(schema.get("items", {}), each, root) for each in data)
     if isinstance(data, dict):
         own, others = schema.get("properties", {}), schema.get("additionalProperties", {})
         rest = [value for name, value in data.items() if name not in own]
         return (
             set(schema.get("required", ())) <= set(data)
-            and len(data) >= schema.get("minProperties", 0)
+            and schema.get("minProperties", 0) <= len(data) <= schema.get("maxProperties", len(data))
+            and all(valid(schema.get("propertyNames", {}), name, root) for name in data)
             and all(valid(own[name], value, root) for name, value in data.items() if name in own)
             and (not rest if others is False else all(valid(others, value, root) for value in rest))
         )

@@ -113,7 +113,7 @@ MISTAKES = {
     "joins one": (changed("drive", joins=["B"]), "parts.drive.joins: a dyad joins two joints (given: a list)"),
     "joins three": (changed("drive", joins=["B", "D", "A"]), "parts.drive.joins: a dyad joins two joints"),
     "joins text": (changed("drive", joins="B"), 'parts.drive.joins: a dyad joins two joints (given: "B")'),
-    "joins numbers": (changed("drive", joins=[1, 2]), "parts.drive.joins: it is not a name (given: 1)"),
+    "joins numbers": (changed("drive", joins=[1, 2]), "parts.drive.joins.1: it is not a name (given: 1)"),
     "joins one twice": (changed("drive", joins=["B", "B"]), "parts.drive.joins: both ends of the dyad hang on B"),
     "three links": (
         changed("drive", links={"a": "l1", "b": "l2", "c": "l3"}),

@@ -15,7 +15,7 @@ from loomopt.maths.systems import Maths, Number, within_turn
 from loomopt.physics.effects.beatup import ReedPose
 from loomopt.physics.effects.kinds import Load, LoadTable
 from loomopt.physics.mechanisms.dyad import Vector
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Name, Table, Values
 
 if TYPE_CHECKING:
     from loomopt.physics.effects.kinds import SteadyOscillator
@@ -27,7 +27,7 @@ class Own(Table):
     pulse: PulseAngle | None = Field(
         None, description="crank angle δ through which the cloth resists, about front dead centre"
     )
-    table: str | None = Field(
+    table: Name | None = Field(
         None, description="CSV file of M_R instead: angle [deg] from front dead centre, M [N*m], corner"
     )
     reach: PositiveLength | None = Field(

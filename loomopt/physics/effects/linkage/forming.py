@@ -8,7 +8,7 @@ from loomopt.base.quantities import Force, Torque
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.kinds import Load
 from loomopt.physics.effects.linkage import LinkagePose, between, event_angle
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Name, Table, Values
 
 BEGINS, ENDS = "event where it sets in", "event where it ceases"
 
@@ -17,16 +17,16 @@ class Own(Table):
     """Values of the resistance, of an output that turns."""
 
     torque: Torque = Field(description="torque")
-    begins: str = Field(description=BEGINS)
-    ends: str = Field(description=ENDS)
+    begins: Name = Field(description=BEGINS)
+    ends: Name = Field(description=ENDS)
 
 
 class Sliding(Table):
     """Values of the resistance, of an output that slides."""
 
     force: Force = Field(description="force")
-    begins: str = Field(description=BEGINS)
-    ends: str = Field(description=ENDS)
+    begins: Name = Field(description=BEGINS)
+    ends: Name = Field(description=ENDS)
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:

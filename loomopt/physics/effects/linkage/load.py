@@ -12,7 +12,7 @@ from loomopt.physics.effects.kinds import Applied, Load, LoadTable
 from loomopt.physics.effects.linkage import LinkagePose, between, event_angle
 from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.mechanisms.moving import total
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Name, Table, Values
 
 
 class Own(Table):
@@ -20,10 +20,12 @@ class Own(Table):
 
     x: SignedForce | None = Field(None, description="its component along x")
     y: SignedForce | None = Field(None, description="its component along y")
-    begins: str | None = Field(None, description="event where it sets in; it acts all over the turn without one")
-    ends: str | None = Field(None, description="event where it ceases")
-    at: str | None = Field(None, description="event from which the table's angles count, crank angle 0 without one")
-    table: str | None = Field(None, description="CSV file of its components instead: angle [deg], x [N], y [N], corner")
+    begins: Name | None = Field(None, description="event where it sets in; it acts all over the turn without one")
+    ends: Name | None = Field(None, description="event where it ceases")
+    at: Name | None = Field(None, description="event from which the table's angles count, crank angle 0 without one")
+    table: Name | None = Field(
+        None, description="CSV file of its components instead: angle [deg], x [N], y [N], corner"
+    )
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:

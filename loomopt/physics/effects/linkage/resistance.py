@@ -14,7 +14,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.physics.cycle import TURN
 from loomopt.physics.effects.kinds import Load, LoadTable
 from loomopt.physics.effects.linkage import LinkagePose, event_angle
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Name, Table, Values
 
 PULSE, AT = "crank angle δ through which it acts, about the event", "event about which it acts"
 SAID = "CSV file of it instead: angle [deg] from the event, {}, corner"
@@ -25,8 +25,8 @@ class Own(Table):
 
     torque: Torque | None = Field(None, description="largest torque")
     pulse: PulseAngle | None = Field(None, description=PULSE)
-    at: str = Field(description=AT)
-    table: str | None = Field(None, description=SAID.format("M [N*m]"))
+    at: Name = Field(description=AT)
+    table: Name | None = Field(None, description=SAID.format("M [N*m]"))
 
 
 class Sliding(Table):
@@ -34,8 +34,8 @@ class Sliding(Table):
 
     force: Force | None = Field(None, description="largest force")
     pulse: PulseAngle | None = Field(None, description=PULSE)
-    at: str = Field(description=AT)
-    table: str | None = Field(None, description=SAID.format("F [N]"))
+    at: Name = Field(description=AT)
+    table: Name | None = Field(None, description=SAID.format("F [N]"))
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:

@@ -14,7 +14,7 @@ from loomopt.physics.effects.kinds import Applied, Load
 from loomopt.physics.effects.linkage import LinkagePose
 from loomopt.physics.mechanisms.dyad import Vector, dot
 from loomopt.physics.mechanisms.moving import minus
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Name, Table, Values
 
 AT = "event from which the output's travel counts"
 
@@ -22,8 +22,8 @@ AT = "event from which the output's travel counts"
 class Joining(Table):
     """Values of a spring between two joints."""
 
-    begins: str = Field(description="joint where it begins")
-    ends: str = Field(description="joint where it ends")
+    begins: Name = Field(description="joint where it begins")
+    ends: Name = Field(description="joint where it ends")
     stiffness: Stiffness = Field(description="stiffness")
     free: Length = Field(description="its length without force")
 
@@ -32,7 +32,7 @@ class Own(Table):
     """Values of a spring on an output that turns."""
 
     stiffness: RotaryStiffness = Field(description="stiffness")
-    at: str = Field(description=AT)
+    at: Name = Field(description=AT)
     preload: Torque = Field(0.0, description="its torque at that event")
 
 
@@ -40,7 +40,7 @@ class Sliding(Table):
     """Values of a spring on an output that slides."""
 
     stiffness: Stiffness = Field(description="stiffness")
-    at: str = Field(description=AT)
+    at: Name = Field(description=AT)
     preload: Force = Field(0.0, description="its force at that event")
 
 

@@ -20,7 +20,7 @@ from loomopt.maths.periodic_cubic import interval_at
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.kinds import Load, LoadTable, Place
 from loomopt.physics.effects.shedding import FramePose
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Name, Table, Values
 
 TURN = 6.283185307179586
 
@@ -31,7 +31,7 @@ class Own(Table):
     T1: Force | None = Field(None, description="pull of the warp with the shed open upward")
     T2: Force | None = Field(None, description="pull of the warp with the shed open downward")
     shape: Literal["levels", "linear", "step"] = Field("linear", description="how the one pull becomes the other")
-    table: str | None = Field(
+    table: Name | None = Field(
         None, description="CSV file of T instead: angle [deg] of the cam, T [N] positive downward, corner"
     )
 
