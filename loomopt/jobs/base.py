@@ -36,7 +36,8 @@ from loomopt.model.sampling import Sampler, sampled
 from loomopt.model.session import working
 from loomopt.physics.cycle import Floats, Where
 from loomopt.physics.effects.kinds import Check, Event, label, owned
-from loomopt.physics.tolerances import START_ROOM
+from loomopt.physics.schema import Figure
+from loomopt.physics.tolerances import SHOWN_AS_ZERO, START_ROOM
 from loomopt.picture.job_views import JobViews
 from loomopt.scenes.scene import Scene, kept
 from loomopt.scenes.tables import SceneSchema
@@ -328,19 +329,34 @@ class Task(abc.ABC):
         """Return the natural size of a figure: today's value of it, or of the first row that it is read from."""
         row, axis = self.read_from.get(name, (name,))[0], self.scene.schema.own_axes.get(name)
         told = self.model.has_row(row) or self.model.has_quantity(row)
-        return size_read(self.sampler, axis.rows[0] if axis and axis.rows and not told else row)
+        read = axis.rows[0] if axis and axis.rows and not told else row
+        return size_read(self.sampler, read, self.scene.schema.figures)
 
     def size(self, axis: str) -> float:
         """Return the natural size of what of an axis is sought the least of."""
         return next((v.scale for v in self.variables if axis in (v.name, v.called)), 0.0) or self.figure_size(axis)
 
 
-def size_read(today: Sampler, name: str) -> float:
-    """Return the size of a figure as today's machine has it; 1 for one that only its own speed tells."""
+TINY, NOTHING = 1e-6, 1e-13
+"""SI; a figure of today's machine below the first may be nothing but rounding, and is compared with others of its kind.
+Below the second it is: no force, torque or length of a loom is that small."""
+
+
+def size_read(today: Sampler, name: str, figures: Mapping[str, Figure]) -> float:
+    """Return the size of a figure as today's machine has it; 1 for one that only its own speed tells.
+
+    Where today's is only rounding, as of a machine that is balanced already: the largest peak of its kind.
+    """
     motor = drive.motor(today.model.effects)
     if motor and name in motor.rows:
         return 1.0
-    return abs(today.peak(name) if today.model.has_quantity(name) else today.single(name)) or 1.0
+    found = abs(today.peak(name) if today.model.has_quantity(name) else today.single(name))
+    if found < TINY and name in figures:
+        kind = figures[name].kind
+        alike = [each for each in figures if figures[each].kind == kind and today.model.has_quantity(each)]
+        largest = max(map(today.peak, alike), default=0.0)
+        found = largest if found <= SHOWN_AS_ZERO * largest else found
+    return found if found > NOTHING else 1.0
 
 
 def bound_limits(variable: Variable, relaxable_from: bool = True) -> list[Limit]:

@@ -101,6 +101,12 @@ class Objective(abc.ABC):
         """Return what it is never less than, SI; signed: the quantities of which the value counts, not the size."""
         return -math.inf if any(name in signed for name in self.quantities) else self.least
 
+    def vanishes(self, sampler: Sampler) -> bool:
+        """Say whether a design has it at 0, in the natural size of the figure, and no design has less."""
+        if self.least_of(sampler.model.signed) < 0.0 or self.power < 0:
+            return False
+        return abs(self.merit(sampler)) <= FEASIBLE**self.power * self.scale
+
     def least_within(self, lower: Mapping[str, float]) -> float:
         """Return what lower bounds of the variables alone leave it to be at least, SI."""
         return -math.inf

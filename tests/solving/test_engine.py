@@ -104,8 +104,9 @@ def test_where_nothing_helps_the_solvers_own_word_is_passed_on(monkeypatch):
     failed = Point({"x": 0.5, "y": 0.5}, "Restoration_Failed", False, iterations=7)
     monkeypatch.setattr(exchange, "solve", lambda *_, **__: failed)
     monkeypatch.setattr("loomopt.solving.search.elastic.clash", lambda *_: Clash())
-    answer = toy.solve(toy.program("xy", BOWL))
+    answer = toy.solve(toy.program("xy", BOWL, limits=(("x", -1, 3.0),)))
     assert (answer.status, answer.solver["status"]) == ("failed", "Restoration_Failed")
+    assert answer.design_is == "where a solve stopped"
     assert answer.solver["iterations"] % 7 == 0
     assert answer.solver["iterations"] >= 8 * 7
     assert answer.message.startswith("The solver failed (Restoration_Failed): IPOPT could not get back")

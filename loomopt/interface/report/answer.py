@@ -17,7 +17,7 @@ from loomopt.scenes import family as family_table
 from loomopt.scenes.designs import flat
 from loomopt.scenes.scene import Scene, kept
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import Evaluated, Solution, changed
+from loomopt.solving.answer.solution import Evaluated, Solution, Words, changed
 from loomopt.solving.certificate.certificate import COMPLEMENTARY
 
 
@@ -84,7 +84,7 @@ def status(subject: Subject) -> Status:
         verdict = "NOT ADMISSIBLE" if broken else "All limits held"
         return Status("bad" if broken else "open", f"{verdict}; evaluated, nothing was optimised", kept)
     if found.status != "optimal":
-        told = (found.message, found.explanation, *kept)
+        told = (found.message, found.explanation, Words(subject.scene).worse(found.worse), *kept)
         verdict = VERDICTS.get(found.status, found.status.upper())
         return Status("bad", verdict, tuple(each for each in told if each), EXIT.get(found.status, NOT_CERTIFIED))
     if found.certificate is None or not found.certificate.passed or broken:
@@ -109,6 +109,7 @@ def _certified(found: Solution, scene: Scene) -> Status:
     said = (
         found.message if found.terms or not found.target else registry.of(scene).say(scene, found.target, found.figures)
     )
+    told += [worse] if (worse := Words(scene).worse(found.worse)) else []
     verdict = "; ".join(["Optimal and certified", *opened])
     unproven = found.global_bound is not None and not found.global_bound.proven
     return Status("open" if opened else "ok", verdict, (said, *told), NOT_CERTIFIED if unproven else 0)

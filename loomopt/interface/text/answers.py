@@ -19,9 +19,13 @@ if TYPE_CHECKING:
     from loomopt.solving.answer.solution import Proofs
 
 
+HEADINGS = {"infeasible": "relaxed", "failed": "stopped"}
+"""Status of an answer → what the column of its design is called, where it is no answer's."""
+
+
 def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
     """Return the parts of a solved target: sentence, table, what binds, certificate, time."""
-    heading = "relaxed" if answer.relaxation else "design"
+    heading = HEADINGS.get(answer.status, "design")
     parts: list[str | Grid] = [f"{answer.problem}, {answer.sought}: {answer.outcome}"]
     if answer.relaxation:
         clash = ", ".join(joined(limit) for limit in answer.clash)
@@ -30,8 +34,9 @@ def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
         parts += [] if answer.members else [registry.of(scene).say(scene, answer.target, answer.figures)]
     else:
         parts.append(answer.message)
-    parts += [answer.explanation] if answer.explanation else []
-    parts.append(comparison(answer, scene, answer.before, heading))
+    worse = Words(scene).worse(answer.worse)
+    parts += [text for text in (answer.explanation, worse) if text]
+    parts += [comparison(answer, scene, answer.before, heading)] if answer.design else []
     parts += lists(answer, scene)
     parts += [members(answer, scene)] if answer.members else []
     if answer.certificate:

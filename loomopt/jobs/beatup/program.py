@@ -310,7 +310,7 @@ class BeatupTask(Task):
             return abs(self.sampler.peak(name)) or 1.0
         kind = self.scene.schema.figures[name].kind
         fixed = {"torque": self.torque, "length": self.length, "inertia": self.inertia, "angle": 1.0}
-        return fixed.get(kind) or size_read(self.sampler, name)
+        return fixed.get(kind) or size_read(self.sampler, name, self.scene.schema.figures)
 
     def size(self, axis: str) -> float:
         """Return the size of what of an axis is sought the least of."""

@@ -80,7 +80,7 @@ class LinkageJob(Job):
         for name, sense in task.levels:
             value = figures.get(name)
             if name in kinds and value is not None:
-                made_zero = name.startswith("force.") and abs(value) <= FEASIBLE * task.figure_size(name)
+                made_zero = abs(value) <= FEASIBLE * task.figure_size(name)
                 text = scene.show(0.0 if made_zero else value, kinds[name].kind, 9)
                 told.append(f"the {sense} {name} is {text}")
             elif name not in kinds:

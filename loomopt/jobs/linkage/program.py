@@ -167,7 +167,8 @@ class LinkageTask(Task):
         if name == PATH:
             return Value(name, PATH_SQUARE, size**2, power=2)
         if self.model.has_quantity(name):
-            return Peak(name, name, size)
+            square = self.model.square(name)
+            return Peak(name, square, size**2, power=2) if square else Peak(name, name, size)
         row = name if self._is_figure(name) else self.scene.full(name)
         if sense == "most":
             return Value(name, opposite(row), size)
@@ -192,14 +193,17 @@ class LinkageTask(Task):
     # Natural sizes.
 
     def figure_size(self, name: str) -> float:
-        """Return the natural size of a figure: today's; of a force at an event the largest term that it is made of."""
+        """Return the natural size of a figure: today's; of a force at an event the largest term that it is made of.
+
+        Where today's is only rounding, as of a machine that is balanced already, the largest figure of its kind.
+        """
         if name.startswith(("mu.", "angle.")):
             return 1.0
         if name.startswith("force."):
             return self._force(name.removeprefix("force."))
         if name == PATH:
             return self._extent()
-        return size_read(self.sampler, name)
+        return size_read(self.sampler, name, self.scene.schema.figures)
 
     def _force(self, event: str) -> float:
         """Return the largest term of the output at an event, N or N·m."""

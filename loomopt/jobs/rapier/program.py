@@ -299,7 +299,7 @@ class RapierTask(Task):
         """Return the size of a figure, of a mean its square's."""
         peak, stroke = self.sampler.peak("peak_acceleration") or 1.0, self.reading.stroke or 1.0
         own = {"rms_jerk": peak**2, "match_rms": stroke**2, "mu_min": 1.0, "sley_mu_min": 1.0}
-        return own.get(name) or size_read(self.sampler, name)
+        return own.get(name) or size_read(self.sampler, name, self.scene.schema.figures)
 
 
 def constructed(known: Numbers) -> dict[str, float] | None:

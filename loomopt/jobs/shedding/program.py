@@ -541,4 +541,4 @@ class SheddingTask(Task):
 
     def figure_size(self, name: str) -> float:
         """Return the natural size of a figure."""
-        return self.limit_size(name, 0.0) if name in CYCLE else size_read(self.sampler, name)
+        return self.limit_size(name, 0.0) if name in CYCLE else size_read(self.sampler, name, self.scene.schema.figures)

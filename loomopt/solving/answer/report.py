@@ -30,7 +30,7 @@ from loomopt.solving.answer.solution import (
     remedies,
 )
 from loomopt.solving.certificate.verdict import Certificate, GlobalBound
-from loomopt.solving.nlp.point import sampler_at
+from loomopt.solving.nlp.point import BEATEN, excess, sampler_at
 from loomopt.solving.options import target_name
 from loomopt.solving.search.search import Candidate, Search, compared
 
@@ -220,7 +220,8 @@ def _with(scene: Scene, target: str, search: Search, best: Candidate) -> Solutio
     solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search), "status": point.status, "iterations": point.iterations}
     today = functools.partial(evaluated, scene, job, target, {})
     here = evaluation(scene, job, program, job.design(program, best.x))
-    made = with_optimum(job, scene, target, here, best.certificate, solver, today, _sought(search))
+    found = _substituted(search, best) if search.substitute else _sought(search)
+    made = with_optimum(job, scene, target, here, best.certificate, solver, today, found, search.substitute)
     made = replace(made, point=point, optima=_optima(search))
     if search.spared is None:
         return made
@@ -237,8 +238,26 @@ def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solutio
     if points:
         solver |= {"status": points[0].status, "iterations": sum(point.iterations for point in points)}
     today = functools.partial(evaluated, scene, job, target, {})
-    here = evaluation(scene, job, program, job.design(program, clash.x) if clash.x else job.today(scene))
+    x = clash.x or _stopped(search)
+    here = evaluation(scene, job, program, job.design(program, x)) if x else nowhere(scene)
     return without_optimum(target, here, clash, solver, today, job.explain(scene, clash.limits.values()))
+
+
+NO_SOLVE = frozenset({"Not_Assembled", "Not_Enough_Degrees_Of_Freedom", BEATEN})
+"""Statuses of points from which no solve began, or which one left on its way."""
+
+
+def _stopped(search: Search) -> Mapping[str, float]:
+    """Return where a solve stopped, SI, that exceeds its limits least; nothing where none did."""
+    ends = [each.point.x for each in search.candidates if each.point.status not in NO_SOLVE]
+    ends += [search.nearest.x] if search.nearest else []
+    pairs = [(excess(search.program, x), x) for x in ends]
+    return min((pair for pair in pairs if math.isfinite(pair[0])), key=lambda pair: pair[0], default=(0.0, {}))[1]
+
+
+def nowhere(scene: Scene) -> Evaluated:
+    """Return an evaluation of no design, where no solve led to any."""
+    return Evaluated(scene.name, tuple(scene.effects), {}, {}, {}, (), scene=scene)
 
 
 def _counts(search: Search) -> dict[str, Any]:
@@ -293,6 +312,13 @@ def _sought(search: Search) -> str:
     return f"{ended} reached by {reached}{looked}."
 
 
+def _substituted(search: Search, best: Candidate) -> str:
+    """Return which known design stands in place of what solves ended in, as a sentence."""
+    apart = max(abs(best.x[v.name] - search.today.get(v.name, math.inf)) / v.scale for v in search.program.variables)
+    name = "today's machine" if apart <= FEASIBLE else "where one of the solves ended"
+    return f"No solve ended in a better design that is certified; this is the best admissible design known, {name}."
+
+
 def with_optimum(
     job: Job,
     scene: Scene,
@@ -302,10 +328,12 @@ def with_optimum(
     solver: Mapping[str, Any],
     today: Today,
     searched: str,
+    substitute: bool = False,
 ) -> Solution:
     """Return the answer of a design that was reached: optimal if certified, else uncertified.
 
-    searched: how far the best was sought, as a sentence.
+    searched: how far the best was sought, as a sentence; substitute: whether it is a known design that no solve ended
+    in certified.
     """
     binding = prices(Words(scene), certificate)
     passed = certificate.passed and here.admissible
@@ -315,6 +343,7 @@ def with_optimum(
     else:
         reasons = "; ".join(certificate.reasons) or "a limit does not hold on independent evaluation"
         message = f"A design was reached but not certified: {reasons}. Try more starts, such as 20."
+        message = f"{searched} {message}" if substitute else message
     return Solution(
         **vars(here),
         target=target,

@@ -289,6 +289,23 @@ class Beside(NamedTuple):
         return told | {"design": other["design"], "figures": other["figures"]}
 
 
+class Worse(NamedTuple):
+    """A figure that an answer does not seek and makes worse than today's machine has it, SI."""
+
+    figure: str
+    today: float
+    design: float
+
+    @property
+    def share(self) -> float | None:
+        """Its change as a share of today's; None where today has none of it."""
+        return (self.design - self.today) / abs(self.today) if self.today else None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        return {**self._asdict(), "share": self.share}
+
+
 class Yield(NamedTuple):
     """The share of machines that hold, with its standard error."""
 
@@ -385,6 +402,19 @@ def risen(answer: "Solution", nominal: Evaluated) -> dict[str, float]:
     return {name: now - then for name, (now, then) in pairs.items() if now is not None and then is not None}
 
 
+WORSE = 0.01
+"""Share of a figure by which it may become worse than today's without a word."""
+
+DESIGN_IS = {
+    "optimal": "optimum",
+    "uncertified": "best known",
+    "infeasible": "least relaxation",
+    "failed": "where a solve stopped",
+    "interrupted": "best known",
+}
+"""Status of an answer → what its design is."""
+
+
 @dataclass(frozen=True)
 class Solution(Evaluated):
     """A solved target. `status` is ours, `solver["status"]` is IPOPT's own word."""
@@ -425,6 +455,13 @@ class Solution(Evaluated):
         freeze(self, "design", "figures", "units", "reached", "undefined", "solver", "time")
 
     @property
+    def design_is(self) -> str:
+        """What its design is: an optimum only where it is certified."""
+        if self.status in ("infeasible", "failed") and not self.relaxation and self.point is not None:
+            return "optimum without sizes"
+        return DESIGN_IS[self.status]
+
+    @property
     def outcome(self) -> str:
         """What came of it, for people: its status, and of an optimum the goals that it misses."""
         missed = shortfall(self.reached) if self.status == "optimal" else ""
@@ -434,6 +471,28 @@ class Solution(Evaluated):
     def before(self) -> Evaluated | None:
         """Today's machine, evaluated when it is first read."""
         return self.today() if self.today else None
+
+    @lazy
+    def worse(self) -> tuple[Worse, ...]:
+        """Figures with a good end that it makes worse than today's by more than `WORSE`, beside what it seeks."""
+        if self.scene is None or self.status not in ("optimal", "uncertified") or self.before is None:
+            return ()
+        sought = {level.objective for level in self.certificate.levels} if self.certificate else set[str]()
+        known, old = self.scene.schema.figures, self.before.figures
+        ends = {name: each.sides[0] for name, each in known.items() if len(each.sides) == 1 and name not in sought}
+        pairs = {name: (old.get(name), self.figures.get(name)) for name in ends}
+        found = [Worse(name, a, b) for name, (a, b) in pairs.items() if a is not None and b is not None]
+        units = self.units
+        sizes = {
+            unit: max(abs(each.today) for each in found if units.get(each.figure) == unit)
+            for unit in {units.get(each.figure) for each in found}
+        }
+
+        def falls(each: Worse) -> bool:
+            by = each.design - each.today if ends[each.figure] == "max" else each.today - each.design
+            return by > max(WORSE * abs(each.today), SHOWN_AS_ZERO * sizes[units.get(each.figure)])
+
+        return tuple(each for each in found if falls(each))
 
     @property
     def sought(self) -> str:
@@ -448,6 +507,7 @@ class Solution(Evaluated):
             "target": self.target or None,
             "status": self.status,
             "message": self.message,
+            "design_is": self.design_is,
             "effects": base["effects"],
         }
         if self.scene:
@@ -460,6 +520,8 @@ class Solution(Evaluated):
             "global": self.global_bound.as_dict() if self.global_bound else None,
             "time": dict(self.time),
         }
+        if self.worse:
+            tail["worse"] = [each.as_dict() for each in self.worse]
         if self.proofs:
             tail["proofs"] = self.proofs.as_dict()["proofs"]
         if self.robust:
@@ -590,6 +652,16 @@ class Words:
         if limit.name in self.scene.schema.margins:
             return limit.name
         return f"{limit.name} {SIGNS[limit.sign]} {self.shown(limit.name, limit.value)}"
+
+    def worse(self, found: Sequence[Worse]) -> str:
+        """Return what becomes worse than today's machine has it, in one line; "" for nothing."""
+        told = []
+        for each in found:
+            share = 100 * (each.share or 0.0)
+            change = f" ({share:+.{0 if abs(share) > 10 else 1}f} %)" if each.share is not None else ""
+            then = f"{each.today / factor(self.unit(each.figure)):.4g}"
+            told.append(f"{each.figure} {then} -> {self.shown(each.figure, each.design, 4)}{change}")
+        return f"Worse than today's machine: {', '.join(told)}." if told else ""
 
     def price(self, bindings: Sequence[Binding]) -> Price:
         """Return a limit's price: what all its rows together are worth."""

@@ -276,7 +276,7 @@ def _certificate(
         feasibility,
         cycle.violation,
         all(curvature.minimum for curvature in curvatures),
-        curvatures[-1].unique if curvatures else True,
+        curvatures[-1].unique if curvatures else not any(local.active.zero),
         tuple(_binding(local, levels)),
         by=local.derivatives.by,
         clear=local.derivatives.last or not _doubtful(local, levels),

@@ -46,8 +46,8 @@ class ActiveRow(NamedTuple):
 class ActiveSet(NamedTuple):
     """Rows of a program at one design: those of limits first, then the pieces of each objective.
 
-    limits: how many rows limits have; levels: places of each objective's pieces; zero: whether an objective is a
-    magnitude that vanishes, less than which there is none; excess: of every limit of the program, in its natural size,
+    limits: how many rows limits have; levels: places of each objective's pieces; zero: whether an objective
+    vanishes that is never less; excess: of every limit of the program, in its natural size,
     of an equality the magnitude.
     """
 
@@ -66,7 +66,7 @@ def active_set(program: Program, sampler: Sampler) -> ActiveSet:
     for place, objective in enumerate(program.objectives):
         pieces = _pieces(sampler, place, objective)
         levels.append(tuple(range(len(rows), len(rows) + len(pieces))))
-        zero.append(objective.is_magnitude and len(pieces) == len(objective.sides))
+        zero.append(objective.vanishes(sampler))
         rows += pieces
     return ActiveSet(tuple(rows), count, tuple(levels), tuple(zero), excess)
 
@@ -130,7 +130,8 @@ def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: flo
     worth = abs(multiplier) * objective.scale / limit.scale * limit.factor(sampler.rows)
     if objective.power != 1:
         # The row is a power of the figure: its slope with respect to the figure.
-        worth /= abs(objective.power * objective.figure_of(sampler) ** (objective.power - 1))
+        slope = abs(objective.power * objective.figure_of(sampler) ** (objective.power - 1))
+        worth = worth / slope if slope else 0.0
     side = limit.sign or (1 if multiplier > 0 else -1)
     return Binding(limit, side, objective, worth)
 

@@ -148,3 +148,9 @@ def sampler_at(program: Program, x: Mapping[str, float], samples: int = SAMPLES)
         return sampler if all(map(math.isfinite, sampler.static.values())) else None
     except (ValueError, ZeroDivisionError, FloatingPointError):
         return None
+
+
+def excess(program: Program, x: Mapping[str, float]) -> float:
+    """Return by how much variables x (SI) exceed the worst limit, in its natural size; infinite without a cycle."""
+    sampler = sampler_at(program, x) if all(variable.name in x for variable in program.variables) else None
+    return math.inf if sampler is None else max((limit.violation(sampler) for limit in program.limits), default=0.0)

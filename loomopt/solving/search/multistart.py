@@ -22,6 +22,7 @@ from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import BEATEN, SUCCESS, Known, Point, sampler_at
 from loomopt.solving.nlp.rows import chain_roots
+from loomopt.solving.search import fallback
 from loomopt.solving.search.search import Candidate, OnStart, Search, at, judged, tried
 
 SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8, 3, 2
@@ -306,6 +307,8 @@ def resolved(
     for a search of the best basin; near: where neighbours' solves ended, to start warm from; one of another structure
     is left alone. Raises KeyboardInterrupt on Ctrl-C.
     """
+    if ideal := fallback.ideal(search):
+        return ideal
     same = [point for point in near if point.structure == search.program.structure]
     search = rewarded(search, starts, seed, same, on_start) or searched(search, starts, seed, same, on_start)
     for _ in range(RESOLVED if search.best else 0):
@@ -313,7 +316,7 @@ def resolved(
         if finer is search.program:
             break
         search = searched(replace(search, program=finer, candidates=(), best=None), starts, seed, (), on_start)
-    return search
+    return fallback.no_worse(search)
 
 
 def rewarded(

@@ -83,8 +83,8 @@ class Search:
     settings: those of the next solve; today: today's machine by variable, SI; candidates: of every solve, in order;
     best: the best that was reached, judged; nearest: where all limits' excesses together are least, if a start led to
     no design; sought: from how many starts; designs: how many were looked at; stayed: whether it kept to a neighbour's
-    basin; built, solved, tie_broken, certified: seconds of making NLPs, of solves with that, of tie-breaks, of
-    certificates.
+    basin; substitute: whether the best is an admissible design that was known, in place of what solves ended in;
+    built, solved, tie_broken, certified: seconds of making NLPs, of solves with that, of tie-breaks, of certificates.
     """
 
     job: Job
@@ -97,6 +97,7 @@ class Search:
     sought: int = 0
     designs: int = 0
     stayed: bool = False
+    substitute: bool = False
     built: float = 0.0
     solved: float = 0.0
     tie_broken: float = 0.0

@@ -414,7 +414,7 @@ def whole_answer(solver: Solver, target: str | None, found: Reached, asking: Ask
 def _without(solver: Solver, terms: FrontTerms, found: Reached) -> Solution:
     """Return the answer where no design was reached: the nearest one there is, and what clashes."""
     clash = clashing(solver, terms.program) if found.status == "infeasible" else Clash()
-    here = terms.whole(solver.job.design(solver.base, clash.x)) if clash.x else terms.evaluation({})
+    here = terms.whole(solver.job.design(solver.base, clash.x)) if clash.x else report.nowhere(solver.scene)
     today = functools.partial(terms.evaluation, {})
     told = {"status": found.reason, "accuracy": solver.accuracy}
     explained = solver.job.explain(solver.scene, clash.limits.values())
