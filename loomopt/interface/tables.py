@@ -204,9 +204,8 @@ def curves(
         raise refusal(problem, scene.origin, "accuracy", remedy="Leave the accuracy out, or take the effect off")
     given: dict[str, tuple[float, ...]] = {}
     if measured is not None:
-        given = csv_tables.measured(
-            Path(arguments.path(measured, "measured", "a CSV file", "Name one")), _kinds(rows())
-        )
+        place = Path(arguments.path(measured, "measured", "a table: .csv, .xlsx or .parquet", "Name one"))
+        given = dict(csv_tables.measured(place, _kinds(rows())).columns)
         angles = [angle % TURN for angle in given.pop(PHI)]
         rows = functools.partial(rows, also=angles)
     if accuracy is None:

@@ -52,8 +52,9 @@ class PeriodicCubic(NamedTuple):
 
     @property
     def largest(self) -> float:
-        """The largest |value| among its samples."""
-        return max(abs(self._value(k, self.begins[k])) for k in range(self.samples))
+        """The largest |value| among its samples, on both sides of jumps."""
+        ends = (*self.begins[1:], self.begins[0] + TURN)
+        return max(abs(self._value(k, at)) for k in range(self.samples) for at in (self.begins[k], ends[k]))
 
     @property
     def acting(self) -> tuple[float, ...]:
@@ -129,39 +130,58 @@ def through(angles: tuple[float, ...], values: tuple[float, ...], marked: tuple[
 
     A last sample one turn after the first is the same one. Raises ValueError, with what is wrong, in words.
     """
-    rows = sorted(zip(angles, values, marked, strict=True))
-    if len(rows) > 2 and rows[-1][0] - rows[0][0] > TURN - SAME:
-        if rows[-1][1] != rows[0][1]:
-            raise ValueError("the last row is the first one turn later, with another value")
-        rows = [(rows[0][0], rows[0][1], rows[0][2] or rows[-1][2]), *rows[1:-1]]
+    rows = _sides(sorted(zip(angles, values, marked, strict=True), key=lambda row: row[0]))
+    if len(rows) > 2 and rows[-1].angle - rows[0].angle > TURN - SAME:
+        begin, last = rows[0], rows.pop()
+        if last.ahead != begin.value and not (begin.corner or last.corner):
+            raise ValueError(
+                "the last row is the first one turn later, with another value: mark one as a corner for a jump there"
+            )
+        rows[0] = begin._replace(ahead=last.ahead, corner=begin.corner or last.corner)
     if len(rows) < FEWEST:
         raise ValueError("it has too few angles")
-    corners = [k for k, row in enumerate(rows) if row[2]]
+    corners = [k for k, row in enumerate(rows) if row.corner]
     _refuse_gaps(rows)
-    turned = [*rows, *((angle + TURN, value, mark) for angle, value, mark in rows)]
+    turned = [*rows, *(row._replace(angle=row.angle + TURN) for row in rows)]
     if not corners:
         return _made(rows, _cubics([*rows, turned[len(rows)]], closed=True), 0, _spread(rows, closed=True))
     first = corners[0]
     ends = [*corners, first + len(rows)]
     cubics: list[Cubic] = []
-    for begin, end in itertools.pairwise(ends):
-        cubics += _cubics(turned[begin : end + 1])
+    arcs = [turned[begin : end + 1] for begin, end in itertools.pairwise(ends)]
+    for arc in arcs:
+        cubics += _cubics(arc)
     # The intervals are counted from the first sample on again.
     cubics = cubics[-first:] + cubics[:-first] if first else cubics
-    arcs = [turned[begin : end + 1] for begin, end in itertools.pairwise(ends)]
     squares = [square for arc in arcs for square in _left_out(arc, range(1, len(arc) - 1))]
     return _made(rows, cubics, len(corners), _rms(squares))
 
 
-_Row = tuple[float, float, bool]
-"""Angle, rad; value; whether it is a corner."""
+class _Row(NamedTuple):
+    """A sample: angle, rad; value behind it and ahead of it, which differ at a jump only; whether it is a corner."""
+
+    angle: float
+    value: float
+    ahead: float
+    corner: bool
+
+
+def _sides(rows: Sequence[tuple[float, float, bool]]) -> list[_Row]:
+    """Return samples in the order of their angles; two of one angle are both sides of a corner."""
+    found: list[_Row] = []
+    for angle, value, mark in rows:
+        if found and found[-1].angle == angle:
+            found[-1] = found[-1]._replace(value=value, corner=True)
+        else:
+            found.append(_Row(angle, value, value, mark))
+    return found
 
 
 def _refuse_gaps(rows: Sequence[_Row]) -> None:
     """Raise ValueError for a wide interval without samples that is no line between corners."""
-    for row, after in zip(rows, [*rows[1:], (rows[0][0] + TURN, *rows[0][1:])], strict=True):
-        if after[0] - row[0] > WIDEST and not (row[2] and after[2]):
-            begin, end = math.degrees(row[0]), math.degrees(after[0])
+    for row, after in zip(rows, [*rows[1:], rows[0]._replace(angle=rows[0].angle + TURN)], strict=True):
+        if after.angle - row.angle > WIDEST and not (row.corner and after.corner):
+            begin, end = math.degrees(row.angle), math.degrees(after.angle)
             raise ValueError(
                 f"nothing says what the curve does between {begin:.6g} and {end:.6g} deg: mark both as corners for a "
                 "straight line between them, or give samples there"
@@ -172,7 +192,11 @@ def _cubics(rows: Sequence[_Row], closed: bool = False) -> list[Cubic]:
     """Return c0 … c3 between samples, about each interval's middle; closed: the last is the first one turn later."""
     import numpy as np
 
-    angles, values = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+    # Inside, both sides are one; of the ends the curve has the one that is its own.
+    angles, values = (
+        np.array([row.angle for row in rows]),
+        np.array([*(row.value for row in rows[:-1]), rows[-1].ahead]),
+    )
     widths, chords = np.diff(angles), np.diff(values) / np.diff(angles)
     slopes = _slopes(widths, chords, closed)
     before, after = slopes[:-1], slopes[1:]
@@ -216,17 +240,17 @@ def _left_out(rows: Sequence[_Row], places: Sequence[int]) -> list[float]:
     squares = []
     for k in places:
         near = [row for j, row in enumerate(rows[: k + BESIDE + 1]) if j >= k - BESIDE and j != k]
-        place = sum(row[0] < rows[k][0] for row in near) - 1
-        t = rows[k][0] - (near[place][0] + near[place + 1][0]) / 2
+        place = sum(row.angle < rows[k].angle for row in near) - 1
+        t = rows[k].angle - (near[place].angle + near[place + 1].angle) / 2
         c0, c1, c2, c3 = _cubics(near)[place]
-        squares.append((c0 + t * (c1 + t * (c2 + t * c3)) - rows[k][1]) ** 2)
+        squares.append((c0 + t * (c1 + t * (c2 + t * c3)) - rows[k].value) ** 2)
     return squares
 
 
 def _spread(rows: Sequence[_Row], closed: bool) -> float | None:
     """Return the rms of `_left_out` of all samples of a closed curve."""
-    before = [(angle - TURN, value, mark) for angle, value, mark in rows[-BESIDE:]]
-    after = [(angle + TURN, value, mark) for angle, value, mark in rows[:BESIDE]]
+    before = [row._replace(angle=row.angle - TURN) for row in rows[-BESIDE:]]
+    after = [row._replace(angle=row.angle + TURN) for row in rows[:BESIDE]]
     whole = [*before, *rows, *after]
     return _rms(_left_out(whole, range(len(before), len(before) + len(rows))))
 
@@ -236,6 +260,6 @@ def _rms(squares: Sequence[float]) -> float | None:
 
 
 def _made(rows: Sequence[_Row], cubics: Sequence[Cubic], corners: int, spread: float | None) -> PeriodicCubic:
-    begins = tuple(row[0] for row in rows)
+    begins = tuple(row.angle for row in rows)
     middles = tuple((a + b) / 2 for a, b in zip(begins, (*begins[1:], begins[0] + TURN), strict=True))
     return PeriodicCubic(begins, middles, tuple(cubics), corners, spread)

@@ -57,14 +57,24 @@ def _curve(scene: Scene, load: Load[Any], own: Table) -> PeriodicCubic | Periodi
     if table is None or given is None:
         return None
     key = ".".join(("effects", *load.path, table.key))
-    columns, origin = csv_tables.read(scene, given, key, table.columns, (CORNER,), periodic_cubic.FEWEST)
-    angles, *values, marked = columns
+    read = csv_tables.read(
+        scene,
+        given,
+        key,
+        table.columns,
+        marks=(CORNER,),
+        fewest=periodic_cubic.FEWEST,
+        twice=True,
+        digits=getattr(own, "digits", None),
+    )
+    angles, *values = read.columns.values()
+    marked = read.marks[CORNER]
     try:
         found = tuple(periodic_cubic.through(angles, each, tuple(map(bool, marked))) for each in values)
         return PeriodicCubics(found) if table.beside else found[0]
     except ValueError as error:
         remedy = f"Correct the table: angles are {table.angle}; a column {CORNER} marks corners with 1"
-        raise refusal(f"the table is no curve over one turn: {error}", origin, remedy=remedy) from None
+        raise refusal(f"the table is no curve over one turn: {error}", read.file, remedy=remedy) from None
 
 
 def bounds(scene: Scene, known: Mapping[str, float]) -> dict[str, tuple[float, float]]:

@@ -1,124 +1,130 @@
-"""Tables of numbers in CSV files that a scene names: strict, the units in the header; no message repeats a cell."""
+"""Tables of numbers in files that a scene names: columns by name with their units, as offices write them.
 
-import csv
-import io
+`table_cells` makes cells of a file. Here its heading is found, the decimal sign is decided from all cells that are
+read, and every number is read with the precision to which it is printed. What can be read in two ways is refused, or
+read by a rule that a remark states; a refusal names line, column and text of the file.
+"""
+
+import itertools
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from loomopt.base.errors import BadInput, near_file, refusal
+from loomopt.base.errors import BadInput, near_file, refusal, shown
 from loomopt.base.quantities import is_beyond, plain_number
-from loomopt.base.units import DISPLAY_UNIT, QuantityError, factor, fits
+from loomopt.base.units import DISPLAY_UNIT, QuantityError, ascii_unit, factor, fits, meant_unit
+from loomopt.scenes import table_cells
 from loomopt.scenes.scene import Scene, reads
+from loomopt.scenes.table_cells import LARGEST_FILE, Cells, Row
 
-LARGEST_FILE, FEWEST_ROWS, MOST_ROWS = 1_000_000, 8, 2000
+FEWEST_ROWS, MOST_ROWS = 8, 2000
 UNITS = {
     "angle": ("deg", "rad"),
     "length": ("mm", "cm", "m", "in"),
     "torque": ("N*m", "kN*m", "N*mm", "lbf*in", "lbf*ft"),
     "force": ("N", "kN", "lbf"),
 }
-"""Units a column may have, by kind of quantity."""
+"""Units of a column that messages name, by kind of quantity; any unit of the kind is read."""
+ALIASES = {"angle": ("phi", "theta"), "phi1": ("phi", "angle"), "phi": ("phi1", "angle")}
+"""Column → other names under which it is found too: curves that are written have their angles under phi."""
 MARKS = {"": 0.0, "0": 0.0, "1": 1.0, "x": 1.0}
 """What a column of marks may hold."""
 TURN = 2 * math.pi + 1e-4
 """Largest angle, rad: one turn, with room for 6.2832."""
-_HEADING = re.compile(r"(.*\S) +\[(.+)\]")
+LONGEST_TOLD = 20
+"""Characters of a cell that a message repeats: a file that is no table may hold what is not to be shown."""
+FIRST_ROWS = 20
+"""Rows among which the heading is looked for: a title may stand above it."""
+POINT, COMMA = ".", ","
+_HEADINGS = tuple(
+    map(re.compile, (r"(.+?)\s*\[(.*)\]", r"(.+?)\s*\((.*)\)", r"(\S+)\s*/\s*(\S+)", r"(\S+)\s+in\s+(\S+)"))
+)
+_BRACKETS = re.compile(r"[\[(](.*)[\])]")
+_BLANK_GROUPS = re.compile(r"(?<=\d)[ \u00a0\u2009\u202f'’](?=\d{3}(?!\d))")
+_GROUPS = {sign: re.compile(rf"[+-]?\d{{1,3}}(?:\{sign}\d{{3}})+") for sign in (POINT, COMMA)}
+_NUMBER = re.compile(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?", re.ASCII)
+_MAYBE_GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+_DIGITS = re.compile(r"[+-]?(\d*)\.?(\d*)(?:[eE]([+-]?\d+))?")
+SIGNIFICANT = 0.5
+"""Share of a column's numbers that lack decimals of the others, above which digits are counted from the first one."""
 
 
 class _Column(NamedTuple):
-    """A column that is read: its name, kind of quantity and place, and its unit in SI."""
+    """A column that is read: its name, as the file calls it, kind of quantity, place, and unit in SI."""
 
     name: str
+    called: str
     kind: str
     place: int
     unit: float
 
 
+class Table(NamedTuple):
+    """What is read of a file.
+
+    file: as it was named; columns: by name, SI; halves: half a unit of the last digit of each number, SI, by name;
+    marks: columns of marks by name; lines: of the file, for each row; remarks: how what can be read in two ways was
+    read, a sentence each without its full stop.
+    """
+
+    file: str
+    columns: Mapping[str, tuple[float, ...]]
+    halves: Mapping[str, tuple[float, ...]]
+    marks: Mapping[str, tuple[float, ...]]
+    lines: tuple[int, ...]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def precision(self) -> dict[str, float]:
+        """How far a number of each column may be off by rounding, SI."""
+        return {name: max(halves) for name, halves in self.halves.items()}
+
+
 def read(
-    scene: Scene, given: str, key: str, kinds: Mapping[str, str], marks: Sequence[str] = (), fewest: int = FEWEST_ROWS
-) -> tuple[list[tuple[float, ...]], str]:
-    """Return the columns of a table, SI, and the file as named. Raises BadInput.
+    scene: Scene,
+    given: str,
+    key: str,
+    kinds: Mapping[str, str],
+    *,
+    marks: Sequence[str] = (),
+    fewest: int = FEWEST_ROWS,
+    twice: bool = False,
+    digits: int | None = None,
+) -> Table:
+    """Return the columns of a table. Raises BadInput.
 
     given: the file as the scene names it, under `key`; kinds: column name → kind of quantity; marks: columns without a
-    unit that may be there, 1 (or x) in the rows that are meant, 0 in all without one; fewest: rows there must be.
+    unit that may be there, 1 (or x) in the rows that are meant, 0 in all without one; fewest: rows there must be;
+    twice: whether an angle may stand in two rows, for both sides of a corner; digits: decimals of what is no angle, in
+    place of those printed. Angles that fall are turned round.
     """
-    rows = _named(scene, given, key, header(kinds))
-    return [*_columns(rows, kinds, given, fewest), *(_marked(rows, name, given) for name in marks)], given
+    return _table(list(table_cells.read(_named(scene, given, key), given)), given, kinds, marks, fewest, twice, digits)
 
 
-def columns(scene: Scene, given: str, key: str, allowed: str) -> tuple[str, ...]:
-    """Return the names of a table's columns that have a unit; allowed: the header it should have. Raises BadInput.
+def columns(scene: Scene, given: str, key: str, kinds: Mapping[str, str]) -> tuple[str, ...]:
+    """Return which columns of a table are there; kinds: those it may have. Raises BadInput.
 
     given: the file as the scene names it, under `key`.
     """
-    rows = _named(scene, given, key, allowed)
-    found = [_HEADING.fullmatch(cell.strip()) for cell in rows[0]] if rows else []
-    return tuple(heading[1] for heading in found if heading)
+    tables = list(table_cells.read(_named(scene, given, key), given))
+    return max((_there(cells, kinds) for cells in tables), key=len)
 
 
-def _named(scene: Scene, given: str, key: str, allowed: str) -> list[list[str]]:
-    """Return the cells of a file that a scene names, or that came with it, row by row. Raises BadInput."""
-    held = scene.paths.text(key)
-    reads(scene, given)
-
-    def raw() -> bytes:
-        if held is not None:
-            return held.encode()
-        return _bytes(scene.paths.located(given, key, scene.origin), given, scene.origin, key)
-
-    return _rows(raw, given, allowed)
-
-
-def measured(path: Path, kinds: Mapping[str, str]) -> dict[str, tuple[float, ...]]:
-    """Return those columns of a caller's table that have a name of `kinds`, SI, its first one always. Raises BadInput.
+def measured(path: Path, kinds: Mapping[str, str]) -> Table:
+    """Return those columns of a caller's table that have a name of `kinds`, its first one always. Raises BadInput.
 
     kinds: column name → kind of quantity, angles first.
     """
     given, (angle, *names) = str(path), kinds
-    allowed = f"{angle} [{DISPLAY_UNIT[kinds[angle]]}] and a column of the curves"
-    rows = _rows(lambda: _bytes(path, given, "", "beside"), given, allowed)
-    headings = [_HEADING.fullmatch(cell.strip()) for cell in rows[0]] if rows else []
-    there = [name for name in names if any(each and each[1] == name for each in headings)]
-    if rows and not there:
+    tables = list(table_cells.read(_bytes(path, given, "", "beside"), given))
+    there = max((_there(cells, {name: kinds[name] for name in names}) for cells in tables), key=len)
+    if any(cells.rows for cells in tables) and not there:
         allowed = ", ".join(f"{name} [{DISPLAY_UNIT[kinds[name]]}]" for name in names)
         remedy = "Name its columns as the curves are named"
         raise refusal("the table has no column of the curves", given, allowed=allowed, remedy=remedy)
-    asked = {name: kinds[name] for name in (angle, *there)}
-    return dict(zip(asked, _columns(rows, asked, given, 1), strict=True))
-
-
-def _rows(read: Callable[[], bytes], given: str, allowed: str) -> list[list[str]]:
-    """Return the cells of a CSV file, row by row. Raises BadInput."""
-    try:
-        raw = read()
-        if len(raw) > LARGEST_FILE:
-            raise refusal("the table is too large", given, allowed="up to 1 MB", remedy="Thin it out")
-        lines = io.StringIO(raw.decode("utf-8-sig"), newline=None)
-        return list(csv.reader((line for line in lines if line.strip() and not line.startswith("#")), strict=True))
-    except BadInput:
-        raise
-    except OSError as error:
-        problem = f"the table cannot be read: {error.strerror or 'it is no file'}"
-        raise refusal(problem, given, remedy="Check the path and its permissions") from None
-    except UnicodeDecodeError as error:
-        raise refusal(f"it is not UTF-8 text (byte {error.start})", given, remedy="Save the file as UTF-8") from None
-    except (csv.Error, ValueError):
-        remedy = "Write short cells, and close every quotation mark on its own line"
-        raise refusal("the table is not CSV", given, allowed=allowed, remedy=remedy) from None
-
-
-def _bytes(path: Path, given: str, origin: str, key: str) -> bytes:
-    """Return what stands in a file, a byte more than may at most. Raises BadInput where there is none, and OSError."""
-    if not path.is_file():
-        problem = "the table cannot be read: there is no such file"
-        near = near_file(path)
-        remedy = f'Perhaps "{Path(given).with_name(Path(near).name)}" is meant' if near else "Correct it"
-        raise refusal(problem, origin, key, given, remedy=remedy)
-    with path.open("rb") as file:
-        return file.read(LARGEST_FILE + 1)
+    return _table(tables, given, {name: kinds[name] for name in (angle, *there)}, fewest=1)
 
 
 def header(kinds: Mapping[str, str]) -> str:
@@ -126,95 +132,339 @@ def header(kinds: Mapping[str, str]) -> str:
     return ", ".join(f"{name} [{DISPLAY_UNIT[kind]}]" for name, kind in kinds.items())
 
 
-def _columns(
-    rows: Sequence[Sequence[str]], kinds: Mapping[str, str], origin: str, fewest: int
-) -> list[tuple[float, ...]]:
-    if not rows:
-        raise refusal("the table is empty", origin, allowed=header(kinds), remedy="Give a header and rows")
-    columns = list(_found(rows[0], kinds, origin))
-    if not fewest <= len(rows) - 1 <= MOST_ROWS:
-        found = f"the table has {len(rows) - 1} rows"
-        raise refusal(found, origin, allowed=f"{fewest} to {MOST_ROWS}", remedy="Give more, or fewer")
-    for line, row in enumerate(rows[1:], 2):
-        _check_length(row, rows[0], line, origin)
-    values = [tuple(_number(row, column, line, origin) for line, row in enumerate(rows[1:], 2)) for column in columns]
-    for column, numbers in zip(columns, values, strict=True):
-        if column.kind == "angle" and column.name == next(iter(kinds)):
-            _check_angles(column.name, numbers, origin)
-    return values
+def _named(scene: Scene, given: str, key: str) -> bytes:
+    """Return what stands in a file that a scene names, or that came with it. Raises BadInput."""
+    held = scene.paths.text(key)
+    reads(scene, given)
+    if held is not None:
+        return held.encode()
+    return _bytes(scene.paths.located(given, key, scene.origin), given, scene.origin, key)
 
 
-def _found(head: Sequence[str], kinds: Mapping[str, str], origin: str) -> Iterator[_Column]:
-    """Yield the columns that a header names. Raises BadInput for one that is not there once, with its unit."""
-    headings = [_HEADING.fullmatch(cell.strip()) for cell in head]
-    for name, kind in kinds.items():
-        named = [(place, each[2]) for place, each in enumerate(headings) if each and each[1] == name]
-        if len(named) > 1:
-            raise refusal(f"the table has column {name} {len(named)} times", origin, remedy="Take out all but one")
-        if not named or not _is_unit(named[0][1], kind):
-            units = " or ".join(UNITS.get(kind, (DISPLAY_UNIT[kind],)))
-            problem = f"the table has no column {name} with its unit ({units})"
-            raise refusal(problem, origin, allowed=header(kinds), remedy="Name the columns so, parted by commas")
-        yield _Column(name, kind, named[0][0], factor(named[0][1]))
-
-
-def _is_unit(text: str, kind: str) -> bool:
-    """Say whether a column of a kind may have a unit."""
-    if kind in UNITS:
-        return text in UNITS[kind]
+def _bytes(path: Path, given: str, origin: str, key: str) -> bytes:
+    """Return what stands in a file, a byte more than may at most. Raises BadInput."""
     try:
-        return text == DISPLAY_UNIT[kind] or fits(text, kind)
+        if not path.is_file():
+            problem = "the table cannot be read: there is no such file"
+            near = near_file(path)
+            remedy = f'Perhaps "{Path(given).with_name(Path(near).name)}" is meant' if near else "Correct it"
+            raise refusal(problem, origin, key, given, remedy=remedy)
+        with path.open("rb") as file:
+            return file.read(LARGEST_FILE + 1)
+    except BadInput:
+        raise
+    except (OSError, ValueError) as error:
+        problem = f"the table cannot be read: {getattr(error, 'strerror', None) or 'it is no file'}"
+        raise refusal(problem, given, remedy="Check the path and its permissions") from None
+
+
+def _table(
+    tables: Sequence[Cells],
+    origin: str,
+    kinds: Mapping[str, str],
+    marks: Sequence[str] = (),
+    fewest: int = FEWEST_ROWS,
+    twice: bool = False,
+    digits: int | None = None,
+) -> Table:
+    """Return the table that a file's cells make, with the separator that gives most of the columns."""
+    cells = max(tables, key=lambda each: len(_there(each, kinds)))
+    if not cells.rows:
+        raise refusal("the table is empty", origin, allowed=header(kinds), remedy="Give a header and rows")
+    head, rows = _headed(cells, kinds)
+    found, units = _found(head, rows, kinds, origin)
+    rows = rows[units:]
+    for row in rows:
+        _check_length(row, head, cells.separator, origin)
+    if found[0].kind == "angle" and not twice:
+        rows = _once(rows, found)
+    if not fewest <= len(rows) <= MOST_ROWS:
+        problem = f"the table has {len(rows)} rows below its header"
+        raise refusal(problem, origin, allowed=f"{fewest} to {MOST_ROWS}", remedy="Give more, or fewer")
+    decimal, remarks = _decimal_sign(rows, found, cells.separator, origin)
+    texts = {column: [_plain(row.cell(column.place), decimal) for row in rows] for column in found}
+    values = {
+        column.name: tuple(_number(text, row, column, origin) for text, row in zip(texts[column], rows, strict=True))
+        for column in found
+    }
+    halves = {
+        column.name: tuple(
+            half * column.unit for half in _halves(texts[column], None if column.kind == "angle" else digits)
+        )
+        for column in found
+    }
+    marked = {name: _marked(head, rows, name, origin) for name in marks}
+    lines = tuple(row.line for row in rows)
+    first = found[0]
+    if first.kind == "angle":
+        _check_angles(first, values[first.name], rows, twice, origin)
+        if values[first.name][0] > values[first.name][-1] and _falls(values[first.name]):
+            values, halves, marked = ({n: each[::-1] for n, each in of.items()} for of in (values, halves, marked))
+            lines = lines[::-1]
+    return Table(origin, values, halves, marked, lines, remarks)
+
+
+# The heading.
+
+
+def _heading(cell: str) -> tuple[str, str | None]:
+    """Return the name in a heading, and the unit where one stands behind it."""
+    plain = " ".join(cell.split())
+    for pattern in _HEADINGS:
+        found = pattern.fullmatch(plain)
+        if found:
+            return found[1], found[2].strip()
+    return plain, None
+
+
+def _places(row: Row, name: str) -> list[int]:
+    """Return the places of a column in a heading: under its name, else whatever its case, else under another name."""
+    headings = [_heading(cell)[0] for cell in row.cells]
+    for called in (name, *ALIASES.get(name, ())):
+        found = [place for place, each in enumerate(headings) if each == called]
+        found = found or [place for place, each in enumerate(headings) if each.casefold() == called.casefold()]
+        if found:
+            return found
+    return []
+
+
+def _there(cells: Cells, kinds: Mapping[str, str]) -> tuple[str, ...]:
+    """Return which columns are there with one separator."""
+    head, _ = _headed(cells, kinds)
+    return tuple(name for name in kinds if _places(head, name))
+
+
+def _headed(cells: Cells, kinds: Mapping[str, str]) -> tuple[Row, Sequence[Row]]:
+    """Return the heading and the rows below it: the first row that names most of the columns, or a remark above."""
+    candidates = [(row, cells.rows[k + 1 :]) for k, row in enumerate(cells.rows[:FIRST_ROWS])]
+    candidates += [(row, cells.rows) for row in cells.remarks]
+    if not candidates:
+        return Row(1, ()), ()
+    return max(candidates, key=lambda each: sum(bool(_places(each[0], name)) for name in kinds))
+
+
+def _found(head: Row, rows: Sequence[Row], kinds: Mapping[str, str], origin: str) -> tuple[list[_Column], int]:
+    """Return the columns that a heading names, and how many rows of units stand below it, 0 or 1. Raises BadInput."""
+    places = {name: _places(head, name) for name in kinds}
+    below = 0
+    found = []
+    for name, kind in kinds.items():
+        there = places[name]
+        if len(there) > 1:
+            raise refusal(f"the table has column {name} {len(there)} times", origin, remedy="Take out all but one")
+        usual = " or ".join(UNITS.get(kind, (DISPLAY_UNIT[kind],)))
+        if not there:
+            problem = f"the table has no column {name} (line {head.line}: holds {_quoted(head)})"
+            remedy = f"Name the columns so, each with its unit ({usual}); one row of headings, then rows of numbers"
+            raise refusal(problem, origin, allowed=header(kinds), remedy=remedy)
+        called, unit = _heading(head.cell(there[0]))
+        where = f"line {head.line}, column {called}"
+        if unit is None and rows:
+            cell = rows[0].cell(there[0])
+            inside = _BRACKETS.fullmatch(cell)
+            text = inside[1].strip() if inside else cell
+            if text and plain_number(_plain(text, POINT)) is None and plain_number(_plain(text, COMMA)) is None:
+                unit, below, where = text, 1, f"line {rows[0].line}, column {called}"
+        if unit is None:
+            problem = f"{where}: the unit is missing, so column {name} has none"
+            remedy = f'Write "{name} [{DISPLAY_UNIT[kind]}]", or the units in a row of their own below'
+            raise refusal(problem, origin, allowed=usual, remedy=remedy)
+        found.append(_Column(name, called, kind, there[0], _size(unit, kind, where, usual, origin)))
+    return found, below
+
+
+def _cell(text: str) -> str:
+    """Return a cell as a message repeats it: numbers and units are short, and what is long is none of a message."""
+    return shown(text) if len(text) <= LONGEST_TOLD else f"a text of {len(text)} characters"
+
+
+def _quoted(row: Row) -> str:
+    return ", ".join(map(_cell, row.cells[:8])) or "nothing"
+
+
+def _size(unit: str, kind: str, where: str, usual: str, origin: str) -> float:
+    """Return a unit of a column in SI. Raises BadInput for one that is none of its kind."""
+    plain, meant = ascii_unit(unit), ""
+    try:
+        if plain == DISPLAY_UNIT[kind] or fits(plain, kind):
+            return factor(plain)
     except QuantityError:
-        return False
+        meant = meant_unit(plain, kind)
+    remedy = f'Perhaps "{meant}" is meant' if meant else "Write one of these units"
+    raise refusal(f"{where}: {_cell(unit)} is no unit of this column", origin, allowed=usual, remedy=remedy)
 
 
-def _marked(rows: Sequence[Sequence[str]], name: str, origin: str) -> tuple[float, ...]:
-    """Return which rows a column marks; none where there is no such column. Raises BadInput."""
-    places = [place for place, cell in enumerate(rows[0]) if cell.strip() == name]
-    if not places:
-        return (0.0,) * (len(rows) - 1)
-    cells = [row[places[0]].strip().lower() for row in rows[1:]]
-    for line, cell in enumerate(cells, 2):
-        if cell not in MARKS:
-            problem = f"row {line} of the table holds no mark under {name}"
-            raise refusal(problem, origin, allowed="1 or x for a mark, 0 or nothing for none", remedy="Correct it")
-    return tuple(MARKS[cell] for cell in cells)
-
-
-def _check_length(row: Sequence[str], head: Sequence[str], line: int, origin: str) -> None:
-    """Raise BadInput for a row that does not stand under its header: a decimal comma parts one number into two."""
-    nameless = (cell for cell, name in zip(row, head, strict=False) if not name.strip())
-    if len(row) != len(head) or any(cell.strip() for cell in nameless):
-        cells = sum(1 for cell in row if cell.strip())
-        problem = f"row {line} of the table has {cells} numbers or words under {sum(map(bool, head))} columns"
-        remedy = "Write one number in each column, with a decimal point, not a comma"
+def _check_length(row: Row, head: Row, separator: str, origin: str) -> None:
+    """Raise BadInput for a row that has cells beside its header: a decimal comma parts one number into two."""
+    strange = [cell for place, cell in enumerate(row.cells) if cell and not head.cell(place)]
+    if strange:
+        cells, named = sum(map(bool, row.cells)), sum(map(bool, head.cells))
+        problem = f"line {row.line}: {cells} cells stand under {named} headings, {_cell(strange[0])} under none"
+        remedy = "Write one number under each heading"
+        if separator == COMMA:
+            remedy += "; a decimal comma needs another sign between cells, such as a semicolon"
         raise refusal(problem, origin, remedy=remedy)
 
 
-def _number(row: Sequence[str], column: _Column, line: int, origin: str) -> float:
-    text = row[column.place].strip(" \t")
+# Numbers.
+
+
+def _decimal_sign(
+    rows: Sequence[Row], found: Sequence[_Column], separator: str, origin: str
+) -> tuple[str, tuple[str, ...]]:
+    """Return the decimal sign of the columns that are read, and remarks on it. Raises BadInput where it may be both.
+
+    A cell shows it where it has both signs, one of them twice, or one that groups no three digits.
+    """
+    proof: dict[str, str] = {}
+    unsure: dict[str, str] = {}
+    grouped = False
+    for row in rows:
+        for column in found:
+            text = _bare(row.cell(column.place))
+            signs = [sign for sign in text if sign in (POINT, COMMA)]
+            if not signs or not _NUMBER.fullmatch(text):
+                continue
+            where = f"{_cell(text)} (line {row.line}, column {column.called})"
+            other = COMMA if signs[-1] == POINT else POINT
+            if len(set(signs)) == 2:
+                proof.setdefault(signs[-1], where)
+                grouped = True
+            elif len(signs) > 1:
+                proof.setdefault(other, where)
+                grouped = True
+            elif _MAYBE_GROUP.fullmatch(text):
+                unsure.setdefault(signs[0], where)
+            else:
+                proof.setdefault(signs[0], where)
+    signs = list(proof)
+    remedy = "Write all numbers with one decimal sign, and nothing between thousands"
+    if len(signs) == 2:
+        problem = f"the decimal sign is a point and a comma: {proof[POINT]}, {proof[COMMA]}"
+        raise refusal(problem, origin, remedy=remedy)
+    if signs:
+        (sign,) = signs
+        other = COMMA if sign == POINT else POINT
+        if other in unsure and not grouped:
+            problem = f"it may be a decimal sign or part thousands: {unsure[other]}, beside {proof[sign]}"
+            raise refusal(problem, origin, remedy=remedy)
+        return sign, ()
+    if len(unsure) == 2:
+        problem = f"the decimal sign may be a point or a comma: {unsure[POINT]}, {unsure[COMMA]}"
+        raise refusal(problem, origin, remedy=remedy)
+    if COMMA in unsure:
+        if separator != ";":
+            problem = f"a comma may be the decimal sign or part thousands: {unsure[COMMA]}"
+            remedy = "Write decimal points, or one more decimal, or semicolons between cells"
+            raise refusal(problem, origin, remedy=remedy)
+        return COMMA, (f"commas are read as decimal commas, since semicolons part the cells: {unsure[COMMA]}",)
+    if POINT in unsure and separator == ";":
+        return POINT, (f"points are read as decimal points: {unsure[POINT]}",)
+    return POINT, ()
+
+
+def _bare(text: str) -> str:
+    """Return a number's text with the plain minus sign, and without blanks between thousands."""
+    return _BLANK_GROUPS.sub("", text.replace("\u2212", "-"))
+
+
+def _plain(text: str, decimal: str) -> str:
+    """Return a number's text with a decimal point, and without what groups thousands."""
+    other = COMMA if decimal == POINT else POINT
+    whole, sign, rest = _bare(text).partition(decimal)
+    whole = whole.replace(other, "") if _GROUPS[other].fullmatch(whole) else whole
+    return f"{whole}{sign and POINT}{rest}"
+
+
+def _number(text: str, row: Row, column: _Column, origin: str) -> float:
     value = plain_number(text)
+    where = f"line {row.line}, column {column.called}"
     if is_beyond(text):
-        problem = f"row {line} of the table holds a number under {column.name} that is too large or too small"
         raise refusal(
-            problem, origin, value=text, allowed="0, and sizes of 1e-60 to 1e60", remedy="Write 0 for next to nothing"
+            f"{where}: the number {_cell(text)} is too large or too small",
+            origin,
+            allowed="0, and sizes of 1e-60 to 1e60",
+            remedy="Write 0 for next to nothing",
         )
     if value is None:
-        problem = f"row {line} of the table holds no number under {column.name}"
-        remedy = "Write digits and a decimal point, such as 12.5 or 1.25e1"
+        cell = row.cell(column.place)
+        problem = f"{where}: {_cell(cell)} is no number" if cell else f"{where}: the cell is empty"
+        remedy = "Write digits and a decimal sign, such as 12.5 or 1.25e1"
         raise refusal(problem, origin, remedy=remedy)
     return value * column.unit
 
 
-def _check_angles(name: str, angles: Sequence[float], origin: str) -> None:
-    """Raise BadInput for an angle that comes twice, and for angles that are not of one turn."""
+def _halves(texts: Sequence[str], digits: int | None) -> list[float]:
+    """Return half a unit of the last digit of each number, in its own unit; digits: decimals, None for those printed.
+
+    All numbers have as many decimals as the one that has most: offices strip zeros. Where most would have lost some so,
+    numbers are written with a count of digits from the first one on; those with an exponent are so always.
+    """
+    if digits is not None:
+        return [0.5 * 10.0**-digits] * len(texts)
+    parts = [_DIGITS.fullmatch(text) for text in texts]
+    powers = [int(each[3] or 0) if each else 0 for each in parts]
+    decimals = [len(each[2]) - power if each else 0 for each, power in zip(parts, powers, strict=True)]
+    counts = [len((each[1] + each[2]).lstrip("0")) if each else 0 for each in parts]
+    plain = [k for k, power in enumerate(powers) if not power and counts[k]]
+    most, longest = max((decimals[k] for k in plain), default=0), max(counts, default=0)
+    short = sum(decimals[k] < most for k in plain)
+    few = sum(counts[k] < longest for k in range(len(texts)) if counts[k])
+    if longest > 3 and short > SIGNIFICANT * len(plain) and few < SIGNIFICANT * len(plain):
+        sizes = [abs(float(text)) for text in texts]
+        return [0.5 * 10.0 ** (math.floor(math.log10(size)) + 1 - longest) if size else 0.0 for size in sizes]
+    return [
+        0.5 * 10.0 ** -(max(decimals[k], 0) if powers[k] else most) if counts[k] else 0.5 * 10.0**-most
+        for k in range(len(texts))
+    ]
+
+
+def _marked(head: Row, rows: Sequence[Row], name: str, origin: str) -> tuple[float, ...]:
+    """Return which rows a column marks; none where there is no such column. Raises BadInput."""
+    places = _places(head, name)
+    if not places:
+        return (0.0,) * len(rows)
+    for row in rows:
+        if row.cell(places[0]).lower() not in MARKS:
+            problem = f"line {row.line}, column {name}: {_cell(row.cell(places[0]))} is no mark"
+            allowed = "1 or x for a mark, 0 or nothing for none"
+            raise refusal(problem, origin, allowed=allowed, remedy="Correct it")
+    return tuple(MARKS[row.cell(places[0]).lower()] for row in rows)
+
+
+# Angles.
+
+
+def _once(rows: Sequence[Row], found: Sequence[_Column]) -> list[Row]:
+    """Return rows without those that only repeat the one before them, all columns that are read alike."""
+    kept: list[Row] = []
+    for row in rows:
+        if not kept or any(row.cell(column.place) != kept[-1].cell(column.place) for column in found):
+            kept.append(row)
+    return kept
+
+
+def _falls(angles: Sequence[float]) -> bool:
+    """Say whether angles fall from row to row, or stay."""
+    return all(angle >= after for angle, after in itertools.pairwise(angles))
+
+
+def _check_angles(column: _Column, angles: Sequence[float], rows: Sequence[Row], twice: bool, origin: str) -> None:
+    """Raise BadInput for an angle that comes too often, and for angles that are not of one turn."""
+    name = column.called
     if max(map(abs, angles)) > TURN or max(angles) - min(angles) > TURN:
+        worst = max(range(len(angles)), key=lambda k: abs(angles[k]))
+        given = f"line {rows[worst].line}: {_cell(rows[worst].cell(column.place))}"
+        problem = f"the table's angles {name} go beyond one turn ({given})"
         allowed = "-360 to 360 deg, one turn in all"
-        problem = f"the table's angles {name} go beyond one turn"
         raise refusal(problem, origin, allowed=allowed, remedy="Check their unit, or take off whole turns")
-    seen: set[float] = set()
-    for line, angle in enumerate(angles, 2):
-        if angle in seen:
-            problem = f"row {line} of the table repeats an angle {name}"
-            raise refusal(problem, origin, remedy="Keep one row for each angle")
-        seen.add(angle)
+    places: dict[float, list[int]] = {}
+    for k, angle in enumerate(angles):
+        places.setdefault(angle, []).append(k)
+        there = places[angle]
+        if len(there) > 1 + twice or (len(there) == 2 and there[1] != there[0] + 1):
+            angle = _cell(rows[k].cell(column.place))
+            problem = f"line {rows[k].line}, column {name}: the angle {angle} stands in line {rows[there[0]].line} too"
+            remedy = "Keep one row for each angle"
+            remedy += ", or two rows, one below the other, for both sides of a corner" if twice else ""
+            raise refusal(problem, origin, remedy=remedy)

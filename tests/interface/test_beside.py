@@ -68,9 +68,9 @@ def test_the_command_tells_the_rms_and_writes_both(measured, tmp_path):
     [
         ("phi [deg],chi [deg]\n0,1\n", "no column of the curves"),
         ("psi [deg]\n1\n", "no column phi"),
-        ("phi [deg],psi [mm]\n0,1\n", "no column psi with its unit"),
-        ("phi [deg],psi [deg]\n0,1\n0,2\n", "repeats an angle"),
-        ("phi [deg],psi [deg]\n0,\n", "no number under psi"),
+        ("phi [deg],psi [mm]\n0,1\n", "is no unit of this column"),
+        ("phi [deg],psi [deg]\n0,1\n0,2\n", "stands in line 2 too"),
+        ("phi [deg],psi [deg]\n0,\n", "column psi: the cell is empty"),
         ("", "empty"),
     ],
 )

@@ -69,7 +69,7 @@ def test_samples_left_out_tell_how_well_they_resolve_the_curve():
 @pytest.mark.parametrize(
     ("angles", "values", "marked", "told"),
     [
-        ((0.0, 1.0, 2.0, TURN), (0.0, 1.0, 0.5, 0.1), (True,) * 4, "with another value"),
+        ((0.0, 1.0, 2.0, TURN), (0.0, 1.0, 0.5, 0.1), (False,) * 4, "with another value"),
         ((0.0, 1.0, 2.0), (0.0, 1.0, 0.0), (False,) * 3, "mark both as corners"),
         ((0.0, 1.0), (0.0, 1.0), (True,) * 2, "too few"),
     ],
@@ -77,3 +77,21 @@ def test_samples_left_out_tell_how_well_they_resolve_the_curve():
 def test_what_says_no_curve_is_refused(angles, values, marked, told):
     with pytest.raises(ValueError, match=told):
         through(angles, values, marked)
+
+
+def test_two_samples_of_one_angle_are_both_sides_of_a_jump():
+    angles = (0.0, 1.0, 2.0, 2.0, 3.0, 4.0, 5.0)
+    curve = through(angles, (0.0, 1.0, 2.0, -2.0, -1.0, -1.5, -1.0), (True, *(False,) * 6))
+    assert curve.corners == 2
+    assert curve.samples == 6
+    ahead, behind = (float(curve.at(systems.FLOAT, 2.0, k)) for k in (1.0, 2.0))
+    assert (ahead, behind) == (pytest.approx(2.0, abs=1e-14), pytest.approx(-2.0, abs=1e-14))
+    assert float(curve.at(systems.FLOAT, 1.5, 1.0)) == pytest.approx(1.5, abs=1e-14)
+    assert curve.largest == 2.0
+
+
+def test_a_curve_may_jump_where_its_turn_ends():
+    curve = through((0.0, 1.5, 3.0, 4.75, TURN), (1.0, 0.0, 0.0, 0.0, -1.0), (True, *(False,) * 4))
+    assert curve.corners == 1
+    assert float(curve.at(systems.FLOAT, 0.0, 0.0)) == pytest.approx(1.0, abs=1e-13)
+    assert float(curve.at(systems.FLOAT, TURN, 3.0)) == pytest.approx(-1.0, abs=1e-13)

@@ -1,4 +1,4 @@
-"""Tables in CSV files: what can be mistaken is refused by name, never read as other numbers."""
+"""Tables as offices write them: what is plain is read, what can be mistaken is refused in words of the file."""
 
 import csv
 import math
@@ -29,27 +29,33 @@ def with_row(row):
 
 # text of the file -> part of the message
 REFUSED = {
-    "decimal commas": (HEAD + "\n".join(f"{k},5,{k},25" for k in range(12)), "row 2 of the table has 4"),
-    "one decimal comma": (with_row("150,1,5"), "row 7 of the table has 3"),
-    "next to nothing": (with_row("150,1.3e-171"), 'too small (given: "1.3e-171"). Allowed: 0, and sizes of'),
-    "quoted decimal comma": (with_row('150,"1,5"'), "row 7 of the table holds no number under S"),
+    "decimal commas": (HEAD + "\n".join(f"{k},5,{k},25" for k in range(12)), "line 2: 4 cells stand under 2 headings"),
+    "one decimal comma": (with_row("150,1,5"), "line 7: 3 cells stand under 2 headings"),
+    "next to nothing": (with_row("150,1.3e-171"), 'column S: the number "1.3e-171" is too large or too small'),
+    "a comma beside a point": (with_row('150,"1,5"').replace("0,0", "0,0.5"),
+        "the decimal sign is a point and a comma"),
+    "thousands or a decimal comma": (
+        "phi1 [deg]\tS [mm]\n" + "\n".join(f"{30 * k}\t1,{100 + k}" for k in range(12)),
+        'may be the decimal sign or part thousands: "1,100" (line 2, column S)'),
+    "thousands or a decimal point": (
+        "phi1 [deg];S [mm]\n" + "\n".join(f"{30 * k};{v}" for k, v in enumerate(["0,5", "1.234"] * 6)),
+        'may be a decimal sign or part thousands: "1.234" (line 3, column S), beside "0,5" (line 2, column S)'),
     "decimal commas under nameless columns": (
-        "phi1 [deg],S [mm],,\n" + "\n".join(f"{k},5,{k},25" for k in range(12)), "row 2 of the table has 4"),
-    "semicolons": ("phi1 [deg];S [mm]\n" + "\n".join(f"{k},5;{k},25" for k in range(12)), "parted by commas"),
-    "row cut short": (with_row("150"), "row 7 of the table has 1"),
-    "grouped digits": (with_row("150,1_0"), "row 7"),
-    "digits of another script": (with_row("150,\u0661\u0662"), "row 7"),
-    "wide digits": (with_row("150,\uff11\uff12"), "row 7"),
-    "space inside": (with_row("150,1 0"), "row 7"),
-    "hexadecimal": (with_row("150,0x10"), "row 7"),
-    "empty cell": (with_row("150,"), "row 7"),
-    "not finite": (with_row("150,nan"), "row 7"),
-    "infinite": (with_row("150,1e999"), "row 7"),
-    "too large to compute with": (with_row("150,1e200"), "row 7"),
-    "too small to compute with": (with_row("150,1e-400"), "row 7"),
-    "unit in the cell": (with_row("150,10 mm"), "row 7"),
-    "one angle twice": (with_row("120,5"), "row 7 of the table repeats an angle phi1"),
-    "one angle twenty times": (HEAD + "90,5\n" * 20, "row 3 of the table repeats an angle phi1"),
+        "phi1 [deg],S [mm],,\n" + "\n".join(f"{k},5,{k},25" for k in range(12)), "line 2: 4 cells stand under 2"),
+    "row cut short": (with_row("150"), "line 7, column S: the cell is empty"),
+    "grouped digits": (with_row("150,1_0"), 'line 7, column S: "1_0" is no number'),
+    "digits of another script": (with_row("150,\u0661\u0662"), "line 7"),
+    "wide digits": (with_row("150,\uff11\uff12"), "line 7"),
+    "space inside": (with_row("150,1 0"), "line 7"),
+    "hexadecimal": (with_row("150,0x10"), "line 7"),
+    "empty cell": (with_row("150,"), "line 7"),
+    "not finite": (with_row("150,nan"), "line 7"),
+    "infinite": (with_row("150,1e999"), "line 7"),
+    "too large to compute with": (with_row("150,1e200"), "line 7"),
+    "too small to compute with": (with_row("150,1e-400"), "line 7"),
+    "unit in the cell": (with_row("150,10 mm"), "line 7"),
+    "one angle twice": (with_row("120,5"), 'line 7, column phi1: the angle "120" stands in line 6 too'),
+    "one angle twenty times": (HEAD + "90,5\n" * 20, "the table has 1 rows below its header"),
     "angles of two turns": (HEAD + "\n".join(f"{60 * k},{k}" for k in range(12)), "phi1 go beyond one turn"),
     "angles of the second turn": (HEAD + "\n".join(f"{361 + k},{k}" for k in range(12)), "beyond one turn"),
     "a turn and a half in all": (HEAD + "\n".join(f"{-270 + 50 * k},{k}" for k in range(12)), "beyond one turn"),
@@ -57,14 +63,19 @@ REFUSED = {
     "a column twice": ("phi1 [deg],S [mm],S [mm]\n" + "\n".join(f"{r},1" for r in ROWS), "column S 2 times"),
     "a column in two units": (
         "phi1 [deg],phi1 [rad],S [mm]\n" + "\n".join(f"{k},{k},1" for k in range(12)), "column phi1 2 times"),
+    "no unit": ("phi1,S\n" + "\n".join(ROWS), "line 1, column phi1: the unit is missing"),
+    "another unit": (HEAD.replace("mm", "mN") + "\n".join(ROWS), 'column S: "mN" is no unit of this column'),
+    "a date": (with_row("150,2024-05-01"), '"2024-05-01" is no number'),
+    "an old workbook": (b"\xd0\xcf\x11\xe0" + bytes(600), "a workbook of Excel 97"),
+    "a workbook cut short": (b"PK\x03\x04" + bytes(600), "no workbook that can be read"),
     "unit without its bracket": ("phi1 [deg,S [mm]\n" + "\n".join(ROWS), "no column phi1"),
     "long cell": (HEAD + "0," + "1" * (csv.field_size_limit() + 1) + "\n", "not CSV"),
     "open quotation mark": (with_row('150,"10'), "not CSV"),
     "text after a quotation mark": (with_row('150,"10"5'), "not CSV"),
-    "not UTF-8": (HEAD.encode() + b"0,\xff\n", "UTF-8"),
+    "not UTF-8": (HEAD.encode() + b"0,\x81\n", "UTF-8"),
     "too large": (HEAD + "0,1\n" * 300_000, "too large"),
-    "a line of its own by U+2028": (with_row("150,5\u2028160,6"), "row 7"),
-    "null character": (with_row("150,5\0"), "row 7"),
+    "a line of its own by U+2028": (with_row("150,5\u2028160,6"), "line 7"),
+    "null character": (with_row("150,5\0"), "line 7"),
 }  # fmt: skip
 
 
@@ -94,7 +105,24 @@ READ = {
         "phi1 [deg],S [mm],,\n" + "\n".join(f"{r},," for r in ROWS), 330, 11),
     "a whole turn with its end": (HEAD + "\n".join(f"{30 * k},{k % 12}" for k in range(13)), 360, 0),
     "both sides of zero": (HEAD + "\n".join(f"{30 * k - 180},{k}" for k in range(13)), 180, 12),
-    "backward": (HEAD + "\n".join(reversed(ROWS)), 0, 0),
+    "backward": (HEAD + "\n".join(reversed(ROWS)), 330, 11),
+    "a row twice": (with_row("120,4").replace("120,4\n120,4", "120,4\n120,4\n150,5"), 330, 11),
+    "quoted decimal comma": (with_row('150,"1,5"'), 330, 11),
+    "semicolons and decimal commas": (
+        "phi1 [deg];S [mm]\n" + "\n".join(f"{30 * k},0;{k},25" for k in range(12)), 330, 11.25),
+    "thousands beside a decimal sign": (
+        "phi1 [deg];S [mm]\n" + "\n".join(f"{30 * k};1.00{k % 10},5" for k in range(12)), 330, 1001.5),
+    "thousands parted by blanks, a true minus": (
+        "phi1 [deg]\tS [mm]\n" + "\n".join(f"{30 * k}\t\u22121\u202f00{k % 10}.5" for k in range(12)), 330, -1001.5),
+    "ambiguous commas between semicolons": (
+        "phi1 [deg];S [mm]\n" + "\n".join(f"{30 * k};1,{100 + k}" for k in range(12)), 330, 1.111),
+    "units in a row of their own": ("phi1,S\n[deg],[mm]\n" + "\n".join(ROWS), 330, 11),
+    "bare units in a row of their own": ("phi1;S\ndeg;mm\n" + "\n".join(r.replace(",", ";") for r in ROWS), 330, 11),
+    "round brackets, degree sign, another case": ("PHI1 (\u00b0),s (mm)\n" + "\n".join(ROWS), 330, 11),
+    "Windows-1252": ("phi1 [\u00b0],S [mm],Gr\u00f6\u00dfe\n".encode("cp1252") + "\n".join(ROWS).encode(), 330, 11),
+    "a title above": ("Messung 7\n\n" + HEAD + "\n".join(ROWS), 330, 11),
+    "the header in a remark": ("# phi1 [deg],S [mm]\n" + "\n".join(ROWS), 330, 11),
+    "angles under the name of curves": ("phi [deg],S [mm]\n" + "\n".join(ROWS), 330, 11),
     "radians, rounded": (
         "phi1 [rad],S [mm]\n" + "\n".join(f"{math.tau * k / 12:.4f},{k}" for k in range(13)), 360, 12),
 }  # fmt: skip
@@ -117,7 +145,8 @@ def test_the_packaged_table_is_read_to_the_last_digit():
 
 
 @pytest.mark.parametrize(
-    ("row", "part"), [("50,5,25", "row 7 of the table has 3"), ("40,5", "row 7 of the table repeats an angle angle")]
+    ("row", "part"),
+    [("50,5,25", "line 7: 3 cells stand"), ("40,5", 'line 7, column angle: the angle "40" stands in line 6')],
 )
 def test_cam_laws_are_read_as_strictly(tmp_path, row, part):
     path = tmp_path / "law.csv"

@@ -39,7 +39,7 @@ from loomopt.physics.cycle import Node
 from loomopt.physics.effects import kinds
 from loomopt.physics.mechanisms import chain
 from loomopt.physics.mechanisms.chain import Chain
-from loomopt.physics.schema import Axis, Figure, Name, Table, Target
+from loomopt.physics.schema import DIGITS, Axis, Digits, Figure, Name, Table, Target
 from loomopt.physics.schema import TargetTable as AnyTarget
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
@@ -61,6 +61,7 @@ class TargetTable(AnyTarget):
     table: Name | None = Field(
         None, description="CSV file of the path: x [mm], y [mm], and phi [deg] where its timing is given"
     )
+    digits: Digits | None = Field(None, description=DIGITS)
 
     @property
     def sought(self) -> tuple[tuple[str, str], ...]:
@@ -421,13 +422,18 @@ def path(scene: Scene, target: str) -> Path | None:
     name = target if target in own else next(iter(own), None)
     if name is None:
         return None
-    table, key = own[name], f"targets.{name}.table"
-    columns, given = {"x": "length", "y": "length"}, str(table.table)
-    timed = "phi" in csv_tables.columns(scene, given, key, csv_tables.header(columns))
-    columns = {"phi": "angle"} | columns if timed else columns
-    found, _ = csv_tables.read(scene, given, key, columns, fewest=FEWEST)
-    phi, x, y = found if timed else ((), *found)
-    return Path(str(table.point), phi, x, y)
+    found = read_path(scene, name).columns
+    return Path(str(own[name].point), found.get("phi", ()), found["x"], found["y"])
+
+
+def read_path(scene: Scene, name: str) -> csv_tables.Table:
+    """Return the table of the path that a target asks for, with its precision. Raises BadInput."""
+    table, key = scene.targets[name], f"targets.{name}.table"
+    assert isinstance(table, TargetTable)
+    kinds, given = {"phi": "angle", "x": "length", "y": "length"}, str(table.table)
+    there = csv_tables.columns(scene, given, key, kinds)
+    kinds = {column: kind for column, kind in kinds.items() if column in ("x", "y", *there)}
+    return csv_tables.read(scene, given, key, kinds, fewest=FEWEST, digits=table.digits)
 
 
 def _check_path(scene: Scene, known: Reading, name: str, table: TargetTable) -> None:

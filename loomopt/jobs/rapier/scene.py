@@ -10,7 +10,7 @@ from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
 from loomopt.model import drive
 from loomopt.physics.effects import kinds
 from loomopt.physics.mechanisms import rapier_drive
-from loomopt.physics.schema import Axis, Conflict, Figure, Name, Table, Target, TargetTable
+from loomopt.physics.schema import DIGITS, Axis, Conflict, Digits, Figure, Name, Table, Target, TargetTable
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import SceneSchema
@@ -65,6 +65,7 @@ class MatchTarget(TargetTable):
     table: Name | None = Field(
         None, description="CSV file with the columns `phi1 [deg]` and `S [mm]`, beside the scene"
     )
+    digits: Digits | None = Field(None, description=DIGITS)
 
 
 VARIABLES = {
@@ -128,12 +129,17 @@ TARGETS = {
 
 def match_table(scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return crank angles, rad, and head travels, m, of `targets.match.table`. Raises BadInput."""
+    found = read_match(scene).columns
+    return found["phi1"], found["S"]
+
+
+def read_match(scene: Scene) -> csv_tables.Table:
+    """Return the table of head travel with its precision. Raises BadInput."""
     given, key = scene.table(MatchTarget).table, "targets.match.table"
     if given is None:
         remedy = f'Write table = "s.csv" in [targets.match]; the file has the columns {csv_tables.header(MATCHED)}'
         raise refusal("target match needs a table of head travel", scene.origin, key, remedy=remedy)
-    (angles, travels), _ = csv_tables.read(scene, given, key, MATCHED)
-    return angles, travels
+    return csv_tables.read(scene, given, key, MATCHED, digits=scene.table(MatchTarget).digits)
 
 
 SCHEMA = SceneSchema(

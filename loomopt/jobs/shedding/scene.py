@@ -1,7 +1,7 @@
 """What a shedding scene may hold: its tables, design variables, figures and targets."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, Literal
 
 from pydantic import Field, create_model
@@ -29,7 +29,7 @@ from loomopt.physics.effects import kinds
 from loomopt.physics.effects.kinds import Load
 from loomopt.physics.mechanisms import cam_follower, cam_spline
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
-from loomopt.physics.schema import Axis, Conflict, Figure, Name, Table, Target, TargetTable
+from loomopt.physics.schema import Axis, Conflict, Digits, Figure, Name, Table, Target, TargetTable
 from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
@@ -83,6 +83,9 @@ class HealdFrame(Table):
     law: LAW = Field("cycloidal", description="cam law of the rise, and mirrored of the return")
     law_coefficients: Numbers | None = Field(None, description="s'' of a spline law at evenly spaced knots")
     law_table: Name | None = Field(None, description="CSV file of a tabulated law")
+    digits: Digits | None = Field(
+        None, description="decimals to which s of law_table is known, those printed without it"
+    )
     rise: SegmentAngle | None = Field(None, description="cam angle of the rise")
     far_dwell: SegmentAngle | None = Field(None, description="cam angle with the shed open downward")
     near_dwell: SegmentAngle | None = Field(None, description="cam angle with the shed open upward")
@@ -286,13 +289,44 @@ def _table(scene: Scene) -> cam_spline.LawTable:
     if given is None:
         remedy = 'Write law_table = "law.csv"; the file has the columns angle [deg], s [mm] of the rise'
         raise refusal("law table needs its file", scene.origin, key, remedy=remedy)
-    (angles, heights), origin = csv_tables.read(scene, given, key, columns)
+    read = csv_tables.read(scene, given, key, columns, digits=scene.table(HealdFrame).digits)
+    angles, heights = read.columns["angle"], read.columns["s"]
     if not (angles[-1] > 0.0 and heights[-1] > 0.0):
-        raise refusal("the law does not rise", origin, remedy="Give angle and s of the rise, both from 0 on")
+        raise refusal("the law does not rise", given, remedy="Give angle and s of the rise, both from 0 on")
+    places, loose = _even(angles, read.halves["angle"])
+    slopes = [abs(b - a) / max(d - c, 1e-12) for a, b, c, d in _steps(heights, angles)]
+    half = [
+        (own + slope * width * angles[-1]) / heights[-1]
+        for own, slope, width in zip(read.halves["s"], slopes, loose, strict=True)
+    ]
     try:
-        return cam_spline.tabulated([a / angles[-1] for a in angles], [s / heights[-1] for s in heights])
+        return cam_spline.tabulated(places, [s / heights[-1] for s in heights], half)
     except ValueError as error:
-        raise refusal(f"the table is no cam law: {error}", origin, remedy="Correct the table") from None
+        raise refusal(f"the table is no cam law: {error}", given, remedy="Correct the table") from None
+
+
+def _steps(heights: Sequence[float], angles: Sequence[float]) -> Iterator[tuple[float, float, float, float]]:
+    """Yield the heights, then the angles, of the rows before and after each row."""
+    last = len(heights) - 1
+    for k in range(last + 1):
+        near, far = max(0, k - 1), min(last, k + 1)
+        yield heights[near], heights[far], angles[near], angles[far]
+
+
+def _even(angles: Sequence[float], halves: Sequence[float]) -> tuple[list[float], list[float]]:
+    """Return angles as shares of the last one, and what rounding leaves open of them.
+
+    Angles that are evenly spaced but for their rounding are taken as evenly spaced; whole numbers are exact.
+    """
+    whole, last = angles[-1], len(angles) - 1
+    even = [whole * k / last for k in range(last + 1)]
+    if all(abs(a - b) <= 1.02 * half + 1e-12 * whole for a, b, half in zip(angles, even, halves, strict=True)):
+        if max(abs(a - b) for a, b in zip(angles, even, strict=True)) > 1e-9 * whole:
+            return [k / last for k in range(last + 1)], [0.0] * len(angles)
+        return [a / whole for a in angles], [0.0] * len(angles)
+    unit = 2 * max(halves)
+    exact = all(abs(a / unit - round(a / unit)) < 1e-6 for a in angles) and unit > math.radians(0.99)
+    return [a / whole for a in angles], [0.0 if exact else half / whole for half in halves]
 
 
 def unfollowed(numbers: Mapping[str, Any], shown: ShowValue) -> str:

@@ -1,4 +1,4 @@
-"""Cam laws that are data: the freed C² cubic spline, and the C² cubic through the points of a table.
+"""Cam laws that are data: the freed C² cubic spline, and the cubic through the points of a table.
 
 u in [0, 1] is the share of the rise angle, s the share of the travel, both plain numbers; s(0) = 0, s'(0) = 0.
 `piece` is the number (0.0, 1.0 ...) of the interval between breaks: data of a node, never of the design. Beyond its own
@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+from loomopt.maths import smooth_rise
+from loomopt.maths.smooth_rise import SmoothRise
 from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.physics.mechanisms.cam_laws import LawDerivatives
 
@@ -116,15 +118,18 @@ def cycloid_like(n: int) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class LawTable:
-    """The C² cubic through the points of a table, at rest at both ends; s'' need not be 0 there.
+    """The cubic through the points of a table, at rest at both ends; s'' need not be 0 there.
 
-    u, s: the points; v, a: the slope and second derivative at each.
+    u, s: the points, moved as far as their digits allow; v, a: the slope, and the second derivative behind each; ahead:
+    the second derivative ahead of each, another one where it jumps. found: how well all of it is known.
     """
 
     u: tuple[float, ...]
     s: tuple[float, ...]
     v: tuple[float, ...]
     a: tuple[float, ...]
+    ahead: tuple[float, ...]
+    found: SmoothRise
 
     @property
     def breaks(self) -> tuple[Fraction, ...]:
@@ -135,17 +140,17 @@ class LawTable:
         """Return s(u) and its derivatives on interval `piece`."""
         begin, end, s, v, a, after = (
             maths.choose(piece, [maths.number(value) for value in values])
-            for values in (self.u[:-1], self.u[1:], self.s[:-1], self.v[:-1], self.a[:-1], self.a[1:])
+            for values in (self.u[:-1], self.u[1:], self.s[:-1], self.v[:-1], self.a[:-1], self.ahead[1:])
         )
         t, jerk = u - begin, (after - a) / (end - begin)
         return LawDerivatives(s + t * (v + t * (a / 2 + t * jerk / 6)), v + t * (a + t * jerk / 2), a + t * jerk, jerk)
 
 
-def tabulated(u: Sequence[float], s: Sequence[float]) -> LawTable:
-    """Return the C² cubic through the points (u, s) with zero slope at both ends.
+def tabulated(u: Sequence[float], s: Sequence[float], half: Sequence[float] = ()) -> LawTable:
+    """Return the cubic through the points (u, s) with zero slope at both ends, smoothed as far as rounding allows.
 
-    Raises ValueError unless at least 4 points rise from (0, 0) to (1, 1) with u increasing and the curve between them
-    never falls.
+    half: how far rounding may have moved each s; nothing for exact ones. Raises ValueError unless at least 4 points
+    rise from (0, 0) to (1, 1) with u increasing and the curve between them never falls by more than rounding may do.
     """
     import numpy as np
 
@@ -153,11 +158,10 @@ def tabulated(u: Sequence[float], s: Sequence[float]) -> LawTable:
     fault = _table_fault(places, heights)
     if fault:
         raise ValueError(fault)
-    steps, slopes = np.diff(places), np.diff(heights) / np.diff(places)
-    bends = _second_derivatives(steps, slopes)
-    rates = np.concatenate([[0.0], slopes[1:] - steps[1:] * (2 * bends[1:-1] + bends[2:]) / 6, [0.0]])
-    _refuse_a_fall(places, rates, bends)
-    return LawTable(*(tuple(values.tolist()) for values in (places, heights, rates, bends)))
+    halves = tuple(half) or (0.0,) * len(places)
+    found = smooth_rise.through(tuple(places.tolist()), tuple(heights.tolist()), halves)
+    _refuse_a_fall(found, DIP + 4 * max(halves) / float(np.diff(places).min()))
+    return LawTable(found.u, found.s, found.v, found.after, found.before, found)
 
 
 def _table_fault(u: "Floats", s: "Floats") -> str:
@@ -179,37 +183,18 @@ def _table_fault(u: "Floats", s: "Floats") -> str:
     return ""
 
 
-def _second_derivatives(steps: "Floats", slopes: "Floats") -> "Floats":
-    """Return s'' at every point of the clamped cubic; steps: lengths of the intervals, slopes: of their chords.
-
-    The tridiagonal system is diagonally dominant: elimination without pivots is stable.
-    """
+def _refuse_a_fall(found: SmoothRise, dip: float) -> None:
+    """Raise ValueError naming the interval where the slope, a parabola, is least, if it is below −dip there."""
     import numpy as np
 
-    below = np.concatenate([steps, [0.0]])
-    diagonal = 2 * (np.concatenate([[0.0], steps]) + below)
-    right = 6 * np.diff(np.concatenate([[0.0], slopes, [0.0]]))
-    for k in range(1, len(diagonal)):
-        factor = steps[k - 1] / diagonal[k - 1]
-        diagonal[k] -= factor * steps[k - 1]
-        right[k] -= factor * right[k - 1]
-    found: Floats = right / diagonal
-    for k in range(len(found) - 2, -1, -1):
-        found[k] -= steps[k] / diagonal[k] * found[k + 1]
-    return found
-
-
-def _refuse_a_fall(u: "Floats", v: "Floats", a: "Floats") -> None:
-    """Raise ValueError naming the interval where the slope, a parabola, is least, if it falls below 0 there."""
-    import numpy as np
-
-    rise = np.diff(a)
+    u, v, begin, end = (np.array(each) for each in (found.u, found.v, found.after[:-1], found.before[1:]))
+    rise = end - begin
     bowl = np.where(rise > 0, rise, 1.0)
-    share = np.where(rise > 0, np.clip(-a[:-1] / bowl, 0.0, 1.0), 0.0)
-    inside = v[:-1] + np.diff(u) * share * (a[:-1] + rise * share / 2)
+    share = np.where(rise > 0, np.clip(-begin / bowl, 0.0, 1.0), 0.0)
+    inside = v[:-1] + np.diff(u) * share * (begin + rise * share / 2)
     least = np.minimum(inside, v[1:])
     k = int(np.argmin(least))
-    if least[k] < -DIP:
+    if least[k] < -dip:
         raise ValueError(
             f"the curve through the table falls between u = {u[k]:.9g} and {u[k + 1]:.9g} (slope down to "
             f"{least[k]:.3g}); a rise must never fall: correct the points there, or give more digits or other points"

@@ -1,0 +1,173 @@
+"""The cells of a table's file as text: CSV in encodings and with separators that offices write, or a workbook."""
+
+import csv
+import io
+import itertools
+import re
+import zipfile
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+from loomopt.base.errors import BadInput, refusal, shown
+
+LARGEST_FILE = 1_000_000
+"""Bytes of a file."""
+MOST_ROWS, MOST_COLUMNS = 2500, 256
+"""Rows and columns of a sheet that are looked at."""
+SEPARATORS = "\t;,|"
+"""What may stand between cells, the rarer inside a cell first."""
+WORKBOOK, OLD_WORKBOOK, PARQUET = b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1"
+"""How files begin that are no text."""
+ENCODINGS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+"""Byte order mark → encoding."""
+BLANKS = " \t\r\n\u00a0\u2009\u202f"
+"""Blanks around a cell, those that do not break a line included."""
+MOST_UNPACKED = 50_000_000
+"""Bytes of a workbook's parts together."""
+_SEPARATOR_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE)
+_TO_EXCEL = "Save it as .xlsx or as CSV"
+
+
+class Row(NamedTuple):
+    """One row: the line of the file in which it ends, and its cells, without empty ones at the end."""
+
+    line: int
+    cells: tuple[str, ...]
+
+    def cell(self, place: int) -> str:
+        """Return the cell at a place, counted from 0; "" beyond the end."""
+        return self.cells[place] if place < len(self.cells) else ""
+
+
+class Cells(NamedTuple):
+    """A file's rows that are not empty; separator: between its cells, "" in a workbook; remarks: lines after a #."""
+
+    rows: tuple[Row, ...]
+    separator: str
+    remarks: tuple[Row, ...] = ()
+
+
+def read(raw: bytes, origin: str) -> Iterator[Cells]:
+    """Yield the cells of a file, once for each separator that may be meant; at least one. Raises BadInput.
+
+    raw: what stands in the file; origin: what messages call it.
+    """
+    if len(raw) > LARGEST_FILE:
+        raise refusal("the table is too large", origin, allowed="up to 1 MB", remedy="Thin it out")
+    found = text(raw, origin)
+    lines = found.split("\n")
+    first = next((k for k, line in enumerate(lines) if line.strip()), 0)
+    told = _SEPARATOR_LINE.fullmatch(lines[first].strip("\r\n ")) if lines else None
+    if told:
+        lines[first] = ""
+    likely = [told[1]] if told else [sign for sign in SEPARATORS if any(sign in line for line in lines)] or [","]
+    tables = [cells for sign in likely if (cells := _parted(lines, sign)) is not None]
+    if not tables:
+        remedy = "Write short cells, and close every quotation mark on its own line"
+        raise refusal("the table is not CSV", origin, remedy=remedy)
+    yield from tables
+
+
+def text(raw: bytes, origin: str) -> str:
+    """Return a table as text, a workbook's first sheet as CSV with commas. Raises BadInput for what is no table."""
+    if raw.startswith(WORKBOOK):
+        return _written(_sheet(raw, origin))
+    if raw.startswith(PARQUET):
+        return _written(_parquet(raw, origin))
+    if raw.startswith(OLD_WORKBOOK):
+        raise refusal("it is a workbook of Excel 97 (.xls)", origin, remedy=_TO_EXCEL)
+    encoding = next((name for mark, name in ENCODINGS.items() if raw.startswith(mark)), "") or _without_mark(raw)
+    for name in (encoding, "cp1252") if encoding == "utf-8" else (encoding,):
+        try:
+            return raw.decode(name).replace("\r\n", "\n").replace("\r", "\n")
+        except UnicodeDecodeError as error:
+            place = error.start
+    remedy = "Save the file as UTF-8"
+    raise refusal(f"it is no text in UTF-8, UTF-16 or Windows-1252 (byte {place})", origin, remedy=remedy)
+
+
+def _without_mark(raw: bytes) -> str:
+    """Return the encoding of text without a byte order mark: every other byte of UTF-16 is mostly 0."""
+    head = raw[:400]
+    for name, odd in (("utf-16-le", head[1::2]), ("utf-16-be", head[0::2])):
+        if len(head) >= 8 and odd.count(0) > 0.8 * len(odd):
+            return name
+    return "utf-8"
+
+
+def _parted(lines: Sequence[str], separator: str) -> Cells | None:
+    """Return the cells of lines; None where quotation marks do not fit the separator."""
+    numbers: list[int] = []
+
+    def kept() -> Iterator[str]:
+        for number, line in enumerate(lines, 1):
+            if line.strip() and not line.lstrip().startswith("#"):
+                numbers.append(number)
+                yield line + "\n"
+
+    try:
+        rows = [_row(numbers[-1], cells) for cells in csv.reader(kept(), delimiter=separator, strict=True)]
+        remarks = [(k, line.lstrip()[1:].strip()) for k, line in enumerate(lines, 1) if line.lstrip().startswith("#")]
+        told = tuple(_row(k, next(csv.reader([line], delimiter=separator), [])) for k, line in remarks[:20])
+    except (csv.Error, ValueError):
+        return None
+    return Cells(tuple(row for row in rows if row.cells), separator, told)
+
+
+def _row(line: int, cells: Iterable[str]) -> Row:
+    found = [cell.strip(BLANKS) for cell in cells]
+    while found and not found[-1]:
+        found.pop()
+    return Row(line, tuple(found))
+
+
+def _written(rows: Iterable[Sequence[object]]) -> str:
+    """Return rows of cells as CSV text: numbers with all their digits."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    for row in rows:
+        writer.writerow(["" if cell is None else repr(cell) if isinstance(cell, float) else str(cell) for cell in row])
+    return out.getvalue()
+
+
+def _sheet(raw: bytes, origin: str) -> list[Sequence[object]]:
+    """Return the rows of a workbook's first sheet that holds something; an empty row for one without cells."""
+    import warnings
+
+    from openpyxl import load_workbook
+
+    try:
+        if sum(part.file_size for part in zipfile.ZipFile(io.BytesIO(raw)).infolist()) > MOST_UNPACKED:
+            raise refusal("the workbook is too large", origin, allowed="up to 50 MB unpacked", remedy="Thin it out")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of what a sheet has beside its cells
+            book = load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
+            for sheet in book.worksheets:
+                rows = itertools.islice(sheet.iter_rows(max_col=MOST_COLUMNS, values_only=True), MOST_ROWS)
+                found: list[Sequence[object]] = [[_value(cell) for cell in row] for row in rows]
+                if any(cell is not None for row in found for cell in row):
+                    return found
+    except BadInput:
+        raise
+    except (zipfile.BadZipFile, KeyError, ValueError, OSError, TypeError, AttributeError, EOFError) as error:
+        problem = f"it is no workbook that can be read ({shown(type(error).__name__)})"
+        raise refusal(problem, origin, remedy=_TO_EXCEL) from None
+    return []
+
+
+def _value(cell: object) -> object:
+    """Return what a cell of a workbook holds: whole numbers without a point, dates as they read."""
+    return int(cell) if isinstance(cell, float) and cell.is_integer() and abs(cell) < 1e15 else cell
+
+
+def _parquet(raw: bytes, origin: str) -> list[Sequence[object]]:
+    """Return the rows of a Parquet file, its heading first."""
+    import pandas as pd
+
+    try:
+        frame = pd.read_parquet(io.BytesIO(raw))
+    except (ImportError, OSError, ValueError):
+        raise refusal("it is no Parquet file that can be read", origin, remedy=_TO_EXCEL) from None
+    if frame.index.name is not None:
+        frame = frame.reset_index()
+    return [list(map(str, frame.columns)), *(list(row) for row in frame.itertuples(index=False))]
