@@ -245,7 +245,7 @@ def _put_beside(
 
     phi, told = np.asarray(columns[ANGLE]) % TURN, {}
     apart = np.abs((phi[:, None] - np.array(angles) + math.pi) % TURN - math.pi)
-    places = np.argmin(apart, axis=0)
+    places = [_place(row, angles[:k].count(angles[k])) for k, row in enumerate(apart.T)]
     for column in [column for column in columns if split(column)[0] in measured]:
         name, unit = split(column)
         values = np.full(len(phi), math.nan)
@@ -254,3 +254,15 @@ def _put_beside(
         off = np.asarray(columns[column])[places] - np.asarray(measured[name])
         told[f"{RMS}{name} [{unit}]"] = float(np.sqrt(np.nanmean(off**2)))
     return told
+
+
+SAME = 1e-9
+"""rad; rows this close are both sides of a corner."""
+
+
+def _place(apart: "Floats", before: int) -> int:
+    """Return the row of curves for a measured row; apart: from each of them, rad; before: rows of the same angle."""
+    import numpy as np
+
+    near = np.flatnonzero(apart <= apart.min() + SAME)
+    return int(near[min(before, len(near) - 1)])

@@ -115,7 +115,7 @@ def columns(scene: Scene, given: str, key: str, kinds: Mapping[str, str]) -> tup
 def measured(path: Path, kinds: Mapping[str, str]) -> Table:
     """Return those columns of a caller's table that have a name of `kinds`, its first one always. Raises BadInput.
 
-    kinds: column name → kind of quantity, angles first.
+    kinds: column name → kind of quantity, angles first. An empty cell, but for an angle, is NaN.
     """
     given, (angle, *names) = str(path), kinds
     tables = list(table_cells.read(_bytes(path, given, "", "beside"), given))
@@ -124,7 +124,8 @@ def measured(path: Path, kinds: Mapping[str, str]) -> Table:
         allowed = ", ".join(f"{name} [{DISPLAY_UNIT[kinds[name]]}]" for name in names)
         remedy = "Name its columns as the curves are named"
         raise refusal("the table has no column of the curves", given, allowed=allowed, remedy=remedy)
-    return _table(tables, given, {name: kinds[name] for name in (angle, *there)}, fewest=1)
+    names = (angle, *there)
+    return _table(tables, given, {name: kinds[name] for name in names}, fewest=1, twice=True, gaps=True)
 
 
 def header(kinds: Mapping[str, str]) -> str:
@@ -166,6 +167,7 @@ def _table(
     fewest: int = FEWEST_ROWS,
     twice: bool = False,
     digits: int | None = None,
+    gaps: bool = False,
 ) -> Table:
     """Return the table that a file's cells make, with the separator that gives most of the columns."""
     cells = max(tables, key=lambda each: len(_there(each, kinds)))
@@ -184,9 +186,15 @@ def _table(
     decimal, remarks = _decimal_sign(rows, found, cells.separator, origin)
     texts = {column: [_plain(row.cell(column.place), decimal) for row in rows] for column in found}
     values = {
-        column.name: tuple(_number(text, row, column, origin) for text, row in zip(texts[column], rows, strict=True))
+        column.name: tuple(
+            _number(text, row, column, origin, gaps and column is not found[0])
+            for text, row in zip(texts[column], rows, strict=True)
+        )
         for column in found
     }
+    for column in found:
+        if all(map(math.isnan, values[column.name])):
+            raise refusal(f"column {column.called} is empty", origin, remedy="Fill it, or take it out")
     halves = {
         column.name: tuple(
             half * column.unit for half in _halves(texts[column], None if column.kind == "angle" else digits)
@@ -376,7 +384,10 @@ def _plain(text: str, decimal: str) -> str:
     return f"{whole}{sign and POINT}{rest}"
 
 
-def _number(text: str, row: Row, column: _Column, origin: str) -> float:
+def _number(text: str, row: Row, column: _Column, origin: str, gap: bool) -> float:
+    """Return a number, SI; gap: whether an empty cell is NaN. Raises BadInput."""
+    if gap and not text:
+        return math.nan
     value = plain_number(text)
     where = f"line {row.line}, column {column.called}"
     if is_beyond(text):

@@ -69,8 +69,8 @@ def test_the_command_tells_the_rms_and_writes_both(measured, tmp_path):
         ("phi [deg],chi [deg]\n0,1\n", "no column of the curves"),
         ("psi [deg]\n1\n", "no column phi"),
         ("phi [deg],psi [mm]\n0,1\n", "is no unit of this column"),
-        ("phi [deg],psi [deg]\n0,1\n0,2\n", "stands in line 2 too"),
-        ("phi [deg],psi [deg]\n0,\n", "column psi: the cell is empty"),
+        ("phi [deg],psi [deg]\n0,1\n0,2\n0,3\n", "stands in line 2 too"),
+        ("phi [deg],psi [deg]\n0,\n", "column psi is empty"),
         ("", "empty"),
     ],
 )
@@ -85,3 +85,19 @@ def test_a_file_that_measures_nothing_is_refused_in_one_line(tmp_path, rows, tol
 def test_what_is_no_file_is_refused(wrong):
     with pytest.raises(BadInput):
         lo.simulate("beatup", measured=wrong)
+
+
+@pytest.mark.parametrize("comma", [False, True])
+@pytest.mark.parametrize("name", ["p.csv", "p.xlsx"])
+@pytest.mark.parametrize("problem", ["beatup", "rapier", "shedding"])
+@pytest.mark.few(3)
+def test_own_curves_are_read_as_measured_ones(tmp_path, problem, name, comma):
+    path = tmp_path / name
+    words = ["simulate", problem, "--out", str(path), *(["--decimal", "comma"] if comma else [])]
+    made = CliRunner().invoke(app.application(words), words)
+    assert made.exit_code == 0, made.output
+    frame = lo.simulate(problem, measured=path)
+    told = {key: value for key, value in frame.attrs.items() if key.startswith("rms_")}
+    assert len(told) > 3
+    for key, value in told.items():
+        assert float(value) <= 1e-11 * frame[key.removeprefix("rms_")].abs().max(), key

@@ -91,7 +91,7 @@ def test_two_samples_of_one_angle_are_both_sides_of_a_jump():
 
 
 def test_a_curve_may_jump_where_its_turn_ends():
-    curve = through((0.0, 1.5, 3.0, 4.75, TURN), (1.0, 0.0, 0.0, 0.0, -1.0), (True, *(False,) * 4))
+    curve = through((0.0, 1.5, 3.0, 4.5, 5.5, TURN), (1.0, 0.0, 0.0, 0.0, 0.0, -1.0), (True, *(False,) * 5))
     assert curve.corners == 1
     assert float(curve.at(systems.FLOAT, 0.0, 0.0)) == pytest.approx(1.0, abs=1e-13)
-    assert float(curve.at(systems.FLOAT, TURN, 3.0)) == pytest.approx(-1.0, abs=1e-13)
+    assert float(curve.at(systems.FLOAT, TURN, 4.0)) == pytest.approx(-1.0, abs=1e-13)
