@@ -124,8 +124,8 @@ def measured(path: Path, kinds: Mapping[str, str]) -> Table:
         allowed = ", ".join(f"{name} [{DISPLAY_UNIT[kinds[name]]}]" for name in names)
         remedy = "Name its columns as the curves are named"
         raise refusal("the table has no column of the curves", given, allowed=allowed, remedy=remedy)
-    names = (angle, *there)
-    return _table(tables, given, {name: kinds[name] for name in names}, fewest=1, twice=True, gaps=True)
+    asked = {name: kinds[name] for name in (angle, *there)}
+    return _table(tables, given, asked, fewest=1, twice=True, gaps=True)
 
 
 def header(kinds: Mapping[str, str]) -> str:
@@ -474,8 +474,8 @@ def _check_angles(column: _Column, angles: Sequence[float], rows: Sequence[Row],
         places.setdefault(angle, []).append(k)
         there = places[angle]
         if len(there) > 1 + twice or (len(there) == 2 and there[1] != there[0] + 1):
-            angle = _cell(rows[k].cell(column.place))
-            problem = f"line {rows[k].line}, column {name}: the angle {angle} stands in line {rows[there[0]].line} too"
+            text = _cell(rows[k].cell(column.place))
+            problem = f"line {rows[k].line}, column {name}: the angle {text} stands in line {rows[there[0]].line} too"
             remedy = "Keep one row for each angle"
             remedy += ", or two rows, one below the other, for both sides of a corner" if twice else ""
             raise refusal(problem, origin, remedy=remedy)

@@ -97,7 +97,7 @@ def test_own_curves_are_read_as_measured_ones(tmp_path, problem, name, comma):
     made = CliRunner().invoke(app.application(words), words)
     assert made.exit_code == 0, made.output
     frame = lo.simulate(problem, measured=path)
-    told = {key: value for key, value in frame.attrs.items() if key.startswith("rms_")}
+    told = {str(key): value for key, value in frame.attrs.items() if str(key).startswith("rms_")}
     assert len(told) > 3
     for key, value in told.items():
         assert float(value) <= 1e-11 * frame[key.removeprefix("rms_")].abs().max(), key

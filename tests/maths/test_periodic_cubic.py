@@ -85,7 +85,7 @@ def test_two_samples_of_one_angle_are_both_sides_of_a_jump():
     assert curve.corners == 2
     assert curve.samples == 6
     ahead, behind = (float(curve.at(systems.FLOAT, 2.0, k)) for k in (1.0, 2.0))
-    assert (ahead, behind) == (pytest.approx(2.0, abs=1e-14), pytest.approx(-2.0, abs=1e-14))
+    assert [ahead, behind] == pytest.approx([2.0, -2.0], abs=1e-14)
     assert float(curve.at(systems.FLOAT, 1.5, 1.0)) == pytest.approx(1.5, abs=1e-14)
     assert curve.largest == 2.0
 
