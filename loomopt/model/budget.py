@@ -149,7 +149,10 @@ def _share(load: Acting, at: Instant) -> Number:
     others = {each.name for each in at.model.loads} - {load.name}
     found = balance.terms(at.maths, at.model.loads, at.pose, at.given, at.node.switch, others)
     ((_, term),) = found
-    return term * at.pose.q1 if load.acts == "output" else term
+    if load.acts != "output":
+        return term
+    beside = balance.inside(at.maths, load, at.pose, at.given)
+    return term * at.pose.q1 if beside is None else term * at.pose.q1 + beside
 
 
 class _Rule(NamedTuple):

@@ -15,6 +15,7 @@ from loomopt.maths import systems, turning_points
 from loomopt.model.drive import motor_power
 from loomopt.model.model import Formula, Instant
 from loomopt.model.sampling import Sampler
+from loomopt.physics import balance
 from loomopt.physics.balance import Acting
 from loomopt.physics.cycle import TURN, Floats, Pieces
 from loomopt.physics.tolerances import ROUNDED, SAME_ANGLE
@@ -95,6 +96,10 @@ def columns_at(sampler: Sampler, columns: Columns, rows: Rows) -> dict[str, Floa
         partial = bool(getattr(load, "known_in", dict)(sampler.model.words_of(load.name)))
         unit = columns.unit if load.acts == "output" else SI_UNIT["torque"]
         found[f"{load_name(load)} [{unit}]"] = np.where(unknown, np.nan, whole) if partial else whole
+        within = balance.inside(at.maths, load, at.pose, at.given)
+        if within is not None:
+            name = f"{drive_name(load)} [{SI_UNIT['torque']}]"
+            found[name] = np.broadcast_to(np.asarray(within, dtype=float), u.shape).astype(float)
     if columns.force and any(load.acts == "output" for load in loads):
         found[columns.force[0]] = np.where(unknown, np.nan, _column(columns.force[1], at, u))
     if columns.torque and loads:
@@ -133,6 +138,11 @@ def _in_time(columns: Mapping[str, Floats], at: Instant) -> dict[str, Floats]:
             rate = rate if change is None or order == 1 else rate + by_angle[0] * change
             found[f"{name}_{'t' * order} [{unit}/s{f'^{order}' if order > 1 else ''}]"] = rate
     return found
+
+
+def drive_name(load: Acting) -> str:
+    """Name of the column of what a load of the output takes inside the drive besides."""
+    return f"{load_name(load)}_drive"
 
 
 def load_name(load: Acting) -> str:

@@ -111,7 +111,14 @@ def crank_torque(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Giv
     found = list(terms(maths, loads, pose, given, switch, carried(loads)))
     output = [term for load, term in found if load.acts == "output"]
     drive = [term for load, term in found if load.acts == "drive"]
+    drive += [term for load in loads if (term := inside(maths, load, pose, given)) is not None]
     return total([total(output) * pose.q1, *drive] if output else drive)
+
+
+def inside(maths: Maths, load: Acting, pose: Motion, given: Given) -> Number | None:
+    """Crank torque that a load of the output takes inside the drive besides, N·m; None for nothing."""
+    formula = load.inside if isinstance(load, Load) else None
+    return formula(maths, pose, given.values, given.own[load.name]) if formula else None
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ def given(model: JobModel, values: Values) -> Given:
         given_keys = [key for key in keys(effect.own) if not told or owned(effect, key) in model.known]
         own[effect.name] = own_values(effect, words, given_keys, taken)
         taken |= {str(value) for key, value in own[effect.name].items() if key not in words}
-    if not any(check.joints for check in model.checks):
+    if not told and not any(check.joints for check in model.checks):
         return Given(values, own)
     # Where a formula asks whether a number is given, those are that the scene gives.
     there = {owned(effect, key): value for effect in model.effects for key, value in own[effect.name].items()}
@@ -73,7 +73,13 @@ def forces(
     """Write each term, their balance and the crank torque, the crank's motion, then what checks read and demand."""
     at = turning(pose, model)
     found = [each for load in model.loads for each in _written(model, load, at, known, letter)]
-    found += sums(model.loads, at, symbol(total), letter, torque)
+    within = dict[str, Expression]()
+    for load in model.loads:
+        value = balance.inside(systems.sympy(), load, at, known)
+        if value is not None:
+            within[f"{letter}_{load.name}_drive"] = value
+            found.append(equation(load.name, symbol(f"{letter}_{load.name}_drive"), sympy().sympify(value)))
+    found += sums(model.loads, at, symbol(total), letter, torque, tuple(map(symbol, within)))
     found += crank_motion(model, at, known, torque[1])
     found += [each for check in model.checks for each in check_equations(check, at, known)]
     return found + joint_equations(model, at, known, symbol(total), letter)

@@ -100,10 +100,11 @@ def sums(
     total: Expression,
     letter: str,
     torque: tuple[str, str] = ("crank torque", "Md"),
+    within: Sequence[Expression] = (),
 ) -> list[Equation]:
     """Return the output's balance and the crank torque by the balance's own sums; a load's term: LETTER_name.
 
-    torque: what the crank's torque is called, and its symbol.
+    torque: what the crank's torque is called, and its symbol; within: what output loads take inside the drive besides.
     """
     system, found = systems.sympy(), []
     shown = [_shown(load, symbol(f"{letter}_{load.name}")) for load in loads]
@@ -115,14 +116,14 @@ def sums(
     summed += [load for load in shown if load.acts == "drive"]
     if summed:
         name, sign = torque
-        found.append(equation(name, symbol(sign), balance.crank_torque(system, summed, pose, given, {})))
+        found.append(equation(name, symbol(sign), sum(within, balance.crank_torque(system, summed, pose, given, {}))))
     return found
 
 
 def _shown(load: Acting, value: Expression) -> Acting:
     """Return a load whose force is one symbol, and which no state needs to answer."""
     if isinstance(load, Load):
-        return dataclasses.replace(load, force=lambda *_: value, response=None, upon=None)
+        return dataclasses.replace(load, force=lambda *_: value, response=None, upon=None, inside=None)
     return dataclasses.replace(load, force=lambda *_: value)
 
 

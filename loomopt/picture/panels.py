@@ -8,7 +8,7 @@ import numpy as np
 from loomopt.base.records import Frozen
 from loomopt.base.units import SI_UNIT
 from loomopt.maths import systems
-from loomopt.model.curves import ANGLE, COLUMN, POWER, load_name, split
+from loomopt.model.curves import ANGLE, COLUMN, POWER, drive_name, load_name, split
 from loomopt.model.drive import MOTOR, SPEED
 from loomopt.model.drive import POWER as PEAK_POWER
 from loomopt.model.model import COMPONENTS, read_at
@@ -123,6 +123,8 @@ def _of_effects(scene: Scene) -> dict[str, Curve]:
             symbol = load_name(effect)
             name = effect.name.replace("_", " ") if symbol != effect.name else ""
             found[symbol] = Curve(name, BY_EFFECT if effect.acts == "output" else DRIVE)
+            if isinstance(effect, Load) and effect.inside:
+                found[drive_name(effect)] = Curve(f"{effect.name.replace('_', ' ')} of rod and crank", DRIVE)
         elif isinstance(effect, Check):
             found |= {name: Curve(peak=name) for name in (*effect.quantities, *effect.scalars)}
             found |= {name: Curve(panel="in the joints", peak=name) for name in effect.vectors}

@@ -57,6 +57,7 @@ class Machine:
         number = {**scene.operation, **scene.mechanism, **freed}
         self.w, self.M0 = number.get("speed", 0.0), number.get("M0", 0.0)
         self.m4, self.r4 = number.get("m4", 0.0), number.get("r4", 0.0)
+        self.crank = dict(scene.tables["mechanism"]).get("crank")
         self.own = {name: table.model_dump() for name, table in scene.effects.items()}
         self.own = {name: own | {key: freed[key] for key in own.keys() & freed} for name, own in self.own.items()}
         self.today = {name: scene.mechanism[name] for name in DESIGN}
@@ -83,11 +84,21 @@ class Machine:
         if "gravity" in self.own:
             tilt, offset = self.own["gravity"]["tilt"], self.own["gravity"]["offset"]
             M3 = M3 - G * (self.m4 * self.r4 - m4e * r4e) * np.cos(psi + offset + tilt)
+            rocker = self.own.get("rocker_inertia", {})
+            M3 = M3 - G * (rocker.get("m3") or 0.0) * (rocker.get("s3") or 0.0) * np.cos(psi + tilt)
         if "bearing_friction" in self.own:
             own = self.own["bearing_friction"]
             opening = np.mod(phi - beta - 1e-12, 2 * np.pi) < np.mod(np.pi + beta_r - beta, 2 * np.pi)
             M3 = M3 - own["coulomb"] * np.where(opening, 1.0, -1.0) - own["viscous"] * psi_1 * w
         Md = -M3 * psi_1
+        if "gravity" in self.own:
+            up = np.exp(1j * (np.pi / 2 - tilt))
+            rates = 1j * l1 * np.exp(1j * phi), 1j * psi_1 * l3 * np.exp(1j * psi)
+            if self.crank is not None:
+                Md = Md + G * self.crank.mass * self.crank.centre / l1 * (np.conj(up) * rates[0]).real
+            if "rod_inertia" in self.own:
+                rod_mass, part = self.own["rod_inertia"]["m2"], self.own["rod_inertia"]["s2"] / self.today["l2"]
+                Md = Md + G * rod_mass * (np.conj(up) * ((1 - part) * rates[0] + part * rates[1])).real
         if "rod_inertia" in self.own:
             own = self.own["rod_inertia"]
             share = own["s2"] / self.today["l2"]

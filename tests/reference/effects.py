@@ -43,6 +43,8 @@ SIXBAR = {
 OTHER_SIXBAR = {"l1": "55", "l2": "130", "e": "118", "Gx": "385"}
 MASSES = (("rod", "1.5", "62.7"), ("rocker", "4", "60"), ("link", "2.5", "107"))
 """Its links with mass: kg, and where the centre lies along them, mm."""
+REED_MASS = ("sley", "56.8", "45")
+"""What turns with its output, likewise; its counterweight has no mass today."""
 MAIN = 40 * PI / 3
 """rad/s: 400 rpm."""
 
@@ -420,7 +422,7 @@ class Linkage:
     def link(self, name, phi):
         """Return a link's first joint and direction."""
         at = self.joints(phi)
-        a, b = {"rod": ("B", "C"), "rocker": ("D", "C"), "link": ("E", "F")}[name]
+        a, b = {"rod": ("B", "C"), "rocker": ("D", "C"), "link": ("E", "F"), "sley": ("G", "F")}[name]
         return at[a], (at[b] - at[a]) / abs(at[b] - at[a])
 
     def acceleration(self, phi):
@@ -455,13 +457,13 @@ class Linkage:
         return origin + along * direction
 
     def gravity(self, own, phi):
-        """Return the rise of what the packaged scene's links weigh."""
+        """Return the rise of what the packaged scene's links and its reed weigh."""
         down = MP.expj(own["down"])
 
         def height(at):
             return sum(
                 -MP.mpf(mass) * (self.centre(name, MP.mpf(along) / 1000, at) * down.conjugate()).real
-                for name, mass, along in MASSES
+                for name, mass, along in (*MASSES, REED_MASS)
             )
 
         return MP.mpf("9.80665") * slope(height, phi)

@@ -101,6 +101,7 @@ class SixBar:
 
     OMEGA = 400 * 2 * np.pi / 60
     J, CLOTH, PULSE, RADIUS, L4 = 0.62, 745.0, np.radians(29.8), 0.08, 0.1668
+    REED, CENTRE = 56.8, 0.045
 
     def __init__(self, v):
         self.v = v
@@ -118,6 +119,8 @@ class SixBar:
             Mass(4.0, D + 0.06 * (C - D) / v["l3"], 0.01, angle(C - D)),
             Mass(2.5, E + 0.107 * (F - E) / v["l5"], 0.0096, angle(F - E)),
         ]
+        # What turns with the sley is in J: here it weighs only, the counterweight opposite the reed.
+        self.lifted = Series((self.REED * self.CENTRE - v["mass"] * self.RADIUS) * (F - G) / v["l6"])
         self.front, self.rear = self.q.extreme(np.radians(41)), self.q.extreme(np.radians(182))
 
     @property
@@ -141,7 +144,9 @@ class SixBar:
         since = (PHI - self.front + np.pi) % (2 * np.pi) - np.pi
         cloth = np.where(abs(since) <= self.PULSE / 2, self.CLOTH * np.cos(np.pi * since / self.PULSE), 0.0)
         output = self.inertia * self.q.over(2) * self.OMEGA**2 + cloth
-        drive = sum(each.torque(Series.over, self.OMEGA, np.radians(-60)) for each in self.masses)
+        down = np.radians(-60)
+        drive = sum(each.torque(Series.over, self.OMEGA, down) for each in self.masses)
+        drive = drive - GRAVITY * (np.exp(-1j * down) * self.lifted.over(1)).real
         return output * self.q.over(1) + drive
 
     def travel(self, end):
@@ -180,7 +185,7 @@ class Press:
         self.touch = touch
 
     def _torque(self, read, force):
-        output = self.RAM * read(self.s, 2) * self.OMEGA**2 + force
+        output = self.RAM * (read(self.s, 2) * self.OMEGA**2 - GRAVITY) + force
         return output * read(self.s, 1) + sum(m.torque(read, self.OMEGA, -np.pi / 2) for m in self.masses)
 
     @property

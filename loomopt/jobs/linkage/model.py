@@ -51,7 +51,8 @@ class Output(NamedTuple):
 
     against: another link, from which an angle is counted; sign: whether it counts so or the other way round.
     scale: what it is multiplied by; of an angle a length makes a length of it, so that the output slides. zero: the
-    direction from which an angle is counted, x without one.
+    direction from which an angle is counted, x without one. carrier: the link, or joint, whose place moves with the
+    output alone and carries its mass: a link on a fixed axis, the pin of a slider on the frame, a joint; else "".
     """
 
     measure: str
@@ -61,6 +62,7 @@ class Output(NamedTuple):
     scale: Ref | None = None
     zero: Ref | None = None
     slides: bool = False
+    carrier: str = ""
 
 
 class Place(NamedTuple):

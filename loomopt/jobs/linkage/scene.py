@@ -37,7 +37,7 @@ from loomopt.model import drive
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects import kinds
-from loomopt.physics.mechanisms import chain
+from loomopt.physics.mechanisms import chain, chain_forces
 from loomopt.physics.mechanisms.chain import Chain
 from loomopt.physics.schema import DIGITS, Axis, Digits, Figure, Name, Table, Target
 from loomopt.physics.schema import TargetTable as AnyTarget
@@ -173,7 +173,20 @@ def _output(raw: Mapping[str, Any], linked: Chain, names: Mapping[str, Any], use
             raise refusal(f"{key} is for an angle alone", "", f"output.{key}", remedy="Take it out")
     against = _one_of(found, "against", links, "link", "output") if "against" in raw else ""
     sense = SENSES[found.words.get("sense", "forward")]
-    return Output(form, name, against, sense, found.numbers.get("scale"), found.numbers.get("zero"), slides_now)
+    scale, zero = found.numbers.get("scale"), found.numbers.get("zero")
+    carrier = "" if against or scale else _carrier(linked, form, name)
+    return Output(form, name, against, sense, scale, zero, slides_now, carrier)
+
+
+def _carrier(linked: Chain, form: str, name: str) -> str:
+    """Link or joint that carries the mass of an output: `Output.carrier`."""
+    if form == "angle":
+        return name if chain_forces.origins(linked).get(name) in linked.pivots else ""
+    if form != "slide":
+        return name
+    part = next(part for part in linked.parts if part.name == name)
+    on_frame = part.kind == "slider" and part.word("guide") in ("", chain.FRAME_NAME)
+    return part.word("pin") if on_frame else ""
 
 
 def _one_of(found: parts.Entries, key: str, known: Iterable[str], what: str, path: str) -> str:
@@ -496,8 +509,9 @@ def _check_names(scene: Scene, known: Reading) -> None:
     taken |= dict.fromkeys(("omega", "omega_dot", "phi", "instance"), "a symbol of the equations")
     taken |= {
         kinds.label(effect, key): f"a number of effect {effect.name}"
-        for effect in scene.active
+        for effect, own in zip(scene.active, scene.effects.values(), strict=True)
         for key in effect.own.model_fields
+        if getattr(own, key) is not None
     }
     for name in known.numbers:
         parts.check_name(name, f"mechanism.{name}", taken)
@@ -523,6 +537,10 @@ def _check_effects(scene: Scene, known: Reading) -> None:
                 faults.add(unknown(sort, value, places, scene.origin, f"{path}.{key}", "Add it, or correct the name"))
         with faults:
             _check_sense(effect, own.model_dump(), path, scene.origin)
+        if effect.name == "inertia" and getattr(own, "m", None) is not None and not known.linkage.output.carrier:
+            problem = f"{path}.m needs a link of the output that turns about a fixed axis and counts from the frame"
+            remedy = f"Take m out, and give the link's mass in [effects.mass.{known.linkage.output.name}]"
+            faults.add(refusal(problem, scene.origin, f"{path}.m", remedy=remedy))
     faults.tell()
 
 

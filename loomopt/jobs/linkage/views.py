@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from loomopt.jobs import registry
 from loomopt.jobs.linkage.model import LinkagePose, Output, end_of_rest, event_value
 from loomopt.jobs.linkage.program import linkage_of
+from loomopt.jobs.linkage.scene import reading
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT, Number
 from loomopt.model.model import JobModel
@@ -290,7 +291,7 @@ class LinkageViews(JobViews):
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
         """Return what to know beside the numbers: curves, and events that stand elsewhere than today's."""
-        found = told(scene)
+        found = (*told(scene), *_without_place(scene))
         moved = self._moved(scene, design)
         return (*found, *self._rests(scene, design), *((moved,) if moved else ()))
 
@@ -323,6 +324,27 @@ class LinkageViews(JobViews):
         )
         often = f"the output turns {turns} times in a turn of the crank, today's {before} times"
         return f"{often}; its events stand at {where}"
+
+
+def _without_place(scene: Scene) -> Iterator[str]:
+    """Say which mass of the output forces in joints, or its weight, leave out."""
+    out, effects = reading(scene.document).linkage.output, scene.effects
+    readers = {"joint_forces": "forces in the joints and on the frame", "gravity": "gravity"}
+    leave_out = " and ".join(text for name, text in readers.items() if name in effects)
+    verb = "leave" if "joint_forces" in effects else "leaves"
+    for name in ("inertia", "counterweight"):
+        if not leave_out or name not in effects:
+            continue
+        if out.carrier:
+            if name == "inertia" and getattr(effects[name], "m", 0.0) is None:
+                key = "effects.inertia.m and centre"
+                yield f"{leave_out} {verb} out the mass of the output: effects.inertia tells J alone. Give {key}"
+        else:
+            yield (
+                f"{leave_out} {verb} out the mass of effects.{name}, but for what it does to the output itself: the "
+                f"motion of the output {out.measure} of {out.name} alone does not tell where the mass moves. Give it "
+                "as effects.mass, on a link or a joint, instead"
+            )
 
 
 VIEWS = LinkageViews()

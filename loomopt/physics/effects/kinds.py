@@ -278,6 +278,8 @@ class Load(Effect, Generic[Pose]):
     holds at a crank angle inside a piece, as a number the force is handed.
     response: what an oscillator that carries the load makes of it; one with corners cannot be carried without.
     known_in(words): where the term is known, by the words of its table; empty for all over the cycle.
+    inside(maths, pose, given, own): of an output term, what the effect takes inside the drive besides, N·m; None for
+    nothing.
     upon(maths, pose, given, own, switch, loading): the term instead, where it depends on what all others do.
     moved(given, own): the inertia, kg·m² or kg, that it adds to what moves with the output.
     symbol: what its column of the curves is called, its name without one.
@@ -290,6 +292,7 @@ class Load(Effect, Generic[Pose]):
 
     acts: Literal["output", "drive"]
     force: Force[Pose]
+    inside: "Callable[[Maths, Pose, Values, Values], Number | None] | None" = None
     upon: "Callable[[Maths, Pose, Values, Values, Number, Loading], Number] | None" = None
     corners: Corners | None = None
     switch: Callable[[float, tuple[float, ...]], float] = constant_switch

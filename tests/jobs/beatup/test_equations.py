@@ -21,7 +21,7 @@ NUMBERS |= {"m4e": 3.0, "r4e": 0.05, "m4": 56.8, "r4": 0.045}
 OWN = {
     "inertia": {"J4": 0.62},
     "resistance": {"pulse": 0.52},
-    "rocker_inertia": {"J3": 0.05},
+    "rocker_inertia": {"J3": 0.05, "m3": 6.0, "s3": 0.0775},
     "counterweight_inertia": {"JS": 0.01},
     "rod_inertia": {"m2": 4.0, "s2": 0.03, "JS2": 0.004},
     "gravity": {"tilt": 0.3, "offset": 0.1},
@@ -70,7 +70,9 @@ def value(expression, named):
 
 def setting(found, phi):
     """Return the scene's numbers, the pose and the switches at a crank angle, by plain floats."""
-    values = NUMBERS | {f"{name}.{key}": number for name, own in OWN.items() for key, number in own.items()}
+    on = {effect.name for effect in found.effects}
+    own_numbers = ((name, key, number) for name, own in OWN.items() if name in on for key, number in own.items())
+    values = NUMBERS | {f"{name}.{key}": number for name, key, number in own_numbers}
     given = found.given(FLOAT, values)
     split = found.split(FLOAT, given)
     switches = split.switch(split.place(phi)[0])
@@ -90,7 +92,8 @@ def test_printed_terms_are_the_balance(rod, phi):
     drive = sum(symbolic[load.name] for load in found.loads if load.acts == "drive")
     arguments = (FLOAT, found.loads, pose, given, switches)
     assert value(output, named) == pytest.approx(balance.output_force(*arguments), rel=1e-12)
-    torque = output * sp.Symbol("q'", real=True) + drive
+    (within,) = (each.form[0][2] for each in beatup_equations.equations(found) if "M_gravity_drive =" in each.text)
+    torque = output * sp.Symbol("q'", real=True) + drive + within
     assert value(torque, named) == pytest.approx(balance.crank_torque(*arguments), rel=1e-12)
 
 
@@ -211,7 +214,7 @@ def test_a_term_with_corners_says_where_each_formula_holds():
 
 def test_all_effects_together_stay_short_and_their_symbols_apart():
     found = beatup_equations.equations(model(*BEATUP))
-    assert sum(len(equation.name) + len(equation.text) + 2 for equation in found) < 5000
+    assert sum(len(equation.name) + len(equation.text) + 2 for equation in found) < 5600
     keys = [key for effect in BEATUP.values() for key in effect.own.model_fields if key != "model"]
     assert len(keys) == len(set(keys))
 

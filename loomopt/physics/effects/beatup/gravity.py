@@ -1,7 +1,9 @@
-"""Weight of the reed system and of its counterweight.
+"""Weight of the reed system with its counterweight, and of rocker, rod and crank as far as the scene tells their mass.
 
-Output term ∂U/∂q, U = g (m4 r4 − m4e r4e) sin(ψ + χ + tilt): the reed's centre lies at (r4, ψ + χ) from the rocking
-shaft, the counterweight opposite; tilt is the angle of A→D from the horizontal. The rod's weight is left out.
+Output term ∂U/∂q, U = g (m4 r4 − m4e r4e) sin(ψ + χ + tilt) + g m3 s3 sin(ψ + tilt): the reed's centre lies at
+(r4, ψ + χ) from the rocking shaft, the counterweight opposite; tilt is the angle of A→D from the horizontal. Rod and
+crank weigh inside the drive: crank torque dU/dφ, U = g tilted height of m2 at s2 on the rod and m1 at s1 on the crank.
+The ratio s2/l2 stays today's when l2 varies, as in effect rod_inertia.
 """
 
 from pydantic import Field
@@ -11,6 +13,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.beatup import ReedPose
 from loomopt.physics.effects.kinds import LinkMass, Load
 from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.moving import total
 from loomopt.physics.schema import Table, Values
 
 STANDARD_GRAVITY = 9.80665
@@ -27,13 +30,43 @@ class Own(Table):
 def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
     """Return −∂U/∂ψ, N·m (q = −ψ)."""
     moment = given["m4"] * given["r4"] - given["m4e"] * given["r4e"]
-    return -STANDARD_GRAVITY * moment * maths.cos(own["offset"] + own["tilt"] - pose.q)
+    reed = -STANDARD_GRAVITY * moment * maths.cos(own["offset"] + own["tilt"] - pose.q)
+    rocker = rocker_moment(given)
+    return reed if rocker is None else reed - STANDARD_GRAVITY * rocker * maths.cos(own["tilt"] - pose.q)
+
+
+def rocker_moment(given: Values) -> Number | None:
+    """Mass of the rocker times its centre's distance from the rocking shaft, kg·m; None where it is not told."""
+    if "rocker_inertia.m3" not in given or "rocker_inertia.s3" not in given:
+        return None
+    return given["rocker_inertia.m3"] * given["rocker_inertia.s3"]
+
+
+def inside(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number | None:
+    """Crank torque that lifts rod and crank, N·m: the rod as its shares at B and C; None where neither tells a mass."""
+    at_crank, at_rocker = None, None
+    if "rod_inertia.m2" in given:
+        at_rocker = given["rod_inertia.m2"] * given["rod_inertia.s2"] / given["today.l2"]
+        at_crank = (given["rod_inertia.m2"] - at_rocker) * given["l1"]
+    if "crank.mass" in given:
+        at_crank = total(at_crank, given["crank.mass"] * given["crank.centre"])
+    if at_crank is None:
+        return None
+    found = at_crank * maths.cos(pose.phi + own["tilt"])
+    if at_rocker is not None:
+        found = found - at_rocker * given["l3"] * pose.q1 * maths.cos(own["tilt"] - pose.q)
+    return STANDARD_GRAVITY * found
 
 
 def push(maths: Maths, pose: ReedPose, given: Values, own: Values, term: Number) -> Vector:
-    """Return the weight of reed and counterweight, N; x along the line from A to D."""
-    weight = STANDARD_GRAVITY * (given["m4"] + given["m4e"])
-    return Vector(-weight * maths.sin(own["tilt"]), -weight * maths.cos(own["tilt"]))
+    """Return the weight of reed, counterweight and rocker, N; x along the line from A to D."""
+    mass = given["m4"] + given["m4e"]
+    return weight(maths, mass if rocker_moment(given) is None else mass + given["rocker_inertia.m3"], own["tilt"])
+
+
+def weight(maths: Maths, mass: Number, tilt: Number) -> Vector:
+    """Weight of a mass, N; x along the line from A to D."""
+    return Vector(-STANDARD_GRAVITY * mass * maths.sin(tilt), -STANDARD_GRAVITY * mass * maths.cos(tilt))
 
 
 def mass(maths: Maths, given: Values, own: Values) -> LinkMass:
@@ -45,12 +78,13 @@ def mass(maths: Maths, given: Values, own: Values) -> LinkMass:
 
 EFFECT = Load(
     name="gravity",
-    summary="weight of reed system and counterweight",
+    summary="weight of reed system, counterweight, rocker, rod and crank",
     own=Own,
     letters={"offset": "chi"},
     rank=60,
     acts="output",
     force=force,
+    inside=inside,
     mass=mass,
     push=push,
     reads=("m4e", "r4e"),

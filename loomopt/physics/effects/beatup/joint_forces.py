@@ -2,7 +2,7 @@
 
 F_J is the force of the part nearer the drive on the next one: frame → crank (A) → rod (B) → rocker (C), frame → rocker
 (D); x along A→D, y towards C. Output terms are couples on the rocker, and load D by themselves only where they tell
-their force; weights of rod and rocker are in no effect. Shaking force −Σ m a_S, moment −Σ (p_S × m a_S + J α) about A.
+their force. Weights are those of effect gravity. Shaking force −Σ m a_S, moment −Σ (p_S × m a_S + J α) about A.
 """
 
 from collections.abc import Iterator, Mapping
@@ -13,7 +13,7 @@ from loomopt.base.records import lazy
 from loomopt.base.units import ShowValue
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects import pins
-from loomopt.physics.effects.beatup import ReedPose
+from loomopt.physics.effects.beatup import ReedPose, gravity
 from loomopt.physics.effects.kinds import Check, LinkMass, Loading
 from loomopt.physics.schema import Figure, Values
 
@@ -141,11 +141,31 @@ class CrankRockerForces:
 
     @lazy
     def group(self) -> "PairForces":
-        """The group of rod and rocker, loaded by M3 and all masses."""
+        """The group of rod and rocker, loaded by M3, all masses and weights."""
         from loomopt.physics.mechanisms import joint_forces
 
         force = joint_forces.plus(self.swung.force, *self.loading.pushes)
-        return joint_forces.two_links(self.linkage.dyad, self.rod, joint_forces.Wrench(force, self.loading.force))
+        rod = joint_forces.together(each for each in (self.rod, self.rod_weight) if each is not None)
+        return joint_forces.two_links(self.linkage.dyad, rod, joint_forces.Wrench(force, self.loading.force))
+
+    @lazy
+    def rod_weight(self) -> "Wrench | None":
+        """The rod's weight about B; None where it has none."""
+        from loomopt.physics.mechanisms import joint_forces
+
+        given = self.given
+        if "gravity.tilt" not in given or "rod_inertia.m2" not in given:
+            return None
+        force = gravity.weight(self.maths, given["rod_inertia.m2"], given["gravity.tilt"])
+        share, rod = given["rod_inertia.s2"] / given["today.l2"], self.linkage.dyad.link1
+        return joint_forces.Wrench(force, share * joint_forces.cross(rod, force))
+
+    @property
+    def _crank_weight(self) -> "Vector | None":
+        """The crank's weight, N; None where it has none."""
+        if "gravity.tilt" not in self.given or "crank.mass" not in self.given:
+            return None
+        return gravity.weight(self.maths, self.given["crank.mass"], self.given["gravity.tilt"])
 
     @lazy
     def crank(self) -> "Vector | None":
@@ -160,8 +180,10 @@ class CrankRockerForces:
     @lazy
     def force_A(self) -> "Vector":
         """Of the frame on the crank."""
-        pin, own = self.group.outer1, self.crank
-        return pin if own is None else type(pin)(pin.x - own.x, pin.y - own.y)
+        from loomopt.physics.mechanisms import joint_forces
+
+        own = (each for each in (self.crank, self._crank_weight) if each is not None)
+        return joint_forces.plus(self.group.outer1, *map(joint_forces.minus, own))
 
     @property
     def force_B(self) -> "Vector":
@@ -232,7 +254,7 @@ EFFECT = Check(
     own=pins.own(PINS),
     rank=85,
     joints=forces,
-    between=("rod", "swung"),
+    between=("rod", "rod_weight", "swung"),
     vectors=("force_A", "force_B", "force_C", "force_D", SHAKING_FORCE.name),
     scalars=("shaking_moment",),
     sides=SIDES,

@@ -3,12 +3,14 @@
 An effect on the output has two tables: EFFECT of one that turns (torques), SLIDING of one that slides (forces).
 """
 
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple, Protocol
 
-from loomopt.maths.systems import Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.physics.cycle import TURN
-from loomopt.physics.mechanisms.moving import Joint, Link
+from loomopt.physics.effects.kinds import Applied
+from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.moving import Joint, Link, plus, polar, scaled, times, total
 from loomopt.physics.schema import Values
 
 
@@ -22,6 +24,22 @@ class Parts(Protocol):
     @property
     def links(self) -> Mapping[str, Link]:
         """Links by name, the frame among them."""
+
+
+class OutputPart(Protocol):
+    """What of a linkage its output is."""
+
+    @property
+    def measure(self) -> str:
+        """What is measured: "angle", "slide", "x" or "y"."""
+
+    @property
+    def name(self) -> str:
+        """Name of the link, part or joint."""
+
+    @property
+    def carrier(self) -> str:
+        """Link or joint that carries the mass of the output; "" where the output alone does not tell its motion."""
 
 
 class LinkagePose(Protocol):
@@ -51,6 +69,10 @@ class LinkagePose(Protocol):
     def joints(self) -> Parts:
         """The parts."""
 
+    @property
+    def output(self) -> OutputPart:
+        """The part that is the output."""
+
     def travelled(self, given: Values, event: str) -> Number:
         """Return q − q at an event, rad or m."""
 
@@ -71,3 +93,62 @@ def centre(parts: Parts, name: str, along: Number, across: Number) -> Joint:
     if name in parts.links:
         return parts.links[name].point(along, across)
     return parts.joints[name]
+
+
+def on_output(maths: Maths, pose: LinkagePose, distance: Number, angle: Number | None) -> Joint:
+    """Place on the output's link, m from its axis; angle: from the link's line, rad, None along it."""
+    link = pose.joints.links[pose.output.carrier]
+    return link.point(distance) if angle is None else link.point(*scaled(distance, polar(maths, angle)))
+
+
+class OutputMass(NamedTuple):
+    """A mass that moves with the output, kg, and the link or joint that carries it.
+
+    axis: the only direction in which it moves, "x" or "y"; "" where it moves with its place.
+    """
+
+    mass: Number
+    on: str
+    at: Joint
+    axis: str = ""
+
+    def along(self, vector: Vector) -> Vector:
+        """Component of a vector in which the mass moves."""
+        return {"": vector, "x": Vector(vector.x, 0), "y": Vector(0, vector.y)}[self.axis]
+
+
+def output_masses(maths: Maths, pose: LinkagePose, given: Values) -> Iterator[OutputMass]:
+    """Masses of the effects `inertia` and `counterweight`, with their places; given: numbers by their full names."""
+    out = pose.output
+    if not out.carrier:
+        return
+    if out.measure == "angle":
+        if "inertia.m" in given:
+            place = on_output(maths, pose, given["inertia.centre"], given.get("inertia.offset"))
+            yield OutputMass(given["inertia.m"], out.carrier, place)
+        if "counterweight.mass" in given:
+            place = opposite(maths, pose, given["counterweight.radius"], given.get("counterweight.angle"))
+            yield OutputMass(given["counterweight.mass"], out.carrier, place)
+    elif "inertia.mass" in given:
+        axis = "" if out.measure == "slide" else out.measure
+        yield OutputMass(given["inertia.mass"], out.carrier, pose.joints.joints[out.carrier], axis)
+
+
+def opposite(maths: Maths, pose: LinkagePose, distance: Number, angle: Number | None) -> Joint:
+    """Place of a counterweight, m from the output's axis: at an angle, rad, opposite to the link's line without one."""
+    return on_output(maths, pose, -distance if angle is None else distance, angle)
+
+
+def resistance_of_mass(pose: LinkagePose, mass: Number, distance: Number, at: Joint) -> Applied:
+    """Force with which a mass on the output's link resists, N, with a couple that leaves no moment about the axis.
+
+    What the mass adds to the moment about the axis is in the inertia of the output term already.
+    """
+    square, change, link = pose.omega**2, pose.omega_dot, pose.joints.links[pose.output.carrier]
+    slower, faster = at.at(1), at.at(2)
+    pulled = None if faster is None else scaled(square, faster)
+    if change is not None and slower is not None:
+        pulled = plus(pulled, scaled(change, slower))
+    turned = total(times(square, link.rates(2)), times(change, link.rates(1)))
+    push = None if pulled is None else scaled(-mass, pulled)
+    return Applied(pose.output.carrier, push, at.place, times(mass * distance**2, turned), True)
