@@ -20,7 +20,8 @@ NODES = {
 }
 """Job and effects beside its own → nodes of its figures' graph, and figures to the last bit of a glibc machine.
 
-Of the beat-up's, 31 are the weight of the rod, and 13 bring the angle from front dead centre onto the resistance's own turn: 172 and 354 were wrong."""
+Of the beat-up's, 31 are the weight of the rod,
+and 13 bring the angle from front dead centre onto the resistance's own turn: 172 and 354 were wrong."""
 SOLVED = {
     "beatup": {"balance": 320, "pulse": 3082, "torque": 318, "retrofit": 257},
     "rapier": {"stroke-dwell": 1059, "dwell": 900, "smooth": 16647, "match": 8294},

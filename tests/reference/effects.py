@@ -468,6 +468,57 @@ class Linkage:
 
         return MP.mpf("9.80665") * slope(height, phi)
 
+    def bodies(self):
+        """Return link, mass, kg, where its centre lies along the link, m, and inertia about that, of what moves."""
+        inertias = {"rod": "0.002", "rocker": "0.01", "link": "0.0096"}
+        found = [(name, MP.mpf(m), MP.mpf(along) / 1000, MP.mpf(inertias[name])) for name, m, along in MASSES]
+        name, mass, along = REED_MASS[0], MP.mpf(REED_MASS[1]), MP.mpf(REED_MASS[2]) / 1000
+        return [*found, (name, mass, along, MP.mpf(REED["J4"]) - mass * along**2)]
+
+    def resists(self, phi):
+        """Yield link, centre, force, N, and couple, N m, with which each mass resists its motion."""
+        for name, mass, along, inertia in self.bodies():
+            turn = slope(lambda p, name=name: MP.arg(self.link(name, p)[1]), phi, 2)
+            push = -mass * slope(lambda p, name=name, along=along: self.centre(name, along, p), phi, 2) * MAIN**2
+            yield name, self.centre(name, along, phi), push, -inertia * turn * MAIN**2
+
+    def pins(self, phi):
+        """Return the forces in all joints by name, N: every link's own equilibrium, in one matrix, without cloth.
+
+        Of the part nearer the crank or the frame on the next one; cloth does not act where the rows are.
+        """
+        at = self.joints(phi)
+        links = {"crank": "AB", "rod": "BC", "rocker": "DCE", "link": "EF", "sley": "GF"}
+        first = {"B": "crank", "C": "rod", "E": "rocker", "F": "link"}
+        rows = {name: 3 * k for k, name in enumerate(links)}
+        matrix, right, joints = MP.zeros(15, 15), MP.zeros(15, 1), "ABCDEFG"
+        for link, row in rows.items():
+            for joint in links[link]:
+                sign, column = -1 if first.get(joint) == link else 1, 2 * joints.index(joint)
+                matrix[row, column] = matrix[row + 1, column + 1] = sign
+                matrix[row + 2, column], matrix[row + 2, column + 1] = -sign * at[joint].imag, sign * at[joint].real
+        matrix[2, 14] = 1
+        down = MP.expj(-PI / 3) * MP.mpf("9.80665")
+        weights = {name: mass for name, mass, _, _ in self.bodies()}
+        for name, place, push, couple in self.resists(phi):
+            load = push + weights[name] * down
+            right[rows[name]] -= load.real
+            right[rows[name] + 1] -= load.imag
+            right[rows[name] + 2] -= (place.conjugate() * load).imag + couple
+        found = MP.lu_solve(matrix, right)
+        return {joint: MP.mpc(found[2 * k], found[2 * k + 1]) for k, joint in enumerate(joints)}
+
+    def __getattr__(self, name):
+        if not name.startswith("force_"):
+            raise AttributeError(name)
+        return lambda own, phi: abs(self.pins(phi)[name.removeprefix("force_")])
+
+    def shaking_force(self, own, phi):
+        return abs(sum(push for _, _, push, _ in self.resists(phi)))
+
+    def shaking_moment(self, own, phi):
+        return sum((place.conjugate() * push).imag + couple for _, place, push, couple in self.resists(phi))
+
     def load(self, own, phi):
         """Return the torque against a force on F."""
         acts = "begins" not in own or not self.front <= phi < self.rear
@@ -489,7 +540,7 @@ MACHINES = {"beatup": Reed, "rapier": Head, "shedding": Frame, "linkage": Linkag
 
 def knows(job, effect):
     """Say whether there are plain formulas of an effect."""
-    plain = effect == "centrifugal" or (effect == "joint_forces" and job in ("beatup", "shedding"))
+    plain = effect == "centrifugal" or (effect == "joint_forces" and job in ("beatup", "shedding", "linkage"))
     return plain or hasattr(MACHINES.get(job), effect)
 
 
@@ -530,6 +581,9 @@ CASES = {
     ("linkage", "forming", "term"): "10 100 300",
     ("linkage", "mass", "term"): "30 200",
     ("linkage", "gravity", "term"): "30 200",
+    **{("linkage", "joint_forces", f"force_{joint}"): "100" for joint in "ABDCEGF"},
+    ("linkage", "joint_forces", "shaking_force"): "100",
+    ("linkage", "joint_forces", "shaking_moment"): "100",
     ("linkage", "load", "term"): "30 100 300",
     ("linkage", "spring", "term"): "30 200",
     ("shedding", "weight", "term"): "30",
