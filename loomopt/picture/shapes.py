@@ -254,11 +254,12 @@ CHARACTER, CAPITAL_LETTER, WIDE = 0.88, 1.16, 1.45
 
 @dataclass(frozen=True)
 class Line:
-    """Straight strokes through points, m."""
+    """Strokes through points, m: straight, or arcs where bulges tell tan(angle/4) of each, positive to the left."""
 
     layer: str
     points: tuple[Point, ...]
     closed: bool = False
+    bulges: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -297,12 +298,12 @@ Primitive = Trace | Text
 
 
 class Measure(NamedTuple):
-    """A length between two points, m, and its name; half: how far it may be off on each side, m, 0 where not said."""
+    """A length between two points, m, and its name; band: its lower and upper deviation, m, both 0 where not said."""
 
     name: str
     one: Point
     other: Point
-    half: float = 0.0
+    band: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -350,7 +351,10 @@ def scaled(drawing: Drawing, size: float) -> Drawing:
             case Text(_, at):
                 return replace(primitive, at=of(at))
 
-    measures = tuple(Measure(name, of(one), of(other), size * half) for name, one, other, half in drawing.measures)
+    measures = tuple(
+        Measure(name, of(one), of(other), (size * band[0], size * band[1]))
+        for name, one, other, band in drawing.measures
+    )
     primitives = tuple(map(larger, drawing.primitives))
     return replace(drawing, height=size * drawing.height, primitives=primitives, measures=measures)
 

@@ -8,13 +8,14 @@ from typing import NamedTuple
 from loomopt.base.errors import Faults, misread, nearest, refusal, unknown
 from loomopt.base.quantities import NUMBER_PATTERN, Quantity
 from loomopt.base.units import QuantityError
-from loomopt.scenes import tolerance_classes
+from loomopt.scenes import iso_fits, tolerance_classes
 from loomopt.scenes.tables import Place, SceneSchema, bounded, flat, table
 
 SIGMAS = 3.0
 """Standard deviations that a plus_minus is worth where nothing is said."""
 SPREADS = ("normal", "uniform")
-KEYS = ("plus_minus", "class", "sigmas", "spread", "group", "correlation")
+FORMS = ("plus_minus", "plus", "class", "fit")
+KEYS = ("plus_minus", "plus", "minus", "class", "fit", "sigmas", "spread", "group", "correlation")
 _PERCENT = re.compile(rf"[ \t]*({NUMBER_PATTERN}) *%[ \t]*")
 UNIFORM = 1 / math.sqrt(3)
 """Standard deviation of a uniform spread, of its half width."""
@@ -23,13 +24,15 @@ UNIFORM = 1 / math.sqrt(3)
 class Tolerance(NamedTuple):
     """How a number is made.
 
-    number: what a designer calls it; half: to each side, SI, or as a share of the nominal where `share`; standard:
-    its class, whose half width follows from the nominal; sigmas: standard deviations that the half width is worth;
-    uniform: whether all of it is equally likely, and nothing outside; group, correlation: with what it is made.
+    number: what a designer calls it; below, above: how far its band lies below and above the nominal, SI, or as shares
+    of the nominal where `share`; one of them is negative where the whole band lies on one side; standard: its class,
+    whose band follows from the nominal; sigmas: standard deviations that half the band is worth; uniform: whether all
+    of it is equally likely, and nothing outside; group, correlation: with what it is made.
     """
 
     number: str
-    half: float
+    below: float
+    above: float
     share: bool = False
     standard: str = ""
     sigmas: float = SIGMAS
@@ -37,15 +40,30 @@ class Tolerance(NamedTuple):
     group: str = ""
     correlation: float = 0.0
 
-    def plus_minus(self, nominal: float) -> float:
-        """Return how far the number may be off on each side, SI. Raises BadInput where a class does not tell."""
+    def band(self, nominal: float) -> tuple[float, float]:
+        """Lower and upper deviation of the number from its nominal, SI. Raises BadInput where a class tells none."""
         if not self.standard:
-            return self.half * abs(nominal) if self.share else self.half
-        found = tolerance_classes.plus_minus(self.standard, nominal)
-        if math.isnan(found):
+            size = abs(nominal) if self.share else 1.0
+            return -self.below * size, self.above * size
+        if iso_fits.parted(self.standard):
+            found = iso_fits.deviations(self.standard, nominal)
+        else:
+            half = tolerance_classes.plus_minus(self.standard, nominal)
+            found = -half, half
+        if math.isnan(found[0]):
             problem = f"{self.standard} says nothing of {1e3 * nominal:g} mm"
             raise refusal(problem, "", f"tolerances.{self.number}", remedy="Give plus_minus instead")
         return found
+
+    def plus_minus(self, nominal: float) -> float:
+        """Half width of the band, SI. Raises BadInput where a class tells none."""
+        low, high = self.band(nominal)
+        return high if low == -high else (high - low) / 2
+
+    def shift(self, nominal: float) -> float:
+        """Distance of the band's middle, the mean of the machines, from the nominal, SI. Raises BadInput."""
+        low, high = self.band(nominal)
+        return (low + high) / 2
 
     def sigma(self, nominal: float) -> float:
         """Return the standard deviation, SI."""
@@ -99,17 +117,36 @@ def _tolerance(name: str, raw: object, quantity: Quantity, origin: str, key: str
     for each in given:
         if each not in KEYS:
             raise unknown("key", each, KEYS, origin, f"{key}.{each}", given=given)
-    if ("plus_minus" in given) == ("class" in given):
-        problem = "plus_minus and class say the same twice" if "class" in given else "plus_minus is missing"
-        raise refusal(problem, origin, key, remedy='Give one of them, such as plus_minus = "0.06 mm"')
-    share, half, standard = False, 0.0, ""
+    forms = [each for each in FORMS if each in given]
+    if len(forms) != 1:
+        problem = f"{' and '.join(forms)} say the same twice" if forms else "plus_minus is missing"
+        raise refusal(problem, origin, key, remedy=f'Give one of {", ".join(FORMS)}, such as plus_minus = "0.06 mm"')
+    if ("plus" in given) != ("minus" in given):
+        lacking = "minus" if "plus" in given else "plus"
+        problem = f"{lacking} is missing: plus and minus together are the band"
+        raise refusal(problem, origin, f"{key}.{lacking}", remedy=f'Give {lacking} = "0" where there is none')
+    share, below, above, standard = False, 0.0, 0.0, ""
     if "class" in given:
         standard = _standard(given["class"], quantity, origin, f"{key}.class")
+    elif "fit" in given:
+        standard = _fit(given["fit"], quantity, origin, f"{key}.fit")
+    elif "plus" in given:
+        (of_above, above), (of_below, below) = (
+            _deviation(given[side], quantity, origin, f"{key}.{side}") for side in ("plus", "minus")
+        )
+        share = of_above or of_below
+        if (share and not (of_above or above == 0.0)) or (share and not (of_below or below == 0.0)):
+            problem = "one side is a share of the nominal and the other is none"
+            raise refusal(problem, origin, key, remedy="Write both in % or both in a unit")
+        if above + below < 0.0:
+            problem = "the upper end of the band lies below its lower end"
+            raise refusal(problem, origin, key, remedy="Write plus and minus so that plus + minus is not negative")
     else:
-        share, half = _half(given["plus_minus"], quantity, origin, f"{key}.plus_minus")
+        share, above = _half(given["plus_minus"], quantity, origin, f"{key}.plus_minus")
+        below = above
     spread = _one_of(given.get("spread", SPREADS[0]), SPREADS, origin, f"{key}.spread")
     if spread == "uniform" and "sigmas" in given:
-        problem = "a uniform spread has no sigmas: plus_minus is its half width"
+        problem = "a uniform spread has no sigmas: its band is all there is"
         raise refusal(problem, origin, f"{key}.sigmas", remedy="Take sigmas out")
     sigmas = _number(given.get("sigmas", SIGMAS), origin, f"{key}.sigmas", Quantity("number", above=0))
     group = given.get("group", "")
@@ -123,7 +160,7 @@ def _tolerance(name: str, raw: object, quantity: Quantity, origin: str, key: str
     correlation = _number(given.get("correlation", 0.0), origin, f"{key}.correlation", ends)
     if correlation > 1.0:
         raise refusal("it is more than 1", origin, f"{key}.correlation", correlation, "0 to 1", "Correct the value")
-    return Tolerance(name, half, share, standard, sigmas, spread == "uniform", group, correlation)
+    return Tolerance(name, below, above, share, standard, sigmas, spread == "uniform", group, correlation)
 
 
 def _half(raw: object, quantity: Quantity, origin: str, key: str) -> tuple[bool, float]:
@@ -132,6 +169,16 @@ def _half(raw: object, quantity: Quantity, origin: str, key: str) -> tuple[bool,
     if percent:
         return True, _number(percent[1], origin, key, Quantity("number", least=0)) / 100
     return False, _number(raw, origin, key, Quantity(quantity.kind, least=0))
+
+
+def _deviation(raw: object, quantity: Quantity, origin: str, key: str) -> tuple[bool, float]:
+    """Return whether an end of a band is a share of the nominal, and it, SI or as a share; a bare 0 needs no unit."""
+    percent = _PERCENT.fullmatch(raw) if isinstance(raw, str) else None
+    if percent:
+        return True, _number(percent[1], origin, key, Quantity("number")) / 100
+    if raw == 0 or (isinstance(raw, str) and raw.strip() in ("0", "+0", "-0", "0.0")):
+        return False, 0.0
+    return False, _number(raw, origin, key, Quantity(quantity.kind))
 
 
 def _number(raw: object, origin: str, key: str, quantity: Quantity) -> float:
@@ -154,3 +201,14 @@ def _standard(raw: object, quantity: Quantity, origin: str, key: str) -> str:
         problem = f"classes are of lengths, and this is of kind {quantity.kind}"
         raise refusal(problem, origin, key, raw, remedy="Give plus_minus instead")
     return _one_of(raw, tolerance_classes.CLASSES, origin, key)
+
+
+def _fit(raw: object, quantity: Quantity, origin: str, key: str) -> str:
+    if quantity.kind != "length":
+        problem = f"fits are of lengths, and this is of kind {quantity.kind}"
+        raise refusal(problem, origin, key, raw, remedy="Give plus and minus instead")
+    if not isinstance(raw, str) or iso_fits.parted(raw) is None:
+        allowed = f"a letter of {' '.join(iso_fits.LETTERS)} with a grade of {iso_fits.LEAST_GRADE} to "
+        allowed += f"{iso_fits.MOST_GRADE}, k m n K M N to 8"
+        raise refusal("unknown tolerance class", origin, key, raw, allowed, 'Write fit = "H7", or plus and minus')
+    return raw

@@ -63,6 +63,12 @@ def test_a_class_that_says_nothing_of_a_size_is_refused(name, nominal):
         ("tolerances", {"l1": "-1 mm"}, "out of range"),
         ("tolerances", {"l1": {"plus_minus": "1 mm", "class": "IT7"}}, "twice"),
         ("tolerances", {"l1": {"sigmas": 3}}, "plus_minus is missing"),
+        ("tolerances", {"l1": {"plus": "1 mm"}}, "minus is missing"),
+        ("tolerances", {"l1": {"plus": "-1 mm", "minus": "0"}}, "upper end of the band"),
+        ("tolerances", {"l1": {"fit": "H17"}}, "unknown tolerance class"),
+        ("tolerances", {"l1": {"fit": "K9"}}, "unknown tolerance class"),
+        ("tolerances", {"M0": {"fit": "H7"}}, "of lengths"),
+        ("tolerances", {"l1": {"plus": "1 %", "minus": "1 mm"}}, "one side is a share"),
         ("tolerances", {"l1": {"class": "IT77"}}, "IT7"),
         ("tolerances", {"M0": {"class": "IT7"}}, "classes are of lengths"),
         ("tolerances", {"l1": {"plus_minus": "1 mm", "spread": "uniform", "sigmas": 3}}, "no sigmas"),
@@ -92,3 +98,38 @@ def test_that_of_an_effect_that_is_off_waits_for_it():
     assert waiting.with_effect("resistance").given("tolerances.pulse") == "2 deg"
     with pytest.raises(BadInput, match="pulse"):
         BEATUP.without_effect("resistance").update({"tolerances": {"pulse": "2 mm"}})
+
+
+def test_a_band_that_is_not_even_has_its_middle_and_half_width():
+    found = made(
+        l1={"plus": "0", "minus": "0.05 mm"},
+        l2={"plus": "-0.02 mm", "minus": "0.06 mm", "spread": "uniform"},
+        l3={"plus": "1 %", "minus": 0},
+    )
+    assert found["l1"].band(0.03) == (-5e-5, 0.0)
+    assert (found["l1"].shift(0.03), found["l1"].plus_minus(0.03)) == pytest.approx((-2.5e-5, 2.5e-5), rel=1e-14)
+    assert found["l1"].sigma(0.03) == pytest.approx(2.5e-5 / 3, rel=1e-14)
+    assert (found["l2"].shift(0.08), found["l2"].plus_minus(0.08)) == pytest.approx((-4e-5, 2e-5), rel=1e-14)
+    assert found["l3"].band(0.15) == pytest.approx((0.0, 1.5e-3), rel=1e-14)
+
+
+FITS = """
+H7 25 0 21 | g6 25 -20 -7 | H7 50 0 25 | g6 50 -25 -9 | h6 30 -13 0 | f7 40 -50 -25 | H8 40 0 39 | k6 25 2 15
+n6 25 15 28 | p6 25 22 35 | s6 25 35 48 | m6 20 8 21 | K7 25 -15 6 | N7 25 -28 -7 | P7 25 -35 -14 | S7 25 -48 -27
+M7 25 -21 0 | js6 25 -6.5 6.5 | d9 60 -174 -100 | e8 60 -106 -60 | H11 60 0 190 | r6 60 41 60 | k5 40 2 13
+F8 20 20 53 | G7 20 7 28 | D10 30 65 149 | E9 10 25 61 | P6 25 -31 -18 | R7 60 -60 -30 | k6 3 0 6 | K8 25 -23 10
+N8 25 -36 -3 | M6 300 -41 -9 | N6 300 -57 -25 | h9 100 -87 0 | H7 500 0 63 | JS7 100 -17.5 17.5
+"""
+"""Class, size in mm, lower and upper deviation in um: of the tables of limits in ISO 286-2 as handbooks print them."""
+
+
+@pytest.mark.parametrize("row", FITS.replace("\n", "|").strip("|").split("|"))
+def test_fits_have_the_printed_limits(row):
+    name, size, low, high = row.split()
+    found = made(l1={"fit": name})["l1"].band(float(size) / 1000)
+    assert found == pytest.approx((float(low) * 1e-6, float(high) * 1e-6), abs=1e-15)
+
+
+def test_a_fit_says_nothing_beyond_500_mm():
+    with pytest.raises(BadInput, match="says nothing of 600 mm"):
+        made(l1={"fit": "H7"})["l1"].band(0.6)

@@ -85,19 +85,27 @@ def _measured(document: Any, space: Any, drawing: Drawing) -> None:
     style |= {"dimscale": 1.0, "dimclrd": MEASURED, "dimclre": MEASURED, "dimclrt": MEASURED}
     ends = [point for each in drawing.measures for point in (each.one, each.other)]
     middle = [sum(axis) / len(ends) for axis in zip(*ends, strict=True)]
-    for name, *both, half in drawing.measures:
+    for name, *both, band in drawing.measures:
         one, other = sorted(both)  # from left to right, so that no text stands on its head
         across = (other.x - one.x) * (middle[1] - one.y) - (other.y - one.y) * (middle[0] - one.x)
         made = space.add_aligned_dim(
             one,
             other,
             distance=-AWAY * h if across > 0 else AWAY * h,
-            text=f"{name} = <>" + (f" %%p{half:.{DECIMALS}g}" if half else ""),
+            text=f"{name} = <>{_band_text(band)}",
             dimstyle="STANDARD",
             override=style,
             dxfattribs={"layer": MEASURES},
         )
         made.render()
+
+
+def _band_text(band: tuple[float, float]) -> str:
+    """Tolerance of a dimension as text: " %%p0.05", " +0 -0.05", "" without any."""
+    low, high = band
+    if low == -high:
+        return f" %%p{high:.{DECIMALS}g}" if high else ""
+    return " " + " ".join("0" if not end else f"{end:+.{DECIMALS}g}" for end in (high, low))
 
 
 def _append(space: Any, primitive: Primitive, text_height: float) -> None:

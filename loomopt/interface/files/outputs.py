@@ -317,8 +317,8 @@ def _dxf(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) ->
 
     found, made = drawing(scene, design, said), toleranced(scene)
     nominal = registry.of(scene).numbers_of(scene, flat(design))
-    halves = {each.number: each.plus_minus(nominal[name]) for name, each in made.items() if name in nominal}
-    measures = tuple(each._replace(half=halves.get(each.name, 0.0)) for each in found.measures)
+    bands = {each.number: each.band(nominal[name]) for name, each in made.items() if name in nominal}
+    measures = tuple(each._replace(band=bands.get(each.name, (0.0, 0.0))) for each in found.measures)
     atomically(path, functools.partial(dxf.write, replace(found, measures=measures)))
 
 

@@ -9,10 +9,11 @@ from loomopt.base.units import DISPLAY_UNIT
 from loomopt.physics.effects.kinds import Effect, Load, required
 from loomopt.physics.schema import Table
 from loomopt.scenes.display import KINDS
+from loomopt.scenes.iso_fits import PATTERN as FIT_PATTERN
 from loomopt.scenes.scene import TABLES
 from loomopt.scenes.tables import FAMILY, Problem, SceneSchema
 from loomopt.scenes.tolerance_classes import CLASSES
-from loomopt.scenes.tolerances import SPREADS
+from loomopt.scenes.tolerances import FORMS, SPREADS
 
 Json = dict[str, Any]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -128,17 +129,22 @@ def _tolerances(schema: SceneSchema) -> Json:
 def _tolerance(quantity: Quantity) -> Json:
     percent = {"type": "string", "pattern": rf"^[ \t]*{NUMBER_PATTERN} *%[ \t]*$"}
     half: Json = {"anyOf": [percent, _quantity(Quantity(quantity.kind, least=0))], "description": "to each side"}
+    off: Json = {"anyOf": [percent, {"enum": ["0", 0]}, _quantity(Quantity(quantity.kind))]}
     positive, share = _quantity(Quantity("number", above=0)), _quantity(Quantity("number", least=0))
     keys = {
         "plus_minus": half,
+        "plus": off | {"description": "upper end of a band that is not even"},
+        "minus": off | {"description": "how far its lower end lies below the nominal"},
         "class": {"enum": list(CLASSES), "description": "of a length, by its nominal"},
+        "fit": {"type": "string", "pattern": FIT_PATTERN, "description": "ISO 286 class such as H7, by the nominal"},
         "sigmas": positive | {"description": "standard deviations that plus_minus is worth, 3 without it"},
         "spread": {"enum": list(SPREADS)},
         "group": {"type": "string", "description": "what numbers are made together by"},
         "correlation": share | {"description": "with the others of the group"},
     }
-    one: Json = {"oneOf": [{"required": ["plus_minus"]}, {"required": ["class"]}]}
-    together = {"dependentRequired": {"group": ["correlation"], "correlation": ["group"]}}
+    one: Json = {"oneOf": [{"required": [form]} for form in FORMS]}
+    pairs = (("group", "correlation"), ("plus", "minus"))
+    together = {"dependentRequired": {a: [b] for pair in pairs for a, b in (pair, pair[::-1])}}
     return {"if": {"type": "object"}, "then": _closed(keys) | one | together, "else": half}
 
 

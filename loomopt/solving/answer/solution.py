@@ -321,7 +321,7 @@ class Robust(NamedTuple):
     yields: share of machines that hold, by limit and of "all"; nominal, nominal_yields: the optimum without back-off,
     and its machines; kept: equalities and goals, which nothing backs off; corners: figures that bend at the design, of
     whose two slopes in each number the steeper was taken; passes: solves until standard deviations were those of the
-    design.
+    design; shifted: whether bands are not even, so that back-off counts from the mean machine.
     """
 
     sigmas: float
@@ -335,6 +335,7 @@ class Robust(NamedTuple):
     passes: int
     samples: int
     seed: int
+    shifted: bool = False
 
     def cost(self, answer: "Solution") -> dict[str, float]:
         """Return what each figure that is sought has risen by, SI."""

@@ -45,6 +45,8 @@ ROOT, ROOTS = 1e-12, 60
 """Last step to a linear yield's root, in standard deviations, and steps at most."""
 
 
+Band = tuple[float, float]
+"""Lower and upper deviation of a number, SI."""
 Solve = Callable[..., Solution]
 """solve(near=…, backed_off=…): the answer as it is asked for, but for its start and the tightening."""
 
@@ -57,8 +59,8 @@ class Pass(NamedTuple):
     margins: tuple[Margin, ...]
     sigmas: float = 0.0
     passes: int = 0
-    frozen: Mapping[str, float] = Frozen()
-    """Half widths, m, of numbers whose class would flip from pass to pass."""
+    frozen: "Mapping[str, Band]" = Frozen()
+    """Bands, m, of numbers whose class would flip from pass to pass."""
     linear: float | None = None
     """Standard deviations that the linear joint normal asks for, where a yield is."""
 
@@ -74,11 +76,14 @@ class Asked:
     samples: int = SAMPLES
     seed: int = 0
 
-    def plan(self, answer: Solution, frozen: Mapping[str, float]) -> Plan:
-        """Return the study of an answer's machines; frozen: half widths, m, of numbers whose class would flip."""
+    def plan(self, answer: Solution, frozen: "Mapping[str, Band]") -> Plan:
+        """Return the study of an answer's machines; frozen: bands, m, of numbers whose class would flip."""
         given = self.scene.document["tolerances"]
-        own = {name: {key: value for key, value in given[name].items() if key != "class"} for name in frozen}
-        made = {f"tolerances.{name}": {**own[name], "plus_minus": f"{half!r} m"} for name, half in frozen.items()}
+        own = {name: {k: value for k, value in given[name].items() if k not in ("class", "fit")} for name in frozen}
+        made = {
+            f"tolerances.{name}": {**own[name], "plus": f"{high!r} m", "minus": f"{-low!r} m"}
+            for name, (low, high) in frozen.items()
+        }
         scene = self.scene.update(made) if made else self.scene
         return planned(scene, designs.flat(answer.design), self.target, self.samples, self.seed)
 
@@ -187,7 +192,7 @@ SAME = 1e-8
 def _settled(asked: Asked, solve: Solve, here: Pass, sigmas: Sigmas, say: Callable[[str], None]) -> Pass | Solution:
     """Return the pass whose standard deviations are those of its own design."""
     before: dict[tuple[str, int], float] = {}
-    halves: dict[str, list[float]] = {}
+    bands: dict[str, list[Band]] = {}
     for number in range(PASSES):
         say(f"backing off, pass {number + 1}")
         here = here._replace(sigmas=sigmas(here))
@@ -207,11 +212,11 @@ def _settled(asked: Asked, solve: Solve, here: Pass, sigmas: Sigmas, say: Callab
         plan, frozen = asked.plan(answer, here.frozen), dict(here.frozen)
         for name, made in plan.made.items():
             if made.standard:
-                widths = halves.setdefault(made.number, [])
-                if plan.halves[name] in widths[:-1] and plan.halves[name] != widths[-1]:
-                    # A class that flips back and forth stays at its wider half.
-                    frozen[made.number] = max(widths)
-                widths.append(plan.halves[name])
+                known, band = bands.setdefault(made.number, []), made.band(plan.nominal[name])
+                if band in known[:-1] and band != known[-1]:
+                    # A class that flips back and forth stays at its widest band.
+                    frozen[made.number] = max(known, key=lambda each: each[1] - each[0])
+                known.append(band)
         plan = asked.plan(answer, frozen) if frozen != here.frozen else plan
         here = here._replace(answer=answer, plan=plan, margins=margins(plan), frozen=Frozen(frozen))
         here, before = here._replace(passes=here.passes + 1), off
@@ -220,7 +225,7 @@ def _settled(asked: Asked, solve: Solve, here: Pass, sigmas: Sigmas, say: Callab
 
 def tightened(here: Pass) -> dict[tuple[str, int], float]:
     """Return by how much each side is tightened, SI."""
-    return {each.key: here.sigmas * each.sigma for each in here.margins if not each.fixed}
+    return {each.key: each.back_off(here.sigmas) for each in here.margins if not each.fixed}
 
 
 # A yield that is asked for.
@@ -334,6 +339,7 @@ def _told(
         ended.passes,
         asked.samples,
         asked.seed,
+        any(ended.plan.shifts.values()),
     )
     by_name = {name: by for (name, _), by in off.items()}
     limits = tuple(each._replace(backed_off=by_name.get(each.name, 0.0)) for each in here.limits)
@@ -371,17 +377,24 @@ def _said(scene: Scene, answer: Solution, robust: Robust) -> list[str]:
     now, was = robust.yields[ALL], robust.nominal_yields[ALL]
     costs = f"It costs {', '.join(told)}." if told else "It costs nothing of what is sought."
     found = [
-        f"That is with each limit backed off by {robust.sigmas:.6g} sigma of its own figure.",
+        f"That is with each limit backed off by {robust.sigmas:.6g} sigma of its own figure{_from(robust)}.",
         costs,
         f"All limits hold on {_percent(now)} of the machines instead of {100 * was.value:.4g} %.",
     ]
     if robust.kept:
         found.append(f"Nothing backs off {', '.join(robust.kept)}: an equality or a goal, kept as it is.")
     if robust.corners:
+        holds = ", ".join(f"{name} on {_percent(robust.yields[name])}" for name in robust.corners)
         found.append(
-            f"At the design {', '.join(robust.corners)} bends: its sigma is of the steeper slope in each number."
+            f"At the design {', '.join(robust.corners)} bends: its sigma is of the steeper slope in each number. "
+            f"With that back-off the limit holds: {holds} of the machines."
         )
     return found
+
+
+def _from(robust: Robust) -> str:
+    """Say from what back-off counts where it is not the nominal machine."""
+    return " from the mean machine, that in the middle of all tolerance bands" if robust.shifted else ""
 
 
 def _percent(share_of: Yield) -> str:

@@ -23,8 +23,9 @@ MET = 1e-5
 class Margin(NamedTuple):
     """One side of what machines are judged by.
 
-    sign: +1 where the figure may be no more; room: how far the nominal design keeps clear, SI; way: what each
-    independent standard normal number does to what is left of it, (numbers,), SI; fixed: whether nothing backs it off.
+    sign: +1 where the figure may be no more; room: how far the mean machine keeps clear, SI; way: what each
+    independent standard normal number does to what is left of it, (numbers,), SI; fixed: whether nothing backs it off;
+    shift: how much nearer to its end the mean machine is than the nominal design, SI, by bands that are not even.
     """
 
     name: str
@@ -33,11 +34,16 @@ class Margin(NamedTuple):
     way: Floats
     fixed: bool
     corner: bool
+    shift: float = 0.0
 
     @property
     def sigma(self) -> float:
         """The standard deviation, SI."""
         return float(np.linalg.norm(self.way))
+
+    def back_off(self, sigmas: float) -> float:
+        """How far the nominal design must keep clear, SI: of so many sigmas from the mean, and never beyond its end."""
+        return max(sigmas * self.sigma + self.shift, 0.0)
 
     @property
     def key(self) -> tuple[str, int]:
@@ -59,23 +65,32 @@ def margins(plan: Plan) -> tuple[Margin, ...]:
             if end is not None and math.isfinite(end):
                 way = _way(plan, each, own[each.name], side)
                 fixed = each.name in bands
-                found.append(Margin(each.name, sign, sign * (end - value), way, fixed, own[each.name].corner))
+                left = _left(plan, each, own[each.name], side)
+                shift = sign * math.fsum(left[name] * plan.shifts[name] for name in plan.made)
+                room = sign * (end - value) - shift
+                found.append(Margin(each.name, sign, room, way, fixed, own[each.name].corner, shift))
     return tuple(found)
 
 
 def _way(plan: Plan, judged: Judged, slope: Slopes, side: str) -> Floats:
     """Return what independent numbers do to a side's figure, less its own end where that is one of the numbers."""
-    end = plan.scene.full(judged.name) if side in judged.follows else None
+    left = _left(plan, judged, slope, side)
     groups = sorted({each.group for each in plan.made.values() if each.group})
     way = np.zeros(len(plan.made) + len(groups))
     for k, (name, made) in enumerate(plan.made.items()):
-        left = slope.steeper[name] - (name == end)
-        # A figure that is its own limit's number moves with it, and what is left of its slope is rounding.
-        moved = 0.0 if name == end and abs(left) <= MET else left * plan.sigmas[name]
+        moved = left[name] * plan.sigmas[name]
         way[k] = math.sqrt(1 - made.correlation) * moved
         if made.group:
             way[len(plan.made) + groups.index(made.group)] += math.sqrt(made.correlation) * moved
     return way
+
+
+def _left(plan: Plan, judged: Judged, slope: Slopes, side: str) -> dict[str, float]:
+    """Slopes of a side's figure, less those of its own end where that is one of the numbers."""
+    end = plan.scene.full(judged.name) if side in judged.follows else None
+    left = {name: slope.steeper[name] - (name == end) for name in plan.made}
+    # A figure that is its own limit's number moves with it, and what is left of its slope is rounding.
+    return {name: 0.0 if name == end and abs(value) <= MET else value for name, value in left.items()}
 
 
 def share(found: Sequence[Margin], sigmas: float, at: float) -> float:

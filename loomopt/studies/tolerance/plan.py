@@ -143,6 +143,11 @@ class Plan:
         return {name: each.plus_minus(self.nominal[name]) for name, each in self.made.items()}
 
     @lazy
+    def shifts(self) -> dict[str, float]:
+        """Distance of each number's mean from its nominal, SI: the middle of its band. Raises BadInput."""
+        return {name: each.shift(self.nominal[name]) for name, each in self.made.items()}
+
+    @lazy
     def judged(self) -> tuple[Judged, ...]:
         """What machines are judged by: limits of figures, then bands around equalities and goals."""
         closes = {*self.model.assembly, *self.scene.schema.own_margins}

@@ -41,10 +41,13 @@ BINS, REACH = 60, 5.0
 class Spread(NamedTuple):
     """How a figure spreads, SI: linear from slopes, sampled; shares: of the linear variance, by number.
 
-    slopes: by number, SI. corner: whether two slopes meet at the nominal, so that their mean is told.
+    shift_linear, shift: its mean less the nominal, by bands that are not even. slopes: by number, SI. corner: whether
+    two slopes meet at the nominal in some number: the steeper one counts there.
     """
 
     nominal: float
+    shift_linear: float
+    shift: float
     sigma_linear: float
     sigma: float
     shares: Mapping[str, float]
@@ -75,6 +78,8 @@ class Found:
             "figures": {
                 name: {
                     "nominal": each.nominal,
+                    "shift_linear": each.shift_linear,
+                    "shift": _finite(each.shift),
                     "sigma_linear": each.sigma_linear,
                     "sigma": _finite(each.sigma),
                     "shares": dict(each.shares),
@@ -170,6 +175,11 @@ def shared(plan: Plan, slope: Mapping[str, float]) -> tuple[float, dict[str, flo
     return math.sqrt(max(variance, 0.0)), shares
 
 
+def shifted(plan: Plan, slope: Mapping[str, float]) -> float:
+    """Mean of a figure less its nominal, SI, by its slopes and the middles of the numbers' bands."""
+    return math.fsum(slope[name] * plan.shifts[name] for name in plan.made)
+
+
 # Sampled.
 
 
@@ -210,7 +220,7 @@ def drawn(plan: Plan, scramble: int, first: int, count: int) -> dict[str, Floats
                 off = math.sqrt(each.correlation) * common[each.group] + math.sqrt(1 - each.correlation) * off
             if each.uniform:
                 off = (2 * normal.below_each(off) - 1) / UNIFORM
-        found[name] = plan.nominal[name] + plan.sigmas[name] * off
+        found[name] = plan.nominal[name] + plan.shifts[name] + plan.sigmas[name] * off
     return found
 
 
@@ -304,7 +314,7 @@ def conducted(
     """
     with working():
         slope = slopes(plan)
-        linear = {name: shared(plan, own.by_number) for name, own in slope.items()}
+        linear = {name: shared(plan, own.steeper) for name, own in slope.items()}
     sigmas = {name: linear[name][0] for name in plan.figures if slope[name].moves}
     told = on_step or (lambda text: None)
     told("drawing machines")
@@ -333,13 +343,17 @@ def concluded(
     """Return what scrambles show together."""
     figures = {}
     for name, nominal in plan.figures.items():
-        own = {plan.made[number].number: each for number, each in slope[name].by_number.items()}
-        sigma, counts = 0.0, (0,) * BINS
+        own = {plan.made[number].number: each for number, each in slope[name].steeper.items()}
+        sigma, shift, counts = 0.0, 0.0, (0,) * BINS
         if slope[name].moves:
             count, one, two = (math.fsum(each.moments[name][k] for each in sums) for k in range(3))
             sigma = math.sqrt(max(two - one**2 / count, 0.0) / (count - 1)) if count > 1 else math.nan
+            shift = one / count if count else math.nan
             counts = tuple(map(sum, zip(*(each.counts[name] for each in sums), strict=True)))
-        figures[name] = Spread(nominal, linear[name][0], sigma, linear[name][1], own, slope[name].corner, counts)
+        moved = shifted(plan, slope[name].steeper)
+        figures[name] = Spread(
+            nominal, moved, shift, linear[name][0], sigma, linear[name][1], own, slope[name].corner, counts
+        )
     yields = {name: yielded([each.holding[name] / each.machines for each in sums]) for name in sums[0].holding}
     bad = sum(each.bad for each in sums)
     first = tightened(plan, {name: shares for name, (_, shares) in linear.items()}, yields)

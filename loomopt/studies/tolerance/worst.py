@@ -92,7 +92,7 @@ def told(plan: Plan, executor: Executor | None = None) -> Iterator[tuple[str, Wo
 
 def ends(plan: Plan) -> dict[str, tuple[float, float]]:
     """Return the box of all tolerances: ends of each number, SI, rounded outward."""
-    pairs = {name: (plan.nominal[name], half) for name, half in plan.halves.items()}
+    pairs = {name: (plan.nominal[name] + plan.shifts[name], half) for name, half in plan.halves.items()}
     return {
         name: (float(np.nextafter(at - half, -math.inf)), float(np.nextafter(at + half, math.inf)))
         for name, (at, half) in pairs.items()

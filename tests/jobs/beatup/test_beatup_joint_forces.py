@@ -9,6 +9,7 @@ import csv
 import functools
 import math
 from pathlib import Path
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -57,7 +58,7 @@ WEIGHED = {
     "all weighed, no constant speed": ((*OTHERS, "speed_fluctuation"), ROCKER | CRANK, {}),
 }
 """Cases that the reference does not have: every mass that a scene can give, with its weight."""
-EVERY = CASES | WEIGHED
+EVERY: dict[str, Any] = CASES | WEIGHED
 """Case → effects put on, keys set, design."""
 JOINTS = ("force_A", "force_B", "force_C", "force_D")
 NAMES = (*JOINTS, "shaking_force", "shaking_moment")
@@ -66,7 +67,9 @@ NAMES = (*JOINTS, "shaking_force", "shaking_moment")
 def scene_of(case):
     effects, keys, _ = EVERY[case]
     found = lo.load("beatup-light" if case.startswith("light") else "beatup").with_effect("joint_forces", *effects)
-    return (found.update(keys) if keys else found).without_effect(*(("resistance",) if case == "no cloth" else ()))
+    return (found.update(dict(keys)) if keys else found).without_effect(
+        *(("resistance",) if case == "no cloth" else ())
+    )
 
 
 @functools.cache

@@ -40,7 +40,7 @@ def test_a_point_that_nothing_rewards_stays_and_is_named():
 def test_the_end_of_a_rest_that_no_level_seeks_is_not_crept_along():
     """Freed in the target of balance it leaves the least torque of no rest, and goes as far as the rest holds."""
     answer = solved(lo.load("sixbar-sley").free(["end"]), "balance")
-    assert answer.figures["peak_torque"] == pytest.approx(153.4170077, rel=1e-8)
+    assert answer.figures["peak_torque"] == pytest.approx(156.9927548, rel=1e-8)
     assert "end: serves no level, least change from today" in answer.certificate.settled
     assert not answer.certificate.open
     limit = next(each for each in answer.limits if each.name == "travel.rest")

@@ -34,14 +34,14 @@ def solved(target="", **changes):
 def test_the_sley_is_balanced_without_its_rest():
     found = solved()
     assert found.status == "optimal"
-    assert found.figures["peak_torque"] == pytest.approx(153.4170077, rel=1e-9)
+    assert found.figures["peak_torque"] == pytest.approx(156.9927548, rel=1e-9)
     assert abs(found.figures["force.front"]) <= 1e-7
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("target", "figure", "value"),
-    [("torque", "peak_torque", 81.09726086), ("smooth", "peak_acceleration", 0.3712768937)],
+    [("torque", "peak_torque", 85.95624778), ("smooth", "peak_acceleration", 0.3712768937)],
 )
 def test_what_else_is_sought_of_it(target, figure, value):
     found = solved(target)
@@ -52,7 +52,7 @@ def test_what_else_is_sought_of_it(target, figure, value):
 @pytest.mark.slow
 def test_joints_keep_out_of_a_box():
     found = lo.solve(six(limits={"x_max": {"E": {"max": "265 mm"}}, "y_min": {"F": {"min": "270 mm"}}}))
-    assert found.figures["peak_torque"] == pytest.approx(153.746530, abs=1e-6)
+    assert found.figures["peak_torque"] == pytest.approx(157.244860, abs=1e-6)
     assert found.figures["x_max.E"] == pytest.approx(0.265, abs=1e-9)
     assert found.figures["y_min.F"] >= 0.27 - 1e-9
 
@@ -60,7 +60,7 @@ def test_joints_keep_out_of_a_box():
 @pytest.mark.slow
 def test_the_least_torque_with_a_rest_and_the_longest_rest():
     found = lo.solve(SIX)
-    assert found.figures["peak_torque"] == pytest.approx(164.4383316, rel=1e-9)
+    assert found.figures["peak_torque"] == pytest.approx(168.0868528, rel=1e-9)
     assert found.figures["travel.rest"] == pytest.approx(math.radians(0.25), rel=1e-9)
     longest = lo.solve(SIX, "dwell")
     assert math.degrees(longest.design["end"]) == pytest.approx(256.8786297, abs=1e-7)
@@ -71,7 +71,7 @@ def test_the_least_torque_with_a_rest_and_the_longest_rest():
 def test_a_press_needs_the_least_torque():
     found = lo.solve(lo.load("knuckle-press"))
     assert found.status == "optimal"
-    assert found.figures["peak_torque"] == pytest.approx(6764.154280, rel=1e-9)
+    assert found.figures["peak_torque"] == pytest.approx(6721.970155, rel=1e-9)
 
 
 def test_a_point_follows_its_path_as_least_squares_have_it():

@@ -56,8 +56,8 @@ def press(v):
 
 
 CASES = {
-    "balanced": (SIX, six_bar(peak, balanced=True), (), 150.0, 153.4170077),
-    "least torque": (SIX, six_bar(peak), (), 150.0, 81.09726086),
+    "balanced": (SIX, six_bar(peak, balanced=True), (), 150.0, 156.9927548),
+    "least torque": (SIX, six_bar(peak), (), 150.0, 85.95624778),
     "smooth": (SIX, six_bar(bending), (), 0.5, 0.3712768937),
     "at rest": (SIX, six_bar(peak, balanced=True, resting=True), (), 150.0, 168.0868528),
     "longest rest": (SIX, six_bar(early, resting=True), ("end",), 1.0, -math.radians(256.8786297)),
