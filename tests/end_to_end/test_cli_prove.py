@@ -12,7 +12,7 @@ import loomopt as lo
 from loomopt.interface.cli.app import run
 from loomopt.solving.certificate import taylor_bounds
 
-KEYS = ["limit", "text", "status", "margin", "slack", "boxes", "angle", "unit"]
+KEYS = ["limit", "text", "status", "margin", "slack", "boxes", "angle", "unit", "open"]
 DEFAULTS = {"beatup": "balance", "rapier": "stroke-dwell", "shedding": "stiffness"}
 
 

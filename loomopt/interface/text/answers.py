@@ -258,5 +258,11 @@ def proofs(found: "Proofs") -> list[str | Grid]:
         lines.append((text, proof.status, *sizes, unit, str(proof.boxes), place))
     head = ("limit", "status", "margin", "up to", "unit", "boxes", f"fails at [{angle}]")
     table = Grid("", head, tuple(lines), right=(2, 3, 5, 6), first=(0, 1, 2, 4, 6), more="--json")
+    open_ = [
+        f"{joined(proof.said)} is left open from crank angle {proof.open / factor(angle):.4g} {angle} on, "
+        f"after {proof.boxes} boxes."
+        for proof in found.proofs
+        if proof.open is not None
+    ]
     uncovered = (f"Not covered: {text}." for text in found.uncovered)
-    return [f"{found.problem}, {found.target}: {found.said}", table, *uncovered]
+    return [f"{found.problem}, {found.target}: {found.said}", table, *open_, *uncovered]

@@ -84,8 +84,9 @@ class DwellCam:
         moves = self._by_stretch(ones, 0.0, ones, 0.0)
         middle = self._moving(at.begins + at.rise / 2, at.falls + at.fall / 2)
         grows = self._moving(1 / at.rise, -1 / at.fall)
-        # From the middle of the stretch nothing jumps, wherever φ is counted from: it is shorter than a turn.
-        share = within_half_turn(self.maths, self.phi - middle) * grows + self.maths.number(0.5)
+        # From the middle of the stretch nothing jumps, wherever φ is counted from: it is shorter than a turn. A dwell,
+        # in which the law counts for nothing, may be longer than half a turn: there it stands in its middle.
+        share = within_half_turn(self.maths, moves * (self.phi - middle)) * grows + self.maths.number(0.5)
         return law.formula(self.maths, share, piece), grows, moves
 
     def angle(self, order: int) -> Number:

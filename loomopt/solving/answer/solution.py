@@ -24,7 +24,8 @@ class Proof(NamedTuple):
 
     name: of the limit, or of the figure whose claimed peak it is. margin: by how much the refined value stays clear of
     the limit, negative where it exceeds it; slack: what is left open; boxes: how many it took; angle: the crank angle,
-    rad, of that value where the limit fails; unit: SI, of margin and slack.
+    rad, of that value where the limit fails; unit: SI, of margin and slack; open: the crank angle, rad, from which on
+    an undecided one is left open.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Proof(NamedTuple):
     angle: float | None = None
     kind: Literal["limit", "assembly", "peak"] = "limit"
     unit: str = "1"
+    open: float | None = None
 
     @property
     def limit(self) -> str:

@@ -34,11 +34,15 @@ CycleRow = tuple[str, float, Where | None]
 
 
 class CycleBound(NamedTuple):
-    """What the boxes show of one row: proven, violated at `angle` (rad), or neither within the boxes allowed."""
+    """What the boxes show of one row: proven, violated at `angle` (rad), or neither within the boxes allowed.
+
+    open: the crank angle, rad, up to which an undecided one is bounded, piece by piece from the first.
+    """
 
     status: str
     boxes: int
     angle: float | None = None
+    open: float | None = None
 
 
 class AngleBox(NamedTuple):
@@ -77,11 +81,20 @@ class Boxes(Reading):
         pieces = map(self.cycle.switch, range(self.cycle.pieces))
         return [{name: float(value) for name, value in switch.items()} for switch in pieces]
 
-    def bound(self, name: str, sign: float, limit: float, where: Where | None = None) -> CycleBound:
+    def bound(
+        self,
+        name: str,
+        sign: float,
+        limit: float,
+        where: Where | None = None,
+        stop: Callable[[int], bool] | None = None,
+    ) -> CycleBound:
         """Say whether sign · quantity ≤ limit (SI) all over the cycle, or over the pieces `where`.
 
-        What has a corner at 0, where no series is, is bounded by its square.
+        What has a corner at 0, where no series is, is bounded by its square. stop(boxes): whether to leave it undecided
+        after so many; after MOST_BOXES without it.
         """
+        ended = stop or (lambda boxes: boxes >= MOST_BOXES)
         cycle, used, square = self.cycle, 0, self.model.square(name)
         read, limit = (square, limit * abs(limit)) if square else (name, limit)
         for piece in map(int, np.flatnonzero(self.sampler.on(name, where))):
@@ -97,8 +110,9 @@ class Boxes(Reading):
                         "violated", used, float(cycle.starts[piece] * (1 - at) + cycle.starts[piece + 1] * at)
                     )
                 if holds is None:
-                    if used >= MOST_BOXES:
-                        return CycleBound("undecided", used)
+                    if ended(used):
+                        at = cycle.starts[piece] * (1 - box.low) + cycle.starts[piece + 1] * box.low
+                        return CycleBound("undecided", used, open=float(at))
                     boxes += box.halves(bend)
         return CycleBound("proven" if used else "undecided", used)
 

@@ -5,7 +5,8 @@ touches its limit, so it is proven up to a slack: a share of the quantity's larg
 """
 
 import math
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -25,6 +26,7 @@ from loomopt.physics.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Proof, Proofs, Solution, Words
+from loomopt.solving.certificate import taylor_bounds
 from loomopt.solving.certificate.taylor_bounds import Boxes
 from loomopt.solving.options import check_sought, target_name
 
@@ -56,11 +58,31 @@ def prove(
     program = judged_by or job.program(own, asked)
     reads = _readings(own, job, program, full, slack)
     words = Words(own)
-    found = tuple(
-        each._replace(unit=words.si(each.name)) for each in _merged(list(_proofs(program, job, words, *reads)))
-    )
+    found = tuple(each._replace(unit=words.si(each.name)) for each in _merged(_decided(program, job, words, reads)))
     whole = reads[1].sampler
     return Proofs(scene.name, name, found, scene, model.uncovered(whole.model.effects, whole.given.own))
+
+
+FIRST_BOXES, SECONDS = 2000, 5.0
+"""Boxes of every claim before any gets more (every packaged row takes fewer), and s of the processor from which on no
+claim gets more."""
+
+
+def _decided(program: Program, job: Job, words: Words, reads: "tuple[_Read, _Read]") -> list[Proof]:
+    """Return the proofs: each claim gets a few boxes, then those that are open more, while time is left."""
+    begun = time.process_time()
+
+    def late(boxes: int) -> bool:
+        return boxes >= taylor_bounds.MOST_BOXES or time.process_time() - begun > SECONDS
+
+    claims = list(_claims(program, job, words, *reads))
+    few = min(FIRST_BOXES, taylor_bounds.MOST_BOXES)
+    found = [each if isinstance(each, Proof) else _over_cycle(*each, lambda boxes: boxes >= few) for each in claims]
+    for place, each in enumerate(claims):
+        if not isinstance(each, Proof) and found[place].status == "undecided" and not late(few):
+            more = _over_cycle(*each, late)
+            found[place] = more if more.boxes >= found[place].boxes else found[place]
+    return found
 
 
 def _merged(found: list[Proof]) -> Iterator[Proof]:
@@ -111,35 +133,38 @@ def _readings(
     return own, whole
 
 
-def _proofs(program: Program, job: Job, words: Words, own: _Read, whole: _Read) -> Iterator[Proof]:
-    """Yield the proofs: limits of the cycle and of single values, assembly, claimed peaks."""
+def _claims(
+    program: Program, job: Job, words: Words, own: _Read, whole: _Read
+) -> "Iterator[Proof | tuple[_Read, _Claim]]":
+    """Yield what is to be proven: limits of the cycle, assembly, claimed peaks; of single values their proofs."""
     for limit in program.row_limits:
         hidden = limit.row if limit.name in program.named_limits else limit.name
         text = hidden if limit.hidden else words.limit(limit)
         if isinstance(limit, CycleLimit):
             peak = own.sampler.peak(limit.row, limit.where)
-            yield _over_cycle(own, _Claim(limit.name, text, limit.row, limit.bound, peak, limit.where))
+            yield own, _Claim(limit.name, text, limit.row, limit.bound, peak, limit.where)
         else:
             yield _single(own, limit, text)
     for name, (quantity, most) in whole.sampler.model.assembly.items():
-        yield _over_cycle(whole, _Claim(name, name, quantity, most, whole.sampler.peak(quantity), kind="assembly"))
+        yield whole, _Claim(name, name, quantity, most, whole.sampler.peak(quantity), kind="assembly")
     for figure, quantity in job.peaks(whole.sampler.model).items():
         peak = whole.sampler.peak(quantity)
         if math.isfinite(peak):
-            yield _over_cycle(whole, _Claim(figure, f"{figure} as claimed", quantity, peak, peak, kind="peak"))
+            yield whole, _Claim(figure, f"{figure} as claimed", quantity, peak, peak, kind="peak")
 
 
-def _over_cycle(read: _Read, claim: _Claim) -> Proof:
-    """Bound one quantity on boxes; both signs where its magnitude counts."""
+def _over_cycle(read: _Read, claim: _Claim, stop: Callable[[int], bool]) -> Proof:
+    """Bound one quantity on boxes; both signs where its magnitude counts; stop(boxes): whether to leave it open."""
     slack = read.slack * _largest(read.sampler, claim.quantity)
     signs = (1.0,) if claim.quantity in read.sampler.model.signed else (1.0, -1.0)
-    found = [read.boxes.bound(claim.quantity, sign, claim.bound + slack, claim.where) for sign in signs]
+    found = [read.boxes.bound(claim.quantity, sign, claim.bound + slack, claim.where, stop) for sign in signs]
     worst = max(found, key=lambda each: RANK[each.status])
     count = sum(each.boxes for each in found)
     most, angle = claim.peak, None
     if worst.angle is not None:
         most, angle = _highest(read.sampler, claim, worst.angle)
-    return Proof(claim.name, claim.text, worst.status, claim.bound - most, slack, count, angle, claim.kind)
+    open_ = None if worst.open is None else worst.open % (2 * math.pi)
+    return Proof(claim.name, claim.text, worst.status, claim.bound - most, slack, count, angle, claim.kind, open=open_)
 
 
 def _highest(sampler: Sampler, claim: _Claim, angle: float) -> tuple[float, float]:
