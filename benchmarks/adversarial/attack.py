@@ -7,7 +7,7 @@ where an admissible design is found. Whatever is not certified is told with its 
 died. Each failure is printed with its scene and design. Any of them but "second order open" ends in exit status 1, and
 so do many lost ones.
 
-    python benchmarks/adversarial/attack.py [--count N] [--seed S] [--jobs rapier,beatup,shedding] [--seconds T]
+    python benchmarks/adversarial/attack.py [--count N] [--seed S] [--jobs rapier,beatup,shedding,linkage] [--seconds T]
                                 [--only K] [--compare] [--json]
 
 --count: scenes of each job; --seconds: no scene is begun later. Scene K of a job and seed is always the same one:
@@ -34,7 +34,7 @@ BETTER = 1e-6
 HELD = 1e-9
 BROKEN = 1e-7
 """What a certified answer may be off the referee's figures and limits: ten times the accuracy it was asked for."""
-JOBS = ("rapier", "beatup", "shedding")
+JOBS = ("rapier", "beatup", "shedding", "linkage")
 OPEN = "second order open"
 CALLS: dict[str, dict[str, Any]] = {"default": {}, "starts=1": {"starts": 1}, "starts=8": {"starts": 8}}
 COUNTED = (
@@ -84,7 +84,8 @@ class Trial:
         import loomopt as lo
 
         self.task, self.seed = task, seed
-        self.scene = lo.load(task.base).update(task.changes)
+        known = getattr(task, "document", None)
+        self.scene = lo.scene(known) if known else lo.load(task.base).update(task.changes)
         self.found: tuple[dict[str, float], tuple[float, ...]] | None = None
         self.answers: dict[str, Any] = {}
         self.verdicts: list[tuple[str, str]] = []
@@ -157,7 +158,9 @@ class Trial:
 def told(job: str, seed: int, number: int, trial: Trial) -> list[str]:
     """Return a line for each failure, from which it can be made again."""
     task = trial.task
-    again = f"lo.solve(lo.load({task.base!r}).update({task.changes!r}), {task.target!r})"
+    known = getattr(task, "document", None)
+    made = f"lo.scene({known!r})" if known else f"lo.load({task.base!r}).update({task.changes!r})"
+    again = f"lo.solve({made}, {task.target!r})"
     place = f"--jobs {job} --seed {seed} --only {number}"
     return [
         f"{kind} ({place}): {why}\n    {again}\n    answer {dict(trial.answer.design)}" for kind, why in trial.verdicts

@@ -22,7 +22,7 @@ from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import BEATEN, SUCCESS, Known, Point, sampler_at
 from loomopt.solving.nlp.rows import chain_roots
-from loomopt.solving.search import fallback
+from loomopt.solving.search import fallback, vanishing
 from loomopt.solving.search.search import Candidate, OnStart, Search, at, judged, tried
 
 SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8, 3, 2
@@ -316,7 +316,7 @@ def resolved(
         if finer is search.program:
             break
         search = searched(replace(search, program=finer, candidates=(), best=None), starts, seed, (), on_start)
-    return fallback.no_worse(search)
+    return fallback.no_worse(vanishing.held(search))
 
 
 def rewarded(

@@ -199,3 +199,20 @@ def test_a_sum_that_vanishes_at_a_bound_is_certified_without_a_price(least):
     for name in least:
         vanished(answer, name, 8.0)
     assert answer.design["up.stiffness"] == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_a_later_level_has_what_a_first_one_at_0_leaves_it():
+    room = {
+        "bounds.mass.rod.J": {"min": "0.001 kg*m^2", "max": "0.003 kg*m^2"},
+        "bounds.mass.rocker.J": {"min": "0.0005 kg*m^2", "max": "0.003 kg*m^2"},
+    }
+    answer = lo.solve(scene(FOUR_BAR, ["shaking_force", "peak_torque"], room))
+    assert answer.status == "optimal", answer.message
+    assert answer.figures["shaking_force"] <= 1e-9 * 119.7
+    assert answer.design["crank.along"] == pytest.approx(-0.040, abs=1e-10)
+    assert answer.design["rocker.along"] == pytest.approx(-0.080, abs=1e-10)
+    # By hand: the places are given, and less inertia of either link is less torque.
+    assert {price.limit for price in answer.binding} == {"rod.J", "rocker.J"}
+    assert answer.design["rod.J"] == pytest.approx(0.001, rel=1e-9)
+    assert answer.design["rocker.J"] == pytest.approx(0.0005, rel=1e-9)
