@@ -389,6 +389,7 @@ if TYPE_CHECKING:
     from loomopt.model.axes import Requested, Traded
     from loomopt.model.machines import Machines
     from loomopt.model.separation import Parted
+    from loomopt.scenes.csv_tables import Record
     from loomopt.scenes.scene import Scene
 
 
@@ -535,6 +536,10 @@ class Job(abc.ABC):
     def demand(self, scene: Scene, target: str) -> None:
         """Raise BadInput where a target speaks of what the scene does not have."""
         demand(scene, target)
+
+    def tables(self, scene: Scene, target: str) -> "tuple[Record, ...]":
+        """Return what is told of the tables that are read for a target; "" for the scene's default. Raises BadInput."""
+        return numbers.records(scene)
 
     def today(self, scene: Scene) -> dict[str, float]:
         """Return today's design by full names, with every other number that the scene frees."""

@@ -5,6 +5,7 @@ Between two corners the curve is the C² cubic that has one formula over its fir
 cubic. Nothing is smoothed, and nothing holds it between its samples: it may overshoot them.
 """
 
+import contextlib
 import functools
 import itertools
 import math
@@ -117,6 +118,18 @@ class PeriodicCubics(NamedTuple):
         """The largest spread of any."""
         found = [curve.spread for curve in self.curves if curve.spread is not None]
         return max(found, default=None)
+
+
+def misfit(angles: Sequence[float], values: Sequence[float]) -> float | None:
+    """Return the rms by which samples, left out one at a time, lie off the curve of the others; None without a curve.
+
+    angles: rad, of one turn or less; where they leave a gap, the samples beside it are corners.
+    """
+    count = len(angles)
+    for ends in ((), (0, count - 1)):
+        with contextlib.suppress(ValueError):
+            return through(tuple(angles), tuple(values), tuple(k in ends for k in range(count))).spread
+    return None
 
 
 def interval_at(angle: float, begins: Sequence[float]) -> float:

@@ -121,6 +121,14 @@ def through(u: tuple[float, ...], s: tuple[float, ...], half: tuple[float, ...])
     )
 
 
+def values(found: SmoothRise, u: Sequence[float]) -> list[float]:
+    """Return a curve's values at arguments within its own."""
+    import numpy as np
+
+    curve = tuple(np.array(each) for each in found[:5])
+    return [float(value) for value in _at((curve[0], curve[1], curve[2], curve[3], curve[4]), np.array(u))]
+
+
 def _at(curve: "tuple[Floats, Floats, Floats, Floats, Floats]", u: "Floats") -> "Floats":
     """Return the curve at arguments; curve: u, s, v, after and before."""
     import numpy as np

@@ -42,16 +42,24 @@ def _words(scene: Scene) -> Iterator[tuple[str, str, Any]]:
                 yield name, key, known.get((name, key), value)
 
 
-def curves(scene: Scene) -> dict[tuple[str, str], PeriodicCubic | PeriodicCubics]:
+Curve = PeriodicCubic | PeriodicCubics
+
+
+def curves(scene: Scene) -> dict[tuple[str, str], Curve]:
     """Return the curves that the scene's loads are, read from its files, by effect and key. Raises BadInput."""
+    return {place: curve for place, (curve, _) in _curves(scene).items()}
+
+
+def _curves(scene: Scene) -> dict[tuple[str, str], tuple[Curve, csv_tables.Table]]:
+    """Return the curves that the scene's loads are, each with its table. Raises BadInput."""
     on = zip(scene.active, scene.effects.values(), strict=True)
     loads = [(effect, own) for effect, own in on if isinstance(effect, Load) and effect.tabulated]
     found = {(load.name, load.tabulated.key): _curve(scene, load, own) for load, own in loads if load.tabulated}
     return {place: curve for place, curve in found.items() if curve is not None}
 
 
-def _curve(scene: Scene, load: Load[Any], own: Table) -> PeriodicCubic | PeriodicCubics | None:
-    """Return the curve that a load's table names; None where it names none. Raises BadInput."""
+def _curve(scene: Scene, load: Load[Any], own: Table) -> tuple[Curve, csv_tables.Table] | None:
+    """Return the curve that a load's table names, with the table; None where it names none. Raises BadInput."""
     table = load.tabulated
     given = getattr(own, table.key) if table else None
     if table is None or given is None:
@@ -71,7 +79,7 @@ def _curve(scene: Scene, load: Load[Any], own: Table) -> PeriodicCubic | Periodi
     marked = read.marks[CORNER]
     try:
         found = tuple(periodic_cubic.through(angles, each, tuple(map(bool, marked))) for each in values)
-        return PeriodicCubics(found) if table.beside else found[0]
+        return (PeriodicCubics(found) if table.beside else found[0]), read
     except ValueError as error:
         remedy = f"Correct the table: angles are {table.angle}; a column {CORNER} marks corners with 1"
         raise refusal(f"the table is no curve over one turn: {error}", read.file, remedy=remedy) from None
@@ -96,9 +104,14 @@ def labels(scene: Scene) -> dict[str, str]:
 
 def told(scene: Scene) -> tuple[str, ...]:
     """Return what to know of the curves that loads are read from: each a sentence without its full stop."""
+    return tuple(record.said for record in records(scene))
+
+
+def records(scene: Scene) -> tuple[csv_tables.Record, ...]:
+    """Return what is told of the tables that loads are read from. Raises BadInput."""
     found = []
     loads = {load.name: load for load in scene.active if isinstance(load, Load)}
-    for (name, key), curve in curves(scene).items():
+    for (name, key), (curve, read) in _curves(scene).items():
         table = loads[name].tabulated
         assert table is not None
         corners = "one corner" if curve.corners == 1 else f"{curve.corners or 'no'} corners"
@@ -107,9 +120,10 @@ def told(scene: Scene) -> tuple[str, ...]:
             left = f"; left out one at a time, samples lie {scene.show(curve.spread, table.kind, 3)} rms off the curve "
             left += "of the others"
         unread = [each for each in table.needless if scene.given(each) is not None]
-        found.append(
-            f"{name}.{key} {scene.effects[name].model_dump()[key]}: a cubic through {curve.samples} samples with "
-            f"{corners}, rms of the fit {scene.show(0.0, table.kind)}{left}"
-            f"{f'. {unread[0]} is not read' if unread else ''}"
-        )
+        said = f"a cubic through {curve.samples} samples with {corners}, "
+        said += f"rms of the fit {scene.show(0.0, table.kind)}{left}"
+        parts = curve.curves if isinstance(curve, PeriodicCubics) else (curve,)
+        columns = [column for column in table.columns if column != "angle"]
+        record = read.record(f"{name}.{key}", {n: part.spread for n, part in zip(columns, parts, strict=True)}, said)
+        found.append(record._replace(said=f"{record.said}{f'. {unread[0]} is not read' if unread else ''}"))
     return tuple(found)

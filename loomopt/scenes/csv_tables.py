@@ -33,6 +33,8 @@ MARKS = {"": 0.0, "0": 0.0, "1": 1.0, "x": 1.0}
 """What a column of marks may hold."""
 TURN = 2 * math.pi + 1e-4
 """Largest angle, rad: one turn, with room for 6.2832."""
+WHOLE = 0.5
+"""Half a unit of numbers without decimals."""
 LONGEST_TOLD = 20
 """Characters of a cell that a message repeats: a file that is no table may hold what is not to be shown."""
 FIRST_ROWS = 20
@@ -59,14 +61,39 @@ class _Column(NamedTuple):
     kind: str
     place: int
     unit: float
+    text: str
+
+
+class Record(NamedTuple):
+    """What is told of a table that was read, SI.
+
+    key: under which the scene names it; rows: of numbers; precision: how far rounding may have moved a number of each
+    column; misfit: rms by which samples, left out one at a time, lie off the curve of the others, by column; None where
+    it has none. change: the largest change that smoothing made to a value; uncertainty: of the second derivative, as a
+    share of its peak; both None where nothing is smoothed. said: all of it in a sentence without its full stop.
+    """
+
+    key: str
+    file: str
+    rows: int
+    precision: Mapping[str, float]
+    misfit: Mapping[str, float | None]
+    said: str
+    change: float | None = None
+    uncertainty: float | None = None
+
+    def as_dict(self) -> dict[str, object]:
+        """Return it as JSON data; what is not smoothed says nothing of smoothing."""
+        told = {name: value for name, value in self._asdict().items() if value is not None and name != "said"}
+        return told | {"precision": dict(self.precision), "misfit": dict(self.misfit)}
 
 
 class Table(NamedTuple):
     """What is read of a file.
 
-    file: as it was named; columns: by name, SI; halves: half a unit of the last digit of each number, SI, by name;
-    marks: columns of marks by name; lines: of the file, for each row; remarks: how what can be read in two ways was
-    read, a sentence each without its full stop.
+    file: as it was named; columns: by name, SI; halves: half a unit of the last digit of each number, SI, by name, 0 of
+    whole degrees; marks: columns of marks by name; lines: of the file, for each row; units: as written, by column;
+    remarks: how what can be read in two ways was read, a sentence each without its full stop.
     """
 
     file: str
@@ -74,12 +101,25 @@ class Table(NamedTuple):
     halves: Mapping[str, tuple[float, ...]]
     marks: Mapping[str, tuple[float, ...]]
     lines: tuple[int, ...]
+    units: Mapping[str, str]
     remarks: tuple[str, ...] = ()
 
     @property
     def precision(self) -> dict[str, float]:
         """How far a number of each column may be off by rounding, SI."""
         return {name: max(halves) for name, halves in self.halves.items()}
+
+    @property
+    def said(self) -> str:
+        """How it was read, in words: "angle to ±0.5 deg, s to ±0.0005 mm"."""
+        halves = {name: self.precision[name] / factor(unit) for name, unit in self.units.items()}
+        told = (f"{name} to \u00b1{half:.2g} {self.units[name]}" for name, half in halves.items() if half)
+        return "; ".join((f"read {', '.join(told)}", *self.remarks))
+
+    def record(self, key: str, misfit: Mapping[str, float | None], said: str) -> Record:
+        """Return what is told of it; key: under which the scene names it; said: what became of it, in words."""
+        text = f"{key} {self.file}: {said}; {self.said}"
+        return Record(key, self.file, len(self.lines), self.precision, misfit, text)
 
 
 def read(
@@ -196,10 +236,7 @@ def _table(
         if all(map(math.isnan, values[column.name])):
             raise refusal(f"column {column.called} is empty", origin, remedy="Fill it, or take it out")
     halves = {
-        column.name: tuple(
-            half * column.unit for half in _halves(texts[column], None if column.kind == "angle" else digits)
-        )
-        for column in found
+        column.name: tuple(half * column.unit for half in _precision(column, texts[column], digits)) for column in found
     }
     marked = {name: _marked(head, rows, name, origin) for name in marks}
     lines = tuple(row.line for row in rows)
@@ -209,7 +246,8 @@ def _table(
         if values[first.name][0] > values[first.name][-1] and _falls(values[first.name]):
             values, halves, marked = ({n: each[::-1] for n, each in of.items()} for of in (values, halves, marked))
             lines = lines[::-1]
-    return Table(origin, values, halves, marked, lines, remarks)
+    written = {column.name: column.text for column in found}
+    return Table(origin, values, halves, marked, lines, written, remarks)
 
 
 # The heading.
@@ -277,7 +315,7 @@ def _found(head: Row, rows: Sequence[Row], kinds: Mapping[str, str], origin: str
             problem = f"{where}: the unit is missing, so column {name} has none"
             remedy = f'Write "{name} [{DISPLAY_UNIT[kind]}]", or the units in a row of their own below'
             raise refusal(problem, origin, allowed=usual, remedy=remedy)
-        found.append(_Column(name, called, kind, there[0], _size(unit, kind, where, usual, origin)))
+        found.append(_Column(name, called, kind, there[0], *_size(unit, kind, where, usual, origin)))
     return found, below
 
 
@@ -290,12 +328,12 @@ def _quoted(row: Row) -> str:
     return ", ".join(map(_cell, row.cells[:8])) or "nothing"
 
 
-def _size(unit: str, kind: str, where: str, usual: str, origin: str) -> float:
-    """Return a unit of a column in SI. Raises BadInput for one that is none of its kind."""
+def _size(unit: str, kind: str, where: str, usual: str, origin: str) -> tuple[float, str]:
+    """Return a unit of a column in SI, and in ASCII. Raises BadInput for one that is none of its kind."""
     plain, meant = ascii_unit(unit), ""
     try:
         if plain == DISPLAY_UNIT[kind] or fits(plain, kind):
-            return factor(plain)
+            return factor(plain), plain
     except QuantityError:
         meant = meant_unit(plain, kind)
     remedy = f'Perhaps "{meant}" is meant' if meant else "Write one of these units"
@@ -403,6 +441,14 @@ def _number(text: str, row: Row, column: _Column, origin: str, gap: bool) -> flo
         remedy = "Write digits and a decimal sign, such as 12.5 or 1.25e1"
         raise refusal(problem, origin, remedy=remedy)
     return value * column.unit
+
+
+def _precision(column: _Column, texts: Sequence[str], digits: int | None) -> list[float]:
+    """Return half a unit of the last digit of each number of a column, in its own unit; 0 of whole degrees."""
+    if column.kind != "angle":
+        return _halves(texts, digits)
+    found = _halves(texts, None)
+    return [0.0] * len(texts) if column.text == "deg" and min(found) == WHOLE else found
 
 
 def _halves(texts: Sequence[str], digits: int | None) -> list[float]:

@@ -10,6 +10,7 @@ from loomopt.base.errors import BadInput, refusal, unknown
 from loomopt.base.quantities import Quantity, plain_number, quantity_of
 from loomopt.physics.effects.kinds import label
 from loomopt.physics.schema import Table
+from loomopt.scenes import table_cells
 from loomopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -76,18 +77,19 @@ def files(scene: Scene) -> dict[str, str]:
 
 
 def tables(scene: Scene) -> dict[str, str]:
-    """Return the text of every table in a CSV file that a scene names, by the dotted key of its name; no huge one's."""
+    """Return every table in a file that a scene names as CSV text, by the dotted key of its name; no huge one's."""
     found: dict[str, str] = {}
-    for key, raw in _contents(scene, ".csv"):
-        with contextlib.suppress(UnicodeDecodeError):
-            found |= {key: raw.decode("utf-8-sig")} if len(raw) <= LARGEST_TABLE else {}
+    for key, raw in _contents(scene, table_cells.ENDINGS):
+        with contextlib.suppress(BadInput):
+            text = table_cells.text(raw, key)
+            found |= {key: text} if len(text) <= LARGEST_TABLE else {}
     return found
 
 
-def _contents(scene: Scene, ending: str = "") -> Iterator[tuple[str, bytes]]:
+def _contents(scene: Scene, endings: tuple[str, ...] = ("",)) -> Iterator[tuple[str, bytes]]:
     """Yield what stands in every file that a scene names, or that came with it, by the dotted key of its name."""
     for key, text in _texts({name: own for name, own in scene.document.items() if name not in WITHOUT_FILES}):
-        if not text.lower().endswith(ending):
+        if not text.lower().endswith(endings):
             continue
         with contextlib.suppress(BadInput, OSError, ValueError):  # what can be no file's name is none
             held = scene.paths.text(key)

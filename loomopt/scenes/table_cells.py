@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 from loomopt.base.errors import BadInput, refusal, shown
 
+ENDINGS = (".csv", ".tsv", ".tab", ".txt", ".xlsx", ".parquet")
+"""Endings of files that are tables; what a file is, its first bytes tell."""
 LARGEST_FILE = 1_000_000
 """Bytes of a file."""
 MOST_ROWS, MOST_COLUMNS = 2500, 256
@@ -79,7 +81,7 @@ def text(raw: bytes, origin: str) -> str:
     encoding = next((name for mark, name in ENCODINGS.items() if raw.startswith(mark)), "") or _without_mark(raw)
     for name in (encoding, "cp1252") if encoding == "utf-8" else (encoding,):
         try:
-            return raw.decode(name).replace("\r\n", "\n").replace("\r", "\n")
+            return raw.decode(name).removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
         except UnicodeDecodeError as error:
             place = error.start
     remedy = "Save the file as UTF-8"

@@ -11,7 +11,6 @@ from loomopt.base.units import factor
 from loomopt.interface.text.layout import GAP, Grid
 from loomopt.jobs import registry
 from loomopt.model.curves import split
-from loomopt.model.numbers import told
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import keys, label, owned, value_at
 from loomopt.physics.schema import Table
@@ -49,7 +48,7 @@ def parts(scene: Scene) -> list[str | Grid]:
         f"Tables show {', '.join(f'{key} in {scene.shown_in(kind)}' for key, kind in _kinds(scene).items())}",
         Grid("Numbers", ("key", "as given", "SI", ""), tuple(lines), right=(1, 2), units=(3,)),
         Grid("Effects that are on", ("effect", "what it is"), effects) if effects else "No effect is on",
-        *told(scene),
+        *(record.said for record in registry.of(scene).tables(scene, scene.schema.default_target)),
         f"Effects that are off, and not in the equations: {', '.join(off) or 'none'}",
         Grid("Targets", ("target", "what it asks", "expected"), tuple(_targets(scene))),
         *_family(scene),

@@ -9,12 +9,15 @@ from loomopt.jobs.base import EVERY, Figures, InBox, Job, Studied
 from loomopt.jobs.linkage import scene as scenes
 from loomopt.jobs.linkage.model import OBLIQUITY
 from loomopt.jobs.linkage.program import LinkageTask, linkage_of, model
+from loomopt.maths import periodic_cubic
+from loomopt.maths.periodic_cubic import TURN
 from loomopt.maths.systems import Number
 from loomopt.model.curves import Columns
 from loomopt.model.model import Formula, Instant, JobModel
 from loomopt.model.program import Numbers
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FEASIBLE
+from loomopt.scenes.csv_tables import Record
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import SceneSchema
 
@@ -108,6 +111,17 @@ class LinkageJob(Job):
         """Raise BadInput where a target speaks of what the scene does not have."""
         base.demand(scene, target)
         self.task(scene, target).demand_figures()
+
+    def tables(self, scene: Scene, target: str) -> tuple[Record, ...]:
+        """Return what is told of the tables that are read, that of a path too."""
+        asked = scenes.path_target(scene, target)
+        if asked is None:
+            return super().tables(scene, target)
+        read = scenes.read_path(scene, asked)
+        count = len(read.lines)
+        angles = read.columns.get("phi", tuple(TURN * k / count for k in range(count)))
+        misfit = {name: periodic_cubic.misfit(angles, read.columns[name]) for name in ("x", "y")}
+        return (*super().tables(scene, target), read.record(f"targets.{asked}.table", misfit, "the path to follow"))
 
     def studied(self, scene: Scene) -> Studied:
         """Return what studies read."""

@@ -431,12 +431,19 @@ def _fitted(effect: kinds.Effect, linkage: Linkage) -> kinds.Effect:
 
 def path(scene: Scene, target: str) -> Path | None:
     """Return the path that a target asks for, else the first target that has one; None where none has. Raises."""
-    own = {name: table for name, table in scene.targets.items() if isinstance(table, TargetTable) and table.point}
-    name = target if target in own else next(iter(own), None)
+    name = path_target(scene, target)
     if name is None:
         return None
     found = read_path(scene, name).columns
-    return Path(str(own[name].point), found.get("phi", ()), found["x"], found["y"])
+    table = scene.targets[name]
+    assert isinstance(table, TargetTable)
+    return Path(str(table.point), found.get("phi", ()), found["x"], found["y"])
+
+
+def path_target(scene: Scene, target: str) -> str | None:
+    """Return the target whose path is read for a target: its own, else the first that has one; None where none has."""
+    own = [name for name, table in scene.targets.items() if isinstance(table, TargetTable) and table.point]
+    return target if target in own else next(iter(own), None)
 
 
 def read_path(scene: Scene, name: str) -> csv_tables.Table:

@@ -11,13 +11,15 @@ from loomopt.jobs import base
 from loomopt.jobs.base import EVERY, Crossing, Figures, InBox, Job, Studied
 from loomopt.jobs.rapier.model import jerk_mean, linked, match_mean, read, read_many
 from loomopt.jobs.rapier.program import SIDES, RapierTask, model
-from loomopt.jobs.rapier.scene import FIGURES, SCHEMA, STROKE, VARIABLES, MatchTarget, match_table
+from loomopt.jobs.rapier.scene import FIGURES, SCHEMA, STROKE, VARIABLES, MatchTarget, match_table, read_match
+from loomopt.maths import periodic_cubic
 from loomopt.maths.systems import FLOAT, Number
 from loomopt.model.curves import Columns
 from loomopt.model.model import JobModel
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.mechanisms import rapier_drive
+from loomopt.scenes.csv_tables import Record
 from loomopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -64,6 +66,14 @@ class Rapier(Job):
         base.demand(scene, target)
         if target == "match":
             match_table(scene)
+
+    def tables(self, scene: Scene, target: str) -> tuple[Record, ...]:
+        """Return what is told of the tables that are read: of head travel for target match."""
+        if target != "match":
+            return super().tables(scene, target)
+        read = read_match(scene)
+        misfit = {"S": periodic_cubic.misfit(read.columns["phi1"], read.columns["S"])}
+        return (*super().tables(scene, target), read.record("targets.match.table", misfit, "the head travel to match"))
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
         """Return the design, SI, of NLP variables: the drive's own, and every other number that is freed."""

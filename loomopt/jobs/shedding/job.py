@@ -43,10 +43,12 @@ from loomopt.jobs.shedding.scene import (
     check_law,
     check_motion,
     dwelt,
+    read_law,
+    refuse_unclear,
     unfollowed,
 )
 from loomopt.maths import systems
-from loomopt.maths.systems import Number
+from loomopt.maths.systems import FLOAT, Number
 from loomopt.model.curves import Columns
 from loomopt.model.model import Formula, JobModel
 from loomopt.model.numbers import curves
@@ -56,6 +58,7 @@ from loomopt.physics import balance
 from loomopt.physics.mechanisms import cam_limit, cam_spline
 from loomopt.physics.mechanisms.cam_laws import LawDerivatives
 from loomopt.physics.mechanisms.cam_motion import Spline, knots, named_knots
+from loomopt.scenes.csv_tables import Record
 from loomopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -124,6 +127,8 @@ class Shedding(Job):
             raise refusal(problem, scene.origin, "mechanism.segments", remedy=remedy)
         if target == "speed":
             demand_moving(scene, "choose another target")
+        if target != "law":
+            refuse_unclear(scene, self._reads_accelerations(scene))
         own = scene.table(LawTarget)
         fewest, most = cam_spline.FEWEST, cam_spline.MOST
         if target == "law" and (not fewest <= own.intervals <= most or (own.symmetric and own.intervals % 2)):
@@ -131,6 +136,26 @@ class Shedding(Job):
             allowed = f"{fewest} to {most}, an even number for a symmetric law"
             raise refusal(problem, scene.origin, key, own.intervals, allowed, "Write intervals = 16.")
         self.parted(scene, self.sampler(scene, self.today(scene)))
+
+    def _reads_accelerations(self, scene: Scene) -> bool:
+        """Say whether the cam force, or a limit, depends on s''."""
+        if {"law_acceleration", "curvature_min", "curvature_max"} & set(scene.limits):
+            return True
+        model, numbers = self.model(scene), self.numbers(scene)
+        given, loads = model.given(FLOAT, numbers), [load for load in model.loads if load is not RETURN_SPRING]
+
+        def force(bend: float) -> Number:
+            law = LawDerivatives(0.3, 1.0, bend, 0.0)
+            pose = FrameMotion(FLOAT, 0.0, numbers["travel"], RISE, 0.3, 1.0, law, -1, numbers.get("speed", 0.0))
+            return balance.output_force(FLOAT, loads, pose, given, {load.name: 0.0 for load in loads})
+
+        return bool(force(1.0) != force(0.0))
+
+    def tables(self, scene: Scene, target: str) -> tuple[Record, ...]:
+        """Return what is told of the tables that are read, the cam law's first."""
+        if scene.table(HealdFrame).law != "table" or target == "law":
+            return super().tables(scene, target)
+        return (read_law(scene).record(scene), *super().tables(scene, target))
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
         """Return the design, SI, of NLP variables: the spring, what else is freed, and a free law's knots."""

@@ -1,8 +1,9 @@
 """What a shedding scene may hold: its tables, design variables, figures and targets."""
 
+import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from pydantic import Field, create_model
 
@@ -20,8 +21,9 @@ from loomopt.base.quantities import (
     Speed,
     Stiffness,
 )
-from loomopt.base.units import ShowValue, usual
+from loomopt.base.units import ShowValue, factor, usual
 from loomopt.jobs.shedding.model import FOLLOWER, HALF_OPEN, Segment, height, width
+from loomopt.maths import smooth_rise
 from loomopt.model import drive
 from loomopt.model.numbers import curves, words
 from loomopt.physics.cycle import Where
@@ -240,7 +242,7 @@ def chosen(scene: Scene) -> CamLaw:
     name = scene.table(HealdFrame).law
     if name == "spline":
         return Spline(len(_coefficients(scene)) - 1)
-    return Tabulated(_table(scene)) if name == "table" else Named(name)
+    return Tabulated(read_law(scene).law) if name == "table" else Named(name)
 
 
 def check_known(scene: Scene, there: Collection[Where], called: str) -> None:
@@ -270,7 +272,7 @@ def check_law(scene: Scene) -> None:
         if fault:
             raise refusal(f"the spline is no cam law: {fault}", scene.origin, "mechanism.law_coefficients")
     elif name == "table":
-        _table(scene)
+        read_law(scene)
 
 
 def _coefficients(scene: Scene) -> tuple[float, ...]:
@@ -281,9 +283,79 @@ def _coefficients(scene: Scene) -> tuple[float, ...]:
     return tuple(found)
 
 
-def _table(scene: Scene) -> cam_spline.LawTable:
+UNCLEAR = 0.1
+"""Share of its peak to which a table must tell s'' where accelerations are read."""
+FINER, CLOSER = (1, 2, 3, 4), (2, 4)
+"""More digits that may help where a table is unclear, and how many times more rows."""
+LAW_TABLE = "mechanism.law_table"
+
+
+class LawRead(NamedTuple):
+    """A cam law's table as it was read, and the law; half: of each s, as a share of the travel."""
+
+    law: cam_spline.LawTable
+    read: csv_tables.Table
+    half: tuple[float, ...]
+
+    @property
+    def travel(self) -> float:
+        """The height of the rise in the table, m."""
+        return self.read.columns["s"][-1]
+
+    def record(self, scene: Scene) -> csv_tables.Record:
+        """Return what is told of it: what smoothing changed, and how far s'' is known."""
+        found = self.law.found
+        change, misfit = found.change * self.travel, found.misfit * self.travel
+        moved = f"smoothed by {scene.show(change, 'length', 2)} at most" if change else "not smoothed"
+        said = f"a cubic through {len(found.u)} points, {moved}"
+        said += f", s'' jumps at {len(found.jumps)} points" if found.jumps else ""
+        said += f", {len(found.dwells)} dwells" if found.dwells else ""
+        said += (
+            f"; left out one at a time, points lie {scene.show(misfit, 'length', 3)} rms off the curve of the others"
+        )
+        said += f"; s'' is uncertain by {100 * found.uncertainty:.2g} % of its peak"
+        record = self.read.record(LAW_TABLE, {"s": misfit}, said)
+        return record._replace(change=change, uncertainty=found.uncertainty)
+
+    def needed(self) -> str:
+        """Return the digits, or the spacing, with which its s'' would be clear enough."""
+        unit = factor(self.read.units["s"])
+        size = 2 * max(self.half) * self.travel / unit
+        decimals = max(0, round(-math.log10(size))) if size else 15
+        u, found = self.law.u, self.law.found
+        helps = []
+        for more in FINER:
+            s = [round(at * self.travel / unit, decimals + more) * unit / self.travel for at in self.law.s]
+            half = tuple(each / 10.0**more for each in self.half)
+            if len(s) == len(half) and smooth_rise.through(u, tuple(s), half).uncertainty <= UNCLEAR:
+                helps.append(f"s to {decimals + more} decimals of {self.read.units['s']} instead of {decimals}")
+                break
+        whole = self.read.columns["angle"][-1] / factor(self.read.units["angle"])
+        for times in CLOSER:
+            closer = tuple(a + (b - a) * k / times for a, b in itertools.pairwise(u) for k in range(times)) + u[-1:]
+            curve = smooth_rise.values(found, closer)
+            s = [round(at * self.travel / unit, decimals) * unit / self.travel for at in curve]
+            if smooth_rise.through(closer, tuple(s), (max(self.half),) * len(s)).uncertainty <= UNCLEAR:
+                helps.append(f"a row every {whole / (len(closer) - 1):.3g} {self.read.units['angle']}")
+                break
+        return " or ".join(helps) or f"s to {decimals + len(FINER)} decimals of {self.read.units['s']}, in closer rows"
+
+
+def refuse_unclear(scene: Scene, reads_accelerations: bool) -> None:
+    """Raise BadInput where the digits of the law's table cannot tell the accelerations that are read."""
+    if scene.table(HealdFrame).law != "table" or not reads_accelerations:
+        return
+    found = read_law(scene)
+    if found.law.found.uncertainty > UNCLEAR:
+        share = 100 * found.law.found.uncertainty
+        problem = f"the table cannot tell accelerations: s'' is uncertain by {share:.2g} % of its peak"
+        remedy = f"Give {found.needed()}; or digits, where zeros were cut off"
+        raise refusal(problem, found.read.file, LAW_TABLE, allowed=f"up to {100 * UNCLEAR:g} %", remedy=remedy)
+
+
+def read_law(scene: Scene) -> LawRead:
     """Return the law of `mechanism.law_table`: cam angles and displacements of the rise, from 0 on. Raises BadInput."""
-    key = "mechanism.law_table"
+    key = LAW_TABLE
     given = scene.table(HealdFrame).law_table
     columns = {"angle": "angle", "s": "length"}
     if given is None:
@@ -300,7 +372,7 @@ def _table(scene: Scene) -> cam_spline.LawTable:
         for own, slope, width in zip(read.halves["s"], slopes, loose, strict=True)
     ]
     try:
-        return cam_spline.tabulated(places, [s / heights[-1] for s in heights], half)
+        return LawRead(cam_spline.tabulated(places, [s / heights[-1] for s in heights], half), read, tuple(half))
     except ValueError as error:
         raise refusal(f"the table is no cam law: {error}", given, remedy="Correct the table") from None
 
@@ -316,7 +388,7 @@ def _steps(heights: Sequence[float], angles: Sequence[float]) -> Iterator[tuple[
 def _even(angles: Sequence[float], halves: Sequence[float]) -> tuple[list[float], list[float]]:
     """Return angles as shares of the last one, and what rounding leaves open of them.
 
-    Angles that are evenly spaced but for their rounding are taken as evenly spaced; whole numbers are exact.
+    Angles that are evenly spaced but for their rounding are taken as evenly spaced.
     """
     whole, last = angles[-1], len(angles) - 1
     even = [whole * k / last for k in range(last + 1)]
@@ -324,9 +396,7 @@ def _even(angles: Sequence[float], halves: Sequence[float]) -> tuple[list[float]
         if max(abs(a - b) for a, b in zip(angles, even, strict=True)) > 1e-9 * whole:
             return [k / last for k in range(last + 1)], [0.0] * len(angles)
         return [a / whole for a in angles], [0.0] * len(angles)
-    unit = 2 * max(halves)
-    exact = all(abs(a / unit - round(a / unit)) < 1e-6 for a in angles) and unit > math.radians(0.99)
-    return [a / whole for a in angles], [0.0 if exact else half / whole for half in halves]
+    return [a / whole for a in angles], [half / whole for half in halves]
 
 
 def unfollowed(numbers: Mapping[str, Any], shown: ShowValue) -> str:

@@ -29,6 +29,7 @@ from loomopt.jobs.shedding.model import (
     height,
     width,
 )
+from loomopt.jobs.shedding.scene import LAW_TABLE
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.model.curves import POWER
@@ -487,7 +488,15 @@ class SheddingViews(JobViews):
         sampler = job.sampler(scene, design)
         undercut = () if self.missing(scene) else _undercut(scene, design)
         parted = _parted(scene, job.parted(scene, sampler))
-        return (*super().remarks(scene, design), *_partly(sampler), *_floating(scene, sampler), *undercut, *parted)
+        law = [record.said for record in job.tables(scene, "") if record.key == LAW_TABLE]
+        return (
+            *law,
+            *super().remarks(scene, design),
+            *_partly(sampler),
+            *_floating(scene, sampler),
+            *undercut,
+            *parted,
+        )
 
 
 def _parted(scene: Scene, parted: "Parted | None") -> Iterator[str]:

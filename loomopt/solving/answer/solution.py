@@ -1,11 +1,12 @@
 """What a solve or an evaluation says: plain data, ready for JSON."""
 
+import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, Protocol
 
-from loomopt.base.errors import refusal
+from loomopt.base.errors import BadInput, refusal
 from loomopt.base.quantities import quantities_of, quantity_of
 from loomopt.base.records import Shown, freeze, lazy
 from loomopt.base.units import SI_UNIT, factor, show
@@ -244,7 +245,18 @@ class Evaluated:
             "reached": dict(self.reached),
         }
         found |= {"undefined": dict(self.undefined)} if self.undefined else {}
+        tables = _tables(self.scene, str(getattr(self, "target", ""))) if self.scene and not self.members else []
+        found |= {"tables": tables} if tables else {}
         return found | ({"members": [_member_dict(member) for member in self.members]} if self.members else {})
+
+
+def _tables(scene: Scene, target: str) -> list[dict[str, object]]:
+    """Return precision and misfit of each table that was read, as JSON data; none of one that is gone since."""
+    from loomopt.jobs import registry
+
+    with contextlib.suppress(BadInput):
+        return [record.as_dict() for record in registry.of(scene).tables(scene, target)]
+    return []
 
 
 def changed(member: Evaluated) -> str:
