@@ -1,5 +1,6 @@
 """The return spring as coils that can be made: rate, stresses, hooks, initial tension, surge, space [Shigley, ch. 10].
 
+Where the scene says so, stress is corrected, and the initial tension is judged, as in EN 13906-2 and DIN 2089-2.
 It takes no part in the balance: K1 (X + X0) stays the whole force of all springs together. Their wire, coil and turns
 must give K1, and keep what material, winding and space allow.
 """
@@ -7,12 +8,21 @@ must give K1, and keep what material, winding and space allow.
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from loomopt.base.quantities import Force, PositiveDensity, PositiveLength, PositiveNumber, PositivePressure, PureNumber
-from loomopt.base.units import ShowValue, usual
+from loomopt.base.quantities import (
+    Force,
+    Length,
+    PositiveDensity,
+    PositiveLength,
+    PositiveNumber,
+    PositivePressure,
+    PureNumber,
+)
+from loomopt.base.quantities import read as quantity
+from loomopt.base.units import QuantityError, ShowValue, usual
 from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.physics.effects.kinds import Check, Demand, FlatNumber
 from loomopt.physics.schema import Figure, Table, Values
@@ -36,6 +46,7 @@ class Coil:
     wire: wire diameter d, m; diameter: mean coil diameter D, m; turns: active turns n, hooks' share included;
     shear_modulus G and elasticity E, Pa; density, kg/m³; initial_tension: force that parts the turns, N.
     hook_factor: bend radius of the hooks over D/2; 1 for full loops turned up from the last coil.
+    hook_length: m, from the body to the inside of a free hook, None for those loops; correction: of shear, by its name.
     """
 
     wire: Number
@@ -46,6 +57,8 @@ class Coil:
     initial_tension: Number
     elasticity: Number
     hook_factor: Number = 1
+    hook_length: Number | None = None
+    correction: str = "Wahl"
 
     @property
     def index(self) -> Number:
@@ -64,16 +77,25 @@ class Coil:
         return (4 * index - 1) / (4 * index - 4) + 123 / (200 * self.index)
 
     @property
+    def en_factor(self) -> Number:
+        """Factor k = (C + 0.5)/(C − 0.75) of curvature and direct shear [EN 13906-2]."""
+        return (self.index + 0.5) / (self.index - 0.75)
+
+    @property
     def body_turns(self) -> Number:
-        """Turns of the body N_b = n − G/E: the hooks give way like G/E turns [Shigley, eq 10-40]."""
+        """Turns of the body N_b = n − G/E: loops give way like G/E turns [Shigley, eq 10-40]; n beside free hooks."""
+        if self.hook_length is not None:
+            return self.turns
         return self.turns - self.shear_modulus / self.elasticity
 
     @property
     def free_length(self) -> Number:
         """Length inside the hooks, unloaded: 2(D − d) + (N_b + 1) d, m [Shigley, eq 10-39].
 
-        For full twisted loops at both ends.
+        For full twisted loops at both ends; a free hook reaches its own length beyond the body [EN 13906-2].
         """
+        if self.hook_length is not None:
+            return 2 * self.hook_length + (self.body_turns + 1) * self.wire
         return 2 * (self.diameter - self.wire) + (self.body_turns + 1) * self.wire
 
     @property
@@ -100,8 +122,9 @@ class Coil:
         return 8 * force * self.diameter / (maths.pi * self.wire**3)
 
     def shear_stress(self, maths: Maths, force: Number) -> Number:
-        """Return the greatest shear stress of the body K_W 8 F D/(π d³), Pa; force F, N."""
-        return self.wahl * self.torsion(maths, force)
+        """Return the greatest shear stress of the body K 8 F D/(π d³), Pa; force F, N; K by the coil's correction."""
+        factor = self.en_factor if self.correction == "EN 13906" else self.wahl
+        return factor * self.torsion(maths, force)
 
     def initial_stress(self, maths: Maths) -> Number:
         """Return the uncorrected stress of the initial tension 8 F_i D/(π d³), Pa."""
@@ -137,6 +160,26 @@ def strength(maths: Maths, d: Number, A: Number, m: Number) -> Number:
     return A / (1000 * d) ** m
 
 
+WINDINGS = {"bench": ("0.135", "0.00625"), "machine": ("0.075", "0.00375")}
+"""How springs are wound → a and b of the largest initial stress (a − b C) R_m [DIN 2089-2; EN 13906-2]: on a coiling
+bench, or on an automatic coiling machine."""
+
+
+def initial_band(maths: Maths, own: Values) -> tuple[Number, Number]:
+    """Least and greatest initial stress, Pa: by the ends that the scene gives, else by the winding it names."""
+    made = coil(own)
+    if own.get("winding") in WINDINGS:
+        a, b = (maths.number(float(text)) for text in WINDINGS[own["winding"]])
+        least, most = 0 * made.index, (a - b * made.index) * tensile(maths, own)
+    else:
+        least, most = made.initial_stress_least(maths), made.initial_stress_most(maths)
+    if "initial_tension_min" in own:
+        least = made.torsion(maths, own["initial_tension_min"])
+    if "initial_tension_max" in own:
+        most = made.torsion(maths, own["initial_tension_max"])
+    return least, most
+
+
 INDEX = 4.0, 12.0
 """Spring indices that can be wound."""
 RATE = "coils give K1"
@@ -165,7 +208,38 @@ class Own(Table):
     spring_length: PositiveLength = Field(description="space inside the hooks with the shed fully open")
     surge_ratio: PositiveNumber = Field(13.0, description="least surge frequency over that of the cam")
     hook_factor: PositiveNumber = Field(1.0, description="bend radius of the hooks over half the coil's diameter")
+    winding: Literal["shigley", "bench", "machine"] = Field(
+        "shigley",
+        description="what band the initial tension keeps: Shigley's, or as wound on a bench or a machine (EN 13906-2)",
+    )
+    initial_tension_min: Force | None = Field(None, description="least initial tension, instead of the winding's")
+    initial_tension_max: Force | None = Field(None, description="largest initial tension, instead of the winding's")
+    factor: Literal["Wahl", "EN 13906"] = Field("Wahl", description="correction of the shear stress")
+    hooks: Literal["loops", "free"] = Field(
+        "loops", description="full loops of the last coil, whose bend is judged, or free hooks, which are not"
+    )
+    hook_length: Length | None = Field(
+        None, description="of a free hook, from the body to its inside; the coil's inner diameter without it"
+    )
     sizes: Literal["preferred", "any"] = Field("preferred", description="a free wire's: those that are sold, or any")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _band_of_initial_tension(cls, raw: Any) -> Any:
+        """Take initial_tension = { min, max } for the band that it keeps; it stands in its middle then."""
+        band = raw.get("initial_tension") if isinstance(raw, Mapping) else None
+        if not isinstance(band, Mapping) or set(band) != {"min", "max"}:
+            return raw
+        try:
+            ends = [quantity(str(band[side]), "force") for side in ("min", "max")]
+        except QuantityError:
+            return raw
+        return {
+            **raw,
+            "initial_tension": f"{(ends[0] + ends[1]) / 2!r} N",
+            "initial_tension_min": band["min"],
+            "initial_tension_max": band["max"],
+        }
 
 
 def coil(own: Values) -> Coil:
@@ -179,6 +253,8 @@ def coil(own: Values) -> Coil:
         own["initial_tension"],
         own["elasticity"],
         own["hook_factor"],
+        own.get("hook_length", own["diameter"] - own["wire"]) if own.get("hooks") == "free" else None,
+        str(own.get("factor", "Wahl")),
     )
 
 
@@ -198,17 +274,23 @@ def _length(maths: Maths, given: Values, own: Values) -> Number:
     return own_coil.free_length + given["X0"] + given["travel"] - own_coil.initial_tension / own_coil.rate
 
 
+def _bending_share(maths: Maths, given: Values, own: Values) -> Number:
+    """Return the bending stress of the hooks over the strength; 0 of free hooks, whose bend nothing tells."""
+    share = coil(own).hook_bending(maths, load(given, own)) / tensile(maths, own)
+    return 0 * share if own.get("hooks") == "free" else share
+
+
 ROWS: dict[str, Callable[[Maths, Values, Values], Number]] = {
     "coil_index": lambda m, v, own: coil(own).index,
     "shear_stress": lambda m, v, own: coil(own).shear_stress(m, load(v, own)),
     "shear_share": lambda m, v, own: coil(own).shear_stress(m, load(v, own)) / tensile(m, own),
-    "bending_share": lambda m, v, own: coil(own).hook_bending(m, load(v, own)) / tensile(m, own),
+    "bending_share": lambda m, v, own: _bending_share(m, v, own),
     "surge_ratio": lambda m, v, own: 2 * m.pi * coil(own).surge_frequency(m) / v["speed"],
     "spring_length": _length,
     "spring_mass": lambda m, v, own: own["springs"] * coil(own).mass(m),
     RATE: lambda m, v, own: own["springs"] * coil(own).rate - v["K1"],
-    LEAST_INITIAL: lambda m, v, own: coil(own).initial_stress(m) - coil(own).initial_stress_least(m),
-    MOST_INITIAL: lambda m, v, own: coil(own).initial_stress_most(m) - coil(own).initial_stress(m),
+    LEAST_INITIAL: lambda m, v, own: coil(own).initial_stress(m) - initial_band(m, own)[0],
+    MOST_INITIAL: lambda m, v, own: initial_band(m, own)[1] - coil(own).initial_stress(m),
     OPENED: lambda m, v, own: v["K1"] * v["X0"] / own["springs"] - own["initial_tension"],
 }
 """Figures of the coils, then what they keep as margins that are never negative (the rate's is zero), SI."""
@@ -219,7 +301,7 @@ FIGURES = (
     Figure("coil_index", "number", "spring index D/d of the coils", sides=()),
     Figure("shear_stress", "pressure", "largest shear stress of the coils", sides=("max",)),
     Figure("shear_share", "number", "shear stress over tensile strength", sides=()),
-    Figure("bending_share", "number", "hook bending stress over tensile strength", sides=()),
+    Figure("bending_share", "number", "hook bending stress over tensile strength, 0 of free hooks", sides=()),
     Figure("surge_ratio", "number", "surge frequency over that of the cam", sides=()),
     Figure("spring_length", "length", "length inside the hooks, fully stretched", sides=()),
     Figure("spring_mass", "mass", "mass of the coils of all springs", sides=("max",)),
