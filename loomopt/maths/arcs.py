@@ -5,6 +5,7 @@ longest stretch of points whose biarc stays within the tolerance is taken, then 
 through three neighbouring points.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -48,9 +49,7 @@ def _tangents(at: "NDArray[np.complex128]") -> "NDArray[np.complex128]":
     return found
 
 
-def _longest(
-    ring: "NDArray[np.complex128]", tangents: "NDArray[np.complex128]", here: int, tolerance: float
-) -> int:
+def _longest(ring: "NDArray[np.complex128]", tangents: "NDArray[np.complex128]", here: int, tolerance: float) -> int:
     """The farthest point up to which one biarc stays within the tolerance: by doubling, then halving."""
     last, step = len(ring) - 1, 1
 
@@ -96,7 +95,7 @@ def _bulge(along: complex, chord: complex) -> float:
 def distance(points: "NDArray[np.complex128]", arcs: Arcs) -> Floats:
     """Distance of points from a chain of arcs; its last entry is where it ends."""
     found = np.full(len(points), np.inf)
-    for (a, bulge), (b, _) in zip(arcs, arcs[1:], strict=False):
+    for (a, bulge), (b, _) in itertools.pairwise(arcs):
         found = np.minimum(found, _from_arc(points, a, b, bulge))
     return found
 
@@ -114,3 +113,18 @@ def _from_arc(points: "NDArray[np.complex128]", a: complex, b: complex, bulge: f
     turned = np.angle((points - centre) / start) * np.sign(swept) % (2 * math.pi)
     on = np.abs(np.abs(points - centre) - abs(start))
     return np.where(turned <= abs(swept), on, ends)
+
+
+def reach(a: complex, b: complex, bulge: float) -> list[complex]:
+    """Points of an arc that bound it along both axes: its ends, and where it turns back along one."""
+    if bulge == 0.0 or a == b:
+        return [a, b]
+    chord, swept = b - a, 4 * math.atan(bulge)
+    centre = (a + b) / 2 + chord * 1j * (1 - bulge**2) / (4 * bulge)
+    found = [a, b]
+    for quarter in (1, 1j, -1, -1j):
+        point = centre + abs(a - centre) * quarter
+        turned = np.angle((point - centre) / (a - centre)) * np.sign(swept) % (2 * math.pi)
+        if turned <= abs(swept):
+            found.append(point)
+    return found

@@ -307,6 +307,11 @@ def export(
     design: Design = None,
     target: Target = None,
     decimal: Decimal = "point",
+    dxf: Annotated[str | None, typer.Option(metavar="V", help="Version of DXF: r2010 or r12.")] = None,
+    arcs: Annotated[
+        str | None, typer.Option(metavar="T", help='Closed curves as arcs within a tolerance: "0.01 mm".')
+    ] = None,
+    only: Annotated[str | None, typer.Option(metavar="L", help="Draw one layer alone, such as profile.")] = None,
     sets: Set = None,
     on: With = None,
     off: Without = None,
@@ -319,7 +324,8 @@ def export(
     comma = sheets.decimal_comma(decimal)
     scene, given, name, status = read_request(problem, design, target, sets, on, off, free)
     said = outputs.what(api.evaluate(scene, given, name), name, status) if given else None
-    write(out, lambda path: outputs.linkage(path, scene, given, said, comma))
+    how = outputs.workshop(dxf, arcs, only)
+    write(out, lambda path: outputs.linkage(path, scene, given, said, comma, how))
     remarked(scene, given)
 
 

@@ -1,4 +1,4 @@
-"""Drawings as DXF for the workshop: R2010, mm or inches, full scale, a coloured layer for each of the drawing's.
+"""Drawings as DXF for the workshop: R2010 or R12, mm or inches, full scale, a coloured layer for each of the drawing's.
 
 Lengths between joints are dimensions too, which follow their points, on a layer of their own."""
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from loomopt.base.units import factor
+from loomopt.maths.arcs import reach
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import (
     DASH,
@@ -22,6 +23,7 @@ from loomopt.picture.shapes import (
     Primitive,
     Text,
     extent,
+    marks,
     plain,
     scaled,
 )
@@ -31,10 +33,15 @@ MEASURES, MEASURED, DECIMALS, AWAY = "measures", 94, 4, 6.0
 _TEXT_STYLE, _DASHES = "LABELS", "DASHES"
 
 
-def write(drawing: Drawing, path: Path) -> None:
-    """Write the drawing as a DXF file; the same drawing gives the same bytes."""
+R2010, R12 = "r2010", "r12"
+VERSIONS = {R2010: "R2010", R12: "R12"}
+"""Versions of the format, by the words of the option."""
+
+
+def write(drawing: Drawing, path: Path, version: str = R2010) -> None:
+    """Write the drawing as a DXF file of a version (`VERSIONS`); the same drawing gives the same bytes."""
     with _fixed_stamps():
-        _document(drawing).saveas(str(path))
+        _document(drawing, version).saveas(str(path))
 
 
 @contextmanager
@@ -50,12 +57,13 @@ def _fixed_stamps() -> Iterator[None]:
         ezdxf.options.write_fixed_meta_data_for_testing = before
 
 
-def _document(drawing: Drawing) -> Any:
+def _document(drawing: Drawing, version: str) -> Any:
     ezdxf: Any = importlib.import_module("ezdxf")
 
-    document = ezdxf.new("R2010")
+    document = ezdxf.new(VERSIONS[version])
     inches, drawing = drawing.unit == "in", scaled(sheet(drawing), 1 / factor(drawing.unit))
-    document.units = ezdxf.units.IN if inches else ezdxf.units.MM
+    # R12 has no word for its unit.
+    document.units = 0 if version == R12 else ezdxf.units.IN if inches else ezdxf.units.MM
     document.header["$MEASUREMENT"] = 0 if inches else 1
     document.header["$LTSCALE"] = drawing.height / NOMINAL_HEIGHT
     document.linetypes.add(_DASHES, [DASH + GAP, DASH, -GAP], description="__ __ __ __")
@@ -68,16 +76,23 @@ def _document(drawing: Drawing) -> Any:
     document.set_modelspace_vport(height=1.1 * (box.top - box.bottom), center=centre)
     space = document.modelspace()
     for primitive in drawing.primitives:
-        _append(space, primitive, drawing.height)
+        _append(space, primitive, drawing.height, version)
+    corners = [corner for primitive in drawing.primitives for corner in _reached(primitive, drawing.height)]
     if drawing.measures:
-        _measured(document, space, drawing)
+        corners += _measured(document, space, drawing)
+    least, most = (tuple(pick(axis) for axis in zip(*corners, strict=True)) for pick in (min, max))
+    space.reset_extents((*least, 0.0), (*most, 0.0))
     for name in sorted(document.entitydb.dxf_types_in_use()):
         document.classes.add_class(name)  # else ezdxf adds them in the order of a set
     return document
 
 
-def _measured(document: Any, space: Any, drawing: Drawing) -> None:
-    """Add each measure as an aligned dimension that follows its points, on a layer of their own."""
+def _measured(document: Any, space: Any, drawing: Drawing) -> list[tuple[float, float]]:
+    """Add each measure as an aligned dimension that follows its points, on a layer of their own.
+
+    Returns the ends of their lines.
+    """
+    reached: list[tuple[float, float]] = []
     document.layers.add(MEASURES, color=MEASURED, lineweight=18)
     h = drawing.height
     sizes = {"dimtxt": h, "dimasz": 0.8 * h, "dimexo": 0.5 * h, "dimexe": 0.5 * h, "dimgap": 0.4 * h}
@@ -98,6 +113,9 @@ def _measured(document: Any, space: Any, drawing: Drawing) -> None:
             dxfattribs={"layer": MEASURES},
         )
         made.render()
+        lines = [each for each in made.dimension.get_geometry_block() if each.dxftype() == "LINE"]
+        reached += [(end.x, end.y) for each in lines for end in (each.dxf.start, each.dxf.end)]
+    return reached
 
 
 def _band_text(band: tuple[float, float]) -> str:
@@ -108,15 +126,32 @@ def _band_text(band: tuple[float, float]) -> str:
     return " " + " ".join("0" if not end else f"{end:+.{DECIMALS}g}" for end in (high, low))
 
 
-def _append(space: Any, primitive: Primitive, text_height: float) -> None:
+def _reached(primitive: Primitive, text_height: float) -> list[tuple[float, float]]:
+    """Points that bound a primitive along both axes."""
+    match primitive:
+        case Line(_, points, closed, bulges):
+            ends = [complex(*point) for point in points]
+            bent = zip(ends, [*ends[1:], ends[0]], bulges or (0.0,) * len(ends), strict=True)
+            stretches = list(bent) if closed else list(bent)[:-1]
+            return [(at.real, at.imag) for a, b, bulge in stretches for at in reach(a, b, bulge)]
+        case Circle(_, (x, y), radius):
+            return [(x - radius, y - radius), (x + radius, y + radius)]
+        case _:
+            return [(float(x), float(y)) for x, y in marks(primitive, text_height)]
+
+
+def _append(space: Any, primitive: Primitive, text_height: float, version: str) -> None:
     from ezdxf.enums import TextEntityAlignment
 
     layer = {"layer": primitive.layer}
     match primitive:
         case Line(_, (start, end), False):
             space.add_line(start, end, dxfattribs=layer)
-        case Line(_, points, closed):
-            space.add_lwpolyline(points, close=closed, dxfattribs=layer)
+        case Line(_, points, closed, bulges):
+            # Of a polyline each point tells the bulge of the stretch that begins there.
+            add = space.add_polyline2d if version == R12 else space.add_lwpolyline
+            bent = [(*point, bulge) for point, bulge in zip(points, bulges or (0.0,) * len(points), strict=True)]
+            add(bent, format="xyb", close=closed, dxfattribs=layer)
         case Circle(_, centre, radius):
             space.add_circle(centre, radius, dxfattribs=layer)
         case Arc(_, centre, radius, begin, end):

@@ -10,10 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from loomopt.base import __version__
-from loomopt.base.errors import BadInput
+from loomopt.base import __version__, quantities
+from loomopt.base.errors import BadInput, misread, refusal
 from loomopt.base.files import atomically, check, check_room, suffix, together
-from loomopt.base.units import factor
+from loomopt.base.units import QuantityError, factor
 from loomopt.interface import tables
 from loomopt.interface.files import sheets
 from loomopt.jobs import registry
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from loomopt.picture.shapes import Drawing
+    from loomopt.picture.shapes import Drawing, Primitive
 
 PICTURES = (".png", ".svg", ".pdf")
 CURVES = (*sheets.ENDINGS, *PICTURES)
@@ -286,12 +286,72 @@ def drawing(scene: Scene, design: Design, said: DrawnSubject | None = None) -> "
     return replace(found, title=f"{scene.name}: {said.text if said else GIVEN if design else TODAY}")
 
 
+class Workshop(NamedTuple):
+    """How a drawing for the workshop is written.
+
+    version: of DXF, a key of `dxf.VERSIONS`; arcs: tolerance, m, within which closed curves are written as arcs of
+    circles, None for straight strokes; only: the one layer that is drawn, "" for all of them.
+    """
+
+    version: str = "r2010"
+    arcs: float | None = None
+    only: str = ""
+
+
+USUAL = Workshop()
+LEAST_ARCS, ARCS_SHARE = 5e-6, 0.8
+"""Least tolerance of arcs, m, and the share of it that points of the curve may lie off them: the rest is more than
+straight strokes between these points leave (`jobs/shedding/drawing.py`, CURVE_CLOSE)."""
+
+
+def workshop(version: str | None = None, arcs: str | None = None, only: str | None = None) -> Workshop:
+    """Read how a drawing is written: `export`'s options --dxf, --arcs and --only. Raises BadInput."""
+    from loomopt.interface.files.dxf import R2010, VERSIONS
+
+    chosen = (version or R2010).lower()
+    if chosen not in VERSIONS:
+        raise refusal("unknown version of DXF", "", "--dxf", version, ", ".join(VERSIONS), "Choose one of them")
+    if arcs is None:
+        return Workshop(chosen, None, only or "")
+    try:
+        tolerance = quantities.read(arcs, "length")
+    except QuantityError as error:
+        raise misread(error, "", "--arcs", arcs) from None
+    if tolerance < LEAST_ARCS:
+        problem, allowed = "the tolerance of arcs is too small", f"{1e3 * LEAST_ARCS:g} mm or more"
+        raise refusal(problem, "", "--arcs", arcs, allowed, 'Write --arcs "0.01 mm", or leave it out')
+    return Workshop(chosen, tolerance, only or "")
+
+
 @working()
-def linkage(path: Path, scene: Scene, design: Design, said: DrawnSubject | None = None, comma: bool = False) -> None:
+def linkage(
+    path: Path,
+    scene: Scene,
+    design: Design,
+    said: DrawnSubject | None = None,
+    comma: bool = False,
+    how: Workshop = USUAL,
+) -> None:
     """Write a design's linkage in the positions that matter, as its file's ending says (`DRAWINGS`).
 
-    comma: whether CSV has decimal commas.
+    comma: whether CSV has decimal commas; how: it is drawn and written. Raises BadInput.
     """
+    ending = suffix(path, tuple(DRAWINGS))
+    if ending == ".dxf":
+        _dxf(path, scene, design, said, how)
+        return
+    if how._replace(only="") != USUAL:
+        raise refusal(
+            "--dxf and --arcs are of DXF files", "", "--out", str(path), remedy="Name a file that ends in .dxf"
+        )
+    if how.only:
+        if ending != ".svg":
+            remedy = "Name a file that ends in .dxf or .svg"
+            raise refusal("--only is of drawings", "", "--out", str(path), remedy=remedy)
+        from loomopt.interface.files import svg
+
+        text(path, svg.render(only(drawing(scene, design, said), how.only)))
+        return
     if suffix(path, tuple(DRAWINGS)) == ".csv" and comma:
         sheets.write_text(path, registry.of(scene).views.joints_csv(scene, flat(design)), "joints", comma)
     else:
@@ -310,7 +370,38 @@ def _svg(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) ->
     text(path, svg.render(drawing(scene, design, said)))
 
 
-def _dxf(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) -> None:
+def only(drawn: "Drawing", layer: str) -> "Drawing":
+    """One layer of a drawing alone, without dimensions and legend. Raises BadInput where it has no such layer."""
+    from loomopt.picture.shapes import Text
+
+    if layer not in drawn.layers:
+        raise refusal(
+            "the drawing has no such layer", "", "--only", layer, ", ".join(drawn.layers), "Choose one of them"
+        )
+    kept = tuple(each for each in drawn.primitives if each.layer == layer and not isinstance(each, Text))
+    return replace(drawn, title="", legend=(), primitives=kept, measures=())
+
+
+def rounded(drawn: "Drawing", tolerance: float) -> "Drawing":
+    """A drawing whose closed curves are arcs of circles that touch each other, within a tolerance, m."""
+    from loomopt.maths.arcs import closed_biarcs
+    from loomopt.picture.shapes import Line, Point
+
+    def bent(each: "Primitive") -> "Primitive":
+        if not (isinstance(each, Line) and each.closed and len(each.points) > CORNERED):
+            return each
+        arcs = closed_biarcs([(point.x, point.y) for point in each.points], ARCS_SHARE * tolerance)
+        points = tuple(Point(at.real, at.imag) for at, _ in arcs)
+        return replace(each, points=points, bulges=tuple(bulge for _, bulge in arcs))
+
+    return replace(drawn, primitives=tuple(map(bent, drawn.primitives)))
+
+
+CORNERED = 12
+"""Points up to which a closed line is an arrow or a symbol with corners, and no curve."""
+
+
+def _dxf(path: Path, scene: Scene, design: Design, said: DrawnSubject | None, how: Workshop = USUAL) -> None:
     """Write a linkage as DXF at true scale, its lengths with their tolerances."""
     from loomopt.interface.files import dxf
     from loomopt.studies.tolerance.plan import toleranced
@@ -319,7 +410,10 @@ def _dxf(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) ->
     nominal = registry.of(scene).numbers_of(scene, flat(design))
     bands = {each.number: each.band(nominal[name]) for name, each in made.items() if name in nominal}
     measures = tuple(each._replace(band=bands.get(each.name, (0.0, 0.0))) for each in found.measures)
-    atomically(path, functools.partial(dxf.write, replace(found, measures=measures)))
+    found = replace(found, measures=measures)
+    found = only(found, how.only) if how.only else found
+    found = found if how.arcs is None else rounded(found, how.arcs)
+    atomically(path, functools.partial(dxf.write, found, version=how.version))
 
 
 Writer = Callable[[Path, Scene, Design, DrawnSubject | None], None]

@@ -58,7 +58,7 @@ class Coil:
     elasticity: Number
     hook_factor: Number = 1
     hook_length: Number | None = None
-    correction: str = "Wahl"
+    correction: Number = "Wahl"
 
     @property
     def index(self) -> Number:

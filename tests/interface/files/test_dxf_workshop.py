@@ -1,0 +1,91 @@
+"""DXF for the workshop: R12 and R2010, what it covers, one layer alone, and cam profiles as arcs of circles."""
+
+import importlib
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import loomopt as lo
+from loomopt.base.errors import BadInput
+from loomopt.interface.files import outputs
+from loomopt.jobs.shedding import drawing
+from loomopt.maths.arcs import closed_biarcs, distance
+
+ezdxf: Any = importlib.import_module("ezdxf")
+SCENE = lo.load("shedding-printed-travel")
+DESIGN = lo.evaluate(SCENE).design
+
+
+def exported(folder, **options):
+    path = folder / "cam.dxf"
+    outputs.linkage(path, SCENE, DESIGN, how=outputs.workshop(**options))
+    return ezdxf.readfile(path)
+
+
+@pytest.mark.parametrize(("version", "code"), [("r12", "AC1009"), ("R2010", "AC1024")])
+def test_both_versions_are_sound_and_tell_what_they_cover(tmp_path, version, code):
+    document = exported(tmp_path, version=version)
+    assert document.dxfversion == code
+    found = document.audit()
+    assert not found.errors
+    assert not found.fixes
+    low, high = document.header["$EXTMIN"], document.header["$EXTMAX"]
+    for entity in document.modelspace().query("CIRCLE"):
+        for axis in range(2):
+            assert low[axis] <= entity.dxf.center[axis] - entity.dxf.radius
+            assert high[axis] >= entity.dxf.center[axis] + entity.dxf.radius
+
+
+@pytest.mark.parametrize("version", ["r12", "r2010"])
+@pytest.mark.parametrize("tolerance", [0.005, 0.01, 0.1])
+def test_arcs_of_the_profile_lie_within_the_tolerance_of_it(tmp_path, version, tolerance):
+    document = exported(tmp_path, version=version, arcs=f"{tolerance} mm", only="profile")
+    (curve,) = document.modelspace()
+    points = [tuple(each.dxf.location)[:2] for each in curve.vertices] if version == "r12" else None
+    rows = (
+        [(p, v.dxf.bulge) for p, v in zip(points, curve.vertices, strict=True)]
+        if points
+        else [((x, y), bulge) for x, y, bulge in curve.get_points("xyb")]
+    )
+    arcs = [(complex(x, y), bulge) for (x, y), bulge in rows]
+    # The profile itself at cam angles between those at which it was drawn.
+    found = drawing.cam(SCENE, SCENE.mechanism)
+    exact = 1e3 * found.at(np.linspace(0.0, 2 * math.pi, 20_011)).profile
+    apart = distance(exact[:, 0] + 1j * exact[:, 1], [*arcs, arcs[0]])
+    assert np.max(apart) <= tolerance
+    assert len(arcs) < 120
+    # And the arcs touch each other: no corner but rounding.
+    for k in range(len(arcs)):
+        (a, one), (b, two), (c, _) = (arcs[(k + j) % len(arcs)] for j in range(3))
+        kink = np.angle((c - b) / (b - a)) - 2 * math.atan(one) - 2 * math.atan(two)
+        assert abs(math.remainder(kink, 2 * math.pi)) <= 1e-6
+    box = (exact.min(axis=0), exact.max(axis=0))
+    for told, real in zip((document.header["$EXTMIN"], document.header["$EXTMAX"]), box, strict=True):
+        assert told[:2] == pytest.approx(real, abs=1.5 * tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-3, 1e-5])
+def test_biarcs_of_a_circle_are_the_circle(tolerance):
+    angles = np.linspace(0.0, 2 * math.pi, 400, endpoint=False)
+    arcs = closed_biarcs([(3 + 5 * math.cos(t), 5 * math.sin(t)) for t in angles], tolerance)
+    fine = 3 + 5 * np.exp(1j * np.linspace(0.0, 2 * math.pi, 5003))
+    assert (
+        np.max(distance(fine, [*arcs, arcs[0]])) <= 1e-9
+    )  # an arc of nearly a whole turn has its centre by a difference
+    assert len(arcs) <= 8
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"version": "r13"}, "r2010, r12"),
+        ({"arcs": "0.001 mm"}, "too small"),
+        ({"arcs": "1 kg"}, "length"),
+        ({"only": "nose"}, "no such layer"),
+    ],
+)
+def test_what_cannot_be_written_is_refused(tmp_path, options, told):
+    with pytest.raises(BadInput, match=told):
+        exported(tmp_path, **options)
