@@ -17,7 +17,21 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, UNITS, QuantityError, Unit, fits, meant_unit, parse_unit, show
+from loomopt.base.units import (
+    DISPLAY_UNIT,
+    PRIMES,
+    SI_UNIT,
+    SPEEDS,
+    UNITS,
+    QuantityError,
+    Unit,
+    ascii_unit,
+    fits,
+    meant_unit,
+    parse_unit,
+    show,
+    usual_units,
+)
 
 NARROWEST = 1e-10
 """rad: the least pulse, rise and return; a hundred times SAME_ANGLE."""
@@ -69,7 +83,7 @@ def _name(kind: str, least: float, above: float, below: float) -> str:
 @functools.cache
 def foreign(kind: str) -> str:
     """Return a pattern of units that are usual for other kinds of quantity and wrong for this one."""
-    single = [re.escape(name) for name in UNITS if not fits(name, kind)]
+    single = [re.escape(name) for name in (*UNITS, *SPEEDS, *PRIMES) if not fits(name, kind)]
     composed = {_usual(unit) for unit in SI_UNIT.values() if unit not in UNITS and unit != "1" and not fits(unit, kind)}
     return "|".join([*single, *sorted(composed), *_NEVER])
 
@@ -92,7 +106,8 @@ _SMALLEST, _LARGEST = Fraction(1, 10**60), Fraction(10**60)
 _PLAIN = re.compile(NUMBER_PATTERN)
 _QUANTITY = re.compile(rf"({NUMBER_PATTERN}) *(.*)", re.DOTALL)
 _RATIO = re.compile(rf"({NUMBER_PATTERN})(?: */ *({NUMBER_PATTERN}))?")
-_FRACTION = re.compile(r"(?:([0-9]{1,9}) +)?([0-9]{1,9}) */ *([0-9]{1,9}) *([a-z]*)")
+_FRACTION = re.compile(r"(?:([0-9]{1,9}) +)?([0-9]{1,9}) */ *([0-9]{1,9}) *([a-z]*|[\"'″′])")
+_FEET = re.compile(r"([0-9]{1,9}(?:\.[0-9]+)?) *(?:ft|['′’])[ -]*([0-9]{1,9}(?:\.[0-9]+)?) *(?:in|inch|[\"″”])?")
 _GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[ _'’\u00a0\u202f][0-9]{3})+(?![0-9])")
 _ARITHMETIC = re.compile(r"[0-9.] *(?:\*\*|[-+*/^]) *\(?[0-9.]|(?<![eE])\+ *[0-9]|[-*/^] +[0-9]")
 
@@ -119,7 +134,11 @@ def read(text: str, kind: str) -> float:
     except QuantityError as error:
         meant = meant_unit(unit_text, kind)
         problem = f'"{unit_text}" is not a unit' if meant else error.problem
-        raise _misreading(text, kind, problem, _perhaps(meant) or error.remedy) from None
+        near = re.match('Perhaps "(.*?)"', error.remedy)
+        fitting = near and fits(near[1], kind)
+        other = "Units are case-sensitive and joined by * or /" if near else error.remedy
+        remedy = _perhaps(meant) or (error.remedy if fitting else f"{_units_of(kind)}. {other}")
+        raise _misreading(text, kind, problem, remedy) from None
     _check_dimension(unit, unit_text, number, kind)
     return _rounded(_as_written(number, kind) * unit.factor, kind)
 
@@ -212,9 +231,17 @@ def _check_dimension(unit: Unit, unit_text: str, number: str, kind: str) -> None
             "an angular speed in rpm, turn/min, deg/s or rad/s",
             f'If turns are meant, write "{turns:g} rpm"',
         )
+    if kind == "angle" and ascii_unit(unit_text) in PRIMES.values() and not unit_text.isalpha():
+        arcs = "arcsec" if ascii_unit(unit_text) == "in" else "arcmin"
+        remedy = f'{_units_of(kind)}; arc seconds and minutes are written "{number} {arcs}"'
+        raise _refusal(kind, f"the sign {unit_text} is of a length, not of an angle", remedy)
     # Of units that there are, one of two letters is a slip for nearly any other.
-    remedy = _perhaps(meant_unit(unit_text, kind, shortest=3)) or f"Write it in {DISPLAY_UNIT[kind]}"
+    remedy = _perhaps(meant_unit(unit_text, kind, shortest=3)) or f"Write it in {usual_units(kind)}"
     raise _refusal(kind, misfit(unit_text, kind), remedy)
+
+
+def _units_of(kind: str) -> str:
+    return f"{'An' if kind[0] in 'aeiou' else 'A'} {kind} is written in {usual_units(kind)}"
 
 
 def _perhaps(unit: str) -> str:
@@ -247,8 +274,12 @@ def _misreading(text: str, kind: str, problem: str = "", remedy: str = "") -> Qu
     fraction = _FRACTION.fullmatch(text)
     if fraction:
         whole, over, under = (int(digits or 0) for digits in fraction.groups()[:3])
-        decimal = f': "{whole + over / under:.10g} {fraction[4]}"' if under else ""
+        decimal = f': "{whole + over / under:.10g} {ascii_unit(fraction[4])}"' if under else ""
         return _refusal(kind, "a fraction stands for the number", f"Write a decimal number{decimal}")
+    feet = _FEET.fullmatch(text) if kind == "length" else None
+    if feet:
+        inches = 12 * float(feet[1]) + float(feet[2])
+        return _refusal(kind, "feet and inches are two numbers", f'Write one number: "{inches:.10g} in"')
     if _ARITHMETIC.search(text):
         return _refusal(kind, "arithmetic is not worked out here", "Write the result as one number")
     if not re.match(r"[+\- .]*[0-9]", text):

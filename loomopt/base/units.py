@@ -34,9 +34,9 @@ _HORSEPOWER = 550 * 12 * _INCH * _POUND * _GRAVITY
 _TABLE: tuple[tuple[tuple[int, int, int, int], dict[str, Fraction | str]], ...] = (
     ((1, 0, 0, 0), {"m": "1", "mm": "1e-3", "cm": "1e-2", "dm": "0.1", "km": "1000", "um": "1e-6"}),
     ((1, 0, 0, 0), {"in": _INCH, "inch": _INCH, "ft": 12 * _INCH}),
-    ((0, 1, 0, 0), {"kg": "1", "g": "1e-3", "mg": "1e-6", "t": "1000", "lb": _POUND}),
+    ((0, 1, 0, 0), {"kg": "1", "g": "1e-3", "mg": "1e-6", "t": "1000", "lb": _POUND, "lbm": _POUND}),
     ((0, 0, 1, 0), {"s": "1", "ms": "1e-3", "us": "1e-6", "min": "60", "h": "3600"}),
-    ((0, 0, 0, 1), {"rad": "1", "mrad": "1e-3", "deg": _PI / 180, "turn": 2 * _PI}),
+    ((0, 0, 0, 1), {"rad": "1", "mrad": "1e-3", "deg": _PI / 180, "turn": 2 * _PI, "rev": 2 * _PI}),
     ((0, 0, -1, 1), {"rpm": _PI / 30}),
     ((0, 0, -1, 0), {"Hz": "1"}),
     ((1, 1, -2, 0), {"N": "1", "mN": "1e-3", "kN": "1000", "MN": "1e6", "lbf": _POUND * _GRAVITY, "kgf": _GRAVITY}),
@@ -46,6 +46,10 @@ _TABLE: tuple[tuple[tuple[int, int, int, int], dict[str, Fraction | str]], ...] 
 )
 UNITS = {name: Unit(Fraction(factor), powers) for powers, names in _TABLE for name, factor in names.items()}
 """Common units by name; any other is looked up in pint, which is imported only then."""
+SPEEDS = dict.fromkeys(("r/min", "U/min", "picks/min", "pick/min", "ppm"), UNITS["rpm"])
+"""Angular speeds that are read as a whole, by name; a pick is a turn of the shaft."""
+PRIMES = {'"': "in", "'": "ft"}
+"""Signs of a length → its unit."""
 
 SI_UNIT: dict[str, str] = {
     "length": "m",
@@ -88,19 +92,40 @@ class ShowValue(Protocol):
 
 
 _USUAL: dict[str, str] = {
+    "length": "mm cm m in ft",
+    "angle": "deg rad turn",
+    "mass": "kg g lb",
+    "time": "s ms min",
+    "force": "N kN lbf",
     "torque": "N*m N*mm N*cm kN*m lbf*in lbf*ft",
     "inertia": "kg*m^2 kg*mm^2 kg*cm^2 g*mm^2 lb*in^2",
-    "angular speed": "rpm rad/s deg/s turn/min",
+    "angular speed": "rpm rad/s deg/s turn/min rev/min r/min U/min picks/min ppm",
     "angular acceleration": "rad/s^2 deg/s^2",
     "stiffness": "N/m N/mm kN/m lbf/in",
+    "rotary stiffness": "N*m/rad N*m/deg lbf*in/rad",
+    "damping": "N*s/m N*s/mm",
+    "pressure": "MPa Pa bar psi",
     "density": "kg/m^3 g/cm^3 lb/in^3",
+    "velocity": "m/s mm/s in/s",
+    "acceleration": "m/s^2 mm/s^2 in/s^2",
+    "power": "W kW hp",
+    "energy": "J N*m lbf*in",
 }
-"""Composed units that people write, by kind of quantity, beside those of `SI_UNIT`."""
+"""Units that people write, by kind of quantity, beside those of `SI_UNIT`."""
+
+
+def usual_units(kind: str) -> str:
+    """Return the units of a kind of quantity that people write, in words: "rpm, rad/s or deg/s"."""
+    *others, last = dict.fromkeys([DISPLAY_UNIT[kind], *_USUAL.get(kind, "").split(), SI_UNIT[kind]])
+    return f"{', '.join(others)} or {last}" if others else last
+
+
 _LARGEST_EXPONENT, _LONGEST_UNIT = 4, 20
 _TOKEN = re.compile(r"\*\*|[*/^()]|[+-]?[0-9]+|[^\W\d_]+|.", re.DOTALL)
 _SUPERSCRIPT = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _MISTAKEN = {"Nm": "N*m", "Nmm": "N*mm", "kNm": "kN*m", "Ns": "N*s", "Nms": "N*m*s", "grad": "deg"}
 """What pint would take for a yarn count, a plural or a gon → what is meant."""
+_QUOTES = str.maketrans({"″": '"', "”": '"', "′": "'", "’": "'"})
 _LOOKALIKE = str.maketrans({"·": "*", "⋅": "*", "µ": "u", "μ": "u", "°": "deg"})
 
 
@@ -135,6 +160,8 @@ def parse_unit(text: str) -> Unit:
     """
     if text == "1":
         return Unit(Fraction(1), (0, 0, 0, 0))
+    if text in SPEEDS:
+        return SPEEDS[text]
     tokens = _TOKEN.findall(ascii_unit(text))
     reciprocal = tokens[:2] == ["1", "/"]
     if reciprocal:
@@ -146,7 +173,8 @@ def parse_unit(text: str) -> Unit:
 
 
 def ascii_unit(text: str) -> str:
-    """Return a unit's text in ASCII: N·m² as N*m^2, ° as deg."""
+    """Return a unit's text in ASCII: N·m² as N*m^2, ° as deg, " as in."""
+    text = PRIMES.get(text.translate(_QUOTES), text)
     return re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda power: "^" + power[0].translate(_SUPERSCRIPT), text).translate(_LOOKALIKE)
 
 

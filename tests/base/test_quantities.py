@@ -59,10 +59,14 @@ def registry():
     return pint.UnitRegistry()
 
 
+OURS_ALONE = {"1": "", "lbm": "lb", "rev": "turn"}
+"""Units that pint calls otherwise."""
+
+
 @pytest.mark.parametrize("name", [*UNITS, *COMPOUND_UNITS, *DISPLAY_UNIT.values()])
 def test_units_agree_with_pint(registry, name):
     ours = parse_unit(name)
-    theirs = registry.Quantity(1, name if name != "1" else "").to_base_units()
+    theirs = registry.Quantity(1, OURS_ALONE.get(name, name)).to_base_units()
     powers = dict(theirs.unit_items())
     assert float(ours.factor) == pytest.approx(theirs.magnitude, rel=4e-16)
     assert ours.powers == tuple(powers.get(base, 0) for base in ("meter", "kilogram", "second", "radian"))
@@ -105,6 +109,19 @@ def test_a_unit_outside_the_table_comes_from_pint():
         ("360°", "angle", 2 * math.pi),
         ("600 rpm", "angular speed", 62.83185307179586),
         ("600 turn/min", "angular speed", 62.83185307179586),
+        ("600 rev/min", "angular speed", 62.83185307179586),
+        ("600 r/min", "angular speed", 62.83185307179586),
+        ("600U/min", "angular speed", 62.83185307179586),
+        ("600 picks/min", "angular speed", 62.83185307179586),
+        ("600 pick/min", "angular speed", 62.83185307179586),
+        ("600 ppm", "angular speed", 62.83185307179586),
+        ("10 rev/s", "angular speed", 62.83185307179586),
+        ("1 rev", "angle", 2 * math.pi),
+        ("3 lbm", "mass", 1.36077711),
+        ('8"', "length", 0.2032),
+        ("8.5 ″", "length", 0.2159),
+        ("2'", "length", 0.6096),
+        ("2 ′", "length", 0.6096),
         ("360 deg/s", "angular speed", 2 * math.pi),
         ("1 kgf*m", "torque", 9.80665),
         ("0.62 kg*m^2", "inertia", 0.62),
@@ -187,7 +204,22 @@ MISREADINGS = [
     ("65 N/(m", "stiffness", "not a unit", ""),
     ("65 (km/m)^4", "length", "not a unit", ""),
     ("65 mm*", "length", "not a unit", ""),
-    ('8"', "length", "not a unit", ""),
+    ('8 in"', "length", "not a unit", ""),
+    ('8"', "angle", 'the sign " is of a length', '"8 arcsec"'),
+    ("8'", "angle", "the sign ' is of a length", '"8 arcmin"'),
+    ('8"', "mass", "a unit of length, not of mass", "kg, g or lb"),
+    ("8'3\"", "length", "feet and inches are two numbers", '"99 in"'),
+    ("8 ft 3 in", "length", "feet and inches are two numbers", '"99 in"'),
+    ('3 3/8"', "length", "a fraction", '"3.375 in"'),
+    ("600 mm", "angular speed", "a unit of length, not of angular speed", "rpm, rad/s, deg/s"),
+    ("600 kg", "torque", "a unit of mass, not of torque", "N*m, N*mm"),
+    ("5 r", "angle", "not a unit", "An angle is written in deg, rad or turn"),
+    ("5 U", "angle", "not a unit", "An angle is written in deg, rad or turn"),
+    ("5 ppm", "number", "a unit stands after a number", "Take the unit off"),
+    ("5 ppm", "mass", "a unit of angular speed, not of mass", "kg, g or lb"),
+    ("600 picks", "angular speed", "not a unit", "picks/min"),
+    ("600,5 ppm", "angular speed", "a comma", "decimal point"),
+    ('31,5"', "length", "a comma", "decimal point"),
     ("1_000 mm", "length", "grouped", "without separators"),
     ("1 000 mm", "length", "grouped", "without separators"),
     ("0x10 mm", "length", "not a unit", ""),

@@ -189,3 +189,18 @@ def test_a_message_about_a_machine_that_does_not_assemble_speaks_its_own_units()
         SHEDDING.set("mechanism.base_radius", "5 mm")
     with pytest.raises(lo.BadInput, match=r"from [\d.]+ rad to [\d.]+ rad"):
         RAPIER.set("display.angle", "rad").set("mechanism.l5", "340 mm")
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "shown"),
+    [
+        ("length", '"', "1.22047 in"),
+        ("length", "'", "0.101706 ft"),
+        ("speed", "ppm", "600 ppm"),
+        ("mass", "lbm", "2 lbm"),
+    ],
+)
+def test_signs_and_names_of_the_trade_are_units_of_display(kind, given, shown):
+    value = {"length": 0.031, "speed": 62.83185307179586, "mass": 0.90718474}[kind]
+    quantity = {"speed": "angular speed"}.get(kind, kind)
+    assert lo.load("beatup").set(f"display.{kind}", given).show(value, quantity) == shown
