@@ -101,6 +101,59 @@ def test_sigterm_stops_as_ctrl_c_does_and_workers_leave_nothing_behind(tmp_path)
     assert (tmp_path / "t.csv").exists()
 
 
+STARTING = """
+import multiprocessing.process, os, signal, sys, threading, time
+from loomopt.interface.cli import app as cli
+
+count, wait, number, whole_group = int(sys.argv.pop(1)), float(sys.argv.pop(1)), int(sys.argv.pop(1)), sys.argv.pop(1)
+begin, begun = multiprocessing.process.BaseProcess.start, []
+
+def hit():
+    time.sleep(wait)
+    (os.killpg if whole_group == "group" else os.kill)(os.getpid(), number)
+
+def start(self):
+    begun.append(self)
+    if len(begun) == count:
+        threading.Thread(target=hit, daemon=True).start()
+    begin(self)
+
+if __name__ == "__main__":
+    multiprocessing.process.BaseProcess.start = start
+    cli.main()
+"""
+"""A study that is asked to end some time after its first or second worker begins to start, alone or with its group."""
+WORKING = {
+    "sweep": ["sweep", "beatup", "--over", "operation.M0=600:900:50 N*m"],
+    "pareto": ["pareto", "beatup", "--minimise", "peak_torque", "--against", "m4e", "--points", "5"],
+    "tolerance": ["tolerance", "beatup"],
+    "sensitivity": ["sensitivity", "beatup"],
+}
+MOMENTS = [
+    (study, count, wait, number, group)
+    for study in WORKING
+    for count in ("1", "2")
+    for wait in ("0", "0.02", "0.1", "0.3", "0.6", "1", "2")
+    for number in (signal.SIGTERM, signal.SIGINT)
+    for group in ("alone", "group")
+]
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="there are no groups of processes here")
+@pytest.mark.parametrize(
+    ("study", "count", "wait", "number", "group"), slow.after(3, list(dict.fromkeys(MOMENTS[5::9] + MOMENTS)))
+)
+def test_what_stops_a_study_whose_workers_start_leaves_no_traceback(tmp_path, study, count, wait, number, group):
+    script = tmp_path / "study.py"
+    script.write_text(STARTING)
+    words = [sys.executable, str(script), count, wait, str(int(number)), group, *WORKING[study], "--workers", "2"]
+    done = called(*words, cwd=tmp_path, start_new_session=True)
+    assert "Traceback" not in done.stderr
+    assert done.returncode in (0, 130)  # it may have been quicker
+    if done.returncode == 130:
+        assert done.stderr.splitlines()[-1] == "loomopt: stopped; nothing was left half-written."
+
+
 def test_sigterm_during_an_import_stops_cleanly():
     assert is_stopped(called(sys.executable, "-c", HIT.replace("SIGINT", "SIGTERM"), "numpy", "solve", "beatup"))
 

@@ -15,11 +15,13 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput, blamed, refusal, shown
+from loomopt.base.interrupts import SIGNALS
 from loomopt.model.session import working
 from loomopt.studies.run.rows import Row, Study, StudyTask, Together, Work, agree
 
@@ -70,30 +72,55 @@ class Processes(Executor):
         context = multiprocessing.get_context("spawn")
         theirs, self._lifeline = context.Pipe(duplex=False)
         self._pool = ProcessPoolExecutor(count, context, _begin, (theirs,))
-        others = set(multiprocessing.active_children())
+        self._processes = set[BaseProcess]()
         try:
-            ready = self.submit(os.getpid)
-            own = set(multiprocessing.active_children()) - others
-            ready.result()
+            self.submit(os.getpid).result()
         except BrokenExecutor:
             self.shutdown()
-            if any((process.exitcode or 0) < 0 for process in own):
+            if any((process.exitcode or 0) < 0 for process in self._processes):
                 return False
             remedy = 'In a script, make the call below `if __name__ == "__main__":`, as Python\'s multiprocessing asks'
             raise BadInput("worker processes cannot start here", key="workers", remedy=remedy) from None
+        except BaseException:
+            self.shutdown(wait=False)
+            raise
         return True
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Return the future of a call, as any executor does."""
-        with _for_children():
-            return self._pool.submit(fn, *args, **kwargs)
+        with _signals_deferred(), _for_children():
+            others = set(multiprocessing.active_children())
+            found = self._pool.submit(fn, *args, **kwargs)
+            self._processes |= set(multiprocessing.active_children()) - others
+            return found
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes; without `wait` at once, whatever they are at."""
+        """End the processes; without `wait` at once, whatever they are at, those that are still starting too."""
         if not wait:
             self._lifeline.close()
+            for process in self._processes:
+                process.kill()
         self._pool.shutdown(wait=wait, cancel_futures=cancel_futures)
         self._lifeline.close()
+
+
+@contextlib.contextmanager
+def _signals_deferred() -> Iterator[None]:
+    """Defer Ctrl-C and SIGTERM to the end: a process that starts meanwhile is known by then, and can be ended."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    before = {each: handler for each in SIGNALS if (handler := signal.getsignal(each)) not in (None, signal.SIG_IGN)}
+    try:
+        for each in before:
+            signal.signal(each, lambda number, frame: came.append(number))
+        yield
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
+        if came:
+            signal.raise_signal(came[0])
 
 
 @contextlib.contextmanager
