@@ -1,10 +1,10 @@
 """Input spoilt at random: whatever is given is read or refused, by one plain line; nothing else is raised.
 
-    python benchmarks/adversarial/fuzz.py [--count N] [--seed S] [--kind scenes|designs|tables|calls]
+    python benchmarks/adversarial/fuzz.py [--count N] [--seed S] [--kind scenes|files|linkages|designs|tables|calls]
 
-Without --count 10 000 scenes, 500 designs, 500 tables and 500 calls of the command, some twenty minutes; with it so
-many of each. Prints how many of each were read and refused, and each one that was neither, by its number: the same
-seed and number are the same input. Exit status 1 where there is one.
+Without --count 10 000 scenes, 2000 files of linkages, 900 of other jobs, 500 designs, 500 tables and 500 calls of the
+command, some forty minutes; with it so many of each. Prints how many of each were read and refused, and each one that
+was neither, by its number: the same seed and number are the same input. Exit status 1 where there is one.
 """
 
 import argparse
@@ -19,13 +19,14 @@ import os
 import random
 import sys
 import tempfile
+import tomllib
 import traceback
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-FULL = {"scenes": 10_000, "designs": 500, "tables": 500, "calls": 500}
+FULL = {"scenes": 10_000, "files": 900, "linkages": 2000, "designs": 500, "tables": 500, "calls": 500}
 SOLVED = 0.01
 """Share of the scenes that are read which are solved too; all are evaluated."""
 LONGEST_LINE = 2100
@@ -57,6 +58,76 @@ WORDS = (
     "", " ", "x" * 5000, "\x1b[2J", "\u2028", "\u202e", "织机", "../../etc/passwd", "/dev/zero", "/proc/self/environ",
     "-rf", "CON", "true", "null", "[1, 2", "[1, 2, 3]", "{}", "exact", "table", "spline", "levels", "\ud800", "a.b.c",
 )  # fmt: skip
+LINKAGES = ("sixbar-sley", "shaper", "knuckle-press", "path-18")
+CAM = """
+problem = { name = "lever", job = "linkage", title = "A cam moves a lever" }
+operation = { speed = "300 rpm" }
+mechanism = { arm = "100 mm", rod = "200 mm", rock = "150 mm" }
+limits = { mu.push = { min = "30 deg" } }
+bounds = { rod = { min = "180 mm", max = "220 mm" } }
+targets = { t = { least = ["peak_torque"] } }
+[parts]
+D = { kind = "pivot" }
+G = { kind = "pivot", x = "250 mm", y = "0 mm" }
+P = { kind = "point", on = "follower", along = "20 mm" }
+[parts.follower]
+kind = "cam"
+at = "D"
+pin = "V"
+length = "arm"
+law = "cycloidal"
+lift = "20 deg"
+begins = "60 deg"
+rise = "100 deg"
+far_dwell = "60 deg"
+return = "100 deg"
+"""
+CAMS = {
+    "dyad": """
+[parts.push]
+kind = "dyad"
+joins = ["V", "G"]
+pin = "C"
+side = "left"
+links = { bar = "rod", lever = "rock" }
+[output]
+angle = "lever"
+[events]
+top = { extreme = "max" }
+[effects]
+inertia = { J = "0.1 kg*m^2" }
+mass = { bar = { mass = "1 kg", along = "90 mm" } }
+joint_forces = {}
+""",
+    "slider": """
+[parts.push]
+kind = "slider"
+from = "V"
+through = "G"
+direction = "0 deg"
+pin = "C"
+side = "ahead"
+links = { bar = "rod" }
+[parts.extra]
+kind = "pivot"
+x = "rock"
+[parts.slot]
+kind = "slot"
+at = "extra"
+through = "C"
+link = "arm2"
+[parts.Q]
+kind = "point"
+on = "arm2"
+along = "10 mm"
+[output]
+slide = "push"
+[effects]
+inertia = { mass = "1 kg" }
+gravity = { down = "-90 deg" }
+""",
+}
+"""What hangs on the cam's lever."""
 TABLES = {"rapier": ("targets.match.table",), "shedding": ("mechanism.law_table", "mechanism.law=table")}
 HEADS = {"rapier": "phi1 [deg],S [mm]", "shedding": "angle [deg],s [mm]"}
 CELLS = (
@@ -124,8 +195,8 @@ def rescaled(draw: random.Random, value: object) -> str:
     return f"{size * factor!r} {unit}".rstrip(" ")
 
 
-def spoil(draw: random.Random, table: dict[str, Any]) -> None:
-    """Remove, replace, rescale or add something in nested tables."""
+def spoil(draw: random.Random, table: dict[str, Any], names: Sequence[str] = ()) -> None:
+    """Remove, replace, rescale or add something in nested tables; names: words that the scene knows."""
     *path, last = draw.choice(paths(table))
     for name in path:
         table = table[name]
@@ -135,8 +206,14 @@ def spoil(draw: random.Random, table: dict[str, Any]) -> None:
     elif what < 0.85 and not isinstance(table[last], dict | list):
         text = rescaled(draw, table[last])
         table[last] = text if isinstance(table[last], str) else float(text)
+        if names and draw.random() < 0.3:
+            table[last] = draw.choice(names)
     elif what < 0.93:
         table[last] = junk(draw)
+    elif names and draw.random() < 0.5:
+        table[draw.choice(names)] = draw.choice(
+            (*names, [draw.choice(names)], {draw.choice(names): draw.choice(names)})
+        )
     else:
         table[draw.choice((last, *WORDS, "l1", "J4", "K1", "rise", "free", "M0", "pulse", "gravity", "coil"))] = junk(
             draw
@@ -151,6 +228,24 @@ def spoilt_text(draw: random.Random, text: str, parts: tuple[str, ...]) -> bytes
         put = draw.choice((draw.choice(parts).encode("utf-8", "surrogatepass"), draw.randbytes(draw.randint(0, 4))))
         content = content[:at] + put + content[at + draw.choice((0, 1, 5, 50)) :]
     return content
+
+
+def toml(value: object) -> str:
+    """Return a value as TOML writes it in one line; what TOML cannot say is text."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_text(name)} = {toml(each)}" for name, each in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float | datetime.date):
+        return str(value)
+    return _text(str(value))
+
+
+def _text(text: str) -> str:
+    """Return text in quotes."""
+    return json.dumps(text, ensure_ascii=False)
 
 
 def plain_line(text: str) -> None:
@@ -183,7 +278,10 @@ def called(arguments: list[str]) -> str:
     assert "Traceback" not in err.getvalue()
     if status == 2:
         assert out.getvalue() == "", "stdout is not empty"
-        assert err.getvalue().startswith("loomopt: ")
+        lines = [line for line in err.getvalue().splitlines() if not line.startswith(("Remark: ", "remark: "))]
+        assert lines, "nothing is said"
+        assert all(line.startswith("loomopt: ") for line in lines)
+        assert len(set(lines)) == len(lines), "a line is said twice"
         plain_line(err.getvalue().removesuffix("\n"))
         return "refused"
     if "--json" in arguments:
@@ -216,6 +314,58 @@ def scenes(draw: random.Random, folder: Path) -> str:
         plain_line(str(error))
         return "refused"
     return "read"
+
+
+def files(draw: random.Random, folder: Path, sources: Mapping[str, Mapping[str, Any]] | None = None) -> str:
+    """Spoil a packaged scene; have its file shown and evaluated by the command, and some of it solved."""
+    import loomopt as lo
+
+    documents = sources or {name: lo.load(name).document for name in PROBLEMS}
+    document: dict[str, Any] = copy.deepcopy(dict(documents[draw.choice(sorted(documents))]))
+    if draw.random() < 0.3:  # what is off is on
+        for name, own in document.pop("available", {}).items():
+            document.setdefault("effects", {}).setdefault(name, own)
+    for _ in range(draw.choice((1, 1, 2, 3))):
+        spoil(draw, document, names(document))
+    text = "\n".join(f"{_text(name)} = {toml(value)}" for name, value in document.items())
+    (folder / "scene.toml").write_bytes(text.encode("utf-8", "surrogatepass"))
+    said = [called(["show", "scene.toml"]), called(["evaluate", "scene.toml", "--json"])]
+    assert len(set(said)) == 1, f"show and evaluate differ: {said}"
+    if said[0] == "read":
+        off = sorted(document["available"]) if isinstance(document.get("available"), dict) else []
+        rest = [["evaluate", "scene.toml", *(word for name in off for word in ("--with", name))]]
+        rest += [["show", "scene.toml", "--equations"], ["simulate", "scene.toml", "--out", "curves.csv"]]
+        rest += [["solve", "scene.toml", "--starts", "2"]] if draw.random() < SOLVED else []
+        called(draw.choice(rest))
+    return said[0]
+
+
+def names(document: Mapping[str, Any]) -> list[str]:
+    """Return the words that a scene uses: its keys, and text that is no quantity."""
+    keys = {name for path in paths(document) for name in path}
+    texts = [value for path in paths(document) if isinstance(value := _at(document, path), str)]
+    return sorted({*keys, *(text for text in texts if text.isidentifier())})
+
+
+def _at(table: Any, path: tuple[str, ...]) -> object:
+    for name in path:
+        table = table[name]
+    return table
+
+
+def linkages(draw: random.Random, folder: Path) -> str:
+    """Spoil a scene of a linkage likewise: packaged ones, the template, and levers that a cam drives."""
+    import loomopt as lo
+    from loomopt.jobs import registry
+    from loomopt.scenes import packaged
+
+    for path in packaged.problems().values():
+        if path.with_suffix(".csv").exists():
+            (folder / f"{path.stem}.csv").write_bytes(path.with_suffix(".csv").read_bytes())
+    documents = {name: lo.load(name).document for name in LINKAGES}
+    documents["template"] = tomllib.loads(registry.template("linkage"))
+    documents |= {f"cam {name}": tomllib.loads(CAM + text) for name, text in CAMS.items()}
+    return files(draw, folder, documents)
 
 
 def designs(draw: random.Random, folder: Path) -> str:
@@ -283,6 +433,8 @@ def calls(draw: random.Random, folder: Path) -> str:
 
 KINDS: dict[str, Callable[[random.Random, Path], str]] = {
     "scenes": scenes,
+    "files": files,
+    "linkages": linkages,
     "designs": designs,
     "tables": tables,
     "calls": calls,
