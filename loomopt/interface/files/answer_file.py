@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from loomopt.base.errors import refusal
-from loomopt.base.units import factor
 from loomopt.interface import results
 from loomopt.interface.results import Answer, Evaluation
 from loomopt.jobs import registry
@@ -20,7 +19,7 @@ from loomopt.physics.tolerances import FEASIBLE, STATIONARY
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import Price, Proof, Proofs, Relaxation, Words
+from loomopt.solving.answer.solution import JointPrice, Price, Proof, Proofs, Relaxation, Words
 from loomopt.solving.certificate.verdict import Certificate, GlobalBound, GlobalLevel, Level
 
 AGREES = 1e-6
@@ -73,6 +72,7 @@ def _answer(told: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> An
         status=str(told["status"]),
         message=str(told.get("message", "")),
         binding=tuple(_price(each, Words(scene)) for each in told.get("binding", ())),
+        bind_together=tuple(map(_joint_price, told.get("bind_together", ()))),
         certificate=certificate,
         relaxation=tuple(_record(Relaxation, each) for each in told.get("relaxation", ())),
         clash=tuple(map(str, told.get("clash", ()))),
@@ -100,12 +100,18 @@ def _price(told: Mapping[str, Any], words: Words) -> Price:
     """Return a limit's price with its reading in the scene's units."""
     (figure, worth), *_ = told["worth"].items()
     limit, side = str(told["limit"]), str(told["side"])
-    unit, per = words.unit(figure), words.unit(limit)
-    amount = float(worth) * factor(per) / factor(unit)
-    reading = f"{amount:.3g}{'' if unit == '1' else f' {unit}'} per {'unit' if per == '1' else per}"
+    reading = words.price_reading(figure, limit, float(worth))
     return Price(
         limit, side, float(told["value"]), str(told["text"]), {figure: float(worth)}, dict(told["unit"]), reading
     )
+
+
+def _joint_price(told: Mapping[str, Any]) -> JointPrice:
+    """Return what limits are worth together, as it was told."""
+    worth = {str(figure): float(value) for figure, value in told["worth"].items()}
+    alone = tuple(float(next(iter(each.values()))) for each in told["alone"])
+    names, sides = (tuple(map(str, told[key])) for key in ("limits", "sides"))
+    return JointPrice(names, sides, worth, dict(told["unit"]), alone, str(told["reading"]))
 
 
 def _certificate(told: Mapping[str, Any]) -> Certificate:
@@ -120,10 +126,11 @@ def _certificate(told: Mapping[str, Any]) -> Certificate:
         float(told["feasibility"]),
         float(told["whole_cycle"]["violation"]),
         bool(told["minimum"]),
-        bool(told["unique"]),
+        bool(told.get("design_unique", told["unique"])),
         by=str(told["by"]),
         whole_cycle=str(told["whole_cycle"]["by"]),
         settled=tuple(map(str, told.get("settled", ()))),
+        prices_unique=bool(told.get("prices_unique", True)),
     )
 
 

@@ -188,6 +188,8 @@ def _certificate(subject: Subject) -> Iterator[Part]:
     head = "Passed" if found.passed else "NOT PASSED"
     curved = "the curvature says a minimum" if found.minimum else "the curvature does NOT say a minimum"
     unique = "the only one nearby" if found.unique else "not the only one: others are as good"
+    if not found.prices_unique:
+        unique += "; prices are not unique, for limits bind only together"
     told: list[Block] = [
         f"{head}. It was checked apart from the solver, by {found.by}: {curved}, and it is {unique}.",
         Grid("", ("what was checked", "found", "at most"), tuple(lines), right=(1, 2)),

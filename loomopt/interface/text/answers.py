@@ -12,7 +12,7 @@ from loomopt.jobs import registry
 from loomopt.model.program import Alias
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluated, Solution, Words, changed, remedies
+from loomopt.solving.answer.solution import Evaluated, Solution, Words, changed, named, remedies
 from loomopt.solving.certificate.verdict import GlobalBound
 
 if TYPE_CHECKING:
@@ -174,10 +174,11 @@ def relaxation(answer: Solution) -> Grid:
 
 
 def binding(answer: Solution) -> str | Grid:
-    """Return the limits that bind, each with its price."""
+    """Return the limits that bind, each with its price, then those that are worth more together."""
     if not answer.binding:
         return "No limit binds beside the sizes." if answer.rounded else "No limit binds."
     lines = tuple((price.text, next(iter(price.worth)), price.reading) for price in answer.binding)
+    lines += tuple((f"{named(price.limits)} together", price.figure, price.reading) for price in answer.bind_together)
     return Grid("What binds, and what loosening it is worth", ("limit", "moves", "by"), lines)
 
 
@@ -190,6 +191,8 @@ def certificate(answer: Solution) -> list[str]:
     worst = max((level.stationarity for level in found.levels), default=0.0)
     limits, cycle = (f"{value:.0e}" if value > 0 else "0" for value in (found.feasibility, found.violation))
     unique = "unique" if found.unique else "not unique"
+    if not found.prices_unique:
+        unique = "prices not unique" if found.unique else "neither design nor prices unique"
     line = f"Certificate passed: limits {limits}, stationarity {worst:.0e}, whole cycle {cycle}; {unique}"
     return [line, *([f"Chosen among equals: {'; '.join(found.choices)}"] if found.choices else [])]
 

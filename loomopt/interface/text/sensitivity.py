@@ -68,7 +68,7 @@ def _prices(found: Found) -> Grid:
     words, lines = Words(found.scene), []
     for price in found.prices:
         unit = words.unit(price.limit)
-        ends = [f"{x / factor(unit):+.6g}" if math.isfinite(x) else "" for x in price.range]
+        ends = [(f"{x / factor(unit):+.6g}" if x else "0") if math.isfinite(x) else "" for x in price.range]
         lines.append((f"{price.limit} {price.side}", ends[0], price.ends[0], ends[1], price.ends[1], unit))
     heads = ("price of", "holds\nfrom", "for then", "to", "for then", "unit")
     return Grid("", heads, tuple(lines), (1, 3), first=(0, 1, 3, 5), more="--json")

@@ -23,6 +23,7 @@ from loomopt.solving.answer.solution import (
     Clash,
     Evaluated,
     Finding,
+    JointPrice,
     Price,
     Relaxation,
     Solution,
@@ -335,11 +336,14 @@ def with_optimum(
     searched: how far the best was sought, as a sentence; substitute: whether it is a known design that no solve ended
     in certified.
     """
-    binding = prices(Words(scene), certificate)
+    words = Words(scene)
+    binding, together = prices(words, certificate), joint_prices(words, certificate)
     passed = certificate.passed and here.admissible
     headline = _headline(job, scene, target, here, {price.limit for price in binding})
     if passed:
-        message = " ".join(part for part in (headline, stops(binding), _left_open(certificate), searched) if part)
+        message = " ".join(
+            part for part in (headline, stops(binding, together), _left_open(certificate), searched) if part
+        )
     else:
         reasons = "; ".join(certificate.reasons) or "a limit does not hold on independent evaluation"
         message = f"A design was reached but not certified: {reasons}. Try more starts, such as 20."
@@ -351,6 +355,7 @@ def with_optimum(
         message=message,
         explanation=headline if job.members else "",
         binding=binding,
+        bind_together=together,
         certificate=certificate,
         solver=solver,
         today=today,
@@ -397,14 +402,19 @@ def prices(words: Words, certificate: Certificate) -> tuple[Price, ...]:
     return tuple(map(words.price, certificate.priced))
 
 
-def stops(binding: tuple[Price, ...]) -> str:
+def joint_prices(words: Words, certificate: Certificate) -> tuple[JointPrice, ...]:
+    """Return the prices of limits that are worth more together than alone."""
+    return tuple(map(words.joint_price, certificate.bind_together))
+
+
+def stops(binding: tuple[Price, ...], together: tuple[JointPrice, ...] = ()) -> str:
     """Return the sentence that names the limits which stop the first objective they move."""
     if not binding:
         return "No limit binds."
     figure = next(iter(binding[0].worth))
-    first = [price for price in binding if figure in price.worth]
-    listed = ", ".join(f"{price.text} (worth {price.reading})" for price in first)
-    return f"Limits that stop {figure}: {listed}."
+    listed = [f"{price.text} (worth {price.reading})" for price in binding if price.worth.get(figure)]
+    listed += [price.text for price in together if figure in price.worth]
+    return f"Limits that stop {figure}: {', '.join(listed)}."
 
 
 def _helps(relaxations: Sequence[Relaxation]) -> str:

@@ -17,7 +17,7 @@ from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.document import copied
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import FAMILY
-from loomopt.solving.certificate.verdict import Binding, Certificate, GlobalBound, worth_of
+from loomopt.solving.certificate.verdict import Binding, Certificate, GlobalBound, JointBinding, worth_of
 
 
 class Proof(NamedTuple):
@@ -146,6 +146,43 @@ class Price(NamedTuple):
         """Return it as JSON data; a limit that binds where it stands says no more."""
         told = {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in self._asdict().items() if k != "reading"}
         return {k: v for k, v in told.items() if v or k != "backed_off"}
+
+
+class JointPrice(NamedTuple):
+    """Limits that are worth more together than the sum of what each is worth alone.
+
+    worth: objective figure → its fall, SI, where each limit is loosened by one SI unit; alone: what each is worth by
+    itself; reading: both in the designer's own units, as a phrase.
+    """
+
+    limits: tuple[str, ...]
+    sides: tuple[str, ...]
+    worth: Mapping[str, float]
+    unit: Mapping[str, str]
+    alone: tuple[float, ...]
+    reading: str
+
+    @property
+    def figure(self) -> str:
+        """The figure that it is a price of."""
+        return next(iter(self.worth))
+
+    @property
+    def text(self) -> str:
+        """The price as a phrase: "left and right together: 0.2 N*m per mm; each alone: 0"."""
+        return f"{named(self.limits)} together: {self.reading}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        alone = [{self.figure: each} for each in self.alone]
+        told = {"limits": list(self.limits), "sides": list(self.sides), "worth": dict(self.worth)}
+        return told | {"unit": dict(self.unit), "alone": alone, "text": self.text, "reading": self.reading}
+
+
+def named(names: Sequence[str]) -> str:
+    """Return names as a list in a sentence: "a, b and c"."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 class Relaxation(NamedTuple):
@@ -438,6 +475,8 @@ class Solution(Evaluated):
     status: str = "failed"
     message: str = ""
     binding: tuple[Price, ...] = ()
+    bind_together: tuple[JointPrice, ...] = ()
+    """Limits that are worth more together than each alone."""
     certificate: Certificate | None = None
     relaxation: tuple[Relaxation, ...] = ()
     clash: tuple[str, ...] = ()
@@ -530,6 +569,7 @@ class Solution(Evaluated):
         head["reached"] = base["reached"]
         tail: dict[str, Any] = {
             "binding": [price.as_dict() for price in self.binding],
+            "bind_together": [price.as_dict() for price in self.bind_together],
             "certificate": certificate_dict(self.certificate) if self.certificate else None,
             "solver": dict(self.solver),
             "global": self.global_bound.as_dict() if self.global_bound else None,
@@ -558,7 +598,7 @@ class Solution(Evaluated):
 
 def certificate_dict(certificate: Certificate) -> dict[str, Any]:
     """Return the certificate as JSON data."""
-    return {
+    told = {
         "passed": certificate.passed,
         "by": certificate.by,
         "reasons": list(certificate.reasons),
@@ -573,9 +613,12 @@ def certificate_dict(certificate: Certificate) -> dict[str, Any]:
         "feasibility": float(certificate.feasibility),
         "whole_cycle": {"violation": float(certificate.violation), "by": certificate.whole_cycle},
         "minimum": certificate.minimum,
-        "unique": certificate.unique,
+        "unique": certificate.unique and certificate.prices_unique,
         "settled": list(certificate.choices),
     }
+    if certificate.prices_unique:
+        return told
+    return told | {"design_unique": certificate.unique, "prices_unique": False}
 
 
 def _scene_dict(scene: "Scene", target: str | None) -> dict[str, Any]:
@@ -683,10 +726,6 @@ class Words:
         first = bindings[0]
         limit, figure = first.limit, first.objective.figure
         worth = worth_of(bindings)
-        figure_unit, limit_unit = self.unit(figure), self.unit(limit.name)
-        amount = worth * factor(limit_unit) / factor(figure_unit)
-        per = limit_unit if limit_unit != "1" else "unit"
-        figure_text = f" {figure_unit}" if figure_unit != "1" else ""
         return Price(
             limit=limit.name,
             side=SIDES[first.side],
@@ -694,8 +733,42 @@ class Words:
             text=self.limit(limit),
             worth={figure: worth},
             unit={figure: f"{self.si(figure)}/{grouped(self.si(limit.name))}"},
-            reading=f"{amount:.3g}{figure_text} per {per}",
+            reading=self.price_reading(figure, limit.name, worth),
         )
+
+    def price_reading(self, figure: str, limit: str, worth: float) -> str:
+        """Return a price, SI, in the designer's own units, as a phrase: "0.2 N*m per mm"."""
+        per = self.unit(limit)
+        return f"{self._amount(figure, worth * factor(per))} per {per if per != '1' else 'unit'}"
+
+    def _amount(self, figure: str, value: float) -> str:
+        """Return an SI value of a figure with three digits and its unit, if it has one."""
+        unit = self.unit(figure)
+        return f"{value / factor(unit):.3g}{f' {unit}' if unit != '1' else ''}"
+
+    def joint_price(self, joint: JointBinding) -> JointPrice:
+        """Return what limits are worth together."""
+        first = joint.bindings[0]
+        figure, names = first.objective.figure, [each.limit.name for each in joint.bindings]
+        units = list(dict.fromkeys(map(self.unit, names)))
+        worth = joint.worth([1.0] * len(names))
+        if len(units) == 1:
+            reading = self.price_reading(figure, names[0], worth)
+            per = grouped(self.si(names[0]))
+        else:
+            # Of limits of several kinds the sum depends on the steps: one unit of each.
+            amount = joint.worth([factor(self.unit(name)) for name in names])
+            reading = f"{self._amount(figure, amount)} for {named([f'1 {unit}' for unit in units])}"
+            per = f"({', '.join(dict.fromkeys(map(self.si, names)))})"
+        alone = [each.worth for each in joint.bindings]
+        each_alone = [
+            f"{name} {self.price_reading(figure, name, price) if price else 0}"
+            for name, price in zip(names, alone, strict=True)
+        ]
+        rest = f"alone: {', '.join(each_alone)}" if any(alone) else "each alone: 0"
+        sides = tuple(SIDES[each.side] for each in joint.bindings)
+        unit = f"{self.si(figure)}/{per}"
+        return JointPrice(tuple(names), sides, {figure: worth}, {figure: unit}, tuple(alone), f"{reading}; {rest}")
 
     def relaxation(self, limit: Limit, need: float, alone: bool) -> Relaxation:
         """Return how far a limit must give way, SI and as a phrase."""

@@ -5,6 +5,7 @@ limit with a positive multiplier at one level is an equality of free sign at the
 figure that decides is too near its threshold for floats, all is judged again in 40 digits.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,13 +17,15 @@ from loomopt.base.errors import BadInput, blamed
 from loomopt.base.records import lazy
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
+from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import DOUBT, FEASIBLE, FLAT, JET_ERROR, POSITIVE, STATIONARY
 from loomopt.solving.certificate import kkt, second_order
 from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet, LevelMultipliers, System, active_set, priced
+from loomopt.solving.certificate.multiplier_set import MultiplierSet
 from loomopt.solving.certificate.second_order import Curvature, Local
 from loomopt.solving.certificate.taylor_bounds import between_points, cycle_rows, judged
-from loomopt.solving.certificate.verdict import Binding, Certificate, FrameRow, Level
+from loomopt.solving.certificate.verdict import Binding, Certificate, FrameRow, JointBinding, Level
 from loomopt.solving.nlp.point import Settings
 
 COMPLEMENTARY = 1e-8
@@ -269,6 +272,7 @@ def _certificate(
     names = local.derivatives.names
     moved = dict(zip(names, map(float, step * local.scales), strict=True)) if len(step) else {}
     level = curvatures[-1].level if curvatures else ()
+    prices = _priced(local, levels)
     return Certificate(
         not reasons,
         tuple(reasons),
@@ -277,7 +281,7 @@ def _certificate(
         cycle.violation,
         all(curvature.minimum for curvature in curvatures),
         curvatures[-1].unique if curvatures else not any(local.active.zero),
-        tuple(_binding(local, levels)),
+        prices.binding,
         by=local.derivatives.by,
         clear=local.derivatives.last or not _doubtful(local, levels),
         whole_cycle="bounded" if cycle.bound == "proven" else "refined",
@@ -285,6 +289,8 @@ def _certificate(
         step=float(np.abs(step).max(initial=0.0)),
         level=tuple(dict(zip(names, map(float, way), strict=True)) for way in level),
         frame=tuple(map(_frame_row, _stopping(local, levels))),
+        bind_together=prices.together,
+        prices_unique=prices.unique,
     )
 
 
@@ -358,10 +364,127 @@ def _not_least(levels: Sequence[JudgedLevel]) -> Iterator[str]:
         yield "second order fails: along some direction the objective falls (a saddle or a maximum)"
 
 
-def _binding(local: Local, levels: Sequence[JudgedLevel]) -> Iterator[Binding]:
-    """Yield the limits that bind, each with its worth for the first objective it moves."""
-    for k, row in enumerate(local.active.rows[: local.active.limits]):
-        multipliers = [float(each.multipliers.of[k]) for each in levels]
-        first = next((level for level, multiplier in enumerate(multipliers) if abs(multiplier) > POSITIVE), None)
-        if first is not None and row.limit and row.limit.name in local.program.named_limits:
-            yield priced(local.sampler, row.limit, local.program.objectives[first], multipliers[first])
+class Prices(NamedTuple):
+    """Limits that bind, those that are worth more together than alone, and whether every limit has one price."""
+
+    binding: tuple[Binding, ...]
+    together: tuple[JointBinding, ...]
+    unique: bool
+
+
+ONE_PRICE = 1e-7
+"""Difference of two multipliers, relative to the larger where that exceeds 1, up to which they are one price: what
+slopes of rows that depend on each other may differ by (RANK)."""
+
+MOST_TOGETHER = 8
+"""Limits without a price of their own of which every combination is looked at; of more, pairs and all of them."""
+
+
+def _priced(local: Local, levels: Sequence[JudgedLevel]) -> Prices:
+    """Return what limits are worth, each for the first objective that it moves."""
+    rows = local.active.rows[: local.active.limits]
+    places: dict[tuple[str, int], list[int]] = {}
+    for k, row in enumerate(rows):
+        side = _side(local, k)
+        if side and row.name in local.program.named_limits:
+            places.setdefault(side, []).append(k)
+    found: dict[int, Binding] = {}
+    together: list[JointBinding] = []
+    several: set[int] = set()
+    for level, judged_level in enumerate(levels):
+        every = level_multipliers(local, levels, level)
+        tied: list[list[int]] = []
+        for name, own in list(places.items()):
+            low, high = _range(every, own)
+            if max(abs(low), abs(high)) <= POSITIVE:
+                continue
+            del places[name]
+            if math.isfinite(high - low) and high - low <= ONE_PRICE * max(1.0, abs(high)):
+                shares = {k: float(judged_level.multipliers.of[k]) for k in own}
+                found |= {k: _binding(local, level, k, share) for k, share in shares.items() if abs(share) > POSITIVE}
+                continue
+            alone = low if low > POSITIVE else high if high < -POSITIVE and not name[1] else 0.0
+            found[own[0]] = _binding(local, level, own[0], alone)
+            tied.append(own)
+        joint = _together(local, level, every, tied, found)
+        together += joint
+        partners = {(each.limit.name, each.limit.sign) for of in joint for each in of.bindings}
+        # What is worth nothing, alone or with others, does not bind.
+        gaining = [own[0] for own in tied if found[own[0]].worth]
+        gaining += [own[0] for own in tied if _side(local, own[0]) in partners]
+        idle = {own[0] for own in tied}.difference(gaining)
+        several |= {own[0] for own in tied}.difference(idle)
+        found = {k: each for k, each in found.items() if k not in idle}
+    return Prices(tuple(found[k] for k in sorted(found)), tuple(together), not several)
+
+
+def _side(local: Local, place: int) -> tuple[str, int] | None:
+    """Return the name and the side of the limit that a row is of."""
+    limit = local.active.rows[place].limit
+    return (limit.name, limit.sign) if limit else None
+
+
+def level_multipliers(local: Local, levels: Sequence[JudgedLevel], place: int) -> MultiplierSet:
+    """Return all multipliers that balance the slopes of one level."""
+    found = levels[place].multipliers
+    if local.active.zero[place] or not np.any(found.of):
+        # Of what vanishes nothing can fall; a level with nothing to choose has no prices.
+        count = len(local.active.rows)
+        return MultiplierSet(np.zeros(count), np.zeros((count, 0)), np.zeros(count, dtype=bool))
+    earlier = levels[:place]
+    own = local._replace(closed=tuple(c for each in earlier if each.curvature and (c := each.curvature.closed)))
+    system = kkt.system(local.active, place, [each.multipliers for each in earlier], local.program.fixed)
+    return kkt.multiplier_set(local.active, own.slopes, system, found)
+
+
+def _range(every: MultiplierSet, places: Sequence[int]) -> tuple[float, float]:
+    """Return the least and the largest sum of the multipliers of some rows."""
+    cost = np.isin(np.arange(len(every.start)), places).astype(float)
+    return every.least(cost), -every.least(-cost)
+
+
+def _binding(local: Local, level: int, place: int, multiplier: float) -> Binding:
+    """Return the limit of a row with what it is worth by a multiplier."""
+    limit = local.active.rows[place].limit
+    assert limit is not None
+    return priced(local.sampler, limit, local.program.objectives[level], multiplier)
+
+
+def _together(
+    local: Local,
+    level: int,
+    every: MultiplierSet,
+    tied: Sequence[Sequence[int]],
+    found: Mapping[int, Binding],
+) -> list[JointBinding]:
+    """Return the smallest sets of limits that are worth more together than the sum of what each is worth alone.
+
+    Of each at least one limit is worth nothing alone.
+
+    tied: the rows of each limit that has more than one price; found: what it is worth alone, by its first row.
+    """
+    ends: list[tuple[int, Binding, Floats]] = []
+    for own in tied:
+        unit, each = _binding(local, level, own[0], 1.0), found[own[0]]
+        cost = np.where(np.isin(np.arange(len(every.start)), own), unit.worth, 0.0)
+        # An equality that gains nothing alone may gain on either side.
+        sides = (each.side,) if unit.limit.sign or each.worth else (1, -1)
+        ends += [(own[0], each._replace(side=side), cost if unit.limit.sign else side * cost) for side in sides]
+    together, least = list[JointBinding](), list[set[int]]()
+    sizes = range(2, len(ends) + 1) if len(ends) <= MOST_TOGETHER else (2, len(ends))
+    for chosen in itertools.chain.from_iterable(itertools.combinations(range(len(ends)), size) for size in sizes):
+        rows, bindings, costs = zip(*(ends[k] for k in chosen), strict=True)
+        known = any(of <= {*chosen} for of in least) or len({*rows}) < len(rows)
+        if known or all(each.worth for each in bindings):
+            continue
+        joint = JointBinding(bindings, np.array(costs), every)
+        steps = [1.0 / max(float(np.abs(cost).max()), TINY) for cost in costs]
+        alone = sum(step * each.worth for step, each in zip(steps, bindings, strict=True))
+        if joint.worth(steps) > alone + ONE_PRICE * max(1.0, alone):
+            together.append(joint)
+            least.append({*chosen})
+    return together
+
+
+TINY = 1e-300
+"""Keeps the step of a limit that costs nothing a number."""

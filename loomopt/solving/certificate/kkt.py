@@ -18,7 +18,8 @@ from loomopt.model.objectives import Objective
 from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.physics.tolerances import ACTIVE, POSITIVE, SAME_NODE
+from loomopt.physics.tolerances import ACTIVE, FEASIBLE, POSITIVE, RANK, SAME_NODE
+from loomopt.solving.certificate.multiplier_set import MultiplierSet
 from loomopt.solving.certificate.verdict import Binding
 
 MOVED = 100 * SAME_NODE
@@ -241,6 +242,25 @@ def replaceable(gradients: Floats, system: System, found: LevelMultipliers, most
     places = zip([*system.pieces, *system.inequalities], apart[:one_sided], strict=True)
     near = [k for k, distance in places if found.of[k] > POSITIVE and distance * found.of[k] <= reach]
     return [k for k in near if k in system.inequalities]
+
+
+def multiplier_set(active: ActiveSet, gradients: Floats, system: System, found: LevelMultipliers) -> MultiplierSet:
+    """All multipliers of one level, of which `found` are some; gradients: (rows, variables).
+
+    Rows that only come near take no part, unless `found` rests on them.
+    """
+    away = [row.excess < -FEASIBLE and abs(found.of[k]) <= POSITIVE for k, row in enumerate(active.rows)]
+    rows = [k for k in (*system.pieces, *system.inequalities, *system.equalities) if not away[k]]
+    held = [int(np.argmax(row)) for row in system.held]
+    columns = np.vstack([gradients[[*rows, *held]].T, np.isin([*rows, *held], system.pieces)])
+    lengths = np.linalg.norm(columns, axis=0)
+    lengths = np.where(lengths > 0.0, lengths, 1.0)
+    _, sizes, turned = np.linalg.svd(columns / lengths)
+    open_ways = turned[int(np.sum(sizes > RANK)) :].T / lengths[:, None]
+    ways = np.zeros((len(active.rows), open_ways.shape[1]))
+    ways[[*rows, *held]] = open_ways
+    signed = np.isin(np.arange(len(active.rows)), [*system.pieces, *system.inequalities])
+    return MultiplierSet(np.where(signed, np.maximum(found.of, 0.0), found.of), ways, signed)
 
 
 def _equations(gradients: Floats, system: System) -> tuple[Floats, Floats, int]:

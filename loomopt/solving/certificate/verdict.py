@@ -5,9 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from loomopt.model.limits import Limit
 from loomopt.model.objectives import Objective, Sought
+from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ROUNDED
+from loomopt.solving.certificate.multiplier_set import MultiplierSet
 
 
 class Level(NamedTuple):
@@ -31,6 +35,23 @@ class Binding(NamedTuple):
     side: int
     objective: Objective
     worth: float
+
+
+@dataclass(frozen=True)
+class JointBinding:
+    """Limits that are worth more together than each alone, as where extremes tie.
+
+    bindings: one of each limit, with its worth alone, SI; costs: (limits, rows), the multipliers that count for each
+    limit, times the fall of the objective's figure per SI unit; multipliers: all that balance the slopes.
+    """
+
+    bindings: tuple[Binding, ...]
+    costs: Floats = field(compare=False, repr=False)
+    multipliers: MultiplierSet = field(compare=False, repr=False)
+
+    def worth(self, steps: Sequence[float]) -> float:
+        """Fall of the objective's figure, SI, where each limit is loosened by its step, SI, in proportion."""
+        return self.multipliers.least(np.array(steps) @ self.costs)
 
 
 def worth_of(bindings: Sequence[Binding]) -> float:
@@ -92,6 +113,10 @@ class Certificate:
     nothing where levels before that one do not vanish, for then it hangs on how they curve."""
     open: tuple[str, ...] = ()
     """Variables, as a designer calls them, that are left as they came, though others are as good."""
+    bind_together: tuple[JointBinding, ...] = field(default=(), repr=False)
+    """Limits that are worth more together than each alone."""
+    prices_unique: bool = True
+    """Whether every limit has one price: what it is worth to loosen it a little is what tightening it costs."""
 
     @property
     def choices(self) -> tuple[str, ...]:

@@ -30,7 +30,9 @@ def fitted(scene: Scene, ideal: Solution, name: str, sizes: Sequence[float], sol
     said = f"Any size would have {name} {scene.show(value, 'length')}"
     if not found:
         message = f"No {name} that is sold gives an admissible design (tried {', '.join(tried) or 'none in bounds'}). "
-        return replace(ideal, status="infeasible", message=f"{message}{said}.", certificate=None, binding=())
+        return replace(
+            ideal, status="infeasible", message=f"{message}{said}.", certificate=None, binding=(), bind_together=()
+        )
     best = found[0]
     for answer in found[1:]:
         best = answer if _better(answer, best) else best

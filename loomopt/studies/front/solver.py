@@ -4,9 +4,11 @@ import functools
 import math
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
 
 from loomopt.base.records import lazy
 from loomopt.jobs import registry
@@ -435,14 +437,16 @@ def _certified(
 ) -> Solution:
     """Return the answer of a design that was reached."""
     words = Words(solver.scene)
-    prices = report.prices(words, replace(certificate, binding=tuple(_explicit(terms, certificate))))
+    explicit = _explicit(terms, certificate)
+    prices, together = report.prices(words, explicit), report.joint_prices(words, explicit)
     reason = f"A design was reached but not certified: {found.reason}."
     return Solution(
         **vars(here),
         target=terms.target or "",
         status=found.status,
-        message=reason if found.reason else f"{_sought(words, terms, asking)} {report.stops(prices)}",
+        message=reason if found.reason else f"{_sought(words, terms, asking)} {report.stops(prices, together)}",
         binding=prices,
+        bind_together=together,
         certificate=certificate,
         solver={"accuracy": solver.accuracy},
         today=functools.partial(terms.evaluation, {}),
@@ -454,19 +458,31 @@ def _as_read(job: Job, program: Program, x: Mapping[str, float]) -> dict[str, fl
     return job.values(program, job.design(program, x))
 
 
-def _explicit(terms: FrontTerms, certificate: Certificate) -> Iterator[Binding]:
-    """Yield what binds, a limit on an axis as a limit of its figure."""
+def _explicit(terms: FrontTerms, certificate: Certificate) -> Certificate:
+    """Return a certificate with what binds, a limit on an axis as a limit of its figure."""
     caps = {capped(axis): (axis, cap) for axis, cap in terms.caps}
-    for each in certificate.binding:
+
+    def slope(each: Binding) -> float:
         if each.limit.name not in caps:
-            yield each
-            continue
+            return 1.0
         axis, cap = caps[each.limit.name]
-        name, limit, figure = axis.axis.name, each.limit, _end(axis, cap)
+        return abs(axis.slope(_end(axis, cap)))
+
+    def told(each: Binding) -> Binding:
+        if each.limit.name not in caps:
+            return each
+        axis, cap = caps[each.limit.name]
+        limit = each.limit
         if not axis.objective.is_magnitude:
-            limit = replace(limit, sign=axis.sign, value=figure)
-        worth = each.worth * abs(axis.slope(figure))
-        yield each._replace(limit=replace(limit, name=name), side=limit.sign, worth=worth)
+            limit = replace(limit, sign=axis.sign, value=_end(axis, cap))
+        worth = each.worth * slope(each)
+        return each._replace(limit=replace(limit, name=axis.axis.name), side=limit.sign, worth=worth)
+
+    together = []
+    for joint in certificate.bind_together:
+        slopes = np.array([slope(each) for each in joint.bindings])
+        together.append(replace(joint, bindings=tuple(map(told, joint.bindings)), costs=slopes[:, None] * joint.costs))
+    return replace(certificate, binding=tuple(map(told, certificate.binding)), bind_together=tuple(together))
 
 
 def _sought(words: Words, terms: FrontTerms, asking: Asking) -> str:

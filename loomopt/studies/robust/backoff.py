@@ -346,7 +346,9 @@ def _told(
     binding = tuple(_priced(words, price, off) for price in answer.binding)
     found = replace(answer, limits=limits, reached=here.reached, scene=scene, binding=binding, robust=robust)
     said = " ".join(_said(scene, found, robust))
-    message = answer.message.replace(report.stops(answer.binding), report.stops(binding))
+    message = answer.message.replace(
+        report.stops(answer.binding, answer.bind_together), report.stops(binding, answer.bind_together)
+    )
     explanation = " ".join(text for text in (answer.explanation, said) if text)
     return replace(found, message=f"{message} {said}", explanation=explanation)
 
@@ -415,7 +417,13 @@ def _in_the_way(asked: Asked, answer: Solution, sigmas: float) -> Solution:
 
 def _as_stands(asked: Asked, answer: Solution, status: str) -> Solution:
     return replace(
-        answer, status=status, limits=_limits(asked, answer), scene=asked.scene, certificate=None, binding=()
+        answer,
+        status=status,
+        limits=_limits(asked, answer),
+        scene=asked.scene,
+        certificate=None,
+        binding=(),
+        bind_together=(),
     )
 
 

@@ -425,10 +425,11 @@ def _told(asked: Asked, answer: Solution, nominal: Solution, best: Best) -> Solu
     here = report.evaluated(scene, asked.job, asked.target, own)
     # A size is what was chosen and no limit; and how far today's machine is goes by the widths of the scene's bounds.
     binding = tuple(price for price in answer.binding if price.limit not in asked.sizes)
+    together = tuple(price for price in answer.bind_together if not {*price.limits} & {*asked.sizes})
     figures = {**answer.figures, **{name: here.figures[name] for name in ("change",) if name in answer.figures}}
-    stops = report.stops(binding) if binding else "No limit binds beside the sizes."
-    message = message.replace(report.stops(answer.binding), stops)
-    found = replace(answer, scene=scene, limits=here.limits, binding=binding, figures=figures)
+    stops = report.stops(binding, together) if binding else "No limit binds beside the sizes."
+    message = message.replace(report.stops(answer.binding, answer.bind_together), stops)
+    found = replace(answer, scene=scene, limits=here.limits, binding=binding, bind_together=together, figures=figures)
     return replace(found, message=message, explanation=explanation, rounded=rounded)
 
 
@@ -437,6 +438,6 @@ def _without(asked: Asked, nominal: Solution, best: Best) -> Solution:
     helps = "Take smaller steps or wider bounds; the design told is the optimum without sizes."
     if best.gap:
         message = f"No admissible sizes were found in {best.boxes} boxes of a lattice of {asked.points} points. {helps}"
-        return replace(nominal, status="failed", message=message, certificate=None, binding=())
+        return replace(nominal, status="failed", message=message, certificate=None, binding=(), bind_together=())
     message = f"None of the {asked.points} points of the lattice keeps all limits: {best.rests}. {helps}"
-    return replace(nominal, status="infeasible", message=message, certificate=None, binding=())
+    return replace(nominal, status="infeasible", message=message, certificate=None, binding=(), bind_together=())

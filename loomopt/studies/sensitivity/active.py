@@ -7,7 +7,8 @@ peaks.
 """
 
 import itertools
-from collections.abc import Hashable, Iterator, Mapping
+import math
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -18,12 +19,13 @@ from loomopt.maths.nnls import nnls
 from loomopt.model.limits import CycleLimit, Limit
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
-from loomopt.physics.cycle import Floats
+from loomopt.physics.cycle import TURN, Floats
 from loomopt.physics.tolerances import FLAT, POSITIVE, RANK
 from loomopt.solving.certificate import kkt
-from loomopt.solving.certificate.certificate import judged_levels
+from loomopt.solving.certificate.certificate import judged_levels, level_multipliers
 from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow, active_set
+from loomopt.solving.certificate.multiplier_set import MultiplierSet
 from loomopt.solving.certificate.second_order import Local
 
 NEARBY = 1e-4
@@ -39,10 +41,15 @@ class LostError(Exception):
 
 
 class At(NamedTuple):
-    """Rows at one scene and design, in natural sizes: values (rows,), slopes (rows, variables)."""
+    """Rows of an active set at one scene and design, in natural sizes: values (rows,), slopes (rows, variables).
+
+    rows: as they stand there, extremes moved along; sampler: of the design.
+    """
 
     values: Floats
     slopes: Floats
+    rows: tuple[ActiveRow, ...]
+    sampler: Sampler
 
 
 @dataclass(frozen=True)
@@ -113,18 +120,22 @@ class Optimum:
             if held:
                 yield held
 
-    def _must(self, place: int) -> bool:
-        """Say whether a row has a price at any level, and none of the others can stand for it."""
-        prices = [abs(float(each.multipliers.of[place])) for each in self.levels]
-        if max(prices) <= POSITIVE:
-            return False
-        others = [k for k in range(len(self.rows)) if k != place and self._alike(k, place)]
-        return not others
+    @lazy
+    def multiplier_sets(self) -> tuple[MultiplierSet, ...]:
+        """All multipliers of each level up to the last that chooses."""
+        return tuple(level_multipliers(self.local, self.levels, k) for k in range(self.level + 1))
 
-    def _alike(self, one: int, other: int) -> bool:
-        """Say whether two rows of one side of a limit, or of one level, have the same slope."""
-        a, b = self.local.gradients[one], self.local.gradients[other]
-        return bool(np.abs(a - b).max() <= RANK * max(1.0, float(np.abs(a).max())))
+    def _must(self, place: int) -> bool:
+        """Say whether a row has a price at any level whatever multipliers balance the slopes."""
+        unit = np.eye(len(self.rows))[place]
+        return any(every.least(unit) > POSITIVE or every.least(-unit) > POSITIVE for every in self.multiplier_sets)
+
+    def support(self, level: int, multipliers: Floats) -> Held:
+        """Return the rows that multipliers (rows,) of a level rest on."""
+        pieces = [k for k in self.active.levels[level] if multipliers[k] > POSITIVE]
+        met = [k for k in np.flatnonzero(np.abs(multipliers) > POSITIVE).tolist() if k not in self.active.levels[level]]
+        free = np.flatnonzero(~self.multiplier_sets[level].signed)
+        return Held(tuple(met), tuple(pieces), multipliers, tuple(free.tolist()))
 
     def _held(self, met: tuple[int, ...], pieces: tuple[int, ...]) -> Held | None:
         slopes = self.local.gradients
@@ -173,19 +184,20 @@ class Optimum:
         except (ArithmeticError, ValueError) as error:
             raise LostError(str(error)) from None
 
-    def at(self, program: Program, x: Mapping[str, float], held: Held) -> At:
-        """Return the rows of an active set at another scene and design. Raises LostError."""
+    def at(self, program: Program, x: Mapping[str, float], held: Held, known: Sequence[ActiveRow] | None = None) -> At:
+        """Return the rows of an active set at another scene and design; known: as they stood nearby. Raises LostError.
+
+        known is what a path leads along: an extreme may pass from one piece of the cycle to the next.
+        """
         sampler = self.sampler(program, x)
-        chosen = [self._of(program, self.rows[k]) for k in (*held.met, *held.pieces)]
-        rows = kkt.moved(chosen, sampler)
-        if rows is None:
-            raise LostError("an extreme that holds the optimum is gone")
+        chosen = [self.rows[k] for k in (*held.met, *held.pieces)] if known is None else known
+        rows = tuple(_anchored(self._of(program, row), sampler) for row in chosen)
         try:
             found = JetDerivatives(program, x, sampler, rows)
             slopes = found.gradients() / np.array(found.sizes) * self.sizes
         except (ArithmeticError, ValueError) as error:
             raise LostError(str(error)) from None
-        return At(np.array([_value(row, sampler) for row in rows]), slopes)
+        return At(np.array([_value(row, sampler) for row in rows]), slopes, rows, sampler)
 
     def _of(self, program: Program, row: ActiveRow) -> ActiveRow:
         """Return a row as another scene has it, measured as here. Raises LostError where it has no such limit."""
@@ -228,13 +240,21 @@ class Optimum:
         _, sizes, turned = np.linalg.svd(slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-300))
         return np.asarray(turned[int(np.sum(sizes > RANK)) :].T)
 
-    def bends(self, program: Program, x: Mapping[str, float], held: Held, weights: Floats, basis: Floats) -> Floats:
+    def bends(
+        self,
+        program: Program,
+        x: Mapping[str, float],
+        held: Held,
+        weights: Floats,
+        basis: Floats,
+        known: Sequence[ActiveRow] | None = None,
+    ) -> Floats:
         """Return H Z, (variables, k): the Hessian of the Lagrangian along a basis, by differences of its slopes."""
         found = np.zeros((len(self.names), basis.shape[1]))
         for k, way in enumerate(basis.T):
             for share, factor in ((1.0, 2 / 3), (2.0, -1 / 12)):
                 for sign in (1.0, -1.0):
-                    there = self.at(program, self.moved(x, sign * share * NEARBY * way), held)
+                    there = self.at(program, self.moved(x, sign * share * NEARBY * way), held, known)
                     found[:, k] += sign * factor * (weights @ there.slopes)
         return found / NEARBY
 
@@ -242,6 +262,35 @@ class Optimum:
 def identity(limit: Limit) -> Hashable:
     """Return what a limit is known by in another scene, where there may be more of them, or fewer."""
     return limit.side, limit.reads, limit.where if isinstance(limit, CycleLimit) else None
+
+
+NEIGHBOUR = 0.02
+"""rad; how far from where an extreme stood the one is looked for that it has become in another piece: two samples."""
+HIGHER = 1e-12
+"""By how much, in natural sizes, that one is higher, or the extreme has not moved there: rounding of a value."""
+
+
+def _anchored(row: ActiveRow, sampler: Sampler) -> ActiveRow:
+    """Return a row where its extreme stands at another design. Raises LostError where it is gone."""
+    if row.node is None:
+        return row
+    moved = kkt.moved([row], sampler)
+    node = moved[0].node if moved else None
+    where = row.limit.where if isinstance(row.limit, CycleLimit) else None
+    angle = sampler.angle(node or row.node)
+    alike = [e for e in sampler.extremes(row.reads, where) if e.sign == row.node.sign]
+    near = [e for e in alike if turn_between(sampler.angle(e), angle) <= NEIGHBOUR]
+    best = max(near, key=lambda extreme: extreme.height, default=None)
+    if best and (node is None or best.height > node.height + HIGHER * row.scale):
+        node = best
+    if node is None:
+        raise LostError("an extreme that holds the optimum is gone")
+    return row._replace(node=node)
+
+
+def turn_between(one: float, other: float) -> float:
+    """Return the angle between two crank angles, rad, the shorter way round."""
+    return abs((one - other + math.pi) % TURN - math.pi)
 
 
 def _value(row: ActiveRow, sampler: Sampler) -> float:

@@ -14,14 +14,18 @@ from loomopt.base.records import lazy
 from loomopt.base.units import SI_UNIT
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
+from loomopt.model.limits import CycleLimit
 from loomopt.model.program import Program
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.model.session import working
 from loomopt.physics.cycle import Floats
-from loomopt.physics.tolerances import POSITIVE
+from loomopt.physics.tolerances import ACTIVE, FEASIBLE, POSITIVE, SAME_NODE
 from loomopt.scenes import designs, numbers
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import SIDES, Solution, Words, demand_single
-from loomopt.studies.sensitivity.active import Held, LostError, Optimum, flat, identity
+from loomopt.solving.answer.solution import SIDES, Price, Solution, Words, demand_single
+from loomopt.solving.certificate import kkt
+from loomopt.solving.certificate.kkt import ActiveRow
+from loomopt.studies.sensitivity.active import STILL_MET, At, Held, LostError, Optimum, flat, identity
 from loomopt.studies.tolerance.plan import toleranced
 
 Side = Literal["up", "down"]
@@ -40,9 +44,12 @@ PERCENT = 0.01
 """Share of itself by which a number moves where it has no tolerance."""
 PRICE_MOVED = 0.1
 """Share of itself by which a price has moved where its range ends."""
-FIRST_STEP, GROWTH, MOST_STEPS, CLOSE = 1e-7, 4.0, 60, 1e-10
+FIRST_STEP, GROWTH, MOST_STEPS, CLOSE = 1e-7, 4.0, 80, 1e-9
 """Of a limit's natural size: the first step along its range; each is so many times the one before; secants and halvings
 of the last; and the share of a range to which its end is told."""
+NO_SHIFT, MOST_STRETCHES = 1e-11, 20
+"""Share of a limit's natural size that is no move of it; and how often a path may begin anew where a step was too
+long."""
 NEWTON, SETTLED = 24, 1e-11
 """Newton's steps to the optimum of an active set, and what is left of its equations, in natural sizes."""
 SLOW = 0.1
@@ -157,7 +164,7 @@ class Study:
         for held in found.sets():
             # An answer is right to the accuracy that it was asked for; its derivatives are to be right to more.
             with contextlib.suppress(LostError, np.linalg.LinAlgError):
-                return Optimum(self.program, _settled(found, held, self.program, found.x).x)
+                return Optimum(self.program, _settled(found, held, self.program, Place(found.x)).x)
         return found
 
     @lazy
@@ -233,22 +240,28 @@ def conducted(study: Study, on_step: Callable[[str], None] | None = None) -> Fou
     say = on_step or (lambda text: None)
     optimum, rows, prices = study.optimum, list[Row](), list[PriceRange]()
     held = list(optimum.sets())
+    chosen = dict[str, dict[Side, Held]]()
     for key in study.keys:
         say(f"moving {key}")
-        rows += _derivatives(study, held, key) if held else _of_vertex(study, key)
+        if held:
+            sides = _sides(study, held, key)
+            chosen[key] = {side: own for side, (own, _) in sides.items()}
+            rows += _told(study, key, {side: way for side, (_, way) in sides.items()})
+        else:
+            rows += _of_vertex(study, key)
     if not rows:
         touched = ", ".join(dict.fromkeys(row.name for row in optimum.rows if row.limit))
         why = f"no active set of independent rows was found that holds the optimum: {touched}"
         return Found(study.scene, study.target, study.answer, (), (), why, {}, {})
     for price in study.answer.binding if held else ():
         say(f"following the price of {price.limit}")
-        found = _priced(study, held, price.limit, price.side)
+        found = _priced(study, chosen.get(_key_of(study, price) or "", {}), price)
         prices += [found] if found else []
     kinds = {key: each.quantity.kind for key, each in study.keys.items()}
     sizes = {key: study.size(key) for key in study.keys}
     worth = {name: abs(value) for name, value in study.answer.figures.items() if value}
     rows.sort(key=lambda row: -abs(row.value * sizes[row.number]) / worth.get(row.of, 1.0))
-    holds = tuple(_holding(study, held[0], key) for key in _unpriced(study, rows)) if held else ()
+    holds = tuple(each for key in _unpriced(study, rows) if held and (each := _holding(study, chosen[key], key)))
     return Found(study.scene, study.target, study.answer, tuple(rows), tuple(prices), None, sizes, kinds, holds)
 
 
@@ -329,23 +342,25 @@ def _of_vertex(study: Study, key: str) -> Iterator[Row]:
     yield from _told(study, key, chosen)
 
 
-def _derivatives(study: Study, held: Sequence[Held], key: str) -> Iterator[Row]:
-    """Yield the derivatives of all figures and of the design in one number."""
+def _sides(study: Study, sets: Sequence[Held], key: str) -> dict[Side, tuple[Held, Direction]]:
+    """Return the active set that holds the optimum where a number grows, and where it falls, and how it moves there."""
     ways = []
-    for own in held:
+    for own in sets:
         with contextlib.suppress(LostError, BadInput, np.linalg.LinAlgError):
-            ways.append(direction(study, own, key))
-    size = max((float(np.abs(each.step).max(initial=0.0)) for each in ways), default=0.0)
-    chosen: dict[Side, Direction] = {}
+            ways.append((own, direction(study, own, key)))
+    size = max((float(np.abs(way.step).max(initial=0.0)) for _, way in ways), default=0.0)
+    chosen: dict[Side, tuple[Held, Direction]] = {}
     for side in SIDES_OF_A_NUMBER[: 1 if study.ahead(key) else 2]:
         sign, place = (1.0, 0) if side == "up" else (-1.0, 1)
         # What is not met must not rise on this side.
-        fitting = [each for each in ways if each.rises[place] <= ALIKE * size]
+        fitting = [(own, way) for own, way in ways if way.rises[place] <= ALIKE * size]
         if fitting:
-            best = max(sign * each.objective for each in fitting)
+            best = max(sign * way.objective for _, way in fitting)
             # Of sets alike the one with the most rows: it knows what the others leave open.
-            chosen[side] = next(each for each in fitting if sign * each.objective >= best - ALIKE * (size + abs(best)))
-    yield from _told(study, key, chosen)
+            chosen[side] = next(
+                each for each in fitting if sign * each[1].objective >= best - ALIKE * (size + abs(best))
+            )
+    return chosen
 
 
 def _told(study: Study, key: str, chosen: Mapping[Side, Direction]) -> Iterator[Row]:
@@ -386,12 +401,16 @@ def _figures(study: Study, key: str, side: Side | None, way: Direction) -> Itera
             total[name] += turn * weight * (value if value is not None else math.nan) / h
     words, level = Words(study.scene), optimum.program.objectives[optimum.level]
     scales = {each.figure: each.scale for each in optimum.program.objectives if each.power == 1}
+    merit = level.merit(optimum.sampler(optimum.program, optimum.x))
+    # Some figures are another number than the row of which the least is sought, such as an angle from its complement.
+    own = study.answer.figures.get(level.figure)
+    is_row = own is not None and abs(own - merit) <= ALIKE * max(abs(merit), level.scale)
     alike: dict[str, float] = {}
     for name, figure in study.answer.figures.items():
         alike[words.si(name)] = max(alike.get(words.si(name), 0.0), abs(figure or 0.0))
     for name, value in total.items():
         told = value
-        if name == level.figure and level.power == 1 and not level.is_magnitude:
+        if name == level.figure and is_row and level.power == 1 and not level.is_magnitude:
             told = way.objective * level.scale
         if math.isfinite(told):
             kind = SI_UNIT[study.keys[key].quantity.kind]
@@ -407,31 +426,112 @@ NOTHING = 1e-8
 # Prices.
 
 
-def _priced(study: Study, sets: Sequence[Held], limit: str, side: str) -> PriceRange | None:
-    """Return a price with its range; None for a limit whose value is no number of the scene."""
-    optimum = study.optimum
-    signs = {word: sign for sign, word in SIDES.items()}
-    place = next(
-        (
-            k
-            for k, row in enumerate(optimum.rows)
-            if row.limit and row.limit.name == limit and row.limit.sign in (0, signs.get(side, 0))
-        ),
-        None,
-    )
-    key = next((key for key in _keys_of(study, limit, side) if key in study.keys), None)
-    if place is None or key is None:
+def _priced(study: Study, chosen: Mapping[Side, Held], price: Price) -> PriceRange | None:
+    """Return a price with its range; None for a limit whose value is no number of the scene.
+
+    chosen: what holds the optimum where the number grows, and where it falls.
+    """
+    key = _key_of(study, price)
+    places = _places(study, price)
+    if key is None or not places:
         return None
-    held = next((each for each in sets if place in each.met), sets[0])
-    price = next(each for each in study.answer.binding if (each.limit, each.side) == (limit, side))
     figure, worth = next(iter(price.worth.items()))
-    found = [_end(study, held, key, place, sign) for sign in (-1.0, 1.0)]
-    reach = (-found[0][0], found[1][0])
-    return PriceRange(limit, side, worth, price.value, reach, (found[0][1], found[1][1]), price.unit[figure])
+    ends = {side: _price_end(study, chosen.get(side), key, price, side) for side in SIDES_OF_A_NUMBER}
+    reach = (0.0 - ends["down"][0], ends["up"][0])
+    why = (ends["down"][1], ends["up"][1])
+    return PriceRange(price.limit, price.side, worth, price.value, reach, why, price.unit[figure])
 
 
 def _keys_of(study: Study, limit: str, side: str) -> tuple[str, ...]:
     return (f"bounds.{limit}.{side}", f"limits.{limit}.{side}", f"operation.{limit}", f"mechanism.{limit}")
+
+
+def _key_of(study: Study, price: Price) -> str | None:
+    """Return the dotted key of a limit's value; None where it is no number of the scene."""
+    return next((key for key in _keys_of(study, price.limit, price.side) if key in study.keys), None)
+
+
+def _places(study: Study, price: Price) -> list[int]:
+    """Return the places of a limit's rows."""
+    signs = {0, *(sign for sign, side in SIDES.items() if side == price.side)}
+    rows = enumerate(study.optimum.rows)
+    return [k for k, row in rows if row.limit and row.limit.name == price.limit and row.limit.sign in signs]
+
+
+def _price_end(study: Study, held: Held | None, key: str, price: Price, side: Side) -> tuple[float, str]:
+    """Return how far a price holds where its limit's number moves to one side, SI, and why not farther."""
+    optimum, places = study.optimum, _places(study, price)
+    figure, worth = next(iter(price.worth.items()))
+    level = next(k for k, each in enumerate(optimum.program.objectives) if each.figure == figure)
+    if level > optimum.level:
+        return 0.0, "the optimum cannot be followed"
+    # On this side the multipliers count by which the limit is worth least, where it is loosened, or most.
+    loosened = (side == "up") == (price.side == "max")
+    limit = optimum.rows[places[0]].limit
+    # The multiplier of an equality has the sign of the side on which it gains.
+    sign = -1.0 if price.side == "min" and limit and not limit.sign else 1.0
+    cost = np.where(np.isin(np.arange(len(optimum.rows)), places), sign, 0.0)
+    every = optimum.multiplier_sets[level]
+    here = {way: every.at_least(way * cost) for way in (1.0, -1.0)}
+    multipliers = here[1.0 if loosened else -1.0]
+    if multipliers is None:
+        return 0.0, "no design is admissible beyond"
+    own = optimum.support(level, multipliers)
+    largest = max(
+        sign * _worth(optimum, optimum.x, level, w, optimum.rows, places) for w in here.values() if w is not None
+    )
+    size = worth or largest
+    now = sign * _worth(optimum, optimum.x, level, multipliers, optimum.rows, places)
+    if abs(now - worth) > PRICE_MOVED * size:
+        return 0.0, f"the price is {Words(study.scene).price_reading(figure, price.limit, now)} there"
+    if held is None:
+        return 0.0, "it is out of range" if study.ahead(key) else "the optimum cannot be followed"
+
+    def beyond(there: Walked) -> tuple[float, str]:
+        """Return by how much a price has moved beyond what counts, negative where it has not."""
+        rows, weights = there.at.rows, there.weights
+        own_places = [*held.met, *held.pieces]
+        if level != optimum.level:
+            own_places = [*own.met, *own.pieces]
+            at = optimum.at(there.program, there.x, own)
+            weights, left = optimum.weights(at, own)
+            rows = at.rows
+            if left > STILL_MET:
+                raise LostError("an earlier objective does not stay at its best")
+        full = np.zeros(len(optimum.rows))
+        full[own_places] = weights
+        known = list(optimum.rows)
+        for k, row in zip(own_places, rows, strict=True):
+            known[k] = row
+        value = sign * _worth(optimum, there.x, level, full, known, places, there.at.sampler)
+        turned = f"the price moves by {'+' if value > worth else '-'}10 %" if worth else "it has a price of its own"
+        return abs(value - worth) / size - PRICE_MOVED, turned
+
+    row = optimum.rows[places[0]]
+    return _end(study, held, key, row.scale, 1.0 if side == "up" else -1.0, beyond)
+
+
+def _worth(
+    optimum: Optimum,
+    x: Mapping[str, float],
+    level: int,
+    multipliers: Floats,
+    rows: Sequence[ActiveRow],
+    places: Sequence[int],
+    sampler: Sampler | None = None,
+) -> float:
+    """Return what a limit is worth, SI, by multipliers of its rows: the fall of the figure, whatever its objective is.
+
+    A worth below 0 is that of the other side.
+    """
+    sampler = sampler or optimum.sampler(optimum.program, x)
+    total = 0.0
+    for k in places:
+        limit = rows[k].limit
+        assert limit is not None
+        unit = kkt.priced(sampler, limit, optimum.program.objectives[level], 1.0).worth
+        total += float(multipliers[k]) * unit
+    return total
 
 
 def _unpriced(study: Study, rows: Sequence[Row]) -> list[str]:
@@ -441,85 +541,110 @@ def _unpriced(study: Study, rows: Sequence[Row]) -> list[str]:
     return [key for key in study.keys if key.startswith("operation.") and key in moving - limits]
 
 
-def _holding(study: Study, held: Held, key: str) -> Holding:
-    down, up = (_end(study, held, key, None, sign) for sign in (-1.0, 1.0))
-    here = study.value(key)
+def _holding(study: Study, chosen: Mapping[Side, Held], key: str) -> Holding | None:
+    """Return how far a number may move until other rows hold the optimum; None where none were found that do."""
+    here, found = study.value(key), list[tuple[float, str]]()
+    for side in SIDES_OF_A_NUMBER:
+        if side not in chosen:
+            return None
+        found.append(_end(study, chosen[side], key, abs(here), 1.0 if side == "up" else -1.0))
+    up, down = found
     return Holding(key, (here - down[0], here + up[0]), (down[1], up[1]))
 
 
 class Walked(NamedTuple):
-    """An active set's optimum at a value of a number: variables, multipliers of its rows.
+    """An active set's optimum at a value of a number: variables, its rows, their multipliers.
 
     amiss: by how much a price is below 0 or a limit exceeded, in natural sizes, negative where none is; wrong: which.
     """
 
+    program: Program
     x: dict[str, float]
+    at: At
     weights: Floats
     wrong: str
     amiss: float
 
 
-def _end(study: Study, held: Held, key: str, place: int | None, sign: float) -> tuple[float, str]:
-    """Return how far a number may move on one side, SI, and why not farther; place: of the row whose price counts."""
-    optimum, here = study.optimum, study.value(key)
-    scale = abs(here) if place is None else optimum.rows[place].scale
-    price = math.nan if place is None else float(held.weights[place])
+class Place(NamedTuple):
+    """Where a path along a number has led: variables, SI, and the rows as they stand there, None at its beginning."""
 
-    def met(t: float, x: Mapping[str, float]) -> tuple[Mapping[str, float], float, str]:
+    x: Mapping[str, float]
+    rows: tuple[ActiveRow, ...] | None = None
+
+
+def _end(
+    study: Study,
+    held: Held,
+    key: str,
+    scale: float,
+    sign: float,
+    beyond: Callable[[Walked], tuple[float, str]] | None = None,
+) -> tuple[float, str]:
+    """Return how far a number may move on one side, SI, and why not farther.
+
+    scale: natural size of the number; beyond(there): by how much what counts has changed too much, and how.
+    """
+    optimum, here = study.optimum, study.value(key)
+
+    def look(t: float, place: Place) -> tuple[Place, float, str]:
         """Return where a shift leads, and by how much it is beyond the range, negative inside, with the reason."""
         try:
-            there = _walked(study, held, key, here + sign * t, x)
+            there = _settled(optimum, held, study.at(key, here + sign * t)[1], place)
+            moved = beyond(there) if beyond else (-math.inf, "")
         except BadInput as error:
-            return x, math.inf, error.problem
+            return place, math.inf, error.problem
         except (LostError, np.linalg.LinAlgError):
-            return x, math.inf, "the optimum cannot be followed farther"
-        if place is None:
-            return there.x, there.amiss, there.wrong
-        now = float(there.weights[held.met.index(place)])
-        turned = f"the price moves by {'+' if abs(now) > abs(price) else '-'}10 %"
-        return there.x, *max((there.amiss, there.wrong), (abs(now / price - 1.0) - PRICE_MOVED, turned))
+            return place, math.inf, "the optimum cannot be followed farther"
+        return Place(there.x, there.at.rows), *max((there.amiss, there.wrong), moved)
 
-    low, step, at, below = 0.0, FIRST_STEP * scale, optimum.x, -PRICE_MOVED
-    while True:
-        high = low + step
-        there, above, why = met(high, at)
-        if above > 0.0:
-            break
-        low, at, below, step = high, dict(there), above, step * GROWTH
-        if low > FARTHEST * scale:
-            return math.inf, "nothing within reach ends it"
-    for turn in range(MOST_STEPS):
-        if high - low <= CLOSE * high:
-            break
-        secant = low - below * (high - low) / (above - below) if math.isfinite(above) else math.nan
-        # Every third time half of what is left, where secants stay on one side.
-        middle = secant if turn % 3 < 2 and low < secant < high else (low + high) / 2
-        there, value, found = met(middle, at)
+    low, step, at, below = 0.0, FIRST_STEP * scale, Place(optimum.x), -PRICE_MOVED
+    for _ in range(MOST_STRETCHES):
+        while True:
+            high = low + step
+            there, above, why = look(high, at)
+            if above > 0.0:
+                break
+            low, at, below, step = high, there, above, step * GROWTH
+            if low > FARTHEST * scale:
+                return math.inf, "nothing within reach ends it"
+        for turn in range(MOST_STEPS):
+            if high - low <= CLOSE * high or high <= NO_SHIFT * scale:
+                break
+            secant = low - below * (high - low) / (above - below) if math.isfinite(above - below) else math.nan
+            # Every third time half of what is left, where secants stay on one side.
+            middle = secant if turn % 3 < 2 and low < secant < high else (low + high) / 2
+            there, value, found = look(middle, at)
+            # The value at an end that stays counts half [the Illinois method: Dowell and Jarratt, BIT 11 (1971)].
+            if value > 0.0:
+                high, above, why, below = middle, value, found, below / 2
+            else:
+                low, at, below, above = middle, there, value, above / 2
+        if high <= NO_SHIFT * scale:
+            return 0.0, why
+        # What too long a step has lost is found again from nearby.
+        step = max(2 * CLOSE * high, FIRST_STEP * scale)
+        there, value, _ = look(high + step, at)
         if value > 0.0:
-            high, above, why = middle, value, found
-        else:
-            low, at, below = middle, dict(there), value
+            break
+        low, at, below = high + step, there, value
     return (low + high) / 2, why
 
 
-def _walked(study: Study, held: Held, key: str, value: float, x: Mapping[str, float]) -> Walked:
-    """Return the optimum of an active set at a number's value, by Newton's method from nearby. Raises LostError."""
-    return _settled(study.optimum, held, study.at(key, value)[1], x)
-
-
-def _settled(optimum: Optimum, held: Held, program: Program, x: Mapping[str, float]) -> Walked:
+def _settled(optimum: Optimum, held: Held, program: Program, place: Place) -> Walked:
     """Return the optimum of an active set of a task, by Newton's method from nearby. Raises LostError."""
     own = [*held.met, *held.pieces]
-    here, bends, before, length = dict(x), None, math.inf, 0.0
+    here, rows, bends, before, length = dict(place.x), place.rows, None, math.inf, 0.0
     for _ in range(NEWTON):
-        at = optimum.at(program, here, held)
+        at = optimum.at(program, here, held, rows)
+        rows = at.rows
         values, slopes = optimum.equations(at, held)
         step = -np.linalg.pinv(slopes, rcond=1e-10) @ values
         basis = optimum.open(slopes)
         weights, _ = optimum.weights(at, held)
         if basis.shape[1]:
             if bends is None or bends.shape[1] != basis.shape[1] or length > SLOW * before:
-                bends = optimum.bends(program, here, held, weights, basis)
+                bends = optimum.bends(program, here, held, weights, basis, rows)
             vectors, sizes = flat(basis, bends)
             if len(sizes):
                 pull = bends.T @ step + basis.T @ (weights @ at.slopes)
@@ -530,20 +655,69 @@ def _settled(optimum: Optimum, held: Held, program: Program, x: Mapping[str, flo
             break
     else:
         raise LostError("Newton's method does not settle")
-    at = optimum.at(program, here, held)
+    at = optimum.at(program, here, held, rows)
     weights, _ = optimum.weights(at, held)
-    leaving = [
+    amiss = [
         (-float(w) / max(1.0, abs(float(held.weights[k]))), f"{optimum.rows[k].name}'s price is 0")
         for k, w in zip(own, weights, strict=True)
-        if k not in held.free and abs(held.weights[k]) > POSITIVE
+        if k not in held.free and (abs(held.weights[k]) > POSITIVE or w < -STILL_MET)
     ]
-    sampler = optimum.sampler(program, here)
+    amiss += [*_entering(optimum, held, program, at), *_overtaking(optimum, held, at)]
+    worst = max(amiss, default=(-math.inf, ""))
+    return Walked(program, here, at, weights, worst[1], worst[0])
+
+
+def _entering(optimum: Optimum, held: Held, program: Program, at: At) -> Iterator[tuple[float, str]]:
+    """Yield by how much each limit is exceeded, natural sizes, where the active set does not meet it, and what it is.
+
+    Of a limit over the whole cycle all other extremes count.
+    """
     touched = {identity(row.limit) for row in optimum.rows if row.limit}
-    once = {row.limit.name for row in optimum.rows if row.limit}
-    entering = [
-        (limit.excess(sampler), f"{limit.name} is reached{' on its other side' if limit.name in once else ''}")
-        for limit in program.limits
-        if limit.sign and identity(limit) not in touched
-    ]
-    worst = max([*leaving, *entering], default=(-math.inf, ""))
-    return Walked(here, weights, worst[1], worst[0])
+    names = {row.limit.name for row in optimum.rows if row.limit}
+    rows = at.rows[: len(held.met)]
+    for limit in program.limits:
+        own = identity(limit)
+        met = [row for row in rows if row.limit and identity(row.limit) == own]
+        said = f"{limit.name} is reached"
+        if not limit.sign:
+            continue
+        if own not in touched:
+            yield limit.excess(at.sampler), f"{said} on its other side" if limit.name in names else said
+        elif isinstance(limit, CycleLimit):
+            other = _other(at.sampler.extremes(limit.row, limit.where), met)
+            if other:
+                excess = (other.height - limit.bound) / limit.scale
+                yield _beside(excess), f"{said} at {_degrees(at.sampler, other)} too"
+        elif not met:
+            yield _beside(limit.excess(at.sampler)), said
+
+
+def _overtaking(optimum: Optimum, held: Held, at: At) -> Iterator[tuple[float, str]]:
+    """Yield by how much other pieces of the objective are above those of the active set, natural sizes, and which."""
+    objective, pieces = optimum.program.objectives[optimum.level], at.rows[len(held.met) :]
+    top = max(at.values[len(held.met) :])
+    for name in objective.quantities:
+        other = _other(at.sampler.extremes(name), [row for row in pieces if row.reads == name])
+        if other:
+            said = f"{objective.figure} is as large at {_degrees(at.sampler, other)}"
+            yield _beside(other.height / objective.scale - top), said
+    for name, sign in () if objective.is_magnitude else objective.sides:
+        if not any((row.reads, row.sign) == (name, sign) for row in pieces):
+            yield _beside(sign * at.sampler.single(name) / objective.scale - top), f"{name} is as large"
+
+
+def _other(extremes: Sequence[Extreme], rows: Sequence[ActiveRow]) -> Extreme | None:
+    """Return the highest extreme at which none of some rows stands; None without one."""
+    nodes = [row.node for row in rows if row.node]
+    others = (e for e in extremes if not any(e.piece == n.piece and abs(e.u - n.u) <= SAME_NODE for n in nodes))
+    return next(others, None)
+
+
+def _beside(excess: float) -> float:
+    """Return what is exceeded, minus infinity where a row only stays level with those that hold the optimum."""
+    return -math.inf if -ACTIVE <= excess <= FEASIBLE else excess
+
+
+def _degrees(sampler: Sampler, extreme: Extreme) -> str:
+    """Return the crank angle of an extreme in words."""
+    return f"{math.degrees(sampler.angle(extreme)) % 360:.6g} deg"

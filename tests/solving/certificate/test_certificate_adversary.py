@@ -199,13 +199,31 @@ def pyramid(sides):
     return plane(f(lambda x, y, z: z, "xyz", **planes), tuple((name, -1, 0.0) for name in planes), names="xyz")
 
 
+def apex(sides, lowered):
+    """Return how far the apex falls where some planes are 1 lower: a linear program of their own three coordinates."""
+    angles = 2 * math.pi * np.arange(sides) / sides
+    slopes = np.column_stack([-np.cos(angles), -np.sin(angles), np.ones(sides)])
+    least = np.array([-1.0 if f"g{k}" in lowered else 0.0 for k in range(sides)])
+    return -linprog([0, 0, 1], A_ub=-slopes, b_ub=-least, bounds=[(None, None)] * 3).fun
+
+
 @pytest.mark.parametrize("sides", [3, 4, 7, 24])
 def test_an_apex_where_more_limits_meet_than_there_are_directions_passes(sides):
     certificate = judged(pyramid(sides), xyz(0, 0, 0))
     assert certificate.passed, certificate.reasons
     assert certificate.unique
-    assert 2 <= len(certificate.binding) <= 4
-    assert sum(binding.worth for binding in certificate.binding) == pytest.approx(1.0, rel=1e-9), "all planes 1 lower"
+    assert certificate.prices_unique == (sides == 3)
+    if sides == 3:
+        assert [binding.worth for binding in certificate.binding] == pytest.approx([1 / 3] * 3, rel=1e-9)
+        assert certificate.bind_together == ()
+    else:
+        assert {binding.worth for binding in certificate.binding} == {0.0}, "the others hold the apex where it is"
+        assert certificate.bind_together
+    for joint in certificate.bind_together:
+        names = {binding.limit.name for binding in joint.bindings}
+        lower = apex(sides, names)
+        assert joint.worth([1.0] * len(names)) == pytest.approx(lower, rel=1e-9)
+        assert lower > 1e-3
     for x, y, z in ((1e-6, 0, 1e-6), (0, 1e-4, 1e-4), (-1e-6, 1e-6, 2e-6)):
         assert_refused(judged(pyramid(sides), xyz(x, y, z)), FALLS)
     assert_refused(judged(pyramid(sides), xyz(0, 0, -1e-6)), EXCEEDED)
@@ -224,7 +242,10 @@ def test_a_price_is_said_once_for_a_limit_that_stands_twice():
     twice = f(lambda x, y: 3 * x + y**2, h=lambda x, y: 2 * x)
     certificate = judged(plane(twice, (("x", -1, 0.0), ("h", -1, 0.0))), xy(0, 0))
     assert certificate.passed
-    assert sum(b.worth * (2 if b.limit.name == "h" else 1) for b in certificate.binding) == pytest.approx(3.0)
+    assert [binding.worth for binding in certificate.binding] == [0.0, 0.0]
+    (joint,) = certificate.bind_together
+    assert joint.worth([1.0, 1.0]) == pytest.approx(1.5), "h 1 lower lets x fall by half"
+    assert joint.worth([1.0, 2.0]) == pytest.approx(3.0)
 
 
 def test_touching_limits_that_close_every_way_down_keep_a_minimum():

@@ -80,9 +80,16 @@ def test_the_last_level_that_falls_is_named():
 # The toy x² + y² with three limits that touch at 0 ------------------------------------------------------------------
 
 
-def local(objectives=("f",), **x):
-    rows = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "g": lambda v: v["y"]}
-    program = toy.program("xy", rows, limits=(("x", -1, 0.0), ("y", -1, 0.0), ("x", 1, 0.0)), objectives=objectives)
+TOUCHING = (("x", -1, 0.0), ("y", -1, 0.0), ("x", 1, 0.0))
+
+
+def local(objectives=("f",), limits=TOUCHING, **x):
+    rows = {
+        "f": lambda v: v["x"] ** 2 + v["y"] ** 2,
+        "g": lambda v: v["y"],
+        "slope": lambda v: 3 * v["x"] + 2 * v["y"],
+    }
+    program = toy.program("xy", rows, limits=limits, objectives=objectives)
     x = {"x": 0.0, "y": 0.0, **x}
     sampler = Sampler(program.model, x)
     active = active_set(program, sampler)
@@ -141,13 +148,13 @@ def test_a_later_level_tells_what_the_earlier_ones_are_held_by():
 
 
 def test_a_limit_is_worth_what_the_first_objective_it_moves_would_fall():
-    here = local(("f", "g"))
+    here = local(("f", "slope"), TOUCHING[:2])
     levels = [
-        JudgedLevel(judged().level, LevelMultipliers(np.array([0.0, POSITIVE, 0.0, 1.0, 0.0]), 0.0)),
-        JudgedLevel(judged().level, LevelMultipliers(np.array([3.0, 2.0, 0.0, 0.0, 1.0]), 0.0)),
+        JudgedLevel(judged().level, LevelMultipliers(np.array([0.0, POSITIVE, 1.0, 0.0]), 0.0)),
+        JudgedLevel(judged().level, LevelMultipliers(np.array([3.0, 2.0, 0.0, 1.0]), 0.0)),
     ]
-    found = [(each.limit.row, each.objective.figure, each.worth) for each in certificate._binding(here, levels)]
-    assert found == [("x", "g", 3.0), ("y", "g", 2.0)]
+    found = [(each.limit.row, each.objective.figure, each.worth) for each in certificate._priced(here, levels).binding]
+    assert found == [("x", "slope", 3.0), ("y", "slope", 2.0)]
 
 
 # Proportion ---------------------------------------------------------------------------------------------------------
