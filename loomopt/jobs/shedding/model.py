@@ -330,6 +330,11 @@ class CamProgram(CamFrame):
         at = dict(zip([*tops[-1:], *tops[:-1]][::-1], begins[::-1], strict=True))
         return at[min(tops)], at[max(tops)]
 
+    @property
+    def breaks(self) -> frozenset[str]:
+        """No event is a break of a law: the half open shed is known only where no law breaks there."""
+        return frozenset()
+
     @lazy
     def stretches(self) -> tuple[tuple[int, int], ...]:
         """The segment, and the piece of its law, of each stretch between corners in order."""
@@ -357,11 +362,16 @@ class CamProgram(CamFrame):
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """Return the angles where segments begin, rad, and what their laws are made of."""
-        values, angle, found = given.values, 0, {}
+        values, angle = given.values, 0
+        found: dict[str, Number] = {}
         for k, move in enumerate(self.moves):
             found[f"begin.{k + 1}"] = angle
             angle = angle + values[width(k)]
             found |= move.law.prepared(maths, values) if move.law else {}
+        if HALF_OPEN in called:
+            # Of one move down and one up, each of a law that is symmetric.
+            down, up = (next(k for k, move in enumerate(self.moves) if move.kind == kind) for kind in (RISE, RETURN))
+            found[HALF_OPEN] = tuple(found[f"begin.{k + 1}"] + values[width(k)] / 2 for k in (down, up))
         return found
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:

@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from fractions import Fraction
 from typing import Any, Literal, NamedTuple
 
 from pydantic import Field, create_model
@@ -197,10 +198,24 @@ def check_motion(scene: Scene) -> None:
         before = before if each.to is None else each.to
     known = curves(scene)
     loads = [each.name for each in scene.active if HALF_OPEN in each.reads and (each.name, "table") not in known]
-    if loads:
-        problem = f"{loads[0]} is told for a motion of rise, far dwell, return and near dwell only"
-        remedy = f"Give effects.{loads[0]}.table, a curve over the cam angle"
-        raise refusal(problem, scene.origin, "mechanism.segments", remedy=remedy)
+    for name in loads:
+        if not _opens_once(scene):
+            problem = f"{name} is told for one move from the lowest X to the highest and one back, of symmetric laws"
+            remedy = f"Give effects.{name}.table, a curve over the cam angle"
+            raise refusal(problem, scene.origin, "mechanism.segments", remedy=remedy)
+        shape = getattr(scene.effects[name], "shape", "linear")
+        if shape != "linear":
+            remedy = 'Write shape = "linear", or give a table'
+            raise refusal(
+                "of segments the shape is linear", scene.origin, f"effects.{name}.shape", shape, remedy=remedy
+            )
+
+
+def _opens_once(scene: Scene) -> bool:
+    """Say whether the segments move down once and up once, by symmetric laws without a break in the middle."""
+    own = [move for move in moves(scene) if move.law]
+    symmetric = all(move.law and move.law.symmetric and Fraction(1, 2) not in move.law.breaks for move in own)
+    return symmetric and sorted(move.rises for move in own) == [False, True]
 
 
 def moves(scene: Scene) -> tuple[Segment, ...]:

@@ -2,7 +2,7 @@
 
 T is T1 with the shed open upward (X = 0) and −T2 with it open downward. Between them, by `shape`:
     linear   in proportion to the shed: T1 (1 − 2X/h) above the middle, −T2 (2X/h − 1) below; a corner where
-             X = h/2, the event half_open
+             X = h/2, the event half_open; of a motion in segments too that moves down once and up once
     step     the cubic STEP of eq 8 over the rise and over the return
     levels   nothing is said: T is T1 and −T2 in the dwells, and contact is judged there only
 
@@ -51,7 +51,7 @@ def past_middle(angle: float, corners: tuple[float, ...]) -> float:
     """Return 1 between the angles where the shed is half open, 0 outside and without any; of a table the interval."""
     if len(corners) > 2:
         return interval_at(angle, corners)
-    return float(corners[0] <= angle % TURN < corners[1]) if corners else 0.0
+    return float((angle - corners[0]) % TURN < (corners[1] - corners[0]) % TURN) if corners else 0.0
 
 
 def known_in(words: Mapping[str, str]) -> tuple[Place, ...]:
