@@ -205,7 +205,8 @@ def curves(
     given: dict[str, tuple[float, ...]] = {}
     if measured is not None:
         place = Path(arguments.path(measured, "measured", "a table: .csv, .xlsx or .parquet", "Name one"))
-        given = dict(csv_tables.measured(place, _kinds(rows())).columns)
+        table = csv_tables.measured(place, _kinds(rows()))
+        given = dict(table.columns)
         angles = [angle % TURN for angle in given.pop(PHI)]
         rows = functools.partial(rows, also=angles)
     if accuracy is None:
@@ -216,7 +217,7 @@ def curves(
         columns, error = curves.sparse_curves(job.sampler(scene, designs.flat(design)), rows, accuracy)
         more |= {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
     if given:
-        more |= {"measured": str(measured), **_put_beside(columns, angles, given)}
+        more |= {"measured": str(measured), **_put_beside(columns, angles, given), **_told(table)}
     frame = pd.DataFrame(columns)
     frame.attrs.update(provenance(scene, **more))
     return frame
@@ -254,6 +255,12 @@ def _put_beside(
         off = np.asarray(columns[column])[places] - np.asarray(measured[name])
         told[f"{RMS}{name} [{unit}]"] = float(np.sqrt(np.nanmean(off**2)))
     return told
+
+
+def _told(table: csv_tables.Table) -> dict[str, object]:
+    """Return the precision of measured columns, SI, and how what can be read in two ways was read."""
+    precision = {f"precision_{name}": size for name, size in table.precision.items() if size}
+    return precision | ({"read": "; ".join(table.remarks)} if table.remarks else {})
 
 
 SAME = 1e-9

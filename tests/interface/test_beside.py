@@ -101,3 +101,15 @@ def test_own_curves_are_read_as_measured_ones(tmp_path, problem, name, comma):
     assert len(told) > 3
     for key, value in told.items():
         assert float(value) <= 1e-11 * frame[key.removeprefix("rms_")].abs().max(), key
+
+
+def test_precision_and_the_rule_for_ambiguous_commas_are_told(tmp_path):
+    path = tmp_path / "m.csv"
+    path.write_text("phi [deg];psi [deg]\n0;82,250\n66;67,125\n120;74,500\n")
+    words = ["simulate", "beatup", "--beside", str(path)]
+    told = CliRunner().invoke(app.application(words), words)
+    assert told.exit_code == 0, told.output
+    assert "0.0005" in told.stdout
+    assert "commas are read as decimal commas" in " ".join(told.stdout.split())
+    frame = lo.simulate("beatup", measured=path)
+    assert float(frame.attrs["precision_psi"]) == pytest.approx(math.radians(0.0005))

@@ -163,9 +163,11 @@ def beside(scene: Scene, frame: "pd.DataFrame") -> Grid:
             worst = there[np.argmax(np.abs(off[there]))]
             angle = scene.show(float(frame["phi [rad]"].iloc[worst]), "angle", 5)
             rms = math.sqrt(float(np.mean(off[there] ** 2)))
-            lines.append((name, shown, str(len(there)), f"{rms:.4g}", f"{off[worst]:.4g}", angle))
-    heads = ("curve", "unit", "samples", "rms", "largest", "at")
-    return Grid(f"Curves less what was measured ({frame.attrs['measured']})", heads, tuple(lines), right=(2, 3, 4, 5))
+            known = f"{float(frame.attrs.get(f'precision_{name}', 0.0)) / size:.2g}"
+            lines.append((name, shown, str(len(there)), f"{rms:.4g}", f"{off[worst]:.4g}", angle, known))
+    heads = ("curve", "unit", "samples", "rms", "largest", "at", "digits to \u00b1")
+    file = "; ".join(str(frame.attrs[key]) for key in ("measured", "read") if key in frame.attrs)
+    return Grid(f"Curves less what was measured ({file})", heads, tuple(lines), right=(2, 3, 4, 5, 6))
 
 
 def _angles(marks: Marks) -> dict[str, float]:
