@@ -73,14 +73,15 @@ class StudyTable:
         """Return one line per row, units in the column names; si: in SI, else in the scene's own units."""
         return study_table.frame(self.study, self.rows, arguments.flag(si, "si"))
 
-    def answer(self, point: int) -> Answer:
-        """Return the whole answer of a row: its solve is repeated, to the same digits. Raises BadInput."""
-        allowed = ", ".join(str(row.point) for row in self.solved[:20])
-        number = arguments.whole(point, "point", allowed, "Choose one of them")
-        for task, parent in run.tasks(self.study, self.solved):
-            if task.point == number:
-                return solved(self.study.solve(task, parent), self.study.scene_at(number), self.study.target)
-        raise refusal("the study has no such point", key="point", origin="", value=point, allowed=allowed)
+    def answer(self, point: "int | str | Mapping[str, str | float]") -> Answer:
+        """Return the whole answer of a row: its solve is repeated, to the same digits.
+
+        point: the row's number, or its label as the table prints it: "3", its place "715 N*m", or of several columns
+        {"operation.M0": "715 N*m", "peak_torque": "86 N*m"}. Raises BadInput for a label of no row or of several.
+        """
+        number = study_table.labelled_point(self.study, self.solved, point)
+        task, parent = next(each for each in run.tasks(self.study, self.solved) if each[0].point == number)
+        return solved(self.study.solve(task, parent), self.study.scene_at(number), self.study.target)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
         """Return the figure, the designs at the ends and in the middle beside it; it shows itself in Jupyter.

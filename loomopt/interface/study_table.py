@@ -2,10 +2,14 @@
 
 import itertools
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from loomopt.base.units import SI_UNIT, factor
+from loomopt.base import arguments
+from loomopt.base.errors import refusal
+from loomopt.base.quantities import read
+from loomopt.base.units import SI_UNIT, QuantityError, factor
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words, grouped
@@ -42,7 +46,7 @@ class ColumnUnits:
 
     def of(self, name: str) -> str:
         """Return the unit of a key that varies, a design variable or a figure."""
-        kind = self.study.kinds.get(name) or self.words.kind(name)
+        kind = _kind(self.study, name)
         return SI_UNIT[kind] if self.si else self.study.scene.shown_in(kind)
 
     def price(self, multiplier: Multiplier) -> tuple[str, float]:
@@ -76,6 +80,87 @@ def columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> dict[st
         Column(each.text, *units.price(each), tuple(row.multipliers.get(each) for row in rows)) for each in multipliers
     )
     return found if si else _without_rounding(found)
+
+
+PRINTED = 1e-5
+"""Share of a column's largest number by which a place may differ from its row's: tables print six digits."""
+NAMED = re.compile(r"(?P<key>[^\s=]+)\s*=\s*(?P<value>.+)|(?P<name>[A-Za-z_]\S*)\s+(?P<rest>.+)|(?P<bare>.+)")
+
+
+def labelled_point(study: SceneStudy, rows: Sequence[Row], label: int | str | Mapping[str, str | float]) -> int:
+    """Return the number of the point that a label names. Raises BadInput for none, and for more than one.
+
+    label: the number, also as the table prints it ("3", "3*"); the place, as "715 N*m", or of several columns
+    "operation.M0 = 715 N*m, peak_torque = 86 N*m"; or a mapping, column → text with its unit or a number in SI.
+    """
+    numbers = [row.point for row in rows]
+    allowed = f"{', '.join(map(str, numbers[:20]))}, or a place such as {_place_example(study, rows)}"
+    remedy = "Choose one of them"
+    if not isinstance(label, str | Mapping):
+        found = [k for k in numbers if k == arguments.whole(label, "point", allowed, remedy)]
+    elif isinstance(label, str) and (mark := label.strip().removeprefix("point ").rstrip("*")) in map(str, numbers):
+        found = [int(mark)]
+    else:
+        places = _named_places(study, rows, label, allowed)
+        found = [row.point for k, row in enumerate(rows) if all(_is_there(c, k, value) for c, value in places)]
+    if len(found) != 1:
+        problem = f"it names the points {', '.join(map(str, found[:20]))}" if found else "the study has no such point"
+        remedy = "Name more columns, or the number" if found else remedy
+        raise refusal(problem, "", "point", str(label), allowed, remedy)
+    return found[0]
+
+
+def _named_places(
+    study: SceneStudy, rows: Sequence[Row], label: str | Mapping[str, str | float], allowed: str
+) -> list[tuple[Column, float]]:
+    """Return the columns that a label names, each with the value that it gives, SI. Raises BadInput."""
+    made, remedy = columns(study, rows), "Write the number of the row, or its place with its unit"
+    known = {column.name: column for part in made.values() for column in part}
+    first = next(iter(made["place"]), None)
+    named: list[tuple[str, str | float]] = list(label.items()) if isinstance(label, Mapping) else []
+    for text in label.split(",") if isinstance(label, str) else ():
+        match = NAMED.fullmatch(text.strip())
+        if match is None or first is None:
+            raise refusal("it is no label of a row", "", "point", str(label), allowed, remedy)
+        named.append((match["key"] or match["name"] or first.name, match["value"] or match["rest"] or match["bare"]))
+    found = []
+    for name, given in named:
+        if name not in known:
+            raise refusal(f"the table has no column {name}", "", "point", str(label), ", ".join(known), remedy)
+        column = known[name]
+        try:
+            value = given if isinstance(given, int | float) else read(given, _kind(study, name))
+        except QuantityError as error:
+            if not _is_number(given):
+                raise refusal(error.problem, "", "point", str(label), error.allowed, remedy) from None
+            value = float(given) * column.size
+        found.append((column, float(value)))
+    return found
+
+
+def _is_there(column: Column, at: int, value: float) -> bool:
+    own, largest = column.values[at], max((abs(each) for each in column.values if each is not None), default=0.0)
+    return own is not None and abs(own - value) <= PRINTED * largest
+
+
+def _is_number(text: object) -> bool:
+    try:
+        return math.isfinite(float(str(text)))
+    except ValueError:
+        return False
+
+
+def _kind(study: SceneStudy, name: str) -> str:
+    return study.kinds.get(name) or Words(study.scene).kind(name)
+
+
+def _place_example(study: SceneStudy, rows: Sequence[Row]) -> str:
+    """Return how a row's place is written, by its first number."""
+    column = next(iter(columns(study, rows)["place"]), None)
+    value = next((each for each in column.shown if each is not None), None) if column else None
+    if column is None or value is None:
+        return '"3"'
+    return f'"{value:.6g}{"" if column.unit == "1" else f" {column.unit}"}"'
 
 
 def _filled(columns: Iterable[Column]) -> list[Column]:

@@ -104,7 +104,7 @@ def _round(rank: int, count: int, last: int) -> int:
 
 SCENES, KEPT = "scenes of a sweep", 32
 """What a session calls them, and how many it keeps: as many as are solved together."""
-PLAN = 4
+PLAN = 5
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""
 Over = Mapping[str, str | Sequence[str | float]]
 """Dotted key of a scene → "LO:HI:STEP UNIT", or its values as a scene would give them."""
@@ -215,6 +215,9 @@ class Sweep:
         ask = {"beyond": [dict(known[other].warm) for other in beyond if other is not None]}
         place = {axis.key: axis.values[k] for axis, k in places}
         across = None if parent is None else self.lattice.across(point, parent, usable)
+        if any(known[k].warm.get("basins", 1) > 1 for k in (parent, across) if k is not None):
+            # Where a search ends in several optima, another of them may be best here.
+            return StudyTask(point, None, place, {"beyond": []})
         beside = [] if parent is None or across is None else self._beside(place, known[parent], known[across])
         return StudyTask(point, parent, place, ask, beside=beside)
 
@@ -321,10 +324,11 @@ class Sweep:
         """Return the row of an answer."""
         scene = self.scene_at(task.point)
         passed = answer.certificate is not None and answer.certificate.passed
-        warm: Mapping[str, object] = {}
+        warm: dict[str, object] = {}
         if passed and not self.cold:
             program = registry.of_target(scene, self.target).program(scene, self.target)
             warm = _warm(answer.point, program, between.optimum(scene, program, answer))
+            warm |= {"basins": len(answer.optima)} if len(answer.optima) > 1 else {}
         return Row(
             point=task.point,
             place=task.place,

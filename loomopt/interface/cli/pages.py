@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -13,6 +13,7 @@ from loomopt.interface.progress import Progress
 if TYPE_CHECKING:
     from loomopt.interface.report.page import Chapter
     from loomopt.interface.results import Evaluation
+    from loomopt.scenes.scene import Scene
 
 NOT_CERTIFIED, INFEASIBLE = 4, 3
 """Exit statuses."""
@@ -52,63 +53,110 @@ def report(
     assert path is not None
     suffix(path, document.PAGES)
     check(path)
-    for name in studies or ():
+    wanted = tuple(dict.fromkeys(studies or ()))
+    for name in wanted:
         if name not in STUDIES:
             raise refusal("there is no such study", "", "--study", name, ", ".join(STUDIES), "Choose one of them")
+    inputs = [_checked_input(thing, target, (sets, on, off, free), wanted, proven) for thing in things]
+    if wanted and not any(each.scene for each in inputs):
+        remedy = "Leave out --study, or name an answer or a scene too"
+        raise refusal(
+            "a store's fronts and sweeps have no studies beside them", "", "--study", wanted[0], remedy=remedy
+        )
     chapters: list[Chapter] = []
     with Progress() as progress:
-        for thing in things:
-            chapters += _chapters(thing, target, (sets, on, off, free), proven, studies or (), progress)
+        for each in inputs:
+            chapters += each.chapters(progress.say)
         progress.say("writing the page")
         document.write(path, chapters)
     remark(f"Wrote {path}")
-    for each in chapters:
-        if each.status.level != "ok":
-            remark(f"{each.heading}: {each.status.verdict}")
-    raise typer.Exit(max((each.status.exit for each in chapters), default=0))
+    for chapter in chapters:
+        if chapter.status.level != "ok":
+            remark(f"{chapter.heading}: {chapter.status.verdict}")
+    raise typer.Exit(max((chapter.status.exit for chapter in chapters), default=0))
 
 
-def _chapters(
+Say = Callable[[str], None]
+
+
+class Input(NamedTuple):
+    """What a page is made of, checked but not computed yet.
+
+    chapters(say): its chapters; scene: that of its design, None of a store.
+    """
+
+    chapters: "Callable[[Say], list[Chapter]]"
+    scene: "Scene | None" = None
+
+
+def _checked_input(
     thing: str,
     target: str | None,
-    asked: "tuple[list[str] | None, list[str] | None, list[str] | None, list[str] | None]",
-    prove: bool,
+    changes: "tuple[list[str] | None, list[str] | None, list[str] | None, list[str] | None]",
     studies: Sequence[str],
-    progress: Progress,
-) -> "list[Chapter]":
-    """Return the chapters of one argument: a scene is solved, an answer is judged, a store's studies are read."""
+    prove: bool = False,
+) -> Input:
+    """Return an argument, a scene, an answer's file or a store, read and checked. Raises BadInput."""
     from loomopt.base.errors import refusal
-    from loomopt.interface import api
     from loomopt.interface.files import answer_file, store_file
     from loomopt.interface.report import document
     from loomopt.jobs import registry
-    from loomopt.scenes.tables import FAMILY
 
     answer, store = registry.answer_path(thing), store_file.is_store(Path(thing))
-    if (answer or store) and (target or any(asked)):
+    if (answer or store) and (target or any(changes)):
         remedy = "Leave out --target, --set, --with, --without and --free, or evaluate the design in a scene of its own"
         raise refusal("it is judged as it was found", "", thing, remedy=remedy)
-    if studies and (store or target == FAMILY):
-        remedy = "Leave out --study, or report one design by itself"
-        raise refusal("studies are of one design in its scene", "", "--study", studies[0], remedy=remedy)
     if store:
-        return [document.of_study(each.study, each.solved) for each in store_file.recalled(Path(thing))]
+        tables = store_file.recalled(Path(thing))
+        return Input(lambda say: [document.of_study(each.study, each.solved) for each in tables])
     if answer:
         found = answer_file.recalled(answer)
-        return document.of_answer(found.found, _beside(found.found, studies, progress.say), found.doubts)
-    from loomopt.studies.tolerance.plan import demand_made
-
-    sets, on, off, free = asked
+        _check_studies(found.found.scene, found.found.target or None, studies)
+        return Input(
+            lambda say: document.of_answer(found.found, _beside(found.found, studies, say), found.doubts),
+            found.found.scene,
+        )
+    sets, on, off, free = changes
     scene = read_scene(thing, sets, on, off, free)
+    _check_studies(scene, target, studies)
+    return Input(lambda say: _solved(scene, target, prove, studies, say), scene)
+
+
+def _check_studies(scene: "Scene", target: str | None, studies: Sequence[str]) -> None:
+    """Raise BadInput for a target, or a study beside a design of it, that a scene does not have."""
+    from loomopt.base.errors import refusal
+    from loomopt.jobs import registry
+    from loomopt.scenes.tables import FAMILY
+    from loomopt.solving.options import target_name
+    from loomopt.studies import budget
+    from loomopt.studies.effects import study as effects
+    from loomopt.studies.tolerance import plan as tolerance
+
+    name = target_name(scene, target, families=True)
+    registry.of_target(scene, name).demand(scene, name)
+    if studies and name == FAMILY:
+        remedy = "Leave out --study, or report one design by itself"
+        raise refusal("studies are of one design in its scene", "", "--study", studies[0], remedy=remedy)
+    if "budget" in studies:
+        budget.drawn_up(scene, {})
     if "tolerance" in studies:
-        demand_made(scene)
-    progress.say(f"solving {scene.name}")
-    solved = api.solve(scene, target, prove=prove, on_step=progress.say)
+        tolerance.planned(scene, None, name)
+    if "effects" in studies:
+        effects.planned(scene, name)
+
+
+def _solved(scene: "Scene", target: str | None, prove: bool, studies: Sequence[str], say: Say) -> "list[Chapter]":
+    """Return the chapters of a scene, which is solved."""
+    from loomopt.interface import api
+    from loomopt.interface.report import document
+
+    say(f"solving {scene.name}")
+    solved = api.solve(scene, target, prove=prove, on_step=say)
     remarked(scene, solved.design)
-    return document.of_answer(solved, _beside(solved, studies, progress.say))
+    return document.of_answer(solved, _beside(solved, studies, say))
 
 
-def _beside(found: "Evaluation", studies: Sequence[str], say: Callable[[str], None]) -> list[object]:
+def _beside(found: "Evaluation", studies: Sequence[str], say: Say) -> list[object]:
     """Return what studies find of a design in its scene, each as its own command does by default. Raises BadInput."""
     made = []
     for name in studies:

@@ -36,6 +36,9 @@ def recalled(path: Path) -> list[StudyTable]:
     with Store(path) as store:
         told = {key: (about, tuple(store.rows(key))) for key, about in store.studies().items()}
     found = [StudyTable(_study(about, path), rows) for about, rows in told.values() if rows and "samples" not in about]
+    if not found and any(rows for _, rows in told.values()):
+        problem = "the store holds machines of a tolerance study, which are no designs"
+        raise refusal(problem, str(path), "store", remedy="Give the design's answer and --study tolerance")
     if not found:
         raise refusal("the store holds no row yet", str(path), "store", remedy="Run its study first")
     return found

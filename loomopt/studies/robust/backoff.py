@@ -8,14 +8,15 @@ import functools
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from loomopt.base import arguments
-from loomopt.base.errors import refusal
+from loomopt.base.errors import BadInput, refusal
 from loomopt.base.records import Frozen
 from loomopt.jobs import registry
 from loomopt.maths import normal
@@ -25,8 +26,7 @@ from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import SIDES, SIGNS, Finding, Price, Robust, Solution, Words, Yield
 from loomopt.solving.options import check_sought, target_name
-from loomopt.studies.robust import margins as own_margins
-from loomopt.studies.robust.margins import Margin, check_crossings, margins, share
+from loomopt.studies.robust.margins import Margin, check_crossings, margins, narrow_band, share
 from loomopt.studies.tolerance.plan import SCRAMBLES, Plan, planned
 from loomopt.studies.tolerance.study import ALL, Sums, summed, yielded
 
@@ -41,6 +41,9 @@ MOST_SIGMAS = 12.0
 TRIALS, MOST_BESIDE = 12, 0.5
 """Sampled yields that are looked at on the way to one that is asked for, and how far beyond it one may be, in standard
 errors."""
+EDGE, CAPPED = 1e-3, 0.99
+"""How near the largest back-off that can be is found, in standard deviations, and the share of it that a limit keeps
+which has no room for more: with all of it the others could hardly move."""
 ROOT, ROOTS = 1e-12, 60
 """Last step to a linear yield's root, in standard deviations, and steps at most."""
 
@@ -61,6 +64,10 @@ class Pass(NamedTuple):
     passes: int = 0
     frozen: "Mapping[str, Band]" = Frozen()
     """Bands, m, of numbers whose class would flip from pass to pass."""
+    applied: Mapping[tuple[str, int], float] = MappingProxyType({})
+    """What each side was tightened by, SI."""
+    caps: Mapping[str, float] = Frozen()
+    """The most standard deviations of limits that have no room for more."""
     linear: float | None = None
     """Standard deviations that the linear joint normal asks for, where a yield is."""
 
@@ -166,11 +173,12 @@ def _searched(
             return settled
         here = settled
         say("looking for better designs as far from their limits")
-        again = last(backed_off=tightened(here))
+        off = tightened(here)
+        again = last(backed_off=off)
         if again.status != "optimal":
             return _in_the_way(asked, again, here.sigmas)
         same = _same(again, here.answer)
-        here = here._replace(answer=again, plan=asked.plan(again, here.frozen))
+        here = here._replace(answer=again, plan=asked.plan(again, here.frozen), applied=off)
         if same:
             return here
         here = here._replace(margins=margins(here.plan))
@@ -194,19 +202,22 @@ def _settled(asked: Asked, solve: Solve, here: Pass, sigmas: Sigmas, say: Callab
     before: dict[tuple[str, int], float] = {}
     bands: dict[str, list[Band]] = {}
     for number in range(PASSES):
-        say(f"backing off, pass {number + 1}")
+        step = f"backing off, pass {number + 1}"
+        say(step)
         here = here._replace(sigmas=sigmas(here))
         if math.isnan(here.sigmas):
-            return _out_of_reach(asked, here)
+            return _infeasible(asked, here.answer, _fixed(here))
         check_crossings(here.plan, here.sigmas)
-        narrow = own_margins.bands(here.margins, here.sigmas, Words(asked.scene))
+        narrow = narrow_band(here.margins, here.sigmas, here.caps)
         if narrow:
-            return _infeasible(asked, here.answer, f"{narrow} on both sides: {here.sigmas:.6g} sigma each")
+            return _narrow(asked, here, *narrow)
         off = tightened(here)
         size = max(off.values(), default=0.0)
         if before and all(abs(off[key] - before.get(key, 0.0)) <= SETTLED * (off[key] or size) for key in off):
             return here
-        answer = solve(near=[here.answer.point] if here.answer.point else [], backed_off=off)
+        step = f"backing off by {here.sigmas:.4g} sigma, pass {number + 1}"
+        near = [here.answer.point] if here.answer.point else []
+        answer = solve(near=near, backed_off=off, on_step=lambda text, step=step: say(f"{step}: {text}"))
         if answer.status != "optimal":
             return _in_the_way(asked, answer, here.sigmas)
         plan, frozen = asked.plan(answer, here.frozen), dict(here.frozen)
@@ -219,59 +230,119 @@ def _settled(asked: Asked, solve: Solve, here: Pass, sigmas: Sigmas, say: Callab
                 known.append(band)
         plan = asked.plan(answer, frozen) if frozen != here.frozen else plan
         here = here._replace(answer=answer, plan=plan, margins=margins(plan), frozen=Frozen(frozen))
-        here, before = here._replace(passes=here.passes + 1), off
+        here, before = here._replace(passes=here.passes + 1, applied=off), off
     return _unsettled(asked, here)
 
 
 def tightened(here: Pass) -> dict[tuple[str, int], float]:
     """Return by how much each side is tightened, SI."""
-    return {each.key: each.back_off(here.sigmas) for each in here.margins if not each.fixed}
+    return {each.key: each.back_off(here.sigmas, here.caps) for each in here.margins if not each.fixed}
 
 
 # A yield that is asked for.
 
 
+class Trials(NamedTuple):
+    """What back-offs have given.
+
+    low, high: standard deviations and sampled yield of the largest back-off that gives too little, and of the least
+    that gives enough; enough: its pass. best: the pass of the most machines, with their share. edge: the standard
+    deviations beyond which there is no design, and why: obstacle, and the limits that have no more room.
+    """
+
+    low: tuple[float, float]
+    best: tuple[Yield, Pass]
+    high: tuple[float, float] = (math.inf, 1.0)
+    enough: Pass | None = None
+    edge: float = MOST_SIGMAS
+    obstacle: str = ""
+    narrow: tuple[str, ...] = ()
+
+
+class Obstacle(NamedTuple):
+    """Why there is no design with a back-off, and the limits that have no room for it."""
+
+    why: str
+    limits: tuple[str, ...] = ()
+
+
 def _yielding(
     asked: Asked, solves: tuple[Solve, Solve], start: Pass, before: Mapping[str, Yield], say: Callable[[str], None]
 ) -> Pass | Solution:
-    """Return the back-off whose sampled yield is no less than asked for, and hardly more."""
-    least, solve = asked.share or 0.0, solves[0]
-    if before[ALL].value >= least:
+    """Return the back-off whose sampled yield is no less than asked for, and hardly more.
+
+    Limits that have no room for so much are backed off as far as they can be, and the others farther. Where all that is
+    too little, the answer says the most that was found, and what stands in the way of more.
+    """
+    if before[ALL].value >= (asked.share or 0.0):
         return start
-    here = _settled(asked, solve, start, lambda at: linear(at.margins, least, at.sigmas), say)
-    if isinstance(here, Solution):
-        return here
-    passes = here = here._replace(linear=here.sigmas)
-    low, high = (0.0, before[ALL].value), (math.inf, 1.0)
+    trials = Trials((0.0, before[ALL].value), (before[ALL], start))
+    while True:
+        trials = _tried(asked, solves[0], trials, say)
+        if trials.enough:
+            return _searched(asked, solves, trials.enough, lambda at, k=trials.high[0]: k, say)  # type: ignore[misc]
+        here, tight = trials.best[1], [name for name in trials.narrow if name not in trials.best[1].caps]
+        if not tight or not trials.low[0]:
+            return _most(asked, *trials.best, trials.obstacle)
+        caps = Frozen({**here.caps, **dict.fromkeys(tight, CAPPED * trials.low[0])})
+        trials = Trials(trials.low, (trials.best[0], here._replace(caps=caps)), obstacle=trials.obstacle)
+
+
+def _tried(asked: Asked, solve: Solve, trials: Trials, say: Callable[[str], None]) -> Trials:
+    """Return what back-offs between those known give, until one gives enough and hardly more, or none can."""
+    least, start = asked.share or 0.0, trials.best[1]
+    following = linear(start, least)
+    if math.isnan(following):
+        # The sides that nothing backs off, or no farther, lose machines however far the others are backed off.
+        top = share(start.margins, MOST_SIGMAS, start.applied, start.caps)
+        following = max(linear(start, top * (1 - 1 / SAMPLES)), trials.low[0])
+        trials = trials._replace(edge=following, obstacle=trials.obstacle or _fixed(start))
+        tried = _reached(asked, solve, start, lambda at: following, say)
+    else:
+        tried = _reached(asked, solve, start, lambda at: linear(at, least), say)
+        tried = tried._replace(linear=tried.sigmas) if isinstance(tried, Pass) else tried
+    following = tried.sigmas if isinstance(tried, Pass) else following
     for _ in range(TRIALS):
-        say(f"drawing machines at {passes.sigmas:.6g} sigma")
-        found = _yields(passes.plan)[ALL]
-        here = passes if found.value >= least else here
-        if found.value >= least:
-            high = min(high, (passes.sigmas, found.value))
+        if isinstance(tried, Obstacle):
+            trials = trials._replace(edge=following, obstacle=tried.why, narrow=tried.limits)
+            following = (trials.low[0] + following) / 2
         else:
-            low = max(low, (passes.sigmas, found.value))
-        grain = max(MOST_BESIDE * found.se, 2.0 / asked.samples)
-        if 0.0 <= found.value - least <= grain or high[0] - low[0] <= SETTLED:
-            break
-        following = _between(passes, low, high, found.value, least)
-        if following > MOST_SIGMAS:
-            return _out_of_reach(asked, passes)
-        settled = _settled(asked, solve, passes, lambda at, k=following: k, say)  # type: ignore[misc]
-        if isinstance(settled, Solution):
-            return settled
-        passes = settled
-    if math.isinf(high[0]):
-        return _unsettled(asked, passes)
-    return _searched(asked, solves, here, lambda at: high[0], say)
+            say(f"drawing machines at {tried.sigmas:.6g} sigma")
+            found, point = _yields(tried.plan)[ALL], tried.sigmas
+            if found.value > trials.best[0].value:
+                trials = trials._replace(best=(found, tried))
+            if found.value >= least:
+                trials = trials._replace(enough=tried, high=min(trials.high, (point, found.value)))
+            else:
+                trials = trials._replace(low=max(trials.low, (point, found.value)))
+            grain = max(MOST_BESIDE * found.se, 2.0 / asked.samples)
+            if 0.0 <= found.value - least <= grain or trials.high[0] - trials.low[0] <= SETTLED:
+                return trials
+            following = _between(tried, trials.low, trials.high, found.value, least)
+        if not trials.enough and trials.edge - trials.low[0] <= EDGE:
+            return trials
+        if not trials.enough and following >= trials.edge:
+            following = (trials.low[0] + trials.edge) / 2
+        start = trials.enough or trials.best[1]
+        tried = _reached(asked, solve, start, lambda at, k=following: k, say)  # type: ignore[misc]
+    return trials
+
+
+def _reached(asked: Asked, solve: Solve, start: Pass, sigmas: Sigmas, say: Callable[[str], None]) -> Pass | Obstacle:
+    """Return the pass at a back-off, or why there is no design with it."""
+    try:
+        found = _settled(asked, solve, start, sigmas, say)
+    except BadInput as error:
+        return Obstacle(error.problem)
+    return found if isinstance(found, Pass) else Obstacle(found.message.rstrip("."), found.clash)
 
 
 def _between(at: Pass, low: tuple[float, float], high: tuple[float, float], found: float, least: float) -> float:
     """Return where a yield is likely to be what is asked for: by the linear one's slope, within what is known."""
     step = 1e-4
-    slope = _scored(share(at.margins, at.sigmas + step, at.sigmas)) - _scored(share(at.margins, at.sigmas, at.sigmas))
+    sides = [_scored(share(at.margins, at.sigmas + shift, at.applied, at.caps)) for shift in (0.0, step)]
     # A little beyond it, for what is found must be no less.
-    following = at.sigmas + (_scored(least) - _scored(found)) / (slope / step or 1.0) * 1.02
+    following = at.sigmas + (_scored(least) - _scored(found)) / ((sides[1] - sides[0]) / step or 1.0) * 1.02
     if low[0] < following < high[0]:
         return following
     return (low[0] + high[0]) / 2 if math.isfinite(high[0]) else low[0] + 0.1
@@ -282,20 +353,20 @@ def _scored(value: float) -> float:
     return float(normal.quantile(np.array([min(max(value, 1e-12), 1 - 1e-12)]))[0])
 
 
-def linear(found: Sequence[Margin], least: float, at: float) -> float:
+def linear(at: Pass, least: float) -> float:
     """Return of how many standard deviations the linear joint normal yield is `least`; no number where of none.
 
-    at: of how many it is now. By secants of what a normal distribution has below it, nearly straight in them.
+    By secants of what a normal distribution has below it, nearly straight in them.
     """
 
     def short(sigmas: float) -> float:
-        return _scored(share(found, sigmas, at)) - _scored(least)
+        return _scored(share(at.margins, sigmas, at.applied, at.caps)) - _scored(least)
 
     if short(0.0) >= 0.0:
         return 0.0
     if short(MOST_SIGMAS) < 0.0:
         return math.nan
-    low, high, here = 0.0, MOST_SIGMAS, at or 2.0
+    low, high, here = 0.0, MOST_SIGMAS, at.sigmas or 2.0
     before, value_before = here + 0.01, short(here + 0.01)
     for _ in range(ROOTS):
         value = short(here)
@@ -345,7 +416,7 @@ def _told(
     limits = tuple(each._replace(backed_off=by_name.get(each.name, 0.0)) for each in here.limits)
     binding = tuple(_priced(words, price, off) for price in answer.binding)
     found = replace(answer, limits=limits, reached=here.reached, scene=scene, binding=binding, robust=robust)
-    said = " ".join(_said(scene, found, robust))
+    said = " ".join(_said(scene, ended, found, robust))
     message = answer.message.replace(
         report.stops(answer.binding, answer.bind_together), report.stops(binding, answer.bind_together)
     )
@@ -366,7 +437,7 @@ def _priced(words: Words, price: Price, off: Mapping[tuple[str, int], float]) ->
     return price._replace(value=value, text=text, backed_off=by)
 
 
-def _said(scene: Scene, answer: Solution, robust: Robust) -> list[str]:
+def _said(scene: Scene, ended: Pass, answer: Solution, robust: Robust) -> list[str]:
     """Return what back-off costs and what it buys, as sentences."""
     words, told = Words(scene), list[str]()
     for name, change in robust.cost(answer).items():
@@ -379,7 +450,7 @@ def _said(scene: Scene, answer: Solution, robust: Robust) -> list[str]:
     now, was = robust.yields[ALL], robust.nominal_yields[ALL]
     costs = f"It costs {', '.join(told)}." if told else "It costs nothing of what is sought."
     found = [
-        f"That is with each limit backed off by {robust.sigmas:.6g} sigma of its own figure{_from(robust)}.",
+        f"That is with {_backed(ended)}{_from(robust)}.",
         costs,
         f"All limits hold on {_percent(now)} of the machines instead of {100 * was.value:.4g} %.",
     ]
@@ -397,6 +468,12 @@ def _said(scene: Scene, answer: Solution, robust: Robust) -> list[str]:
 def _from(robust: Robust) -> str:
     """Say from what back-off counts where it is not the nominal machine."""
     return " from the mean machine, that in the middle of all tolerance bands" if robust.shifted else ""
+
+
+def _backed(here: Pass) -> str:
+    """How far limits are backed off, as a phrase."""
+    less = [f"{name} by {sigmas:.6g} sigma" for name, sigmas in here.caps.items() if sigmas < here.sigmas]
+    return f"each limit backed off by {here.sigmas:.6g} sigma of its own figure{''.join(f', {each}' for each in less)}"
 
 
 def _percent(share_of: Yield) -> str:
@@ -433,15 +510,31 @@ def _limits(asked: Asked, answer: Solution) -> tuple[Finding, ...]:
     return report.evaluated(asked.scene, registry.of(asked.scene), asked.target, own).limits
 
 
-def _out_of_reach(asked: Asked, here: Pass) -> Solution:
+def _narrow(asked: Asked, here: Pass, name: str, width: float, needed: float) -> Solution:
+    """Return that the band of a limit has no room for the back-off of both sides."""
+    words = Words(asked.scene)
+    why = f"the band of {name}, {words.shown(name, width, 4)}, is no wider than {words.shown(name, needed, 4)}"
+    found = _infeasible(asked, here.answer, f"{why} on both sides: {here.sigmas:.6g} sigma each")
+    return replace(found, clash=(name,))
+
+
+def _fixed(here: Pass) -> str:
+    """Return which sides lose machines that no back-off saves."""
     fixed = ", ".join(dict.fromkeys(each.name for each in here.margins if each.fixed))
-    kept = f", for nothing backs off {fixed}" if fixed else ""
-    least = 100 * (asked.share or 0.0)
-    why = f"no back-off up to {MOST_SIGMAS:g} sigma lets all limits hold on {least:.6g} % of the machines{kept}"
-    return _infeasible(asked, here.answer, why)
+    return f"nothing backs off {fixed}" if fixed else f"no more than {MOST_SIGMAS:g} sigma are tried"
+
+
+def _most(asked: Asked, found: Yield, here: Pass, obstacle: str) -> Solution:
+    """Return the answer of the most machines, which are fewer than asked for, and what stands in the way of more."""
+    message = (
+        f"{100 * (asked.share or 0.0):.6g} % of the machines cannot hold all limits: the most that was found is "
+        f"{_percent(found)}, the yield of the design shown, with {_backed(here)}. In the way of more: "
+        f"{obstacle or f'{TRIALS} back-offs were tried'}. Tighten the tolerances, widen the limits or ask for less."
+    )
+    return replace(_as_stands(asked, here.answer, "infeasible"), message=message)
 
 
 def _unsettled(asked: Asked, here: Pass) -> Solution:
     """Return that no fixed point was found."""
-    message = f"The standard deviations of limits do not settle within {PASSES} passes; ask for fewer sigmas."
+    message = f"The standard deviations of the limits still change after {PASSES} solves. Ask for a smaller back-off."
     return replace(_as_stands(asked, here.answer, "failed"), message=message)

@@ -1,7 +1,7 @@
 """What a design's limits leave to its machines: each side's room in standard deviations of its own figure, linear."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -41,9 +41,13 @@ class Margin(NamedTuple):
         """The standard deviation, SI."""
         return float(np.linalg.norm(self.way))
 
-    def back_off(self, sigmas: float) -> float:
+    def reach(self, sigmas: float, caps: Mapping[str, float]) -> float:
+        """How far the mean machine must keep clear, SI; caps: the most sigmas that a limit has room for."""
+        return min(sigmas, caps.get(self.name, math.inf)) * self.sigma
+
+    def back_off(self, sigmas: float, caps: Mapping[str, float]) -> float:
         """How far the nominal design must keep clear, SI: of so many sigmas from the mean, and never beyond its end."""
-        return max(sigmas * self.sigma + self.shift, 0.0)
+        return max(self.reach(sigmas, caps) + self.shift, 0.0)
 
     @property
     def key(self) -> tuple[str, int]:
@@ -93,11 +97,20 @@ def _left(plan: Plan, judged: Judged, slope: Slopes, side: str) -> dict[str, flo
     return {name: 0.0 if name == end and abs(value) <= MET else value for name, value in left.items()}
 
 
-def share(found: Sequence[Margin], sigmas: float, at: float) -> float:
-    """Return the linear share of machines that hold all sides, were those that are met `sigmas` away, not `at`."""
+def share(
+    found: Sequence[Margin], sigmas: float, applied: Mapping[tuple[str, int], float], caps: Mapping[str, float]
+) -> float:
+    """Linear share of machines that hold all sides, were each back-off that is met one of `sigmas`.
+
+    applied: the back-off that the design was solved with, SI, by name and sign of a side; caps: the most standard
+    deviations that a limit has room for.
+    """
     if not found:
         return 1.0
-    rooms = [each.room if each.fixed else _room(each, sigmas, at) for each in found]
+    rooms = [
+        each.room if each.fixed else _room(each, each.back_off(sigmas, caps), applied.get(each.key, 0.0))
+        for each in found
+    ]
     ways = np.array([each.way for each in found])
     high = np.array([room * sign for room, sign in zip(rooms, (each.sign for each in found), strict=True)])
     low = np.where([each.sign < 0 for each in found], high, -np.inf)
@@ -105,9 +118,10 @@ def share(found: Sequence[Margin], sigmas: float, at: float) -> float:
     return joint_normal.within(ways, low, high)
 
 
-def _room(margin: Margin, sigmas: float, at: float) -> float:
-    met = margin.room <= at * margin.sigma * (1 + MET) + MET * margin.sigma
-    return sigmas * margin.sigma if met else max(margin.room, sigmas * margin.sigma)
+def _room(margin: Margin, wanted: float, applied: float) -> float:
+    """What a side leaves to the mean machine with another back-off, SI; one that stopped the design goes along."""
+    met = margin.room + margin.shift <= applied * (1 + MET) + MET * margin.sigma
+    return wanted - margin.shift if met else max(margin.room, wanted - margin.shift)
 
 
 def check_crossings(plan: Plan, sigmas: float) -> None:
@@ -156,8 +170,8 @@ def _extremes(sampler: Sampler, quantity: str, side: int) -> dict[float, float]:
     return dict(sorted(((side * sampler.angle(each)) % turn, abs(each.value)) for each in inside))
 
 
-def bands(found: Sequence[Margin], sigmas: float, words: Words) -> str:
-    """Return which band is narrower than back-off on both of its sides takes, as a phrase; "" for none."""
+def narrow_band(found: Sequence[Margin], sigmas: float, caps: Mapping[str, float]) -> tuple[str, float, float] | None:
+    """Limit whose band is narrower than back-off on both sides takes, with both widths, SI; None for none."""
     sides: dict[str, dict[int, Margin]] = {}
     for each in found:
         if not each.fixed:
@@ -165,7 +179,7 @@ def bands(found: Sequence[Margin], sigmas: float, words: Words) -> str:
     for name, own in sides.items():
         if len(own) < len(SIDES):
             continue
-        width, needed = own[-1].room + own[1].room, sigmas * (own[-1].sigma + own[1].sigma)
+        width, needed = own[-1].room + own[1].room, sum(each.reach(sigmas, caps) for each in own.values())
         if width <= needed:
-            return f"the band of {name}, {words.shown(name, width, 4)}, is no wider than {words.shown(name, needed, 4)}"
-    return ""
+            return name, width, needed
+    return None

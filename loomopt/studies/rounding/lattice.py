@@ -10,7 +10,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,7 +46,7 @@ AGREES = 1e-7
 """Share of its natural size by which a level read on the lattice and as solved may differ."""
 
 Solve = Callable[..., Solution]
-"""solve(scene, near=…): the answer of a scene as it is asked for."""
+"""solve(scene, near=…, on_step=…): the answer of a scene as it is asked for."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,16 @@ def asked(scene: Scene, target: str | None, given: Mapping[str, object] | None) 
         remedy = "Write --round l1=0.5mm, or add [steps] to the scene"
         raise refusal("nothing says which sizes there are", own.origin, "round_to", remedy=remedy)
     found: dict[str, tuple[float, ...]] = {}
+    own_steps = numbers.sizes(scene).steps
     for number in dict.fromkeys((*steps, *stock)):
-        key = f"steps.{number}" if number in steps else f"stock.{number}"
+        if number in stock and number in steps:
+            problem = f"{number} has a step and sizes in stock, of which only one can count"
+            remedy = f"Take steps.{number} or stock.{number} out of the file"
+            if number not in own_steps:
+                remedy = f"Leave {number} out of --round, or take stock.{number} out of the file"
+            raise refusal(problem, own.origin, f"stock.{number}", own.document["stock"].get(number, ""), remedy=remedy)
+        table = "stock" if number in stock else "steps" if number in own_steps else "bounds"
+        key = f"{table}.{number}"
         bound = scene.bounds.get(number)
         if bound is None or not bound.free or bound.min == bound.max:
             problem = f"{number} is not free, so that there is nothing to round"
@@ -104,8 +112,6 @@ def asked(scene: Scene, target: str | None, given: Mapping[str, object] | None) 
             raise refusal(f"{number} has no end", own.origin, key, remedy="Give it min and max in [bounds]")
         known = stock.get(number) or sizes.multiples(steps[number], bound.min, bound.max)
         inside = tuple(size for size in known if bound.min <= size <= bound.max)
-        if number in stock and number in steps:
-            raise refusal(f"{number} has a step and sizes that are sold", own.origin, key, remedy="Give one of them")
         if not inside:
             problem = f"no size of {number} lies within its bounds"
             remedy = f"Take {'a smaller step' if number in steps else 'other sizes'}, or wider bounds"
@@ -135,16 +141,15 @@ def solved(
     Raises BadInput where a goal is out of reach on the lattice alone, and no band says how close is close enough.
     """
     say = on_step or (lambda text: None)
-    nominal = solve(asked.scene)
+    nominal = _under("solving without sizes", asked.scene, solve, say)
     if nominal.status != "optimal" or nominal.point is None:
         return nominal
     whole = _whole(asked, nominal, say) if asked.points < MOST_POINTS else None
     best = whole or _branched(asked, nominal, solve, say)
     if best.point is None:
         return _without(asked, nominal, best)
-    say("solving with the best sizes")
     fixed = asked.within({name: (value, value) for name, value in best.point.items()})
-    answer = (last or solve)(fixed)
+    answer = _under("solving with the best sizes", fixed, last or solve, say)
     if answer.status != "optimal":
         return replace(answer, scene=asked.scene, message=f"With the best sizes found: {answer.message}")
     _check_goals(asked, nominal, answer)
@@ -152,6 +157,12 @@ def solved(
         message = "What was read on the lattice and what was solved there differ; please report it."
         return replace(answer, status="uncertified", message=message, scene=asked.scene)
     return _told(asked, answer, nominal, best)
+
+
+def _under(step: str, scene: Scene, solve: Solve, say: Callable[[str], None], **how: Any) -> Solution:
+    """Return a scene's answer, the steps of its solve told below the step that it is one of."""
+    say(step)
+    return solve(scene, **how, on_step=lambda text: say(f"{step}: {text}"))
 
 
 def _check_goals(asked: Asked, nominal: Solution, answer: Solution) -> None:
@@ -166,7 +177,8 @@ def _check_goals(asked: Asked, nominal: Solution, answer: Solution) -> None:
         if lost and not (name in bands and value is not None and abs(value) <= bands[name] + abs(goal.high)):
             told = Words(scene).shown(name, value or 0.0)
             problem = f"no sizes meet {name} exactly: the nearest found leave {told}"
-            remedy = f"Leave a number that moves it free, or say what is close enough: [accept] {name}"
+            near = Words(scene).shown(name, abs(value or 0.0), 3)
+            remedy = f'Leave a number that moves it free, or say within what it is met: [accept] {name} = "{near}"'
             raise refusal(problem, scene.origin, f"accept.{name}", remedy=remedy)
 
 
@@ -200,7 +212,7 @@ def _whole(asked: Asked, nominal: Solution, say: Callable[[str], None]) -> Best 
     kept: list[dict[str, Floats]] = []
     grids = list(names.values())
     for first in range(0, asked.points, BLOCK):
-        say(f"reading the lattice, {first} of {asked.points} points")
+        say(f"reading {asked.points} points of sizes, {100 * first // asked.points} %")
         places = np.unravel_index(np.arange(first, min(first + BLOCK, asked.points)), [len(own) for own in grids])
         point = {name: np.array(own)[at] for (name, own), at in zip(names.items(), places, strict=True)}
         part = reader.admissible(point)
@@ -331,17 +343,19 @@ def _branched(asked: Asked, nominal: Solution, solve: Solve, say: Callable[[str]
     queue: list[tuple[tuple[float, ...], int, Ends, Solution]] = []
     best: tuple[float, ...] | None = None
     point: Mapping[str, float] | None = None
+    found: Solution | None = None
     boxes, rests = (
         0,
         "each box of sizes was solved without them from its neighbour, to an optimum nearby",
     )
 
     def take(ends: Ends, near: Solution) -> None:
-        nonlocal best, point, boxes
+        nonlocal best, point, boxes, found
         boxes += 1
-        say(f"box {boxes} of sizes")
         scene = asked.within({k: (asked.sizes[k][a], asked.sizes[k][b]) for k, (a, b) in ends.items()})
-        answer = solve(scene, near=[near.point] if near.point else [])
+        start = [near.point] if near.point else []
+        step = f"box {boxes} of sizes, {MOST_BOXES} at most; {_standing(asked, found, near)}"
+        answer = _under(step, scene, solve, say, near=start)
         if answer.status != "optimal" or answer.point is None:
             return
         program = asked.job.program(scene, asked.target)
@@ -353,6 +367,7 @@ def _branched(asked: Asked, nominal: Solution, solve: Solve, say: Callable[[str]
             return
         if all(_off(asked, k, float(answer.design[k])) is None for k in asked.sizes):
             best, point = worth, {k: _nearest(asked.sizes[k], float(answer.design[k])) for k in asked.sizes}
+            found = answer
             return
         heapq.heappush(queue, (worth, next(order), ends, answer))
 
@@ -369,6 +384,21 @@ def _branched(asked: Asked, nominal: Solution, solve: Solve, say: Callable[[str]
     elif best is None and queue:
         gap = math.inf
     return Best(point, None, boxes, gap, rests)
+
+
+def _standing(asked: Asked, best: Solution | None, bound: Solution) -> str:
+    """Return the best sizes' figures that are sought, and how much better others may be, as a phrase.
+
+    bound: the answer of the most promising box that is open.
+    """
+    words, names = Words(asked.scene), list(dict.fromkeys(each.figure for each in asked.program.objectives))
+    if best is None:
+        return "no sizes found yet"
+    told = ", ".join(f"{name} {words.shown(name, best.figures[name] or 0.0, 6)}" for name in names)
+    gaps = {name: abs((best.figures[name] or 0.0) - (bound.figures[name] or 0.0)) for name in names}
+    sizes = {each.figure: each.scale ** (1 / each.power) for each in asked.program.objectives}
+    open_ones = [f"{name} {words.shown(name, gap, 2)}" for name, gap in gaps.items() if gap > AGREES * sizes[name]]
+    return f"best {told}; gap {', '.join(open_ones) or '0'}"
 
 
 def _off(asked: Asked, name: str, value: float) -> float | None:

@@ -1,5 +1,6 @@
 """What a page shows beside an answer: the terminal's tables and a chart of each study, forces, a family's members."""
 
+import json
 import re
 from html import unescape
 from xml.etree import ElementTree
@@ -127,3 +128,63 @@ def test_the_command_adds_studies_to_each_answer(tmp_path, monkeypatch, capsys):
     assert "no number of the scene has a tolerance" in told
     assert "solving" not in told
     assert not (tmp_path / "b.html").exists()
+
+
+@pytest.fixture(scope="module")
+def files(answer, tmp_path_factory):
+    """An answer, the store of a sweep and that of a front."""
+    folder = tmp_path_factory.mktemp("files")
+    (folder / "a.json").write_text(json.dumps(answer.as_dict()), encoding="utf-8")
+    lo.sweep("shedding-static", {"mechanism.travel": "60:70:5 mm"}, store=folder / "sweep.db")
+    lo.pareto("shedding-static", ["K1", "X0"], points=3, store=folder / "front.db")
+    return folder
+
+
+def test_one_page_holds_an_answer_with_stores_and_studies(files, tmp_path, monkeypatch):
+    monkeypatch.chdir(files)
+    page = tmp_path / "page.html"
+    words = [
+        "report",
+        "sweep.db",
+        "a.json",
+        "front.db",
+        "--study",
+        "budget",
+        "--study",
+        "tolerance",
+        "--study",
+        "budget",
+    ]
+    assert run([*words, "--out", str(page)]) == 0
+    html = page.read_text(encoding="utf-8")
+    chapters = html.split("<article")[1:]
+    heads = [re.search("<h2>(.*?)</h2>", each)[1] for each in chapters]
+    assert [head.partition(",")[0] for head in heads] == [
+        "sweep of shedding-static",
+        "beatup",
+        "pareto of shedding-static",
+    ]
+    shown = [re.findall("<h3>(.*?)</h3>", each) for each in chapters]
+    assert sum(title == "Where the crank torque comes from" for title in shown[1]) == 1
+    assert not any("Where the crank torque comes from" in titles for titles in (shown[0], shown[2]))
+
+
+@pytest.mark.parametrize(
+    ("inputs", "told"),
+    [
+        (["beatup", "no-such.db"], "no-such.db"),
+        (["beatup", "a.json", "damaged.json"], "damaged.json"),
+        (["beatup", "shedding", "--study", "tolerance"], "no number of the scene has a tolerance"),
+        (["shedding", "rapier", "--study", "budget"], "no effect acts on the crank"),
+        (["beatup", "sweep.db", "--target", "pulse"], "judged as it was found"),
+        (["beatup", "shedding", "--target", "pulse"], "pulse"),
+        (["sweep.db", "front.db", "--study", "budget"], "have no studies beside them"),
+    ],
+)
+def test_all_inputs_are_checked_before_anything_is_computed(files, inputs, told, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(files)
+    (files / "damaged.json").write_text('{"status": "optimal"', encoding="utf-8")
+    monkeypatch.setattr("loomopt.interface.api.solve", lambda *given, **how: pytest.fail("a scene was solved"))
+    assert run(["report", *inputs, "--out", str(tmp_path / "page.html")]) == 2
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "page.html").exists()

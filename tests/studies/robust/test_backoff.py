@@ -6,6 +6,7 @@ yields by 16 scrambles of 2^20 Sobol points, their standard errors in brackets b
 
 import functools
 import math
+import re
 
 import pytest
 
@@ -130,6 +131,64 @@ def test_a_goal_whose_band_loses_machines_leaves_a_yield_out_of_reach():
     found = solved(beatup().set("accept.M3_fdc", "1 N*m"), least=0.99)
     assert found.status == "infeasible"
     assert "nothing backs off M3_fdc" in found.message
+
+
+def loom(tolerance):
+    """Return a sley whose spread changes along the back-off, all links made within a tolerance."""
+    links = {"l1": "34 mm", "l2": "75 mm", "l3": "172 mm", "l4": "185 mm"}
+    return lo.scene(
+        {
+            "problem": {"name": "loom", "job": "beatup", "title": "Sley", "source": "made up"},
+            "operation": {"speed": "520 rpm", "M0": "800 N*m"},
+            "mechanism": {**links, "m4e": "0 kg", "r4e": "0 mm"},
+            "effects": {"inertia": {"J4": "0.90 kg*m^2"}, "resistance": {"pulse": "30 deg"}},
+            "bounds": {
+                "l1": {"min": "32 mm", "max": "37 mm"},
+                "l2": {"min": "65 mm", "max": "95 mm"},
+                "l3": {"min": "165 mm", "max": "180 mm"},
+                "m4e": {"min": "0 kg", "max": "10 kg"},
+                "r4e": {"min": "0 mm", "max": "90 mm"},
+            },
+            "limits": {
+                "swing": {"min": "22.5 deg", "max": "23.5 deg"},
+                "theta": {"min": "-2 deg", "max": "2 deg"},
+                "mu_min": {"min": "55 deg"},
+            },
+            "tolerances": {name: {"plus_minus": tolerance} for name in links},
+        }
+    )
+
+
+def test_a_yield_whose_spread_falls_along_the_back_off_settles():
+    """One side binds alone: 95 % are at the quantile of the normal distribution, 1.645 sigma of theta."""
+    found = lo.solve(loom("0.06 mm"), min_yield=0.95)
+    assert found.status == "optimal"
+    assert found.robust.linear == pytest.approx(1.6448536, abs=1e-6)
+    assert found.robust.sigmas == pytest.approx(1.6448536, abs=0.02)
+    assert 0.95 <= found.robust.yields["all"].value <= 0.95 + 2e-3
+    assert found.figures["peak_torque"] == pytest.approx(91.55727, abs=2e-4)
+
+
+@pytest.mark.slow
+def test_where_a_band_has_no_more_room_the_other_limits_back_off_farther():
+    found = lo.solve(loom("1 mm"), min_yield=0.95)
+    assert found.status == "optimal"
+    assert 0.95 <= found.robust.yields["all"].value <= 0.95 + 2e-3
+    assert "swing by 1.9" in found.message
+    drawn = lo.tolerance(found.scene, found, worst=False, samples=2**16)
+    assert drawn.yields["all"].value == pytest.approx(0.95, abs=3e-3)
+
+
+@pytest.mark.slow
+def test_a_yield_that_no_design_has_is_told_with_the_most_that_was_found():
+    """Each of two bands, 1 and 4 deg wide, holds no more machines than it does with their middle in its own."""
+    found = lo.solve(loom("5 mm"), min_yield=0.5)
+    assert found.status == "infeasible"
+    most = float(re.search(r"the most that was found is ([\d.]+) %", found.message)[1]) / 100
+    drawn = lo.tolerance(found.scene, found, worst=False, samples=2**16)
+    assert drawn.yields["all"].value == pytest.approx(most, abs=3e-3)
+    assert most > 0.26, "0.32 of swing, of which 0.81 of theta"
+    assert "the band of theta, 4 deg, is no wider than" in found.message
 
 
 def test_what_cannot_be_asked_is_refused_in_one_line():

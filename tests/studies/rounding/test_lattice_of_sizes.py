@@ -4,6 +4,7 @@ Reference values: all 1 197 735 points read apart, each with the counterweight t
 """
 
 import json
+import re
 
 import pytest
 
@@ -105,7 +106,7 @@ def test_a_lattice_without_an_admissible_point():
 def test_sizes_that_leave_a_goal_out_of_reach_ask_for_a_band():
     links = {"bounds.l1": "30 mm", "bounds.l2": "75.5 mm", "bounds.l3": "149 mm", "bounds.l4": "167 mm"}
     steps = {"m4e": "2 kg", "r4e": "40 mm"}
-    with pytest.raises(BadInput, match=r"no sizes meet M3_fdc exactly.*\[accept\] M3_fdc"):
+    with pytest.raises(BadInput, match=r"no sizes meet M3_fdc exactly.*within.*\[accept\] M3_fdc = \""):
         rounded("beatup", steps, **links)
     found = rounded("beatup", steps, **links, **{"accept.M3_fdc": "50 N*m"})
     assert found.status == "optimal"
@@ -134,3 +135,34 @@ def test_a_pattern_leaves_what_is_held():
     assert set(lattice.asked(scene, None, {"l*": "1 mm"}).sizes) == {"l4", "l5", "l6", "l3p"}
     with pytest.raises(BadInput, match="l1 is not free"):
         lattice.asked(scene, None, {"l1": "1 mm"})
+
+
+def test_progress_says_boxes_best_and_gap_through_every_solve():
+    """A box's own solves never take the line: what is said names the box, what is best and how much better may be."""
+    said: list[str] = []
+    scene = registry.load("beatup").update({"bounds.l1": "30 mm", "bounds.l4": "167 mm"})
+    lo.solve(scene, "pulse", round_to={"l2": "2 mm", "l3": "2 mm"}, on_step=said.append)
+    boxes = [line for line in said if line.startswith("box ")]
+    assert boxes
+    assert all("of sizes, 600 at most; " in line for line in boxes)
+    assert any("no sizes found yet" in line for line in boxes)
+    assert any(re.search(r"; best pulse_rms [\d.]+ N\*m; gap pulse_rms [\d.e-]+ N\*m", line) for line in boxes)
+    first, last = said.index(boxes[0]), len(said) - said[::-1].index(boxes[-1])
+    assert said[first:last] == boxes
+    assert said[-1].startswith("solving with the best sizes")
+
+
+def test_a_step_of_the_call_that_meets_a_stock_of_the_file_is_told_by_the_files_key():
+    scene = registry.load("shedding").set("stock.X0", ["30 mm", "70 mm"])
+    with pytest.raises(BadInput, match=r"stock\.X0.*Leave X0 out of --round") as caught:
+        lo.solve(scene, round_to={"X0": "5 mm"})
+    assert "steps." not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"), [({"bounds.l1": "31 mm"}, r"bounds\.l1"), ({"bounds.l4.free": False}, r"bounds\.l4")]
+)
+def test_a_step_of_the_call_is_told_by_keys_of_the_file(change, told):
+    with pytest.raises(BadInput, match=told) as caught:
+        lo.solve(registry.load("beatup").update(change), round_to={"l1": "0.5 mm", "l4": "50 mm"})
+    assert "steps." not in str(caught.value)
