@@ -17,6 +17,8 @@ TRIED = 400
 OPEN = np.radians(35)
 """Machines looked at for one that closes, with transmission angles of at least so much."""
 INERTIA, MASS = 0.3, 2.0
+ROUNDING = 1e-14
+"""Share of the largest term of a Fourier series below which one is noise."""
 
 
 def vector(length, angle):
@@ -65,6 +67,8 @@ def rates(q):
     k = 1j * np.fft.rfftfreq(q.shape[1], 1 / q.shape[1])
     k[-1] = 0.0
     series = np.fft.rfft(q, axis=1)
+    # What is only rounding would grow with each derivative.
+    series = np.where(np.abs(series) > ROUNDING * np.abs(series).max(axis=1, keepdims=True), series, 0.0)
     return [np.fft.irfft(series * k**order, q.shape[1], axis=1) for order in (1, 2, 3)]
 
 
@@ -205,8 +209,16 @@ def _drawn(rng):
         q, cosine, sine = (each[0] for each in shape.moved(today[None], EVEN))
     if not np.all(np.isfinite(q)) or np.abs(cosine).max() > np.cos(OPEN) or np.abs(sine).max() > np.cos(OPEN):
         return None
+    if _ambiguous(q) or _ambiguous(-q):
+        return None
     least = float(np.arccos(np.abs(cosine).max())), float(np.arccos(np.abs(sine).max()))
     return _machine(rng, shape, texts, units, today, float(np.ptp(q)), least)
+
+
+def _ambiguous(q):
+    """Say whether several maxima of an output are as good as equal: a scene would have to say which is meant."""
+    tops = q[(q > np.roll(q, 1)) & (q >= np.roll(q, -1))]
+    return np.sum(tops > q.max() - 0.02 * np.ptp(q)) > 1
 
 
 def _machine(rng, shape, texts, units, today, swing, least):

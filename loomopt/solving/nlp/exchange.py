@@ -192,6 +192,10 @@ design and 7 of 78 above it (all packaged targets, and fronts of three), in 4 ms
 HINTED = 1e-8
 """Change of a slope, as events are found anew, that counts as none: a hundredth of STATIONARY."""
 
+LOST = 1e3
+"""Factor by which a round exceeds what an earlier one did where it has left the optimum that rounds came near: nodes
+beside each other leave a direction flat, along which IPOPT may end anywhere."""
+
 DRAWS = 200
 """Random starts drawn for each that is wanted: where fewer than one in 200 assembles, the ranges hold no machine."""
 
@@ -260,19 +264,27 @@ def solve(
     result = _round(calls, begin, 0)
     if not _is_done(result, settings):
         result = _led(calls, result) or _compared(calls, begin, result)
-    excesses = list[float]()
+    excesses, closest = list[float](), None
     for more in range((ELASTIC_ROUNDS if elastic else EXCHANGE_ROUNDS) - 1, -1, -1):
         if isinstance(result, Point) or _is_done(result, settings):
             break
         excesses.append(result.violation)
         if not elastic and _creeps(excesses):
             break
+        if closest and result.violation > LOST * closest.violation:
+            break
+        if result.steady and not elastic and (closest is None or result.violation < closest.violation):
+            closest = result
         followed = _followed(calls, result) if result.steady else None
         if followed:
             return followed
         if more:
             result = _round(calls, result.after, result.iterations)
-    return result if isinstance(result, Point) else _ended(calls, result)
+    if isinstance(result, Point):
+        return result
+    if closest and result.violation > settings.excess and closest.violation < result.violation:
+        result = closest._replace(iterations=result.iterations)
+    return _ended(calls, result)
 
 
 def _creeps(excesses: Sequence[float]) -> bool:

@@ -224,7 +224,32 @@ def _another(search: Search) -> Search:
         if search.passed:
             return search
     found = _met_farther(replace(search, best=best), best)
+    if not found.passed and any(level.stationarity > STATIONARY for level in best.certificate.levels[:-1]):
+        found = _first_levels_alone(found, best)
     return found if found.passed or best.certificate.minimum else _held_harder(found, best)
+
+
+def _first_levels_alone(search: Search, best: Candidate) -> Search:
+    """Return the search with where its first levels alone are least from its best, if that passes for all levels.
+
+    Where a level is least at a point, not in a corner, no weight keeps a later one from pulling it away; and that one
+    has nothing left to choose there.
+    """
+    program = search.program
+    for count in range(1, len(program.objectives)):
+        fewer = replace(search, program=replace(program, objectives=program.objectives[:count]), candidates=())
+        fewer = tried(replace(fewer, settings=replace(fewer.settings, penalty=Settings().penalty)), best.point.x)
+        first = fewer.candidates[-1]
+        search = replace(search, built=fewer.built, solved=fewer.solved)
+        fewer = _certified(fewer, first) if first.point.reached else fewer
+        if fewer.passed and fewer.best:
+            x = fewer.best.x
+            search, moved, draft = _judged_at(search, x)
+            if draft.whole.passed:
+                levels = objectives(program, moved)
+                found = Candidate(replace(first.point, x=dict(moved)), levels, best.value, moved, draft.whole)
+                return replace(search, best=found, candidates=(*search.candidates, found))
+    return search
 
 
 def _met_farther(search: Search, best: Candidate) -> Search:
@@ -283,6 +308,13 @@ def _certified(search: Search, candidate: Candidate) -> Search:
         if sampler_at(search.program, stepped) is None:
             break
         search, moved, better = _judged_at(search, stepped)
+        if better.judged.residual >= here.residual or better.judged.feasibility > FEASIBLE:
+            # A long step leaves the rows that bind by its square: it is led back onto them.
+            near = replace(candidate.point, x=stepped)
+            back = exchange.brought_closer(search.program, near, replace(search.settings, farthest=POLISH_FARTHER))
+            if back is None:
+                break
+            search, moved, better = _judged_at(search, back.x)
         if better.judged.residual >= here.residual or better.judged.feasibility > FEASIBLE:
             break
         x, draft = moved, better

@@ -80,11 +80,14 @@ def test_violation_is_two_decades_below_the_accuracy(accuracy):
 
 
 def test_rounds_that_run_out_leave_a_violation_that_is_told():
-    """A peak as high wherever it stands slips between all nodes so far: what is exceeded is said, nothing certified."""
+    """A peak as high wherever it stands slips between all nodes so far: what is exceeded is said, nothing certified.
+
+    The round that came nearest counts, not the last.
+    """
     task = program(limits=(("sharp", 1, 0.7),))
     point = solved(task)
-    assert point.violation == pytest.approx(highest(task, point, "sharp") - 0.7, abs=1e-5)
-    assert point.violation > 1e-3
+    assert point.violation == pytest.approx(highest(task, point, "sharp") - 0.7, abs=1e-8)
+    assert 1e-7 < point.violation < 1e-4
     certificate = certify(task, point.x, 1e-8)
     assert not certificate.passed
     assert any("limit sharp is exceeded" in reason for reason in certificate.reasons)
