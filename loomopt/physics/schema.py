@@ -24,9 +24,8 @@ class TargetTable(Table):
     expected: dict[str, Any] | None = Field(None, description="what the target is known to reach: shown, never used")
 
 
-Digits = Annotated[int, Field(ge=0, le=15)]
-"""Decimals of a table's values: where zeros were cut off, or more are printed than are known."""
 DIGITS = "decimals to which the table's values are known, those printed without it"
+"""What the key `digits` beside a table is: for cut zeros, or where more are printed than are known."""
 
 Values = Mapping[str, Number]
 """Scene numbers by name, in one number system: `l1`, `M0`, `today.l1`, …"""

@@ -39,7 +39,7 @@ from loomopt.physics.cycle import Node
 from loomopt.physics.effects import kinds
 from loomopt.physics.mechanisms import chain, chain_forces
 from loomopt.physics.mechanisms.chain import Chain
-from loomopt.physics.schema import DIGITS, Axis, Digits, Figure, Name, Table, Target
+from loomopt.physics.schema import DIGITS, Axis, Figure, Name, Table, Target
 from loomopt.physics.schema import TargetTable as AnyTarget
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
@@ -61,7 +61,7 @@ class TargetTable(AnyTarget):
     table: Name | None = Field(
         None, description="CSV file of the path: x [mm], y [mm], and phi [deg] where its timing is given"
     )
-    digits: Digits | None = Field(None, description=DIGITS)
+    digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
     @property
     def sought(self) -> tuple[tuple[str, str], ...]:

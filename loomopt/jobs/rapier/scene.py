@@ -10,7 +10,7 @@ from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
 from loomopt.model import drive
 from loomopt.physics.effects import kinds
 from loomopt.physics.mechanisms import rapier_drive
-from loomopt.physics.schema import DIGITS, Axis, Conflict, Digits, Figure, Name, Table, Target, TargetTable
+from loomopt.physics.schema import DIGITS, Axis, Conflict, Figure, Name, Table, Target, TargetTable
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import SceneSchema
@@ -65,7 +65,7 @@ class MatchTarget(TargetTable):
     table: Name | None = Field(
         None, description="CSV file with the columns `phi1 [deg]` and `S [mm]`, beside the scene"
     )
-    digits: Digits | None = Field(None, description=DIGITS)
+    digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
 
 VARIABLES = {

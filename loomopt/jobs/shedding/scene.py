@@ -32,7 +32,7 @@ from loomopt.physics.effects import kinds
 from loomopt.physics.effects.kinds import Load
 from loomopt.physics.mechanisms import cam_follower, cam_spline
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
-from loomopt.physics.schema import Axis, Conflict, Digits, Figure, Name, Table, Target, TargetTable
+from loomopt.physics.schema import Axis, Conflict, Figure, Name, Table, Target, TargetTable
 from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
@@ -86,8 +86,8 @@ class HealdFrame(Table):
     law: LAW = Field("cycloidal", description="cam law of the rise, and mirrored of the return")
     law_coefficients: Numbers | None = Field(None, description="s'' of a spline law at evenly spaced knots")
     law_table: Name | None = Field(None, description="CSV file of a tabulated law")
-    digits: Digits | None = Field(
-        None, description="decimals to which s of law_table is known, those printed without it"
+    digits: int | None = Field(
+        None, ge=0, le=15, description="decimals to which s of law_table is known, those printed without it"
     )
     rise: SegmentAngle | None = Field(None, description="cam angle of the rise")
     far_dwell: SegmentAngle | None = Field(None, description="cam angle with the shed open downward")

@@ -15,7 +15,7 @@ from loomopt.maths.systems import Maths, Number, within_turn
 from loomopt.physics.effects.beatup import ReedPose
 from loomopt.physics.effects.kinds import Load, LoadTable
 from loomopt.physics.mechanisms.dyad import Vector
-from loomopt.physics.schema import DIGITS, Digits, Name, Table, Values
+from loomopt.physics.schema import DIGITS, Name, Table, Values
 
 if TYPE_CHECKING:
     from loomopt.physics.effects.kinds import SteadyOscillator
@@ -30,7 +30,7 @@ class Own(Table):
     table: Name | None = Field(
         None, description="CSV file of M_R instead: angle [deg] from front dead centre, M [N*m], corner"
     )
-    digits: Digits | None = Field(None, description=DIGITS)
+    digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
     reach: PositiveLength | None = Field(
         None, description="distance from the rocking shaft D at which the cloth pushes, for the force there"
     )

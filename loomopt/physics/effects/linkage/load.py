@@ -12,7 +12,7 @@ from loomopt.physics.effects.kinds import Applied, Load, LoadTable
 from loomopt.physics.effects.linkage import LinkagePose, between, event_angle
 from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.mechanisms.moving import total
-from loomopt.physics.schema import DIGITS, Digits, Name, Table, Values
+from loomopt.physics.schema import DIGITS, Name, Table, Values
 
 
 class Own(Table):
@@ -26,7 +26,7 @@ class Own(Table):
     table: Name | None = Field(
         None, description="CSV file of its components instead: angle [deg], x [N], y [N], corner"
     )
-    digits: Digits | None = Field(None, description=DIGITS)
+    digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:

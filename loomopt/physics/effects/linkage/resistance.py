@@ -14,7 +14,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.physics.cycle import TURN
 from loomopt.physics.effects.kinds import Load, LoadTable
 from loomopt.physics.effects.linkage import LinkagePose, event_angle
-from loomopt.physics.schema import DIGITS, Digits, Name, Table, Values
+from loomopt.physics.schema import DIGITS, Name, Table, Values
 
 PULSE, AT = "crank angle δ through which it acts, about the event", "event about which it acts"
 SAID = "CSV file of it instead: angle [deg] from the event, {}, corner"
@@ -27,7 +27,7 @@ class Own(Table):
     pulse: PulseAngle | None = Field(None, description=PULSE)
     at: Name = Field(description=AT)
     table: Name | None = Field(None, description=SAID.format("M [N*m]"))
-    digits: Digits | None = Field(None, description=DIGITS)
+    digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
 
 class Sliding(Table):
@@ -37,7 +37,7 @@ class Sliding(Table):
     pulse: PulseAngle | None = Field(None, description=PULSE)
     at: Name = Field(description=AT)
     table: Name | None = Field(None, description=SAID.format("F [N]"))
-    digits: Digits | None = Field(None, description=DIGITS)
+    digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:

@@ -20,7 +20,7 @@ from loomopt.maths.periodic_cubic import interval_at
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.kinds import Load, LoadTable, Place
 from loomopt.physics.effects.shedding import FramePose
-from loomopt.physics.schema import DIGITS, Digits, Name, Table, Values
+from loomopt.physics.schema import DIGITS, Name, Table, Values
 
 TURN = 6.283185307179586
 
@@ -34,7 +34,7 @@ class Own(Table):
     table: Name | None = Field(
         None, description="CSV file of T instead: angle [deg] of the cam, T [N] positive downward, corner"
     )
-    digits: Digits | None = Field(None, description=DIGITS)
+    digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
