@@ -3,7 +3,7 @@
 import functools
 import math
 from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -96,6 +96,42 @@ class Arcs(NamedTuple):
     """What their formulas are made of, where that is a chain."""
     parting: Callable[[Maths, Given], tuple[Number, ...]] | None = None
     """Those of the corners that part the cycle, where others of its corners do so already."""
+
+
+class Followed(NamedTuple):
+    """A crank angle that no formula gives: its event, the name of its value, and where it lies on one design, rad.
+
+    rates(maths, given, phi): what vanishes there, and its slope.
+    """
+
+    name: str
+    value: str
+    angle: float
+    rates: Callable[[Maths, Given, Number], Sequence[Number]]
+
+
+class Following(NamedTuple):
+    """The events of one design that hints lead to.
+
+    hints: names of their hints; events: in an order in which each reads those before it; turns: every crank angle of
+    one turn at which the output turns; sure(maths, given, turns): what must be positive, with what is said where it is
+    not, so that a scan of another design finds the same events; turns: their crank angles there. paths: where the way
+    to an event begins, by the name of its value, and the event: what its `rates` give is positive between them.
+    """
+
+    hints: frozenset[str]
+    events: tuple[Followed, ...]
+    turns: tuple[Followed, ...]
+    sure: Callable[[Maths, Given, Sequence[Number]], Sequence[tuple[str, Number]]]
+    paths: tuple[tuple[str, Followed], ...] = ()
+
+
+@runtime_checkable
+class Follows(Protocol):
+    """A mechanism that says of its events what boxes of designs need to enclose them."""
+
+    def following(self, given: Given) -> Following | None:
+        """Return the events of a design in floats that hints lead to; None where they are not followed so."""
 
 
 class Kinematics(Protocol):

@@ -5,7 +5,7 @@ q = the output that the scene names (an angle, a slide, a coordinate of a joint)
 
 import functools
 import math
-from collections.abc import Callable, Collection, Hashable, Mapping
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from loomopt.base.records import lazy
 from loomopt.maths import systems, turning_points
 from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.model import drive
-from loomopt.model.kinematics import Arcs, Group, Kinematics
+from loomopt.model.kinematics import Arcs, Followed, Following, Group, Kinematics
 from loomopt.model.model import CycleQuantity, DesignRow, Instant, Integral, JobModel
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Floats, Node
@@ -377,7 +377,7 @@ class Linkage(Kinematics):
         found |= self._nearest(maths, given)
         if OUTPUT_PLACES in called:
             for place in self.places:
-                if place.value in found:
+                if place.value in found or place.value in given.values:
                     found |= self._placed(maths, given._replace(values={**given.values, **found}), place)
         return found
 
@@ -589,6 +589,60 @@ class Linkage(Kinematics):
         k = int(beyond[0])
         return beside + place.side * turning_points.crossing(excess, float(steps[k - 1]), float(steps[k]))
 
+    def following(self, given: Given) -> Following | None:
+        """Return the events of a design in floats that are extremes and travels; None with cams, or a free timing."""
+        if self.chain.cams or (self.path and self.path.times):
+            return None
+        turns = self.turns(given)
+        free = [place for place in self.places if place.angle is None]
+        events = [
+            Followed(
+                place.name, place.value, float(given.values[place.value]), functools.partial(_rates_of, self, place)
+            )
+            for place in free
+        ]
+        turning = functools.partial(_rates_of, self, Place("a turn", "max"))
+        paths = [
+            (event_value(place.beside), event)
+            for place, event in zip(free, events, strict=True)
+            if place.travel is not None
+        ]
+        return Following(
+            frozenset(place.hint for place in free),
+            tuple(events),
+            tuple(Followed("a turn of the output", "", turn.angle, turning) for turn in turns),
+            functools.partial(self._sure, turns, float(given.values.get(SWEPT, 0.0))),
+            tuple(paths),
+        )
+
+    def _sure(
+        self, turns: Sequence[Turn], swept: float, maths: Maths, given: Given, at: Sequence[Number]
+    ) -> list[tuple[str, Number]]:
+        """Return what is positive where a scan finds the same events as of the design with those turns."""
+        found: list[tuple[str, Number]] = []
+        for place in (place for place in self.places if place.extreme):
+            mine = turns.index(next(turn for turn in turns if _is(turn, chosen(tuple(turns), place))))
+            others = [k for k, turn in enumerate(turns) if turn.extreme == place.extreme and k != mine]
+            said = f"another extreme of the output is {place.name}"
+            if place.near is None:
+                angle = chosen(tuple(turns), place).angle
+                moved = at[mine] + (angle - turns[mine].angle)
+                beyond = f"{place.name} passes crank angle 0"
+                found += [(beyond, moved - 0.0), (beyond, TURN - moved)]
+                sign = 1 if place.extreme == "max" else -1
+                q = [self.pose(maths, given, Node(at[k], {})).q for k in (mine, *others)]
+                found += [(said, sign * (q[0] - other)) for other in q[1:]]
+                continue
+            away = [_away(at[k], turns[k].angle, place.near) for k in (mine, *others)]
+            found += [(said, other - away[0]) for other in away[1:]]
+            found.append((f"{place.name} passes half a turn from near", math.pi - away[0]))
+        high, low = extremes(self.places)
+        if high and low:
+            later = given.values[event_value(low)] - given.values[event_value(high)]
+            sign = 1 if swept == 0.0 else -1
+            found.append((f"{low} and {high} follow in the other order", sign * later))
+        return found
+
     def pose(self, maths: Maths, given: Given, node: Node) -> LinkagePose:
         """Return the pose at crank angles φ, rad."""
         values, out = given.values, self.output
@@ -648,6 +702,25 @@ def end_of_rest(turn: Turn, place: Place) -> Corner | None:
         return end if place.rest == "ends" else begin
     near = place.near
     return min(turn.rest, key=lambda corner: abs(apart(corner.angle, near)))
+
+
+def _rates_of(linkage: Linkage, place: Place, maths: Maths, given: Given, phi: Number) -> Sequence[Number]:
+    """Return what vanishes at an extreme or a travel, and its slope."""
+    pose = linkage.pose(maths, given, Node(phi, {}))
+    if place.travel is None:
+        return pose.q1, pose.q2
+    return pose.since(linkage.at_event(maths, given, place.beside)) + number(maths, given.values, place.travel), pose.q1
+
+
+def _is(turn: Turn, other: Turn) -> bool:
+    return (turn.extreme, turn.q) == (other.extreme, other.q)
+
+
+def _away(at: Number, angle: float, near: float) -> Number:
+    """Return how far a turn near an angle, rad, is from another one."""
+    nearest = apart(angle, near)
+    off = at - angle + nearest
+    return off if nearest >= 0 else -off
 
 
 def apart(angle: float, other: float) -> float:

@@ -18,11 +18,13 @@ from loomopt.maths import intervals, systems
 from loomopt.maths.interval_series import Series, along
 from loomopt.maths.intervals import PI, Enclosure, Floats, Interval, interval
 from loomopt.maths.systems import Number
+from loomopt.model.kinematics import Follows
 from loomopt.model.model import JobModel
 from loomopt.model.reading import Quantities, Rows
 from loomopt.model.sampling import Extreme, sampled
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node, Where
+from loomopt.solving.proof.followed_events import EventBox
 from loomopt.solving.proof.reading import NodeLayout
 from loomopt.solving.proof.task import BoxRows, OpenError
 
@@ -71,8 +73,7 @@ class NumberBox:
         if names := ", ".join(state.name for state in model.states):
             raise OpenError(f"the steady state of {names} is not bounded by boxes")
         self.sampler = sampled(model, dict(values))
-        if self.sampler.hints:
-            raise OpenError("corners of the cycle are found by iteration, which boxes do not enclose")
+        self.followed = self._followed() if self.sampler.hints else None
         self.layout = NodeLayout(self.sampler)
         with np.errstate(all="ignore"):
             given = self.given(self.low[:, None], self.high[:, None])
@@ -85,12 +86,40 @@ class NumberBox:
         """Return the numbers of parts, ends (numbers, parts), SI, with what follows from them, and slopes."""
         count = len(self.names)
         own = {name: intervals.variable(k, count, low[k], high[k]) for k, name in enumerate(self.names)}
-        return self.model.given(self.system, {**self.fixed, **own})
+        values = {**self.fixed, **own}
+        if self.followed:
+            middle = low + (high - low) / 2
+            values |= self.followed.given(values, self._numbers(middle), _half(low, high))
+        return self.model.given(self.system, values)
 
     def points(self, at: Floats) -> Given:
         """Return the numbers at points (numbers, parts), SI."""
-        own = {name: interval(at[k][None]) for k, name in enumerate(self.names)}
-        return self.model.given(self.system, {**self.fixed, **own})
+        values = self._numbers(at)
+        if self.followed:
+            values |= self.followed.points(values)
+        return self.model.given(self.system, values)
+
+    def _numbers(self, at: Floats) -> dict[str, Number]:
+        """Return the numbers at points (numbers, parts), SI."""
+        return self.fixed | {name: interval(at[k][None]) for k, name in enumerate(self.names)}
+
+    def _followed(self) -> EventBox:
+        """Return the events that hints lead to, enclosed over the box. Raises OpenError."""
+        kinematics = self.model.kinematics
+        following = kinematics.following(self.sampler.given) if isinstance(kinematics, Follows) else None
+        if following is None:
+            raise OpenError("corners of the cycle are found by iteration, which boxes do not enclose")
+        hints = {name: hint for name, hint in self.sampler.hints.items() if name not in following.hints}
+        self.fixed |= {name: self.system.number(hint) for name, hint in hints.items()}
+        low, high = self.low[:, None], self.high[:, None]
+        own = {n: intervals.variable(k, len(low), low[k], high[k]) for k, n in enumerate(self.names)}
+        half, middle = _half(low, high), low + (high - low) / 2
+
+        def meant(whole: Number, there: Number, half: Floats) -> Interval:
+            return _meant(_whole(whole, half), _whole(there, half).v, half)
+
+        with np.errstate(all="ignore"):
+            return EventBox(self.system, following, {**self.fixed, **own}, self._numbers(middle), half, meant)
 
     def rows(self, given: Given) -> BoxRows:
         """Return what reads single values."""
