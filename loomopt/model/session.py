@@ -79,9 +79,13 @@ def working(session: Session | None = None) -> Iterator[Session]:
     """Compute in a session, the current one where none is given, while no other thread does; yields the session.
 
     A thread that has begun may begin again, as a solve within a solve does. Where the code of another distribution
-    fails meanwhile, BadInput says whose it is.
+    fails meanwhile, BadInput says whose it is. A search meets designs that do not close: their numbers are not finite,
+    which whoever reads them tests, and NumPy warns of none of them, whatever Python does with warnings.
     """
-    with LOCK, naming():
+    # Nothing that computes comes without NumPy; what only reads a scene may.
+    import numpy as np
+
+    with LOCK, naming(), np.errstate(all="ignore"):
         token = _CURRENT.set(session or current())
         try:
             yield current()
