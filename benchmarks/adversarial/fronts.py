@@ -1,12 +1,17 @@
 """Fronts of random scenes: two axes of each drawn, every point certified or shown to have no admissible design.
 
-Scene K is of the job that K names in turn, drawn as `attack.py` draws it, with its target's demands or without any;
-its axes are two that the scene offers. Each front that ends otherwise is printed with how to make it again.
+Scene K is of the job that K names in turn, drawn as `attack.py` draws it (a linkage: a packaged one whose numbers are
+drawn within a tenth), with its target's demands or without any; its axes are two that the scene offers. Then certified
+rows are attacked: what each seeks is searched for from scratch, from many starts, and solved from the design of every
+other row of the front. A row is beaten where that is certified too and better by more than 1e-6 of its natural size.
+Each front that ends otherwise is printed with how to make it again.
 
-    python -m benchmarks.adversarial.fronts [--from A] [--to B] [--points N] [--seconds T] [--json]
+    python -m benchmarks.adversarial.fronts [--from A] [--to B] [--points N] [--rows R] [--jobs linkage,rapier]
+                                            [--seconds T] [--json]
 
---seconds: no front is begun later. Seconds of rows and fronts are the processor's: other work on the machine counts
-little. Ends in exit status 1 where a row is uncertified or failed.
+--rows: how many of a front, evenly spread, are attacked; --seconds: no front is begun later. Seconds of rows and fronts
+are the processor's: other work on the machine counts little. Ends in exit status 1 where a row is beaten, uncertified
+or failed.
 """
 
 import argparse
@@ -17,13 +22,19 @@ from collections import Counter
 from typing import Any, NamedTuple
 
 from benchmarks import harness
-from benchmarks.adversarial.attack import JOBS, scene_of
+from benchmarks.adversarial import attack
+from benchmarks.adversarial.attack import BETTER, scene_of
+
+LINKAGES = ("sixbar-sley", "shaper", "knuckle-press")
+JOBS = (*attack.JOBS, "linkage")
+SHARE_DRAWN = 0.1
+"""Within which the numbers of a packaged linkage are drawn."""
 
 OPEN = ("uncertified", "failed")
 """Statuses of rows that say nothing."""
 SHARE = 0.5
 """Of fronts that hold what the target demands; the others hold the scene's limits alone."""
-COUNTED = ("tried", "certified", "infeasible", "refused", "uncertified")
+COUNTED = ("tried", "certified", "infeasible", "refused", "uncertified", "beaten", "rows attacked")
 
 
 class Asked(NamedTuple):
@@ -35,7 +46,29 @@ class Asked(NamedTuple):
     target: str
 
 
-def drawn(number: int) -> Asked:
+def linkage(number: int) -> tuple[Any, str]:
+    """Return a linkage whose numbers are drawn, the next draw where one does not close, and a target of it."""
+    import numpy as np
+
+    import loomopt as lo
+    from loomopt.base.errors import BadInput
+
+    rng = np.random.default_rng([zlib.crc32(b"linkages of fronts"), number])
+    base = lo.load(LINKAGES[number // len(JOBS) % len(LINKAGES)])
+    while True:
+        changes = {}
+        for name in base.bounds:
+            if name in base.document["mechanism"]:
+                size, unit = str(base.document["mechanism"][name]).split()
+                share = rng.uniform(1.0 - SHARE_DRAWN, 1.0 + SHARE_DRAWN)
+                changes[f"mechanism.{name}"] = f"{float(size) * share:.6g} {unit}"
+        try:
+            return base.update(changes), next(iter(base.schema.targets))
+        except BadInput:
+            continue
+
+
+def drawn(number: int, jobs: tuple[str, ...] = JOBS) -> Asked:
     """Return the front of scene `number`; always the same one."""
     import numpy as np
 
@@ -43,10 +76,14 @@ def drawn(number: int) -> Asked:
     from loomopt.base.errors import BadInput
     from loomopt.studies.front import front
 
-    task = scene_of(JOBS[number % len(JOBS)], 0, number)
-    scene = lo.load(task.base).update(task.changes)
+    job = jobs[number % len(jobs)]
+    if job == "linkage":
+        scene, own = linkage(number)
+    else:
+        task = scene_of(job, 0, number)
+        scene, own = lo.load(task.base).update(task.changes), task.target
     rng = np.random.default_rng([zlib.crc32(b"fronts"), number])
-    target = task.target if rng.random() < SHARE else "none"
+    target = own if rng.random() < SHARE else "none"
     offered = {name: axis.senses for name, axis in scene.schema.axes.items()}
     while True:
         one, other = map(str, rng.choice(sorted(offered), 2, replace=False))
@@ -60,12 +97,36 @@ def drawn(number: int) -> Asked:
         return Asked(scene, axes, most, target)
 
 
-def told(number: int, points: int) -> tuple[str, dict[str, Any]]:
+def beaten(study: Any, rows: int) -> tuple[int, list[dict[str, Any]]]:
+    """Return how many rows of a front were attacked, and those that are beaten, with by how much."""
+    from loomopt.model.session import working
+    from loomopt.studies.front import plan
+
+    trade, found = study.study, list[dict[str, Any]]()
+    sought = trade.solver.axes[0]
+    known = [row for row in study.rows if row.certified and trade.axes[1] in row.place]
+    chosen = known[:: max(1, len(known) // rows)][:rows]
+    for row in chosen:
+        asking = trade.asking(row.place)
+        others = [other.warm for other in study.rows if other.certified and other is not row]
+        with working():
+            ends = [trade.solver.solve(asking, (), True), trade.solver.solve(asking, others, None)]
+        mine = sought.value(plan.value(row, trade.axes[0]))
+        for by, end in zip(("search", "rows"), ends, strict=True):
+            kept = all(a <= b + plan.ALIKE for a, b in zip(end.warm.get("held", ()), row.warm["held"], strict=False))
+            apart = mine - sought.value(end.warm["axes"][trade.axes[0]]) if end.certified and kept else 0.0
+            if apart > BETTER * sought.objective.scale:
+                share = apart / sought.objective.scale
+                found.append({"point": row.point, "place": dict(row.place), "by": by, "apart": share})
+    return len(chosen), found
+
+
+def told(number: int, points: int, rows: int, jobs: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
     """Return what became of a front: a word, and what tells it apart."""
     import loomopt as lo
     from loomopt.base.errors import BadInput
 
-    asked, began = drawn(number), time.perf_counter()
+    asked, began = drawn(number, jobs), time.perf_counter()
     call = {"number": number, "job": asked.scene.job, "axes": asked.axes, "maximise": asked.maximise}
     call["target"] = asked.target
     try:
@@ -76,7 +137,10 @@ def told(number: int, points: int) -> tuple[str, dict[str, Any]]:
     certified = sum(row.certified for row in study.rows)
     said = {"rows": len(study.rows), "certified": certified, "amiss": amiss}
     said |= {"slowest": max(row.seconds for row in study.rows), "seconds": time.perf_counter() - began}
-    return "uncertified" if amiss else "certified" if certified else "infeasible", call | said
+    said["attacked"], said["beaten"] = beaten(study, rows)
+    said["bettered"] = study.findings.bettered
+    word = "beaten" if said["beaten"] else "uncertified" if amiss else "certified" if certified else "infeasible"
+    return word, call | said
 
 
 def parsed() -> argparse.Namespace:
@@ -84,6 +148,8 @@ def parsed() -> argparse.Namespace:
     words.add_argument("--from", dest="first", type=int, default=0)
     words.add_argument("--to", type=int, default=189)
     words.add_argument("--points", type=int, default=8)
+    words.add_argument("--rows", type=int, default=4)
+    words.add_argument("--jobs", default=",".join(JOBS))
     words.add_argument("--seconds", type=float, default=float("inf"))
     words.add_argument("--json", action="store_true")
     return words.parse_args()
@@ -97,9 +163,10 @@ def main() -> None:
     for number in range(asked.first, asked.to + 1):
         if time.monotonic() - began > asked.seconds:
             break
-        word, said = told(number, asked.points)
+        word, said = told(number, asked.points, asked.rows, tuple(asked.jobs.split(",")))
         counts.update(["tried", word])
-        if word == "uncertified":
+        counts["rows attacked"] += said.get("attacked", 0)
+        if word in ("uncertified", "beaten"):
             failures.append(said)
         print(word, said, file=sys.stderr, flush=True)
     row = {name: counts[name] for name in COUNTED}

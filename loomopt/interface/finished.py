@@ -131,6 +131,7 @@ class StudyTable:
             "units": study_table.units(self.study, self.rows),
             "changes": [change.as_dict() for change in self.findings.changes],
             "gaps": list(self.findings.gaps),
+            **({} if self.findings.bettered is None else {"bettered": self.findings.bettered}),
             "provenance": study_table.study_provenance(self.study),
         }
 

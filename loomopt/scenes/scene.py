@@ -325,6 +325,16 @@ class Scene(Shown):
         document = self._set({f"bounds.{name}.free": True for name in asked})
         return build(document, self.jobs, self.origin, self.paths, self.call.then(Call(free=tuple(named))))
 
+    def without_limit(self, name: str, sides: Iterable[str]) -> "Scene":
+        """Return the scene without these sides, "min" and "max", of a limit that it has."""
+        place = "limits", *name.split(".")
+        own = looked_up(self.document, place)
+        left = set(own) - set(sides) if isinstance(own, Mapping) else set()
+        document: Mapping[str, Any] = self.document
+        for gone in [(*place, side) for side in sides] if left else [place]:
+            document = removed(document, gone)
+        return build(document, self.jobs, self.origin, self.paths, self.call)
+
     def equations(self) -> tuple[Equation, ...]:
         """Return the equations the scene really uses: `name`, `text` and `latex` of each, which Jupyter shows."""
         return self.jobs.equations(self)

@@ -31,7 +31,7 @@ def test_json_has_the_rows_in_the_order_of_the_second_axis(cli):
     status, out, err = cli("beatup", *FEW, "--json")
     data = json.loads(out, parse_constant=pytest.fail)
     assert (status, err) == (0, "")
-    assert list(data) == ["problem", "target", "message", "rows", "units", "changes", "gaps", "provenance"]
+    assert list(data) == ["problem", "target", "message", "rows", "units", "changes", "gaps", "bettered", "provenance"]
     assert (data["problem"], data["target"]) == ("beatup", "balance")
     assert {tuple(row) for row in data["rows"]} == {(*ROW, "seconds", "axes")}
     masses = [row["axes"]["m4e"] for row in data["rows"]]

@@ -87,6 +87,7 @@ def parts(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str 
     grid = Grid("", (*heads, "status"), tuple(lines), right, first=(*asked, len(heads)), more="--out F.csv, --json")
     reasons = [f"point {row.point}, {row.status}: {row.reason}" for row in found.rows if row.reason]
     more = [f"and {len(reasons) - MOST_REASONS} more, in the table's last column"] if reasons[MOST_REASONS:] else []
+    count += f", {found.bettered} bettered from a neighbour's design" if found.bettered else ""
     message = [found.message] if found.message else []
     said = [change_said(study, change, si) for change in found.changes]
     conditions = study.conditions

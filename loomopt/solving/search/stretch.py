@@ -123,6 +123,14 @@ def solved(asked: Sequence[Between]) -> list[Search | None]:
     return found
 
 
+def moved(asked: Sequence[Between]) -> list[dict[str, float] | None]:
+    """Return where the first optimum of each program moves with the rows that stop it: variables, SI, not certified.
+
+    None where it does not come to rest, or one of these rows would let go: then another set of rows stops it there.
+    """
+    return _stationary([(each, each.first.frame) for each in asked])
+
+
 @dataclass(frozen=True)
 class _Begun:
     """A program at its start with the rows of a frame there."""

@@ -23,6 +23,8 @@ FEWEST = 3
 """Points of a front."""
 ENDS = "LO:HI UNIT as text, or both ends as numbers in SI"
 """How a range is given."""
+SOUGHT: Mapping[Sense, str] = {"least": "min", "most": "max"}
+"""Which end of an axis is sought → the side of a limit that stands in its way."""
 NONE = "none"
 """What is given in place of a target, where the scene's limits alone hold."""
 Ranges = Mapping[str, tuple[float, float]]
@@ -88,17 +90,40 @@ def trade(
                 remedy="Write the smaller end first",
             )
     senses = _sense(scene, first, minimise, maximise), _sense(scene, second, minimise, maximise)
+    open_ended, lifted = _lifted(scene, dict(zip((first, second), senses, strict=True)))
     found = Trade(
-        _freed(_bounded(scene, ranges or {}), axes),
+        _freed(_bounded(open_ended, ranges or {}), axes),
         (first, second),
         senses,
         target,
         tuple((ranges or {}).items()),
         wanted,
         float(accuracy),
+        lifted,
     )
     _ = found.solver
     return found
+
+
+def _lifted(scene: Scene, senses: Mapping[str, Sense]) -> tuple[Scene, tuple[str, ...]]:
+    """Return the scene without its limits that stand in the way of an end that is sought, and these in words.
+
+    Of an axis of which the least is sought that is a minimum, of one of which the most is sought a maximum; a limit to
+    one value stands in the way of both ends.
+    """
+    words, said = Words(scene), []
+    for name, sense in senses.items():
+        axis, limit = scene.schema.axes.get(name), scene.limits.get(name)
+        if limit is None or axis is None or axis.form == "magnitude":
+            continue
+        ends = {"min": limit.min, "max": limit.max}
+        one = limit.min is not None and limit.min == limit.max
+        sides = [side for side in ends if ends[side] is not None and (one or side == SOUGHT[sense])]
+        if sides:
+            scene = scene.without_limit(name, sides)
+            most = "" if one else " at least" if sides == ["min"] else " at most"
+            said.append(f"{name}{most} {words.shown(name, ends[sides[0]] or 0.0)}")
+    return scene, tuple(said)
 
 
 def _sense(scene: Scene, name: str, minimise: Sequence[str], maximise: Sequence[str]) -> Sense:

@@ -27,11 +27,11 @@ from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.kkt import ActiveRow, active_set
 from loomopt.solving.certificate.verdict import Binding, Certificate
 from loomopt.solving.nlp import exchange
-from loomopt.solving.nlp.point import Settings
+from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.search import elastic, least_change, multistart, stretch
 from loomopt.solving.search.multistart import rewarded, searched, spread, tied
 from loomopt.solving.search.search import Candidate, Search, judged, objectives, tried
-from loomopt.studies.front.plan import Touched, sloped
+from loomopt.studies.front.plan import ALIKE, Touched, sloped
 from loomopt.studies.run import rows
 from loomopt.studies.run.rows import PEAK, Multiplier, Side
 
@@ -76,6 +76,17 @@ class Reached:
     def certified(self) -> bool:
         """Whether it is as good as an answer."""
         return self.status == "optimal"
+
+
+class Moved(NamedTuple):
+    """Where a neighbour's design moves to in another program, not certified.
+
+    figure: of the axis sought there, SI; led: whether it kept to its basin: Newton's method or pivots led all the way.
+    """
+
+    point: Point
+    figure: float
+    led: bool
 
 
 class Solver:
@@ -166,6 +177,64 @@ class Solver:
         searches = zip(asked, stretch.solved(begun), strict=True)
         return [self._told(search, of) if search and self._priced(search, of) else None for of, search in searches]
 
+    def moved(self, asked: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Moved | None]:
+        """Return where a neighbour's optimum moves to each program with the rows that stop it.
+
+        None where other rows stop it there. ends: as of `between`, the neighbour's optimum first.
+        """
+        begun = []
+        for asking, (*optima, _) in zip(asked, ends, strict=True):
+            first, second = map(stretch.read_optimum, optima)
+            begun.append(stretch.Between(self._begun(asking), first, second, 0.0))
+        return [
+            None if x is None else self._moved(Point(x, "Solve_Succeeded", True), each.search, 0, led=True)
+            for each, x in zip(begun, stretch.moved(begun), strict=True)
+        ]
+
+    def solved_from(
+        self, asking: Asking, near: Mapping[str, Any], held: Sequence[float], begin: float | None, steps: int
+    ) -> Moved | None:
+        """Return where a neighbour's design moves to in a program by solves on the way; None where one ends nowhere.
+
+        held: what the target holds along the front; where that is not kept, no design counts; begin: the value of the
+        second axis, natural, at the neighbour; steps: how many there may be at most: one that pivots do not lead is
+        halved, as it may leave its basin.
+        """
+        share, step, found = 0.0, 1.0, None
+        while share < 1.0:
+            there, (other, end) = share + step, asking.caps
+            cap = end if begin is None or end is None else begin + there * (end - begin)
+            search = self._from(self._begun(asking._replace(caps=(other, cap))), [near])
+            candidate = search.candidates[0] if search.reached else None
+            if step * steps > 1.0 and (candidate is None or candidate.point.iterations):
+                step /= 2
+                continue
+            if candidate is None:
+                return None
+            if any(one > other + ALIKE for one, other in zip(candidate.objectives[: self.held], held, strict=True)):
+                return None
+            led = not candidate.point.iterations and (found is None or found.led)
+            found, share = self._moved(candidate.point, search, asking.first, led), there
+            near = {"point": rows.written(found.point, search.program)}
+        return found
+
+    def _moved(self, point: Point, search: Search, first: int, led: bool) -> Moved:
+        return Moved(point, self._figure(self.axes[first], search.program, point.x), led)
+
+    def rests(self, asking: Asking, point: Point) -> bool:
+        """Say whether a point is a certified optimum of a program, as good or bad as others may be, up to its cap.
+
+        What keeps clear of the cap on the other axis is only the neighbour's own design.
+        """
+        search, other = self._begun(asking), 1 - asking.first
+        cap, objective = asking.caps[other], self.axes[other].objective
+        merit = objective.merit(sampled(search.program.model, {**search.program.parameters, **point.x}))
+        if cap is None or abs(merit - cap) > ACTIVE * objective.scale:
+            return False
+        at = replace(point, structure=search.program.structure)
+        candidate = Candidate(at, objectives(search.program, point.x))
+        return judged(replace(search, candidates=(candidate,))).passed
+
     @lazy
     def _peaks(self) -> tuple[str, ...]:
         return between.told_peaks(self.scene, self.job, self.base)
@@ -197,6 +266,11 @@ class Solver:
         return search
 
     def _beside(self, search: Search, near: Sequence[Mapping[str, Any]]) -> Search:
+        """Return the search after solves from neighbours' rows, its best judged."""
+        search = self._from(search, near)
+        return judged(search) if search.reached else search
+
+    def _from(self, search: Search, near: Sequence[Mapping[str, Any]]) -> Search:
         """Return the search after solves from neighbours' rows."""
         program = search.program
         for data in near:
@@ -205,7 +279,7 @@ class Solver:
                 search = tried(search, point.x, point)
             elif start := exchange.started(program, data["point"]["x"]):
                 search = tried(search, start)
-        return judged(search) if search.reached else search
+        return search
 
     def _spread(self, search: Search) -> Search:
         """Return a search whose best passed after a look at other basins, where there may be any."""

@@ -24,10 +24,10 @@ from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Solution, Words
 from loomopt.studies.front import plan, solver
 from loomopt.studies.front.plan import ENDS, FrontScale, Next
-from loomopt.studies.front.solver import Asking, Reached, Solver
-from loomopt.studies.run.rows import Findings, Row, StudyTask, enough_together
+from loomopt.studies.front.solver import Asking, Moved, Reached, Solver
+from loomopt.studies.run.rows import Findings, Row, StudyTask, enough_together, written
 
-PLAN = 6
+PLAN = 7
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""
 POINTS = 40
 SEARCHED = 1
@@ -51,7 +51,7 @@ class Trade:
     """A front to be computed, as a plan of tasks: two axes with what is sought of each, and what is demanded of both.
 
     axes: names; senses: "least" or "most" of each; target: whose demands hold, None for none; ranges: axis → from, to,
-    SI; points: how many.
+    SI; points: how many; lifted: limits of the scene that do not hold, as they stand in the way of an end, in words.
     """
 
     scene: Scene
@@ -61,10 +61,12 @@ class Trade:
     ranges: tuple[tuple[str, tuple[float, float]], ...] = ()
     points: int = POINTS
     accuracy: float = ACCURACY
+    lifted: tuple[str, ...] = ()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return how to make it again: what is built from it does not pickle."""
-        return Trade, (self.scene, self.axes, self.senses, self.target, self.ranges, self.points, self.accuracy)
+        own = self.scene, self.axes, self.senses, self.target, self.ranges, self.points, self.accuracy, self.lifted
+        return Trade, own
 
     name = "pareto"
 
@@ -109,9 +111,9 @@ class Trade:
 
     @functools.cached_property
     def demands(self) -> tuple[list[str], list[str]]:
-        """What the target demands of every row, and what it demands that does not hold, for people.
+        """What the target demands of every row, and what it or the scene demands that does not hold, for people.
 
-        Without a target the second is what the job's default would demand.
+        Without a target the second is what the job's default would demand, beside limits on axes that are lifted.
         """
         base, job, words = self.solver.base, self.solver.job, Words(self.scene)
         whose = self.target or self.scene.schema.default_target
@@ -125,7 +127,7 @@ class Trade:
             # The scene has not what the default target needs: it demands nothing of it.
             wanted = ()
         kept = {goal.figure for goal in base.goals}
-        return held, [_demand(words, goal) for goal in wanted if goal.figure not in kept]
+        return held, [*self.lifted, *(_demand(words, goal) for goal in wanted if goal.figure not in kept)]
 
     @property
     def settings(self) -> dict[str, object]:
@@ -176,7 +178,7 @@ class Trade:
         wide = _spread(len(found)) if len(rows) == len(ENDS) else set()
         first = len(rows)
         tasks = [self._task(first + k, each, scale, by_point, k in wide) for k, each in enumerate(found)]
-        return enough_together(tasks)
+        return tasks if found and found[0].steps else enough_together(tasks)
 
     def _task(self, point: int, each: Next, scale: FrontScale, rows: Mapping[int, Row], wide: bool) -> StudyTask:
         others = [rows[other].warm for other in each.near[1:]]
@@ -184,16 +186,36 @@ class Trade:
         ask = {"also": others, "held": held, "wide": wide}
         ask |= {"again": each.again, "fine": each.fine, "near": list(each.near)}
         length = len(each.near) + WIDE * wide
+        if each.steps and each.again is not None:
+            ask |= {"trial": self._known(rows[each.again], rows[each.near[0]], each, scale), "steps": each.steps}
         if each.end is not None:
             return StudyTask(point, each.near[0], {}, {**ask, "end": each.end}, length)
         ask |= {"spare": [rows[each.spare].warm]} if each.spare is not None else {}
         place = {self.axes[1]: scale.figure(1, each.b)}
+        if each.steps and each.again is not None:
+            optima = [rows[other].warm.get("optimum") for other in (each.near[0], each.again)]
+            beside = [*optima, 0.0] if all(optima) and each.steps == 1 else []
+            return StudyTask(point, each.near[0], dict(rows[each.again].place), ask, length, beside)
         if wide or each.beside is None:
             return StudyTask(point, each.near[0], place, ask, length)
         *ends, share = each.beside
         optima = [rows[end].warm.get("optimum") for end in ends]
         beside = [*optima, share] if all(optima) else []
         return StudyTask(point, each.near[0], place, ask, length, beside)
+
+    def _known(self, row: Row, by: Row, each: Next, scale: FrontScale) -> dict[str, object]:
+        """Return what a trial must beat as JSON data: an axis of a row, SI, and by how much; the neighbour it is from.
+
+        begin: its second axis, SI; done: whether the row was solved from it before, so that only what became of its
+        design is asked.
+        """
+        axis = each.end or 0
+        return {
+            "best": plan.value(row, self.axes[axis]),
+            "slack": plan.ALIKE * scale.width[axis],
+            "begin": plan.value(by, self.axes[1]),
+            "done": each.steps == 1 and by.point in plan.solved_from(row),
+        }
 
     @property
     def sizes(self) -> tuple[float, float]:
@@ -291,24 +313,62 @@ class Trade:
 
     def _beside(self, tasks: Sequence[StudyTask]) -> list[Met | None]:
         """Return what tasks between two neighbours' optima come to; None of one that must be solved alone."""
-        places = [k for k, task in enumerate(tasks) if task.beside]
-        asked = [self._asking(tasks[k]) for k in places]
-        ends = [tasks[k].beside for k in places]
         found: list[Met | None] = [None] * len(tasks)
-        for k, asking, reached in zip(places, asked, self.solver.between(asked, ends), strict=True):
+        places = [k for k, task in enumerate(tasks) if task.beside and "trial" not in task.ask]
+        asked = [self.asking(tasks[k].place) for k in places]
+        for k, asking, reached in zip(
+            places, asked, self.solver.between(asked, [tasks[k].beside for k in places]), strict=True
+        ):
             met = reached and _kept(reached, tasks[k].ask["held"])
-            found[k] = Met(met, asking, dict(tasks[k].place)) if met and met.certified else None
+            if met and met.certified:
+                between = replace(met, warm={**met.warm, "between": True})
+                found[k] = Met(between, asking, dict(tasks[k].place))
+        places = [k for k, task in enumerate(tasks) if task.beside and "trial" in task.ask]
+        asked = [self.asking(tasks[k].place) for k in places]
+        moved = self.solver.moved(asked, [tasks[k].beside for k in places])
+        for k, asking, end in zip(places, asked, moved, strict=True):
+            if tasks[k].ask["trial"]["done"] or (end and self._excess(tasks[k], 0, end.figure) >= 0.0):
+                found[k] = self._stands(tasks[k], asking, end)
         return found
 
-    def _asking(self, task: StudyTask) -> Asking:
-        return Asking(0, (self._cap(0), self.solver.axes[1].value(task.place[self.axes[1]])))
+    def _tried(self, task: StudyTask, asking: Asking, near: Mapping[str, Any]) -> Moved | None:
+        """Return where a neighbour's design comes to at the place of a trial; None for nowhere."""
+        steps = int(task.ask["steps"])
+        begin = self.solver.axes[1].value(task.ask["trial"]["begin"]) if steps > 1 else None
+        return self.solver.solved_from(asking, near, task.ask["held"], begin, steps)
+
+    def _excess(self, task: StudyTask, axis: int, figure: float) -> float:
+        """Return by how much a trial is worse than what it should beat, SI: 0 where both are one, < 0 for better."""
+        known = task.ask["trial"]
+        excess = float(self.signs[axis] * (figure - known["best"]))
+        return 0.0 if abs(excess) <= known["slack"] else excess
+
+    def _stands(self, task: StudyTask, asking: Asking, end: Moved | None) -> Met:
+        """Return that a row stands though its neighbour's design was moved there; end: what that came to.
+
+        What kept to its basin, is worse and an optimum itself is another design.
+        """
+        worse = end is not None and end.led and self._excess(task, asking.first, end.figure) > 0.0
+        apart = worse and end is not None and self.solver.rests(asking, end.point)
+        warm = {"apart": list(task.ask["near"]) if apart else []}
+        return Met(Reached("uncertified", "a neighbour's design is no better there", warm=warm), asking, task.place)
+
+    def asking(self, place: Mapping[str, float]) -> Asking:
+        """Return the program of a place: the second axis, SI, by its name."""
+        return Asking(0, (self._cap(0), self.solver.axes[1].value(place[self.axes[1]])))
 
     def _alone(self, task: StudyTask, parent: Row | None) -> Met:
         """Return what a task comes to by solves of its own."""
         near = [*([parent.warm] if parent else []), *task.ask.get("also", ())]
-        if "end" in task.ask:
-            return self._end(int(task.ask["end"]), near)
-        asking = self._asking(task)
+        end = task.ask.get("end")
+        asking = self.asking(task.place) if end is None else self._asking_of_end(end)
+        if "trial" in task.ask:
+            ended = None if task.ask["trial"]["done"] else self._tried(task, asking, near[0])
+            if ended is None or self._excess(task, asking.first, ended.figure) >= 0.0:
+                return self._stands(task, asking, ended)
+            near = [{"point": written(ended.point, self.solver.program(asking))}]
+        if end is not None:
+            return self._end(end, near)
         found = self.solver.solve(asking, near, bool(task.ask["wide"]), task.ask.get("spare", ()))
         return Met(_kept(found, task.ask["held"]), asking, dict(task.place))
 
@@ -320,12 +380,16 @@ class Trade:
         values = sorted(map(self.solver.axes[axis].value, asked))
         return values[0] if best else values[1]
 
+    def _asking_of_end(self, end: int) -> Asking:
+        """Return the program of an end of the front, but for its own range."""
+        return Asking(1, (self._cap(0), None)) if end else Asking(0, (None, self._cap(1)))
+
     def _end(self, end: int, near: Sequence[Mapping[str, Any]]) -> Met:
         """Return an end of the front, and what was asked there: the axis' least, but not beyond its range.
 
         near: from where it is solved; without, it is searched for.
         """
-        asking = Asking(1, (self._cap(0), None)) if end else Asking(0, (None, self._cap(1)))
+        asking = self._asking_of_end(end)
         found, sought = self.solver.solve(asking, near, not near), self.solver.axes[end]
         reached = sought.value(found.warm["axes"][self.axes[end]]) if found.certified else -math.inf
         least = self._cap(end, best=True)
@@ -356,7 +420,7 @@ class Trade:
 def _row(task: StudyTask, met: Met, seconds: float) -> Row:
     """Return the row of what a task came to."""
     found, _, place = met
-    told = {**found.warm, **{name: task.ask.get(name) for name in ("again", "fine", "near")}}
+    told = {**found.warm, **{name: task.ask.get(name) for name in ("again", "fine", "near", "end", "steps")}}
     return Row(
         task.point,
         place,
@@ -413,16 +477,17 @@ def read_front(study: "Trade", rows: Sequence[Row]) -> Findings:
     first, second = study.labels
     if not all(scale.width):
         said = f"{first} and {second} do not conflict: one design is best in both."
-        return Findings((by_point[ENDS[0]],), said + _apart(study, rows))
+        return Findings((by_point[ENDS[0]],), said + _apart(study, rows), bettered=0)
     spots, _ = plan.spots(rows, scale)
-    changes, gaps = plan.changes_and_gaps(spots, scale)
+    changes, gaps = plan.changes_and_gaps(spots, scale, plan.basins_apart(rows))
     best = tuple(by_point[spot.point] for spot in spots)
     message = f"{len(best)} designs between the {study.senses[1]} {second} and the {study.senses[0]} {first}."
     message += _apart(study, rows)
     # In the order of the figure itself, whichever way is sought.
     order = sorted(best, key=lambda row: plan.value(row, study.axes[1]))
     changes.sort(key=lambda change: change.at or 0.0)
-    return Findings((*order, *failed), message, tuple(changes), tuple(sorted(gaps)))
+    bettered = sum(row.warm["again"] is not None for row in best)
+    return Findings((*order, *failed), message, tuple(changes), tuple(sorted(gaps)), bettered)
 
 
 def _stood(study: "Trade", row: Row, rows: Mapping[int, Row]) -> bool:

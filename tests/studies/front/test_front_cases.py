@@ -1,5 +1,9 @@
 """Scenes whose fronts ended without a certificate: a second level of one design, corners that coincide, a jump."""
 
+import json
+import math
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +23,7 @@ def test_an_end_whose_second_level_leaves_one_design_is_certified():
     """Two pieces of the largest force and two of the least meet: each is held by one of them, none may rise."""
     scene = lo.load(CASES / "second_level_of_one_point.toml")
     found = lo.pareto(scene, ("K1", "contact_max"), "stiffness", points=8)
-    assert all(row.certified for row in found.solved)
+    assert all(row.certified for row in found.rows)
     assert len(found) == 8
     forces, stiffness = (plan.values(found.rows, axis) for axis in ("contact_max", "K1"))
     assert forces[0] == pytest.approx(2327.2748160284, rel=1e-9)
@@ -51,6 +55,38 @@ def test_a_jump_is_told_as_one_and_beside_it_the_neighbours_design_stands():
     shortest, before = (row.design["l1"] for row in found.rows[:-3:-1])
     assert shortest == pytest.approx(0.0331774274, rel=1e-8)
     assert before == pytest.approx(0.0332447297, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_row_is_bettered_by_its_neighbours_design_and_a_jump_of_design_is_told():
+    """Two basins of a six-bar sley: the search finds the one that is worse from 81 deg to 83 deg of least angle."""
+    scene = lo.load(CASES / "basins-of-a-sley.toml")
+    found = lo.pareto(scene, ("peak_torque", "mu.beat"), maximise="mu.beat", points=5)
+    assert all(row.certified for row in found.rows)
+    best = {73.12393: 6.539777417, 79.02194: 6.733152704, 81.23367: 7.008311798, 81.97092: 7.153085393}
+    axes = {plan.value(row, "mu.beat") * 180 / math.pi: plan.value(row, "peak_torque") for row in found.rows}
+    for angle, torque in best.items():
+        at_least = min(value for place, value in axes.items() if place >= angle - 1e-3)
+        assert at_least == pytest.approx(torque, rel=1e-6), angle
+    jumps = [change.between for change in found.findings.changes if change.kind == "jump"]
+    assert any(min(two) < 82.7 * math.pi / 180 < max(two) for two in jumps)
+    assert not any(min(two) < 81.6 * math.pi / 180 < max(two) for two in jumps)
+    assert found.as_dict()["bettered"] == found.findings.bettered > 0
+
+
+@pytest.mark.slow
+def test_warnings_that_are_errors_change_nothing_of_a_front():
+    """Designs between which the swing is sought do not all close: NumPy divides by zero there."""
+    place = str(CASES / "swing-of-a-sley.toml")
+    axes = ["--minimise", "peak_torque", "--maximise", "swing", "--against", "swing", "--points", "5", "--json"]
+    call = [sys.executable, "-W", "error", "-m", "loomopt", "pareto", place, *axes]
+    found = subprocess.run(call, capture_output=True, text=True, check=False)
+    assert found.returncode == 0, found.stderr
+    assert "arning" not in found.stderr
+    rows = json.loads(found.stdout)["rows"]
+    assert len([row for row in rows if not row.get("narrows")]) == 5
+    assert len(rows) >= 9
+    assert all(row["certified"] for row in rows)
 
 
 def test_a_point_whose_second_level_is_not_certified_keeps_what_the_first_came_to(monkeypatch):

@@ -13,10 +13,10 @@ from loomopt.studies.run.rows import Row, Side
 SCALE = FrontScale(("a", "b"), (1, 1), (0.0, 0.0), (1.0, 1.0))
 
 
-def row(point, b, a, slope=-1.0, active=("l1 min",), asked=None, certified=True, again=None, fine=False, parent=None):
-    """Return a row at (b, a); asked: how much of b it might have had."""
-    warm = {"axes": {"a": a, "b": b}, "active": [[label, "", 1] for label in active]}
-    warm |= {"again": again, "fine": fine, "near": None}
+def row(point, b, a, slope=-1.0, active=("l1 min",), asked=None, certified=True, again=None, parent=None, **more):
+    """Return a row at (b, a); asked: how much of b it might have had; more: what else it says of itself."""
+    warm: dict[str, object] = {"axes": {"a": a, "b": b}, "active": [[label, "", 1] for label in active]}
+    warm |= {"again": again, "fine": False, "near": None, **more}
     status = "optimal" if certified else "failed"
     place = {} if point < 2 else {"b": b if asked is None else asked}
     return Row(point, place, parent, status, None, {}, {}, {plan.sloped(("a", "b")): slope}, {}, certified, 0.0, warm)
@@ -39,7 +39,8 @@ def computed(answer, points=40):
     rows = [answered(0, 1.0), answered(1, 0.0)]
     while batch := plan.following(rows, SCALE, points):
         for each in batch:
-            rows.append(answered(len(rows), each.b, again=each.again, fine=each.fine, parent=each.near[0]))
+            more = {"again": each.again, "fine": each.fine, "parent": each.near[0], "steps": each.steps}
+            rows.append(answered(len(rows), each.b, **more))
     return rows
 
 
@@ -76,7 +77,8 @@ def test_a_row_that_was_lost_with_its_process_is_a_failed_row_and_not_asked_for_
     found = plan.following(rows, SCALE, 40)
     assert all(each.again is None for each in found)
     assert 0.6 not in [each.b for each in found]
-    assert plan.following([*ENDS, Row(2, {"b": 0.5}, 0, "failed", "it died")], SCALE, 3) == []
+    rest = plan.following([*ENDS, Row(2, {"b": 0.5}, 0, "failed", "it died")], SCALE, 3)
+    assert [(each.again, each.near) for each in rest] == [(1, (0,)), (0, (1,))]
 
 
 def test_a_point_that_was_missed_is_not_asked_for_again():
@@ -102,8 +104,10 @@ def test_either_side_of_a_change_is_solved_from_the_other_before_it_is_narrowed_
         row(4, 0.8, 0.2, active=("l2 max",)),
     ]
     found = plan.following(rows, SCALE, 5)
-    assert [(each.again, each.near, each.fine) for each in found] == [(2, (3,), False), (3, (2,), False)]
-    rows += [row(5, 0.3, 0.7, again=2, parent=3), row(6, 0.6, 0.4, active=("l2 max",), again=3, parent=2)]
+    pairs = [(1, 2), (2, 1), (2, 3), (3, 2), (3, 4), (4, 3), (4, 0), (0, 4)]
+    assert [(each.again, *each.near) for each in found] == pairs
+    assert all(each.steps == 1 and not each.fine for each in found)
+    rows += [row(5 + k, 0.5, 0.0, certified=False, again=again, parent=by) for k, (again, by) in enumerate(pairs)]
     (middle,) = plan.following(rows, SCALE, 5)
     assert middle.fine
     assert middle.b == pytest.approx(0.45)
@@ -159,7 +163,58 @@ def test_a_plan_ends():
     def answer(b):
         return b, 1 - b, -1.0, (f"l{math.floor(1000 * b)} min",)
 
-    assert len(computed(answer, points=10)) <= plan.MOST_MORE * 10 + plan.BATCH
+    rows = computed(answer, points=10)
+    asked = [each for each in rows if each.warm["again"] is None]
+    assert len(asked) <= plan.MOST_MORE * 10 + plan.BATCH
+    # The others are trials: each row from either neighbour, in one step and in short ones.
+    assert len(rows) <= 6 * len(asked)
+
+
+def two_basins(b, basin):
+    """Return what a basin comes to with so much of b: the second one is better from 0.55 on."""
+    return (b, 1.1 * (1 - b), -1.1) if basin == "l1 min" else (b, 2 * (0.8 - b) + 0.005, -2.0)
+
+
+def moved(points=6):
+    """Return the rows of a front whose points first all stand in the first basin, but for the end of least a.
+
+    A row that is tried from another one comes to the other's basin.
+    """
+    rows = [row(0, 0.8, 0.005, -2.0, active=("l2 max",)), row(1, 0.0, 1.1, -1.1)]
+    while batch := plan.following(rows, SCALE, points):
+        for each in batch:
+            basin = rows[each.near[0]].warm["active"][0][0] if each.steps else "l1 min"
+            b, a, slope = two_basins(each.b, basin)
+            stands = each.steps and a > plan.value(rows[each.again], "a") - plan.ALIKE
+            more = {"apart": list(each.near)} if stands and a > plan.value(rows[each.again], "a") + plan.ALIKE else {}
+            said = {"again": each.again, "fine": each.fine, "parent": each.near[0], "steps": each.steps, **more}
+            rows.append(row(len(rows), b, a, slope, (basin,), asked=each.b, certified=not stands, **said))
+    return rows
+
+
+def test_a_row_that_a_neighbours_design_beats_is_bettered_and_the_next_one_after_it():
+    front, _ = plan.spots(moved(), SCALE)
+    for spot in front:
+        best = min(two_basins(spot.b, basin)[1] for basin in ("l1 min", "l2 max"))
+        assert spot.a == pytest.approx(best, abs=1e-12), spot.b
+    assert sum(spot.active[0].side.limit == "l2" for spot in front) >= 3
+
+
+def test_a_basin_that_changes_is_a_jump_though_both_figures_pass_on_without_one():
+    rows = moved()
+    front, _ = plan.spots(rows, SCALE)
+    changes, gaps = plan.changes_and_gaps(front, SCALE, plan.basins_apart(rows))
+    (jump,) = [change for change in changes if change.kind == "jump"]
+    assert jump.at == pytest.approx(0.505 / 0.9, abs=1e-9)
+    assert jump.limits == (Side("l1", "min"), Side("l2", "max"))
+    assert gaps == []
+
+
+def test_a_row_that_comes_out_again_but_for_rounding_keeps_its_place():
+    rows = [*ENDS, row(2, 0.5, 0.4), row(3, 0.5 - 1e-12, 0.4 - 1e-12, again=2, parent=0)]
+    assert [spot.point for spot in plan.spots(rows, SCALE)[0]] == [1, 2, 0]
+    rows = [*ENDS, row(2, 0.5, 0.4), row(3, 0.5 + 1e-12, 0.3, again=2, parent=0)]
+    assert [spot.point for spot in plan.spots(rows, SCALE)[0]] == [1, 3, 0]
 
 
 def test_ends_that_are_one_have_no_width():
