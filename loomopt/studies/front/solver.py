@@ -222,18 +222,15 @@ class Solver:
         return Moved(point, self._figure(self.axes[first], search.program, point.x), led)
 
     def rests(self, asking: Asking, point: Point) -> bool:
-        """Say whether a point is a certified optimum of a program, as good or bad as others may be, up to its cap.
+        """Say whether a point is a certified optimum of a program, as good or bad as others may be.
 
-        What keeps clear of the cap on the other axis is only the neighbour's own design.
+        Its cap on the other axis must have a price: else it is only the neighbour's own design, or nothing moves it.
         """
-        search, other = self._begun(asking), 1 - asking.first
-        cap, objective = asking.caps[other], self.axes[other].objective
-        merit = objective.merit(sampled(search.program.model, {**search.program.parameters, **point.x}))
-        if cap is None or abs(merit - cap) > ACTIVE * objective.scale:
-            return False
+        search = self._begun(asking)
         at = replace(point, structure=search.program.structure)
         candidate = Candidate(at, objectives(search.program, point.x))
-        return judged(replace(search, candidates=(candidate,))).passed
+        search = judged(replace(search, candidates=(candidate,)))
+        return search.passed and self._priced(search, asking)
 
     @lazy
     def _peaks(self) -> tuple[str, ...]:

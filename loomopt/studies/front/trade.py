@@ -207,7 +207,8 @@ class Trade:
         """Return what a trial must beat as JSON data: an axis of a row, SI, and by how much; the neighbour it is from.
 
         begin: its second axis, SI; done: whether the row was solved from it before, so that only what became of its
-        design is asked.
+        design is asked; inner: whether it is no end. What is an end's by chance, such as the radius of no mass, need
+        not serve beside it, and tells nothing of another basin.
         """
         axis = each.end or 0
         return {
@@ -215,6 +216,7 @@ class Trade:
             "slack": plan.ALIKE * scale.width[axis],
             "begin": plan.value(by, self.axes[1]),
             "done": each.steps == 1 and by.point in plan.solved_from(row),
+            "inner": by.warm.get("end") is None,
         }
 
     @property
@@ -348,7 +350,8 @@ class Trade:
 
         What kept to its basin, is worse and an optimum itself is another design.
         """
-        worse = end is not None and end.led and self._excess(task, asking.first, end.figure) > 0.0
+        told = end is not None and end.led and task.ask["trial"]["inner"]
+        worse = told and end is not None and self._excess(task, asking.first, end.figure) > 0.0
         apart = worse and end is not None and self.solver.rests(asking, end.point)
         warm = {"apart": list(task.ask["near"]) if apart else []}
         return Met(Reached("uncertified", "a neighbour's design is no better there", warm=warm), asking, task.place)
