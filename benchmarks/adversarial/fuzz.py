@@ -17,6 +17,7 @@ import json
 import math
 import os
 import random
+import re
 import sys
 import tempfile
 import tomllib
@@ -183,15 +184,15 @@ def paths(table: Mapping[str, Any], start: tuple[str, ...] = ()) -> list[tuple[s
     return [(*start, name) for name in table] + inner
 
 
-def rescaled(draw: random.Random, value: object) -> str:
-    """Return a quantity of the same unit and of another size."""
+def rescaled(draw: random.Random, value: object, mild: bool = False) -> str:
+    """Return a quantity of the same unit and of another size; mild: of nearly the same."""
     number, _, unit = str(value).partition(" ")
     try:
         size = float(number) or 1.0
     except ValueError:
         size = 1.0
-    mild, wild = draw.uniform(0.9, 1.1), (draw.uniform(-1.0, 2.0), 10.0 ** draw.uniform(-60, 60), 0.0)
-    factor = mild if draw.random() < 0.6 else draw.choice(wild)
+    near, wild = draw.uniform(0.9, 1.1), (draw.uniform(-1.0, 2.0), 10.0 ** draw.uniform(-60, 60), 0.0)
+    factor = 0.8 + 0.2 * near if mild else near if draw.random() < 0.6 else draw.choice(wild)
     return f"{size * factor!r} {unit}".rstrip(" ")
 
 
@@ -325,8 +326,12 @@ def files(draw: random.Random, folder: Path, sources: Mapping[str, Mapping[str, 
     if draw.random() < 0.3:  # what is off is on
         for name, own in document.pop("available", {}).items():
             document.setdefault("effects", {}).setdefault(name, own)
-    for _ in range(draw.choice((1, 1, 2, 3))):
-        spoil(draw, document, names(document))
+    if draw.random() < 0.3:  # another machine: dimensions are a little different
+        for path in draw.sample(_quantities(document), 2):
+            _at(document, path[:-1])[path[-1]] = rescaled(draw, _at(document, path), mild=True)
+    else:
+        for _ in range(draw.choice((1, 1, 2, 3))):
+            spoil(draw, document, names(document))
     text = "\n".join(f"{_text(name)} = {toml(value)}" for name, value in document.items())
     (folder / "scene.toml").write_bytes(text.encode("utf-8", "surrogatepass"))
     said = [called(["show", "scene.toml"]), called(["evaluate", "scene.toml", "--json"])]
@@ -347,7 +352,13 @@ def names(document: Mapping[str, Any]) -> list[str]:
     return sorted({*keys, *(text for text in texts if text.isidentifier())})
 
 
-def _at(table: Any, path: tuple[str, ...]) -> object:
+def _quantities(document: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Return the paths of the numbers of a scene's mechanism, operation and effects that have a unit."""
+    tables = [path for path in paths(document) if path[0] in ("mechanism", "operation", "effects")]
+    return [path for path in tables if re.match(r"-?[0-9.]+ [^\W\d]", str(_at(document, path)))]
+
+
+def _at(table: Any, path: tuple[str, ...]) -> Any:
     for name in path:
         table = table[name]
     return table

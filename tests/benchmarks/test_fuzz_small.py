@@ -8,7 +8,7 @@ import pytest
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 
-COUNTS = {"scenes": 150, "designs": 100, "tables": 100, "calls": 30}
+COUNTS = {"scenes": 150, "files": 30, "linkages": 40, "designs": 100, "tables": 100, "calls": 30}
 
 
 @pytest.fixture(scope="module")
@@ -22,6 +22,14 @@ def test_what_is_spoilt_is_read_or_refused(fuzz, kind):
     assert raised == {}
     assert set(seen) == {"read", "refused"}
     assert min(seen.values()) >= COUNTS[kind] // 10, "it must reach what is read as well as what is refused"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["files", "linkages"])
+def test_every_spoilt_file_of_the_full_study_is_read_or_refused(fuzz, kind):
+    seen, raised = fuzz.fuzz(kind, fuzz.FULL[kind], seed=0)
+    assert raised == {}
+    assert min(seen.values()) >= fuzz.FULL[kind] // 10
 
 
 def test_the_same_seed_and_number_are_the_same_input(fuzz):
