@@ -335,14 +335,13 @@ def files(draw: random.Random, folder: Path, sources: Mapping[str, Mapping[str, 
     text = "\n".join(f"{_text(name)} = {toml(value)}" for name, value in document.items())
     (folder / "scene.toml").write_bytes(text.encode("utf-8", "surrogatepass"))
     said = [called(["show", "scene.toml"]), called(["evaluate", "scene.toml", "--json"])]
-    assert len(set(said)) == 1, f"show and evaluate differ: {said}"
-    if said[0] == "read":
+    if said[-1] == "read":
         off = sorted(document["available"]) if isinstance(document.get("available"), dict) else []
         rest = [["evaluate", "scene.toml", *(word for name in off for word in ("--with", name))]]
         rest += [["show", "scene.toml", "--equations"], ["simulate", "scene.toml", "--out", "curves.csv"]]
         rest += [["solve", "scene.toml", "--starts", "2"]] if draw.random() < SOLVED else []
         called(draw.choice(rest))
-    return said[0]
+    return said[-1]
 
 
 def names(document: Mapping[str, Any]) -> list[str]:
