@@ -2,16 +2,20 @@
 
 import functools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import loomopt as lo
 from loomopt.base.errors import BadInput
+from loomopt.interface.text import sensitivity as text
 from loomopt.jobs import registry
 from loomopt.solving import engine
 from loomopt.studies.sensitivity import study
 from loomopt.studies.sensitivity.active import least
 
+RAMS = Path(__file__).parents[2] / "solving" / "answer" / "cases" / "mirrored_rams.toml"
 DIGITS = 2e-9
 """Of a derivative with ten digits: differences of the fourth order."""
 RANGE = 2e-5
@@ -140,6 +144,56 @@ def test_how_far_prices_of_the_shedding_hold():
     assert ranges["travel"] == pytest.approx((-7.2410e-3, 8.4256e-3), rel=1e-5)
     rpm = 2 * math.pi / 60
     assert ranges["speed"] == pytest.approx((-59.998 * rpm, 59.998 * rpm), rel=1e-5)
+
+
+def test_another_angle_of_the_same_limit_ends_a_price():
+    """Beyond 18 361.28 N the roller lifts off at the beginning of the cycle first, where a newton costs 12.5 N/m."""
+    (price,) = [price for price in found("shedding").prices if price.limit == "N_min"]
+    assert price.range == (0.0, pytest.approx(18361.28, abs=6e-3))
+    assert price.ends == ("it is out of range", "N_min is reached at 0 deg too")
+
+
+@pytest.mark.slow
+def test_another_angle_ends_it_at_the_printed_travel_too():
+    (price,) = [price for price in found("shedding-printed-travel").prices if price.limit == "N_min"]
+    assert price.range == (0.0, pytest.approx(17442.74, abs=6e-3))
+
+
+def test_a_price_range_that_is_0_is_told_as_0():
+    (grid,) = [part for part in text.parts(found("shedding")) if getattr(part, "columns", ("",))[0] == "price of"]
+    (line,) = [line for line in grid.lines if line[0] == "N_min min"]
+    assert line[1] == "0"
+
+
+@functools.cache
+def rams(target):
+    answer = lo.solve(lo.load(RAMS), target=target)
+    return study.conducted(study.planned(lo.load(RAMS), answer))
+
+
+def test_bounds_that_bind_only_together_have_derivatives_of_their_own_on_each_side():
+    """Loosened alone a bound gains nothing; tightened it costs what both are worth."""
+    rows = {(row.number, row.side): row.value for row in rams("torque").rows if row.of == "peak_torque"}
+    for name in ("left", "right"):
+        assert rows[f"bounds.{name}.max", "up"] == 0.0
+        assert rows[f"bounds.{name}.max", "down"] == pytest.approx(-0.19781344543, rel=1e-8)
+    for price in rams("torque").prices:
+        assert price.worth == 0.0
+        assert price.range == (0.0, math.inf)
+        assert price.ends[0] == "the price is 0.000198 N*m per mm there"
+
+
+def test_prices_of_two_objectives_each_follow_their_own():
+    """Of two angles the most of one and then of the other is sought: cos mu = r / rod."""
+    rows = {(row.number, row.of): row.value for row in rams("angles").rows}
+    slope = 0.05 / 0.3**2 / math.sqrt(1 - (0.05 / 0.3) ** 2)
+    for name, of in (("right", "mu.ram1"), ("left", "mu.ram2")):
+        assert rows[f"bounds.{name}.max", of] == pytest.approx(slope, rel=1e-8)
+        (price,) = [price for price in rams("angles").prices if price.limit == name]
+        for end, moved in zip(price.range, (1.1, 0.9), strict=True):
+            rod = 0.3 + end
+            there = 0.05 / rod**2 / math.sqrt(1 - (0.05 / rod) ** 2)
+            assert there / slope == pytest.approx(moved, rel=1e-7)
 
 
 @pytest.mark.slow
