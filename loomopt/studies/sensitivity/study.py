@@ -255,7 +255,7 @@ def conducted(study: Study, on_step: Callable[[str], None] | None = None) -> Fou
         return Found(study.scene, study.target, study.answer, (), (), why, {}, {})
     for price in study.answer.binding if held else ():
         say(f"following the price of {price.limit}")
-        found = _priced(study, chosen.get(_key_of(study, price) or "", {}), price)
+        found = _priced(study, held, chosen.get(_key_of(study, price) or "", {}), price)
         prices += [found] if found else []
     kinds = {key: each.quantity.kind for key, each in study.keys.items()}
     sizes = {key: study.size(key) for key in study.keys}
@@ -426,17 +426,19 @@ NOTHING = 1e-8
 # Prices.
 
 
-def _priced(study: Study, chosen: Mapping[Side, Held], price: Price) -> PriceRange | None:
+def _priced(study: Study, sets: Sequence[Held], chosen: Mapping[Side, Held], price: Price) -> PriceRange | None:
     """Return a price with its range; None for a limit whose value is no number of the scene.
 
-    chosen: what holds the optimum where the number grows, and where it falls.
+    chosen: what holds the optimum where the number grows, and where it falls; sets: all active sets that do, the first
+    of which that meets the limit is followed on a side that has none of its own.
     """
     key = _key_of(study, price)
     places = _places(study, price)
     if key is None or not places:
         return None
     figure, worth = next(iter(price.worth.items()))
-    ends = {side: _price_end(study, chosen.get(side), key, price, side) for side in SIDES_OF_A_NUMBER}
+    usual = next((each for each in sets if {*places} & {*each.met}), None)
+    ends = {side: _price_end(study, chosen.get(side, usual), key, price, side) for side in SIDES_OF_A_NUMBER}
     reach = (0.0 - ends["down"][0], ends["up"][0])
     why = (ends["down"][1], ends["up"][1])
     return PriceRange(price.limit, price.side, worth, price.value, reach, why, price.unit[figure])
@@ -485,7 +487,7 @@ def _price_end(study: Study, held: Held | None, key: str, price: Price, side: Si
     if abs(now - worth) > PRICE_MOVED * size:
         return 0.0, f"the price is {Words(study.scene).price_reading(figure, price.limit, now)} there"
     if held is None:
-        return 0.0, "it is out of range" if study.ahead(key) else "the optimum cannot be followed"
+        return 0.0, "the optimum cannot be followed"
 
     def beyond(there: Walked) -> tuple[float, str]:
         """Return by how much a price has moved beyond what counts, negative where it has not."""
@@ -549,7 +551,12 @@ def _holding(study: Study, chosen: Mapping[Side, Held], key: str) -> Holding | N
             return None
         found.append(_end(study, chosen[side], key, abs(here), 1.0 if side == "up" else -1.0))
     up, down = found
-    return Holding(key, (here - down[0], here + up[0]), (down[1], up[1]))
+    low, high = (0.0 if abs(end) <= AS_NOTHING * abs(here) else end for end in (here - down[0], here + up[0]))
+    return Holding(key, (low, high), (down[1], up[1]))
+
+
+AS_NOTHING = 1e-6
+"""Share of a number below which the end of its range is 0: near it prices vanish into rounding."""
 
 
 class Walked(NamedTuple):
