@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 from support import toy
 
 from loomopt.solving.certificate.certificate import certify
@@ -116,15 +117,32 @@ def test_an_optimum_off_along_one_axis_never_passes(problem, axis, step):
 @fixed
 @given(quadratics())
 def test_prices_said_hold_the_slope(problem):
-    """Worths of rows and bounds balance the gradient, whichever of several equal choices they are."""
+    """Worths balance the gradient where they are unique; else each is the least of a linear program's multipliers."""
     program = problem.program()
     certificate = certify(program, problem.point(problem.best), ACCURACY)
     pull = problem.hessian @ problem.best + problem.gradient
+    if not certificate.prices_unique:
+        _check_least(problem, certificate, pull)
+        return
     for binding in certificate.binding:
         name = binding.limit.row
         slope = problem.rows[int(name[1:])] if name[0] == "g" else np.eye(len(pull))[int(name[1:])]
         pull = pull + binding.side * binding.worth * slope
     assert np.abs(pull).max() == pytest.approx(0.0, abs=1e-6)
+
+
+def _check_least(problem, certificate, pull):
+    """Check what each limit is worth alone beside the least multiplier that SciPy finds."""
+    touched = {
+        (f"g{k}", 1): row for k, row in enumerate(problem.rows) if row @ problem.best >= problem.bound[k] - 1e-12
+    }
+    for k, ends in enumerate(problem.box):
+        unit = np.eye(len(pull))[k]
+        touched |= {(f"x{k}", s): s * unit for s, end in zip((-1, 1), ends, strict=True) if end == problem.best[k]}
+    for binding in certificate.binding:
+        cost = [float(key == (binding.limit.row, binding.side)) for key in touched]
+        found = linprog(cost, A_eq=np.array(list(touched.values())).T, b_eq=-pull)
+        assert binding.worth == pytest.approx(found.fun, abs=1e-7)
 
 
 @settings(fixed, max_examples=25)
