@@ -54,7 +54,9 @@ def given(model: JobModel, values: Values) -> Given:
         given_keys = [key for key in keys(effect.own) if not told or owned(effect, key) in model.known]
         own[effect.name] = own_values(effect, words, given_keys, taken)
         taken |= {str(value) for key, value in own[effect.name].items() if key not in words}
-    if not told and not any(check.joints for check in model.checks):
+    asks = any(check.joints for check in model.checks)
+    asks = asks or (told and any(isinstance(load, Load) and load.inside for load in model.loads))
+    if not asks:
         return Given(values, own)
     # Where a formula asks whether a number is given, those are that the scene gives.
     there = {owned(effect, key): value for effect in model.effects for key, value in own[effect.name].items()}

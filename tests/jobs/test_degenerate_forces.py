@@ -88,7 +88,7 @@ def test_without_a_load_pins_carry_nothing_or_say_what_is_missing(name):
 def test_a_linkage_without_a_load_carries_nothing():
     scene = lo.load("sixbar-sley").with_effect("joint_forces")
     document = scene.without_effect(*(effect for effect in scene.effects if effect not in ("joint_forces", "inertia")))
-    found, undefined = forces_of(document.set("effects.inertia.J", "1e-30 kg*m^2"))
+    found, undefined = forces_of(document.set("effects.inertia", {"J": "1e-30 kg*m^2"}))
     assert set(undefined) == {"friction_loss"}
     assert all(value == pytest.approx(0.0, abs=1e-24) for value in found.values())
 

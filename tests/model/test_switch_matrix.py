@@ -60,8 +60,14 @@ CHECKED = {
     ],
     "speed_fluctuation": ["omega [rad/s]", "motor_torque [N*m]"],
 }
-BY_INERTIA = {"shedding": ["shaking_force [N]"], "beatup": ["shaking_moment [N*m]"]}
+BY_INERTIA = {"shedding": forces("shaking_force"), "beatup": ["shaking_moment [N*m]"]}
 """What joint_forces tells only beside the effect inertia."""
+
+
+def _is_no_vector(column):
+    return not column.startswith("shaking_force")
+
+
 CORNERS = {"resistance 0": 2, "bearing_friction 0": 2, "tape_friction 0": 4, "warp_tension 0": 2}
 """Corners that an effect's example brings; the packaged head turns four times."""
 UNREAD = {
@@ -250,7 +256,9 @@ def test_curves_have_columns_of_the_active_effects_only(combination):
     names = [effect.name for effect in effects_of(combination)]
     told = {f"{each} joint_forces": BY_INERTIA[each] for each in BY_INERTIA if "inertia" in names}
     keys = [key for name in names for key in (name, f"{job} {name}")]
-    checked = [column for key in keys for column in (*CHECKED.get(key, []), *told.get(key, []))]
+    # Vectors stand before sizes alone.
+    known = [(*CHECKED.get(key, []), *told.get(key, [])) for key in keys]
+    checked = [column for own in known for column in (own if job != "shedding" else sorted(own, key=_is_no_vector))]
     expected += dict.fromkeys(checked)
     assert list(table_of(combination)) == expected + (AFTER[job].split(", ") if job in AFTER else [])
 

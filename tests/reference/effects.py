@@ -332,7 +332,7 @@ class Frame:
         return self.couple(theta)
 
     def shaking_force(self, own, theta):
-        return -MP.mpf(PACKAGED["M"]) * slope(self.X, theta, 2) * SPEED**2
+        return abs(MP.mpf(PACKAGED["M"]) * slope(self.X, theta, 2) * SPEED**2)
 
     def damping(self, own, theta):
         return own["C"] * slope(self.X, theta) * SPEED

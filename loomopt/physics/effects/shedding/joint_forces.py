@@ -94,13 +94,16 @@ class CamForces:
         )
 
     @lazy
-    def shaking_force(self) -> Number:
-        """Of frame and spring, along X."""
+    def shaking_force(self) -> "Vector":
+        """Of frame and spring on the loom, N; y upward, against X."""
+        from loomopt.physics.mechanisms.dyad import Vector
+
         moving = [own.second for own, _ in self.loading.masses]
         total = moving[0]
         for own in moving[1:]:
             total = total + own
-        return -total * self.pose.acceleration
+        force = total * self.pose.acceleration
+        return Vector(0 * force, force)
 
     def heading(self, part: str) -> "Vector":
         """Return the unit direction of the cam, x where it begins to rise, or of the lever, to its roller."""
@@ -133,8 +136,8 @@ EFFECT = Check(
     own=pins.own(PINS),
     rank=95,
     joints=forces,
-    vectors=("lever_pivot_force",),
-    scalars=(*PUSHES[:-1], "shaking_force"),
+    vectors=("lever_pivot_force", "shaking_force"),
+    scalars=PUSHES[:-1],
     sides={
         "roller_force": ("cam", "lever"),
         "cam_shaft_force": ("frame", "cam"),
