@@ -257,8 +257,8 @@ def test_curves_have_columns_of_the_active_effects_only(combination):
     told = {f"{each} joint_forces": BY_INERTIA[each] for each in BY_INERTIA if "inertia" in names}
     keys = [key for name in names for key in (name, f"{job} {name}")]
     # Vectors stand before sizes alone.
-    known = [(*CHECKED.get(key, []), *told.get(key, [])) for key in keys]
-    checked = [column for own in known for column in (own if job != "shedding" else sorted(own, key=_is_no_vector))]
+    every = [(*CHECKED.get(key, []), *told.get(key, [])) for key in keys]
+    checked = [column for own in every for column in (own if job != "shedding" else sorted(own, key=_is_no_vector))]
     expected += dict.fromkeys(checked)
     assert list(table_of(combination)) == expected + (AFTER[job].split(", ") if job in AFTER else [])
 
