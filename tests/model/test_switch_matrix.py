@@ -190,12 +190,18 @@ def offered(job):
     return frozenset().union(*(registry.find(job).numbers(scene_of(last)) for last in lasts))
 
 
+LOOKED_FOR = ("rod_inertia.m2", "rocker_inertia.m3", "gravity.tilt")
+"""Numbers by whose presence gravity and the forces in joints of the beat-up know what weighs: where their effect is off
+no scene has them, and they are not offered."""
+
+
 @functools.cache
 def read_by(combination):
     """Return the names of all symbols in the model's graphs: quantities on every piece, rows, corners."""
     sampled = sampler_of(combination)
     model, system, phi = sampled.model, systems.casadi(), ca.SX.sym("phi")
-    symbols = {name: ca.SX.sym(name) for name in offered(combination.job)}
+    off = {name for name in LOOKED_FOR if name.split(".")[0] not in combination.names}
+    symbols = {name: ca.SX.sym(name) for name in offered(combination.job) if name not in off}
     motors = [effect for effect in effects_of(combination) if isinstance(effect, Speed)]
     if motors:  # the formulas of all else are those at constant speed
         model = registry.find(combination.job).model(scene_of(combination))
@@ -250,7 +256,9 @@ def test_curves_have_columns_of_the_active_effects_only(combination):
     known = "speed" in scene_of(combination).operation
     expected += IN_TIME[job].split(", ") if known else []
     expected += [column for load in loads if isinstance(load, State) for column in load.columns]
-    expected += [f"{name} [{unit}]" for name in names]
+    # Beside its output term gravity has one inside the drive, where the rod has a mass.
+    inside = {"gravity": ["gravity_drive [N*m]"]} if job == "beatup" and "rod_inertia" in combination.names else {}
+    expected += [column for name in names for column in (f"{name} [{unit}]", *inside.get(name, []))]
     expected += [f"{force} [{unit}]"] if output else []
     expected += ([TORQUE[job], "motor_power [W]"] if known else [TORQUE[job]]) if names else []
     names = [effect.name for effect in effects_of(combination)]
