@@ -1,4 +1,4 @@
-# make solve: balance the packaged loom.   make test: the suite; make slow: its slow studies.   All make .venv first.
+# make solve: balance the packaged loom.   make test: the suite; make slow: its slow studies; make whole: those in full size.   All make .venv first.
 PYTHON ?= python3
 BIN := .venv/bin
 SUITE := $(BIN)/python -m pytest -n auto --dist loadfile --durations 10
@@ -10,7 +10,7 @@ COVERING := --cov loomopt --cov-report=
 PORT ?= 8000
 TOTAL = @echo "Coverage by $(1): $$($(BIN)/python -m coverage report --format=total) % of the lines of loomopt"
 
-.PHONY: solve test slow coverage lint types docs docs-open outputs notebooks benchmark locked clean
+.PHONY: solve test slow whole coverage lint types docs docs-open outputs notebooks benchmark locked clean
 
 solve: .venv/installed
 	$(BIN)/loomopt solve beatup --target balance
@@ -20,7 +20,10 @@ test: .venv/installed-test
 	$(if $(COVER),$(call TOTAL,make test))
 
 slow: .venv/installed-test
-	$(SUITE) -m slow -rs
+	$(SUITE) -m "slow and not whole" -rs
+
+whole: .venv/installed-test
+	$(SUITE) -m whole -rs
 
 coverage: .venv/installed-test
 	$(SUITE) -m "not slow" $(COVERING) $(COVERED)

@@ -37,18 +37,24 @@ def no_line_of_progress(monkeypatch):
 
 
 def pytest_collection_modifyitems(items):
-    """Leave a few cases of a test that says so quick, spread so that values of several columns change together."""
+    """Sort the cases of a test marked `few` into quick, slow and whole ones.
+
+    The quick and the slow ones are spread over all, so that values of several columns change together.
+    """
     tests: dict[str, list[pytest.Item]] = {}
     for item in items:
         if item.get_closest_marker("few"):
             tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
     for cases in tests.values():
-        count, of = cases[0].get_closest_marker("few").args[0], len(cases)
-        step = next(step for step in itertools.count(of // count + 1) if math.gcd(step, of) == 1)
-        quick = {k * step % of for k in range(count)}
+        marker, of = cases[0].get_closest_marker("few"), len(cases)
+        (count,), slow = marker.args, marker.kwargs.get("slow", of)
+        step = next(step for step in itertools.count(of // max(count, 1) + 1) if math.gcd(step, of) == 1)
+        ranks = {k * step % of: k for k in range(of)}
         for place, item in enumerate(cases):
-            if place not in quick:
+            if ranks[place] >= count:
                 item.add_marker(pytest.mark.slow)
+            if ranks[place] >= count + slow:
+                item.add_marker(pytest.mark.whole)
 
 
 def pytest_collection_finish():

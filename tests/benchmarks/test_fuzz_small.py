@@ -26,6 +26,15 @@ def test_what_is_spoilt_is_read_or_refused(fuzz, kind):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["files", "linkages"])
+def test_spoilt_files_are_read_or_refused(fuzz, kind):
+    seen, raised = fuzz.fuzz(kind, 200, seed=1)
+    assert raised == {}
+    assert min(seen.values()) >= 200 // 10
+
+
+@pytest.mark.slow
+@pytest.mark.whole
+@pytest.mark.parametrize("kind", ["files", "linkages"])
 def test_every_spoilt_file_of_the_full_study_is_read_or_refused(fuzz, kind):
     seen, raised = fuzz.fuzz(kind, fuzz.FULL[kind], seed=0)
     assert raised == {}

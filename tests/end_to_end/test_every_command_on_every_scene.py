@@ -57,19 +57,14 @@ ALWAYS = (("show",), ("show", "--equations"), ("evaluate", "--json"), ("simulate
 
 
 def subjects():
-    """Return, as pytest parameters: a scene, of a package or a template, and the effects that are put on.
-
-    Of several effects that a scene may put on, those alone are slow cases, all together a quick one.
-    """
+    """Return, as pytest parameters: a scene, of a package or a template, and the effects that are put on."""
     found = []
     for name in (*packaged.problems(), *(f"{job}.toml" for job in sorted(registry.own_names()))):
         template = name.endswith(".toml")
         read = registry.scene(tomllib.loads(registry.template(name[:-5]))) if template else registry.load(name)
         alone = available(read)
         sets = ["", *alone, *([" ".join(alone)] if len(alone) > 1 else [])]
-        for on in sets:
-            marks = pytest.mark.slow if on in alone and len(alone) > 1 else ()
-            found.append(pytest.param(name, on, id=f"{name} with {on}" if on else name, marks=marks))
+        found += [pytest.param(name, on, id=f"{name} with {on}" if on else name) for on in sets]
     return found
 
 
@@ -112,6 +107,7 @@ def place(tmp_path, monkeypatch):
     return written
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(("name", "on"), SUBJECTS)
 def test_cheap_commands(name, on, place, capsys):
     where = place(name)
@@ -120,7 +116,7 @@ def test_cheap_commands(name, on, place, capsys):
         assert status == 0 or words not in ALWAYS or on, words
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(2, slow=14)
 @pytest.mark.parametrize(("name", "on"), SUBJECTS)
 def test_pictures(name, on, place, capsys):
     where = place(name)
@@ -128,7 +124,7 @@ def test_pictures(name, on, place, capsys):
         called(words, where, on, capsys)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1, slow=8)
 @pytest.mark.parametrize(("name", "on"), SUBJECTS)
 def test_one_solve(name, on, place, capsys):
     where = place(name)
@@ -143,7 +139,7 @@ def test_one_solve(name, on, place, capsys):
                 called(made, "today" if made[0] == "compare" else "found/answer.json", "", capsys)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, slow=5)
 @pytest.mark.parametrize(("name", "on"), SUBJECTS)
 def test_studies(name, on, place, capsys):
     where = place(name)

@@ -143,12 +143,8 @@ MOMENTS = [
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="there are no groups of processes here")
-@pytest.mark.parametrize(
-    ("study", "count", "wait", "number", "group"),
-    slow.after(
-        2, [("sweep", "2", "0.3", signal.SIGTERM, "alone"), ("pareto", "2", "0.3", signal.SIGINT, "group"), *MOMENTS]
-    ),
-)
+@pytest.mark.few(2, slow=10)
+@pytest.mark.parametrize(("study", "count", "wait", "number", "group"), MOMENTS)
 def test_what_stops_a_study_whose_workers_start_leaves_no_traceback(tmp_path, study, count, wait, number, group):
     script = tmp_path / "study.py"
     script.write_text(STARTING)

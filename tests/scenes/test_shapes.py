@@ -131,6 +131,7 @@ def test_values_of_a_wrong_shape_are_read_or_refused(job):
 
 
 @pytest.mark.slow
+@pytest.mark.whole
 @pytest.mark.parametrize("job", JOBS)
 def test_every_value_of_a_wrong_shape_is_read_or_refused(job):
     raw = document(job)

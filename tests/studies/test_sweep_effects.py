@@ -107,7 +107,7 @@ def test_five_rows_with_an_effect_on_are_what_solves_give(job, name):
     assert rows_that_differ(scene, {key: f"{first}:{last}:{5 * step} {unit}"}) == {}
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, slow=8)
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize(("job", "name"), CASES)
 def test_every_row_with_an_effect_on_is_what_a_solve_gives(job, name, axis):

@@ -78,7 +78,7 @@ def test_prices_of_a_root_are_those_of_the_figure():
     assert checked(lo.load(LEAST_RMS)) == 8
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, slow=3)
 @pytest.mark.parametrize("problem", sorted(problems()))
 def test_every_packaged_scene(problem):
     checked(registry.load(problem))

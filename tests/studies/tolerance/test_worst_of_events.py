@@ -79,11 +79,12 @@ def test_a_four_bar_with_a_pulse_about_its_front_is_decided():
 
 
 @pytest.mark.slow
-def test_of_sixty_random_linkages_fifty_are_decided():
+@pytest.mark.parametrize(("count", "fewest"), [(6, 5), pytest.param(60, 50, marks=pytest.mark.whole)])
+def test_of_random_linkages_five_in_six_are_decided(count, fewest):
     decided = 0
-    for scene in scenes(60):
+    for scene in scenes(count):
         worst = lo.tolerance(scene, samples=16, worst=True).as_dict()["worst"]
         decided += all(each["proven"] for each in worst.values())
         for each in worst.values():
             assert not each["proven"] or each["min"] <= each["found"][0] <= each["found"][1] <= each["max"]
-    assert decided >= 50
+    assert decided >= fewest
