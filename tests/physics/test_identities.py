@@ -42,7 +42,11 @@ NUMBERS = {
     "r4": 0.045,
     "inertia.J4": 0.62,
     "resistance.pulse": 0.52,
+    "crank.mass": 2.5,
+    "crank.centre": 0.012,
     "rocker_inertia.J3": 0.05,
+    "rocker_inertia.m3": 6.0,
+    "rocker_inertia.s3": 0.0775,
     "counterweight_inertia.JS": 0.01,
     "rod_inertia.m2": 4.0,
     "rod_inertia.s2": 0.03,
@@ -69,9 +73,14 @@ def sized(lengths):
     return NUMBERS | dict(zip(("l1", "l2", "l3", "l4"), lengths, strict=True))
 
 
+def in_scene(names, numbers):
+    """Return the numbers that a scene with these effects has: none of an effect that is off."""
+    return {name: value for name, value in numbers.items() if name.split(".")[0] not in {*BEATUP} - {*names}}
+
+
 def torques(names, numbers, phi, rod="exact", omega_dot=None, system=systems.FLOAT):
     """Return M3 and Md of the product at a crank angle, rad."""
-    found = model(names, rod)
+    found, numbers = model(names, rod), in_scene(names, numbers)
     given_ = found.given(system, {name: system.number(value) for name, value in numbers.items()})
     plain = found.given(systems.FLOAT, numbers)
     cornered = {load.name: load for load in found.loads if load.corners}
@@ -128,7 +137,18 @@ class Machine:
         if "gravity" in self.names:
             direction = self.positions(phi)[2] + n["gravity.offset"] + n["gravity.tilt"]
             heights = n["m4"] * n["r4"] * MP.sin(direction) + n["m4e"] * n["r4e"] * MP.sin(direction + MP.pi)
-            found += MP.mpf("9.80665") * heights
+            found += MP.mpf("9.80665") * (heights + self.lifted(phi))
+        return found
+
+    def lifted(self, phi):
+        """Return mass times height of crank, rocker and rod, kg·m; of the two of an effect only where it is on."""
+        n, tilt = self.number, self.number["gravity.tilt"]
+        psi, _, *_, x, y = self.state(phi)
+        found = n["crank.mass"] * n["crank.centre"] * MP.sin(MP.mpf(phi) + tilt)
+        if "rocker_inertia" in self.names:
+            found += n["rocker_inertia.m3"] * n["rocker_inertia.s3"] * MP.sin(psi + tilt)
+        if "rod_inertia" in self.names:
+            found += n["rod_inertia.m2"] * (x * MP.sin(tilt) + y * MP.cos(tilt))
         return found
 
     def losses(self, phi):
@@ -233,9 +253,14 @@ def lagrange(names, rod):
     elif "rod_inertia" in names:
         turning = sp.asin((c[1] - b[1]) / l2)
         kinetic += mass * speed2(b + ratio * (c - b)) / 2 + s["rod_inertia.JS2"] * speed2([turning]) / 2
-    moment = s["m4"] * s["r4"] - s["m4e"] * s["r4e"]
-    height = sp.sin(psi + s["gravity.offset"] + s["gravity.tilt"])
-    potential = sp.Rational("9.80665") * moment * height if "gravity" in names else sp.Integer(0)
+    tilt, centre = s["gravity.tilt"], b + ratio * (c - b)
+    lifted = (s["m4"] * s["r4"] - s["m4e"] * s["r4e"]) * sp.sin(psi + s["gravity.offset"] + tilt)
+    lifted += s["crank.mass"] * s["crank.centre"] * sp.sin(phi + tilt)
+    if "rocker_inertia" in names:
+        lifted += s["rocker_inertia.m3"] * s["rocker_inertia.s3"] * sp.sin(psi + tilt)
+    if "rod_inertia" in names:
+        lifted += mass * (centre[0] * sp.sin(tilt) + centre[1] * sp.cos(tilt))
+    potential = sp.Rational("9.80665") * lifted if "gravity" in names else sp.Integer(0)
     on_rocker = sp.Integer(0)
     if "resistance" in names:
         on_rocker += inside * s["M0"] * sp.cos(sp.pi * (phi - beta) / s["resistance.pulse"])

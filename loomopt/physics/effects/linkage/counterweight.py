@@ -29,7 +29,7 @@ def force(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: N
 
 def applied(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> list[Applied]:
     """Return what the mass resists with, in its place."""
-    if not pose.output.carrier:
+    if pose.output.carrier == "":
         return []
     at = opposite(maths, pose, own["radius"], own.get("angle"))
     return [resistance_of_mass(pose, own["mass"], own["radius"], at)]

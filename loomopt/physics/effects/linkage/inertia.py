@@ -54,7 +54,7 @@ def force(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: N
 
 def applied(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> list[Applied]:
     """Return what the mass resists with, in its centre; nothing without a mass."""
-    if "m" not in own or not pose.output.carrier:
+    if "m" not in own or pose.output.carrier == "":
         return []
     at = on_output(maths, pose, own["centre"], own.get("offset"))
     return [resistance_of_mass(pose, own["m"], own["centre"], at)]

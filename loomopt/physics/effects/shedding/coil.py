@@ -167,12 +167,12 @@ bench, or on an automatic coiling machine."""
 
 def initial_band(maths: Maths, own: Values) -> tuple[Number, Number]:
     """Least and greatest initial stress, Pa: by the ends that the scene gives, else by the winding it names."""
-    made = coil(own)
-    if own.get("winding") in WINDINGS:
-        a, b = (maths.number(float(text)) for text in WINDINGS[own["winding"]])
-        least, most = 0 * made.index, (a - b * made.index) * tensile(maths, own)
-    else:
+    made, winding = coil(own), WINDINGS.get(own.get("winding", ""))
+    if winding is None:
         least, most = made.initial_stress_least(maths), made.initial_stress_most(maths)
+    else:
+        a, b = (maths.number(float(text)) for text in winding)
+        least, most = 0 * made.index, (a - b * made.index) * tensile(maths, own)
     if "initial_tension_min" in own:
         least = made.torsion(maths, own["initial_tension_min"])
     if "initial_tension_max" in own:
