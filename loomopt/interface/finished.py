@@ -79,7 +79,7 @@ class StudyTable:
         point: the row's number, or its label as the table prints it: "3", its place "715 N*m", or of several columns
         {"operation.M0": "715 N*m", "peak_torque": "86 N*m"}. Raises BadInput for a label of no row or of several.
         """
-        number = study_table.labelled_point(self.study, self.solved, point)
+        number = study_table.labelled_point(self.study, self.rows, self.solved, point)
         task, parent = next(each for each in run.tasks(self.study, self.solved) if each[0].point == number)
         return solved(self.study.solve(task, parent), self.study.scene_at(number), self.study.target)
 

@@ -87,13 +87,16 @@ PRINTED = 1e-5
 NAMED = re.compile(r"(?P<key>[^\s=]+)\s*=\s*(?P<value>.+)|(?P<name>[A-Za-z_]\S*)\s+(?P<rest>.+)|(?P<bare>.+)")
 
 
-def labelled_point(study: SceneStudy, rows: Sequence[Row], label: int | str | Mapping[str, str | float]) -> int:
+def labelled_point(
+    study: SceneStudy, rows: Sequence[Row], solved: Sequence[Row], label: int | str | Mapping[str, str | float]
+) -> int:
     """Return the number of the point that a label names. Raises BadInput for none, and for more than one.
 
+    rows: those that the table shows, of which a place is one; solved: all, of which a number is one.
     label: the number, also as the table prints it ("3", "3*"); the place, as "715 N*m", or of several columns
     "operation.M0 = 715 N*m, peak_torque = 86 N*m"; or a mapping, column → text with its unit or a number in SI.
     """
-    numbers = [row.point for row in rows]
+    numbers = [row.point for row in solved]
     allowed = f"{', '.join(map(str, numbers[:20]))}, or a place such as {_place_example(study, rows)}"
     remedy = "Choose one of them"
     if not isinstance(label, str | Mapping):
@@ -106,7 +109,7 @@ def labelled_point(study: SceneStudy, rows: Sequence[Row], label: int | str | Ma
     if len(found) != 1:
         problem = f"it names the points {', '.join(map(str, found[:20]))}" if found else "the study has no such point"
         remedy = "Name more columns, or the number" if found else remedy
-        raise refusal(problem, "", "point", str(label), allowed, remedy)
+        raise refusal(problem, "", "point", label, allowed, remedy)
     return found[0]
 
 
@@ -117,22 +120,24 @@ def _named_places(
     made, remedy = columns(study, rows), "Write the number of the row, or its place with its unit"
     known = {column.name: column for part in made.values() for column in part}
     first = next(iter(made["place"]), None)
-    named: list[tuple[str, str | float]] = list(label.items()) if isinstance(label, Mapping) else []
+    named = list[tuple[str, str | float]]()
+    for name, value in arguments.table(label, "point", allowed, remedy).items() if isinstance(label, Mapping) else ():
+        named.append((name, value if isinstance(value, str) else arguments.number(value, "point", allowed, remedy)))
     for text in label.split(",") if isinstance(label, str) else ():
         match = NAMED.fullmatch(text.strip())
         if match is None or first is None:
-            raise refusal("it is no label of a row", "", "point", str(label), allowed, remedy)
+            raise refusal("it is no label of a row", "", "point", label, allowed, remedy)
         named.append((match["key"] or match["name"] or first.name, match["value"] or match["rest"] or match["bare"]))
     found = []
     for name, given in named:
         if name not in known:
-            raise refusal(f"the table has no column {name}", "", "point", str(label), ", ".join(known), remedy)
+            raise refusal(f"the table has no column {name}", "", "point", label, ", ".join(known), remedy)
         column = known[name]
         try:
             value = given if isinstance(given, int | float) else read(given, _kind(study, name))
         except QuantityError as error:
             if not _is_number(given):
-                raise refusal(error.problem, "", "point", str(label), error.allowed, remedy) from None
+                raise refusal(error.problem, "", "point", label, error.allowed, remedy) from None
             value = float(given) * column.size
         found.append((column, float(value)))
     return found

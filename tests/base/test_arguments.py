@@ -59,9 +59,9 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
     "solve": [
         ({"starts": "2"}, "starts: it is not a whole number"),
         ({"seed": "2"}, "seed: it is not a whole number"),
-        ({"near": "before"}, "near: it is no answer"),
-        ({"everywhere": True, "gap": "2"}, "gap: it is not a number"),
-        ({"everywhere": True, "seconds": None}, "seconds: it is not a number"),
+        ({"warm_start": "before"}, "warm_start: it is no answer"),
+        ({"global_proof": True, "gap": "2"}, "gap: it is not a number"),
+        ({"global_proof": True, "seconds": None}, "seconds: it is not a number"),
     ],
     "prove": [({"slack": "2"}, "slack: it is not a number")],
     "simulate": [({"accuracy": "2"}, "accuracy: it is not a number")],
@@ -208,7 +208,7 @@ def test_a_hook_or_a_flag_of_the_wrong_kind_is_told():
             lo.solve(SCENE, **{key: 3})  # type: ignore[arg-type]
     with pytest.raises(lo.BadInput, match="on_row: it cannot be called"):
         lo.effects(SCENE, on_row=3)  # type: ignore[arg-type]
-    for key in ("prove", "everywhere"):
+    for key in ("prove", "global_proof"):
         with pytest.raises(lo.BadInput, match=f'{key}: it is neither true nor false .given: "no"'):
             lo.solve(SCENE, **{key: "no"})  # type: ignore[arg-type]
     with pytest.raises(lo.BadInput, match="resume: it is neither true nor false"):

@@ -189,13 +189,13 @@ METHODS = {
         ),
         *("point", "problem", "proofs", "prove", "reached", "relaxation", "scene", "simulate", "solver", "sought"),
         *("beside", "outcome", "status", "table", "target", "terms", "time", "to_frame", "today", "units"),
-        *("report", "robust", "rounded", "undefined", "members", "change"),
+        *("report", "robust", "rounded", "undefined", "members", "change", "worse", "bind_together", "design_is"),
     },
     "Scene": {
         *("active", "bounds", "call", "called", "change", "document", "effects", "equations", "free", "full", "given"),
         *("job", "jobs", "limits", "mechanism", "name", "operation", "origin", "own", "paths", "schema", "set", "show"),
         *("shown_in", "source", "table", "tables", "targets", "title", "unit_for", "units", "update", "with_effect"),
-        *("hash", "without_effect"),
+        *("hash", "without_effect", "without_limit"),
     },
 }
 

@@ -561,7 +561,6 @@ class Solution(Evaluated):
             "target": self.target or None,
             "status": self.status,
             "message": self.message,
-            "design_is": self.design_is,
             "effects": base["effects"],
         }
         if self.scene:
@@ -569,12 +568,15 @@ class Solution(Evaluated):
         head["reached"] = base["reached"]
         tail: dict[str, Any] = {
             "binding": [price.as_dict() for price in self.binding],
-            "bind_together": [price.as_dict() for price in self.bind_together],
             "certificate": certificate_dict(self.certificate) if self.certificate else None,
             "solver": dict(self.solver),
             "global": self.global_bound.as_dict() if self.global_bound else None,
             "time": dict(self.time),
+            "design_is": self.design_is,
+            "bind_together": [price.as_dict() for price in self.bind_together],
         }
+        if "tables" in base:
+            tail["tables"] = base.pop("tables")
         if self.worse:
             tail["worse"] = [each.as_dict() for each in self.worse]
         if self.proofs:
