@@ -30,6 +30,7 @@ def least(cost: Floats, start: Floats, ways: Floats, signed: NDArray[np.bool_]) 
     slope = basis.T @ cost
     level = LEVEL * max(1.0, float(np.abs(cost).max()))
     zero: list[int] = []
+    free = signed.copy()
     for _ in range(EXCHANGES * len(x)):
         rows = basis[zero]
         prices = np.linalg.lstsq(rows.T, slope, rcond=LEVEL)[0] if zero else np.zeros(0)
@@ -39,10 +40,10 @@ def least(cost: Floats, start: Floats, ways: Floats, signed: NDArray[np.bool_]) 
             if not loose:
                 return x
             zero.remove(min(loose))
+            free[min(loose)] = True
             continue
         move = basis @ (down / np.linalg.norm(down))
-        falling = np.flatnonzero(signed & (move < -LEVEL))
-        falling = falling[~np.isin(falling, zero)]
+        falling = np.flatnonzero(free & (move < -LEVEL))
         if not falling.size:
             return None
         steps = x[falling] / -move[falling]
@@ -52,4 +53,5 @@ def least(cost: Floats, start: Floats, ways: Floats, signed: NDArray[np.bool_]) 
         x = np.where(signed, np.maximum(x, 0.0), x)
         x[first] = 0.0
         zero.append(first)
+        free[first] = False
     return x

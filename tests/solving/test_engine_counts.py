@@ -19,7 +19,8 @@ def test_where_no_start_assembles_nothing_was_iterated(monkeypatch):
     monkeypatch.setattr(exchange, "started", lambda *_: None)
     monkeypatch.setattr("loomopt.solving.search.elastic.least", lambda *_: None)
     monkeypatch.setattr("loomopt.solving.search.elastic.clash", lambda *_: Clash())
-    answer = toy.solve(toy.program("xy", BOWL))
+    # At today's x = 0.5 the limit is exceeded: an admissible one would be solved from.
+    answer = toy.solve(toy.program("xy", BOWL, limits=(("x", -1, 0.75),)))
     assert answer.status == "failed"
     expected = {"status": "Not_Assembled", "iterations": 0, "starts": 1, "starts_at_best": 0, "accuracy": 1e-8}
     assert {name: answer.solver[name] for name in expected} == expected

@@ -22,7 +22,7 @@ from loomopt.physics.tolerances import DOUBT, FEASIBLE, FLAT, JET_ERROR, POSITIV
 from loomopt.solving.certificate import kkt, second_order
 from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet, LevelMultipliers, System, active_set, priced
-from loomopt.solving.certificate.multiplier_set import MultiplierSet
+from loomopt.solving.certificate.multiplier_set import KnownMultipliers, MultiplierSet
 from loomopt.solving.certificate.second_order import Curvature, Local
 from loomopt.solving.certificate.taylor_bounds import between_points, cycle_rows, judged
 from loomopt.solving.certificate.verdict import Binding, Certificate, FrameRow, JointBinding, Level
@@ -160,9 +160,10 @@ def drafted(
     rows = cycle_rows(program)
     local = Local(program, x, sampler, active, found, found.gradients(), shown=shown)
     levels, unserved = judged_levels(local), _unserved(sampler)
+    prices = _priced(local, levels)
 
     def put(cycle: WholeCycle) -> Certificate:
-        return _certificate(local, cycle, levels, accuracy, unserved)
+        return _certificate(local, cycle, levels, prices, accuracy, unserved)
 
     def scan() -> WholeCycle:
         return WholeCycle(between_points(sampler, rows, Settings(accuracy).checked), judged(sampler, rows, accuracy))
@@ -261,7 +262,12 @@ def _unserved(sampler: Sampler) -> str:
 
 
 def _certificate(
-    local: Local, cycle: WholeCycle, levels: Sequence[JudgedLevel], accuracy: float, model: str = ""
+    local: Local,
+    cycle: WholeCycle,
+    levels: Sequence[JudgedLevel],
+    prices: "Prices",
+    accuracy: float,
+    model: str = "",
 ) -> Certificate:
     """Return what was verified, and every reason why it is not enough; model: why it is none for here, if so."""
     feasibility = float(max(0.0, *local.active.excess))
@@ -272,7 +278,6 @@ def _certificate(
     names = local.derivatives.names
     moved = dict(zip(names, map(float, step * local.scales), strict=True)) if len(step) else {}
     level = curvatures[-1].level if curvatures else ()
-    prices = _priced(local, levels)
     return Certificate(
         not reasons,
         tuple(reasons),
@@ -392,10 +397,10 @@ def _priced(local: Local, levels: Sequence[JudgedLevel]) -> Prices:
     together: list[JointBinding] = []
     several: set[int] = set()
     for level, judged_level in enumerate(levels):
-        every = level_multipliers(local, levels, level)
+        known = KnownMultipliers(level_multipliers(local, levels, level))
         tied: list[list[int]] = []
         for name, own in list(places.items()):
-            low, high = _range(every, own)
+            low, high = known.range(own, ONE_PRICE)
             if max(abs(low), abs(high)) <= POSITIVE:
                 continue
             del places[name]
@@ -406,7 +411,7 @@ def _priced(local: Local, levels: Sequence[JudgedLevel]) -> Prices:
             alone = low if low > POSITIVE else high if high < -POSITIVE and not name[1] else 0.0
             found[own[0]] = _binding(local, level, own[0], alone)
             tied.append(own)
-        joint = _together(local, level, every, tied, found)
+        joint = _together(local, level, known, tied, found)
         together += joint
         partners = {(each.limit.name, each.limit.sign) for of in joint for each in of.bindings}
         # What is worth nothing, alone or with others, does not bind.
@@ -437,12 +442,6 @@ def level_multipliers(local: Local, levels: Sequence[JudgedLevel], place: int) -
     return kkt.multiplier_set(local.active, own.slopes, system, found)
 
 
-def _range(every: MultiplierSet, places: Sequence[int]) -> tuple[float, float]:
-    """Return the least and the largest sum of the multipliers of some rows."""
-    cost = np.isin(np.arange(len(every.start)), places).astype(float)
-    return every.least(cost), -every.least(-cost)
-
-
 def _binding(local: Local, level: int, place: int, multiplier: float) -> Binding:
     """Return the limit of a row with what it is worth by a multiplier."""
     limit = local.active.rows[place].limit
@@ -453,7 +452,7 @@ def _binding(local: Local, level: int, place: int, multiplier: float) -> Binding
 def _together(
     local: Local,
     level: int,
-    every: MultiplierSet,
+    multipliers: KnownMultipliers,
     tied: Sequence[Sequence[int]],
     found: Mapping[int, Binding],
 ) -> list[JointBinding]:
@@ -463,7 +462,7 @@ def _together(
 
     tied: the rows of each limit that has more than one price; found: what it is worth alone, by its first row.
     """
-    ends: list[tuple[int, Binding, Floats]] = []
+    every, ends = multipliers.every, list[tuple[int, Binding, Floats]]()
     for own in tied:
         unit, each = _binding(local, level, own[0], 1.0), found[own[0]]
         cost = np.where(np.isin(np.arange(len(every.start)), own), unit.worth, 0.0)
@@ -477,11 +476,11 @@ def _together(
         known = any(of <= {*chosen} for of in least) or len({*rows}) < len(rows)
         if known or all(each.worth for each in bindings):
             continue
-        joint = JointBinding(bindings, np.array(costs), every)
         steps = [1.0 / max(float(np.abs(cost).max()), TINY) for cost in costs]
         alone = sum(step * each.worth for step, each in zip(steps, bindings, strict=True))
-        if joint.worth(steps) > alone + ONE_PRICE * max(1.0, alone):
-            together.append(joint)
+        more, joint = alone + ONE_PRICE * max(1.0, alone), np.array(steps) @ np.array(costs)
+        if multipliers.bound(joint) > more and multipliers.least(joint) > more:
+            together.append(JointBinding(bindings, np.array(costs), every))
             least.append({*chosen})
     return together
 

@@ -1,6 +1,8 @@
 """All multipliers that balance one level's slopes, and what limits are worth by them, alone and together."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -36,3 +38,46 @@ class MultiplierSet(NamedTuple):
         if not self.ways.shape[1]:
             return self.start
         return linear_program.least(cost, self.start, self.ways, self.signed)
+
+
+@dataclass(frozen=True)
+class KnownMultipliers:
+    """The multipliers of a set that were met so far: what they show needs no linear program.
+
+    every: the set; met: its start, and what least costs were reached at, (rows,) each.
+    """
+
+    every: MultiplierSet
+    met: list[Floats] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.met.append(self.every.start)
+
+    def bound(self, cost: Floats) -> float:
+        """Least of cost · multipliers over those met: the least of all is no more."""
+        return float(min(cost @ each for each in self.met))
+
+    def least(self, cost: Floats) -> float:
+        """Least of cost · multipliers over all, as of the set."""
+        found = self.every.at_least(cost)
+        if found is None:
+            return -math.inf
+        self.met.append(found)
+        return float(cost @ found)
+
+    def range(self, places: Sequence[int], apart: float) -> tuple[float, float]:
+        """Least and largest sum of the multipliers of some rows.
+
+        Of rows with a sign the largest is one that was met where that is more than the least by the share `apart` of
+        the larger of it and 1: that there is more than one price is then shown, and the least is exact.
+        """
+        if not self.every.ways.shape[1]:
+            only = float(self.every.start[list(places)].sum())
+            return only, only
+        cost = np.isin(np.arange(len(self.every.start)), places).astype(np.float64)
+        signed = bool(self.every.signed[list(places)].all())
+        low = 0.0 if signed and self.bound(cost) <= 0.0 else self.least(cost)
+        high = -self.bound(-cost)
+        if signed and high - low > apart * max(1.0, high):
+            return low, high
+        return low, -self.least(-cost)

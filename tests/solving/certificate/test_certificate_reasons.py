@@ -222,9 +222,9 @@ def test_without_second_derivatives_only_a_slope_that_is_left_decides(residual, 
 @pytest.mark.parametrize(("bound", "by"), [("proven", "bounded"), ("undecided", "refined"), ("violated", "refined")])
 def test_by_what_the_whole_cycle_is_covered_is_told(bound, by):
     here = local()
-    assert (
-        certificate._certificate(here, WholeCycle(0.0, bound), certificate.judged_levels(here), 1e-8).whole_cycle == by
-    )
+    levels = certificate.judged_levels(here)
+    prices = certificate._priced(here, levels)
+    assert certificate._certificate(here, WholeCycle(0.0, bound), levels, prices, 1e-8).whole_cycle == by
 
 
 def test_what_floats_decide_is_judged_by_jets_and_the_rest_in_40_digits():
