@@ -91,7 +91,7 @@ PER_SECOND = {
 """Kind of a motion per radian of the crank → its kind in time, and the power of the speed between them."""
 
 
-def _per_second(row: dict[str, Any], kind: str, scene: Scene, speed: Any) -> list[dict[str, Any]]:
+def _per_second(row: dict[str, Any], kind: str, scene: Scene, speed: float | None) -> list[dict[str, Any]]:
     """Return the row of a motion in time beside one per crank angle, where the speed is known; speed: the design's."""
     known = scene.operation.get("speed")
     if kind not in PER_SECOND or known is None:

@@ -32,6 +32,7 @@ from loomopt.interface.cli.commands import (
 )
 from loomopt.interface.cli.shell import (
     DIFFERS,
+    call_progress,
     mistake,
     only,
     read_number,
@@ -40,7 +41,6 @@ from loomopt.interface.cli.shell import (
     remark,
     worded,
 )
-from loomopt.interface.progress import Progress
 
 HEADER = Path("include", "coin-or", "IpoptConfig.h")
 """Where IPOPT says its version: beside CasADi's library in its wheel, below the prefix where both were built apart."""
@@ -138,7 +138,7 @@ def solve(
 
         comma = sheets.decimal_comma(decimal)
         outputs.check_answer(out)
-    with Progress() as progress:
+    with call_progress() as progress:
         answer = api.solve(scene, target, **settings, on_step=progress.say)
     unwritten = None
     if out:
@@ -184,7 +184,7 @@ def accuracy(
     scene = read_scene(problem, sets, on, off, free)
     climbs: list[study.Climb] = []
     try:
-        with Progress() as progress:
+        with call_progress() as progress:
             climbs.extend(study.climbs(scene, full, progress.say))
     finally:
         if climbs:
@@ -202,13 +202,13 @@ def check(
     from loomopt.studies import check as study
 
     if write:
-        with Progress() as progress:
+        with call_progress() as progress:
             written = study.write(write, problems or (), progress.say)
         remark(f"Wrote {len(written)} reference tables to {write}")
         return
     outcomes: list[study.Outcome] = []
     try:
-        with Progress() as progress:
+        with call_progress() as progress:
             outcomes.extend(study.check(problems or (), on_step=progress.say))
     finally:
         if outcomes:

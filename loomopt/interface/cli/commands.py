@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from loomopt.interface.cli.shell import DIFFERS, read_number, read_request, remark
-from loomopt.interface.progress import Progress
+from loomopt.interface.cli.shell import DIFFERS, call_progress, read_number, read_request, remark
 
 if TYPE_CHECKING:
     from loomopt.interface.text.layout import Grid
@@ -213,7 +212,7 @@ def prove(
     from loomopt.interface.text import answers
 
     scene, given, name, _ = read_request(problem, design, target, sets, on, off, free)
-    with Progress() as progress:
+    with call_progress() as progress:
         progress.say("proving")
         found = api.prove(scene, given, name, slack=read_number("--slack", slack, float))
     tell(as_json, found.as_dict, lambda: answers.proofs(found))

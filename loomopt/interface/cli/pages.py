@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from loomopt.interface.cli.commands import Decimal, Free, Json, Set, With, Without, checked, remarked, tell, write
-from loomopt.interface.cli.shell import only, read_scene, remark
-from loomopt.interface.progress import Progress
+from loomopt.interface.cli.shell import call_progress, only, read_scene, remark
 
 if TYPE_CHECKING:
     from loomopt.interface.report.page import Chapter
@@ -64,7 +63,7 @@ def report(
             "a store's fronts and sweeps have no studies beside them", "", "--study", wanted[0], remedy=remedy
         )
     chapters: list[Chapter] = []
-    with Progress() as progress:
+    with call_progress() as progress:
         for each in inputs:
             chapters += each.chapters(progress.say)
         progress.say("writing the page")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from loomopt.base.errors import BadInput, clean
 
 if TYPE_CHECKING:
+    from loomopt.interface.progress import Progress
     from loomopt.scenes.scene import Call, Scene
 
 DIFFERS = 1
@@ -159,6 +160,13 @@ def read_steps(text: str) -> dict[str, str]:
     if len(found) < len(pairs):
         raise refusal("a number has two steps", "", "--round", text, remedy="Give each number one step")
     return found
+
+
+def call_progress() -> "Progress":
+    """Return the progress of one call, on stderr."""
+    from loomopt.interface.progress import Progress
+
+    return Progress()
 
 
 def remark(text: str) -> None:

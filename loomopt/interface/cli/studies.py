@@ -20,8 +20,7 @@ from loomopt.interface.cli.commands import (
     tell,
     write,
 )
-from loomopt.interface.cli.shell import read_number, read_scene, remark
-from loomopt.interface.progress import Progress
+from loomopt.interface.cli.shell import call_progress, read_number, read_scene, remark
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -198,7 +197,7 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
 
     count = None if how.workers is None else read_number("--workers", how.workers, int)
     try:
-        with _executor(how.dask, count) as executor, Progress() as progress:
+        with _executor(how.dask, count) as executor, call_progress() as progress:
             progress.say(counted(study, 0))
             found = conducted(study, executor, count, how.store, how.resume, kept)
     except (KeyboardInterrupt, BrokenExecutor):
@@ -302,7 +301,7 @@ def effects(
         tell(as_json, found.as_dict, lambda: effects.parts(found))
 
     try:
-        with _executor(dask, count) as executor, Progress() as progress:
+        with _executor(dask, count) as executor, call_progress() as progress:
             progress.say("solving with all effects on")
             found = finished.conducted_effects(study, executor, count, kept)
     except KeyboardInterrupt:
@@ -338,7 +337,7 @@ def sensitivity(
     checked(figure, out)
     comma = sheets.decimal_comma(decimal)
     scene = read_scene(problem, sets, on, off, free)
-    with Progress() as progress:
+    with call_progress() as progress:
         answer = api.solve(scene, target, on_step=progress.say)
         if answer.status != "optimal":
             if as_json:
@@ -387,7 +386,7 @@ def tolerance(
     drawn, begin = read_number("--samples", samples, int), read_number("--seed", seed, int)
     scene, given, name, _ = read_request(problem, design, target, sets, on, off, free)
     plan = planned(scene, given, name, drawn, begin)
-    with _executor(dask, count) as executor, Progress() as progress:
+    with _executor(dask, count) as executor, call_progress() as progress:
         found = finished.conducted_tolerance(plan, executor, count, progress.say, worst, store, resume)
     tell(as_json, found.as_dict, lambda: tolerance.parts(found))
     write(out, lambda path: studies.table(path, found.table(), comma=comma))

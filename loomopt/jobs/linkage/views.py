@@ -329,19 +329,17 @@ class LinkageViews(JobViews):
 def _without_place(scene: Scene) -> Iterator[str]:
     """Say which mass of the output forces in joints, or its weight, leave out."""
     out, effects = reading(scene.document).linkage.output, scene.effects
-    readers = {"joint_forces": "forces in the joints and on the frame", "gravity": "gravity"}
-    leave_out = " and ".join(text for name, text in readers.items() if name in effects)
-    verb = "leave" if "joint_forces" in effects else "leaves"
+    tellers = " and ".join(each.of_masses for each in scene.active if each.of_masses)
     for name in ("inertia", "counterweight"):
-        if not leave_out or name not in effects:
+        if not tellers or name not in effects:
             continue
         if out.carrier:
             if name == "inertia" and getattr(effects[name], "m", 0.0) is None:
                 key = "effects.inertia.m and centre"
-                yield f"{leave_out} {verb} out the mass of the output: effects.inertia tells J alone. Give {key}"
+                yield f"left out of {tellers}: the mass of the output. effects.inertia tells J alone. Give {key}"
         else:
             yield (
-                f"{leave_out} {verb} out the mass of effects.{name}, but for what it does to the output itself: the "
+                f"left out of {tellers}: the mass of effects.{name}, but for what it does to the output itself. The "
                 f"motion of the output {out.measure} of {out.name} alone does not tell where the mass moves. Give it "
                 "as effects.mass, on a link or a joint, instead"
             )

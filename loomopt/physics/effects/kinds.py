@@ -199,6 +199,7 @@ class Effect:
     models: what it needs with each word of its key `model`, which its numbers differ by.
     many: whether the table holds one table for each of several instances; kind, instance: of one of them its table.
     alone: of such an effect what values mean that stand in its table by themselves; None where that is a mistake.
+    of_masses: what it tells that depends on where masses move, in words; "" for nothing.
     """
 
     name: str
@@ -220,6 +221,7 @@ class Effect:
     kind: str = ""
     instance: str = ""
     alone: "Effect | None" = None
+    of_masses: str = ""
 
     @property
     def path(self) -> tuple[str, ...]:

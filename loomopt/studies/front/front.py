@@ -11,6 +11,7 @@ from loomopt.base import arguments
 from loomopt.base.errors import BadInput, misread, refusal, shown
 from loomopt.base.quantities import read as read_quantity
 from loomopt.base.units import SI_UNIT, QuantityError
+from loomopt.model.axes import FORMS
 from loomopt.physics.schema import Sense
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import numbers
@@ -114,7 +115,7 @@ def _lifted(scene: Scene, senses: Mapping[str, Sense]) -> tuple[Scene, tuple[str
     words, said = Words(scene), []
     for name, sense in senses.items():
         axis, limit = scene.schema.axes.get(name), scene.limits.get(name)
-        if limit is None or axis is None or axis.form == "magnitude":
+        if limit is None or axis is None or (axis.form and FORMS[axis.form].is_magnitude):
             continue
         ends = {"min": limit.min, "max": limit.max}
         one = limit.min is not None and limit.min == limit.max

@@ -134,10 +134,10 @@ def test_what_leaves_a_mass_out_says_so():
     assert not any("mass" in text for text in remarks(scene))
     bare = scene.set("effects.inertia.m", None)
     (text,) = (text for text in remarks(bare) if "mass" in text)
-    assert text.startswith("forces in the joints and on the frame and gravity leave out the mass of the output")
+    assert text.startswith("left out of gravity and forces in the joints and on the frame: the mass of the output")
     assert "effects.inertia.m and centre" in text
     (text,) = (text for text in remarks(bare.without_effect("joint_forces")) if "mass" in text)
-    assert text.startswith("gravity leaves out")
+    assert text.startswith("left out of gravity: ")
     assert not remarks(bare.without_effect("joint_forces", "gravity"))
     # What moves twice as far as the ram: nothing tells where it is.
     geared = yoke({"slide": "ram", "scale": "2"})

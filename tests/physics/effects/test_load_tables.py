@@ -94,9 +94,9 @@ def test_setting_a_table_takes_the_place_of_the_pulse_and_back(resisted):
     [
         ("angle [deg],M [N*m]\n0,1\n5,2\n", "2 rows"),
         ("angle [deg],M [N*m]\n0,1\n5,2\n9,1\n", "mark both as corners"),
-        ("angle [deg],M [N*m],corner\n0,1,1\n5,2,\n9,1,yes\n", "no mark under corner"),
-        ("angle [deg],M [N]\n0,1\n5,2\n9,1\n", "no column M with its unit"),
-        ("angle [deg],T [N*m]\n0,1\n5,2\n9,1\n", "no column M with its unit"),
+        ("angle [deg],M [N*m],corner\n0,1,1\n5,2,\n9,1,yes\n", 'line 4, column corner: "yes" is no mark'),
+        ("angle [deg],M [N]\n0,1\n5,2\n9,1\n", 'line 1, column M: "N" is no unit of this column'),
+        ("angle [deg],T [N*m]\n0,1\n5,2\n9,1\n", "no column M [(]line 1: holds"),
     ],
 )
 def test_a_table_that_is_no_curve_is_refused_when_the_scene_is_read(tmp_path, rows, told):

@@ -60,4 +60,5 @@ EFFECT = Load(
     force=force,
     applied=applied,
     examples=({"down": "-90 deg"},),
+    of_masses="gravity",
 )

@@ -183,4 +183,5 @@ EFFECT: Check[LinkagePose] = Check(
     fitted=fitted,
     said=SAID,
     examples=({},),
+    of_masses="forces in the joints and on the frame",
 )

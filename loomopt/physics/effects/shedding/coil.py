@@ -8,7 +8,7 @@ must give K1, and keep what material, winding and space allow.
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field, model_validator
 
@@ -225,9 +225,11 @@ class Own(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _band_of_initial_tension(cls, raw: Any) -> Any:
+    def _band_of_initial_tension(cls, raw: object) -> object:
         """Take initial_tension = { min, max } for the band that it keeps; it stands in its middle then."""
-        band = raw.get("initial_tension") if isinstance(raw, Mapping) else None
+        if not isinstance(raw, Mapping):
+            return raw
+        band = raw.get("initial_tension")
         if not isinstance(band, Mapping) or set(band) != {"min", "max"}:
             return raw
         try:
