@@ -71,11 +71,13 @@ class KnownMultipliers:
         Of rows with a sign the largest is one that was met where that is more than the least by the share `apart` of
         the larger of it and 1: that there is more than one price is then shown, and the least is exact.
         """
-        if not self.every.ways.shape[1]:
-            only = float(self.every.start[list(places)].sum())
+        own, ways = list(places), self.every.ways
+        shortest = np.linalg.norm(ways, axis=0).min(initial=math.inf)
+        if np.abs(ways[own].sum(axis=0)).max(initial=0.0) <= linear_program.LEVEL * shortest:
+            only = float(self.every.start[own].sum())
             return only, only
         cost = np.isin(np.arange(len(self.every.start)), places).astype(np.float64)
-        signed = bool(self.every.signed[list(places)].all())
+        signed = bool(self.every.signed[own].all())
         low = 0.0 if signed and self.bound(cost) <= 0.0 else self.least(cost)
         high = -self.bound(-cost)
         if signed and high - low > apart * max(1.0, high):
