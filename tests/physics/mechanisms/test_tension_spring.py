@@ -229,22 +229,29 @@ def test_a_tighter_coil_is_stressed_more_and_takes_more_initial_stress(coil):
     assert width == pytest.approx(2 * 6.9e6 * (4 - (coil.index - 3) / 6.5), rel=1e-12)
 
 
-@given(coils(), forces)
+@pytest.mark.parametrize("own", [{}, {"hook_length": 0.04, "correction": "EN 13906"}])
+@given(coil=coils(), force=forces)
 @settings(REPEATABLE, max_examples=20)
-def test_every_number_system_gives_the_same_figures(coil, force):
-    data = [*dataclasses.astuple(coil), force]
+def test_every_number_system_gives_the_same_figures(own, coil, force):
+    coil = dataclasses.replace(coil, **own)
+    numbers = [each.name for each in dataclasses.fields(Coil) if isinstance(getattr(coil, each.name), int | float)]
+    data = [*(getattr(coil, name) for name in numbers), force]
+
+    def made(values):
+        return dataclasses.replace(coil, **dict(zip(numbers, values, strict=True)))
+
     reference = figures(FLOAT, coil, force)
     for system, convert in (
         (systems.numpy(), lambda x: np.array([x, x])),
         (systems.mpmath(), systems.mpmath().number),
         (systems.sympy(), sp.Rational),
     ):
-        *own, own_force = map(convert, data)
-        found = [float(np.ravel(value)[-1]) for value in map(_evaluated, figures(system, Coil(*own), own_force))]
+        *values, own_force = map(convert, data)
+        found = [float(np.ravel(value)[-1]) for value in map(_evaluated, figures(system, made(values), own_force))]
         assert found == pytest.approx(reference, rel=1e-12)
     symbols = ca.SX.sym("x", len(data))
-    *own, own_force = ca.vertsplit(symbols)
-    function = ca.Function("figures", [symbols], [ca.vertcat(*figures(systems.casadi(), Coil(*own), own_force))])
+    *values, own_force = ca.vertsplit(symbols)
+    function = ca.Function("figures", [symbols], [ca.vertcat(*figures(systems.casadi(), made(values), own_force))])
     assert function(data).full().ravel() == pytest.approx(np.array(reference), rel=1e-12)
 
 

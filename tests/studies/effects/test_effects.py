@@ -18,13 +18,15 @@ from loomopt.studies.effects import study
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import StudyTask
 
+# The peak's column is tests/reference/beatup.py at the reference's design, over 4 million angles: the rod's weight, which
+# gravity puts inside the drive, is in it. It changes no M3: the design and its regrets are those of a rod without weight.
 TABLE = {  # shift of M3 and of the peak, N·m; regret of M3, % of its natural size
-    "inertia": (677.009, -77.527, 13.804),
-    "rocker_inertia": (54.59525, -6.64009, 7.114),
-    "counterweight_inertia": (11.57419, -1.40770, 1.030),
-    "gravity": (7.95174, -1.06723, 0.486),
-    "rod_inertia": (0.0, -2.28048, 0.0),
-    "bearing_friction": (-2.0, 0.39194, 0.0),
+    "inertia": (677.009, -77.201606, 13.804),
+    "rocker_inertia": (54.59525, -6.640084, 7.114),
+    "counterweight_inertia": (11.57419, -1.407698, 1.030),
+    "gravity": (7.95174, -0.944246, 0.486),
+    "rod_inertia": (0.0, -2.157494, 0.0),
+    "bearing_friction": (-2.0, 0.392090, 0.0),
     "centrifugal": (0.0, 0.0, 0.0),
     "resistance": (-745.0, None, 0.0),
 }
@@ -66,7 +68,7 @@ def alike(study):
 def test_the_reference_has_all_effects_on_that_combine(beatup):
     assert set(TABLE) <= set(beatup.reference.effects)
     assert beatup.reference.figures["M3_fdc"] == pytest.approx(-4.130151, abs=6e-7)
-    assert beatup.reference.figures["peak_torque"] == pytest.approx(93.344816, abs=6e-7)
+    assert beatup.reference.figures["peak_torque"] == pytest.approx(93.221830, abs=6e-7)
     assert beatup.reference.scales == pytest.approx(SCALES, abs=6e-4)
     assert beatup.reference.status == "optimal"
 
@@ -108,7 +110,7 @@ def test_at_one_percent_two_effects_may_be_left_out_together(beatup):
     assert beatup.kept == tuple(name for name in beatup.reference.effects if name not in beatup.left_out)
     assert beatup.together.effect == "bearing_friction, centrifugal"
     assert beatup.together.may_go
-    assert beatup.together.shift["peak_torque"] == pytest.approx(0.39194 / 93.850, rel=1e-4)
+    assert beatup.together.shift["peak_torque"] == pytest.approx(0.392090 / 93.850, rel=1e-4)
 
 
 def test_regret_alone_is_a_trap(beatup):

@@ -276,7 +276,7 @@ def test_what_is_drawn_is_kept_and_taken_up_again(tmp_path):
         assert file.execute("SELECT count(*) FROM study").fetchall() == [(2,)]
     with pytest.raises(BadInput, match="nothing to resume from"):
         lo.tolerance(scene, samples=1600, worst=False, resume=True)
-    with pytest.raises(BadInput, match="holds no row"):
+    with pytest.raises(BadInput, match="machines of a tolerance study, which are no designs"):
         recalled(path)
 
 
