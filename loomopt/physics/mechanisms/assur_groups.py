@@ -141,7 +141,7 @@ class TwoLinks:
         """Stretched where the base is r1 + r2, folded where it is |r1 − r2|: for equal links, where it vanishes."""
         return {
             "span_far": lambda: self._square / (self.r1 + self.r2) ** 2,
-            "span_near": lambda: (self.r1 - self.r2) ** 2 / self._square,
+            "span_near": lambda: dyad.square(self.r1 - self.r2) / self._square,
             "span_pass": lambda: passing(*self._bases),
         }
 
@@ -270,7 +270,7 @@ class OnGuide:
     @property
     def spans(self) -> Mapping[str, Callable[[], Number]]:
         """Singular where the link stands across the guide."""
-        return {"span": lambda: (self.height / self.r) ** 2}
+        return {"span": lambda: dyad.square(self.height / self.r)}
 
     def across(self) -> Number:
         """Return the sine of the angle between the link and the guide's normal, scaled."""

@@ -106,7 +106,7 @@ class CrankRockerPose:
 
 def _base_square(maths: Maths, lengths: Lengths, phi: Number) -> Number:
     """Return the square of B to D, m², written so that nothing cancels near change points."""
-    return (lengths.l4 - lengths.l1) ** 2 + 4 * lengths.l1 * lengths.l4 * maths.sin(phi / 2) ** 2
+    return (lengths.l4 - lengths.l1) ** 2 + 4 * lengths.l1 * lengths.l4 * dyad.square(maths.sin(phi / 2))
 
 
 def span_far(maths: Maths, lengths: Lengths, phi: Number) -> Number:
@@ -116,7 +116,7 @@ def span_far(maths: Maths, lengths: Lengths, phi: Number) -> Number:
 
 def span_near(maths: Maths, lengths: Lengths, phi: Number) -> Number:
     """Return the square of l2 − l3 over that of B to D: 1 where rod and rocker are folded; phi: crank angle, rad."""
-    return (lengths.l2 - lengths.l3) ** 2 / _base_square(maths, lengths, phi)
+    return dyad.square(lengths.l2 - lengths.l3) / _base_square(maths, lengths, phi)
 
 
 def curves(lengths: Lengths, phi: "Floats", chunk: int = 8192) -> tuple["Floats", "Floats", "Floats"]:

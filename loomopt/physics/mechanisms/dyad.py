@@ -76,13 +76,23 @@ def second_rate_2(dyad: Dyad, base_2: Vector, rate1: Number, rate2: Number, r1: 
     return 2 / dyad.area4 * (dot(dyad.link1, base_2) + rate1 * rate1 * (r1 * r1) - rate2 * rate2 * mutual)
 
 
+def square(x: Number) -> Number:
+    """Return x², as a product: the power of a ball around 0 is no number."""
+    return x * x
+
+
+def cube(x: Number) -> Number:
+    """Return x³, as products likewise."""
+    return x * x * x
+
+
 def third_rate_1(
     dyad: Dyad, base_3: Vector, rates: tuple[Number, Number], seconds: tuple[Number, Number], r2: Number
 ) -> Number:
     """Return d³φ₁/dφ³ of link 1; base_3: d³(base)/dφ³, rates and seconds of both links as from `rates`."""
     mutual = dot(dyad.link1, dyad.link2)
     bent = 3 * (rates[0] * seconds[0] * mutual - rates[1] * seconds[1] * (r2 * r2))
-    return rates[0] ** 3 + 2 / dyad.area4 * (dot(dyad.link2, base_3) + bent)
+    return cube(rates[0]) + 2 / dyad.area4 * (dot(dyad.link2, base_3) + bent)
 
 
 def third_rate_2(
@@ -91,4 +101,4 @@ def third_rate_2(
     """Return d³φ₂/dφ³ of link 2; base_3: d³(base)/dφ³, rates and seconds of both links as from `rates`."""
     mutual = dot(dyad.link1, dyad.link2)
     bent = 3 * (rates[0] * seconds[0] * (r1 * r1) - rates[1] * seconds[1] * mutual)
-    return rates[1] ** 3 + 2 / dyad.area4 * (dot(dyad.link1, base_3) + bent)
+    return cube(rates[1]) + 2 / dyad.area4 * (dot(dyad.link1, base_3) + bent)

@@ -193,7 +193,7 @@ class RapierPose:
     @lazy
     def _base_3(self) -> Vector:
         rate, turn = self.phi3_1, 8 * self.stand.sense
-        along, across = -3 * rate * self.phi3_2, self.phi3_3 - rate**3
+        along, across = -3 * rate * self.phi3_2, self.phi3_3 - dyad.cube(rate)
         carrier, crank = self.carrier, self.second_crank
         return Vector(
             along * carrier.x - across * carrier.y + turn * crank.y,

@@ -108,7 +108,8 @@ def value(system, function, own, phi, omega_dot=None):
 def test_every_effect_has_its_case():
     assert OWN.keys() == BEATUP.keys()
     assert all(
-        set(OWN[name]) == set(effect.own.model_fields) - {"model", "table", "digits"} - PLACING for name, effect in BEATUP.items()
+        set(OWN[name]) == set(effect.own.model_fields) - {"model", "table", "digits"} - PLACING
+        for name, effect in BEATUP.items()
     )
 
 

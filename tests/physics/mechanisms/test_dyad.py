@@ -133,3 +133,28 @@ def test_rates_are_the_derivatives_of_the_links_angles(motion, r1, r2, direction
     constants = [base * math.cos(direction), base * math.sin(direction), *motion, r1, r2]
     closed, automatic, condition = (np.array(part).ravel() for part in RATES(constants, 0.0, side))
     assert np.all(np.abs(closed - automatic) <= 16 * EPS * (np.abs(closed) + condition) + 1e-300)
+
+
+@pytest.mark.parametrize(("power", "name"), [(2, "square"), (3, "cube")])
+def test_a_power_of_a_ball_around_zero_encloses_the_powers_of_all_in_it(power, name):
+    system = systems.balls()
+    for centre, radius in ((0.0, 1e-18), (1e-3, 2e-3), (-0.4, 0.1)):
+        ball = system.number(0) + type(system.pi)(centre, radius)
+        found = getattr(dyad, name)(ball)
+        assert all(found.contains((centre + share * radius) ** power) for share in (-0.9, 0.0, 0.5, 0.9))
+        assert float(found.rad()) <= 2 * power * (abs(centre) + radius) ** (power - 1) * radius
+
+
+def test_a_link_at_rest_for_an_instant_has_a_third_rate_in_balls():
+    """Where a rate is a ball around 0, as at an event: near what it is in plain floats."""
+    system = systems.balls()
+    number = system.number
+    closed = dyad.close(system, Vector(number(3.0), number(1.0)), number(2.0), number(2.5), 1)
+    rest = type(system.pi)(0.0, 1e-17)
+    ball = dyad.third_rate_1(
+        closed, Vector(number(0.3), number(-0.2)), (rest, rest), (number(0.1), number(0.2)), number(2.5)
+    )
+    plain = dyad.close(systems.FLOAT, Vector(3.0, 1.0), 2.0, 2.5, 1)
+    assert float(ball) == pytest.approx(
+        dyad.third_rate_1(plain, Vector(0.3, -0.2), (0.0, 0.0), (0.1, 0.2), 2.5), rel=1e-12
+    )

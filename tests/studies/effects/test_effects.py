@@ -18,8 +18,8 @@ from loomopt.studies.effects import study
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import StudyTask
 
-# The peak's column is tests/reference/beatup.py at the reference's design, over 4 million angles: the rod's weight, which
-# gravity puts inside the drive, is in it. It changes no M3: the design and its regrets are those of a rod without weight.
+# The peak's column is of tests/reference/beatup.py at the reference's design, over 4 million angles. The rod's weight,
+# inside the drive, is in it; M3, the design and the regrets are those of a rod without weight.
 TABLE = {  # shift of M3 and of the peak, N·m; regret of M3, % of its natural size
     "inertia": (677.009, -77.201606, 13.804),
     "rocker_inertia": (54.59525, -6.640084, 7.114),
