@@ -410,8 +410,8 @@ def _stood_for(effect: Effect | None, key: list[str]) -> tuple[str, ...]:
 
 
 def _deciding(own: Table) -> dict[str, Any]:
-    """Return what of a target's table decides an answer; an indifference only where one is given."""
-    return own.model_dump(exclude={"expected"} | ({"indifference"} - own.model_fields_set))
+    """Return what of a target's table decides an answer; an indifference and digits only where they are given."""
+    return own.model_dump(exclude={"expected"} | ({"indifference", "digits"} - own.model_fields_set))
 
 
 def _put_on(document: Mapping[str, Any], *effect: str) -> Mapping[str, Any]:
