@@ -324,6 +324,7 @@ def export(
     scene, given, name, status = read_request(problem, design, target, sets, on, off, free)
     said = outputs.what(api.evaluate(scene, given, name), name, status) if given else None
     how = outputs.workshop(dxf, arcs, only)
+    outputs.check_workshop(out, how)
     write(out, lambda path: outputs.linkage(path, scene, given, said, comma, how))
     remarked(scene, given)
 

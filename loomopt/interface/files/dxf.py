@@ -3,6 +3,7 @@
 Lengths between joints are dimensions too, which follow their points, on a layer of their own."""
 
 import importlib
+import logging
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -46,15 +47,18 @@ def write(drawing: Drawing, path: Path, version: str = R2010) -> None:
 
 @contextmanager
 def _fixed_stamps() -> Iterator[None]:
-    """Have ezdxf write constant dates and identifiers instead of today's."""
+    """Have ezdxf write constant dates and identifiers, and log no warning that R12 has no unit."""
     ezdxf: Any = importlib.import_module("ezdxf")
 
-    before = ezdxf.options.write_fixed_meta_data_for_testing
+    log = logging.getLogger("ezdxf")
+    before, level = ezdxf.options.write_fixed_meta_data_for_testing, log.level
     ezdxf.options.write_fixed_meta_data_for_testing = True
+    log.setLevel(logging.ERROR)
     try:
         yield
     finally:
         ezdxf.options.write_fixed_meta_data_for_testing = before
+        log.setLevel(level)
 
 
 def _document(drawing: Drawing, version: str) -> Any:

@@ -323,6 +323,18 @@ def workshop(version: str | None = None, arcs: str | None = None, only: str | No
     return Workshop(chosen, tolerance, only or "")
 
 
+def check_workshop(paths: Sequence[Path], how: Workshop) -> None:
+    """Raise BadInput where no file of a call takes its options, before any is written; how: those options."""
+    endings = {path: path.suffix.lower() for path in paths}
+    if how._replace(only="") != USUAL and ".dxf" not in endings.values():
+        remedy = "Name a file that ends in .dxf"
+        raise refusal("--dxf and --arcs are of DXF files", "", "--out", str(paths[0]), remedy=remedy)
+    for path, ending in endings.items():
+        if how.only and ending in (".csv", ".xlsx"):
+            remedy = "Name a file that ends in .dxf or .svg"
+            raise refusal("--only is of drawings", "", "--out", str(path), remedy=remedy)
+
+
 @working()
 def linkage(
     path: Path,
@@ -340,14 +352,7 @@ def linkage(
     if ending == ".dxf":
         _dxf(path, scene, design, said, how)
         return
-    if how._replace(only="") != USUAL:
-        raise refusal(
-            "--dxf and --arcs are of DXF files", "", "--out", str(path), remedy="Name a file that ends in .dxf"
-        )
     if how.only:
-        if ending != ".svg":
-            remedy = "Name a file that ends in .dxf or .svg"
-            raise refusal("--only is of drawings", "", "--out", str(path), remedy=remedy)
         from loomopt.interface.files import svg
 
         text(path, svg.render(only(drawing(scene, design, said), how.only)))

@@ -9,6 +9,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
+from loomopt.interface.cli.app import run
 from loomopt.interface.files import outputs
 from loomopt.jobs.shedding import drawing
 from loomopt.maths.arcs import closed_biarcs, distance
@@ -89,3 +90,21 @@ def test_biarcs_of_a_circle_are_the_circle(tolerance):
 def test_what_cannot_be_written_is_refused(tmp_path, options, told):
     with pytest.raises(BadInput, match=told):
         exported(tmp_path, **options)
+
+
+def test_options_of_dxf_stand_beside_other_files_and_the_log_stays_silent(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    assert run(["export", "shedding", "--out", "cam.dxf", "--out", "cam.svg", "--dxf", "r12", "--arcs", "0.01 mm"]) == 0
+    assert "INSUNITS" not in capfd.readouterr().err
+    assert {path.name for path in tmp_path.iterdir()} == {"cam.dxf", "cam.svg"}
+
+
+@pytest.mark.parametrize(
+    "options", [["--out", "a.svg", "--dxf", "r12"], ["--out", "a.dxf", "--out", "a.csv", "--only", "profile"]]
+)
+def test_options_that_no_file_takes_are_refused_before_a_file_is_written(options, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(["export", "shedding", *options]) == 2
+    out, err = capsys.readouterr()
+    assert (out, len(err.splitlines())) == ("", 1)
+    assert list(tmp_path.iterdir()) == []
