@@ -15,7 +15,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import SAME_OBJECTIVE
-from loomopt.solving.nlp.point import Elastic, Known, Point, Settings, sampler_at
+from loomopt.solving.nlp.point import SUCCESS, Elastic, Known, Point, Settings, sampler_at
 from loomopt.solving.nlp.rows import HeldStations, Multipliers, RowFamily, chained, epigraphs, families, held, stations
 from loomopt.solving.nlp.transcribe import Transcription, transcribe
 
@@ -175,6 +175,13 @@ class Calls:
     def worth(self, point: Point) -> float:
         """Return the NLP's objective at a point that has its epigraph variables."""
         return math.fsum(w * h for w, h in zip(self.weights, self._heights(point.x, point.extra), strict=True))
+
+    def is_worse(self, answer: "IpoptAnswer", start: Sampler) -> bool:
+        """Say whether a solve ended nowhere, or at a worse point than its start."""
+        if answer.status not in SUCCESS:
+            return True
+        levels = zip(self.weights, self.program.objectives, strict=True)
+        return answer.value > math.fsum(weight * of.merit(start) / of.scale for weight, of in levels) + SAME_OBJECTIVE
 
     def is_beaten(self, answer: "IpoptAnswer") -> bool:
         """Say whether a solve at some nodes is already no better than is known."""
