@@ -15,7 +15,7 @@ from unittest import mock
 
 import loomopt as lo
 from loomopt.physics.schema import Sense
-from loomopt.solving.search import stretch
+from loomopt.solving.search import neighbour_newton
 from loomopt.studies import sweep
 from loomopt.studies.front.trade import Trade
 from loomopt.studies.run import run
@@ -68,7 +68,7 @@ def timed(planned: Callable[[], SceneStudy], together: bool) -> tuple[tuple[Row,
     began = time.process_time()
     if together:
         return run.run(planned()), time.process_time() - began
-    alone = mock.patch.object(stretch, "solved", lambda asked: [None] * len(asked))
+    alone = mock.patch.object(neighbour_newton, "solved", lambda asked: [None] * len(asked))
     with alone, mock.patch.object(sweep, "MOST_COARSE", 10**6):
         # What a study has planned it keeps: with other points from scratch it is another one.
         return run.run(planned()), time.process_time() - began

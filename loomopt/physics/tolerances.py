@@ -39,7 +39,7 @@ BINDING = 1e-6
 """Multiplier above which a row binds where a solve ends: IPOPT leaves TOLERANCE/distance, so what is farther than 1e-5
 from its bound is below it. A row wrongly held is told by the certificate."""
 
-TOUCHING, SETTLED = 1e-8, 1e-8
+TOUCHING, CONVERGED = 1e-8, 1e-8
 """Distance from its bound at which an extreme is polished onto it; move, in u or scaled, below which nothing moves:
 both the root of rounding, for a maximum's place is known no better."""
 

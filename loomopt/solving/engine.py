@@ -71,9 +71,9 @@ def solve(
             refused = f"{', '.join(sold)} comes in sizes, which boxes do not tell" if sold else ""
             search, bound = levels.claimed(search, global_proof, refused)
         if search.best:
-            from loomopt.solving.search import indifference
+            from loomopt.solving.search import mass_tradeoff
 
-            search = indifference.settled(search)
+            search = mass_tradeoff.settled(search)
         # Figures are read as finely for every answer: they are no part of what accuracy costs.
         evaluations = own.positions - begun
 

@@ -22,12 +22,12 @@ from loomopt.scenes import designs, numbers
 from loomopt.scenes.numbers import files, quantity
 from loomopt.scenes.provenance import versions
 from loomopt.scenes.scene import Scene
-from loomopt.solving import between, engine
+from loomopt.solving import engine, neighbour_answer
 from loomopt.solving.answer.solution import SIDES, Solution
-from loomopt.solving.certificate.verdict import worth_of
+from loomopt.solving.certificate.records import worth_of
 from loomopt.solving.nlp.point import Point
 from loomopt.solving.options import check_numbers, check_sought, target_name
-from loomopt.solving.search import stretch
+from loomopt.solving.search import neighbour_newton
 from loomopt.solving.search.search import Search
 from loomopt.studies.run import rows
 from loomopt.studies.run.rows import Change, Findings, Multiplier, Row, Side, StudyTask, enough_together
@@ -238,7 +238,7 @@ class Sweep:
     def solve(self, task: StudyTask, parent: Row | None) -> Solution:
         """Return the answer of a task. Raises BadInput for a combination that is no scene."""
         (search,) = self._between([task])
-        answer = between.told(self.scene_at(task.point), self.target, search) if search else None
+        answer = neighbour_answer.told(self.scene_at(task.point), self.target, search) if search else None
         return answer if answer and answer.status == "optimal" else self._alone(task, parent)
 
     def _alone(self, task: StudyTask, parent: Row | None) -> Solution:
@@ -253,14 +253,14 @@ class Sweep:
         """Return the searches between two neighbours' optima; None of a task that must be solved alone."""
         found: list[Search | None] = [None] * len(tasks)
         begun = [(k, each) for k, task in enumerate(tasks) if task.beside and (each := self._begun(task))]
-        for (k, _), search in zip(begun, stretch.solved([each for _, each in begun]), strict=True):
+        for (k, _), search in zip(begun, neighbour_newton.solved([each for _, each in begun]), strict=True):
             found[k] = search
         return found
 
-    def _begun(self, task: StudyTask) -> stretch.Between | None:
+    def _begun(self, task: StudyTask) -> neighbour_newton.Between | None:
         """Return a task between its neighbours' optima; None where it is no scene, which it tells by itself."""
         with contextlib.suppress(BadInput):
-            return between.begun(self.scene_at(task.point), self.target, self.accuracy, task.beside)
+            return neighbour_answer.begun(self.scene_at(task.point), self.target, self.accuracy, task.beside)
         return None
 
     def place(self, row: Row) -> Mapping[str, float]:
@@ -299,10 +299,10 @@ class Sweep:
     def _row_between(self, task: StudyTask, search: Search) -> Row | None:
         """Return the row of a search that ended between two neighbours; None where it must be solved alone."""
         best, program = search.best, search.program
-        here = between.evaluated(self.scene_at(task.point), search)
+        here = neighbour_answer.evaluated(self.scene_at(task.point), search)
         if best is None or here is None:
             return None
-        optimum = stretch.optimum(search.job, program, best.x, best.certificate)
+        optimum = neighbour_newton.optimum(search.job, program, best.x, best.certificate)
         return Row(
             point=task.point,
             place=task.place,
@@ -327,7 +327,7 @@ class Sweep:
         warm: dict[str, object] = {}
         if passed and not self.cold:
             program = registry.of_target(scene, self.target).program(scene, self.target)
-            warm = _warm(answer.point, program, between.optimum(scene, program, answer))
+            warm = _warm(answer.point, program, neighbour_answer.optimum(scene, program, answer))
             warm |= {"basins": len(answer.optima)} if len(answer.optima) > 1 else {}
         return Row(
             point=task.point,
@@ -345,7 +345,7 @@ class Sweep:
         )
 
 
-def _warm(point: Point, program: Program, optimum: stretch.Optimum | None) -> dict[str, object]:
+def _warm(point: Point, program: Program, optimum: neighbour_newton.Optimum | None) -> dict[str, object]:
     """Return what a neighbour can start from."""
     return {**rows.written(point, program), **({"optimum": optimum.as_dict()} if optimum else {})}
 
@@ -364,8 +364,8 @@ def _changes(line: Sequence[Row]) -> Iterator[Change]:
     for row, after in itertools.pairwise(line):
         before, now = ({multiplier.side for multiplier in each.multipliers} for each in (row, after))
         if row.certified and after.certified and before != now:
-            between = (next(iter(row.place.values())), next(iter(after.place.values())))
-            yield Change(between, "active set", tuple(map(Side, sorted({side.limit for side in before ^ now}))))
+            ends = (next(iter(row.place.values())), next(iter(after.place.values())))
+            yield Change(ends, "active set", tuple(map(Side, sorted({side.limit for side in before ^ now}))))
 
 
 def _gaps(line: Sequence[Row]) -> Iterator[tuple[float, float]]:

@@ -20,7 +20,7 @@ from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import JointPrice, Price, Proof, Proofs, Relaxation, Words
-from loomopt.solving.certificate.verdict import Certificate, GlobalBound, GlobalLevel, Level
+from loomopt.solving.certificate.records import Certificate, GlobalBound, GlobalLevel, Level
 
 AGREES = 1e-6
 """Relative; a figure computed anew that differs by less is the one in the file: another machine may have made that."""

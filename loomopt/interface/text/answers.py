@@ -13,7 +13,7 @@ from loomopt.model.program import Alias
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Evaluated, Solution, Words, changed, named, remedies
-from loomopt.solving.certificate.verdict import GlobalBound
+from loomopt.solving.certificate.records import GlobalBound
 
 if TYPE_CHECKING:
     from loomopt.solving.answer.solution import Proofs

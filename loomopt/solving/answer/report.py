@@ -30,7 +30,7 @@ from loomopt.solving.answer.solution import (
     Words,
     remedies,
 )
-from loomopt.solving.certificate.verdict import Certificate, GlobalBound
+from loomopt.solving.certificate.records import Certificate, GlobalBound
 from loomopt.solving.nlp.point import BEATEN, excess, sampler_at
 from loomopt.solving.options import target_name
 from loomopt.solving.search.search import Candidate, Search, compared

@@ -17,7 +17,7 @@ from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.document import copied
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import FAMILY
-from loomopt.solving.certificate.verdict import Binding, Certificate, GlobalBound, JointBinding, worth_of
+from loomopt.solving.certificate.records import Binding, Certificate, GlobalBound, JointBinding, worth_of
 
 
 class Proof(NamedTuple):

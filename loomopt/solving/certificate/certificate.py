@@ -23,9 +23,9 @@ from loomopt.solving.certificate import kkt, second_order
 from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet, LevelMultipliers, System, active_set, priced
 from loomopt.solving.certificate.multiplier_set import KnownMultipliers, MultiplierSet
+from loomopt.solving.certificate.records import Binding, Certificate, FrameRow, JointBinding, Level
 from loomopt.solving.certificate.second_order import Curvature, Local
 from loomopt.solving.certificate.taylor_bounds import between_points, cycle_rows, judged
-from loomopt.solving.certificate.verdict import Binding, Certificate, FrameRow, JointBinding, Level
 from loomopt.solving.nlp.point import Settings
 
 COMPLEMENTARY = 1e-8

@@ -20,7 +20,7 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ACTIVE, FEASIBLE, POSITIVE, RANK, SAME_NODE
 from loomopt.solving.certificate.multiplier_set import MultiplierSet
-from loomopt.solving.certificate.verdict import Binding
+from loomopt.solving.certificate.records import Binding
 
 MOVED = 100 * SAME_NODE
 """How far, in u, an extreme may move with a design: what is farther is another."""

@@ -25,10 +25,10 @@ from loomopt.physics.tolerances import (
     POLISH_STEPS,
     SAME_NODE,
     SAME_OBJECTIVE,
-    SETTLED,
+    CONVERGED,
     TOUCHING,
 )
-from loomopt.solving.nlp.follow import follow
+from loomopt.solving.nlp.active_set_pivots import follow
 from loomopt.solving.nlp.ipopt import Calls, IpoptAnswer, run
 from loomopt.solving.nlp.point import BEATEN, SUCCESS, Elastic, Known, Point, Settings, sampler_at
 from loomopt.solving.nlp.rows import BindingRows, Multipliers, RowFamily, binding
@@ -58,7 +58,7 @@ def polish(
             return x, touching
         x, extra, step = met_at
         moved = calls.sampler(x)
-        if moved is None or step <= SETTLED:
+        if moved is None or step <= CONVERGED:
             return x, touching
         peaks = calls.peaks(moved)
     return x, touching

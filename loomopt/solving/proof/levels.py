@@ -17,7 +17,7 @@ from loomopt.model.objectives import Objective
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
-from loomopt.solving.certificate.verdict import GlobalBound, GlobalLevel
+from loomopt.solving.certificate.records import GlobalBound, GlobalLevel
 from loomopt.solving.options import GlobalProof
 from loomopt.solving.proof.reading import Reader
 from loomopt.solving.proof.task import BoxTask, OpenError, reduced, silent

@@ -19,7 +19,7 @@ from loomopt.model.program import LEAST_CHANGE, Program, Variable
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 from loomopt.solving.certificate.certificate import certify
-from loomopt.solving.certificate.verdict import Certificate
+from loomopt.solving.certificate.records import Certificate
 from loomopt.solving.search.search import Candidate, Search, as_read, corrected, judged_as_is, objectives, tried
 from loomopt.solving.search.tie_break import unchanging
 

@@ -22,7 +22,7 @@ from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import BEATEN, SUCCESS, Known, Point, sampler_at
 from loomopt.solving.nlp.rows import chain_roots
-from loomopt.solving.search import fallback, vanishing
+from loomopt.solving.search import fallback, vanishing_levels
 from loomopt.solving.search.search import Candidate, OnStart, Search, at, judged, tried
 
 SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8, 3, 2
@@ -316,7 +316,7 @@ def resolved(
         if finer is search.program:
             break
         search = searched(replace(search, program=finer, candidates=(), best=None), starts, seed, (), on_start)
-    return fallback.no_worse(vanishing.held(search))
+    return fallback.no_worse(vanishing_levels.held(search))
 
 
 def rewarded(
@@ -325,14 +325,14 @@ def rewarded(
     """Return the search without the numbers that serve no level; None without any, or where it leads to no answer."""
     if not search.program.any_numbers:
         return None
-    from loomopt.solving.search import unrewarded
+    from loomopt.solving.search import inactive_variables
 
     screening = _screening(search, exchange.starts(search.program, 1, seed))
-    held = unrewarded.held(search, screening.unread()) if screening else None
+    held = inactive_variables.held(search, screening.unread()) if screening else None
     if held is None:
         return None
     found = searched(replace(search, program=held), count, seed, near, on_start)
-    found = unrewarded.freed(found, search.program) if found.passed else found
+    found = inactive_variables.freed(found, search.program) if found.passed else found
     return found if found.passed else None
 
 

@@ -21,7 +21,7 @@ from loomopt.physics.tolerances import (
     STATIONARY,
 )
 from loomopt.solving.certificate.certificate import Draft, begun
-from loomopt.solving.certificate.verdict import Certificate
+from loomopt.solving.certificate.records import Certificate
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import SUCCESS, Known, Point, Settings, sampler_at
 from loomopt.solving.search import tie_break

@@ -20,15 +20,15 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import ACTIVE, FEASIBLE, SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
-from loomopt.solving import between
+from loomopt.solving import neighbour_answer
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Clash, Evaluated, Finding, Solution, Words
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.kkt import ActiveRow, active_set
-from loomopt.solving.certificate.verdict import Binding, Certificate
+from loomopt.solving.certificate.records import Binding, Certificate
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
-from loomopt.solving.search import elastic, least_change, multistart, stretch
+from loomopt.solving.search import elastic, least_change, multistart, neighbour_newton
 from loomopt.solving.search.multistart import rewarded, searched, spread, tied
 from loomopt.solving.search.search import Candidate, Search, judged, objectives, tried
 from loomopt.studies.front.plan import ALIKE, Touched, sloped
@@ -165,16 +165,16 @@ class Solver:
                 search, asking = after, asking._replace(levels=2)
         return self._told(least_change.with_least_change(search), asking)
 
-    def between(self, asked: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Reached | None]:
+    def neighbour_answer(self, asked: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Reached | None]:
         """Return what programs of one level come to between two optima; None of one that must be solved alone.
 
         ends: both optima as JSON data, and how far a program lies from the first to the second.
         """
         begun = []
         for asking, (*optima, share) in zip(asked, ends, strict=True):
-            first, second = map(stretch.read_optimum, optima)
-            begun.append(stretch.Between(self._begun(asking), first, second, share, self._peaks))
-        searches = zip(asked, stretch.solved(begun), strict=True)
+            first, second = map(neighbour_newton.read_optimum, optima)
+            begun.append(neighbour_newton.Between(self._begun(asking), first, second, share, self._peaks))
+        searches = zip(asked, neighbour_newton.solved(begun), strict=True)
         return [self._told(search, of) if search and self._priced(search, of) else None for of, search in searches]
 
     def moved(self, asked: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Moved | None]:
@@ -184,11 +184,11 @@ class Solver:
         """
         begun = []
         for asking, (*optima, _) in zip(asked, ends, strict=True):
-            first, second = map(stretch.read_optimum, optima)
-            begun.append(stretch.Between(self._begun(asking), first, second, 0.0))
+            first, second = map(neighbour_newton.read_optimum, optima)
+            begun.append(neighbour_newton.Between(self._begun(asking), first, second, 0.0))
         return [
             None if x is None else self._moved(Point(x, "Solve_Succeeded", True), each.search, 0, led=True)
-            for each, x in zip(begun, stretch.moved(begun), strict=True)
+            for each, x in zip(begun, neighbour_newton.moved(begun), strict=True)
         ]
 
     def solved_from(
@@ -234,7 +234,7 @@ class Solver:
 
     @lazy
     def _peaks(self) -> tuple[str, ...]:
-        return between.told_peaks(self.scene, self.job, self.base)
+        return neighbour_answer.told_peaks(self.scene, self.job, self.base)
 
     def _begun(self, asking: Asking) -> Search:
         return Search(self.job, self.program(asking), Settings(self.accuracy), self._today)
@@ -308,7 +308,7 @@ class Solver:
             "axes": axes,
             "held": list(objectives(program, best.x)[: self.held]),
         }
-        optimum = stretch.optimum(self.job, program, best.x, best.certificate) if asking[::2] == (0, 1) else None
+        optimum = None
         told |= {"optimum": optimum.as_dict()} if optimum else {}
         return Reached(
             status,

@@ -9,7 +9,7 @@ from loomopt.model.limits import BoundLimit, CycleLimit, RatioLimit
 from loomopt.model.objectives import Value
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Clash, Relaxation
-from loomopt.solving.certificate.verdict import Binding, Certificate
+from loomopt.solving.certificate.records import Binding, Certificate
 
 ROWS = {"f": lambda v: v["x"] ** 2, "p": lambda v: v["x"] + v["y"]}
 WAVES = {"w": lambda m, v, phi: v["x"] * m.cos(phi)}

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from loomopt.solving.answer.solution import Evaluated, Finding, Relaxation, Solution, certificate_dict
-from loomopt.solving.certificate.verdict import Certificate, Level
+from loomopt.solving.certificate.records import Certificate, Level
 
 HELD, BROKEN = Finding("p", 1.0, None, 2.0, True), Finding("q", 3.0, None, 2.0, False)
 

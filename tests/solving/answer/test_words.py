@@ -8,7 +8,7 @@ import loomopt as lo
 from loomopt.model.limits import BoundLimit
 from loomopt.model.objectives import Magnitude, Peak, Value
 from loomopt.solving.answer.solution import Relaxation, Words, outward, remedies
-from loomopt.solving.certificate.verdict import Binding
+from loomopt.solving.certificate.records import Binding
 
 
 @pytest.mark.parametrize(

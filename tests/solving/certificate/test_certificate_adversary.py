@@ -10,10 +10,10 @@ import pytest
 from scipy.optimize import linprog
 from support import toy
 
+from loomopt.solving.certificate.batch_certificate import certify_together
 from loomopt.solving.certificate.certificate import certified, certify
 from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
-from loomopt.solving.certificate.together import certify_together
 
 ACCURACY = 1e-8
 FALLS, CURVES, EXCEEDED, PRICED = "can still fall", "second order fails", " is exceeded by ", "carries a price"

@@ -21,8 +21,8 @@ from loomopt.solving.certificate.certificate import (
 from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import LevelMultipliers, active_set
+from loomopt.solving.certificate.records import Level
 from loomopt.solving.certificate.second_order import Curvature, Local
-from loomopt.solving.certificate.verdict import Level
 
 NONE = LevelMultipliers(np.zeros(0), 0.0)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt.solving.nlp import follow
-from loomopt.solving.nlp.follow import reach
+from loomopt.solving.nlp import active_set_pivots
+from loomopt.solving.nlp.active_set_pivots import reach
 from loomopt.solving.nlp.rows import binding
 
 WIDE = 10.0
@@ -246,7 +246,7 @@ def test_held_variables_stay_active_and_give_way_to_none():
 
 def test_a_step_along_curvature_is_newton_s(monkeypatch):
     """Each of these takes two looks: one that moves, and one that finds nothing left."""
-    monkeypatch.setattr(follow, "PIVOTS", 2)
+    monkeypatch.setattr(active_set_pivots, "PIVOTS", 2)
     slid = reach(curved([0, -1e-5], [[1, 0], [0, 1e-4]], [[1, 0]], [0.0]), call([0, 0], rows=1), bound([1]), 5.0)
     assert slid.x == pytest.approx([0, 0.1], abs=1e-9)
     let_go = curved([-1, 1e-5], [[0, 0], [0, 1e-4]], [[1, 0], [0, 1]], [1.0, 0.0])
@@ -259,7 +259,7 @@ def test_a_step_along_curvature_is_newton_s(monkeypatch):
 
 
 def test_the_limit_whose_multiplier_is_brought_to_zero_first_gives_way(monkeypatch):
-    monkeypatch.setattr(follow, "PIVOTS", 2)
+    monkeypatch.setattr(active_set_pivots, "PIVOTS", 2)
     for prices, expected in (((0.9, 0.2), [1, 0.5]), ((0.2, 0.9), [0.5, 1])):
         nlp = programme([-price for price in prices], 0, [[1, 0], [0, 1], [1, 1]], [1, 1, 1.5])
         found = reach(nlp, call([1, 1], rows=3), bound([1, 1, 0]), 5.0)
@@ -267,7 +267,7 @@ def test_the_limit_whose_multiplier_is_brought_to_zero_first_gives_way(monkeypat
 
 
 def test_the_objective_s_curvature_has_weight_1(monkeypatch):
-    monkeypatch.setattr(follow, "PIVOTS", 2)
+    monkeypatch.setattr(active_set_pivots, "PIVOTS", 2)
     nlp = curved([-1, -1], 2 * np.eye(2), [[-1, 0]], [0.0])
     nlp.curvature = lambda x, p, weight, prices: 2 * weight * np.eye(2)
     found = reach(nlp, call([0.5, 0.1], rows=1), bound([0]), 5.0)

@@ -7,7 +7,7 @@ import pytest
 from support import toy
 
 from loomopt.solving.certificate.certificate import Draft
-from loomopt.solving.certificate.verdict import Certificate, Level
+from loomopt.solving.certificate.records import Certificate, Level
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.search import search as searching

@@ -9,7 +9,7 @@ from searches import BAD, GOOD, PROGRAM, candidate, certified, empty, solved
 from support import toy
 
 from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
-from loomopt.solving.certificate.verdict import Certificate, Level
+from loomopt.solving.certificate.records import Certificate, Level
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.search import search as searching

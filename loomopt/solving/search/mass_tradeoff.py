@@ -14,7 +14,7 @@ from loomopt.model.objectives import Objective
 from loomopt.model.program import Added, Program
 from loomopt.model.sampling import sampled
 from loomopt.physics.tolerances import INDIFFERENT, MOVED, SAME_OBJECTIVE, SHOWN_AS_ZERO
-from loomopt.solving.certificate.verdict import Level
+from loomopt.solving.certificate.records import Level
 from loomopt.solving.nlp.point import Known
 from loomopt.solving.search.search import Candidate, Search, Spared, judged, objectives, tried, worths
 

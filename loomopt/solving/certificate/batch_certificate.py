@@ -25,7 +25,7 @@ from loomopt.physics.tolerances import JET_ERROR, NEWTON_SHIFT
 from loomopt.solving.certificate.certificate import NUMBERLESS, certified, certify, drafted, prepared
 from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet
-from loomopt.solving.certificate.verdict import Certificate
+from loomopt.solving.certificate.records import Certificate
 
 MOST = 16
 """Designs that are read at once, at most: of more each takes no less, and what is kept of them grows."""

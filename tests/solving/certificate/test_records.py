@@ -3,7 +3,7 @@
 import pytest
 
 from loomopt.physics.tolerances import ROUNDED
-from loomopt.solving.certificate.verdict import Certificate, Level
+from loomopt.solving.certificate.records import Certificate, Level
 
 
 def certificate(*levels, feasibility=0.0, violation=0.0, **more):

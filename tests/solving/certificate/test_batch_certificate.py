@@ -9,7 +9,7 @@ import pytest
 from loomopt.jobs import registry
 from loomopt.scenes import designs
 from loomopt.solving import engine
-from loomopt.solving.certificate import together
+from loomopt.solving.certificate import batch_certificate
 from loomopt.solving.certificate.certificate import certify, prepared
 from loomopt.solving.certificate.derivatives import JetDerivatives
 
@@ -49,8 +49,8 @@ def beside(program, x, share, count):
 def test_derivatives_are_those_of_each_design_alone(job, target):
     program, x = optimum(job, target)
     places = [(each, prepared(program, each, ACCURACY)) for each in beside(program, x, 1e-9, 4)]
-    asked = [together.DesignAt(program, each, sampler, active.rows) for each, (sampler, active) in places]
-    for of, found in zip(asked, together.derivatives(asked), strict=True):
+    asked = [batch_certificate.DesignAt(program, each, sampler, active.rows) for each, (sampler, active) in places]
+    for of, found in zip(asked, batch_certificate.derivatives(asked), strict=True):
         alone = JetDerivatives(program, of.x, of.sampler, of.rows)
         basis = np.linalg.qr(np.random.default_rng(2).standard_normal((len(alone.names), 3)))[0]
         for mine, own in ((found.gradients(), alone.gradients()), (found.curvatures(basis), alone.curvatures(basis))):
@@ -61,10 +61,10 @@ def test_derivatives_are_those_of_each_design_alone(job, target):
 def test_derivatives_are_the_same_bits_in_batches_of_any_size(job, target):
     program, x = optimum(job, target)
     places = [(each, prepared(program, each, ACCURACY)) for each in beside(program, x, 1e-9, 10)]
-    asked = [together.DesignAt(program, each, sampler, active.rows) for each, (sampler, active) in places]
-    whole = together.derivatives(list(itertools.islice(itertools.cycle(asked), 200)))
+    asked = [batch_certificate.DesignAt(program, each, sampler, active.rows) for each, (sampler, active) in places]
+    whole = batch_certificate.derivatives(list(itertools.islice(itertools.cycle(asked), 200)))
     for size in (1, 8):
-        parts = [together.derivatives(asked[begin : begin + size]) for begin in range(0, len(asked), size)]
+        parts = [batch_certificate.derivatives(asked[begin : begin + size]) for begin in range(0, len(asked), size)]
         for one, other in zip(itertools.chain(*parts), whole[: len(asked)], strict=True):
             assert one.gradients().tobytes() == other.gradients().tobytes()
             assert one.bends.tobytes() == other.bends.tobytes()
@@ -82,11 +82,11 @@ def test_adversaries_are_refused_in_batches_as_they_are_alone(job, target, count
     program, x = optimum(job, target)
     asked = [(program, each) for share in (1e-6, 1e-4) for each in beside(program, x, share, 2)]
     several = list(itertools.islice(itertools.cycle(asked), count))
-    whole = together.certify_together(several, ACCURACY)
+    whole = batch_certificate.certify_together(several, ACCURACY)
     for k, (_, each) in enumerate(asked):
         assert verdict(whole[k]) == verdict(certify(program, each, ACCURACY))
         assert whole[k].passed == (each == x)
-        assert whole[k] == together.certify_together([asked[k]], ACCURACY)[0]
+        assert whole[k] == batch_certificate.certify_together([asked[k]], ACCURACY)[0]
     assert all(whole[k] == whole[k % len(asked)] for k in range(count))
 
 

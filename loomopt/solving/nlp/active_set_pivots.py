@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.physics.tolerances import SAME_NODE, SETTLED
+from loomopt.physics.tolerances import SAME_NODE, CONVERGED
 from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Point
 from loomopt.solving.nlp.rows import BindingRows, Flags, Multipliers
@@ -313,7 +313,7 @@ def follow(calls: Calls, warm: Point) -> Point | None:
         violation = calls.violation(extremes, point.extra)
         become = [(old, _nearest(of, old)) for of, own in zip(extremes, point.binding, strict=True) for old in own]
         change = _Change(np.array([old.u for old, _ in become]), np.array([now.u - old.u for old, now in become]))
-        if violation <= calls.settings.excess and change.largest <= SETTLED:
+        if violation <= calls.settings.excess and change.largest <= CONVERGED:
             return replace(point, iterations=0, violation=violation, built=calls.built)
         nodes = _aimed(calls.loose(sampler, extremes), [now for _, now in become], change, last)
         idle = 0 if change.largest < FOLLOW_PROGRESS * nearest else idle + 1

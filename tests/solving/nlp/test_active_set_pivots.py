@@ -10,7 +10,7 @@ from waves import model, objective, program
 
 from loomopt.model.kinematics import Arcs
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.solving.nlp import exchange, follow
+from loomopt.solving.nlp import active_set_pivots, exchange
 from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Point, Settings
 
@@ -25,7 +25,7 @@ def solved(task):
 
 
 def followed(task, near):
-    return follow.follow(Calls(task, Settings()), near)
+    return active_set_pivots.follow(Calls(task, Settings()), near)
 
 
 def at(piece, u, value=1.0, signed=False):
@@ -70,7 +70,7 @@ def test_limits_may_come_to_bind_and_let_go_on_the_way():
 def test_what_lies_too_far_is_not_followed():
     near, task = solved(program([("y", -1, 2.0)], PEAK)), program([("y", -1, 2.3)], PEAK)
     assert followed(task, near) is None
-    with mock.patch.object(follow, "FOLLOW_FARTHEST", 0.4):
+    with mock.patch.object(active_set_pivots, "FOLLOW_FARTHEST", 0.4):
         assert followed(task, near).x == pytest.approx(solved(task).x, abs=1e-8)
 
 
@@ -99,9 +99,12 @@ def test_corners_that_change_their_order_end_it():
 
 def test_rounds_without_progress_run_out():
     near, task = solved(program([("y", -1, 2.0)], SLOPE)), program([("y", -1, 2.1)], SLOPE)
-    with mock.patch.object(follow, "FOLLOW_ROUNDS", 2):
+    with mock.patch.object(active_set_pivots, "FOLLOW_ROUNDS", 2):
         assert followed(task, near) is None
-    with mock.patch.object(follow, "FOLLOW_PROGRESS", 0.0), mock.patch.object(follow, "FOLLOW_PATIENCE", 1):
+    with (
+        mock.patch.object(active_set_pivots, "FOLLOW_PROGRESS", 0.0),
+        mock.patch.object(active_set_pivots, "FOLLOW_PATIENCE", 1),
+    ):
         assert followed(task, near) is None
 
 
@@ -109,53 +112,58 @@ def test_extremes_are_searched_until_they_stand_still():
     """One pivot leaves a node where the extreme was, as far below it as the square of its move."""
     near, task = solved(program([("y", -1, 2.0)], SLOPE)), program([("y", -1, 2.1)], SLOPE)
     best = (6.75 + 1.1**2) / 9
-    with mock.patch.object(follow, "SETTLED", 1.0), mock.patch.object(Calls, "violation", return_value=0.0):
+    with (
+        mock.patch.object(active_set_pivots, "CONVERGED", 1.0),
+        mock.patch.object(Calls, "violation", return_value=0.0),
+    ):
         assert abs(followed(task, near).x["x"] - best) > 1e-5
     with mock.patch.object(Calls, "violation", return_value=0.0):
         assert followed(task, near).x["x"] == pytest.approx(best, abs=1e-12), "they stand still by themselves"
-    with mock.patch.object(follow, "SETTLED", 1.0):
+    with mock.patch.object(active_set_pivots, "CONVERGED", 1.0):
         assert followed(task, near).x["x"] == pytest.approx(best, abs=1e-9), "no extreme is above its bound"
 
 
 def test_the_extreme_a_node_has_become_is_the_nearest_of_its_sign_on_its_piece():
     extremes = [at(0, 0.30, 5.0), at(0, 0.52, -4.0), at(0, 0.45, 3.0), at(1, 0.50, 9.0)]
-    assert follow._nearest(extremes, at(0, 0.5)) == extremes[2]
-    assert follow._nearest(extremes, at(0, 0.2)) == extremes[0]
-    assert follow._nearest(extremes, at(0, 0.5, -1.0)) == extremes[1]
-    assert follow._nearest(extremes, at(2, 0.5)) == at(2, 0.5), "itself where there is none"
+    assert active_set_pivots._nearest(extremes, at(0, 0.5)) == extremes[2]
+    assert active_set_pivots._nearest(extremes, at(0, 0.2)) == extremes[0]
+    assert active_set_pivots._nearest(extremes, at(0, 0.5, -1.0)) == extremes[1]
+    assert active_set_pivots._nearest(extremes, at(2, 0.5)) == at(2, 0.5), "itself where there is none"
 
 
 def test_binding_extremes_come_first_and_leave_room_for_the_others():
     extremes = [at(0, k / 20, 9.0 - k) for k in range(9)]
-    chosen = follow._chosen(extremes, [at(0, 0.21), at(0, 0.38)], 6)
+    chosen = active_set_pivots._chosen(extremes, [at(0, 0.21), at(0, 0.38)], 6)
     assert chosen[:2] == [extremes[4], extremes[8]]
     assert chosen[2:] == [extremes[k] for k in (0, 1, 2, 3)], "six in all, the largest first"
     same = [at(0, 0.5), at(0, 0.5005), at(0, 0.502), at(1, 0.5)]
-    assert follow._chosen(same, [at(0, 0.5)], 6) == [same[0], same[2], same[3]], "one node stands for close ones"
+    assert active_set_pivots._chosen(same, [at(0, 0.5)], 6) == [same[0], same[2], same[3]], (
+        "one node stands for close ones"
+    )
     many = [at(0, k / 20, 9.0 - k) for k in range(9)]
-    assert follow._chosen(many, many[:7], 6) == many[:7]
+    assert active_set_pivots._chosen(many, many[:7], 6) == many[:7]
 
 
 def change(u, move):
-    return follow._Change(np.array(u), np.array(move))
+    return active_set_pivots._Change(np.array(u), np.array(move))
 
 
 def test_a_secant_through_two_rounds_points_to_where_extremes_stand_still():
     """u moves to 0.4 + (u − 0.4)/2: from 0.8 to 0.6 and on to 0.5; the secant hits 0.4 at once."""
     extremes = ((at(0, 0.5), at(0, 0.9)),)
-    aimed = follow._aimed(extremes, [extremes[0][0]], change([0.6], [-0.1]), change([0.8], [-0.2]))
+    aimed = active_set_pivots._aimed(extremes, [extremes[0][0]], change([0.6], [-0.1]), change([0.8], [-0.2]))
     assert [e.u for e in aimed[0]] == pytest.approx([0.4, 0.9])
     assert [e.value for e in aimed[0]] == [1.0, 1.0]
-    outside = follow._aimed(extremes, [extremes[0][0]], change([0.1], [-0.2]), change([0.3], [-0.3]))
+    outside = active_set_pivots._aimed(extremes, [extremes[0][0]], change([0.1], [-0.2]), change([0.3], [-0.3]))
     assert outside[0][0].u == 0.0, "no node leaves its piece"
-    outside = follow._aimed(extremes, [extremes[0][0]], change([0.9], [0.2]), change([0.7], [0.3]))
+    outside = active_set_pivots._aimed(extremes, [extremes[0][0]], change([0.9], [0.2]), change([0.7], [0.3]))
     assert outside[0][0].u == 1.0
 
 
 @pytest.mark.parametrize("last", [None, change([0.8, 0.1], [-0.2, 0.0]), change([0.8], [-0.1])])
 def test_without_two_rounds_that_compare_extremes_stay(last):
     extremes = ((at(0, 0.5), at(0, 0.9)),)
-    assert follow._aimed(extremes, [extremes[0][0]], change([0.6], [-0.1]), last) == extremes
+    assert active_set_pivots._aimed(extremes, [extremes[0][0]], change([0.6], [-0.1]), last) == extremes
 
 
 def test_the_largest_move_counts_whatever_its_direction():

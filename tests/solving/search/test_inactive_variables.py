@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from support import toy
 
-from loomopt.solving.search import unrewarded
+from loomopt.solving.search import inactive_variables
 
 BOUNDS = {"x": (0.5, 9.0), "y": (0.5, 9.0), "z": (0.0, 9.0)}
 TODAY = {"x": 2.0, "y": 2.0, "z": 5.0}
@@ -74,7 +74,7 @@ def test_a_number_that_only_moves_where_a_wave_is_read_serves_no_level():
 def test_a_program_whose_every_number_serves_stays_itself_and_so_does_one_of_a_jobs_own_numbers():
     asked: list[object] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(unrewarded, "held", functools.partial(_noted, asked, unrewarded.held))
+        patch.setattr(inactive_variables, "held", functools.partial(_noted, asked, inactive_variables.held))
         solved(program(objectives=("sum",), any_numbers=True))
         solved(program(any_numbers=False))
     assert asked == [None]
@@ -95,6 +95,6 @@ def test_a_wrong_guess_costs_a_second_search_and_no_answer():
         return replace(search.program, variables=tuple(fixed))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(unrewarded, "held", worst)
+        patch.setattr(inactive_variables, "held", worst)
         design, _ = solved(own)
     assert design["x"] + design["y"] == pytest.approx(4, abs=1e-8)

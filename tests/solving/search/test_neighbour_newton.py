@@ -6,8 +6,8 @@ import pytest
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.model.sampling import Sampler
-from loomopt.solving import between, engine
-from loomopt.solving.search import stretch
+from loomopt.solving import engine, neighbour_answer
+from loomopt.solving.search import neighbour_newton
 
 ENDS, CLOSE = (750.0, 780.0), 1e-12
 """N*m: the same limits bind all the way."""
@@ -17,13 +17,13 @@ def ended(resistance, target="balance"):
     scene = lo.load("beatup").set("operation.M0", f"{resistance!r} N*m")
     answer = engine.solve(scene, target)
     program = registry.of(scene).program(scene, target)
-    return answer, between.optimum(scene, program, answer)
+    return answer, neighbour_answer.optimum(scene, program, answer)
 
 
 def asked(resistance, ends, optima, target="balance"):
     scene = lo.load("beatup").set("operation.M0", f"{resistance!r} N*m")
     share = (resistance - ends[0]) / (ends[1] - ends[0])
-    return between.begun(scene, target, 1e-8, [*(each.as_dict() for each in optima), share])
+    return neighbour_answer.begun(scene, target, 1e-8, [*(each.as_dict() for each in optima), share])
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def digits(found):
 
 def test_what_comes_of_it_is_what_a_solve_alone_comes_to(optima):
     resistances = 755.0, 771.0
-    made = stretch.solved([asked(resistance, ENDS, optima) for resistance in resistances])
+    made = neighbour_newton.solved([asked(resistance, ENDS, optima) for resistance in resistances])
     for found, resistance in zip(made, resistances, strict=True):
         alone, _ = ended(resistance)
         best = found.best
@@ -52,10 +52,10 @@ def test_what_comes_of_it_is_what_a_solve_alone_comes_to(optima):
 
 def test_it_is_the_same_bits_in_batches_of_any_size(optima):
     several = [asked(float(m), ENDS, optima) for m in np.linspace(*ENDS, 12)[1:-1]]
-    whole = stretch.solved(several * 20)
+    whole = neighbour_newton.solved(several * 20)
     assert len(whole) == 200
     for size in (1, 8):
-        parts = [stretch.solved(several[begin : begin + size]) for begin in range(0, len(several), size)]
+        parts = [neighbour_newton.solved(several[begin : begin + size]) for begin in range(0, len(several), size)]
         assert digits(whole[:10]) == digits([each for part in parts for each in part]) == digits(whole[-10:])
 
 
@@ -68,9 +68,9 @@ def test_extremes_that_figures_read_are_found_with_the_certificates_and_not_agai
 
     scene, task = lo.load("beatup").set("operation.M0", "755.0 N*m"), asked(755.0, ENDS, optima)
     assert set(task.told) == {"peak_torque", "peak_power", "obliquity"}
-    (search,) = stretch.solved([task])
+    (search,) = neighbour_newton.solved([task])
     monkeypatch.setattr(Sampler, "_sampled", counted)
-    here = between.evaluated(scene, search)
+    here = neighbour_answer.evaluated(scene, search)
     assert sampled == []
     peaks = {"peak_torque", "peak_power", "mu_min"}
     alone = lo.evaluate(scene, here.design).figures
@@ -80,7 +80,7 @@ def test_extremes_that_figures_read_are_found_with_the_certificates_and_not_agai
 def test_what_a_target_reads_in_a_model_of_its_own_tells_no_figures():
     scene = lo.load("rapier")
     job = registry.of(scene)
-    assert between.told_peaks(scene, job, job.program(scene, "stroke-dwell")) == ()
+    assert neighbour_answer.told_peaks(scene, job, job.program(scene, "stroke-dwell")) == ()
 
 
 def test_beyond_a_change_of_what_binds_the_other_neighbours_rows_are_tried():
@@ -90,18 +90,18 @@ def test_beyond_a_change_of_what_binds_the_other_neighbours_rows_are_tried():
     kinds = [{row.kind for row in of.frame} for of in optima]
     assert kinds[0] != kinds[1]
     for resistance, kind in ((697.0, kinds[0]), (704.0, kinds[1])):
-        (found,) = stretch.solved([asked(resistance, ends, optima)])
+        (found,) = neighbour_newton.solved([asked(resistance, ends, optima)])
         assert found.passed
         assert {row.kind for row in found.best.certificate.frame} == kind
 
 
 def test_a_way_that_ends_at_no_optimum_is_left(optima):
     """Rows of another stretch: their Newton's method ends where a limit breaks, or no price is right."""
-    assert stretch.solved([asked(880.0, ENDS, optima), asked(620.0, ENDS, optima)]) == [None, None]
+    assert neighbour_newton.solved([asked(880.0, ENDS, optima), asked(620.0, ENDS, optima)]) == [None, None]
 
 
 def test_an_optimum_is_read_as_it_was_written(optima):
     import json
 
     for each in optima:
-        assert stretch.read_optimum(json.loads(json.dumps(each.as_dict()))) == each
+        assert neighbour_newton.read_optimum(json.loads(json.dumps(each.as_dict()))) == each

@@ -23,7 +23,7 @@ from loomopt.physics.cycle import TURN, Floats, Node
 from loomopt.physics.tolerances import RANK
 from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow
-from loomopt.solving.certificate.verdict import Level
+from loomopt.solving.certificate.records import Level
 from loomopt.solving.nlp.point import sampler_at
 from loomopt.solving.search.search import Search, as_read, at, judged, objectives, tried
 

@@ -12,12 +12,12 @@ from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Clash, Evaluated, Solution
 from loomopt.solving.nlp.point import Settings
-from loomopt.solving.search import stretch
+from loomopt.solving.search import neighbour_newton
+from loomopt.solving.search.neighbour_newton import Optimum
 from loomopt.solving.search.search import Clock, Search
-from loomopt.solving.search.stretch import Optimum
 
 
-def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> stretch.Between | None:
+def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> neighbour_newton.Between | None:
     """Return a target between two optima; None where more than a search makes its answer, or they are of another one.
 
     beside: both optima as JSON data, and how far the target lies from the first to the second.
@@ -26,11 +26,11 @@ def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> 
     if job.sizes(scene):
         return None
     program = job.program(scene, target)
-    first, second = map(stretch.read_optimum, beside[:2])
+    first, second = map(neighbour_newton.read_optimum, beside[:2])
     if not (first.serves(program) and second.serves(program)):
         return None
     search = Search(job, program, Settings(accuracy), job.start(program, scene))
-    return stretch.Between(search, first, second, beside[2], told_peaks(scene, job, program))
+    return neighbour_newton.Between(search, first, second, beside[2], told_peaks(scene, job, program))
 
 
 def told_peaks(scene: Scene, job: Job, program: Program) -> tuple[str, ...]:
@@ -70,4 +70,4 @@ def optimum(scene: Scene, program: Program, answer: Solution) -> Optimum | None:
         return None
     full = {scene.full(name): value for name, value in designs.flat(answer.design).items()}
     job = registry.of(scene)
-    return stretch.optimum(job, program, job.values(program, full), answer.certificate)
+    return neighbour_newton.optimum(job, program, job.values(program, full), answer.certificate)

@@ -19,9 +19,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE, POSITIVE, PRECISE, ROUNDING
-from loomopt.solving.certificate.kkt import ActiveRow
-from loomopt.solving.certificate.taylor_bounds import cycle_rows
-from loomopt.solving.certificate.together import (
+from loomopt.solving.certificate.batch_certificate import (
     Bent,
     DesignAt,
     Designs,
@@ -30,7 +28,9 @@ from loomopt.solving.certificate.together import (
     shares,
     without_extremes,
 )
-from loomopt.solving.certificate.verdict import Certificate, FrameRow
+from loomopt.solving.certificate.kkt import ActiveRow
+from loomopt.solving.certificate.records import Certificate, FrameRow
+from loomopt.solving.certificate.taylor_bounds import cycle_rows
 from loomopt.solving.nlp.point import Point, sampler_at
 from loomopt.solving.search import tie_break
 from loomopt.solving.search.search import Candidate, Search, as_read, objectives
@@ -281,7 +281,7 @@ def _certified(
 
 def _judged(ended: Sequence[tuple[Between, dict[str, float]]]) -> Iterator[Search | None]:
     """Yield the search of each with the optimum that it ended at, variables SI, or None where that is not shown."""
-    from loomopt.solving.search import indifference, least_change
+    from loomopt.solving.search import least_change, mass_tradeoff
 
     searches = [asked.search for asked, _ in ended]
     tidied = [search.job.tidy(search.program, x) for search, (_, x) in zip(searches, ended, strict=True)]
@@ -305,7 +305,7 @@ def _judged(ended: Sequence[tuple[Between, dict[str, float]]]) -> Iterator[Searc
         after = replace(search, candidates=(candidate,), best=candidate, stayed=True)
         open_still = certificate.level and len(least_change.unsettled(after, candidate)[1])
         # What is not as simple as it may be, or has a remark, is told by a search of its own.
-        yield after if not open_still and indifference.simpler(after) is after else None
+        yield after if not open_still and mass_tradeoff.simpler(after) is after else None
 
 
 def _holds(program: Program, x: Mapping[str, float], told: Sequence[str]) -> bool:
