@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.physics.tolerances import SAME_NODE, CONVERGED
+from loomopt.physics.tolerances import CONVERGED, SAME_NODE
 from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Point
 from loomopt.solving.nlp.rows import BindingRows, Flags, Multipliers

@@ -17,6 +17,7 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import TURN, Cycle, Floats
 from loomopt.physics.tolerances import (
     BINDING,
+    CONVERGED,
     NEEDED,
     POLISH_DONE,
     POLISH_FARTHEST,
@@ -25,7 +26,6 @@ from loomopt.physics.tolerances import (
     POLISH_STEPS,
     SAME_NODE,
     SAME_OBJECTIVE,
-    CONVERGED,
     TOUCHING,
 )
 from loomopt.solving.nlp.active_set_pivots import follow

@@ -165,7 +165,7 @@ class Solver:
                 search, asking = after, asking._replace(levels=2)
         return self._told(least_change.with_least_change(search), asking)
 
-    def neighbour_answer(self, asked: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Reached | None]:
+    def solve_neighbours(self, asked: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Reached | None]:
         """Return what programs of one level come to between two optima; None of one that must be solved alone.
 
         ends: both optima as JSON data, and how far a program lies from the first to the second.
@@ -180,7 +180,7 @@ class Solver:
     def moved(self, asked: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Moved | None]:
         """Return where a neighbour's optimum moves to each program with the rows that stop it.
 
-        None where other rows stop it there. ends: as of `between`, the neighbour's optimum first.
+        None where other rows stop it there. ends: as of `solve_neighbours`, the neighbour's optimum first.
         """
         begun = []
         for asking, (*optima, _) in zip(asked, ends, strict=True):

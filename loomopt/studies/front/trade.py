@@ -319,7 +319,7 @@ class Trade:
         places = [k for k, task in enumerate(tasks) if task.beside and "trial" not in task.ask]
         asked = [self.asking(tasks[k].place) for k in places]
         for k, asking, reached in zip(
-            places, asked, self.solver.between(asked, [tasks[k].beside for k in places]), strict=True
+            places, asked, self.solver.solve_neighbours(asked, [tasks[k].beside for k in places]), strict=True
         ):
             met = reached and _kept(reached, tasks[k].ask["held"])
             if met and met.certified:
