@@ -28,11 +28,21 @@ NEIGHBOURS: dict[str, tuple[str, tuple[str, ...]]] = {
     "shedding": ("operation.speed", ("600 rpm", "603 rpm", "612 rpm")),
 }
 NUMBERS = (
-    *("SAMPLES", "CLOSER", "IPOPT_TOLERANCE", "IPOPT_SLOPE", "WARM_BARRIER", "WARM_PUSH", "PENALTY", "NEAR", "BINDING"),
-    *("FIRST_SLOTS", "LEADING", "FIRST_SHARE", "FIRST_ROOM", "EXCHANGE_ROUNDS", "STANDS", "TOUCHING", "CONVERGED"),
+    *(
+        "SAMPLES",
+        "REFINED_MULTIPLIER",
+        "IPOPT_TOLERANCE",
+        "IPOPT_SLOPE",
+        "WARM_BARRIER",
+        "WARM_PUSH",
+        "PENALTY",
+        "NEAR",
+        "BINDING",
+    ),
+    *("FIRST_SLOTS", "LEADING", "FIRST_SHARE", "FIRST_ROOM", "EXCHANGE_ROUNDS", "END_EXCESS", "TOUCHING", "CONVERGED"),
     *("POLISH_STEPS", "POLISH_FARTHEST", "POLISH_RANK", "POLISH_MET", "POLISH_DONE", "FOLLOW_FARTHEST"),
     *("FOLLOW_ROUNDS", "FOLLOW_PROGRESS", "FOLLOW_PATIENCE", "SAME_NODE", "PIVOTS", "PIVOT_NEWTON_STEPS"),
-    *("PIVOT_STEP", "PIVOT_MET", "PIVOT_STATIONARY", "PIVOT_DEPENDENT", "PIVOT_CURVED", "PIVOT_SLOPE", "PIVOT_RANK"),
+    *("PIVOT_STEP", "PIVOT_RESIDUAL", "PIVOT_STATIONARY", "PIVOT_DEPENDENT", "PIVOT_FLAT", "PIVOT_SLOPE", "PIVOT_RANK"),
 )
 IPOPTS = {
     "IPOPT_TOLERANCE": ("tol", "constr_viol_tol", "compl_inf_tol"),
@@ -74,8 +84,8 @@ def outcome(programs: list[tuple[Program, ...]]) -> Outcome:
             sampler = sampler_at(program, point.x)
             iterations += point.iterations
             left += near is not None and point.iterations > 0
-            near = point if point.reached else None
-            if not point.reached or sampler is None:
+            near = point if point.usable else None
+            if not point.usable or sampler is None:
                 found.append(None)
                 continue
             excess = max(excess, point.violation, *(k.excess(sampler) for k in program.limits if k.sign != 0))

@@ -134,7 +134,7 @@ class ByHand:
         calls = Calls(program, Settings())
         start = dict(program.starts[0])
         sampler, nodes = calls.sampler(start), answer.point.nodes
-        nlp = calls.transcribed(sampler, nodes, warm=False)
+        nlp = calls.nlp(sampler, nodes, warm=False)
         arguments = calls.arguments(nlp, sampler, start, calls.first_extra(nlp, sampler), nodes)
         return nlp, nlp.solver(False, calls.settings), arguments, program
 

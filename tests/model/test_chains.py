@@ -6,7 +6,7 @@ from loomopt.jobs import registry
 from loomopt.jobs.shedding import model as shedding
 from loomopt.maths import systems
 from loomopt.model.sampling import Sampler
-from loomopt.solving.nlp.rows import Station, chain_values, chained, station_switches, stations
+from loomopt.solving.nlp.rows import Station, chain_names, chain_values, station_switches, stations
 
 SCENE = registry.load("shedding")
 JOB = registry.of(SCENE)
@@ -25,11 +25,11 @@ def names(program):
 def test_a_free_law_is_a_chain_of_its_knots_and_a_given_one_is_none(symmetric):
     program = task(symmetric)
     expected = [f"law_{of}_{k}" for k in range(1, 7) for of in "sv"]
-    assert list(chained(program.model, names(program))) == expected
-    assert chained(program.model, ["K1", "X0"]) == ()
+    assert list(chain_names(program.model, names(program))) == expected
+    assert chain_names(program.model, ["K1", "X0"]) == ()
     assert stations(program.model, Sampler(program.model, {**program.parameters, **program.starts[0]}).given, []) == ()
     fixed = JOB.program(SCENE, "stiffness")
-    assert chained(fixed.model, names(fixed)) == ()
+    assert chain_names(fixed.model, names(fixed)) == ()
 
 
 def test_stations_are_the_knots_of_rise_and_return_by_their_places_among_all_corners():
@@ -49,7 +49,7 @@ def test_what_is_told_to_follow_is_what_the_model_derives(symmetric):
     program = task(symmetric, intervals=12)
     values = {**program.parameters, **program.starts[0]}
     derived = program.model.given(systems.FLOAT, values).values
-    chain = {name: derived[name] for name in chained(program.model, names(program))}
+    chain = {name: derived[name] for name in chain_names(program.model, names(program))}
     assert chain_values(program.model, names(program), systems.FLOAT, {**values, **chain}) == pytest.approx(
         chain, abs=1e-15
     )

@@ -150,7 +150,7 @@ def task():
 def test_a_program_with_a_state_is_solved():
     program = task()
     point = exchange.solve(program, program.starts[0], Settings())
-    assert point.reached
+    assert point.usable
     best = Sampler(ELASTIC, {**program.parameters, **point.x})
     assert program.limits[0].excess(best) <= 1e-9
     value = program.objectives[0].merit(best)

@@ -16,7 +16,7 @@ BOWL = {"f": lambda v: (v["x"] - 1) ** 2 + v["y"] ** 2}
 
 def test_where_no_start_assembles_nothing_was_iterated(monkeypatch):
     monkeypatch.setattr(exchange, "starts", lambda *_: [])
-    monkeypatch.setattr(exchange, "started", lambda *_: None)
+    monkeypatch.setattr(exchange, "complete_start", lambda *_: None)
     monkeypatch.setattr("loomopt.solving.search.elastic.least", lambda *_: None)
     monkeypatch.setattr("loomopt.solving.search.elastic.clash", lambda *_: Clash())
     # At today's x = 0.5 the limit is exceeded: an admissible one would be solved from.

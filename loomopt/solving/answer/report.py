@@ -295,7 +295,7 @@ def _figures(search: Search, candidate: Candidate) -> dict[str, float | None]:
 
 def _is_there(candidate: Candidate, best: Candidate) -> bool:
     """Say whether a solve ended in the best, or was left where it could only have ended there."""
-    if candidate.point.reached:
+    if candidate.point.usable:
         return compared(candidate, best) == 0
     return abs(candidate.point.value - best.value) <= SAME_OBJECTIVE
 

@@ -142,7 +142,7 @@ NUMBERLESS = ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError
 
 def prepared(program: Program, x: Mapping[str, float], accuracy: float) -> tuple[Sampler, ActiveSet]:
     """Return the sampler of variables x (SI), and their active set. Raises any of `NUMBERLESS`."""
-    sampler = sampled(program.model, {**program.parameters, **x}, Settings(accuracy).sampled)
+    sampler = sampled(program.model, {**program.parameters, **x}, Settings(accuracy).sample_count)
     sampler.search(name for name, _, _ in cycle_rows(program))
     return sampler, active_set(program, sampler)
 
@@ -166,7 +166,9 @@ def drafted(
         return _certificate(local, cycle, levels, prices, accuracy, unserved)
 
     def scan() -> WholeCycle:
-        return WholeCycle(between_points(sampler, rows, Settings(accuracy).checked), judged(sampler, rows, accuracy))
+        return WholeCycle(
+            between_points(sampler, rows, Settings(accuracy).check_count), judged(sampler, rows, accuracy)
+        )
 
     return Draft(put(WholeCycle(0.0, "proven")), put, scan)
 

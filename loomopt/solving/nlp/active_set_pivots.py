@@ -1,7 +1,8 @@
-"""The answer near a solved neighbour, by pivots alone: each whole-cycle row stands on its own extreme as that moves.
+"""The answer near a solved neighbour by pivots: every whole-cycle row stays at its extreme as the extreme moves.
 
-A fixed-point iteration: put nodes on the extremes, pivot to the KKT point, find the extremes there. It is the reduction
-method for semi-infinite programs with a fixed number of nodes [Hettich and Kortanek, SIAM Review 35 (1993), section 7].
+A fixed-point iteration: put nodes on the extremes, pivot to the KKT point, compute the extremes there. This is the
+reduction method for semi-infinite programs with a fixed number of nodes [Hettich and Kortanek, SIAM Review 35 (1993),
+section 7].
 """
 
 import math
@@ -20,22 +21,21 @@ from loomopt.solving.nlp.point import Point
 from loomopt.solving.nlp.rows import BindingRows, Flags, Multipliers
 
 PIVOTS, PIVOT_NEWTON_STEPS, PIVOT_STEP = 20, 8, 1e-9
-"""Limits exchanged before the solver must choose, Newton steps to where they meet, and the step that ends them: what
-is left is its square."""
+"""Most pivots, most Newton steps of a pivot, and the step that ends Newton's method: the error is its square."""
 
-PIVOT_MET, PIVOT_STATIONARY = 1e-12, 1e-9
-"""Excess and slope of a KKT point reached by pivots: IPOPT's own, met by Newton's method at once."""
+PIVOT_RESIDUAL, PIVOT_STATIONARY = 1e-12, 1e-9
+"""Largest excess and slope of a KKT point of pivots: IPOPT's tolerances, which Newton's method meets at once."""
 
-PIVOT_DEPENDENT, PIVOT_CURVED = 1e-7, 1e-6
+PIVOT_DEPENDENT, PIVOT_FLAT = 1e-7, 1e-6
 """Part of a slope outside the span of others below which it depends on them, and curvature below which a direction is
-flat: ten and a hundred times the error of an extreme's place, 1e-8, with which slopes and curvatures change."""
+flat: ten and a hundred times the error of an extreme's place, 1e-8, which moves slopes and curvatures as much."""
 
 PIVOT_SLOPE, PIVOT_RANK = 1e-9, 1e-10
-"""Rise toward a limit along a way, and relative singular value, that are no more than rounding of slopes."""
+"""Rise toward a limit along a direction, and relative singular value, that are rounding of slopes."""
 
 
 class PivotDerivatives(Protocol):
-    """What is asked of an NLP: functions of x, scaled, and its parameters, as CasADi calls them."""
+    """Functions of an NLP, of scaled x and its parameters, as in CasADi."""
 
     @property
     def jacobian(self) -> Any:
@@ -51,7 +51,7 @@ class PivotDerivatives(Protocol):
 
 
 class PivotEnd(NamedTuple):
-    """A KKT point: x scaled; what is active, and the multipliers of all, 0 for what is not."""
+    """A KKT point: x scaled; the active rows and bounds; the multipliers of all, 0 where inactive."""
 
     x: Floats
     active: BindingRows
@@ -60,15 +60,15 @@ class PivotEnd(NamedTuple):
 
 
 class _Problem(NamedTuple):
-    """An NLP with its numbers; firm: limits that are active whatever their multiplier: equalities, held variables."""
+    """An NLP with its numbers; firm: limits that are always active: equalities and fixed variables."""
 
     nlp: PivotDerivatives
     arguments: Mapping[str, Any]
     firm: Flags
 
 
-class _Meeting(NamedTuple):
-    """Where the active limits meet: all limits' excess and slopes there."""
+class _Intersection(NamedTuple):
+    """Intersection of the active limits: excess and slopes of all limits there."""
 
     x: Floats
     active: Flags
@@ -76,76 +76,78 @@ class _Meeting(NamedTuple):
     slopes: Floats
 
     @property
-    def held(self) -> NDArray[np.intp]:
-        """The places of the active limits."""
+    def places(self) -> NDArray[np.intp]:
+        """Places of the active limits."""
         return np.flatnonzero(self.active)
 
 
-class _Priced(NamedTuple):
-    """A meeting with the multipliers of its active limits, and what slope of the objective they leave."""
+class _PricedIntersection(NamedTuple):
+    """An intersection with the multipliers of its active limits, and the rest of the objective's slope."""
 
-    at: _Meeting
+    intersection: _Intersection
     prices: Floats
-    left: Floats
+    slope: Floats
 
     @property
     def multipliers(self) -> Floats:
-        """The multipliers of all limits."""
-        found = np.zeros(len(self.at.active))
-        found[self.at.held] = self.prices
-        return found
+        """Multipliers of all limits."""
+        multipliers = np.zeros(len(self.intersection.active))
+        multipliers[self.intersection.places] = self.prices
+        return multipliers
 
 
 class _Step(NamedTuple):
-    """Where to look next, and with which limits active."""
+    """Start of the next intersection, and the limits active there."""
 
     x: Floats
     active: Flags
 
 
-def reach(nlp: PivotDerivatives, arguments: Mapping[str, Any], active: BindingRows, farthest: float) -> PivotEnd | None:
-    """Return the KKT point that pivots lead to from arguments["x0"] and what was active there.
+def pivot_to_kkt(
+    nlp: PivotDerivatives, arguments: Mapping[str, Any], active: BindingRows, farthest: float
+) -> PivotEnd | None:
+    """Pivot from arguments["x0"] and its active set to a KKT point.
 
-    None where there is none within `farthest`, scaled.
+    None if there is none within `farthest`, scaled.
     """
     fixed = arguments["lbx"] == arguments["ubx"]
     firm = np.concatenate([arguments["lbg"] == 0.0, fixed, np.zeros(len(fixed), dtype=bool)])
     problem = _Problem(nlp, arguments, firm)
-    # A held variable is active once, at its upper bound.
-    below = np.concatenate([np.zeros(len(firm) - len(fixed), dtype=bool), fixed])
+    # A fixed variable is active once, at its upper bound.
+    fixed_lower = np.concatenate([np.zeros(len(firm) - len(fixed), dtype=bool), fixed])
     first = np.concatenate([active.rows, active.at_upper, active.at_lower])
-    step: _Step | None = _Step(arguments["x0"], (first | firm) & ~below)
+    step: _Step | None = _Step(arguments["x0"], (first | firm) & ~fixed_lower)
     for _ in range(PIVOTS):
-        meeting = _met(problem, step) or _met(problem, _parted(problem, step))
+        meeting = _newton_onto_active(problem, step) or _newton_onto_active(problem, _drop_slackest(problem, step))
         if meeting is None or np.abs(meeting.x - arguments["x0"]).max() > farthest:
             return None
-        here = _priced(problem, meeting)
-        if np.abs(here.left).max() > PIVOT_STATIONARY:
-            step = _slid(problem, here)
-        elif meeting.excess[_worst(meeting)] > PIVOT_MET:
-            step = _entered(problem, here)
-        elif _dual_feasible(problem, here):
-            return _reached(problem, here)
+        priced = _with_multipliers(problem, meeting)
+        if np.abs(priced.slope).max() > PIVOT_STATIONARY:
+            step = _slide_step(problem, priced)
+        elif meeting.excess[_worst(meeting)] > PIVOT_RESIDUAL:
+            step = _entering_step(problem, priced)
+        elif _dual_feasible(problem, priced):
+            return _pivot_end(problem, priced)
         else:
-            step = _left(problem, here)
+            step = _leaving_step(problem, priced)
     return None
 
 
-def _reached(problem: _Problem, here: _Priced) -> PivotEnd:
-    """Return a KKT point in the solver's words."""
-    x = np.clip(here.at.x, problem.arguments["lbx"], problem.arguments["ubx"])
-    rows, upper, lower = _sides(here.at.active, len(x))
-    lam_g, above, below = _sides(here.multipliers, len(x))
-    return PivotEnd(x, BindingRows(rows, lower, upper), above - below, lam_g)
+def _pivot_end(problem: _Problem, priced: _PricedIntersection) -> PivotEnd:
+    """KKT point in the solver's variables and multipliers."""
+    x = np.clip(priced.intersection.x, problem.arguments["lbx"], problem.arguments["ubx"])
+    rows, upper, lower = _sides(priced.intersection.active, len(x))
+    lam_g, upper_prices, lower_prices = _sides(priced.multipliers, len(x))
+    return PivotEnd(x, BindingRows(rows, lower, upper), upper_prices - lower_prices, lam_g)
 
 
 def _sides(limits: Any, variables: int) -> list[Any]:
-    """Return what is said of all limits as that of rows, of upper and of lower bounds."""
+    """Entries of all limits, split into those of rows, of upper bounds and of lower bounds."""
     return np.split(limits, [len(limits) - 2 * variables, len(limits) - variables])
 
 
-def _met(problem: _Problem, step: _Step | None) -> _Meeting | None:
-    """Return where the active limits meet, by Newton's method with the least change; None where they do not."""
+def _newton_onto_active(problem: _Problem, step: _Step | None) -> _Intersection | None:
+    """Newton's method with least change onto the intersection of the active limits; None if there is none."""
     if step is None:
         return None
     x, active = step
@@ -153,18 +155,18 @@ def _met(problem: _Problem, step: _Step | None) -> _Meeting | None:
         excess, slopes = _limits(problem, x)
         if not np.all(np.isfinite(slopes)):
             return None
-        change = _least(slopes[active], -excess[active])
+        change = _least_norm(slopes[active], -excess[active])
         x, excess = x + change, excess + slopes @ change
         if np.abs(change).max() <= PIVOT_STEP:
-            met = np.abs(excess[active]).max(initial=0.0) <= PIVOT_MET
-            return _Meeting(x, active, excess, slopes) if met else None
+            converged = np.abs(excess[active]).max(initial=0.0) <= PIVOT_RESIDUAL
+            return _Intersection(x, active, excess, slopes) if converged else None
     return None
 
 
-def _parted(problem: _Problem, step: _Step | None) -> _Step | None:
-    """Return a step without the active limit that has most room where all of them come nearest; None without any.
+def _drop_slackest(problem: _Problem, step: _Step | None) -> _Step | None:
+    """The step without the active limit that has most room at the nearest point to all; None without any.
 
-    Where a front ends a limit stands on the opposite one, and both are active; beside it only one can be.
+    At the end of a front a limit coincides with the opposite one and both are active; near the end only one can be.
     """
     if step is None:
         return None
@@ -172,15 +174,15 @@ def _parted(problem: _Problem, step: _Step | None) -> _Step | None:
     active = step.active
     if not np.all(np.isfinite(slopes[active])):
         return None
-    left = excess + slopes @ _least(slopes[active], -excess[active])
-    slackest = int(np.argmin(np.where(active & ~problem.firm, left, np.inf)))
-    if not active[slackest] or left[slackest] >= -PIVOT_MET:
+    room = excess + slopes @ _least_norm(slopes[active], -excess[active])
+    slackest = int(np.argmin(np.where(active & ~problem.firm, room, np.inf)))
+    if not active[slackest] or room[slackest] >= -PIVOT_RESIDUAL:
         return None
     return _Step(step.x, active & (np.arange(len(active)) != slackest))
 
 
 def _limits(problem: _Problem, x: Floats) -> tuple[Floats, Floats]:
-    """Return the excess and the slopes of all limits."""
+    """Excess and slopes of all limits."""
     arguments, unit = problem.arguments, np.eye(len(x))
     rows, jacobian = problem.nlp.jacobian(x, arguments["p"])
     bounds = x - arguments["ubx"], arguments["lbx"] - x
@@ -188,105 +190,111 @@ def _limits(problem: _Problem, x: Floats) -> tuple[Floats, Floats]:
     return excess, np.concatenate([np.asarray(jacobian), unit, -unit])
 
 
-def _priced(problem: _Problem, at: _Meeting) -> _Priced:
-    """Return a meeting with the least-squares multipliers of what is active."""
-    gradient = np.asarray(problem.nlp.gradient(at.x, problem.arguments["p"])[1]).ravel()
-    prices = _least(at.slopes[at.held].T, -gradient)
-    return _Priced(at, prices, gradient + prices @ at.slopes[at.held])
+def _with_multipliers(problem: _Problem, intersection: _Intersection) -> _PricedIntersection:
+    """The intersection with the least-squares multipliers of the active limits."""
+    gradient = np.asarray(problem.nlp.gradient(intersection.x, problem.arguments["p"])[1]).ravel()
+    prices = _least_norm(intersection.slopes[intersection.places].T, -gradient)
+    return _PricedIntersection(intersection, prices, gradient + prices @ intersection.slopes[intersection.places])
 
 
-def _worst(at: _Meeting) -> int:
-    """Return the limit that is broken most of those that are not active."""
-    return int(np.argmax(np.where(at.active, -np.inf, at.excess)))
+def _worst(intersection: _Intersection) -> int:
+    """Inactive limit with the largest excess."""
+    return int(np.argmax(np.where(intersection.active, -np.inf, intersection.excess)))
 
 
-def _dual_feasible(problem: _Problem, here: _Priced) -> bool:
-    """Say whether no active limit that may let go has a negative multiplier."""
-    return bool(here.prices[~problem.firm[here.at.held]].min(initial=0.0) >= -PIVOT_STATIONARY)
+def _dual_feasible(problem: _Problem, priced: _PricedIntersection) -> bool:
+    """Whether no active limit that may be dropped has a negative multiplier."""
+    return bool(priced.prices[~problem.firm[priced.intersection.places]].min(initial=0.0) >= -PIVOT_STATIONARY)
 
 
-def _slid(problem: _Problem, here: _Priced) -> _Step | None:
-    """Return the step along the active limits to where the slope vanishes, or to the first limit in the way."""
-    _, sizes, basis = np.linalg.svd(here.at.slopes[here.at.held])
-    open_ways = basis[int(np.sum(sizes > PIVOT_RANK * sizes.max(initial=1.0))) :].T
-    bends, ways = np.linalg.eigh(open_ways.T @ _curvature(problem, here) @ open_ways)
-    curved = np.abs(bends) > PIVOT_CURVED
-    bends, ways = bends[curved], open_ways @ ways[:, curved]
-    rest = here.left - ways @ (ways.T @ here.left)
-    if np.any(bends < 0) or np.abs(rest).max() > PIVOT_STATIONARY:
+def _slide_step(problem: _Problem, priced: _PricedIntersection) -> _Step | None:
+    """Step along the active limits to where the slope vanishes, or to the first limit in the way."""
+    _, sizes, basis = np.linalg.svd(priced.intersection.slopes[priced.intersection.places])
+    null_space = basis[int(np.sum(sizes > PIVOT_RANK * sizes.max(initial=1.0))) :].T
+    curvatures, directions = np.linalg.eigh(null_space.T @ _curvature(problem, priced) @ null_space)
+    curved = np.abs(curvatures) > PIVOT_FLAT
+    curvatures, directions = curvatures[curved], null_space @ directions[:, curved]
+    rest = priced.slope - directions @ (directions.T @ priced.slope)
+    if np.any(curvatures < 0) or np.abs(rest).max() > PIVOT_STATIONARY:
         return None
-    return _moved(here.at, here.at.active, -ways @ ((ways.T @ here.left) / bends), 1.0)
+    return _bounded_step(
+        priced.intersection, priced.intersection.active, -directions @ ((directions.T @ priced.slope) / curvatures), 1.0
+    )
 
 
-def _entered(problem: _Problem, here: _Priced) -> _Step | None:
-    """Return the active set with the worst broken limit in it, in place of the one it brings to zero first."""
-    at, worst, active = here.at, _worst(here.at), here.at.active.copy()
-    slopes = at.slopes[at.held]
-    shares = _least(slopes.T, at.slopes[worst])
-    if np.abs(at.slopes[worst] - shares @ slopes).max() <= PIVOT_DEPENDENT:
-        givers = ~problem.firm[at.held] & (shares > PIVOT_SLOPE)
-        if not givers.any():
+def _entering_step(problem: _Problem, priced: _PricedIntersection) -> _Step | None:
+    """Active set with the most violated limit, in place of the limit whose multiplier reaches zero first."""
+    intersection, worst, active = priced.intersection, _worst(priced.intersection), priced.intersection.active.copy()
+    slopes = intersection.slopes[intersection.places]
+    shares = _least_norm(slopes.T, intersection.slopes[worst])
+    if np.abs(intersection.slopes[worst] - shares @ slopes).max() <= PIVOT_DEPENDENT:
+        candidates = ~problem.firm[intersection.places] & (shares > PIVOT_SLOPE)
+        if not candidates.any():
             return None
-        ratios = np.maximum(here.prices, 0.0) / np.where(givers, shares, 1.0)
-        active[at.held[np.argmin(np.where(givers, ratios, np.inf))]] = False
+        ratios = np.maximum(priced.prices, 0.0) / np.where(candidates, shares, 1.0)
+        active[intersection.places[np.argmin(np.where(candidates, ratios, np.inf))]] = False
     active[worst] = True
-    return _Step(at.x, active)
+    return _Step(intersection.x, active)
 
 
-def _left(problem: _Problem, here: _Priced) -> _Step | None:
-    """Return the step away from the active limit of the most negative multiplier; None where nothing ends it."""
-    at, active = here.at, here.at.active.copy()
-    loosest = int(np.argmin(np.where(problem.firm[at.held], np.inf, here.prices)))
-    way = _least(at.slopes[at.held], -1.0 * (np.arange(len(at.held)) == loosest))
-    bend = way @ _curvature(problem, here) @ way
-    active[at.held[loosest]] = False
-    return _moved(at, active, way, -here.prices[loosest] / bend if bend > PIVOT_CURVED else np.inf)
+def _leaving_step(problem: _Problem, priced: _PricedIntersection) -> _Step | None:
+    """Step away from the active limit with the most negative multiplier; None where nothing ends it."""
+    intersection, active = priced.intersection, priced.intersection.active.copy()
+    loosest = int(np.argmin(np.where(problem.firm[intersection.places], np.inf, priced.prices)))
+    direction = _least_norm(
+        intersection.slopes[intersection.places], -1.0 * (np.arange(len(intersection.places)) == loosest)
+    )
+    curvature = direction @ _curvature(problem, priced) @ direction
+    active[intersection.places[loosest]] = False
+    return _bounded_step(
+        intersection, active, direction, -priced.prices[loosest] / curvature if curvature > PIVOT_FLAT else np.inf
+    )
 
 
-def _moved(at: _Meeting, active: Flags, way: Floats, farthest: float) -> _Step | None:
-    """Return the step along a way, or to the first limit in it, which is active then; None where it has no end."""
-    rise = at.slopes @ way
+def _bounded_step(intersection: _Intersection, active: Flags, direction: Floats, farthest: float) -> _Step | None:
+    """Step along a direction up to the first limit, which becomes active; None where it has no end."""
+    rise = intersection.slopes @ direction
     rising = ~active & (rise > PIVOT_SLOPE)
-    room = np.where(rising, np.maximum(-at.excess, 0.0) / np.where(rising, rise, 1.0), np.inf)
+    room = np.where(rising, np.maximum(-intersection.excess, 0.0) / np.where(rising, rise, 1.0), np.inf)
     first = int(np.argmin(room))
     length = min(room[first], farthest)
     if not np.isfinite(length):
         return None
     if room[first] < farthest:
         active = active | (np.arange(len(active)) == first)
-    return _Step(at.x + length * way, active)
+    return _Step(intersection.x + length * direction, active)
 
 
-def _curvature(problem: _Problem, here: _Priced) -> Floats:
-    """Return the Lagrangian's second derivatives."""
-    rows, *_ = _sides(here.multipliers, len(here.at.x))
-    upper = np.asarray(problem.nlp.curvature(here.at.x, problem.arguments["p"], 1.0, rows))
+def _curvature(problem: _Problem, priced: _PricedIntersection) -> Floats:
+    """Second derivatives of the Lagrangian."""
+    rows, *_ = _sides(priced.multipliers, len(priced.intersection.x))
+    upper = np.asarray(problem.nlp.curvature(priced.intersection.x, problem.arguments["p"], 1.0, rows))
     full: Floats = upper + upper.T - np.diag(np.diag(upper))
     return full
 
 
-def _least(matrix: Floats, target: Floats) -> Floats:
-    """Return the shortest vector that matrix takes nearest to a target."""
+def _least_norm(matrix: Floats, target: Floats) -> Floats:
+    """Shortest vector that the matrix maps nearest to a target."""
     return np.asarray(np.linalg.lstsq(matrix, target, rcond=PIVOT_RANK)[0], dtype=np.float64)
 
 
 FOLLOW_FARTHEST, FOLLOW_ROUNDS = 0.2, 24
-"""Farthest that a neighbour's answer is followed, in natural sizes, and the rounds it may take.
+"""Farthest distance of the answer from its neighbour, in the variables' scales, and the most rounds.
 
-The experiment: a tenth of the way doubles IPOPT's iterations, ten times saves a seventh; but pivots are local, and
-beyond a fifth of its size a design is another. Half the rounds do.
+The experiment: a tenth of the distance doubles IPOPT's iterations, ten times it saves a seventh; but pivots are local,
+and beyond a fifth of its scale a design is a different one. Half the rounds suffice.
 """
 
 FOLLOW_PROGRESS, FOLLOW_PATIENCE = 0.9, 5
-"""Share to which the extremes' moves must shrink, and the rounds in a row in which they may fail to: with two, one of
-the experiment's neighbours is left to IPOPT."""
+"""Share to which the extremes' moves must shrink, and the consecutive rounds in which they may fail to: with two, one
+of the experiment's neighbours is left to IPOPT."""
 
 Nodes = Sequence[Sequence[Extreme]]
 """Nodes of each family."""
 
 
 class _Change(NamedTuple):
-    """What binding nodes did in a round: where each stood on its piece, and how far the extreme has moved from it."""
+    """Change of binding nodes in a round: the place of each on its piece, and the move of its extreme."""
 
     u: Floats
     move: Floats
@@ -297,79 +305,95 @@ class _Change(NamedTuple):
         return float(np.abs(self.move).max(initial=0.0))
 
 
-def follow(calls: Calls, warm: Point) -> Point | None:
-    """Return the answer near a solved neighbour; None where pivots lead nowhere: the solver must choose what binds."""
+def follow_neighbour(calls: Calls, warm: Point) -> Point | None:
+    """The answer near a solved neighbour; None if pivots fail and the solver must choose the active set."""
     sampler = calls.sampler(warm.x)
     if sampler is None:
         return None
     order, point, nodes = sampler.cycle.order, warm, warm.nodes
-    nearest, idle, last = math.inf, 0, None
+    least_move, stalled_rounds, last_change = math.inf, 0, None
     for _ in range(FOLLOW_ROUNDS):
-        pivoted = _pivoted(calls, sampler, point, nodes)
-        sampler = calls.sampler(pivoted.x) if pivoted else None
-        if pivoted is None or sampler is None or sampler.cycle.order != order:
+        pivot_point = _pivot_round(calls, sampler, point, nodes)
+        sampler = calls.sampler(pivot_point.x) if pivot_point else None
+        if pivot_point is None or sampler is None or sampler.cycle.order != order:
             return None
-        point, extremes = pivoted, calls.peaks(sampler)
+        point, extremes = pivot_point, calls.peaks(sampler)
         violation = calls.violation(extremes, point.extra)
-        become = [(old, _nearest(of, old)) for of, own in zip(extremes, point.binding, strict=True) for old in own]
-        change = _Change(np.array([old.u for old, _ in become]), np.array([now.u - old.u for old, now in become]))
+        moves = [
+            (node, _nearest(extreme_group, node))
+            for extreme_group, binding_group in zip(extremes, point.binding, strict=True)
+            for node in binding_group
+        ]
+        change = _Change(
+            np.array([node.u for node, _ in moves]), np.array([extreme.u - node.u for node, extreme in moves])
+        )
         if violation <= calls.settings.excess and change.largest <= CONVERGED:
-            return replace(point, iterations=0, violation=violation, built=calls.built)
-        nodes = _aimed(calls.loose(sampler, extremes), [now for _, now in become], change, last)
-        idle = 0 if change.largest < FOLLOW_PROGRESS * nearest else idle + 1
-        if idle == FOLLOW_PATIENCE:
+            return replace(point, iterations=0, violation=violation, build_seconds=calls.build_seconds)
+        nodes = _anderson_targets(
+            calls.nodeless_extremes(sampler, extremes), [extreme for _, extreme in moves], change, last_change
+        )
+        stalled_rounds = 0 if change.largest < FOLLOW_PROGRESS * least_move else stalled_rounds + 1
+        if stalled_rounds == FOLLOW_PATIENCE:
             return None
-        nearest, last = min(nearest, change.largest), change
+        least_move, last_change = min(least_move, change.largest), change
     return None
 
 
-def _aimed(
-    extremes: Nodes, binding: Sequence[Extreme], change: _Change, last: _Change | None
+def _anderson_targets(
+    extremes: Nodes, binding: Sequence[Extreme], change: _Change, last_change: _Change | None
 ) -> tuple[tuple[Extreme, ...], ...]:
-    """Return the extremes with those that bind moved to where the last two rounds point.
+    """The extremes, with the binding ones moved by the secant of the last two rounds.
 
-    Where the objective is nearly flat, extremes and design chase each other in circles: the secant through two rounds
-    ends that [Anderson's mixing of depth 1: Walker and Ni, SIAM J. Numer. Anal. 49 (2011)].
+    Where the objective is nearly flat, extremes and design oscillate; the secant through two rounds damps that
+    [Anderson's mixing of depth 1: Walker and Ni, SIAM J. Numer. Anal. 49 (2011)].
     """
-    aims: dict[int, float] = {}
-    if last is not None and last.u.shape == change.u.shape and np.any(change.move != last.move):
-        turned = change.move - last.move
-        share = float(turned @ change.move / (turned @ turned))
-        goals = change.u + change.move - share * (change.u - last.u + turned)
-        aims = {id(now): min(max(float(to), 0.0), 1.0) for now, to in zip(binding, goals, strict=True)}
-    return tuple(tuple(e._replace(u=aims.get(id(e), e.u)) for e in of) for of in extremes)
+    targets: dict[int, float] = {}
+    if last_change is not None and last_change.u.shape == change.u.shape and np.any(change.move != last_change.move):
+        move_change = change.move - last_change.move
+        share = float(move_change @ change.move / (move_change @ move_change))
+        goals = change.u + change.move - share * (change.u - last_change.u + move_change)
+        targets = {
+            id(extreme): min(max(float(target), 0.0), 1.0) for extreme, target in zip(binding, goals, strict=True)
+        }
+    return tuple(tuple(e._replace(u=targets.get(id(e), e.u)) for e in extreme_group) for extreme_group in extremes)
 
 
-def _pivoted(calls: Calls, sampler: Sampler, point: Point, extremes: Nodes) -> Point | None:
-    """Return the point that pivots lead to from another, with nodes on the extremes; None without one."""
-    nodes = [_chosen(of, old, calls.slots) for of, old in zip(extremes, point.binding, strict=True)]
-    nlp = calls.transcribed(sampler, nodes, warm=False)
+def _pivot_round(calls: Calls, sampler: Sampler, point: Point, extremes: Nodes) -> Point | None:
+    """Pivot from a point with nodes at the extremes; None if pivots fail."""
+    nodes = [
+        _select_nodes(extreme_group, binding_group, calls.slots)
+        for extreme_group, binding_group in zip(extremes, point.binding, strict=True)
+    ]
+    nlp = calls.nlp(sampler, nodes, warm=False)
     arguments = calls.arguments(nlp, sampler, point.x, point.extra, nodes)
     # Binding nodes come first in their family.
     active = point.multipliers.binding(nlp.rows, list(map(len, point.binding)))
-    reached = reach(nlp, arguments, active, FOLLOW_FARTHEST)
-    if reached is None:
+    end = pivot_to_kkt(nlp, arguments, active, FOLLOW_FARTHEST)
+    if end is None:
         return None
-    pairs = zip(nodes, nlp.rows.at_nodes(reached.active.rows), strict=True)
-    design, extra = nlp.rows.parted(reached.x)
+    pairs = zip(nodes, nlp.rows.node_rows(end.active.rows), strict=True)
+    design, extra = nlp.rows.split(end.x)
     return replace(
         point,
         x=calls.design(design),
         nodes=tuple(map(tuple, nodes)),
         extra=extra,
-        multipliers=Multipliers(nlp.rows, reached.lam_x, reached.lam_g),
-        binding=tuple(tuple(e for e, on in zip(of, flags, strict=False) if on) for of, flags in pairs),
+        multipliers=Multipliers(nlp.rows, end.lam_x, end.lam_g),
+        binding=tuple(
+            tuple(e for e, is_active in zip(extreme_group, active_flags, strict=False) if is_active)
+            for extreme_group, active_flags in pairs
+        ),
     )
 
 
-def _chosen(extremes: Sequence[Extreme], binding: Sequence[Extreme], slots: int) -> list[Extreme]:
-    """Return the extremes that the binding ones have become, then others, as many as there is room for."""
+def _select_nodes(extremes: Sequence[Extreme], binding: Sequence[Extreme], slots: int) -> list[Extreme]:
+    """Extremes at the binding nodes, then other extremes, as many as there is room for."""
     first = [_nearest(extremes, node) for node in binding]
-    others = [e for e in extremes if not any(e.piece == f.piece and abs(e.u - f.u) <= SAME_NODE for f in first)]
-    return first + others[: max(0, slots - len(first))]
+    other_extremes = [e for e in extremes if not any(e.piece == f.piece and abs(e.u - f.u) <= SAME_NODE for f in first)]
+    return first + other_extremes[: max(0, slots - len(first))]
 
 
 def _nearest(extremes: Sequence[Extreme], node: Extreme) -> Extreme:
-    """Return the extreme a node has become: the nearest of its sign on its piece, itself where there is none."""
-    alike = [e for e in extremes if e.piece == node.piece and e.sign == node.sign]
-    return min(alike, key=lambda extreme: abs(extreme.u - node.u), default=node)
+    """Extreme nearest to a node on its piece with its sign; the node itself where there is none."""
+    candidates = [e for e in extremes if e.piece == node.piece and e.sign == node.sign]
+    return min(candidates, key=lambda extreme: abs(extreme.u - node.u), default=node)

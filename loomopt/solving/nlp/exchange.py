@@ -1,8 +1,8 @@
-"""Solve a program with its whole-cycle rows held everywhere: solve at a few nodes, add the true extremes, repeat.
+"""Solve a program with its whole-cycle rows: solve at a few nodes, add the largest extremes as nodes, repeat.
 
 The exchange method for semi-infinite programs [Hettich and Kortanek, Semi-infinite programming, SIAM Review 35 (1993),
-section 5; Blankenship and Falk, JOTA 19 (1976)]. Nodes are never dropped (that can cycle); the extremes are found on
-the design just reached, in plain NumPy, and between any two nodes.
+section 5; Blankenship and Falk, JOTA 19 (1976)]. Nodes are never dropped, because that can cycle. The extremes are
+those of the last design over the whole cycle, computed in NumPy.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,7 +28,7 @@ from loomopt.physics.tolerances import (
     SAME_OBJECTIVE,
     TOUCHING,
 )
-from loomopt.solving.nlp.active_set_pivots import follow
+from loomopt.solving.nlp.active_set_pivots import follow_neighbour
 from loomopt.solving.nlp.ipopt import Calls, IpoptAnswer, run
 from loomopt.solving.nlp.point import BEATEN, SUCCESS, Elastic, Known, Point, Settings, sampler_at
 from loomopt.solving.nlp.rows import BindingRows, Multipliers, RowFamily, binding
@@ -40,9 +40,10 @@ NodeRows = Sequence[Sequence[Extreme]]
 def polish(
     calls: Calls, x: dict[str, float], extra: Floats, multipliers: Multipliers, peaks: NodeRows
 ) -> tuple[dict[str, float], NodeRows]:
-    """Return x (SI) put exactly on what binds, and the extremes that do; x itself where that is no small, clear step.
+    """Move x (SI) exactly onto the binding rows; x is unchanged where no small, unique step does that.
 
-    extra: the epigraph variables; multipliers: the solver's; peaks: the extremes at x.
+    extra: the epigraph variables; multipliers: the solver's; peaks: the extremes at x. Returns x and the binding
+    extremes of each family.
     """
     touching: NodeRows = ()
     for _ in range(POLISH_STEPS):
@@ -50,54 +51,54 @@ def polish(
         if sampler is None:
             return x, touching
         touching = [
-            [e for e in of if calls.excess(family, e, extra) >= -TOUCHING]
-            for family, of in zip(calls.families, calls.loose(sampler, peaks), strict=True)
+            [e for e in extremes if calls.excess(family, e, extra) >= -TOUCHING]
+            for family, extremes in zip(calls.families, calls.nodeless_extremes(sampler, peaks), strict=True)
         ]
-        met_at = _newton(calls, sampler, x, extra, multipliers, touching)
-        if met_at is None:
+        newton_end = _newton_at_nodes(calls, sampler, x, extra, multipliers, touching)
+        if newton_end is None:
             return x, touching
-        x, extra, step = met_at
-        moved = calls.sampler(x)
-        if moved is None or step <= CONVERGED:
+        x, extra, step = newton_end
+        moved_sampler = calls.sampler(x)
+        if moved_sampler is None or step <= CONVERGED:
             return x, touching
-        peaks = calls.peaks(moved)
+        peaks = calls.peaks(moved_sampler)
     return x, touching
 
 
-def _newton(
+def _newton_at_nodes(
     calls: Calls, sampler: Sampler, x: dict[str, float], extra: Floats, multipliers: Multipliers, nodes: NodeRows
 ) -> tuple[dict[str, float], Floats, float] | None:
-    """Return x (SI) and extra where the binding rows and the nodes' rows are met, and the step there, scaled.
+    """Newton's method from x (SI) onto the binding rows and the rows of nodes: x, extra and the scaled step.
 
-    None where there is no such point nearby.
+    None where no such point is near.
     """
-    nlp = calls.transcribed(sampler, nodes, warm=False)
+    nlp = calls.nlp(sampler, nodes, warm=False)
     arguments = calls.arguments(nlp, sampler, x, extra, nodes)
-    bound = multipliers.binding(nlp.rows, list(map(len, nodes)))
-    flat = met(nlp.jacobian, arguments, arguments["x0"], bound, calls.settings.farthest)
+    active = multipliers.binding(nlp.rows, list(map(len, nodes)))
+    flat = newton_onto_active_rows(nlp.jacobian, arguments, arguments["x0"], active, calls.settings.farthest)
     if flat is None:
         return None
-    design, extra = nlp.rows.parted(flat)
+    design, extra = nlp.rows.split(flat)
     return calls.design(design), extra, float(np.abs(flat - arguments["x0"]).max())
 
 
-def met(
-    jacobian: Any, arguments: Mapping[str, Any], x: Floats, bound: BindingRows, farthest: float = POLISH_FARTHEST
+def newton_onto_active_rows(
+    jacobian: Any, arguments: Mapping[str, Any], x: Floats, active: BindingRows, farthest: float = POLISH_FARTHEST
 ) -> Floats | None:
-    """Return x (scaled) on its binding rows and bounds, or None where that is not a clear, small step.
+    """Newton's method from x (scaled) onto its binding rows and bounds; None where the step is not small and unique.
 
-    Equalities are met whatever their multipliers, and what the step breaks: rows that are touched without one.
+    Equalities are included whatever their multipliers, and so are rows that the step would violate.
     jacobian: CasADi function (x, p) → (g, dg/dx); arguments: the solver's bounds lbx, ubx, lbg, ubg and parameters p.
     """
     lower, upper, p = arguments["lbx"], arguments["ubx"], arguments["p"]
-    start = np.where(bound.at_lower, lower, np.where(bound.at_upper, upper, x))
+    start = np.where(active.at_lower, lower, np.where(active.at_upper, upper, x))
     used = arguments["ubg"] == 0.0
-    rows = (bound.rows | (arguments["lbg"] == 0.0)) & used
-    free = ~(bound.at_lower | bound.at_upper) & (lower < upper)
+    rows = (active.rows | (arguments["lbg"] == 0.0)) & used
+    free = ~(active.at_lower | active.at_upper) & (lower < upper)
     if not np.all(np.isfinite(start)):
         return None
     while True:
-        trial = _on_rows(jacobian, start, p, rows, free)
+        trial = _newton_onto_rows(jacobian, start, p, rows, free)
         values = np.asarray(jacobian(trial, p)[0]).ravel()
         broken = used & ~rows & (values > POLISH_MET)
         small = np.abs(trial - x).max() <= farthest
@@ -105,12 +106,14 @@ def met(
             break
         rows = rows | broken
     inside = np.all(trial >= lower - POLISH_MET) and np.all(trial <= upper + POLISH_MET)
-    held = np.all(values <= arguments["ubg"] + POLISH_MET) and np.all(values >= arguments["lbg"] - POLISH_MET)
-    return np.clip(trial, lower, upper) if small and inside and held else None
+    feasible = np.all(values <= arguments["ubg"] + POLISH_MET) and np.all(values >= arguments["lbg"] - POLISH_MET)
+    return np.clip(trial, lower, upper) if small and inside and feasible else None
 
 
-def _on_rows(jacobian: Any, start: Floats, p: Floats, rows: NDArray[np.bool_], free: NDArray[np.bool_]) -> Floats:
-    """Return a start (scaled) after Newton's steps of least change onto rows, along what is free."""
+def _newton_onto_rows(
+    jacobian: Any, start: Floats, p: Floats, rows: NDArray[np.bool_], free: NDArray[np.bool_]
+) -> Floats:
+    """Newton steps of least change from `start` (scaled) onto rows, along the free variables."""
     trial = start.copy()
     for _ in range(POLISH_STEPS):
         values, slopes = jacobian(trial, p)
@@ -124,94 +127,99 @@ def _on_rows(jacobian: Any, start: Floats, p: Floats, rows: NDArray[np.bool_], f
     return trial
 
 
-CLOSER = 1e-7
-"""Multiplier above which a row is put on its bound where what is left of a slope, or of a curvature, refuses a design:
-IPOPT leaves it up to 5e-5 away, more than POLISH_FARTHER. A row wrongly held is told by the certificate."""
+REFINED_MULTIPLIER = 1e-7
+"""Multiplier above which a row is moved onto its bound when the certificate rejects a design's slope or curvature:
+IPOPT leaves it up to 5e-5 away, more than POLISH_FARTHER. The certificate shows a row that should not be active."""
 
 
-def brought_closer(program: Program, point: Point, settings: Settings) -> Point | None:
-    """Return a solved point put on all that carries a slope, however far from it the solver stopped.
+def refine_active_set(program: Program, point: Point, settings: Settings) -> Point | None:
+    """Move a solved point onto all rows that carry a slope, even if the solver stopped far from them.
 
-    IPOPT leaves a row its tolerance over the multiplier away. Where several nodes stand for one extreme they share the
-    multiplier; and where a row is steep, a small one balances much: what counts is the slope that it carries.
+    IPOPT stops at a distance of its tolerance over the multiplier. Several nodes at one extreme share the multiplier,
+    and a small multiplier of a steep row balances a large slope: a row counts by multiplier times slope.
     """
     calls = Calls(program, settings)
     sampler = calls.sampler(point.x)
     if sampler is None or not point.multipliers:
         return None
-    before, peaks = point.multipliers, calls.loose(sampler, calls.peaks(sampler))
-    every = [_shared(*of) for of in zip(peaks, point.nodes, before.at_nodes, strict=True)]
-    priced = [of[: before.rows.slots] for of in every]
-    nodes = [[e for e, _ in of] for of in priced]
-    nlp = calls.transcribed(sampler, nodes, warm=False)
+    multipliers, peaks = point.multipliers, calls.nodeless_extremes(sampler, calls.peaks(sampler))
+    sums = [_price_sums(*family_nodes) for family_nodes in zip(peaks, point.nodes, multipliers.nodes, strict=True)]
+    node_prices = [family_nodes[: multipliers.rows.slots] for family_nodes in sums]
+    nodes = [[e for e, _ in family_nodes] for family_nodes in node_prices]
+    nlp = calls.nlp(sampler, nodes, warm=False)
     arguments = calls.arguments(nlp, sampler, point.x, point.extra, nodes)
-    carried = before.on(nlp.rows).lam_g
-    for own, of in zip(nlp.rows.at_nodes(carried), priced, strict=True):
-        own[:] = np.pad([price for _, price in of], (0, len(own) - len(of)))
+    carried = multipliers.for_slots(nlp.rows).lam_g
+    for row_prices, family_nodes in zip(nlp.rows.node_rows(carried), node_prices, strict=True):
+        row_prices[:] = np.pad([price for _, price in family_nodes], (0, len(row_prices) - len(family_nodes)))
     slopes = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[1])
     carried *= np.maximum(np.abs(slopes).max(axis=1, initial=0.0), 1.0)
-    flat = met(nlp.jacobian, arguments, arguments["x0"], binding(before.lam_x, carried, CLOSER), settings.farthest)
+    flat = newton_onto_active_rows(
+        nlp.jacobian,
+        arguments,
+        arguments["x0"],
+        binding(multipliers.lam_x, carried, REFINED_MULTIPLIER),
+        settings.farthest,
+    )
     if flat is None:
         return None
-    design, extra = nlp.rows.parted(flat)
+    design, extra = nlp.rows.split(flat)
     x = calls.design(design)
-    moved = calls.sampler(x)
-    if moved is None:
+    moved_sampler = calls.sampler(x)
+    if moved_sampler is None:
         return None
-    x, touching = polish(calls, x, extra, before, calls.peaks(moved))
+    x, touching = polish(calls, x, extra, multipliers, calls.peaks(moved_sampler))
     return replace(point, x=x, extra=extra, binding=_frozen(touching), rough=False)
 
 
-def _shared(extremes: Sequence[Extreme], nodes: Sequence[Extreme], prices: Floats) -> list[tuple[Extreme, float]]:
-    """Return the extremes that nodes with a multiplier stand for, each with the sum of these, the largest first."""
+def _price_sums(extremes: Sequence[Extreme], nodes: Sequence[Extreme], prices: Floats) -> list[tuple[Extreme, float]]:
+    """Extremes at which nodes have a multiplier, with the sum of these multipliers, the largest first."""
 
-    def alike(extreme: Extreme, node: Extreme) -> bool:
-        here = extreme.piece == node.piece and extreme.sign == node.sign
-        return here and abs(extreme.u - node.u) <= SAME_NODE
+    def is_same(extreme: Extreme, node: Extreme) -> bool:
+        same_side = extreme.piece == node.piece and extreme.sign == node.sign
+        return same_side and abs(extreme.u - node.u) <= SAME_NODE
 
     pairs = list(zip(nodes, prices.tolist(), strict=False))
-    sums = [(e, sum(price for node, price in pairs if alike(e, node))) for e in extremes]
-    return sorted((each for each in sums if each[1] > 0.0), key=lambda each: -each[1])
+    price_sums = [(e, sum(price for node, price in pairs if is_same(e, node))) for e in extremes]
+    return sorted((pair for pair in price_sums if pair[1] > 0.0), key=lambda pair: -pair[1])
 
 
 EXCHANGE_ROUNDS, ELASTIC_ROUNDS = 16, 32
-"""Rounds of the exchange, each with an NLP solve: half of them do in the experiment. Least relaxations are flat, and
-creep (tests/solving/search/test_infeasible.py)."""
+"""Rounds of the exchange, each with an NLP solve: half of them suffice in the experiment. Least relaxations are flat
+and converge slowly (tests/solving/search/test_infeasible.py)."""
 
-CREEPING = 4
-"""Rounds in a row that do not halve an excess of less than STANDS. A law whose curvature touches its limit along a
-whole stretch has added 90 nodes by the sixteenth round, each takes ten seconds, and none since the fifth has helped."""
+STALL_ROUNDS = 4
+"""Consecutive rounds that do not halve an excess of less than END_EXCESS. A law whose curvature touches its limit over
+a long arc has added 90 nodes by the sixteenth round, ten seconds each, and none after the fifth has helped."""
 
-STANDS = 1e-7
-"""Largest excess of a row at a point that the certificate should look at though IPOPT gave up: ACTIVE."""
+END_EXCESS = 1e-7
+"""Largest excess of a row at a point that is certified although IPOPT failed there: ACTIVE."""
 
-NEARLY = 1e-6
+START_EXCESS = 1e-6
 """Largest excess of a row at a start that counts as feasible: that of an optimum read from a table of ten digits. The
 barrier pushes such a start away from its active rows, and IPOPT may then end at a worse point or at none."""
 
-LED = 1e-2
+PIVOT_EXCESS = 1e-2
 """Largest excess from which pivots are tried before a second solve. They take 104 of 119 starts below it to the known
 design and 7 of 78 above it (all packaged targets, and fronts of three), in 4 ms where that solve takes 11."""
 
-HINTED = 1e-8
-"""Change of a slope, as events are found anew, that counts as none: a hundredth of STATIONARY."""
+SAME_SLOPE = 1e-8
+"""Change of a slope after new events that is negligible: a hundredth of STATIONARY."""
 
-LOST = 1e3
-"""Factor by which a round exceeds what an earlier one did where it has left the optimum that rounds came near: nodes
-beside each other leave a direction flat, along which IPOPT may end anywhere."""
+LOST_FACTOR = 1e3
+"""Factor on the least excess of earlier rounds above which a round has left their optimum: close nodes leave a
+direction flat, along which IPOPT may end anywhere."""
 
-DRAWS = 200
-"""Random starts drawn for each that is wanted: where fewer than one in 200 assembles, the ranges hold no machine."""
+RANDOM_TRIALS = 200
+"""Random starts tried for each one required: if fewer than one in 200 assembles, the ranges hold no machine."""
 
 Nodes = tuple[tuple[Extreme, ...], ...]
 """Nodes of each family."""
 
 
 class _Place(NamedTuple):
-    """Where a round begins: variables, SI, with the extremes there; nodes to solve at.
+    """Start of a round: variables, SI, with the extremes there; nodes to solve at.
 
-    multipliers: to start warm from, if there are any; extra: the epigraph or elastic variables, None where nothing is
-    known.
+    multipliers: for a warm start, may be empty; extra: the epigraph or elastic variables, None where unknown.
     """
 
     x: dict[str, float]
@@ -223,16 +231,16 @@ class _Place(NamedTuple):
 
 
 class _Round(NamedTuple):
-    """What a round gave: IPOPT's answer, and where the next one begins.
+    """Result of a round: IPOPT's answer, and the start of the next round.
 
-    reached: whether the answer is worth a certificate; violation: the largest excess of an extreme; steady: whether
-    events, and the switches there, are those that it was solved with; iterations: of all rounds so far.
+    usable: whether the answer is worth a certificate; violation: the largest excess of an extreme; steady: whether
+    events and their switches did not change during the round; iterations: of all rounds so far.
     """
 
-    after: _Place
+    end: _Place
     nlp: Transcription
     answer: IpoptAnswer
-    reached: bool
+    usable: bool
     violation: float
     steady: bool
     iterations: int
@@ -248,17 +256,17 @@ def solve(
 ) -> Point:
     """Solve a program from a start (SI) or warm from a solved neighbour.
 
-    warm: of the same structure; of another one with the same rows only pivots lead on from it.
+    warm: of the same structure; one of another structure with the same rows is a start for pivots only.
     """
     calls = Calls(program, settings, elastic, known)
     if warm:
-        within = {v.name: min(max(warm.x[v.name], v.lower), v.upper) for v in program.variables}
-        warm = replace(warm, x=within)
-        led = bool(warm.multipliers)
-        followed = follow(calls, warm) if warm.reached and led else None
-        if followed:
-            return followed
-        if not led or warm.structure not in (None, program.structure):
+        clipped = {v.name: min(max(warm.x[v.name], v.lower), v.upper) for v in program.variables}
+        warm = replace(warm, x=clipped)
+        has_multipliers = bool(warm.multipliers)
+        pivot_end = follow_neighbour(calls, warm) if warm.usable and has_multipliers else None
+        if pivot_end:
+            return pivot_end
+        if not has_multipliers or warm.structure not in (None, program.structure):
             warm = None
     x = dict(warm.x if warm else start)
     sampler = calls.sampler(x)
@@ -267,241 +275,260 @@ def solve(
     begin = _begin(calls, x, sampler, warm)
     result = _round(calls, begin, 0)
     if not _is_done(result, settings):
-        result = _led(calls, result) or _compared(calls, begin, result)
-    excesses, closest = list[float](), None
-    for more in range((ELASTIC_ROUNDS if elastic else EXCHANGE_ROUNDS) - 1, -1, -1):
+        result = _try_pivots(calls, result) or _add_known_nodes(calls, begin, result)
+    violations, best_round = list[float](), None
+    for rounds_left in range((ELASTIC_ROUNDS if elastic else EXCHANGE_ROUNDS) - 1, -1, -1):
         if isinstance(result, Point) or _is_done(result, settings):
             break
-        excesses.append(result.violation)
-        if not elastic and _creeps(excesses):
+        violations.append(result.violation)
+        if not elastic and _stalled(violations):
             break
-        if closest and result.violation > LOST * closest.violation:
+        if best_round and result.violation > LOST_FACTOR * best_round.violation:
             break
-        if result.steady and not elastic and (closest is None or result.violation < closest.violation):
-            closest = result
-        followed = _followed(calls, result) if result.steady else None
-        if followed:
-            return followed
-        if more:
-            result = _round(calls, result.after, result.iterations)
+        if result.steady and not elastic and (best_round is None or result.violation < best_round.violation):
+            best_round = result
+        pivot_end = _pivot_end(calls, result) if result.steady else None
+        if pivot_end:
+            return pivot_end
+        if rounds_left:
+            result = _round(calls, result.end, result.iterations)
     if isinstance(result, Point):
         return result
-    if closest and result.violation > settings.excess and closest.violation < result.violation:
-        result = closest._replace(iterations=result.iterations)
-    return _ended(calls, result)
+    if best_round and result.violation > settings.excess and best_round.violation < result.violation:
+        result = best_round._replace(iterations=result.iterations)
+    return _end_point(calls, result)
 
 
-def _creeps(excesses: Sequence[float]) -> bool:
-    """Say whether rounds no longer bring what is exceeded down: IPOPT's rounding decides where the next extreme is."""
-    before, last = excesses[:-CREEPING], excesses[-CREEPING:]
-    return bool(before) and max(last) <= STANDS and 2 * min(last) > min(before)
+def _stalled(excesses: Sequence[float]) -> bool:
+    """Whether rounds no longer reduce the excess: rounding in IPOPT then decides where the next extreme is."""
+    earlier, latest = excesses[:-STALL_ROUNDS], excesses[-STALL_ROUNDS:]
+    return bool(earlier) and max(latest) <= END_EXCESS and 2 * min(latest) > min(earlier)
 
 
 def _is_done(result: _Round | Point, settings: Settings) -> bool:
-    """Say whether another round has nothing to add."""
-    if isinstance(result, Point) or not result.reached:
+    """Whether the exchange needs no further round."""
+    if isinstance(result, Point) or not result.usable:
         return True
     return result.violation <= settings.excess and result.steady
 
 
 def _begin(calls: Calls, x: dict[str, float], sampler: Sampler, warm: Point | None) -> _Place:
-    """Return where the exchange begins: at the largest extremes of the start, or at a neighbour's nodes."""
+    """Start of the exchange: the largest extremes of the start, or a neighbour's nodes."""
     peaks = _frozen(calls.peaks(sampler))
-    beside = calls.ways.beside if calls.ways else None
-    if beside:
-        return _Place(x, sampler, peaks, beside.nodes, Multipliers(), None)
-    nodes = warm.nodes if warm else calls.first_nodes(calls.loose(sampler, peaks))
+    elastic_start = calls.elastic.start if calls.elastic else None
+    if elastic_start:
+        return _Place(x, sampler, peaks, elastic_start.nodes, Multipliers(), None)
+    nodes = warm.nodes if warm else calls.first_nodes(calls.nodeless_extremes(sampler, peaks))
     if calls.settings.uniform:
-        nodes = tuple(_uniform(sampler, family, calls.settings.uniform) for family in calls.families)
+        nodes = tuple(_uniform_nodes(sampler, family, calls.settings.uniform) for family in calls.families)
     if warm and warm.multipliers:
         return _Place(x, sampler, peaks, nodes, warm.multipliers, warm.extra)
     return _Place(x, sampler, peaks, nodes, Multipliers(), None)
 
 
-def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
-    """Return what one round gives: solve at the nodes, add the extremes that exceed their bounds.
+def _round(calls: Calls, place: _Place, iterations: int) -> _Round | Point:
+    """One round: solve at the nodes, then add the extremes that exceed their bounds.
 
-    A point of failure where what the solver reached has no real cycle, or is no better than what is known; iterations:
-    of the rounds before.
+    A failed point where the solver's end has no real cycle, or is no better than the best known; iterations: of the
+    rounds before.
     """
-    nlp = calls.transcribed(here.sampler, here.nodes, warm=bool(here.multipliers))
-    extra = calls.first_extra(nlp, here.sampler) if here.extra is None else here.extra
-    answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, here.multipliers)
+    nlp = calls.nlp(place.sampler, place.nodes, warm=bool(place.multipliers))
+    extra = calls.first_extra(nlp, place.sampler) if place.extra is None else place.extra
+    answer = run(calls, nlp, place.sampler, place.x, extra, place.nodes, place.multipliers)
     iterations += answer.iterations
-    if answer.status not in SUCCESS and here.multipliers:
-        extra = calls.first_extra(nlp, here.sampler)
-        answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, Multipliers())
+    if answer.status not in SUCCESS and place.multipliers:
+        extra = calls.first_extra(nlp, place.sampler)
+        answer = run(calls, nlp, place.sampler, place.x, extra, place.nodes, Multipliers())
         iterations += answer.iterations
-    elif not here.multipliers and calls.is_worse(answer, here.sampler) and _is_feasible(calls, nlp, here, extra):
-        zero = Multipliers(nlp.rows, np.zeros(len(here.x) + len(extra)), np.zeros(nlp.rows.size))
-        answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, zero)
+    elif not place.multipliers and calls.is_worse(answer, place.sampler) and _rows_hold(calls, nlp, place, extra):
+        zero = Multipliers(nlp.rows, np.zeros(len(place.x) + len(extra)), np.zeros(nlp.rows.size))
+        answer = run(calls, nlp, place.sampler, place.x, extra, place.nodes, zero)
         iterations += answer.iterations
     beaten = answer.status in SUCCESS and calls.is_beaten(answer)
-    beaten_as = Point(answer.x, BEATEN, False, iterations, built=calls.built, value=answer.value)
-    if beaten and not here.sampler.hints:
-        return beaten_as
+    beaten_point = Point(answer.x, BEATEN, False, iterations, build_seconds=calls.build_seconds, value=answer.value)
+    if beaten and not place.sampler.hints:
+        return beaten_point
     sampler = calls.sampler(answer.x)
     if sampler is None:
-        return beaten_as if beaten else Point(answer.x, "Invalid_Number_Detected", False, iterations)
-    nodes, before = here.nodes, here.sampler.cycle
-    if sampler.cycle.order != before.order:
-        nodes = tuple(tuple(_carried(e, before, sampler) for e in of) for of in nodes)
-    hinted = not _moved(calls, nlp, answer, here, sampler, nodes)
-    if beaten and hinted:
-        return beaten_as
+        return beaten_point if beaten else Point(answer.x, "Invalid_Number_Detected", False, iterations)
+    nodes, first_cycle = place.nodes, place.sampler.cycle
+    if sampler.cycle.order != first_cycle.order:
+        nodes = tuple(tuple(_node_in_cycle(e, first_cycle, sampler) for e in family_nodes) for family_nodes in nodes)
+    same_events = not _events_moved(calls, nlp, answer, place, sampler, nodes)
+    if beaten and same_events:
+        return beaten_point
     peaks, violation = _frozen(calls.peaks(sampler)), 0.0
     if not calls.settings.uniform:
         violation = calls.violation(peaks, answer.extra)
         nodes = tuple(
-            (*of, *(e for e in top if calls.excess(family, e, answer.extra) > calls.settings.excess))
-            for of, top, family in zip(nodes, calls.loose(sampler, peaks), calls.families, strict=True)
+            (*family_nodes, *(e for e in peak_group if calls.excess(family, e, answer.extra) > calls.settings.excess))
+            for family_nodes, peak_group, family in zip(
+                nodes, calls.nodeless_extremes(sampler, peaks), calls.families, strict=True
+            )
         )
-    after = _Place(answer.x, sampler, peaks, nodes, answer.multipliers, answer.extra)
-    reached = answer.status in SUCCESS or _stands(calls, nlp, after, answer.extra)
-    steady = sampler.stills == here.sampler.stills and hinted
-    return _Round(after, nlp, answer, reached, violation, steady, iterations)
+    end = _Place(answer.x, sampler, peaks, nodes, answer.multipliers, answer.extra)
+    reached = answer.status in SUCCESS or _is_feasible(calls, nlp, end, answer.extra)
+    steady = sampler.stills == place.sampler.stills and same_events
+    return _Round(end, nlp, answer, reached, violation, steady, iterations)
 
 
-def _moved(
-    calls: Calls, nlp: Transcription, answer: IpoptAnswer, before: _Place, sampler: Sampler, nodes: NodeRows
+def _events_moved(
+    calls: Calls, nlp: Transcription, answer: IpoptAnswer, place: _Place, sampler: Sampler, nodes: NodeRows
 ) -> bool:
-    """Say whether what IPOPT was given is another where events are found anew at the point that it reached.
+    """Whether rows change when events are computed anew at the point that IPOPT reached.
 
-    An event that no formula gives is one step from its hint: right near it only. What no row reads changes none.
-    sampler: of the point; nodes: those it was solved at, in the point's own cycle.
+    An event without a formula is one Newton step from its hint, and exact only near it. Rows that read no event do not
+    change. sampler: of the point; nodes: those of the solve, in the point's cycle.
     """
-    hints = before.sampler.hints
+    hints = place.sampler.hints
     if sampler.hints == hints:
         return False
-    if tuple(sampler.hints) != tuple(hints) or sampler.corner_count != before.sampler.corner_count:
+    if tuple(sampler.hints) != tuple(hints) or sampler.corner_count != place.sampler.corner_count:
         return True
-    then = calls.arguments(nlp, before.sampler, answer.x, answer.extra, before.nodes)
-    now = calls.arguments(nlp, sampler, answer.x, answer.extra, nodes)
-    rows, worth = ([read(then["x0"], each["p"]) for each in (then, now)] for read in (nlp.jacobian, nlp.gradient))
-    pairs = [*zip(*rows, strict=True), *zip(*worth, strict=True)]
-    most = (calls.settings.excess, HINTED, calls.settings.excess * max(calls.weights), HINTED)
-    return any(not np.abs(np.asarray(a - b)).max(initial=0.0) <= m for (a, b), m in zip(pairs, most, strict=True))
+    old_arguments = calls.arguments(nlp, place.sampler, answer.x, answer.extra, place.nodes)
+    new_arguments = calls.arguments(nlp, sampler, answer.x, answer.extra, nodes)
+    rows, objectives = (
+        [read(old_arguments["x0"], arguments["p"]) for arguments in (old_arguments, new_arguments)]
+        for read in (nlp.jacobian, nlp.gradient)
+    )
+    pairs = [*zip(*rows, strict=True), *zip(*objectives, strict=True)]
+    largest_changes = (calls.settings.excess, SAME_SLOPE, calls.settings.excess * max(calls.weights), SAME_SLOPE)
+    return any(
+        not np.abs(np.asarray(a - b)).max(initial=0.0) <= m for (a, b), m in zip(pairs, largest_changes, strict=True)
+    )
 
 
-def _led(calls: Calls, result: _Round | Point) -> Point | None:
-    """Return what pivots make of a first round that ended near its basin's least, where that is no worse than is known.
+def _try_pivots(calls: Calls, result: _Round | Point) -> Point | None:
+    """Pivots from a first round that ended near its basin's optimum, if their end is not worse than the best known.
 
-    As good as the best that is known it is beaten, without a second solve. A worse end is left to the solver: pivots
-    stop wherever slopes balance.
+    An end as good as the best known is beaten, without a second solve. A worse end is left to the solver: pivots stop
+    wherever slopes balance.
     """
-    if isinstance(result, Point) or not calls.known.nodes or not result.steady or result.violation > LED:
+    if isinstance(result, Point) or not calls.known.nodes or not result.steady or result.violation > PIVOT_EXCESS:
         return None
-    followed = _followed(calls, result)
-    if followed is None:
+    pivot_end = _pivot_end(calls, result)
+    if pivot_end is None:
         return None
-    end = result.answer._replace(x=followed.x, extra=followed.extra, value=calls.worth(followed))
+    end = result.answer._replace(x=pivot_end.x, extra=pivot_end.extra, value=calls.objective(pivot_end))
     if not calls.is_beaten(end):
-        return replace(followed, value=end.value)
-    alike = end.value <= calls.known.most + SAME_OBJECTIVE
-    return Point(end.x, BEATEN, False, result.iterations, built=calls.built, value=end.value) if alike else None
+        return replace(pivot_end, value=end.value)
+    is_as_good = end.value <= calls.known.cutoff + SAME_OBJECTIVE
+    return (
+        Point(end.x, BEATEN, False, result.iterations, build_seconds=calls.build_seconds, value=end.value)
+        if is_as_good
+        else None
+    )
 
 
-def _compared(calls: Calls, begin: _Place, result: _Round | Point) -> _Round | Point:
-    """Return the first round with the nodes that are known to bind for the next one, in place of its own idle ones.
+def _add_known_nodes(calls: Calls, first_place: _Place, result: _Round | Point) -> _Round | Point:
+    """The first round with the known binding nodes for the next round, in place of its idle nodes.
 
-    There they tell soon whether a basin is as good; from the first they would lead every start into the known one. What
-    is dropped once cannot cycle; with all of them a larger NLP would have to be built.
+    They show soon whether a basin is as good; in the first round they would pull every start into the known basin.
+    Nodes that are dropped once cannot cycle; keeping all of them would need a larger NLP.
     """
     if isinstance(result, Point) or not calls.known.nodes:
         return result
-    here, kept = result.after, _binding(result.after)
-    added = (of[len(first) :] for of, first in zip(here.nodes, begin.nodes, strict=True))
-    nodes = [(*own, *more) for own, more in zip(kept, added, strict=True)]
-    return result._replace(after=here._replace(nodes=calls.with_known(nodes), multipliers=Multipliers()))
+    place, active_nodes = result.end, _binding(result.end)
+    added = (family_nodes[len(first) :] for family_nodes, first in zip(place.nodes, first_place.nodes, strict=True))
+    nodes = [(*active, *new_nodes) for active, new_nodes in zip(active_nodes, added, strict=True)]
+    return result._replace(end=place._replace(nodes=calls.with_known(nodes), multipliers=Multipliers()))
 
 
-def _ended(calls: Calls, result: _Round) -> Point:
-    """Return the point that the exchange ends in, put exactly on what binds."""
-    here, answer, program = result.after, result.answer, calls.program
+def _end_point(calls: Calls, result: _Round) -> Point:
+    """The point in which the exchange ends, moved exactly onto the binding rows."""
+    place, answer, program = result.end, result.answer, calls.program
     point = Point(
-        here.x,
+        place.x,
         answer.status,
-        result.reached,
+        result.usable,
         result.iterations,
-        here.nodes,
+        place.nodes,
         result.violation,
         extra=answer.extra,
         multipliers=answer.multipliers,
-        built=calls.built,
+        build_seconds=calls.build_seconds,
         value=answer.value,
     )
-    if not result.reached or not calls.settings.polished:
+    if not result.usable or not calls.settings.polish:
         return point
-    if calls.elastic:
+    if calls.is_elastic:
         return replace(
             point,
-            reached=result.violation <= STANDS,
-            relaxed=_relaxed(program, answer.extra),
-            binding=_binding(here),
+            usable=result.violation <= END_EXCESS,
+            relaxation=_relaxation(program, answer.extra),
+            binding=_binding(place),
         )
-    x, touching = polish(calls, here.x, answer.extra, answer.multipliers, here.peaks)
-    rough, structure = x is here.x, program.structure
-    return replace(point, x=x, rough=rough, binding=_frozen(touching), built=calls.built, structure=structure)
+    x, touching = polish(calls, place.x, answer.extra, answer.multipliers, place.peaks)
+    rough, structure = x is place.x, program.structure
+    return replace(
+        point, x=x, rough=rough, binding=_frozen(touching), build_seconds=calls.build_seconds, structure=structure
+    )
 
 
-def _followed(calls: Calls, result: _Round) -> Point | None:
-    """Return the answer that pivots lead to from what binds where IPOPT stopped; None where they do not.
+def _pivot_end(calls: Calls, result: _Round) -> Point | None:
+    """End of pivots from the active set where IPOPT stopped; None if they do not converge.
 
-    They move the nodes with the extremes, where the exchange can only add: along a flat direction that shifts the
-    extremes it creeps.
+    Pivots move the nodes with the extremes; the exchange only adds nodes, and converges slowly along a flat direction
+    that shifts the extremes.
     """
-    here, status = result.after, result.answer.status
-    if calls.elastic or status not in SUCCESS or not here.multipliers or not calls.settings.polished:
+    place, status = result.end, result.answer.status
+    if calls.is_elastic or status not in SUCCESS or not place.multipliers or not calls.settings.polish:
         return None
-    loose, binding = _frozen(calls.loose(here.sampler, here.peaks)), _binding(here)
-    point = Point(here.x, status, True, nodes=loose, binding=binding, structure=calls.program.structure)
-    followed = follow(calls, replace(point, extra=result.answer.extra, multipliers=here.multipliers))
-    return replace(followed, iterations=result.iterations, value=result.answer.value) if followed else None
+    loose, binding = _frozen(calls.nodeless_extremes(place.sampler, place.peaks)), _binding(place)
+    point = Point(place.x, status, True, nodes=loose, binding=binding, structure=calls.program.structure)
+    pivot_end = follow_neighbour(calls, replace(point, extra=result.answer.extra, multipliers=place.multipliers))
+    return replace(pivot_end, iterations=result.iterations, value=result.answer.value) if pivot_end else None
 
 
-def _binding(here: _Place) -> Nodes:
-    """Return of each family the nodes that carry a multiplier where the solver stopped."""
-    pairs = zip(here.nodes, here.multipliers.at_nodes, strict=True)
-    return tuple(tuple(e for e, price in zip(of, own, strict=False) if price > BINDING) for of, own in pairs)
+def _binding(place: _Place) -> Nodes:
+    """Nodes of each family with a multiplier where the solver stopped."""
+    pairs = zip(place.nodes, place.multipliers.nodes, strict=True)
+    return tuple(
+        tuple(e for e, price in zip(family_nodes, prices, strict=False) if price > BINDING)
+        for family_nodes, prices in pairs
+    )
 
 
-def _stands(calls: Calls, nlp: Transcription, here: _Place, extra: Floats) -> bool:
-    """Say whether all rows hold where IPOPT gave up: then the certificate judges, not the solver's word."""
-    grown = any(len(of) > nlp.rows.slots for of in here.nodes)
-    if grown or here.sampler.corner_count != nlp.structure.corners:
+def _is_feasible(calls: Calls, nlp: Transcription, place: _Place, extra: Floats) -> bool:
+    """Whether all rows hold where IPOPT failed: then the certificate decides, not the solver's status."""
+    grown = any(len(family_nodes) > nlp.rows.slots for family_nodes in place.nodes)
+    if grown or place.sampler.corner_count != nlp.structure.corners:
         return False
-    return _is_feasible(calls, nlp, here, extra, STANDS)
+    return _rows_hold(calls, nlp, place, extra, END_EXCESS)
 
 
-def _is_feasible(calls: Calls, nlp: Transcription, here: _Place, extra: Floats, excess: float = NEARLY) -> bool:
-    """Say whether all rows hold at a place, up to an excess of each, scaled."""
-    if calls.elastic:
+def _rows_hold(calls: Calls, nlp: Transcription, place: _Place, extra: Floats, excess: float = START_EXCESS) -> bool:
+    """Whether all rows hold at a place, up to a scaled excess."""
+    if calls.is_elastic:
         return False
-    arguments = calls.arguments(nlp, here.sampler, here.x, extra, here.nodes)
+    arguments = calls.arguments(nlp, place.sampler, place.x, extra, place.nodes)
     rows = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[0]).ravel()
     return bool(np.all(rows <= arguments["ubg"] + excess) and np.all(rows >= arguments["lbg"] - excess))
 
 
-def _relaxed(program: Program, extra: Floats) -> dict[int, float]:
-    """Return the excess each relaxable limit needs, SI, where it is more than rounding."""
+def _relaxation(program: Program, extra: Floats) -> dict[int, float]:
+    """Excess of each relaxable limit, SI, where it is more than rounding."""
     limits = program.limits
-    needs = {k: extra[way[0]] - (extra[way[1]] if len(way) == 2 else 0.0) for k, way in program.excess_places.items()}
+    needs = {
+        k: extra[signed_places[0]] - (extra[signed_places[1]] if len(signed_places) == 2 else 0.0)
+        for k, signed_places in program.excess_places.items()
+    }
     return {k: float(need * limits[k].scale) for k, need in needs.items() if abs(need) > NEEDED}
 
 
-def _uniform(sampler: Sampler, family: RowFamily, count: int) -> tuple[Extreme, ...]:
-    """Return equal nodes of one turn for a family's row: both signs of it where its magnitude counts."""
+def _uniform_nodes(sampler: Sampler, family: RowFamily, count: int) -> tuple[Extreme, ...]:
+    """Equally spaced nodes of one turn for a family; both signs where the magnitude counts."""
     pieces, u = sampler.cycle.located(TURN * np.arange(count) / count)
-    on = sampler.on(family.row, family.where)[pieces]
-    places = list(zip(pieces[on].tolist(), u[on].tolist(), strict=True))
+    on_piece = sampler.on(family.row, family.where)[pieces]
+    places = list(zip(pieces[on_piece].tolist(), u[on_piece].tolist(), strict=True))
     if family.row in sampler.model.signed:
         return tuple(Extreme(*place, 0.0, signed=True) for place in places)
     return tuple(Extreme(*place, sign) for place in places for sign in (1.0, -1.0))
 
 
-def _carried(node: Extreme, before: Cycle, sampler: Sampler) -> Extreme:
-    """Return a node of a cycle whose corners stood in another order, at the same crank angle."""
-    angle = float(before.angles(np.array([node.piece]), np.array([node.u]))[0])
+def _node_in_cycle(node: Extreme, old_cycle: Cycle, sampler: Sampler) -> Extreme:
+    """A node at the same crank angle in a cycle whose corners have another order."""
+    angle = float(old_cycle.angles(np.array([node.piece]), np.array([node.u]))[0])
     return Extreme(*sampler.cycle.place(angle), node.value, node.signed)
 
 
@@ -510,23 +537,23 @@ def _frozen(nodes: Sequence[Sequence[Extreme]]) -> Nodes:
 
 
 def starts(program: Program, count: int, seed: int = 0) -> list[dict[str, float]]:
-    """Return the job's own starts, all of them, then random ones within each variable's range, up to `count`."""
-    own = [start for start in (started(program, x) for x in program.starts) if start]
-    if len(own) >= count:
-        return own
+    """The job's starts, all of them, then random starts within each variable's range, up to `count`."""
+    job_starts = [start for start in (complete_start(program, x) for x in program.starts) if start]
+    if len(job_starts) >= count:
+        return job_starts
     generator = np.random.default_rng(seed)
-    drawn: list[dict[str, float]] = []
-    for _ in range(DRAWS * count):
-        if len(own) + len(drawn) >= count:
+    random_starts: list[dict[str, float]] = []
+    for _ in range(RANDOM_TRIALS * count):
+        if len(job_starts) + len(random_starts) >= count:
             break
-        trial = started(program, {v.name: float(generator.uniform(*v.range)) for v in program.variables})
+        trial = complete_start(program, {v.name: float(generator.uniform(*v.range)) for v in program.variables})
         if trial:
-            drawn.append(trial)
-    return own + drawn
+            random_starts.append(trial)
+    return job_starts + random_starts
 
 
-def started(program: Program, x: Mapping[str, float]) -> dict[str, float] | None:
-    """Return a start with the variables that follow from the others; None where the linkage has no real cycle."""
+def complete_start(program: Program, x: Mapping[str, float]) -> dict[str, float] | None:
+    """A start with the variables that follow from the others, SI; None where the linkage has no real cycle."""
     try:
         full = program.completed(x)
     except (ValueError, ZeroDivisionError):

@@ -1,4 +1,4 @@
-"""An NLP's objective and rows as CasADi expressions, read through the same rows as in every other number system."""
+"""An NLP's objective and rows as CasADi expressions, from the same formulas as every other number system."""
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,26 +17,28 @@ from loomopt.physics.schema import Values
 from loomopt.solving.nlp.rows import NodeParameters, RowFamily, Structure, chain_values
 
 FEW_CHOICES = 8
-"""Numbers that a node may choose from by a switch before the chosen one becomes a variable: a row that reads more makes
-slopes and curvatures dense. Named cam laws have five pieces at most."""
+"""Most numbers from which a switch selects one by formula; with more the selected number becomes a variable, because
+such rows make derivatives dense. Named cam laws have five pieces at most."""
 
 
 class Lifted(NamedTuple):
-    """A lifted variable and what it is worth; of a choice, one of the column `options`: that where `at` is 1, not 0."""
+    """A lifted variable and its formula; of a choice also the column `options` and `at`, 1 at the chosen one, else
+    0.
+    """
 
     symbol: Any
-    worth: Any
-    at: Any = None
+    formula: Any
+    selector: Any = None
     options: Any = None
 
 
 def identity(value: Number) -> object:
-    """Return what two expressions share that are one, for as long as they are kept, and two numbers that are equal."""
+    """Key that is equal for one expression, as long as it exists, and for equal numbers."""
     return value if isinstance(value, float | int) else value.element_hash()
 
 
-def chosen(place: Number, values: Sequence[Number]) -> Number:
-    """Return the value at a place as every number system does, of many in one product."""
+def value_at(place: Number, values: Sequence[Number]) -> Number:
+    """The value at a place, as in every number system; among many values in one product."""
     import casadi as ca
 
     if isinstance(place, float | int):
@@ -47,7 +49,7 @@ def chosen(place: Number, values: Sequence[Number]) -> Number:
 
 
 class Options(Sequence[Number]):
-    """What there is to choose from, as one column for all choices."""
+    """The values of a choice, as one column for all choices among them."""
 
     def __init__(self, values: Sequence[Number]) -> None:
         import casadi as ca
@@ -57,76 +59,79 @@ class Options(Sequence[Number]):
         self.key = tuple(map(identity, self.values))
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Number of values."""
         return len(self.values)
 
     def __getitem__(self, place: Number) -> Number:
-        """Return the value at a place."""
+        """The value at a place."""
         return self.values[place]
 
 
 class Lifts:
-    """Lifted variables as they are asked for while rows are written down; own: the NLP's other variables, a column.
+    """Lifted variables, created while rows are written; own: the NLP's other variables, a column.
 
-    named: values that follow one after the other; picked: choices, after all of them.
+    chained_values: chained values; choices: choices, after all chained values.
     """
 
-    def __init__(self, own: Any) -> None:
+    def __init__(self, variables: Any) -> None:
         self.maths: Maths = replace(systems.casadi(), choose=self.choose)
-        self.named: list[Lifted] = []
-        self.picked: list[Lifted] = []
-        self._moving = own
+        self.chained_values: list[Lifted] = []
+        self.choices: list[Lifted] = []
+        self._variables = variables
         self._symbols: dict[str, Any] = {}
         self._options: dict[object, tuple[Options, bool]] = {}
         self._places: dict[object, tuple[Any, Any]] = {}
         self._choices: dict[object, Any] = {}
 
     def symbols(self, names: Sequence[str]) -> dict[str, Any]:
-        """Return a symbol for each value that is lifted; `define` says what it is worth."""
+        """Symbols of the lifted values, by name; `define` sets their formulas."""
         import casadi as ca
 
         self._symbols = {name: ca.SX.sym(name) for name in names}
-        self._moving = ca.vertcat(self._moving, *self._symbols.values())
+        self._variables = ca.vertcat(self._variables, *self._symbols.values())
         return self._symbols
 
     def define(self, worth: Mapping[str, Any]) -> None:
-        """Say what each lifted value is worth; each reads only those before it."""
-        self.named = [Lifted(symbol, worth[name]) for name, symbol in self._symbols.items()]
+        """Set the formula of every lifted value; a formula reads only values before it."""
+        self.chained_values = [Lifted(symbol, worth[name]) for name, symbol in self._symbols.items()]
 
     def choose(self, place: Number, values: Sequence[Number]) -> Number:
-        """Return the value at a place as every number system does; a variable for one of many that the design moves."""
+        """The value at a place, as in every number system; a variable where one of many varies with the design."""
         if isinstance(place, float | int) or len(values) <= FEW_CHOICES:
-            return chosen(place, values)
-        given = values if isinstance(values, Options) else Options(values)
-        key = identity(place), given.key
+            return value_at(place, values)
+        options = values if isinstance(values, Options) else Options(values)
+        key = identity(place), options.key
         if key not in self._choices:
-            self._choices[key] = self._choice(place, given)
+            self._choices[key] = self._choice(place, options)
         return self._choices[key]
 
-    def _choice(self, place: Any, given: Options) -> Any:
+    def _choice(self, place: Any, choice_options: Options) -> Any:
         import casadi as ca
 
-        if given.key not in self._options:
-            self._options[given.key] = given, bool(ca.depends_on(given.column, self._moving))
-        options, moves = self._options[given.key]
-        at = identity(place), len(options)
-        if at not in self._places:
-            self._places[at] = place == ca.DM(range(len(options))), place
-        where = self._places[at][0]
-        worth = ca.dot(where, options.column)
-        if not moves:
-            return worth
-        self.picked.append(Lifted(ca.SX.sym("chosen"), worth, where, options.column))
-        return self.picked[-1].symbol
+        if choice_options.key not in self._options:
+            self._options[choice_options.key] = (
+                choice_options,
+                bool(ca.depends_on(choice_options.column, self._variables)),
+            )
+        options, varies = self._options[choice_options.key]
+        place_key = identity(place), len(options)
+        if place_key not in self._places:
+            self._places[place_key] = place == ca.DM(range(len(options))), place
+        selector = self._places[place_key][0]
+        formula = ca.dot(selector, options.column)
+        if not varies:
+            return formula
+        self.choices.append(Lifted(ca.SX.sym("chosen"), formula, selector, options.column))
+        return self.choices[-1].symbol
 
     @property
-    def defined(self) -> list[Lifted]:
-        """All lifted variables, in an order in which each reads only those before it."""
-        return self.named + self.picked
+    def variables(self) -> list[Lifted]:
+        """All lifted variables; each reads only those before it."""
+        return self.chained_values + self.choices
 
 
 class _Choice(NamedTuple):
-    """One of many numbers by a switch: its symbol, the switch, and what there is to choose from."""
+    """A choice of one of many numbers by a switch: its symbol, the switch and the numbers."""
 
     symbol: Any
     switch: str
@@ -134,7 +139,7 @@ class _Choice(NamedTuple):
 
 
 class _Traced(NamedTuple):
-    """A quantity as a function of the numbers it reads, angle, switches and what it chooses from many by a switch."""
+    """A quantity as a function of numbers, crank angle, switches and choices."""
 
     function: Any
     numbers: Any
@@ -142,10 +147,10 @@ class _Traced(NamedTuple):
 
 
 class QuantityFunctions:
-    """The quantities of one NLP; numbers that follow from others at once are inputs too: all nodes share them.
+    """The quantities of one NLP; numbers that follow directly from others are inputs, shared by all nodes.
 
-    So is what a formula chooses from many numbers by a switch: a node whose switch is known reads one of them. values:
-    the scene's numbers, given: what follows too, of the rows; switches: names of a node's.
+    Choices of a formula are inputs too: a node with a known switch reads one number only. values: the scene's numbers;
+    given: these and the numbers that follow from them, of the rows; switches: names of a node's switches.
     """
 
     def __init__(self, model: JobModel, values: Values, given: Given, switches: Sequence[str], lifts: Lifts) -> None:
@@ -154,28 +159,28 @@ class QuantityFunctions:
         self.model, self.lifts = model, lifts
         symbols = {name: ca.SX.sym(name) for name in values}
         self._symbols = list(symbols.values())
-        """Kept: what identifies a symbol is another's once it is gone."""
+        """All symbols stay alive: CasADi reuses the identity of a deleted one."""
         self._worth: dict[object, Any] = {identity(symbol): values[name] for name, symbol in symbols.items()}
-        found = model.given(replace(systems.casadi(), choose=chosen), symbols)
-        shared = self._shared(found.values, given.values)
-        self.given, self._in_symbols = given, Given(shared, found.own, linkage=found.linkage)
+        symbolic = model.given(replace(systems.casadi(), choose=value_at), symbols)
+        shared = self._shared(symbolic.values, given.values)
+        self.given, self._in_symbols = given, Given(shared, symbolic.own, linkage=symbolic.linkage)
         self.phi, self.switches = ca.SX.sym("phi"), {name: ca.SX.sym(name) for name in switches}
         self._traced: dict[str, _Traced] = {}
 
-    def _shared(self, values: Values, worth: Values) -> dict[str, Number]:
-        """Return numbers with a symbol for each that follows from others."""
+    def _shared(self, values: Values, formulas: Values) -> dict[str, Number]:
+        """The numbers, with a symbol for each one that follows from others."""
         import casadi as ca
 
-        found = dict(values)
+        shared = dict(values)
         for key, value in values.items():
             if isinstance(value, ca.SX) and not value.is_constant() and identity(value) not in self._worth:
-                found[key] = ca.SX.sym(key)
-                self._symbols.append(found[key])
-                self._worth[identity(found[key])] = worth[key]
-        return found
+                shared[key] = ca.SX.sym(key)
+                self._symbols.append(shared[key])
+                self._worth[identity(shared[key])] = formulas[key]
+        return shared
 
     def at(self, name: str, phi: Number, switch: Values) -> Number:
-        """Return a quantity at a crank angle, rad."""
+        """A quantity at a crank angle, rad."""
         if name not in self._traced:
             self._traced[name] = self._trace(name)
         traced = self._traced[name]
@@ -188,50 +193,50 @@ class QuantityFunctions:
         choices = _Choices(self.switches, self._worth)
         system = replace(systems.casadi(), choose=choices.choose)
         value = self.model.quantity(system, self._in_symbols, name, Node(self.phi, self.switches))
-        read = [each for each in ca.symvar(ca.SX(value)) if identity(each) in self._worth]
-        inputs = ca.vertcat(*read), self.phi, *self.switches.values(), *choices.symbols
-        worth = ca.vertcat(*(self._worth[identity(each)] for each in read))
-        return _Traced(ca.Function("quantity", list(inputs), [value]), worth, tuple(choices))
+        symbols = [symbol for symbol in ca.symvar(ca.SX(value)) if identity(symbol) in self._worth]
+        inputs = ca.vertcat(*symbols), self.phi, *self.switches.values(), *choices.symbols
+        formulas = ca.vertcat(*(self._worth[identity(symbol)] for symbol in symbols))
+        return _Traced(ca.Function("quantity", list(inputs), [value]), formulas, tuple(choices))
 
 
 class _Choices:
-    """What a formula chooses from many numbers by a switch; worth: what each symbol stands for."""
+    """Choices of a formula among many numbers by a switch; worth: the formula of each symbol."""
 
     def __init__(self, switches: Values, worth: dict[object, Any]) -> None:
         self.switches = {identity(symbol): name for name, symbol in switches.items()}
         self.worth = worth
-        self._found: dict[Any, _Choice] = {}
+        self._choices: dict[Any, _Choice] = {}
 
     def __iter__(self) -> Iterator[_Choice]:
-        """Return them in the order in which they were met."""
-        return iter(self._found.values())
+        """The choices, in the order in which the formula makes them."""
+        return iter(self._choices.values())
 
     @property
     def symbols(self) -> list[Any]:
-        """The symbol of each."""
+        """Symbols of the choices."""
         return [choice.symbol for choice in self]
 
     def choose(self, place: Number, values: Sequence[Number]) -> Number:
-        """Return the value at a place; of many numbers by a switch a symbol."""
+        """The value at a place; a symbol where a switch selects one of many numbers."""
         import casadi as ca
 
         switch = self.switches.get(identity(place))
         if not switch or len(values) <= FEW_CHOICES or not all(map(self._known, values)):
-            return chosen(place, values)
+            return value_at(place, values)
         keys = list(map(identity, values))
-        if (switch, *keys) not in self._found:
+        if (switch, *keys) not in self._choices:
             options = Options([self.worth.get(key, value) for key, value in zip(keys, values, strict=True)])
-            self._found[switch, *keys] = _Choice(ca.SX.sym("chosen"), switch, options)
-        return self._found[switch, *keys].symbol
+            self._choices[switch, *keys] = _Choice(ca.SX.sym("chosen"), switch, options)
+        return self._choices[switch, *keys].symbol
 
     def _known(self, value: Number) -> bool:
         return isinstance(value, float | int) or identity(value) in self.worth or bool(value.is_constant())
 
 
 class Expressions(NamedTuple):
-    """x: the design's variables and the extra ones, scaled; p: parameters; f: objective; g: rows, each ≤ 0 or = 0.
+    """x: variables of design and extra ones, scaled; p: parameters; f: objective; g: rows, each ≤ 0 or = 0.
 
-    lifts: variables beside x that rows read.
+    lifts: the lifted variables, which rows read beside x.
     """
 
     x: Any
@@ -242,15 +247,15 @@ class Expressions(NamedTuple):
 
 
 def expressions(structure: Structure) -> Expressions:
-    """Return the NLP of a structure."""
+    """The NLP of a structure as expressions."""
     import casadi as ca
 
     scaled = ca.SX.sym("x", len(structure.program.variables))
     extra = ca.SX.sym("t", structure.rows.extras)
     p = ca.SX.sym("p", structure.layout.size)
-    built = _Built(structure, scaled, extra, p)
-    rows = structure.rows.stacked(built.limits(), built.pieces(), built.held(), built.cycle())
-    return Expressions(ca.vertcat(scaled, extra), p, built.objective(), ca.vertcat(*rows), built.lifts)
+    writer = _NlpWriter(structure, scaled, extra, p)
+    rows = structure.rows.stack(writer.limits(), writer.pieces(), writer.station_rows(), writer.node_rows())
+    return Expressions(ca.vertcat(scaled, extra), p, writer.objective(), ca.vertcat(*rows), writer.lifts)
 
 
 class NodeRows(Rows):
@@ -271,22 +276,22 @@ class NodeRows(Rows):
         self.shape, self.rules, self.quantities = shape, rules, quantities
 
     def quantity(self, name: str, phi: Number, switch: Values) -> Number:
-        """Return a whole-cycle quantity at a crank angle, rad, SI."""
+        """A whole-cycle quantity at a crank angle, rad, SI."""
         return self.quantities.at(name, phi, switch)
 
     def read(self, names: Sequence[str]) -> None:
-        """Read the figures and rows of the design that will be asked for, all at once."""
+        """Read figures and rows of the design in one evaluation."""
         self._single |= self.model.static(self.maths, self.given, self.stills, names)
 
     def at(self, name: str, parameters: Any) -> Number:
-        """Return a whole-cycle quantity at the node that parameters (a column) say, SI."""
+        """A whole-cycle quantity at the node of parameters (a column), SI."""
         import casadi as ca
 
         switch = {key: parameters[self.shape.places.start + k] for k, key in enumerate(self.shape.switches)}
         return self.quantity(name, ca.dot(parameters[self.shape.angle], self.column), switch)
 
     def mean(self, integral: Integral) -> Number:
-        """Return a mean by its rule, SI."""
+        """A mean by its quadrature rule, SI."""
         import casadi as ca
 
         rule = self.rules[integral.name]
@@ -295,14 +300,14 @@ class NodeRows(Rows):
         return total(weighted) / total(widths)
 
 
-class _Built:
-    """One NLP being written down; scaled, extra: its variables; column: its parameters; all of them columns."""
+class _NlpWriter:
+    """Writer of one NLP; scaled, extra: its variables; column: its parameters; all of them columns."""
 
     def __init__(self, structure: Structure, scaled: Any, extra: Any, column: Any) -> None:
         import casadi as ca
 
         program, layout = structure.program, structure.layout
-        vector = ca.vertsplit(layout.before(column, "nodes"))
+        vector = ca.vertsplit(layout.prefix(column, "nodes"))
         self.structure, self.program, self.extra = structure, program, ca.vertsplit(extra)
         self.vector, self.column = vector, column
         self.lifts = Lifts(ca.vertcat(scaled, extra))
@@ -313,7 +318,7 @@ class _Built:
         names, model = program.model.switches, program.model
         stills = {e: dict(zip(names, layout.read(vector, f"still {e}"), strict=True)) for e in model.events_read}
         rules = {name: layout.columns(column, f"mean {name}") for name, _ in structure.points}
-        values |= self.lifts.symbols(structure.recurrent)
+        values |= self.lifts.symbols(structure.chained_values)
         self.lifts.define(chain_values(model, structure.names, self.lifts.maths, values))
         given = model.given(self.lifts.maths, values)
         quantities = QuantityFunctions(model, values, given, structure.node.switches, self.lifts)
@@ -322,7 +327,7 @@ class _Built:
         self.scales, self.weights = layout.read(vector, "objective scale"), layout.read(vector, "objective weight")
 
     def objective(self) -> Any:
-        """Return the weighted sum of the objectives, or of what the limits give way."""
+        """Weighted sum of the objectives, or of the excesses of an elastic NLP."""
         if self.structure.elastic:
             weights = self.structure.layout.read(self.vector, "way weight")
             return total([weight * way for weight, way in zip(weights, self.extra, strict=True)])
@@ -334,19 +339,19 @@ class _Built:
         ]
         return total([weight * level for weight, level in zip(self.weights, levels, strict=True)])
 
-    def given_way(self, place: int) -> Any:
-        """Return by how much a limit gives way, in its natural size; of an equality with its sign."""
+    def relaxation(self, place: int) -> Any:
+        """Excess by which a limit is relaxed, in its scale; signed for an equality."""
         ways = [self.extra[way] for way in self.structure.excess_places.get(place, ())]
         return ways[0] - ways[1] if len(ways) == 2 else total(ways)
 
     def limits(self) -> Any:
-        """Return the rows of limits that are one row each, as a column: by entry CasADi would take as long again."""
+        """Rows of limits with one row each, as one column: entry by entry CasADi takes twice as long."""
         import casadi as ca
 
         limits, static = self.program.single_limits, self.structure.rows.limits
         self.rows.read([limits[k].row for k in static])
         columns = [
-            (limits[k].residual(self.rows, self.bounds[k]), self.limit_scales[k], self.given_way(k)) for k in static
+            (limits[k].residual(self.rows, self.bounds[k]), self.limit_scales[k], self.relaxation(k)) for k in static
         ]
         excess, scales, ways = (
             (ca.vertcat(*column) for column in zip(*columns, strict=True)) if columns else [ca.SX()] * 3
@@ -354,48 +359,51 @@ class _Built:
         return excess / scales - ways
 
     def pieces(self) -> list[Any]:
-        """Return the smooth pieces below epigraph variables: both signs of a magnitude, each value of several."""
-        found = []
+        """Smooth pieces below epigraph variables: both signs of a magnitude, each value of several."""
+        pieces = []
         for t, epigraph in zip(self.extra, self.structure.epigraphs, strict=not self.structure.elastic):
             scale, sides = self.scales[epigraph.objective], self.program.objectives[epigraph.objective].sides
-            found += [sign * self.rows.single(row) / scale - t for row, sign in sides]
-        return found
+            pieces += [sign * self.rows.single(row) / scale - t for row, sign in sides]
+        return pieces
 
-    def held(self) -> list[Any]:
-        """Return the rows of whole-cycle quantities at the stations of each family, as a column for each."""
+    def station_rows(self) -> list[Any]:
+        """Rows of whole-cycle quantities at stations, one column for each family."""
         import casadi as ca
 
-        layout, found = self.structure.layout, []
-        opened = [
+        layout, columns = self.structure.layout, []
+        open_switches = [
             dict(zip(self.structure.open_switches, row, strict=True)) for row in layout.rows(self.vector, "station")
         ]
         for k, family in enumerate(self.structure.families):
-            stations = [self.structure.stations[place] for place in self.structure.held[k]]
+            stations = [self.structure.stations[place] for place in self.structure.station_rows[k]]
             corners = [self.rows.corners[corner] for corner, _ in stations]
-            switches = [{**opened[place], **self.structure.stations[place].switch} for place in self.structure.held[k]]
+            switches = [
+                {**open_switches[place], **self.structure.stations[place].switch}
+                for place in self.structure.station_rows[k]
+            ]
             values = map(self.rows.quantity, itertools.repeat(family.square or family.row), corners, switches)
-            found.append(self._rows(family, ca.vertcat(*layout.read(self.vector, f"sign {k}")), ca.vertcat(*values)))
-        return found
+            columns.append(self._rows(family, ca.vertcat(*layout.read(self.vector, f"sign {k}")), ca.vertcat(*values)))
+        return columns
 
-    def cycle(self) -> list[Any]:
-        """Return the rows of whole-cycle quantities, one for each slot."""
-        found = []
+    def node_rows(self) -> list[Any]:
+        """Rows of whole-cycle quantities at nodes, one for each slot."""
+        rows = []
         for k, family in enumerate(self.structure.families):
             slots = self.structure.layout.columns(self.column, f"family {k}")
-            read = family.square or family.row
-            found += [slot[0] * self._rows(family, slot[1], self.rows.at(read, slot[2:])) for slot in slots]
-        return found
+            quantity = family.square or family.row
+            rows += [slot[0] * self._rows(family, slot[1], self.rows.at(quantity, slot[2:])) for slot in slots]
+        return rows
 
     def _rows(self, family: RowFamily, sign: Any, value: Any) -> Any:
-        """Return by how much a whole-cycle quantity exceeds its bound, in its natural size.
+        """Excess of a whole-cycle quantity over its bound, in its scale.
 
-        Of squares the difference over the bound and one size more: near the bound's own size it is as steep.
+        For squares the difference is divided by bound + 1, so that its slope near the bound is the same.
         """
         if family.epigraph >= 0:
             scale = self.scales[self.structure.epigraphs[family.epigraph].objective]
             return sign * value / scale - self.extra[family.epigraph]
         scale = self.limit_scales[family.limit]
-        bound = self.bounds[family.limit] / scale + self.given_way(family.limit)
+        bound = self.bounds[family.limit] / scale + self.relaxation(family.limit)
         if family.square:
             return (sign * value / scale**2 - bound**2) / (1 + bound)
         return sign * value / scale - bound
@@ -404,17 +412,19 @@ class _Built:
 def second_derivative(
     formula: Callable[[Maths, Number, Sequence[Number]], Number], switches: int
 ) -> Callable[[Floats, Floats], Floats]:
-    """Return the second derivative of formula(maths, phi, switches) with respect to phi.
+    """Second derivative of formula(maths, phi, switches) with respect to phi.
 
-    What is returned takes angles (n,), rad, and their switches (switches, n), and gives (n,).
+    Returns a function of angles (n,), rad, and their switches (switches, n); its values are (n,).
     """
     import casadi as ca
 
     phi, data = ca.SX.sym("phi"), ca.SX.sym("switch", switches)
     slope = ca.gradient(formula(systems.casadi(), phi, ca.vertsplit(data) if switches else []), phi)
-    found = ca.Function("second", [phi, data], [ca.gradient(slope, phi)])
+    function = ca.Function("second", [phi, data], [ca.gradient(slope, phi)])
 
-    def at(angles: Floats, places: Floats) -> Floats:
-        return np.asarray(found(angles[None, :], places.reshape(switches, len(angles))), dtype=np.float64).ravel()
+    def evaluate(angles: Floats, switch_values: Floats) -> Floats:
+        return np.asarray(
+            function(angles[None, :], switch_values.reshape(switches, len(angles))), dtype=np.float64
+        ).ravel()
 
-    return at
+    return evaluate

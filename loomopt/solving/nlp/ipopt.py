@@ -1,4 +1,4 @@
-"""How IPOPT is asked to work, and one run of it [Wächter and Biegler, Mathematical Programming 106 (2006)]."""
+"""Arguments of IPOPT for a program, and one run of it [Wächter and Biegler, Mathematical Programming 106 (2006)]."""
 
 import contextlib
 import functools
@@ -16,7 +16,16 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solving.nlp.point import SUCCESS, Elastic, Known, Point, Settings, sampler_at
-from loomopt.solving.nlp.rows import HeldStations, Multipliers, RowFamily, chained, epigraphs, families, held, stations
+from loomopt.solving.nlp.rows import (
+    CycleStations,
+    Multipliers,
+    RowFamily,
+    chain_names,
+    epigraphs,
+    families,
+    station_places,
+    stations,
+)
 from loomopt.solving.nlp.transcribe import Transcription, transcribe
 
 FIRST_SLOTS, LEADING = 6, 4
@@ -39,52 +48,55 @@ ELASTIC_SHARE = 1e-3
 
 
 class Calls:
-    """How one program is put to its NLP; charges what had to be built on the way.
+    """Calls of a program's NLP; the time of building NLPs is added to `built`.
 
-    slots: nodes of each family that a first NLP has room for; leading: those of a start.
+    slots: nodes of each family in the first NLP; leading: nodes of each family at a start.
     """
 
     def __init__(
-        self, program: Program, settings: Settings, ways: Elastic | None = None, known: Known | None = None
+        self, program: Program, settings: Settings, elastic: Elastic | None = None, known: Known | None = None
     ) -> None:
-        self.program, self.settings, self.ways, self.known = program, settings, ways, known or Known()
-        self.elastic = elastic = ways is not None
-        self.families, self.epigraphs = families(program, elastic), epigraphs(program, elastic)
+        self.program, self.settings, self.elastic, self.known = program, settings, elastic, known or Known()
+        self.is_elastic = elastic is not None
+        self.families, self.epigraphs = families(program, self.is_elastic), epigraphs(program, self.is_elastic)
         names = [variable.name for variable in program.variables]
-        self.slots, self.leading = BESIDE_STATIONS if chained(program.model, names) else (FIRST_SLOTS, LEADING)
+        self.slots, self.leading = BESIDE_STATIONS if chain_names(program.model, names) else (FIRST_SLOTS, LEADING)
         count = len(program.objectives)
         self.weights = [settings.penalty ** (count - 1 - k) for k in range(count)]
-        self.built = 0.0
+        self.build_seconds = 0.0
 
     def sampler(self, x: Mapping[str, float]) -> Sampler | None:
-        """Return the sampler of variables x (SI), or None where the linkage has no real position."""
-        return sampler_at(self.program, x, self.settings.sampled)
+        """Sampler of variables x (SI), or None where the linkage has no real position."""
+        return sampler_at(self.program, x, self.settings.sample_count)
 
     def peaks(self, sampler: Sampler) -> list[list[Extreme]]:
-        """Return the local extremes of each family's quantity, largest first."""
+        """Local extremes of each family's quantity, largest first."""
         sampler.search(family.row for family in self.families)
         return [sampler.extremes(family.row, family.where) for family in self.families]
 
-    def loose(self, sampler: Sampler, extremes: Sequence[Sequence[Extreme]]) -> list[list[Extreme]]:
-        """Return of each family the extremes that no row of a station holds: these need a node."""
+    def nodeless_extremes(self, sampler: Sampler, extremes: Sequence[Sequence[Extreme]]) -> list[list[Extreme]]:
+        """Extremes of each family that no station has a row for: these need a node."""
         corners = stations(self.program.model, sampler.given, [v.name for v in self.program.variables])
-        stood = HeldStations(corners, sampler.cycle)
-        rows = [set(held([corner.switch for corner in corners], family)) for family in self.families]
+        cycle_stations = CycleStations(corners, sampler.cycle)
+        rows = [set(station_places([corner.switch for corner in corners], family)) for family in self.families]
         pairs = zip(rows, extremes, strict=True)
-        return [[e for e in of if stood.station(e) not in own] for own, of in pairs]
+        return [
+            [e for e in family_extremes if cycle_stations.station(e) not in row_places]
+            for row_places, family_extremes in pairs
+        ]
 
-    def transcribed(self, sampler: Sampler, nodes: Sequence[Sequence[Extreme]], warm: bool) -> Transcription:
-        """Return the NLP with room for nodes of each family, its solver made; charges what had to be built."""
+    def nlp(self, sampler: Sampler, nodes: Sequence[Sequence[Extreme]], warm: bool) -> Transcription:
+        """NLP with room for the nodes of each family, with its solver; counts the time of building."""
         slots = self.slots
-        while any(len(of) > slots for of in nodes):
+        while any(len(family_nodes) > slots for family_nodes in nodes):
             slots *= 2
         began = time.perf_counter()
         building = functools.partial(self.settings.say, "building the equations")
-        nlp, fresh = transcribe(self.program, sampler, slots, self.elastic, building)
+        nlp, is_new = transcribe(self.program, sampler, slots, self.is_elastic, building)
         nlp.solver(warm, self.settings)
-        if fresh:
+        if is_new:
             self.settings.say()
-        self.built += time.perf_counter() - began if fresh else 0.0
+        self.build_seconds += time.perf_counter() - began if is_new else 0.0
         return nlp
 
     def arguments(
@@ -95,27 +107,27 @@ class Calls:
         extra: Floats,
         nodes: Sequence[Sequence[Extreme]],
     ) -> dict[str, Any]:
-        """Return what the NLP is called with: start, parameters and bounds, all scaled."""
+        """Arguments of the NLP: start, parameters and bounds, all scaled."""
         rows, (lower, upper) = nlp.rows, self._bounds()
         scaled = np.array([x[v.name] / v.scale for v in self.program.variables])
         lbg, ubg = np.full(rows.size, -np.inf), np.zeros(rows.size)
-        rows.of_limits(lbg)[[self.program.limits[k].sign == 0 for k in rows.limits]] = 0.0
-        rows.at_nodes(ubg)[~rows.used(list(map(len, nodes)))] = 1.0
+        rows.limit_rows(lbg)[[self.program.limits[k].sign == 0 for k in rows.limits]] = 0.0
+        rows.node_rows(ubg)[~rows.used_slots(list(map(len, nodes)))] = 1.0
         return {
-            "x0": rows.joined(np.clip(scaled, lower, upper), extra),
+            "x0": rows.join(np.clip(scaled, lower, upper), extra),
             "p": nlp.structure.vector(self.program, sampler, self.weights, nodes, self._costs(nlp)),
-            "lbx": rows.joined(lower, np.full(len(extra), 0.0 if self.elastic else -np.inf)),
-            "ubx": rows.joined(upper, self._most(nlp)),
+            "lbx": rows.join(lower, np.full(len(extra), 0.0 if self.is_elastic else -np.inf)),
+            "ubx": rows.join(upper, self._most(nlp)),
             "lbg": lbg,
             "ubg": ubg,
         }
 
     def _bounds(self) -> tuple[Floats, Floats]:
-        """Return the variables' bounds, scaled; limits that may give way are none, but what is positive stays so."""
+        """Bounds of the variables, scaled; relaxable bounds are infinite, but positive variables stay positive."""
         variables = self.program.variables
         lower = np.array([v.lower / v.scale for v in variables])
         upper = np.array([v.upper / v.scale for v in variables])
-        if not self.elastic:
+        if not self.is_elastic:
             return lower, upper
         sides = [(limit.row, limit.sign) for limit in self.program.bound_limits.values()]
         down, up = ({name for name, sign in sides if sign in (side, 0)} for side in (-1, 1))
@@ -125,84 +137,88 @@ class Calls:
             np.where([v.name in up for v in variables], np.inf, upper),
         )
 
-    def _ways(self, nlp: Transcription) -> Floats:
-        """Return the cost of each excess, infinite where a limit is firm; nothing for a program that is not elastic."""
-        if self.ways is None:
+    def _excess_costs(self, nlp: Transcription) -> Floats:
+        """Cost of each excess, infinite where a limit is firm; empty for a program that is not elastic."""
+        if self.elastic is None:
             return np.zeros(0)
-        return np.array(self.ways.costs or np.ones(nlp.rows.extras))
+        return np.array(self.elastic.costs or np.ones(nlp.rows.extras))
 
     def _costs(self, nlp: Transcription) -> Floats:
-        costs = self._ways(nlp)
+        costs = self._excess_costs(nlp)
         return np.where(np.isinf(costs), 0.0, costs)
 
     def _most(self, nlp: Transcription) -> Floats:
-        """Return upper bounds of the epigraph variables, or of the excesses: none where a limit is firm."""
-        if self.ways is None:
+        """Upper bounds of the epigraph variables or excesses; 0 for an excess of a firm limit."""
+        if self.elastic is None:
             return np.full(nlp.rows.extras, np.inf)
-        return np.where(np.isinf(self._ways(nlp)), 0.0, np.inf)
+        return np.where(np.isinf(self._excess_costs(nlp)), 0.0, np.inf)
 
-    def overdetermined(self, arguments: Mapping[str, Any]) -> bool:
-        """Say whether more equalities than free variables leave nothing to solve for."""
+    def is_overdetermined(self, arguments: Mapping[str, Any]) -> bool:
+        """Whether there are more equalities than free variables."""
         return bool(np.sum(arguments["lbg"] == 0.0) > np.sum(arguments["lbx"] < arguments["ubx"]))
 
     def design(self, scaled: Floats) -> dict[str, float]:
-        """Return the design's variables, SI, of the NLP's."""
+        """Variables of the design, SI, from those of the NLP."""
         x = {v.name: float(value * v.scale) for v, value in zip(self.program.variables, scaled, strict=True)}
-        if self.elastic:
+        if self.is_elastic:
             return x
         return {v.name: min(max(x[v.name], v.lower), v.upper) for v in self.program.variables}
 
     def first_extra(self, nlp: Transcription, sampler: Sampler) -> Floats:
-        """Return epigraph variables just above the start's own values, or ones for an elastic start."""
-        if self.ways:
-            beside = self.ways.beside
-            return beside.extra if beside else np.ones(nlp.rows.extras)
+        """Epigraph variables just above the values at the start; ones for an elastic start."""
+        if self.elastic:
+            elastic_start = self.elastic.start
+            return elastic_start.extra if elastic_start else np.ones(nlp.rows.extras)
         levels = [self.program.objectives[epigraph.objective] for epigraph in self.epigraphs]
         first = np.array([level.merit(sampler) / level.scale for level in levels])
         share = np.where(first < 0.0, 1 / FIRST_SHARE, FIRST_SHARE)
         return np.asarray(share * first + FIRST_ROOM)
 
     def excess(self, family: RowFamily, extreme: Extreme, extra: Floats) -> float:
-        """Return by how much an extreme exceeds its bound, relative to the row's size."""
+        """Excess of an extreme over its bound, relative to the row's scale."""
         if family.epigraph >= 0:
             scale = self.program.objectives[self.epigraphs[family.epigraph].objective].scale
             return float(extreme.height / scale - extra[family.epigraph])
         limit, ways = self.program.limits[family.limit], self.program.excess_places
         bound = limit.bound / limit.scale
-        bound += extra[ways[family.limit][0]] if self.elastic and family.limit in ways else 0.0
+        bound += extra[ways[family.limit][0]] if self.is_elastic and family.limit in ways else 0.0
         return float(extreme.height / limit.scale - bound)
 
-    def worth(self, point: Point) -> float:
-        """Return the NLP's objective at a point that has its epigraph variables."""
+    def objective(self, point: Point) -> float:
+        """The NLP's objective at a point that has epigraph variables."""
         return math.fsum(w * h for w, h in zip(self.weights, self._heights(point.x, point.extra), strict=True))
 
     def is_worse(self, answer: "IpoptAnswer", start: Sampler) -> bool:
-        """Say whether a solve ended nowhere, or at a worse point than its start."""
+        """Whether a solve failed, or ended at a worse point than its start."""
         if answer.status not in SUCCESS:
             return True
         levels = zip(self.weights, self.program.objectives, strict=True)
-        return answer.value > math.fsum(weight * of.merit(start) / of.scale for weight, of in levels) + SAME_OBJECTIVE
+        return (
+            answer.value
+            > math.fsum(weight * objective.merit(start) / objective.scale for weight, objective in levels)
+            + SAME_OBJECTIVE
+        )
 
     def is_beaten(self, answer: "IpoptAnswer") -> bool:
-        """Say whether a solve at some nodes is already no better than is known."""
-        if self.ways is not None:
-            costs = np.array(self.ways.costs or np.ones(len(answer.extra)))
-            return float(np.sum(answer.extra[costs == 1.0])) > self.known.most
-        return answer.value > self.known.most and not self._falls_earlier(answer)
+        """Whether a solve at some nodes is already no better than the best known."""
+        if self.elastic is not None:
+            costs = np.array(self.elastic.costs or np.ones(len(answer.extra)))
+            return float(np.sum(answer.extra[costs == 1.0])) > self.known.cutoff
+        return answer.value > self.known.cutoff and not self._falls_earlier(answer)
 
     def _falls_earlier(self, answer: "IpoptAnswer") -> bool:
-        """Say whether an objective before the last is lower at some nodes than is known, those before it the same."""
+        """Whether an objective before the last is lower than the best known, and those before it are equal."""
         if len(self.known.levels) < 2:
             return False
-        for here, known in zip(self._heights(answer.x, answer.extra), self.known.levels[:-1], strict=False):
-            if abs(here - known) > SAME_OBJECTIVE:
-                return bool(here < known)
+        for height, known_height in zip(self._heights(answer.x, answer.extra), self.known.levels[:-1], strict=False):
+            if abs(height - known_height) > SAME_OBJECTIVE:
+                return bool(height < known_height)
         return False
 
     def _heights(self, x: Mapping[str, float], extra: Floats) -> Iterator[float]:
-        """Yield the objectives as the NLP has them, in natural sizes: of an epigraph variable its own value.
+        """Yield the objectives of the NLP in their scales, an epigraph variable for a peak.
 
-        Nothing where the linkage has no real position.
+        Yields nothing where the linkage has no real position.
         """
         heights = {epigraph.objective: float(extra[k]) for k, epigraph in enumerate(self.epigraphs)}
         sampler = self.sampler(x)
@@ -212,32 +228,37 @@ class Calls:
             yield heights[k] if k in heights else objective.merit(sampler) / objective.scale
 
     def first_nodes(self, loose: Sequence[Sequence[Extreme]]) -> tuple[tuple[Extreme, ...], ...]:
-        """Return a start's nodes: its own largest extremes."""
-        return tuple(tuple(of[: self.leading]) for of in loose)
+        """Nodes of a start: its largest extremes."""
+        return tuple(tuple(family_extremes[: self.leading]) for family_extremes in loose)
 
     def with_known(self, nodes: Sequence[Sequence[Extreme]]) -> tuple[tuple[Extreme, ...], ...]:
-        """Return nodes with those known to bind after them, as many as there is room for."""
+        """Nodes, and after them the nodes known to bind, as many as there is room for."""
         if not self.known.nodes:
             return tuple(map(tuple, nodes))
-        room = [max(self.slots, len(of)) for of in nodes]
-        return tuple((*of, *known)[:most] for of, known, most in zip(nodes, self.known.nodes, room, strict=True))
+        room = [max(self.slots, len(family_nodes)) for family_nodes in nodes]
+        return tuple(
+            (*family_nodes, *known_nodes)[:slots]
+            for family_nodes, known_nodes, slots in zip(nodes, self.known.nodes, room, strict=True)
+        )
 
     def violation(self, peaks: Sequence[Sequence[Extreme]], extra: Floats) -> float:
-        """Return the largest excess of an extreme, relative to its row's size; 0 where there is none."""
+        """Largest excess of an extreme, relative to its row's scale; 0 without extremes."""
         pairs = zip(self.families, peaks, strict=True)
-        return max((self.excess(family, e, extra) for family, of in pairs for e in of), default=0.0)
+        return max(
+            (self.excess(family, e, extra) for family, family_extremes in pairs for e in family_extremes), default=0.0
+        )
 
 
 STOPPED = frozenset({"NonIpopt_Exception_Thrown", "User_Requested_Stop"})
-"""What IPOPT says when its callback raised, or asked it to stop."""
+"""Statuses of IPOPT after its callback raised an error or requested a stop."""
 WARNING, ON_CTRL_C = "CasADi - ", "KeyboardInterruptException"
-"""How CasADi begins a warning, and which one it gives on Ctrl-C: whoever pressed it knows."""
+"""Prefix of CasADi's warnings, and the warning on Ctrl-C, which tells the user nothing new."""
 
 
 class IpoptAnswer(NamedTuple):
-    """What IPOPT said.
+    """Result of an IPOPT run.
 
-    extra: the epigraph or elastic variables; multipliers: 0 where it did not run; value: of the objective.
+    extra: the epigraph or elastic variables; multipliers: 0 if IPOPT did not run; value: of the objective.
     """
 
     status: str
@@ -257,44 +278,44 @@ def run(
     nodes: Sequence[Sequence[Extreme]],
     warm: Multipliers,
 ) -> IpoptAnswer:
-    """Return IPOPT's answer from variables x (SI) and extra; warm: multipliers to start from, if there are any.
+    """Run IPOPT from variables x (SI) and extra; warm: multipliers for a warm start, may be empty.
 
     Raises KeyboardInterrupt on Ctrl-C, and what the callback raises.
     """
     arguments = calls.arguments(nlp, sampler, x, extra, nodes)
-    if calls.overdetermined(arguments):
-        none = Multipliers(nlp.rows, np.zeros(len(arguments["x0"])), np.zeros(nlp.rows.size))
-        return IpoptAnswer("Not_Enough_Degrees_Of_Freedom", dict(x), extra, none, 0)
+    if calls.is_overdetermined(arguments):
+        zero_multipliers = Multipliers(nlp.rows, np.zeros(len(arguments["x0"])), np.zeros(nlp.rows.size))
+        return IpoptAnswer("Not_Enough_Degrees_Of_Freedom", dict(x), extra, zero_multipliers, 0)
     if warm:
-        arguments |= {"lam_x0": warm.lam_x, "lam_g0": warm.grown(nlp.rows)}
+        arguments |= {"lam_x0": warm.lam_x, "lam_g0": warm.extend(nlp.rows)}
     solver = nlp.solver(bool(warm), calls.settings)
     with _no_warning_on_ctrl_c():
-        said = solver(**arguments)
+        outputs = solver(**arguments)
     interrupts.check()
     stats = solver.stats()
     status = str(stats["return_status"])
     if status in STOPPED:
         raise calls.settings.callback.error() if calls.settings.callback else KeyboardInterrupt
-    evaluated = sum(int(count) for name, count in stats.items() if name.startswith("n_call_nlp_"))
-    sampler.session.positions += evaluated * max(1, sum(map(len, nodes)))
-    flat, lam_x, lam_g = (np.asarray(said[name]).ravel() for name in ("x", "lam_x", "lam_g"))
-    design, reached = nlp.rows.parted(flat)
+    evaluations = sum(int(count) for name, count in stats.items() if name.startswith("n_call_nlp_"))
+    sampler.session.positions += evaluations * max(1, sum(map(len, nodes)))
+    flat, lam_x, lam_g = (np.asarray(outputs[name]).ravel() for name in ("x", "lam_x", "lam_g"))
+    design, end_extra = nlp.rows.split(flat)
     multipliers = Multipliers(nlp.rows, lam_x, lam_g)
-    iterations, value = int(stats.get("iter_count", 0)), float(np.asarray(said["f"]).item())
-    return IpoptAnswer(status, calls.design(design), reached, multipliers, iterations, value)
+    iterations, value = int(stats.get("iter_count", 0)), float(np.asarray(outputs["f"]).item())
+    return IpoptAnswer(status, calls.design(design), end_extra, multipliers, iterations, value)
 
 
 class _Unwarned:
-    """A stream without CasADi's warning on Ctrl-C, which it writes in pieces; all else passes."""
+    """A stream without CasADi's warning on Ctrl-C, which arrives in pieces; all other text passes."""
 
     def __init__(self, stream: Any) -> None:
-        self._stream, self._held = stream, ""
+        self._stream, self._pending = stream, ""
 
     def write(self, text: str) -> int:
-        """Write a text; of a warning the whole line at its end, or nothing."""
-        line = self._held + text if self._held or text.startswith(WARNING) else ""
-        self._held = "" if line.endswith("\n") else line
-        if self._held or ON_CTRL_C in line:
+        """Write a text; a warning is written as a whole line or not at all."""
+        line = self._pending + text if self._pending or text.startswith(WARNING) else ""
+        self._pending = "" if line.endswith("\n") else line
+        if self._pending or ON_CTRL_C in line:
             return len(text)
         self._stream.write(line or text)
         return len(text)
@@ -319,9 +340,9 @@ def _no_warning_on_ctrl_c() -> Iterator[None]:
 
 
 class IterationCallback:
-    """Reports each iteration; one CasADi callback per NLP size, kept alive with it.
+    """Callback of each iteration; one CasADi callback per NLP size, which lives as long as this object.
 
-    What a report raises stops IPOPT, which tells no more than that it was stopped: `error` says why.
+    An error that a report raises stops IPOPT; `error` returns it.
     """
 
     def __init__(self, report: Callable[[int], None]) -> None:
@@ -330,19 +351,19 @@ class IterationCallback:
         self._made: dict[tuple[int, int, int], Any] = {}
 
     def for_size(self, variables: int, rows: int, parameters: int) -> Any:
-        """Return the CasADi callback for an NLP of this size."""
+        """CasADi callback for an NLP of this size."""
         size = (variables, rows, parameters)
         if size not in self._made:
-            self._made[size] = _make(self._told, *size)
+            self._made[size] = _make(self._report, *size)
         return self._made[size]
 
     def error(self) -> BaseException:
-        """Return what a report has raised, once; without, it was Ctrl-C."""
-        found, self.raised = self.raised, None
-        return found or KeyboardInterrupt()
+        """The error that a report has raised, once; KeyboardInterrupt without one."""
+        error, self.raised = self.raised, None
+        return error or KeyboardInterrupt()
 
-    def _told(self, number: int) -> bool:
-        """Report an iteration; say whether that has failed."""
+    def _report(self, number: int) -> bool:
+        """Report an iteration; True if the report raised an error."""
         try:
             self.report(number)
         except BaseException as error:
@@ -352,7 +373,7 @@ class IterationCallback:
 
 
 def _make(report: Callable[[int], bool], variables: int, rows: int, parameters: int) -> Any:
-    """Return a CasADi callback; defined here so that CasADi is imported only when one is wanted."""
+    """A CasADi callback; defined here so that CasADi is imported only when a callback is needed."""
     import casadi as ca
 
     shapes = {"x": variables, "f": 1, "g": rows, "lam_x": variables, "lam_g": rows, "lam_p": parameters}

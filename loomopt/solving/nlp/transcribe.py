@@ -1,4 +1,4 @@
-"""From a program's structure to one parametric NLP: built once, solved for any numbers."""
+"""One parametric NLP for each structure of a program: built once, solved for any numbers."""
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
@@ -15,41 +15,41 @@ from loomopt.solving.nlp.rows import RowMap, Structure, structure
 
 
 class Entries:
-    """The entries of a sparse matrix of CasADi's by row, as arrays; values follow with each call."""
+    """Entries of a sparse CasADi matrix by row, as arrays; the values are given with each call."""
 
     def __init__(self, sparsity: Any, rows: range, columns: range) -> None:
         row, column = np.array(sparsity.row(), dtype=np.intp), np.array(sparsity.get_col(), dtype=np.intp)
-        kept = (row >= rows.start) & (row < rows.stop) & (column >= columns.start) & (column < columns.stop)
-        place = np.flatnonzero(kept)
+        inside = (row >= rows.start) & (row < rows.stop) & (column >= columns.start) & (column < columns.stop)
+        place = np.flatnonzero(inside)
         self.place = place[np.lexsort((column[place], row[place]))]
         self.row, self.column = row[self.place] - rows.start, column[self.place] - columns.start
         self.shape = len(rows), len(columns)
         self.ends = np.searchsorted(self.row, np.arange(len(rows) + 1))
 
     def dense(self, values: Floats) -> Floats:
-        """Return the matrix; values: of all entries, as CasADi orders them."""
-        found = np.zeros(self.shape)
-        found[self.row, self.column] = values[self.place]
-        return found
+        """The dense matrix; values: of all entries, in CasADi's order."""
+        matrix = np.zeros(self.shape)
+        matrix[self.row, self.column] = values[self.place]
+        return matrix
 
     def times(self, values: Floats, matrix: Floats) -> Floats:
-        """Return its product with a dense matrix."""
-        found = np.zeros((self.shape[0], *matrix.shape[1:]))
-        filled = np.flatnonzero(np.diff(self.ends))
-        if len(filled):
+        """Product with a dense matrix."""
+        product = np.zeros((self.shape[0], *matrix.shape[1:]))
+        nonempty = np.flatnonzero(np.diff(self.ends))
+        if len(nonempty):
             terms = values[self.place].reshape(-1, *[1] * (matrix.ndim - 1)) * matrix[self.column]
-            found[filled] = np.add.reduceat(terms, self.ends[filled])
-        return found
+            product[nonempty] = np.add.reduceat(terms, self.ends[nonempty])
+        return product
 
     def transposed_times(self, values: Floats, vector: Floats) -> Floats:
-        """Return the product of its transpose with a vector."""
-        found = np.zeros(self.shape[1])
-        np.add.at(found, self.column, values[self.place] * vector[self.row])
-        return found
+        """Product of the transpose with a vector."""
+        product = np.zeros(self.shape[1])
+        np.add.at(product, self.column, values[self.place] * vector[self.row])
+        return product
 
 
 class _Local(NamedTuple):
-    """An NLP at one point: values and entries of all rows' slopes, and how the lifted variables follow, Z."""
+    """An NLP at one point: values of all rows, entries of their slopes, and dz/dx of the lifted variables z."""
 
     full: Floats
     rows: Floats
@@ -57,93 +57,97 @@ class _Local(NamedTuple):
     follow: Floats
 
 
-def _of(picked: Sequence[Lifted], x: Any) -> Any:
-    """Return the slopes of the rows of choices, which read so many that as rows among others they would cost most."""
+def _choice_slopes(choices: Sequence[Lifted], x: Any) -> Any:
+    """Slopes of the rows of choices, written apart because each reads many numbers."""
     import casadi as ca
 
-    columns = {id(each.options): each.options for each in picked}
+    columns = {id(choice.options): choice.options for choice in choices}
     slopes = {key: ca.jacobian(options, x) for key, options in columns.items()}
-    rows = [ca.mtimes(each.at.T, slopes[id(each.options)]) for each in picked]
-    return ca.jacobian(ca.vertcat(*(each.symbol for each in picked)), x) - ca.vertcat(*rows)
+    rows = [ca.mtimes(choice.selector.T, slopes[id(choice.options)]) for choice in choices]
+    return ca.jacobian(ca.vertcat(*(choice.symbol for choice in choices)), x) - ca.vertcat(*rows)
 
 
 class Elimination:
-    """An NLP's functions of its own variables and rows, from those with lifted variables, which IPOPT is given."""
+    """Functions of an NLP's original variables and rows, from those with lifted variables, which IPOPT solves."""
 
-    def __init__(self, written: Expressions, own: RowMap) -> None:
+    def __init__(self, nlp: Expressions, row_map: RowMap) -> None:
         import casadi as ca
 
-        lifted = written.lifts.defined
-        z, worth = ca.vertcat(*(each.symbol for each in lifted)), ca.vertcat(*(each.worth for each in lifted))
-        self.full = replace(own, lifted=len(lifted))
-        x, lam_f, lam_g = ca.vertcat(written.x, z), ca.SX.sym("f"), ca.SX.sym("g", self.full.size)
-        g = ca.vertcat(written.g, z - worth)
-        self.nlp = {"x": x, "p": written.p, "f": written.f, "g": g}
-        explicit, _ = ca.substitute_inplace(
-            [each.symbol for each in lifted], [each.worth for each in lifted], [], False
+        lifted = nlp.lifts.variables
+        z, formulas = ca.vertcat(*(lift.symbol for lift in lifted)), ca.vertcat(*(lift.formula for lift in lifted))
+        self.full = replace(row_map, lifted=len(lifted))
+        x, lam_f, lam_g = ca.vertcat(nlp.x, z), ca.SX.sym("f"), ca.SX.sym("g", self.full.size)
+        g = ca.vertcat(nlp.g, z - formulas)
+        self.nlp = {"x": x, "p": nlp.p, "f": nlp.f, "g": g}
+        start_values, _ = ca.substitute_inplace(
+            [lift.symbol for lift in lifted], [lift.formula for lift in lifted], [], False
         )
-        self._start = ca.Function("start", [written.x, written.p], [ca.vertcat(*explicit)])
-        named = ca.vertcat(*(each.symbol - each.worth for each in written.lifts.named))
-        defining = ca.vertcat(ca.jacobian(named, x), _of(written.lifts.picked, x))
-        slopes = ca.vertcat(ca.jacobian(written.g, x), defining)
-        priced = ca.dot(lam_g, g) if ca.depends_on(defining, x) else ca.dot(self.full.own_rows(lam_g), written.g)
-        bend: Any = ca.triu(ca.hessian(lam_f * written.f + priced, x)[0])
+        self._start = ca.Function("start", [nlp.x, nlp.p], [ca.vertcat(*start_values)])
+        named = ca.vertcat(*(lift.symbol - lift.formula for lift in nlp.lifts.chained_values))
+        definition_slopes = ca.vertcat(ca.jacobian(named, x), _choice_slopes(nlp.lifts.choices, x))
+        slopes = ca.vertcat(ca.jacobian(nlp.g, x), definition_slopes)
+        lagrangian_rows = (
+            ca.dot(lam_g, g) if ca.depends_on(definition_slopes, x) else ca.dot(self.full.original_rows(lam_g), nlp.g)
+        )
+        hessian: Any = ca.triu(ca.hessian(lam_f * nlp.f + lagrangian_rows, x)[0])
         self.functions = {
-            "grad_f": ca.Function("nlp_grad_f", [x, written.p], [written.f, ca.gradient(written.f, x)]),
-            "jac_g": ca.Function("nlp_jac_g", [x, written.p], [g, slopes]),
-            "hess_lag": ca.Function("nlp_hess_l", [x, written.p, lam_f, lam_g], [bend]),
+            "grad_f": ca.Function("nlp_grad_f", [x, nlp.p], [nlp.f, ca.gradient(nlp.f, x)]),
+            "jac_g": ca.Function("nlp_jac_g", [x, nlp.p], [g, slopes]),
+            "hess_lag": ca.Function("nlp_hess_l", [x, nlp.p, lam_f, lam_g], [hessian]),
         }
         all_rows, columns, pattern = range(g.numel()), range(x.numel()), slopes.sparsity()
-        rows, definitions = self.full.own_rows(all_rows), self.full.definitions(all_rows)
-        self._g_x = Entries(pattern, rows, self.full.own_variables(columns))
+        rows, definitions = self.full.original_rows(all_rows), self.full.definitions(all_rows)
+        self._g_x = Entries(pattern, rows, self.full.original_variables(columns))
         self._g_z = Entries(pattern, rows, self.full.lifted_variables(columns))
-        self._d_x = Entries(pattern, definitions, self.full.own_variables(columns))
+        self._d_x = Entries(pattern, definitions, self.full.original_variables(columns))
         self._d_z = Entries(pattern, definitions, self.full.lifted_variables(columns))
-        self._bends = Entries(bend.sparsity(), columns, columns)
+        self._bends = Entries(hessian.sparsity(), columns, columns)
 
     def start(self, x: Floats, p: Floats) -> Floats:
-        """Return what the lifted variables are worth."""
+        """Values of the lifted variables."""
         return np.asarray(self._start(x, p), dtype=np.float64).ravel()
 
     def jacobian(self, x: Floats, p: Floats) -> tuple[Floats, Floats]:
-        """Return the rows and their first derivatives."""
-        at = self._at(x, p)
-        return self.full.own_rows(at.rows), self._g_x.dense(at.entries) + self._g_z.times(at.entries, at.follow)
+        """Rows and their first derivatives."""
+        local = self._at(x, p)
+        return self.full.original_rows(local.rows), self._g_x.dense(local.entries) + self._g_z.times(
+            local.entries, local.follow
+        )
 
     def gradient(self, x: Floats, p: Floats) -> tuple[float, Floats]:
-        """Return the objective and its first derivatives."""
-        at = self._at(x, p)
-        value, slope = self._slope(at, p)
-        return value, self.full.own_variables(slope) + self.full.lifted_variables(slope) @ at.follow
+        """The objective and its first derivatives."""
+        local = self._at(x, p)
+        value, slope = self._slope(local, p)
+        return value, self.full.original_variables(slope) + self.full.lifted_variables(slope) @ local.follow
 
     def curvature(self, x: Floats, p: Floats, weight: float, multipliers: Floats) -> Floats:
-        """Return the second derivatives of the Lagrangian, their upper triangle."""
-        at = self._at(x, p)
-        more = self.prices(x, p, weight, multipliers)
-        said = self.functions["hess_lag"](at.full, p, weight, np.concatenate([multipliers, more]))
-        values = np.array(said.nonzeros())
-        along = np.concatenate([np.eye(at.follow.shape[1]), at.follow])
-        half = along.T @ self._bends.times(values, along)
+        """Second derivatives of the Lagrangian, upper triangle."""
+        local = self._at(x, p)
+        definition_prices = self.prices(x, p, weight, multipliers)
+        matrix = self.functions["hess_lag"](local.full, p, weight, np.concatenate([multipliers, definition_prices]))
+        values = np.array(matrix.nonzeros())
+        directions = np.concatenate([np.eye(local.follow.shape[1]), local.follow])
+        half = directions.T @ self._bends.times(values, directions)
         diagonal = self._bends.row == self._bends.column
-        on = np.zeros(len(along))
-        on[self._bends.row[diagonal]] = values[self._bends.place[diagonal]]
-        found: Floats = np.triu(half + half.T - along.T @ (on[:, None] * along))
-        return found
+        diagonal_values = np.zeros(len(directions))
+        diagonal_values[self._bends.row[diagonal]] = values[self._bends.place[diagonal]]
+        triangle: Floats = np.triu(half + half.T - directions.T @ (diagonal_values[:, None] * directions))
+        return triangle
 
     def prices(self, x: Floats, p: Floats, weight: float, multipliers: Floats) -> Floats:
-        """Return the definitions' multipliers, from those of the rows: nothing is to be gained by a lifted variable."""
-        at = self._at(x, p)
-        slope: Floats = self.full.lifted_variables(self._slope(at, p)[1])
-        left: Floats = -weight * slope - self._g_z.transposed_times(at.entries, multipliers)
+        """Multipliers of the definitions, from those of the rows: stationary in the lifted variables."""
+        local = self._at(x, p)
+        slope: Floats = self.full.lifted_variables(self._slope(local, p)[1])
+        multiplier: Floats = -weight * slope - self._g_z.transposed_times(local.entries, multipliers)
         entries, ends = self._d_z, self._d_z.ends
-        values = at.entries[entries.place]
+        values = local.entries[entries.place]
         for k in range(self.full.lifted - 1, -1, -1):
             part = slice(ends[k], ends[k + 1] - 1)
-            left[entries.column[part]] -= values[part] * left[k]
-        return left
+            multiplier[entries.column[part]] -= values[part] * multiplier[k]
+        return multiplier
 
-    def _slope(self, at: _Local, p: Floats) -> tuple[float, Floats]:
-        value, slope = self.functions["grad_f"](at.full, p)
+    def _slope(self, local: _Local, p: Floats) -> tuple[float, Floats]:
+        value, slope = self.functions["grad_f"](local.full, p)
         return float(value), np.asarray(slope, dtype=np.float64).ravel()
 
     def _at(self, x: Floats, p: Floats) -> _Local:
@@ -153,47 +157,53 @@ class Elimination:
         return _Local(full, np.asarray(rows, dtype=np.float64).ravel(), entries, self._follow(entries))
 
     def _follow(self, entries: Floats) -> Floats:
-        """Return dz/dx: each row from those before it."""
-        found = -self._d_x.dense(entries)
+        """dz/dx, row by row: a row follows from those before it."""
+        slopes = -self._d_x.dense(entries)
         column, ends, values = self._d_z.column, self._d_z.ends, entries[self._d_z.place]
         for k in range(self.full.lifted):
-            # The last entry of a row is its own, which is 1.
+            # The last entry of a row is the diagonal, which is 1.
             part = slice(ends[k], ends[k + 1] - 1)
-            found[k] -= values[part] @ found[column[part]]
-        return found
+            slopes[k] -= values[part] @ slopes[column[part]]
+        return slopes
 
 
 class EliminatedSolver:
-    """IPOPT on an NLP with lifted variables, called as if it had none."""
+    """IPOPT on an NLP with lifted variables, called like one without them."""
 
-    def __init__(self, made: Any, eliminated: Elimination) -> None:
-        self.made, self.eliminated = made, eliminated
+    def __init__(self, solver: Any, elimination: Elimination) -> None:
+        self.solver, self.elimination = solver, elimination
 
     def stats(self) -> Mapping[str, Any]:
-        """Return what IPOPT says of its last run."""
-        found: Mapping[str, Any] = self.made.stats()
-        return found
+        """IPOPT's statistics of its last run."""
+        stats: Mapping[str, Any] = self.solver.stats()
+        return stats
 
     def __call__(self, **arguments: Any) -> dict[str, Floats]:
-        """Return IPOPT's answer: f, and x, lam_x, lam_g of the NLP's own variables and rows."""
-        of, x, p = self.eliminated, arguments["x0"], arguments["p"]
-        free, none = np.full(of.full.lifted, np.inf), np.zeros(of.full.lifted)
-        more = {"x0": of.start(x, p), "lbx": -free, "ubx": free, "lbg": none, "ubg": none}
+        """IPOPT's result: f, and x, lam_x, lam_g of the original variables and rows."""
+        elimination, x, p = self.elimination, arguments["x0"], arguments["p"]
+        free, zero = np.full(elimination.full.lifted, np.inf), np.zeros(elimination.full.lifted)
+        lifted_arguments = {"x0": elimination.start(x, p), "lbx": -free, "ubx": free, "lbg": zero, "ubg": zero}
         if "lam_g0" in arguments:
-            more |= {"lam_x0": none, "lam_g0": of.prices(x, p, 1.0, arguments["lam_g0"])}
-        said = self.made(**arguments | {name: np.concatenate([arguments[name], part]) for name, part in more.items()})
-        found = {name: np.asarray(said[name], dtype=np.float64).ravel() for name in ("x", "lam_x", "lam_g")}
-        own = {name: of.full.own_variables(found[name]) for name in ("x", "lam_x")}
-        return {**own, "lam_g": of.full.own_rows(found["lam_g"]), "f": np.asarray(said["f"], dtype=np.float64)}
+            lifted_arguments |= {"lam_x0": zero, "lam_g0": elimination.prices(x, p, 1.0, arguments["lam_g0"])}
+        outputs = self.solver(
+            **arguments | {name: np.concatenate([arguments[name], part]) for name, part in lifted_arguments.items()}
+        )
+        arrays = {name: np.asarray(outputs[name], dtype=np.float64).ravel() for name in ("x", "lam_x", "lam_g")}
+        original = {name: elimination.full.original_variables(arrays[name]) for name in ("x", "lam_x")}
+        return {
+            **original,
+            "lam_g": elimination.full.original_rows(arrays["lam_g"]),
+            "f": np.asarray(outputs["f"], dtype=np.float64),
+        }
 
 
 IPOPT_TOLERANCE, IPOPT_SLOPE, IPOPT_ITERATIONS = 1e-11, 1e-9, 300
-"""Where IPOPT stops: rows and complementarity three decades below the usual accuracy, slopes three below STATIONARY;
-and where it gives up: no packaged target takes it a hundred iterations from its first start."""
+"""IPOPT's tolerances: rows and complementarity three decades below the usual accuracy, slopes three below STATIONARY;
+and its iteration limit: no packaged target needs a hundred iterations from its first start."""
 
 WARM_BARRIER, WARM_PUSH = 1e-8, 1e-10
-"""Barrier that a warm start begins with, which keeps a row of multiplier 1 so far from its bound, and how far a start
-is pushed inside: less than what IPOPT itself left."""
+"""First barrier parameter of a warm start, which is the distance of a row of multiplier 1 from its bound, and the push
+of a start into the bounds: less than IPOPT's own distance."""
 
 IPOPT = {
     "tol": IPOPT_TOLERANCE,
@@ -223,7 +233,7 @@ WARM = {
 
 
 def ipopt_options(settings: Settings, warm: bool) -> dict[str, Any]:
-    """Return IPOPT's options, with those that a study of methods changes; warm: from a solution nearby."""
+    """IPOPT's options for the settings; warm: whether the start is a solution nearby."""
     options: dict[str, Any] = IPOPT | (WARM if warm else {})
     if settings.tolerance:
         options |= dict.fromkeys(("tol", "constr_viol_tol", "compl_inf_tol", "dual_inf_tol"), settings.tolerance)
@@ -233,74 +243,74 @@ def ipopt_options(settings: Settings, warm: bool) -> dict[str, Any]:
 
 
 def graph_size(program: Program, x: Mapping[str, float]) -> int | None:
-    """Return how many nodes objectives and rows are made of, a whole-cycle row at one crank angle.
+    """Number of nodes of the expressions of objectives and rows, a whole-cycle row at one crank angle.
 
-    x: variables, SI, at which the cycle has the pieces that are meant; None where the mechanism does not assemble.
+    x: variables, SI, of a design with the cycle's pieces; None where the mechanism does not assemble.
     """
     import casadi as ca
 
     sampler = sampler_at(program, x)
     if sampler is None:
         return None
-    made = expressions(structure(program, sampler, 1))
-    return int(ca.n_nodes(ca.vertcat(made.f, made.g)))
+    nlp = expressions(structure(program, sampler, 1))
+    return int(ca.n_nodes(ca.vertcat(nlp.f, nlp.g)))
 
 
 NLPS, CACHE_SIZE = "NLPs", 32
-"""What a session calls built NLPs, and how many it keeps; a study of many scenes meets no more structures at a time."""
+"""Name of the built NLPs in a session, and how many it keeps; no study of many scenes uses more structures at a
+time."""
 
 
 class Buffered:
-    """A CasADi function of dense numbers, called with arrays or floats: it reads and writes the same memory every time.
+    """A CasADi function of dense numbers, called with arrays or floats; it reuses its memory in every call.
 
-    A call with arrays makes matrices of CasADi's own of them, and arrays of what comes out: that takes longer than most
-    evaluations.
+    A call without buffers converts arrays to CasADi matrices and back, which takes longer than most evaluations.
     """
 
     def __init__(self, function: Any) -> None:
         self._buffer, self._run = function.buffer()
-        self._given = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
-        self._found = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
-        for k, own in enumerate(self._given):
-            self._buffer.set_arg(k, own.data)
-        for k, own in enumerate(self._found):
-            self._buffer.set_res(k, own.data)
+        self._inputs = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
+        self._results = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
+        for k, array in enumerate(self._inputs):
+            self._buffer.set_arg(k, array.data)
+        for k, array in enumerate(self._results):
+            self._buffer.set_res(k, array.data)
         patterns = [function.sparsity_out(k) for k in range(function.n_out())]
         self._shapes = [pattern.shape for pattern in patterns]
         self._places = [np.array(pattern.find(), dtype=np.intp) for pattern in patterns]
 
     def __call__(self, *arguments: Floats | float) -> tuple[Floats, ...]:
-        """Return what the function does, all of it as matrices."""
-        for own, given in zip(self._given, arguments, strict=True):
-            own[:] = given
+        """Values of the function, each as a matrix."""
+        for array, argument in zip(self._inputs, arguments, strict=True):
+            array[:] = argument
         self._run()
         results = []
-        for values, shape, places in zip(self._found, self._shapes, self._places, strict=True):
-            found = np.zeros(shape[0] * shape[1])
-            found[places] = values
-            results.append(found.reshape(shape, order="F"))
+        for values, shape, places in zip(self._results, self._shapes, self._places, strict=True):
+            matrix = np.zeros(shape[0] * shape[1])
+            matrix[places] = values
+            results.append(matrix.reshape(shape, order="F"))
         return tuple(results)
 
 
 class Transcription:
-    """One built NLP, with its solvers and derivatives as they are first asked for.
+    """One built NLP; its solvers and derivatives are created at their first use.
 
-    Where it has lifted variables, `nlp` has them, and all else does as if it had none.
+    Lifted variables appear in `nlp` only; every other member is in the original variables and rows.
     """
 
-    def __init__(self, made_of: Structure) -> None:
-        self.structure, self.rows = made_of, made_of.rows
-        written = expressions(made_of)
-        self.nlp = {"x": written.x, "p": written.p, "f": written.f, "g": written.g}
-        self._eliminated = Elimination(written, self.rows) if written.lifts.defined else None
+    def __init__(self, nlp_structure: Structure) -> None:
+        self.structure, self.rows = nlp_structure, nlp_structure.rows
+        nlp_expressions = expressions(nlp_structure)
+        self.nlp = {"x": nlp_expressions.x, "p": nlp_expressions.p, "f": nlp_expressions.f, "g": nlp_expressions.g}
+        self._elimination = Elimination(nlp_expressions, self.rows) if nlp_expressions.lifts.variables else None
         self._solvers: dict[Hashable, Any] = {}
         self._derivatives: dict[str, Any] = {}
         self._buffered: dict[str, Buffered] = {}
-        if self._eliminated:
-            self.nlp, self._derivatives = self._eliminated.nlp, self._eliminated.functions
+        if self._elimination:
+            self.nlp, self._derivatives = self._elimination.nlp, self._elimination.functions
 
     def solver(self, warm: bool, settings: Settings) -> Any:
-        """Return IPOPT for this NLP, from scratch or from a solution nearby."""
+        """IPOPT for this NLP, for a cold or a warm start."""
         import casadi as ca
 
         callback = settings.callback
@@ -321,23 +331,23 @@ class Transcription:
             if not self._derivatives:
                 functions = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
                 self._derivatives = {option: solver.get_function(made) for option, made in functions.items()}
-            self._solvers[name] = EliminatedSolver(solver, self._eliminated) if self._eliminated else solver
+            self._solvers[name] = EliminatedSolver(solver, self._elimination) if self._elimination else solver
         return self._solvers[name]
 
     @property
     def jacobian(self) -> Any:
         """Rows and their derivatives, as the solver computes them: (x, p) → (g, dg/dx)."""
-        return self._eliminated.jacobian if self._eliminated else self._called("jac_g")
+        return self._elimination.jacobian if self._elimination else self._called("jac_g")
 
     @property
     def gradient(self) -> Any:
         """The objective and its derivatives: (x, p) → (f, df/dx)."""
-        return self._eliminated.gradient if self._eliminated else self._gradient
+        return self._elimination.gradient if self._elimination else self._gradient
 
     @property
     def curvature(self) -> Any:
         """Second derivatives of the Lagrangian: (x, p, weight of f, multipliers) → their upper triangle."""
-        return self._eliminated.curvature if self._eliminated else self._curvature
+        return self._elimination.curvature if self._elimination else self._curvature
 
     def _gradient(self, x: Floats, p: Floats) -> tuple[float, Floats]:
         value, slope = self._called("grad_f")(x, p)
@@ -358,15 +368,15 @@ def transcribe(
     sampler: Sampler,
     slots: int,
     elastic: bool = False,
-    before: Callable[[], None] | None = None,
+    on_build: Callable[[], None] | None = None,
 ) -> tuple[Transcription, bool]:
-    """Return the NLP of a program's structure, and whether it had to be built; before: called where it has to be."""
-    wanted = structure(program, sampler, slots, elastic)
+    """NLP of a program's structure, and whether it had to be built; on_build: called before it is built."""
+    nlp_structure = structure(program, sampler, slots, elastic)
 
-    def built() -> Transcription:
-        if before:
-            before()
-        return Transcription(wanted)
+    def build() -> Transcription:
+        if on_build:
+            on_build()
+        return Transcription(nlp_structure)
 
-    nlp = sampler.session.kept(NLPS, CACHE_SIZE, wanted.key, built)
-    return nlp, nlp.structure is wanted
+    nlp = sampler.session.kept(NLPS, CACHE_SIZE, nlp_structure.key, build)
+    return nlp, nlp.structure is nlp_structure

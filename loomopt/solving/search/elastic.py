@@ -28,8 +28,8 @@ def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Set
     for start in starts:
         known = Known(best.binding, sum(best.extra.tolist()) - NEEDED) if best else Known()
         point = exchange.solve(program, start, settings, elastic=Elastic(), known=known)
-        best = point if point.reached else best
-        if best and not best.relaxed:
+        best = point if point.usable else best
+        if best and not best.relaxation:
             break
     return best
 
@@ -40,9 +40,9 @@ def clash(search: Search, words: Words) -> Clash:
     First the limits of the least sum of all excesses; then each other limit by itself, where that suffices.
     """
     program, nearest, settings = search.program, search.nearest, search.settings
-    if search.best or nearest is None or not nearest.relaxed:
+    if search.best or nearest is None or not nearest.relaxation:
         return Clash()
-    needs = _by_limit(program, nearest.relaxed)
+    needs = _by_limit(program, nearest.relaxation)
     found = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
     known = {program.excess_places[k] for k in needs} if len(needs) == 1 else set()
     single_ways = list(dict.fromkeys(way for way in program.excess_places.values() if way not in known))
@@ -62,12 +62,14 @@ def _alone(program: Program, ways: tuple[int, ...], nearest: Point, settings: Se
     """
     count = len(nearest.extra)
     free = tuple(CHEAP if way in ways else 1.0 for way in range(count))
-    screened = exchange.solve(program, nearest.x, settings, elastic=Elastic(free, nearest), known=Known(most=SCREENED))
-    if not screened.reached:
+    screened = exchange.solve(
+        program, nearest.x, settings, elastic=Elastic(free, nearest), known=Known(cutoff=SCREENED)
+    )
+    if not screened.usable:
         return None
     firm = tuple(1.0 if way in ways else math.inf for way in range(count))
     point = exchange.solve(program, screened.x, settings, elastic=Elastic(firm, screened))
-    needs = _by_limit(program, point.relaxed) if point.reached else {}
+    needs = _by_limit(program, point.relaxation) if point.usable else {}
     return needs if len(needs) == 1 else None
 
 
@@ -76,8 +78,8 @@ def _priced(program: Program, point: Point, words: Words) -> dict[str, str]:
     prices, places = point.multipliers, [family.limit for family in families(program, elastic=True)]
     if not prices:
         return {}
-    found = list(prices.of_limits.items())
-    for rows in (prices.at_stations, prices.at_nodes):
+    found = list(prices.limits.items())
+    for rows in (prices.stations, prices.nodes):
         found += [(place, float(np.abs(own).max(initial=0.0))) for place, own in zip(places, rows, strict=True)]
     priced = (program.limits[place] for place, price in found if abs(price) > PRICED)
     return {words.limit(limit): limit.name for limit in priced if limit.name in program.named_limits}

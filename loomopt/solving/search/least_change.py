@@ -86,7 +86,7 @@ def _moved(search: Search, best: Candidate, kept: Collection[str], ways: Floats)
         weighed = replace(CHANGED, scale=weight / settings.penalty)
         solved = replace(task, objectives=(*program.objectives, weighed))
         (candidate,) = tried(Search(search.job, solved, settings), warm.x, warm).candidates
-        if not candidate.point.reached:
+        if not candidate.point.usable:
             continue
         if candidate.point.violation > settings.excess:
             # The exchange came to no end: at a larger weight it comes to none either.

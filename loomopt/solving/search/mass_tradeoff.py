@@ -134,7 +134,7 @@ def _solved(search: Search, task: Program, start: Mapping[str, float], most: Seq
     known = Known()
     if task.objectives is levels:
         # An earlier level is no less than at the best: where all together are more, one of them is.
-        known = Known(most=math.fsum(cap * penalty**place for place, cap in enumerate(reversed(caps))))
+        known = Known(cutoff=math.fsum(cap * penalty**place for place, cap in enumerate(reversed(caps))))
     found = judged(tried(Search(search.job, task, search.settings, search.today), start, known=known))
     if found.best is None or not found.passed:
         return None

@@ -481,7 +481,7 @@ def _screening(search: Search, own: Sequence[Mapping[str, float]]) -> "Screening
 
 def _completed(search: Search, starts: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
     """Return the starts that assemble, with the variables that follow from the others."""
-    return [start for start in (exchange.started(search.program, each) for each in starts) if start]
+    return [start for start in (exchange.complete_start(search.program, each) for each in starts) if start]
 
 
 def relaxed(search: Search, starts: Sequence[Mapping[str, float]]) -> Search:
@@ -493,4 +493,4 @@ def relaxed(search: Search, starts: Sequence[Mapping[str, float]]) -> Search:
     places = [*starts, *([search.today] if search.today else [])]
     nearest = least(search.program, places, search.settings)
     search = replace(search, nearest=nearest, sought=len(places), solved=search.solved + time.perf_counter() - began)
-    return search if nearest is None or nearest.relaxed else tried(search, nearest.x)
+    return search if nearest is None or nearest.relaxation else tried(search, nearest.x)

@@ -113,12 +113,12 @@ class Search:
     @property
     def clashes(self) -> bool:
         """Whether limits clash as far as can be seen."""
-        return not self.reached and self.nearest is not None and bool(self.nearest.relaxed)
+        return not self.reached and self.nearest is not None and bool(self.nearest.relaxation)
 
     @property
     def reached(self) -> list[Candidate]:
         """Candidates that are worth a certificate."""
-        return [candidate for candidate in self.candidates if candidate.point.reached]
+        return [candidate for candidate in self.candidates if candidate.point.usable]
 
     @property
     def ranked(self) -> list[Candidate]:
@@ -136,14 +136,14 @@ def tried(search: Search, start: Mapping[str, float], warm: Point | None = None,
     began = time.perf_counter()
     point = exchange.solve(search.program, start, search.settings, warm, known=known)
     spent = time.perf_counter() - began
-    levels = objectives(search.program, point.x) if point.reached else ()
+    levels = objectives(search.program, point.x) if point.usable else ()
     count = len(search.program.objectives)
     weighted = sum(search.settings.penalty ** (count - 1 - k) * level for k, level in enumerate(levels))
     candidate = Candidate(point, levels, weighted if levels else point.value)
     return replace(
         search,
         candidates=(*search.candidates, candidate),
-        built=search.built + point.built,
+        built=search.built + point.build_seconds,
         solved=search.solved + spent,
     )
 
@@ -185,13 +185,13 @@ def judged(search: Search) -> Search:
 
 def _is_same(candidate: Candidate, best: Candidate) -> bool:
     """Say whether a candidate is the best, or the solver gave up at one that is as good."""
-    alike = candidate.is_left and candidate.point.reached and compared(candidate, best) == 0
+    alike = candidate.is_left and candidate.point.usable and compared(candidate, best) == 0
     return candidate.point is best.point or alike
 
 
 def _dropped(candidate: Candidate) -> Candidate:
     """Return a candidate as one that has not reached a design."""
-    return candidate._replace(point=replace(candidate.point, reached=False), objectives=())
+    return candidate._replace(point=replace(candidate.point, usable=False), objectives=())
 
 
 def _judged(search: Search) -> Search:
@@ -207,7 +207,7 @@ def _judged(search: Search) -> Search:
             break
         weight = search.settings.penalty * STRONGER
         search = tried(replace(search, settings=replace(search.settings, penalty=weight)), first.point.x)
-        if not search.candidates[-1].point.reached:
+        if not search.candidates[-1].point.usable:
             break
         search = replace(search, candidates=tuple(c for c in search.candidates if c is not first))
     return search if search.passed else _another(search)
@@ -241,7 +241,7 @@ def _first_levels_alone(search: Search, best: Candidate) -> Search:
         fewer = tried(replace(fewer, settings=replace(fewer.settings, penalty=Settings().penalty)), best.point.x)
         first = fewer.candidates[-1]
         search = replace(search, built=fewer.built, solved=fewer.solved)
-        fewer = _certified(fewer, first) if first.point.reached else fewer
+        fewer = _certified(fewer, first) if first.point.usable else fewer
         if fewer.passed and fewer.best:
             x = fewer.best.x
             search, moved, draft = _judged_at(search, x)
@@ -257,12 +257,12 @@ def _met_farther(search: Search, best: Candidate) -> Search:
     farther = replace(search, settings=replace(search.settings, farthest=POLISH_FARTHER))
     if best.point.rough:
         again = tried(farther, best.point.x)
-        if again.candidates[-1].point.reached:
+        if again.candidates[-1].point.usable:
             again = _certified(again, again.candidates[-1])
         if again.passed:
             return replace(again, settings=search.settings)
     if not best.certificate.minimum or any(level.stationarity > STATIONARY for level in best.certificate.levels):
-        closer = exchange.brought_closer(search.program, best.point, farther.settings)
+        closer = exchange.refine_active_set(search.program, best.point, farther.settings)
         found = _certified(search, best._replace(point=closer)) if closer else search
         if found.passed:
             return found
@@ -277,7 +277,7 @@ def _held_harder(search: Search, best: Candidate) -> Search:
     again, weight = search, search.settings.penalty * STRONGER
     while len(search.program.objectives) > 1 and weight <= STRONGEST_PENALTY:
         again = tried(replace(again, settings=replace(search.settings, penalty=weight)), best.point.x)
-        if again.candidates[-1].point.reached:
+        if again.candidates[-1].point.usable:
             found = _certified(again, again.candidates[-1])
             if found.passed:
                 return replace(found, settings=search.settings)
@@ -311,7 +311,7 @@ def _certified(search: Search, candidate: Candidate) -> Search:
         if better.judged.residual >= here.residual or better.judged.feasibility > FEASIBLE:
             # A long step leaves the rows that bind by its square: it is led back onto them.
             near = replace(candidate.point, x=stepped)
-            back = exchange.brought_closer(search.program, near, replace(search.settings, farthest=POLISH_FARTHER))
+            back = exchange.refine_active_set(search.program, near, replace(search.settings, farthest=POLISH_FARTHER))
             if back is None:
                 break
             search, moved, better = _judged_at(search, back.x)

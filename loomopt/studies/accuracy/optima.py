@@ -66,7 +66,7 @@ def _exchange(target: StudiedTarget, accuracies: Sequence[float]) -> Ladder:
         if answer.status != "optimal":
             return Rung({}, answer.status)
         x = target.variables(answer)
-        sampler = Sampler(target.program.model, {**target.program.parameters, **x}, Settings(setting).sampled)
+        sampler = Sampler(target.program.model, {**target.program.parameters, **x}, Settings(setting).sample_count)
         values = {
             target.quantity(target.figure): answer.figures[target.figure],
             target.quantity("design"): target.placed(x),
@@ -101,7 +101,7 @@ def _solved(target: StudiedTarget, settings: Settings) -> Point:
     first = None
     for start in exchange.starts(target.program, len(target.program.starts)):
         point = exchange.solve(target.program, start, settings)
-        if point.reached:
+        if point.usable:
             return point
         first = first or point
     if first is None:
@@ -122,7 +122,7 @@ def _solves(
 
     def read(setting: Any, point: Point) -> Rung:
         status = f"{point.status}, {point.iterations} iterations"
-        if not point.reached:
+        if not point.usable:
             return Rung({}, status)
         values: dict[str, Any] = {figure: target.merit(point.x), design: target.placed(point.x)}
         return Rung(values | ({claim: _excess(target, point, asked(setting))} if claims else {}), status)
@@ -153,7 +153,7 @@ def _uniform(target: StudiedTarget, points: Sequence[int]) -> Ladder:
     """Return solves on equal points of the turn: what is between them is not seen."""
 
     def asked(count: int) -> Settings:
-        return Settings(uniform=count, polished=False)
+        return Settings(uniform=count, polish=False)
 
     return _solves(target, UNIFORM, tuple(points), asked, lambda count: 1 / count, claims=True)
 
@@ -162,7 +162,7 @@ def _tolerance(target: StudiedTarget, tolerances: Sequence[float]) -> Ladder:
     """Return solves to ever smaller tolerances of IPOPT."""
 
     def asked(tolerance: float) -> Settings:
-        return Settings(tolerance=tolerance, polished=False)
+        return Settings(tolerance=tolerance, polish=False)
 
     return _solves(target, TOLERANCE, tuple(tolerances), asked, float)
 
@@ -171,7 +171,7 @@ def _hessian(target: StudiedTarget) -> Ladder:
     """Return solves with second derivatives, and with IPOPT's own guesses of them."""
 
     def asked(hessian: str) -> Settings:
-        return Settings(hessian=hessian, polished=False)
+        return Settings(hessian=hessian, polish=False)
 
     return _solves(target, HESSIAN, ("limited-memory", "exact"), asked, None)
 
@@ -187,7 +187,7 @@ def _family(target: StudiedTarget, family: LawFamily, counts: Sequence[int]) -> 
     def read(count: int, result: tuple[StudiedTarget, Point]) -> Rung:
         own, point = result
         status = f"{point.status}, {point.iterations} iterations"
-        return Rung({quantity: own.merit(point.x)} if point.reached else {}, status)
+        return Rung({quantity: own.merit(point.x)} if point.usable else {}, status)
 
     @functools.cache
     def reference(_: str) -> LadderReference | None:

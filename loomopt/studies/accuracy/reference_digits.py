@@ -16,7 +16,7 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import BINDING
 from loomopt.solving.nlp.point import Point
-from loomopt.solving.nlp.rows import Epigraph, HeldStations, RowFamily, epigraphs, families, held, stations
+from loomopt.solving.nlp.rows import CycleStations, Epigraph, RowFamily, epigraphs, families, station_places, stations
 
 REFERENCE_DIGITS, CLOSED_DIGITS = 40, 60
 """Digits of references, and of those that readings in 40 digits are compared with: 20 more than any of them has."""
@@ -98,7 +98,7 @@ class _Rows:
         self.number: Callable[[Number], Number] = self.maths.number
         prices = point.multipliers
         self.free = []
-        for variable, price in zip(program.variables, prices.of_variables, strict=True):
+        for variable, price in zip(program.variables, prices.variables, strict=True):
             end = variable.upper if price > BINDING else variable.lower if price < -BINDING else None
             if end is not None or variable.lower == variable.upper:
                 self.fixed[variable.name] = self.number(variable.lower if end is None else end)
@@ -106,11 +106,11 @@ class _Rows:
                 self.free.append(variable)
         self.start = [self.number(x[variable.name]) / self.number(variable.scale) for variable in self.free]
         self.sampler = Sampler(program.model, {**program.parameters, **x})
-        priced = [(program.single_limits[k], abs(price)) for k, price in prices.of_limits.items()]
+        priced = [(program.single_limits[k], abs(price)) for k, price in prices.limits.items()]
         self.static = [limit for limit, price in priced if limit.sign == 0 or price > BINDING]
         above = epigraphs(program)
         levels = [(k, program.objectives[epigraph.objective]) for k, epigraph in enumerate(above)]
-        self.zero = [o for k, o in levels if o.is_magnitude and np.abs(prices.of_pieces(k)).min() > BINDING]
+        self.zero = [o for k, o in levels if o.is_magnitude and np.abs(prices.pieces(k)).min() > BINDING]
         self.tops = [k for k, level in levels if level.quantities]
         self.levels = [above[k].objective for k in self.tops]
         self.families = families(program)
@@ -122,9 +122,9 @@ class _Rows:
         program, sampler = self.program, self.sampler
         found = [list(of) for of in self.point.binding]
         corners = stations(program.model, sampler.given, [variable.name for variable in program.variables])
-        stood = HeldStations(corners, sampler.cycle)
-        for family, of, prices in zip(self.families, found, self.point.multipliers.at_stations, strict=True):
-            signs, own = stood.signs(sampler, family.row), held([corner.switch for corner in corners], family)
+        stood = CycleStations(corners, sampler.cycle)
+        for family, of, prices in zip(self.families, found, self.point.multipliers.stations, strict=True):
+            signs, own = stood.signs(sampler, family.row), station_places([corner.switch for corner in corners], family)
             of += [
                 Extreme(int(stood.pieces[k]), float(stood.u[k]), float(signs[k]))
                 for k, price in zip(own, prices, strict=True)

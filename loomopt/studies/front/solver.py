@@ -274,7 +274,7 @@ class Solver:
             point = rows.read(data["point"], program)
             if point:
                 search = tried(search, point.x, point)
-            elif start := exchange.started(program, data["point"]["x"]):
+            elif start := exchange.complete_start(program, data["point"]["x"]):
                 search = tried(search, start)
         return search
 

@@ -324,7 +324,7 @@ def read(data: Mapping[str, Any], program: Program) -> Point | None:
     if not data["raw"]:
         return point
     lam_x, lam_g, extra = (np.array(data["raw"][name], dtype=np.float64) for name in ("lam_x", "lam_g", "extra"))
-    rows = row_map(program, 0).sized(len(lam_g))
+    rows = row_map(program, 0).with_size(len(lam_g))
     return replace(point, extra=extra, multipliers=Multipliers(rows, lam_x, lam_g))
 
 

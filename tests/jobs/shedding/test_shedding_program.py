@@ -60,7 +60,7 @@ def test_contact_is_one_limit_all_round_and_never_gives_way_itself():
 def test_where_the_warps_pull_is_known_in_the_dwells_contact_is_judged_there():
     levels = JOB.program(SCENE.set("effects.warp_tension.shape", "levels"), "stiffness")
     (contact,) = [family for family in families(levels) if family.row == "lift"]
-    assert [contact.counts({"segment": float(segment)}) for segment in range(4)] == [False, True, False, True]
+    assert [contact.has_rows({"segment": float(segment)}) for segment in range(4)] == [False, True, False, True]
 
 
 def test_what_a_target_keeps_is_a_variable_without_room_that_gives_way_downward():

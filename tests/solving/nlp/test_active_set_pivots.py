@@ -25,7 +25,7 @@ def solved(task):
 
 
 def followed(task, near):
-    return active_set_pivots.follow(Calls(task, Settings()), near)
+    return active_set_pivots.follow_neighbour(Calls(task, Settings()), near)
 
 
 def at(piece, u, value=1.0, signed=False):
@@ -37,8 +37,8 @@ def test_an_answer_is_its_own_neighbour():
     near = solved(task)
     again = followed(task, near)
     assert again.x == pytest.approx(near.x, abs=1e-12)
-    assert (again.iterations, again.built) == (0, 0.0)
-    assert again.reached
+    assert (again.iterations, again.build_seconds) == (0, 0.0)
+    assert again.usable
     assert again.violation <= 1e-10
     assert list(map(len, again.binding)) == list(map(len, near.binding))
 
@@ -133,15 +133,15 @@ def test_the_extreme_a_node_has_become_is_the_nearest_of_its_sign_on_its_piece()
 
 def test_binding_extremes_come_first_and_leave_room_for_the_others():
     extremes = [at(0, k / 20, 9.0 - k) for k in range(9)]
-    chosen = active_set_pivots._chosen(extremes, [at(0, 0.21), at(0, 0.38)], 6)
+    chosen = active_set_pivots._select_nodes(extremes, [at(0, 0.21), at(0, 0.38)], 6)
     assert chosen[:2] == [extremes[4], extremes[8]]
     assert chosen[2:] == [extremes[k] for k in (0, 1, 2, 3)], "six in all, the largest first"
     same = [at(0, 0.5), at(0, 0.5005), at(0, 0.502), at(1, 0.5)]
-    assert active_set_pivots._chosen(same, [at(0, 0.5)], 6) == [same[0], same[2], same[3]], (
+    assert active_set_pivots._select_nodes(same, [at(0, 0.5)], 6) == [same[0], same[2], same[3]], (
         "one node stands for close ones"
     )
     many = [at(0, k / 20, 9.0 - k) for k in range(9)]
-    assert active_set_pivots._chosen(many, many[:7], 6) == many[:7]
+    assert active_set_pivots._select_nodes(many, many[:7], 6) == many[:7]
 
 
 def change(u, move):
@@ -151,19 +151,25 @@ def change(u, move):
 def test_a_secant_through_two_rounds_points_to_where_extremes_stand_still():
     """u moves to 0.4 + (u − 0.4)/2: from 0.8 to 0.6 and on to 0.5; the secant hits 0.4 at once."""
     extremes = ((at(0, 0.5), at(0, 0.9)),)
-    aimed = active_set_pivots._aimed(extremes, [extremes[0][0]], change([0.6], [-0.1]), change([0.8], [-0.2]))
+    aimed = active_set_pivots._anderson_targets(
+        extremes, [extremes[0][0]], change([0.6], [-0.1]), change([0.8], [-0.2])
+    )
     assert [e.u for e in aimed[0]] == pytest.approx([0.4, 0.9])
     assert [e.value for e in aimed[0]] == [1.0, 1.0]
-    outside = active_set_pivots._aimed(extremes, [extremes[0][0]], change([0.1], [-0.2]), change([0.3], [-0.3]))
+    outside = active_set_pivots._anderson_targets(
+        extremes, [extremes[0][0]], change([0.1], [-0.2]), change([0.3], [-0.3])
+    )
     assert outside[0][0].u == 0.0, "no node leaves its piece"
-    outside = active_set_pivots._aimed(extremes, [extremes[0][0]], change([0.9], [0.2]), change([0.7], [0.3]))
+    outside = active_set_pivots._anderson_targets(
+        extremes, [extremes[0][0]], change([0.9], [0.2]), change([0.7], [0.3])
+    )
     assert outside[0][0].u == 1.0
 
 
 @pytest.mark.parametrize("last", [None, change([0.8, 0.1], [-0.2, 0.0]), change([0.8], [-0.1])])
 def test_without_two_rounds_that_compare_extremes_stay(last):
     extremes = ((at(0, 0.5), at(0, 0.9)),)
-    assert active_set_pivots._aimed(extremes, [extremes[0][0]], change([0.6], [-0.1]), last) == extremes
+    assert active_set_pivots._anderson_targets(extremes, [extremes[0][0]], change([0.6], [-0.1]), last) == extremes
 
 
 def test_the_largest_move_counts_whatever_its_direction():
@@ -177,7 +183,7 @@ def test_points_that_were_never_reached_are_no_neighbours():
     nodes = tuple(map(tuple, calls.peaks(calls.sampler({"x": 9.0, "y": 9.0}))))
     lost = Point({"x": 9.0, "y": 9.0}, "Maximum_Iterations_Exceeded", False, nodes=nodes)
     point = exchange.solve(task, task.starts[0], Settings(), warm=lost)
-    assert point.reached
+    assert point.usable
     assert point.iterations > 0
 
 

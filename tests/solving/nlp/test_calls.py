@@ -30,7 +30,7 @@ def put(task, elastic=False, nodes=2):
     sampler = calls.sampler(X)
     peaks = calls.peaks(sampler)
     chosen = [of[:nodes] for of in peaks]
-    nlp = calls.transcribed(sampler, chosen, warm=False)
+    nlp = calls.nlp(sampler, chosen, warm=False)
     extra = calls.first_extra(nlp, sampler)
     return calls, nlp, calls.arguments(nlp, sampler, X, extra, chosen), chosen
 
@@ -71,17 +71,17 @@ def test_room_for_nodes_is_doubled_when_it_is_used_up(nodes, slots):
     calls = calls_of(program((), (objective("circle", "peak"),)))
     sampler = calls.sampler(X)
     of = [Extreme(0, k / 20, 1.0) for k in range(nodes)]
-    assert calls.transcribed(sampler, [of], warm=False).rows.slots == slots
-    assert calls.transcribed(sampler, [[], of, of[:3]], warm=False).rows.slots == slots
+    assert calls.nlp(sampler, [of], warm=False).rows.slots == slots
+    assert calls.nlp(sampler, [[], of, of[:3]], warm=False).rows.slots == slots
 
 
 def test_only_what_is_built_anew_is_charged():
     task = program([("wave", 1, 123.0)], (objective("other bowl"),))
     first, second = calls_of(task), calls_of(task)
-    nlp = first.transcribed(first.sampler(X), [], warm=False)
-    assert first.built > 0.0
-    assert second.transcribed(second.sampler(X), [], warm=False) is nlp
-    assert second.built == 0.0
+    nlp = first.nlp(first.sampler(X), [], warm=False)
+    assert first.build_seconds > 0.0
+    assert second.nlp(second.sampler(X), [], warm=False) is nlp
+    assert second.build_seconds == 0.0
 
 
 def test_epigraph_variables_begin_a_little_above_what_they_stand_for():
@@ -121,7 +121,7 @@ def test_an_excess_of_infinite_cost_is_firm():
     calls = Calls(task, Settings(), Elastic((math.inf, 0.25)))
     sampler = calls.sampler(X)
     nodes = [of[:2] for of in calls.peaks(sampler)]
-    nlp = calls.transcribed(sampler, nodes, warm=False)
+    nlp = calls.nlp(sampler, nodes, warm=False)
     arguments = calls.arguments(nlp, sampler, X, np.array([0.5, 2.0]), nodes)
     assert list(arguments["ubx"][2:]) == [0.0, np.inf]
     value, _ = nlp.gradient(arguments["x0"], arguments["p"])
@@ -134,9 +134,9 @@ def answered(value, extra=(), x=None):
 
 def test_a_solve_is_beaten_once_it_is_no_better_than_what_is_known():
     task = program([("sum", 1, -5.0), ("wave", 1, 1.0)])
-    plain = Calls(task, Settings(), known=Known(most=3.0))
+    plain = Calls(task, Settings(), known=Known(cutoff=3.0))
     assert [plain.is_beaten(answered(value)) for value in (2.999, 3.0, 3.001)] == [False, False, True]
-    elastic = Calls(task, Settings(), Elastic((1e-9, 1.0)), Known(most=3.0))
+    elastic = Calls(task, Settings(), Elastic((1e-9, 1.0)), Known(cutoff=3.0))
     assert not elastic.is_beaten(answered(9.0, (99.0, 3.0))), "what is all but free does not count"
     assert elastic.is_beaten(answered(0.0, (0.0, 3.001)))
     assert not Calls(task, Settings()).is_beaten(answered(1e300))
@@ -148,7 +148,7 @@ def test_a_solve_is_beaten_once_it_is_no_better_than_what_is_known():
 )
 def test_a_solve_that_falls_at_an_earlier_level_is_not_beaten_by_what_the_next_one_weighs(first, second, beaten):
     task = toy.program("xy", {"f": lambda v: 2 * v["x"]}, objectives=("f", "y"), sizes={"f": 2.0})
-    calls = Calls(task, Settings(), known=Known(most=1000.0, levels=(1.0, 0.0)))
+    calls = Calls(task, Settings(), known=Known(cutoff=1000.0, levels=(1.0, 0.0)))
     assert calls.is_beaten(answered(1001.0, x={"x": first, "y": second})) == beaten
     assert not calls.is_beaten(answered(999.0, x={"x": 1.1, "y": 0.0})), "it is still below what is known"
 
@@ -180,12 +180,12 @@ def test_bounds_that_may_give_way_are_none_but_a_positive_one_stays_positive():
 def test_more_equalities_than_free_variables_leave_nothing_to_solve():
     for limits, over in (([("sum", 0, 1.0), ("apart", 0, 0.0)], False), ([("x", 0, 1.0)] * 3, True)):
         calls, _, arguments, _ = put(program(limits))
-        assert calls.overdetermined(arguments) is over
+        assert calls.is_overdetermined(arguments) is over
     held = replace(
         program([("sum", 0, 1.0)]), variables=(Variable("x", 1, 1, 1, (1, 1)), Variable("y", 1, 1, 1, (1, 1)))
     )
     calls, _, arguments, _ = put(held)
-    assert calls.overdetermined(arguments) is True
+    assert calls.is_overdetermined(arguments) is True
 
 
 def test_an_extreme_exceeds_its_epigraph_or_its_limit_in_natural_size():

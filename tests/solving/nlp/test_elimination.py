@@ -23,7 +23,7 @@ def put(lifted, bend, elastic=False):
     x = {name: 0.09 * k - 0.4 for k, name in enumerate(task.starts[0])}
     sampler = calls.sampler(x)
     nodes = [[e for e in of if 0.0 < e.u < 1.0][:2] for of in calls.peaks(sampler)]
-    nlp = calls.transcribed(sampler, nodes, warm=False)
+    nlp = calls.nlp(sampler, nodes, warm=False)
     extra = np.linspace(0.1, 0.9, nlp.rows.extras)
     return calls, nlp, calls.arguments(nlp, sampler, x, extra, nodes), nodes
 
@@ -31,7 +31,7 @@ def put(lifted, bend, elastic=False):
 def shared(nlp):
     """Return which rows there are without stations, in both NLPs alike: single rows, and two slots of each family."""
     places = np.arange(nlp.rows.size)
-    return [*nlp.rows.of_limits(places), *nlp.rows.at_nodes(places)[:, :2].ravel()]
+    return [*nlp.rows.limit_rows(places), *nlp.rows.node_rows(places)[:, :2].ravel()]
 
 
 @pytest.mark.parametrize("bend", BENDS)
@@ -64,10 +64,10 @@ def test_stations_have_the_rows_of_nodes_at_their_corners(bend):
     sampler = calls.sampler(calls.design(arguments["x0"]))
     raised = [1.25 if 1 <= k <= 6 else 1.0 for k in range(COUNT)]
     heights = np.array([sampler.given.values[f"h{k}"] for k in range(COUNT)])
-    assert nlp.rows.at_stations(rows, 0) == pytest.approx(heights * raised - 1.5, rel=1e-14)
+    assert nlp.rows.station_rows(rows, 0) == pytest.approx(heights * raised - 1.5, rel=1e-14)
     swings = np.abs(heights * raised + sampler.values["x0"] ** 2 / 4)
     assert heights.min() < -0.3 < 0.3 < heights.max()
-    assert nlp.rows.at_stations(rows, 1) == pytest.approx(swings - 2.0, rel=1e-13)
+    assert nlp.rows.station_rows(rows, 1) == pytest.approx(swings - 2.0, rel=1e-13)
     step = 1e-6
     for k in (0, 5):
         ends = [nlp.jacobian(arguments["x0"] + sign * step * np.eye(COUNT)[k], arguments["p"])[0] for sign in (1, -1)]
@@ -79,8 +79,8 @@ def test_stations_have_the_rows_of_nodes_at_their_corners(bend):
 @pytest.mark.few(3)
 def test_answers_are_those_without_lifted_variables(bend, limits):
     ours, theirs = (solved(program(bend, lifted, limits)) for lifted in (True, False))
-    assert ours.reached
-    assert theirs.reached
+    assert ours.usable
+    assert theirs.usable
     assert list(ours.x.values()) == pytest.approx(list(theirs.x.values()), abs=1e-9)
     assert max(ours.violation, theirs.violation) <= 1e-10
 
@@ -94,7 +94,7 @@ def test_an_answer_is_a_start_for_the_next_and_what_binds_follows():
     first = solved(task)
     other = replace(task, limits=tuple(replace(limit, value=limit.value * 1.02) for limit in task.limits))
     warm, cold = solved(other, warm=first), solved(other)
-    assert (warm.iterations, warm.reached) == (0, True), "by pivots alone"
+    assert (warm.iterations, warm.usable) == (0, True), "by pivots alone"
     assert list(warm.x.values()) == pytest.approx(list(cold.x.values()), abs=1e-9)
 
 
@@ -129,9 +129,9 @@ def test_the_least_relaxation_is_that_without_lifted_variables():
     """1.25 h3 must come below 1, h3 above 1.5: cheapest is to let h3 give way."""
     limits = (("wave", 1, 1.0), ("h3", -1, 1.5))
     ours, theirs = (solved(program(0.0, lifted, limits), elastic=Elastic()) for lifted in (True, False))
-    assert ours.reached
-    assert ours.relaxed == pytest.approx({1: 0.7}, abs=1e-9)
-    assert theirs.relaxed == pytest.approx({1: 0.7}, abs=1e-9)
+    assert ours.usable
+    assert ours.relaxation == pytest.approx({1: 0.7}, abs=1e-9)
+    assert theirs.relaxation == pytest.approx({1: 0.7}, abs=1e-9)
 
 
 def test_entries_are_those_of_the_dense_matrix():

@@ -46,14 +46,14 @@ def highest(task, point, name):
     ],
 )
 def test_an_exchange_creeps_where_four_rounds_do_not_halve_what_little_is_exceeded(excesses, creeps):
-    assert exchange._creeps(excesses) == creeps
+    assert exchange._stalled(excesses) == creeps
 
 
 def test_the_least_peak_is_half_the_range():
     """cos φ + cos 2φ / 2 runs from −3/4 to 3/2: the best shift is −3/8, the peak 9/8."""
     task = program(objectives=(objective("wave", "peak"),))
     point = solved(task)
-    assert point.reached
+    assert point.usable
     assert point.x["x"] == pytest.approx(-0.375, abs=1e-10)
     assert highest(task, point, "wave") == pytest.approx(1.125, abs=1e-9)
     assert point.violation <= 1e-10
@@ -63,7 +63,7 @@ def test_a_whole_cycle_limit_holds_between_its_nodes():
     """The nearest point to (3, 2) of the unit circle's disc: no node of the first round is where it touches."""
     task = program(limits=(("circle", 1, 1.0),))
     point = solved(task)
-    assert point.reached
+    assert point.usable
     value = Sampler(task.model, point.x).figures["bowl"]
     assert value == pytest.approx((13**0.5 - 1) ** 2, abs=1e-8)
     assert [point.x["x"], point.x["y"]] == pytest.approx([3 / 13**0.5, 2 / 13**0.5], abs=1e-4), "root of the violation"
@@ -74,7 +74,7 @@ def test_a_whole_cycle_limit_holds_between_its_nodes():
 def test_violation_is_two_decades_below_the_accuracy(accuracy):
     task = program(limits=(("circle", 1, 1.0),))
     point = solved(task, accuracy=accuracy)
-    assert point.reached
+    assert point.usable
     assert point.violation <= max(accuracy / 100, 1e-11), "values are sums of rounded terms: no closer than that"
     assert highest(task, point, "circle") <= 1 + accuracy + 1e-11
 
@@ -111,7 +111,7 @@ def test_start_on_the_answer_and_start_far_away_agree():
 
 def test_a_program_without_admissible_design_is_not_reached():
     point = solved(program(limits=(("x", -1, 2.0), ("x", 1, 1.0))))
-    assert not point.reached
+    assert not point.usable
 
 
 @pytest.mark.parametrize(
@@ -127,15 +127,15 @@ def test_a_program_without_admissible_design_is_not_reached():
 def test_elastic_solves_give_the_least_sum_of_excesses(limits, needed):
     task = program(limits=limits)
     point = exchange.solve(task, task.starts[0], Settings(), elastic=Elastic())
-    assert point.reached
-    assert sum(abs(need) for need in point.relaxed.values()) == pytest.approx(needed, abs=1e-6)
+    assert point.usable
+    assert sum(abs(need) for need in point.relaxation.values()) == pytest.approx(needed, abs=1e-6)
 
 
 def test_a_start_that_does_not_assemble_is_told():
     task = balance()
     folded = {**task.starts[0], "l1": 0.3}
     point = exchange.solve(task, folded, Settings())
-    assert (point.status, point.reached) == ("Not_Assembled", False)
+    assert (point.status, point.usable) == ("Not_Assembled", False)
 
 
 def test_starts_are_the_jobs_own_then_random_ones_that_assemble():
@@ -157,7 +157,7 @@ def test_starts_are_the_jobs_own_then_random_ones_that_assemble():
 def test_a_loom_s_peak_holds_between_all_nodes(M0):
     task = balance(BEATUP.set("operation.M0", f"{M0} N*m"))
     point = exchange.solve(task, task.starts[0], Settings())
-    assert point.reached
+    assert point.usable
     sampler = sampler_at(task, point.x)
     pieces, u = sampler.grid(100_000)
     dense = np.abs(sampler.at("peak_torque", pieces, u)).max()
@@ -170,7 +170,7 @@ def test_a_warm_start_from_the_answer_stays_there():
     task = balance()
     cold = exchange.solve(task, task.starts[0], Settings())
     warm = exchange.solve(task, cold.x, Settings(), warm=cold)
-    assert warm.reached
+    assert warm.usable
     assert warm.iterations < cold.iterations
     for variable in task.variables:
         assert warm.x[variable.name] == pytest.approx(cold.x[variable.name], abs=1e-9 * variable.scale)
@@ -180,7 +180,7 @@ def test_a_warm_start_goes_where_a_cold_one_goes_even_from_afar():
     near, far = (balance(BEATUP.set("operation.M0", f"{M0} N*m")) for M0 in (900, 620))
     from_afar = exchange.solve(near, near.starts[0], Settings())
     warm, cold = (exchange.solve(far, far.starts[0], Settings(), warm=point) for point in (from_afar, None))
-    assert warm.reached
+    assert warm.usable
     for name in ("l1", "l2", "l3", "l4", "s"):
         assert warm.x[name] == pytest.approx(cold.x[name], abs=1e-8), name
     assert math.isfinite(warm.violation)
@@ -217,23 +217,23 @@ def test_where_the_solver_gives_up_the_rows_decide(limits, moved, stands, monkey
     monkeypatch.setattr(exchange, "EXCHANGE_ROUNDS", 1)
     point = solved(program(limits=limits))
     assert point.status == "Search_Direction_Becomes_Too_Small"
-    assert point.reached is stands
+    assert point.usable is stands
 
 
 def test_equalities_that_leave_nothing_to_solve_for_are_met_by_a_start_that_stands_on_them():
     task = program([("x", 0, 0.5), ("y", 0, 0.25), ("sum", 0, 0.75)])
     start = {"x": 0.5, "y": 0.25}
     point = exchange.solve(task, start, Settings())
-    assert (point.status, point.reached, point.x) == ("Not_Enough_Degrees_Of_Freedom", True, start)
+    assert (point.status, point.usable, point.x) == ("Not_Enough_Degrees_Of_Freedom", True, start)
     assert exchange.solve(task, {}, Settings(), warm=point).x == start
-    assert not exchange.solve(task, {"x": 0.5, "y": 0.3}, Settings()).reached
+    assert not exchange.solve(task, {"x": 0.5, "y": 0.3}, Settings()).usable
 
 
 def test_rounds_that_run_out_leave_a_point_with_its_violation(monkeypatch):
     monkeypatch.setattr(exchange, "EXCHANGE_ROUNDS", 1)
     task = program(limits=(("circle", 1, 1.0),))
-    point = solved(task, polished=False)
-    assert point.reached
+    point = solved(task, polish=False)
+    assert point.usable
     assert point.violation == pytest.approx(highest(task, point, "circle") - 1.0, rel=1e-6)
     assert point.violation > 1e-3
 
@@ -241,20 +241,20 @@ def test_rounds_that_run_out_leave_a_point_with_its_violation(monkeypatch):
 def test_an_elastic_solve_whose_rounds_run_out_is_not_reached(monkeypatch):
     task = program(limits=(("sum", -1, 4.0), ("circle", 1, 2.0)))
     monkeypatch.setattr(exchange, "ELASTIC_ROUNDS", 2)
-    assert not exchange.solve(task, task.starts[0], Settings(), elastic=Elastic()).reached
+    assert not exchange.solve(task, task.starts[0], Settings(), elastic=Elastic()).usable
 
 
 def test_what_needs_no_relaxation_is_told_as_none():
     task = program(limits=(("x", -1, 2.0), ("x", 1, 1.0), ("y", 1, 5.0)))
     point = exchange.solve(task, task.starts[0], Settings(), elastic=Elastic())
-    assert set(point.relaxed) <= {0, 1}
-    assert all(need > 1e-9 for need in point.relaxed.values())
+    assert set(point.relaxation) <= {0, 1}
+    assert all(need > 1e-9 for need in point.relaxation.values())
 
 
 def test_equal_nodes_of_a_turn_are_all_that_is_seen():
     task = program(limits=(("circle", 1, 1.0),))
-    point = solved(task, uniform=5, polished=False)
-    assert point.reached
+    point = solved(task, uniform=5, polish=False)
+    assert point.usable
     assert point.violation == 0.0
     assert [len(nodes) for nodes in point.nodes] == [10], "both signs"
     angles = sorted({2 * math.pi * node.u for node in point.nodes[0]})
@@ -263,14 +263,14 @@ def test_equal_nodes_of_a_turn_are_all_that_is_seen():
     assert 1e-3 < highest(task, point, "circle") - 1.0 < 1 / math.cos(math.pi / 10) - 1
     assert point.iterations < 60, "one round"
     signed = program(limits=(("circle", 1, 1.0),), physics=model(signed=("circle",)))
-    assert [len(nodes) for nodes in solved(signed, uniform=5, polished=False).nodes] == [5]
+    assert [len(nodes) for nodes in solved(signed, uniform=5, polish=False).nodes] == [5]
 
 
 def test_equal_nodes_keep_to_the_pieces_their_limit_speaks_of():
     half = Arcs("half", lambda maths, given: (1.0, 2.5), lambda angle, corners: float(1.0 <= angle % TURN < 2.5))
     task = program(limits=(("circle", 1, 1.0),), physics=model(arcs=(half,)))
     limited = replace(task, limits=(replace(task.limits[0], where=("half", 1.0)),))
-    nodes = solved(limited, uniform=36, polished=False).nodes[0]
+    nodes = solved(limited, uniform=36, polish=False).nodes[0]
     sampler = sampler_at(limited, limited.starts[0])
     angles = {round(sampler.angle(node) % TURN, 12) for node in nodes}
     assert angles == {round(TURN * k / 36, 12) for k in range(36) if 1.0 <= TURN * k / 36 < 2.5}
@@ -283,7 +283,7 @@ def test_a_node_keeps_its_crank_angle_when_corners_change_their_order():
     before, after = cycle(1.0, 2.0), SimpleNamespace(cycle=cycle(2.1, 2.0))
     node = Extreme(1, 0.25, -3.0, signed=True)
     angle = float(before.angles(np.array([1]), np.array([0.25]))[0])
-    moved = exchange._carried(node, before, cast(Sampler, after))
+    moved = exchange._node_in_cycle(node, before, cast(Sampler, after))
     here = float(after.cycle.angles(np.array([moved.piece]), np.array([moved.u]))[0])
     assert math.remainder(here - angle, TURN) == pytest.approx(0.0, abs=1e-14)
     assert (moved.value, moved.signed) == (-3.0, True)
@@ -307,7 +307,7 @@ def test_iterations_are_those_of_all_rounds(monkeypatch):
 
     monkeypatch.setattr(exchange, "run", counted)
     task = program(limits=(("circle", 1, 1.0),))
-    point = solved(task, polished=False)
+    point = solved(task, polish=False)
     assert len(told) > 2
     assert point.iterations == sum(told)
 
@@ -318,6 +318,6 @@ def test_an_elastic_solve_may_end_in_its_first_round_whatever_is_known():
     known = Known(tuple(solved(task).binding))
     assert any(known.nodes)
     point = exchange.solve(task, {"x": 0.1, "y": 0.1}, Settings(uniform=36), elastic=Elastic(), known=known)
-    assert point.reached
+    assert point.usable
     assert len(point.binding) == len(known.nodes)
     assert set(point.nodes[0]).isdisjoint(known.nodes[0])

@@ -57,7 +57,7 @@ def test_the_least_is_the_one_known_in_closed_form(name):
     limits, level, place, value = KNOWN[name]
     task = program(limits, (level,))
     point = solved(task)
-    assert point.reached
+    assert point.usable
     assert merit(task, point.x) == pytest.approx(value, rel=1e-8)
     assert level.merit(Sampler(task.model, point.x)) == pytest.approx(value, rel=1e-8)
     assert [point.x["x"], point.x["y"]] == pytest.approx(place, abs=1e-4)
@@ -98,7 +98,7 @@ def test_a_neighbour_s_answer_leads_where_a_cold_start_does():
     near = solved(program([("y", -1, 2.0)], (level,)))
     moved = program([("y", -1, 2.1)], (level,))
     warm, cold = solved(moved, warm=near), solved(moved)
-    assert warm.reached
+    assert warm.usable
     assert warm.iterations == 0
     assert merit(moved, warm.x) == pytest.approx(merit(moved, cold.x), rel=1e-9)
 

@@ -107,7 +107,7 @@ def built(task, extra, elastic=False):
     calls, x = Calls(task, Settings(), Elastic() if elastic else None), {"x": 0.5, "y": -2.0}
     sampler = calls.sampler(x)
     nodes = [of[:1] for of in calls.peaks(sampler)]
-    nlp = calls.transcribed(sampler, nodes, warm=False)
+    nlp = calls.nlp(sampler, nodes, warm=False)
     arguments = calls.arguments(nlp, sampler, x, np.array(extra, float), nodes)
     value, slope = nlp.gradient(arguments["x0"], arguments["p"])
     rows = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[0]).ravel()

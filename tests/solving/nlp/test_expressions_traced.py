@@ -23,8 +23,10 @@ def made(bend=0.05):
 
 def value(expression, symbols, lifts, place=None, number=0.0):
     """Return an expression at X, each lifted variable at what it is worth, and a place at a number."""
-    lifted = [each.symbol for each in lifts.defined]
-    (found,) = ca.substitute([expression], lifted, [each.worth for each in lifts.defined]) if lifted else [expression]
+    lifted = [each.symbol for each in lifts.variables]
+    (found,) = (
+        ca.substitute([expression], lifted, [each.formula for each in lifts.variables]) if lifted else [expression]
+    )
     read = ca.vertcat(*symbols.values()), ca.SX.sym("none") if place is None else place
     return float(ca.Function("f", list(read), [found])([{**X, "raise": 1.25}[name] for name in symbols], number))
 
@@ -39,7 +41,7 @@ def test_a_quantity_is_that_of_the_model_at_every_node(name, raised):
         here = quantities.at(name, phi, switch)
         wanted = model.quantity(systems.FLOAT, given, name, Node(phi, switch))
         assert value(here, symbols, quantities.lifts) == pytest.approx(wanted, rel=1e-14)
-    assert quantities.lifts.defined == [], "a node whose switch is known chooses nothing"
+    assert quantities.lifts.variables == [], "a node whose switch is known chooses nothing"
 
 
 def test_a_formula_is_traced_once_and_reads_what_it_needs():
@@ -59,7 +61,7 @@ def test_a_node_whose_switch_is_a_parameter_chooses_variables():
     quantities, symbols, model = made()
     place = ca.SX.sym("place")
     here = quantities.at("wave", 0.4, {"step": place, "raised": 0.0})
-    assert len(quantities.lifts.picked) == 2
+    assert len(quantities.lifts.choices) == 2
     given = model.given(systems.FLOAT, {**X, "raise": 1.25})
     wanted = model.quantity(systems.FLOAT, given, "wave", Node(0.4, {"step": 7.0, "raised": 0.0}))
     assert value(here, symbols, quantities.lifts, place, 7.0) == pytest.approx(wanted, rel=1e-14)

@@ -22,7 +22,7 @@ def begun(task, nodes=1):
     sampler = calls.sampler(X)
     peaks = calls.peaks(sampler)
     chosen = [of[:nodes] for of in peaks]
-    nlp = calls.transcribed(sampler, chosen, warm=False)
+    nlp = calls.nlp(sampler, chosen, warm=False)
     return calls, nlp, sampler, calls.first_extra(nlp, sampler), chosen
 
 
@@ -62,7 +62,7 @@ def test_more_equalities_than_variables_are_not_solved():
     assert answer.status == "Not_Enough_Degrees_Of_Freedom"
     assert (answer.x, answer.iterations) == (X, 0)
     assert not answer.multipliers.lam_x.any()
-    assert answer.multipliers.of_limits == {0: 0.0, 1: 0.0, 2: 0.0}
+    assert answer.multipliers.limits == {0: 0.0, 1: 0.0, 2: 0.0}
 
 
 @pytest.mark.parametrize("status", ["User_Requested_Stop", "NonIpopt_Exception_Thrown"])

@@ -18,6 +18,6 @@ def test_layout_gives_back_what_was_written():
     assert layout.read(vector, "pair") == [7, 8]
     assert layout.rows(vector, "grid") == [[1, 2, 3], [4, 5, 6]]
     assert layout.part(range(9), "pair") == range(7, 9)
-    assert layout.before(vector, "pair").tolist() == [9, 1, 2, 3, 4, 5, 6]
+    assert layout.prefix(vector, "pair").tolist() == [9, 1, 2, 3, 4, 5, 6]
     layout.array(vector, "grid")[1, :2] = 0
     assert vector.tolist() == [9, 1, 2, 3, 0, 0, 6, 7, 8]

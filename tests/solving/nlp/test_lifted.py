@@ -9,7 +9,7 @@ import pytest
 from steps import COUNT, HEIGHTS, NAMES, program
 
 from loomopt.model.program import Variable
-from loomopt.solving.nlp.expressions import FEW_CHOICES, Lifts, Options, chosen, expressions, identity
+from loomopt.solving.nlp.expressions import FEW_CHOICES, Lifts, Options, expressions, identity, value_at
 from loomopt.solving.nlp.ipopt import BESIDE_STATIONS, FIRST_SLOTS, LEADING, Calls
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.nlp.rows import structure
@@ -24,8 +24,8 @@ def made(count=FEW_CHOICES + 1):
 
 def at(made, value, place):
     """Return a value at x = (2, 3, 5), each lifted variable at what it is worth, and a place."""
-    symbols = [each.symbol for each in made.lifts.defined]
-    worth = [each.worth for each in made.lifts.defined]
+    symbols = [each.symbol for each in made.lifts.variables]
+    worth = [each.formula for each in made.lifts.variables]
     (found,) = ca.substitute([ca.SX(value)], symbols, worth) if symbols else [ca.SX(value)]
     return float(ca.Function("f", [made.x, made.place], [found])([2.0, 3.0, 5.0], place))
 
@@ -36,17 +36,17 @@ def test_the_value_at_a_place_is_chosen_whatever_becomes_of_it(count, place):
     case = made(count)
     value = case.lifts.choose(case.place, case.values)
     assert at(case, value, place) == at(case, case.values[int(place)], place)
-    assert len(case.lifts.picked) == (count > FEW_CHOICES)
-    assert chosen(place, case.values) is case.values[int(place)]
+    assert len(case.lifts.choices) == (count > FEW_CHOICES)
+    assert value_at(place, case.values) is case.values[int(place)]
     assert case.lifts.choose(int(place), case.values) is case.values[int(place)]
-    assert at(case, chosen(case.place, case.values), place) == at(case, value, place)
+    assert at(case, value_at(case.place, case.values), place) == at(case, value, place)
 
 
 def test_what_the_design_does_not_move_is_no_variable():
     case = made()
     fixed = [ca.SX.sym("p") for _ in range(FEW_CHOICES + 1)]
     value = case.lifts.choose(case.place, fixed)
-    assert case.lifts.defined == []
+    assert case.lifts.variables == []
     assert not value.is_symbolic()
     assert ca.depends_on(value, ca.vertcat(*fixed))
 
@@ -57,8 +57,8 @@ def test_one_choice_is_one_variable_however_often_it_is_asked_for():
     assert identity(case.lifts.choose(case.place, Options(case.values))) == identity(first)
     other = case.lifts.choose(case.place, case.values[::-1])
     elsewhere = case.lifts.choose(ca.SX.sym("other"), case.values)
-    assert len({identity(each) for each in (first, other, elsewhere)}) == len(case.lifts.picked) == 3
-    assert case.lifts.picked[0].options is case.lifts.picked[2].options, "one column, whose slopes are taken once"
+    assert len({identity(each) for each in (first, other, elsewhere)}) == len(case.lifts.choices) == 3
+    assert case.lifts.choices[0].options is case.lifts.choices[2].options, "one column, whose slopes are taken once"
 
 
 def test_numbers_are_the_same_by_value_and_expressions_by_what_they_are():
@@ -76,12 +76,12 @@ def built(lifted, **changes):
 
 def test_a_chain_is_lifted_value_by_value_each_from_those_before_it():
     written = built(lifted=True)
-    symbols = [each.symbol.name() for each in written.lifts.named]
+    symbols = [each.symbol.name() for each in written.lifts.chained_values]
     assert symbols == list(HEIGHTS)
-    for k, each in enumerate(written.lifts.named):
-        read = {symbol.name() for symbol in ca.symvar(each.worth)} & set(HEIGHTS)
+    for k, each in enumerate(written.lifts.chained_values):
+        read = {symbol.name() for symbol in ca.symvar(each.formula)} & set(HEIGHTS)
         assert read == ({HEIGHTS[k - 1]} if k else set())
-    assert built(lifted=False).lifts.named == []
+    assert built(lifted=False).lifts.chained_values == []
 
 
 def test_rows_read_a_few_variables():
@@ -90,13 +90,13 @@ def test_rows_read_a_few_variables():
     counts = read(written)
     assert len(counts) == 1 + COUNT + 2, "the row of h3, the stations, two slots"
     assert (max(counts), counts[-2:]) == (2, [2, 2])
-    assert [len(each.lifts.picked) for each in (written, plain)] == [4, 4], "two heights a slot"
+    assert [len(each.lifts.choices) for each in (written, plain)] == [4, 4], "two heights a slot"
     assert read(plain) == [4, 2, 2], "h3 hangs on x0 to x3"
 
 
 def read(written):
     """Return how many variables each row reads."""
-    variables = ca.vertcat(written.x, *(each.symbol for each in written.lifts.defined))
+    variables = ca.vertcat(written.x, *(each.symbol for each in written.lifts.variables))
     return np.diff(ca.jacobian(written.g, variables).sparsity().T.colind()).tolist()
 
 
@@ -106,7 +106,7 @@ def test_what_hangs_on_no_variable_is_no_chain():
     task = replace(program(), variables=(rise,), parameters=dict.fromkeys(NAMES, 0.5))
     calls = Calls(task, Settings())
     own = structure(task, calls.sampler({"raise": 1.5}), 2)
-    assert (own.recurrent, own.stations, own.held) == ((), (), [[]])
-    assert expressions(own).lifts.defined == []
+    assert (own.chained_values, own.stations, own.station_rows) == ((), (), [[]])
+    assert expressions(own).lifts.variables == []
     assert (calls.slots, calls.leading) == (FIRST_SLOTS, LEADING)
     assert (Calls(program(), Settings()).slots, BESIDE_STATIONS) == (2, (2, 1))

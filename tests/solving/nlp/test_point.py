@@ -14,8 +14,8 @@ from loomopt.solving.nlp.point import Settings, sampler_at
     [(1e-1, 180), (1e-3, 180), (9e-4, 360), (1e-6, 360), (9e-7, 720), (1e-8, 720), (1e-11, 720)],
 )
 def test_samples_follow_from_the_accuracy(accuracy, samples):
-    assert Settings(accuracy).sampled == samples
-    assert Settings(accuracy, samples=96).sampled == 96
+    assert Settings(accuracy).sample_count == samples
+    assert Settings(accuracy, samples=96).sample_count == 96
 
 
 @pytest.mark.parametrize(
@@ -23,7 +23,7 @@ def test_samples_follow_from_the_accuracy(accuracy, samples):
     [(1e-2, 360), (1e-6, 1639), (1e-8, 16384), (1e-9, 51811), (1e-10, 65536), (1e-11, 65536)],
 )
 def test_points_checked_again_grow_with_the_root_of_the_accuracy(accuracy, points):
-    assert Settings(accuracy).checked == points
+    assert Settings(accuracy).check_count == points
 
 
 @pytest.mark.parametrize(

@@ -46,11 +46,13 @@ def test_what_clashes_is_left_as_it_is():
         return np.array([x[0] - 1.0, x[0] - 1.0 - 1e-9]), np.ones((2, 1))
 
     bound = binding(np.zeros(1), np.ones(2))
-    assert exchange.met(jacobian, arguments, np.array([1.0]), bound) is None
+    assert exchange.newton_onto_active_rows(jacobian, arguments, np.array([1.0]), bound) is None
     alone = binding(np.zeros(1), np.array([1.0, 0.0]))
     free = arguments | {"lbg": np.array([0.0, -np.inf])}
-    assert exchange.met(jacobian, free, np.array([1.0 + 5e-7]), alone) == pytest.approx([1.0], abs=1e-15)
-    assert exchange.met(jacobian, free, np.array([1.0 + 5e-6]), alone) is None, "too far"
+    assert exchange.newton_onto_active_rows(jacobian, free, np.array([1.0 + 5e-7]), alone) == pytest.approx(
+        [1.0], abs=1e-15
+    )
+    assert exchange.newton_onto_active_rows(jacobian, free, np.array([1.0 + 5e-6]), alone) is None, "too far"
 
 
 def bare(lower=(-9.0, -9.0), upper=(9.0, 9.0)):
@@ -65,7 +67,7 @@ def row(value):
 
 
 def holds(nlp, arguments, x, lam_x=(0.0, 0.0), lam_g=(0.0,)):
-    return exchange.met(nlp, arguments, np.array(x), binding(np.array(lam_x), np.array(lam_g)))
+    return exchange.newton_onto_active_rows(nlp, arguments, np.array(x), binding(np.array(lam_x), np.array(lam_g)))
 
 
 def test_what_binds_at_its_bound_is_put_on_it():
@@ -160,19 +162,19 @@ def test_what_carries_a_slope_is_met_however_far_the_solver_stopped():
     """The nearest point to (3, 2) of the unit circle's disc, IPOPT a millionth inside, its multiplier on four nodes."""
     task = program(limits=(("circle", 1, 1.0),))
     exact = solved(task)
-    price = exact.multipliers.at_nodes.sum()
+    price = exact.multipliers.nodes.sum()
     x = {name: value * (1 - 1e-6) for name, value in exact.x.items()}
     lam_g = np.zeros(exact.multipliers.rows.size)
-    exact.multipliers.rows.at_nodes(lam_g)[0, :4] = price / 4
+    exact.multipliers.rows.node_rows(lam_g)[0, :4] = price / 4
     nodes = (tuple(e._replace(u=e.u + shift) for shift in (-3e-4, 2e-4) for e in exact.binding[0]),)
     short = replace(exact, x=x, nodes=nodes, multipliers=replace(exact.multipliers, lam_g=lam_g))
     assert polished(task, x, exact.extra, short)[0] == x, "farther than an extreme that touches"
-    closer = exchange.brought_closer(task, short, Settings(farthest=2e-5))
+    closer = exchange.refine_active_set(task, short, Settings(farthest=2e-5))
     assert closer is not None
     assert np.hypot(closer.x["x"], closer.x["y"]) == pytest.approx(1.0, abs=1e-12)
     assert [len(of) for of in closer.binding] == [2], "either sign of it"
-    assert exchange.brought_closer(task, short, Settings(farthest=1e-9)) is None, "too far"
-    assert exchange.brought_closer(task, replace(short, multipliers=Multipliers()), Settings()) is None
+    assert exchange.refine_active_set(task, short, Settings(farthest=1e-9)) is None, "too far"
+    assert exchange.refine_active_set(task, replace(short, multipliers=Multipliers()), Settings()) is None
 
 
 def test_a_steep_row_counts_by_its_slope():
@@ -185,6 +187,6 @@ def test_a_steep_row_counts_by_its_slope():
     lam_g = 1e-7 * exact.multipliers.lam_g
     short = replace(exact, x=x, multipliers=replace(exact.multipliers, lam_g=lam_g))
     assert lam_g.max() < BINDING
-    closer = exchange.brought_closer(steep, short, Settings(farthest=2e-5))
+    closer = exchange.refine_active_set(steep, short, Settings(farthest=2e-5))
     assert closer is not None
     assert np.hypot(closer.x["x"], closer.x["y"]) == pytest.approx(1.0, abs=1e-12)

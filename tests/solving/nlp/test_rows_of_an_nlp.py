@@ -27,10 +27,10 @@ TASKS = [pytest.param(task, elastic, id=f"{n} {elastic}") for n, task in PROGRAM
 def blocks(rows, g):
     """Return all rows of a vector by what they are of."""
     return [
-        rows.of_limits(g),
-        *(rows.of_pieces(g, k) for k in range(len(rows.pieces))),
-        *(rows.at_stations(g, k) for k in range(len(rows.stations))),
-        rows.at_nodes(g),
+        rows.limit_rows(g),
+        *(rows.piece_rows(g, k) for k in range(len(rows.pieces))),
+        *(rows.station_rows(g, k) for k in range(len(rows.stations))),
+        rows.node_rows(g),
         rows.definitions(g),
     ]
 
@@ -47,11 +47,11 @@ def test_what_is_written_to_a_block_is_read_from_it_alone(task, elastic, lifted)
     for k, block in enumerate(blocks(rows, g)):
         assert np.all(block == k)
     assert len(rows.definitions(g)) == lifted
-    assert len(rows.own_rows(g)) == rows.size - lifted
+    assert len(rows.original_rows(g)) == rows.size - lifted
     x = np.arange(rows.variables + rows.extras + lifted)
-    assert rows.joined(*rows.parted(x)).tolist() == rows.own_variables(x).tolist()
-    assert [*rows.own_variables(x), *rows.lifted_variables(x)] == x.tolist()
-    assert rows.parted(x)[0].tolist() == list(range(len(task.variables)))
+    assert rows.join(*rows.split(x)).tolist() == rows.original_variables(x).tolist()
+    assert [*rows.original_variables(x), *rows.lifted_variables(x)] == x.tolist()
+    assert rows.split(x)[0].tolist() == list(range(len(task.variables)))
 
 
 @pytest.mark.parametrize(("task", "elastic"), TASKS)
@@ -59,25 +59,25 @@ def test_a_built_nlp_has_the_rows_that_are_foretold(task, elastic):
     calls = Calls(task, Settings(), Elastic() if elastic else None)
     sampler = calls.sampler(task.starts[0])
     peaks = calls.peaks(sampler)
-    nodes = [of[:1] for of in calls.loose(sampler, peaks)]
-    nlp = calls.transcribed(sampler, nodes, warm=False)
+    nodes = [of[:1] for of in calls.nodeless_extremes(sampler, peaks)]
+    nlp = calls.nlp(sampler, nodes, warm=False)
     arguments = calls.arguments(nlp, sampler, task.starts[0], calls.first_extra(nlp, sampler), nodes)
     values = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[0]).ravel()
     assert nlp.rows == row_map(task, nlp.rows.slots, elastic)
     assert nlp.rows.size == len(values) == len(arguments["ubg"])
     assert nlp.rows.variables + nlp.rows.extras == len(arguments["x0"])
-    assert row_map(task, 0, elastic).sized(len(values)).size == len(values)
+    assert row_map(task, 0, elastic).with_size(len(values)).size == len(values)
     limits = [task.limits[k] for k in nlp.rows.limits]
-    _, extra = nlp.rows.parted(arguments["x0"])
+    _, extra = nlp.rows.split(arguments["x0"])
     ways = nlp.structure.excess_places
     given = [extra[list(ways.get(k, ()))] for k in nlp.rows.limits]
     expected = [
         limit.excess(sampler) - (way[0] - way[1:].sum() if len(way) else 0.0)
         for limit, way in zip(limits, given, strict=True)
     ]
-    assert nlp.rows.of_limits(values) == pytest.approx(np.array(expected), abs=1e-12)
-    used = nlp.rows.used(list(map(len, nodes)))
-    assert not nlp.rows.at_nodes(values)[~used].any(), "unused slots weigh nothing"
+    assert nlp.rows.limit_rows(values) == pytest.approx(np.array(expected), abs=1e-12)
+    used = nlp.rows.used_slots(list(map(len, nodes)))
+    assert not nlp.rows.node_rows(values)[~used].any(), "unused slots weigh nothing"
 
 
 def test_pieces_are_of_each_row_and_each_sign():
@@ -98,32 +98,32 @@ def priced(rows):
 @pytest.mark.parametrize("slots", [2, 3, 6])
 def test_multipliers_keep_their_rows_where_slots_come_and_go(task, elastic, slots):
     before, rows = priced(row_map(task, 3, elastic)), row_map(task, slots, elastic)
-    after = before.on(rows)
+    after = before.for_slots(rows)
     assert after.rows is rows
-    assert after.of_limits == before.of_limits
-    assert list(before.of_limits) == list(rows.limits)
+    assert after.limits == before.limits
+    assert list(before.limits) == list(rows.limits)
     for k in range(len(rows.pieces)):
-        assert np.array_equal(after.of_pieces(k), before.of_pieces(k))
-    assert list(map(list, after.at_stations)) == list(map(list, before.at_stations))
+        assert np.array_equal(after.pieces(k), before.pieces(k))
+    assert list(map(list, after.stations)) == list(map(list, before.stations))
     common = min(3, slots)
-    assert np.array_equal(after.at_nodes[:, :common], before.at_nodes[:, :common])
-    assert not after.at_nodes[:, common:].any()
+    assert np.array_equal(after.nodes[:, :common], before.nodes[:, :common])
+    assert not after.nodes[:, common:].any()
     assert after.lam_x is before.lam_x
-    assert after.of_variables.tolist() == [-1.0 - k for k in range(len(task.variables))]
+    assert after.variables.tolist() == [-1.0 - k for k in range(len(task.variables))]
 
 
 def test_the_first_nodes_of_each_family_bind_and_of_other_rows_those_with_a_multiplier():
     rows = row_map(PLAIN, 2)
     lam_g = np.zeros(rows.size)
-    rows.of_limits(lam_g)[:] = 0.0, 2e-6
-    rows.at_nodes(lam_g)[0] = 1.0
+    rows.limit_rows(lam_g)[:] = 0.0, 2e-6
+    rows.node_rows(lam_g)[0] = 1.0
     found = Multipliers(rows, np.array([2e-6, -2e-6, *[0.0] * rows.extras]), lam_g).binding(
         row_map(PLAIN, 3), [0, 1, 2, 3]
     )
     grown = row_map(PLAIN, 3)
-    assert grown.of_limits(found.rows).tolist() == [False, True]
-    assert grown.at_nodes(found.rows).tolist() == grown.used([0, 1, 2, 3]).tolist()
-    assert grown.used([0, 1, 2, 3]).sum(axis=1).tolist() == [0, 1, 2, 3]
+    assert grown.limit_rows(found.rows).tolist() == [False, True]
+    assert grown.node_rows(found.rows).tolist() == grown.used_slots([0, 1, 2, 3]).tolist()
+    assert grown.used_slots([0, 1, 2, 3]).sum(axis=1).tolist() == [0, 1, 2, 3]
     assert (found.at_upper[0], found.at_lower[1], found.at_upper.sum(), found.at_lower.sum()) == (True, True, 1, 1)
 
 
@@ -140,6 +140,6 @@ def test_multipliers_say_what_binds():
 
 def test_without_multipliers_there_are_none():
     assert not Multipliers()
-    assert Multipliers().of_limits == {}
-    assert Multipliers().at_nodes.shape == (0, 0)
+    assert Multipliers().limits == {}
+    assert Multipliers().nodes.shape == (0, 0)
     assert priced(RowMap(variables=1))

@@ -10,7 +10,7 @@ from loomopt.physics.cycle import TURN
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Settings, sampler_at
-from loomopt.solving.nlp.rows import HeldStations, RowFamily, held, stations, structure
+from loomopt.solving.nlp.rows import CycleStations, RowFamily, station_places, stations, structure
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,7 @@ def stood():
     """Return where the toy's stations stand, and the design's sampler."""
     task = program()
     sampler = sampler_at(task, task.starts[0])
-    return HeldStations(stations(task.model, sampler.given, list(task.starts[0])), sampler.cycle), sampler
+    return CycleStations(stations(task.model, sampler.given, list(task.starts[0])), sampler.cycle), sampler
 
 
 def test_each_stands_where_its_step_begins(stood):
@@ -34,7 +34,7 @@ def test_a_law_falls_on_its_return_and_its_pieces_end_there():
     scene = registry.load("shedding").set("targets.law.intervals", 12)
     task = registry.of(scene).program(scene, "law")
     sampler = sampler_at(task, task.starts[0])
-    at = HeldStations(stations(task.model, sampler.given, [v.name for v in task.variables]), sampler.cycle)
+    at = CycleStations(stations(task.model, sampler.given, [v.name for v in task.variables]), sampler.cycle)
     rise, back, near = (sampler.given.values[name] for name in ("rise", "return", "begin.near"))
     knots = np.arange(1, 12) / 12
     assert sampler.cycle.angles(at.pieces, at.u) == pytest.approx([*(rise * knots), *(near - back * knots)], rel=1e-14)
@@ -63,7 +63,7 @@ def test_where_a_load_jumps_at_a_corner_the_other_side_is_another_row(stood):
     switched = sampler.cycle.switches.copy()
     switched[before, sampler.cycle.names.index("raised")] = 0.0
     other = type(sampler.cycle)(sampler.cycle.starts, sampler.cycle.names, switched, sampler.cycle.order)
-    assert HeldStations(stations_of(sampler), other).station(Extreme(before, 1.0, 1.0)) is None
+    assert CycleStations(stations_of(sampler), other).station(Extreme(before, 1.0, 1.0)) is None
 
 
 def stations_of(sampler):
@@ -75,17 +75,19 @@ def test_signs_are_those_of_the_values_where_magnitudes_count(stood):
     assert at.signs(sampler, "wave").tolist() == [1.0] * COUNT, "signed"
     task = program()
     low = sampler_at(task, dict.fromkeys(task.starts[0], -0.5))
-    own = HeldStations(stations_of(low), low.cycle)
+    own = CycleStations(stations_of(low), low.cycle)
     assert own.signs(low, "swing").tolist() == [-1.0] * COUNT
-    assert HeldStations((), low.cycle).signs(low, "swing").tolist() == []
+    assert CycleStations((), low.cycle).signs(low, "swing").tolist() == []
 
 
 def test_families_of_part_of_the_turn_have_rows_there_only():
     switches = [{"segment": 0.0, "law": 1.0}, {"segment": 2.0, "law": 1.0}]
-    assert held(switches, RowFamily("lift")) == [0, 1]
-    assert held(switches, RowFamily("lift", where=("segment", 2.0))) == [1]
-    assert held(switches, RowFamily("lift", where=("segment", 1.0))) == []
-    assert held(switches, RowFamily("lift", where=("raised", 1.0))) == [], "whether it holds there is not known"
+    assert station_places(switches, RowFamily("lift")) == [0, 1]
+    assert station_places(switches, RowFamily("lift", where=("segment", 2.0))) == [1]
+    assert station_places(switches, RowFamily("lift", where=("segment", 1.0))) == []
+    assert station_places(switches, RowFamily("lift", where=("raised", 1.0))) == [], (
+        "whether it holds there is not known"
+    )
 
 
 @pytest.mark.parametrize("where", [None, ("step", 2.0)])
@@ -93,7 +95,7 @@ def test_every_station_that_a_family_is_asked_for_has_a_row(where):
     task = program(limits=(("wave", 1, 1.0), ("swing", 1, 2.0)), where=where)
     built = structure(task, sampler_at(task, task.starts[0]), 2)
     count = COUNT if where is None else 1
-    assert [len(places) for places in built.held] == [count, count]
+    assert [len(places) for places in built.station_rows] == [count, count]
     assert built.rows.stations == (count, count)
 
 
@@ -101,7 +103,9 @@ def test_nodes_are_for_what_no_station_holds():
     task = program()
     calls = Calls(task, Settings())
     sampler = calls.sampler(task.starts[0])
-    (peaks,), (loose,) = (found(sampler) for found in (calls.peaks, lambda s: calls.loose(s, calls.peaks(s))))
+    (peaks,), (loose,) = (
+        found(sampler) for found in (calls.peaks, lambda s: calls.nodeless_extremes(s, calls.peaks(s)))
+    )
     corners = [e for e in peaks if e.u in (0.0, 1.0)]
     assert len(corners) > 5
     assert {e for e in peaks if e not in loose} <= set(corners)

@@ -94,7 +94,7 @@ def test_means_are_rows_that_objectives_read(name):
     calls = Calls(task, Settings())
     x = {"x": 0.3, "y": 0.0}
     sampler = calls.sampler(x)
-    nlp = calls.transcribed(sampler, [], warm=False)
+    nlp = calls.nlp(sampler, [], warm=False)
     arguments = calls.arguments(nlp, sampler, x, np.zeros(0), [])
     value = float(nlp.gradient(arguments["x0"], arguments["p"])[0])
     square = np.mean([(0.3 * math.cos(a) - d) ** 2 for a, d in zip(TABLE.angles, TABLE.data, strict=True)])

@@ -70,7 +70,7 @@ def test_what_a_whole_cycle_limit_needs():
 def test_where_a_design_needs_nothing_the_search_for_the_least_relaxation_ends(monkeypatch):
     program = toy.program("xy", ROWS, limits=(("x", -1, 1.0),))
     nearest = least(program, [program.starts[0]] * 3, Settings())
-    assert nearest.relaxed == {}
+    assert nearest.relaxation == {}
     assert nearest.x["x"] >= 1.0 - 1e-9
     calls = []
     original = exchange.solve
@@ -101,9 +101,11 @@ def test_each_start_need_only_be_followed_below_the_best_so_far(monkeypatch, sum
 
     def solve(program, start, settings, elastic, known):
         total = sums[len(calls)]
-        calls.append(known.most)
+        calls.append(known.cutoff)
         reached = total is not None
-        return Point({}, "", reached, relaxed={0: 1.0} if reached else {}, extra=np.array([total] if reached else []))
+        return Point(
+            {}, "", reached, relaxation={0: 1.0} if reached else {}, extra=np.array([total] if reached else [])
+        )
 
     monkeypatch.setattr(exchange, "solve", solve)
     program = toy.program("xy", ROWS, limits=(("x", -1, 2.0),))

@@ -26,7 +26,7 @@ def priced(made, prices):
 
 def point_of(made, prices):
     """Return a point with these multipliers of rows, in their order; without any where there are none."""
-    rows = row_map(made, 0, elastic=True).sized(len(prices))
+    rows = row_map(made, 0, elastic=True).with_size(len(prices))
     lam_x = np.zeros(rows.variables + rows.extras)
     return Point({}, "", True, multipliers=Multipliers(rows, lam_x, np.array(prices)) if len(prices) else Multipliers())
 

@@ -32,7 +32,7 @@ def test_more_starts_are_tried_where_none_is_certified(certified, solved):
 
 def test_one_certified_start_is_enough(certified, solved):
     calls, points = solved
-    points.append(Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, built=0.25))
+    points.append(Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, build_seconds=0.25))
     found = searched(empty(), 1, 0, (), None)
     assert (len(calls), found.passed, found.built) == (1, True, 0.25)
     assert found.solved >= 0.0
@@ -124,7 +124,7 @@ def test_where_limits_clash_no_more_starts_are_tried(certified, solved):
     calls, points = solved
     program = toy.program("xy", limits=(("x", -1, 2.0), ("x", 1, 1.0)), objectives=("x",))
     points.append(Point(program.starts[0], "Infeasible_Problem_Detected", False))
-    nearest = Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, relaxed={0: 1.0}, extra=np.ones(1))
+    nearest = Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, relaxation={0: 1.0}, extra=np.ones(1))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(elastic, "least", lambda *_: nearest)
         found = wide(program)
@@ -308,7 +308,7 @@ def test_a_start_that_ends_beside_the_known_design_is_not_solved_again(monkeypat
 
     monkeypatch.setattr(exchange, "run", counted)
     answer, count = lo.solve("beatup"), len(runs)
-    monkeypatch.setattr(exchange, "LED", -1.0)
+    monkeypatch.setattr(exchange, "PIVOT_EXCESS", -1.0)
     again = lo.solve("beatup")
     assert answer.solver["starts"] == again.solver["starts"]
     assert answer.solver["starts_at_best"] == again.solver["starts_at_best"]

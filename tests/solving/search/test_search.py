@@ -128,7 +128,7 @@ def test_where_a_slope_or_a_curvature_refuses_the_best_it_is_brought_closer_to_w
     seen, answers = certified
     answers[1.0] = replace(BAD, **why)
     beside = replace(candidate(1, x=5.0).point, x={"x": 5.0, "y": 0.0})
-    monkeypatch.setattr(exchange, "brought_closer", lambda *asked: beside)
+    monkeypatch.setattr(exchange, "refine_active_set", lambda *asked: beside)
     found = judged(replace(empty(candidates=(candidate(1, x=1.0),)), settings=Settings(penalty=1e7)))
     assert (seen, found.passed) == (([1.0, 5.0], True) if closer else ([1.0], False))
 
@@ -274,7 +274,7 @@ def test_time_of_solves_is_summed(certified, solved, monkeypatch):
     clock = iter([10.0, 10.25, 20.0, 20.5, 30.0, 31.0, 33.0, 40.0, 40.5])
     monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
     points = solved[1]
-    points += [Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, built=0.125) for _ in range(2)]
+    points += [Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, build_seconds=0.125) for _ in range(2)]
     twice = searching.tried(searching.tried(empty(), {"x": 0.0}), {"x": 0.0})
     assert (twice.solved, twice.built) == (0.75, 0.25)
     judged = searching._certified(twice, twice.candidates[0])
