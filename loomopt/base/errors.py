@@ -13,10 +13,6 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 
-from pydantic import BaseModel
-from pydantic_core import ErrorDetails
-
-from loomopt.base.quantities import described, quantity_of
 from loomopt.base.units import QuantityError
 
 _LONGEST = {"file": 240, "key": 190, "problem": 480, "value": 120, "allowed": 480, "remedy": 240}
@@ -101,9 +97,10 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
 
 
 class Faults:
-    """All that is wrong with what somebody gave: `with faults:` keeps a mistake and goes on, `tell` raises them."""
+    """Mistakes of an input: `with faults:` adds one and goes on, `tell` raises them all; file: where they stand."""
 
-    def __init__(self) -> None:
+    def __init__(self, file: str = "") -> None:
+        self.file = file
         self.found: list[BadInput] = []
 
     def __enter__(self) -> "Faults":
@@ -188,29 +185,8 @@ _MOST_FILES = 1000
 """Files of a folder that are looked through for one of a near name."""
 NEAR, SAME = 0.5, 0.75
 """Share of letters that two names have in common: of which one may be meant, and of which one surely is."""
-_NOTHING = object()
-_PROBLEMS = {
-    "dict_type": ("it is not a table", "a table"),
-    "model_type": ("it is not a table", "a table"),
-    "tuple_type": ("it is not a list", "a list"),
-    "list_type": ("it is not a list", "a list"),
-    "string_type": ("it is not text", "text in quotes"),
-    "bool_type": ("it is neither true nor false", "true, false"),
-    "bool_parsing": ("it is neither true nor false", "true, false"),
-    "int_type": ("it is not a whole number", "a whole number"),
-    "int_parsing": ("it is not a whole number", "a whole number"),
-    "int_parsing_size": ("it is not a whole number", "a whole number"),
-    "int_from_float": ("it is not a whole number", "a whole number"),
-    "greater_than": ("it is out of range", ""),
-    "greater_than_equal": ("it is out of range", ""),
-    "less_than": ("it is out of range", ""),
-    "less_than_equal": ("it is out of range", ""),
-    "string_pattern_mismatch": ("it is empty", "a name in quotes"),
-    "extra_forbidden": ("unknown key", ""),
-}
-"""What pydantic finds wrong → it in words, and what is allowed."""
-_BOUNDS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
-"""How pydantic names the bounds of a field → in words."""
+NOTHING = object()
+"""Stands for no value: None is one."""
 
 
 def shown(value: object) -> str:
@@ -230,7 +206,7 @@ def refusal(
     problem: str,
     origin: str,
     key: str = "",
-    value: object = _NOTHING,
+    value: object = NOTHING,
     allowed: str = "",
     remedy: str = "",
     grade: int = VALUE,
@@ -240,7 +216,7 @@ def refusal(
         clean(problem, _LONGEST_PART),
         file=clean(origin, _LONGEST_PART),
         key=clean(key, 2 * _LONGEST_VALUE),
-        value="" if value is _NOTHING else shown(value),
+        value="" if value is NOTHING else shown(value),
         allowed=clean(allowed, _LONGEST_PART),
         remedy=clean(remedy, _LONGEST_PART),
         grade=grade,
@@ -298,39 +274,3 @@ def near_file(path: Path) -> str:
 def misread(error: QuantityError, origin: str, key: str, value: object) -> BadInput:
     """Return the error for a value that is not the quantity asked for."""
     return refusal(error.problem, origin, key, value, error.allowed, error.remedy)
-
-
-def missing(model: type[BaseModel], origin: str, table: str, name: str, needed: str = "") -> BadInput:
-    """Return the error for a key that a table lacks; needed: what needs it."""
-    quantity = quantity_of(model, name)
-    sort = described(quantity.kind) if quantity else "text"
-    problem = f"{name} is missing{': ' if needed else ''}{needed}"
-    return refusal(problem, origin, f"{table}.{name}", allowed=sort, remedy=f"Add {name} to [{table}]", grade=GAP)
-
-
-def invalid(error: ErrorDetails, model: type[BaseModel], origin: str, table: str) -> BadInput:
-    """Return the error for one thing that pydantic found wrong with a table."""
-    # Places in a list count from 1, as a caller's keys do.
-    names = [str(name + 1 if isinstance(name, int) else name) for name in error["loc"]]
-    if error["type"] == "missing" and len(names) == 1:
-        return missing(model, origin, table, names[0])
-    key, value = ".".join((table, *names)), error["input"]
-    cause = error.get("ctx", {}).get("error")
-    if isinstance(cause, QuantityError):
-        return misread(cause, origin, key, value)
-    choices = str(error.get("ctx", {}).get("expected", "")).replace("'", '"')
-    if choices:
-        return refusal("it is none of the known choices", origin, key, value, choices, "Correct the value")
-    problem, allowed = _PROBLEMS.get(error["type"], (error["msg"], ""))
-    remedy = f"Write [{shown(value)}]" if allowed == "a list" and isinstance(value, str) else "Correct the value"
-    return refusal(problem, origin, key, value, _bounds(model, names) or allowed, remedy)
-
-
-def _bounds(model: type[BaseModel], names: Sequence[str]) -> str:
-    """Return within what a field of a table may lie, where it has bounds of its own."""
-    field = model.model_fields.get(names[0]) if len(names) == 1 else None
-    if field is None:
-        return ""
-    known = ((word, getattr(each, name, None)) for name, word in _BOUNDS.items() for each in field.metadata)
-    found = [f"{word} {bound}" for word, bound in known if bound is not None]
-    return ", ".join([*(["a whole number"] if field.annotation is int else []), *found])

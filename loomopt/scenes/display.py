@@ -4,13 +4,14 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from loomopt.base.errors import Faults, misread, refusal, unknown
+from loomopt.base.errors import Faults
 from loomopt.base.quantities import misfit, quantities_of, unit_of
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, ascii_unit, fits, parse_unit
 from loomopt.physics.effects.kinds import Effect
 from loomopt.physics.schema import Table
+from loomopt.scenes.cursor import Cursor
 from loomopt.scenes.document import looked_up
-from loomopt.scenes.tables import Bound, LimitRange, SceneSchema, table
+from loomopt.scenes.tables import Bound, LimitRange, SceneSchema
 
 KINDS = {"speed" if kind == "angular speed" else kind.replace(" ", "_"): kind for kind in SI_UNIT if kind != "number"}
 """Key of [display] → kind of quantity."""
@@ -23,30 +24,30 @@ _PRESSURES = {"lbf": "psi"}
 """Unit of force → the unit of pressure that goes with it by habit."""
 
 
-def read(raw: object, origin: str, faults: Faults) -> dict[str, str]:
-    """Return [display]: kind of quantity → its unit."""
-    found, given = {}, dict[str, Any]()
-    with faults:
-        given = dict(table(raw, origin, "display"))
-    for key, unit in given.items():
-        with faults:
-            if key not in KINDS:
-                raise unknown("kind of quantity", key, KINDS, origin, f"display.{key}", given=given)
-            found[KINDS[key]] = _unit(unit, KINDS[key], origin, f"display.{key}")
+def read(cursor: Cursor) -> dict[str, str]:
+    """Table [display]: kind of quantity → its unit."""
+    found: dict[str, str] = {}
+    with cursor.faults:
+        given = cursor.entries()
+        for key, place in given.items():
+            with cursor.faults:
+                if key not in KINDS:
+                    raise place.unknown("kind of quantity", key, KINDS, given=given)
+                found[KINDS[key]] = _unit(place, KINDS[key])
     return found
 
 
-def _unit(unit: object, kind: str, origin: str, path: str) -> str:
-    """Return a unit of a kind, in ASCII. Raises BadInput."""
-    allowed = f'a unit of {kind} such as "{DISPLAY_UNIT[kind]}"'
+def _unit(cursor: Cursor, kind: str) -> str:
+    """A unit of a kind of quantity, in ASCII. Raises BadInput."""
+    unit, allowed = cursor.raw, f'a unit of {kind} such as "{DISPLAY_UNIT[kind]}"'
     if not isinstance(unit, str) or len(unit) > _LONGEST:
-        raise refusal("it is not a unit", origin, path, unit, allowed, "Write the unit alone, as text")
+        raise cursor.fault("it is not a unit", unit, allowed, "Write the unit alone, as text")
     try:
         fitting = fits(unit.strip(), kind)
     except QuantityError as error:
-        raise misread(QuantityError(error.problem, allowed, error.remedy), origin, path, unit) from None
+        raise cursor.fault(error.problem, unit, allowed, error.remedy) from None
     if not fitting:
-        raise refusal(misfit(unit.strip(), kind), origin, path, unit, allowed, "Write another unit")
+        raise cursor.fault(misfit(unit.strip(), kind), unit, allowed, "Write another unit")
     return ascii_unit(unit.strip())
 
 
@@ -64,7 +65,7 @@ def units(
     for kind, unit in _written(document, schema, active, ranges):
         if kind not in first and fits(unit, kind):
             first[kind] = ascii_unit(unit)
-    return _completed({**first, **read(document.get("display", {}), "", Faults())})
+    return _completed({**first, **read(Cursor(document.get("display", {}), "display", Faults()))})
 
 
 def unit_for(si: str, known: Mapping[str, str]) -> str:

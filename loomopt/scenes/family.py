@@ -9,9 +9,8 @@ from pydantic import Field
 from loomopt.base.errors import BadInput, refusal, unknown
 from loomopt.base.records import Frozen
 from loomopt.physics.schema import Name, Target, TargetTable
-from loomopt.scenes import tables
 from loomopt.scenes.document import removed
-from loomopt.scenes.scene import TABLES, Scene, build, kept
+from loomopt.scenes.scene import TABLES, Scene, build, kept, places
 from loomopt.scenes.tables import FAMILY
 
 MOST_MEMBERS = 50
@@ -101,7 +100,7 @@ def _changes(scene: Scene, place: int) -> dict[str, Any]:
     if not given:
         raise refusal("a member that changes nothing", scene.origin, at, remedy='Write { M0 = "600 N*m" }')
     found: dict[str, Any] = {}
-    free = {f"{p.table}.{p.key}" for p in _places(scene) if (bound := scene.bounds.get(p.label)) and bound.free}
+    free = {f"{p.table}.{p.key}" for p in places(scene) if (bound := scene.bounds.get(p.label)) and bound.free}
     for key, value in _flat(scene, at, given):
         if key in found:
             raise refusal("it is changed twice", scene.origin, f"{at}.{key}", remedy="Take one of them out")
@@ -114,24 +113,19 @@ def _changes(scene: Scene, place: int) -> dict[str, Any]:
 
 def _flat(scene: Scene, at: str, given: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield dotted keys with their values; a short name is that of the one number it calls."""
-    places = _places(scene)
+    numbers = places(scene)
     for name, value in given.items():
         if name in TABLES or "." in name:
             yield from _leaves(name, value)
             continue
-        found = [f"{p.table}.{p.key}" for p in places if name in (p.key, p.label) and p.given]
+        found = [f"{p.table}.{p.key}" for p in numbers if name in (p.key, p.label) and p.given]
         if len(found) != 1:
-            known = sorted({p.label for p in places if p.given})
+            known = sorted({p.label for p in numbers if p.given})
             if not found:
                 raise unknown("number", name, known, scene.origin, f"{at}.{name}")
             problem, remedy = f"{name} may mean {', '.join(found)}", f"Write one of them in place of {name}"
             raise refusal(problem, scene.origin, f"{at}.{name}", remedy=remedy)
         yield found[0], value
-
-
-def _places(scene: Scene) -> list[tables.Place]:
-    on = {effect: scene.effects[effect.name] for effect in scene.active}
-    return list(tables.places(scene.schema, scene.tables, on, {}))
 
 
 def _leaves(key: str, value: object) -> Iterator[tuple[str, Any]]:

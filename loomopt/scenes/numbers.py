@@ -11,7 +11,7 @@ from loomopt.base.quantities import Quantity, plain_number, quantity_of
 from loomopt.physics.effects.kinds import label
 from loomopt.physics.schema import Table
 from loomopt.scenes import table_cells
-from loomopt.scenes.scene import Scene
+from loomopt.scenes.scene import Scene, cursor, places
 
 if TYPE_CHECKING:
     from loomopt.scenes.sizes import Sizes
@@ -154,12 +154,9 @@ def _refused(problem: str, key: str, text: str, remedy: str = "Correct the range
 
 def sizes(scene: Scene) -> "Sizes":
     """Return what a scene says of sizes that can be ordered. Raises BadInput."""
-    from loomopt.base.errors import Faults
     from loomopt.scenes import sizes as ordered
-    from loomopt.scenes import tables
 
-    on, faults = dict(zip(scene.active, scene.effects.values(), strict=True)), Faults()
-    places = list(tables.places(scene.schema, scene.tables, on, {}))
-    found = ordered.read(scene.document, scene.schema, places, scene.origin, faults)
-    faults.tell()
+    tables = cursor(scene)
+    found = ordered.read(tables, scene.schema, places(scene))
+    tables.faults.tell()
     return found

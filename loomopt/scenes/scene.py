@@ -14,8 +14,9 @@ from loomopt.physics.effects.kinds import Effect, Load, label, owned, required
 from loomopt.physics.schema import Table
 from loomopt.scenes import display
 from loomopt.scenes import tables as read
+from loomopt.scenes.cursor import Cursor
 from loomopt.scenes.document import Paths, copied, looked_up, removed, replaced
-from loomopt.scenes.tables import Bound, JobNames, LimitRange, SceneSchema
+from loomopt.scenes.tables import Bound, JobNames, LimitRange, Place, SceneSchema
 
 _Own = TypeVar("_Own", bound=Table)
 _Made = TypeVar("_Made")
@@ -444,9 +445,9 @@ def _built(
 
     before: a scene whose tables are read again where these are not the very same.
     """
-    faults = Faults()
+    faults = Faults(origin)
     raw = _meant(original, TABLES)
-    problem = read.problem(raw["problem"], jobs, origin, faults)
+    problem = read.problem(Cursor(raw["problem"], "problem", faults), jobs)
     named = [name for table in ("effects", "available") if isinstance(raw[table], Mapping) for name in raw[table]]
     try:
         schema = jobs.schema(problem.job, original, named)
@@ -455,29 +456,28 @@ def _built(
         raise faults.told() from None
     known = (*TABLES, *schema.tables)
     raw = _meant(original, known)
-    for name in original:
-        if name not in known:
-            faults.add(unknown("table", name, known, origin, name, given=original))
+    top = Cursor(raw, "", faults)
+    top.check_keys(original, known, "table")
     last = before if before is not None and before.schema is schema else None
 
     def stays(*names: str) -> bool:
         return last is not None and all(original.get(name) is last.document.get(name) for name in names)
 
     tables = {
-        name: last.tables[name] if last and stays(name) else read.checked(model, raw[name], origin, name, faults)
+        name: last.tables[name] if last and stays(name) else top.at(name).record(model)
         for name, model in (("operation", schema.operation), ("mechanism", schema.mechanism))
     }
     if last and stays("effects"):
         active = dict(zip(last.active, last.effects.values(), strict=True))
     else:
-        active = read.effects(raw["effects"], schema, origin, "effects", faults)
-    available = read.effects(raw["available"], schema, origin, "available", faults)
-    read.demand(schema, tables, active, origin, faults)
-    places = list(read.places(schema, tables, active, available))
+        active = read.effects(top.at("effects"), schema)
+    available = read.effects(top.at("available"), schema)
+    read.check_needs(top, schema, tables, active)
+    known_places = list(read.places(schema, tables, active, available))
     targets = {name: target.own for name, target in schema.targets.items()}
     if isinstance(raw["targets"], Mapping):
         raw["targets"] = {**{name: {} for name in targets}, **raw["targets"]}
-    display.read(raw["display"], origin, faults)
+    display.read(top.at("display"))
     scene = Scene(
         document=original,
         origin=clean(origin),
@@ -493,25 +493,21 @@ def _built(
         active=tuple(active),
         bounds=last.bounds
         if last and stays("bounds", "effects", "available") and _keys(tables) == _keys(last.tables)
-        else read.bounds(raw["bounds"], schema, places, origin, faults),
-        limits=last.limits
-        if last and stays("limits", "effects")
-        else read.limits(raw["limits"], schema, tuple(active), origin, faults),
-        targets=last.targets
-        if last and stays("targets")
-        else read.named(raw["targets"], targets, "target", origin, "targets", faults),
+        else read.bounds(top.at("bounds"), schema, known_places),
+        limits=last.limits if last and stays("limits", "effects") else read.limits(top.at("limits"), schema, active),
+        targets=last.targets if last and stays("targets") else read.records(top.at("targets"), targets, "target"),
         paths=paths or Paths(),
         call=call or Call(),
     )
     if raw["tolerances"] or raw["accept"]:
         from loomopt.scenes import tolerances
 
-        tolerances.read(raw["tolerances"], schema, places, origin, faults)
-        tolerances.accepted(raw["accept"], schema, origin, faults)
+        tolerances.read(top.at("tolerances"), schema, known_places)
+        tolerances.bands(top.at("accept"), schema)
     if raw["steps"] or raw["stock"]:
         from loomopt.scenes import sizes
 
-        sizes.read(raw, schema, places, origin, faults)
+        sizes.read(top, schema, known_places)
     if _judged(scene, faults):
         try:
             jobs.check(scene)
@@ -583,3 +579,14 @@ def kept(scene: Scene, key: Hashable, make: Callable[[], _Made]) -> _Made:
 def reads(scene: Scene, file: str) -> None:
     """Note that a file is read for a scene."""
     scene._files.append(file)
+
+
+def cursor(scene: Scene) -> Cursor:
+    """Cursor on the tables of a scene, empty ones too, to read again what the scene does not keep."""
+    return Cursor({name: {} for name in TABLES} | dict(scene.document), "", Faults(scene.origin))
+
+
+def places(scene: Scene) -> list[Place]:
+    """Places of the numbers of a scene, those of effects that are off left out of account."""
+    on = dict(zip(scene.active, scene.effects.values(), strict=True))
+    return list(read.places(scene.schema, scene.tables, on, {}))

@@ -5,10 +5,10 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
-from loomopt.base.errors import Faults, misread, nearest, refusal
+from loomopt.base.errors import nearest, refusal
 from loomopt.base.quantities import Quantity
-from loomopt.base.units import QuantityError
-from loomopt.scenes.tables import Place, SceneSchema, bounded, flat, table
+from loomopt.scenes.cursor import Cursor
+from loomopt.scenes.tables import Place, SceneSchema, labelled, quantity_of_label
 
 WITHIN = 1e-9
 """Share of a step by which a size may lie outside its bounds: rounding of a unit."""
@@ -22,35 +22,29 @@ class Sizes(NamedTuple):
     stock: Mapping[str, tuple[float, ...]]
 
 
-def read(raw: Mapping[str, object], schema: SceneSchema, known: Sequence[Place], origin: str, faults: Faults) -> Sizes:
-    """Return [steps] and [stock]; raw: the scene's tables; known: places of its numbers."""
+def read(scene: Cursor, schema: SceneSchema, known: Sequence[Place]) -> Sizes:
+    """Tables [steps] and [stock] of a scene; known: places of its numbers."""
     steps: dict[str, float] = {}
     stock: dict[str, tuple[float, ...]] = {}
-    for name in ("steps", "stock"):
-        with faults:
-            labels = [*schema.variables, *(place.label for place in known)]
-            for number, each in flat(table(raw.get(name, {}), origin, name), labels).items():
-                with faults:
-                    key = f"{name}.{number}"
-                    quantity = Quantity(bounded(number, schema, list(known), origin, key, STEP).kind, above=0)
-                    if name == "steps":
-                        steps[number] = _value(each, quantity, origin, key)
+    labels = [*schema.variables, *(place.label for place in known)]
+    for table in ("steps", "stock"):
+        with scene.faults:
+            for label, place in labelled(scene.at(table), labels).items():
+                with scene.faults:
+                    quantity = Quantity(quantity_of_label(place, schema, known, STEP).kind, above=0)
+                    if table == "steps":
+                        steps[label] = place.number(quantity)
                     else:
-                        stock[number] = _sold(each, quantity, origin, key)
+                        stock[label] = _stock(place, quantity)
     return Sizes(steps, stock)
 
 
-def _sold(raw: object, quantity: Quantity, origin: str, key: str) -> tuple[float, ...]:
+def _stock(cursor: Cursor, quantity: Quantity) -> tuple[float, ...]:
+    """Sizes of one number that are sold, ascending. Raises BadInput."""
+    raw = cursor.raw
     if not isinstance(raw, list | tuple) or not raw:
-        raise refusal("it is no list of sizes", origin, key, raw, remedy='Write wire = ["1 mm", "1.2 mm"]')
-    return tuple(sorted({_value(each, quantity, origin, key) for each in raw}))
-
-
-def _value(raw: object, quantity: Quantity, origin: str, key: str) -> float:
-    try:
-        return quantity.validate(raw)
-    except QuantityError as error:
-        raise misread(error, origin, key, raw) from None
+        raise cursor.fault("it is no list of sizes", raw, remedy='Write wire = ["1 mm", "1.2 mm"]')
+    return tuple(sorted({cursor._replace(raw=size).number(quantity) for size in raw}))
 
 
 def named(given: Mapping[str, object], bounded: Collection[str]) -> dict[str, object]:

@@ -1,36 +1,20 @@
 """What a scene of a job may hold, and its tables checked against that.
 
-Whoever reads a table gives the `Faults` that it keeps what is wrong in; what is right is returned all the same.
+A reader adds mistakes to the cursor's list and returns what can be read all the same.
 """
 
-import math
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, TypeVar, cast
+from typing import Any, NamedTuple, Protocol
 
-from pydantic import ValidationError
-
-from loomopt.base.errors import (
-    GAP,
-    NAME,
-    SAME,
-    WHOLE,
-    BadInput,
-    Faults,
-    invalid,
-    misread,
-    missing,
-    nearest,
-    refusal,
-    shown,
-    unknown,
-)
+from loomopt.base.errors import GAP, NAME, SAME, nearest, shown
 from loomopt.base.quantities import Quantity, quantities_of, unit_of
 from loomopt.base.records import lazy
-from loomopt.base.units import QuantityError, ShowValue
+from loomopt.base.units import ShowValue
 from loomopt.physics.effects.kinds import Check, Effect, Event, Load, Speed, instance, label, model_of, needed, required
 from loomopt.physics.schema import Axis, Conflict, Figure, Sense, Table, Target
+from loomopt.scenes.cursor import Cursor
 
 
 @dataclass(frozen=True)
@@ -103,7 +87,6 @@ class SceneSchema:
 FAMILY = "family"
 """What the target of several machines at once is called in every job."""
 
-_Model = TypeVar("_Model", bound=Table)
 _NAME = re.compile(r"[^\W_][\w-]{0,63}")
 _ENDS = {"min", "max", "free"}
 _TAKEN = {"con", "prn", "aux", "nul", *(f"{port}{digit}" for port in ("com", "lpt") for digit in "0123456789¹²³")}
@@ -160,201 +143,133 @@ class Place(NamedTuple):
     waits: bool = False
 
 
-def table(raw: object, origin: str, path: str) -> Mapping[str, Any]:
-    """Return raw if it is a table."""
-    if not isinstance(raw, Mapping):
-        raise refusal("it is not a table", origin, path, raw, "a table", f"Write a table [{path}]", WHOLE)
-    return raw
+def problem(cursor: Cursor, jobs: JobNames) -> Problem:
+    """Table [problem], its name fit for a file name and its job one of `jobs`.
 
-
-def checked(model: type[_Model], raw: object, origin: str, path: str, faults: Faults) -> _Model:
-    """Return a raw table as its model, with NaN for what cannot be read.
-
-    A name that nobody knows stands for the one near it that is missing: that is one mistake, not two.
+    An unknown job stands for the one of a near name, so that the other tables are checked too. Raises BadInput where no
+    name is near.
     """
-    fields = model.model_fields
-    try:
-        given = table(raw, origin, path)
-    except BadInput as error:
-        faults.add(error)
-        return _right({}, model).model_copy(update=dict.fromkeys(fields, math.nan))
-    known = {name: value for name, value in given.items() if name in fields}
-    meant = {nearest(name, fields, given) for name in given if name not in fields} - {"", *known}
-    wrong = dict.fromkeys(meant, math.nan)
-    _all_known(given, fields, "key", origin, path, faults)
-    try:
-        found = model.model_validate(known)
-    except ValidationError as error:
-        for each in error.errors(include_url=False):
-            name = str(each["loc"][0])
-            if each["type"] != "missing" or len(each["loc"]) > 1 or name not in meant:
-                faults.add(invalid(each, model, origin, path))
-            wrong[name] = math.nan
-        found = _right({name: value for name, value in known.items() if name not in wrong}, model)
-    return found.model_copy(update=wrong) if wrong else found
-
-
-def _right(values: Mapping[str, Any], model: type[_Model]) -> _Model:
-    """Return values that can be read as their table, whatever else it requires."""
-    try:
-        return model.model_validate(values)
-    except ValidationError:
-        return cast(_Model, model.model_construct(**values))
-
-
-def problem(raw: object, jobs: JobNames, origin: str, faults: Faults) -> Problem:
-    """Return [problem], its name fit for a file name and its job one of `jobs`.
-
-    Where its job is none, the near one tells what else is wrong. Raises BadInput where none is near.
-    """
-    found = checked(Problem, raw, origin, "problem", faults)
-    if not isinstance(found.job, str):
+    faults, read = cursor.faults, cursor.record(Problem)
+    if not isinstance(read.job, str):
         raise faults.told()
-    if isinstance(found.name, str) and (not _NAME.fullmatch(found.name) or found.name.lower() in _TAKEN):
+    if isinstance(read.name, str) and (not _NAME.fullmatch(read.name) or read.name.lower() in _TAKEN):
         remedy = "Name it as a file could be named anywhere, such as beatup-wide"
         allowed = "up to 64 letters, digits, - and _, a letter or digit first, but for CON, NUL and the like"
-        faults.add(refusal("it is not a name", origin, "problem.name", found.name, allowed, remedy))
-    if found.job in jobs:
-        return found
-    faults.add(unknown("job", found.job, jobs.names(), origin, "problem.job"))
-    near = nearest(found.job, jobs.names(), least=SAME)
+        faults.add(cursor.at("name").fault("it is not a name", read.name, allowed, remedy))
+    if read.job in jobs:
+        return read
+    faults.add(cursor.at("job").unknown("job", read.job, jobs.names()))
+    near = nearest(read.job, jobs.names(), least=SAME)
     if not near:
         raise faults.told()
-    return found.model_copy(update={"job": near})
+    return read.model_copy(update={"job": near})
 
 
-def inner(raw: object, known: Collection[str], what: str, origin: str, path: str, faults: Faults) -> Mapping[str, Any]:
-    """Return a table of tables; one whose name nobody knows stands for the near one where that is not there.
-
-    what: what their names stand for.
-    """
-    with faults:
-        given = table(raw, origin, path)
-        _all_known(given, known, what, origin, path, faults)
-        meant = {nearest(name, known, given, SAME): values for name, values in given.items() if name not in known}
-        return meant | dict(given)
-    return {}
+def records(cursor: Cursor, models: Mapping[str, type[Table]], sort: str) -> dict[str, Table]:
+    """Tables inside a table, in the order of `models`; sort: what their names stand for."""
+    inner = cursor.subtables(models, sort)
+    return {name: inner[name].record(model) for name, model in models.items() if name in inner}
 
 
-def _all_known(
-    given: Collection[str], known: Collection[str], what: str, origin: str, path: str, faults: Faults
-) -> None:
-    for name in given:
-        if name not in known:
-            faults.add(unknown(what, name, known, origin, f"{path}.{name}", given=given))
-
-
-def named(
-    raw: object, models: Mapping[str, type[Table]], what: str, origin: str, path: str, faults: Faults
-) -> dict[str, Table]:
-    """Return the tables inside a table, in the order of `models`; what: what their names stand for."""
-    given = inner(raw, models, what, origin, path, faults)
-    return {
-        name: checked(model, given[name], origin, f"{path}.{name}", faults)
-        for name, model in models.items()
-        if name in given
-    }
-
-
-def effects(raw: object, schema: SceneSchema, origin: str, path: str, faults: Faults) -> dict[Effect, Table]:
-    """Return the effects whose tables stand in a table, in the order of the job, with their values."""
-    given = inner(raw, schema.effects, "effect", origin, path, faults)
-    found: dict[Effect, Table] = {}
+def effects(cursor: Cursor, schema: SceneSchema) -> dict[Effect, Table]:
+    """Effects whose tables stand in [effects] or [available], in the order of the job, with their values."""
+    inner = cursor.subtables(schema.effects, "effect")
+    read: dict[Effect, Table] = {}
     for name, effect in schema.effects.items():
-        if name not in given:
+        if name not in inner:
             continue
-        with faults:
+        place = inner[name]
+        with cursor.faults:
             if isinstance(effect, Event) and not schema.parts:
                 problem = f"effect {name} parts the output from the mechanism, which job {schema.name} cannot follow"
-                raise refusal(problem, origin, f"{path}.{name}", remedy="Take the table out")
+                raise place.fault(problem, remedy="Take the table out")
             if not effect.many:
-                found[effect] = _checked_effect(effect, given[name], origin, f"{path}.{name}", faults)
+                read[effect] = _effect(effect, place)
                 continue
-            instances = dict(table(given[name], origin, f"{path}.{name}"))
-            if effect.alone and not all(isinstance(values, Mapping) for values in instances.values()):
-                own = {key: instances.pop(key) for key in list(instances) if not isinstance(instances[key], Mapping)}
-                found[effect.alone] = _checked_effect(effect.alone, own, origin, f"{path}.{name}", faults)
-            for each, values in instances.items():
-                key = f"{path}.{name}.{each}"
-                found[instance(effect, each)] = _checked_effect(effect, values, origin, key, faults)
-    return found
+            tables = dict(place.table())
+            if effect.alone and not all(isinstance(values, Mapping) for values in tables.values()):
+                single = {key: tables.pop(key) for key in list(tables) if not isinstance(tables[key], Mapping)}
+                read[effect.alone] = _effect(effect.alone, place._replace(raw=single))
+            for key in tables:
+                read[instance(effect, key)] = _effect(effect, place.at(key))
+    return read
 
 
-def _checked_effect(effect: Effect, raw: object, origin: str, path: str, faults: Faults) -> Table:
-    """Return an effect's table: of one that may be a curve of one's own either that, or what it stands for."""
-    found = checked(effect.own, raw, origin, path, faults)
+def _effect(effect: Effect, cursor: Cursor) -> Table:
+    """Table of an effect; one that may be given as a curve has either the curve or the numbers in its place."""
+    read = cursor.record(effect.own)
     curve = effect.tabulated if isinstance(effect, Load) else None
     if curve is None:
-        return found
-    if getattr(found, curve.key) is None:
+        return read
+    if getattr(read, curve.key) is None:
         for key in required(effect):
-            if getattr(found, key) is None:
-                raise missing(effect.own, origin, path, key)
-        return found
-    others = [key for key in curve.instead if key in found.model_fields_set]
+            if getattr(read, key) is None:
+                raise cursor.missing(effect.own, key)
+        return read
+    others = [key for key in curve.instead if key in read.model_fields_set]
     if others:
         problem = f"{curve.key} and {', '.join(others)} say the same twice"
-        raise refusal(problem, origin, f"{path}.{curve.key}", remedy=f"Take {curve.key} out, or {', '.join(others)}")
-    return found
+        raise cursor.at(curve.key).fault(problem, remedy=f"Take {curve.key} out, or {', '.join(others)}")
+    return read
 
 
-def demand(
-    schema: SceneSchema, tables: Mapping[str, Table], active: Mapping[Effect, Table], origin: str, faults: Faults
+def check_needs(
+    scene: Cursor, schema: SceneSchema, tables: Mapping[str, Table], active: Mapping[Effect, Table]
 ) -> None:
-    """Find where an active effect, or the job, needs a number that is not given, and effects that cannot be on."""
+    """Add a mistake for every number that an active effect or the job lacks, and for effects that cannot be on."""
+    faults = scene.faults
     needs = [(key, f"job {schema.name}") for key in schema.needs]
     needs += [(key, f"effect {effect.name}") for effect, own in active.items() for key in needed(effect, own)]
     first = dict(reversed(needs))
     for key in dict.fromkeys(key for key, _ in needs):
         path, name = key.split(".")
         if getattr(tables[path], name) is None:
-            faults.add(missing(type(tables[path]), origin, path, name, f"{first[key]} needs it"))
-    own = tables["mechanism"]
+            faults.add(scene.at(path).missing(type(tables[path]), name, f"{first[key]} needs it"))
+    mechanism, place = tables["mechanism"], scene.at("mechanism")
     for key, others in schema.instead.items():
-        given = [name for name in others if getattr(own, name) is not None]
-        if getattr(own, key) is None:
+        given = [name for name in others if getattr(mechanism, name) is not None]
+        if getattr(mechanism, key) is None:
             for name in others:
                 if name not in given:
-                    faults.add(missing(type(own), origin, "mechanism", name))
+                    faults.add(place.missing(type(mechanism), name))
         elif given:
             problem = f"{key} and {', '.join(given)} say the same twice"
-            remedy = f"Take {key} out, or {', '.join(given)}"
-            faults.add(refusal(problem, origin, f"mechanism.{key}", remedy=remedy))
-    for effect, own_values in active.items():
-        _modelled(effect, own_values, origin, faults)
-    if any(effect.beside or effect.clashes for effect in active):
-        _combined(active, origin, faults)
+            faults.add(place.at(key).fault(problem, remedy=f"Take {key} out, or {', '.join(given)}"))
     for effect, own in active.items():
-        if any(value != value for _, value in own):  # what it is known in is not known
+        _check_model(scene.at("effects").at(effect.name), effect, own)
+    if any(effect.beside or effect.clashes for effect in active):
+        _check_together(scene.at("effects"), active)
+    for effect, own in active.items():
+        if any(value != value for _, value in own):  # where it is known depends on a value that cannot be read
             continue
         words = {key: value for key, value in own if isinstance(value, str)}
         if isinstance(effect, Load) and effect.known_in(words) and not schema.partly_known:
             problem = f"effect {effect.name} is known in part of the cycle only, which job {schema.name} cannot judge"
             remedy = "Take it off, or choose other values"
-            faults.add(refusal(problem, origin, f"effects.{effect.name}", remedy=remedy))
+            faults.add(scene.at("effects").at(effect.name).fault(problem, remedy=remedy))
 
 
-def _modelled(effect: Effect, own: Table, origin: str, faults: Faults) -> None:
-    """Find where an effect lacks a number of its model, or has one of another."""
-    path, found = f"effects.{effect.name}", model_of(effect, own)
-    for key in found.keys:
+def _check_model(cursor: Cursor, effect: Effect, own: Table) -> None:
+    """Add a mistake where an effect lacks a number of its model, or has one of another model."""
+    model = model_of(effect, own)
+    for key in model.keys:
         if getattr(own, key) is None:
-            faults.add(missing(effect.own, origin, path, key))
+            cursor.faults.add(cursor.missing(effect.own, key))
     for word, other in effect.models.items():
-        for key in set(other.keys) - {*found.keys, *found.may}:
+        for key in set(other.keys) - {*model.keys, *model.may}:
             if getattr(own, key) is not None:
-                problem, remedy = f"{key} is of model {word}", f'Write model = "{word}", or take {key} out'
-                faults.add(refusal(problem, origin, f"{path}.{key}", remedy=remedy))
+                remedy = f'Write model = "{word}", or take {key} out'
+                cursor.faults.add(cursor.at(key).fault(f"{key} is of model {word}", remedy=remedy))
 
 
-def _combined(active: Mapping[Effect, Table], origin: str, faults: Faults) -> None:
-    """Find effects that cannot be on together."""
-    from loomopt.physics.effects.kinds import faults as combined
+def _check_together(cursor: Cursor, active: Mapping[Effect, Table]) -> None:
+    """Add a mistake for every pair of effects that cannot be on together."""
+    from loomopt.physics.effects import kinds
 
-    for fault in combined(active):
+    for fault in kinds.faults(active):
         remedy = f"Add [effects.{fault.other}], or take {fault.effect.name} off"
         remedy = remedy if fault.missing else f"Take one of them off (--without {fault.other})"
-        faults.add(refusal(fault.problem, origin, f"effects.{fault.effect.name}", remedy=remedy))
+        cursor.faults.add(cursor.at(fault.effect.name).fault(fault.problem, remedy=remedy))
 
 
 def places(
@@ -419,95 +334,111 @@ def _parted(name: str, value: object, known: Collection[str], begun: Collection[
         yield from _parted(f"{name}.{key}", value[key], known, begun)
 
 
-def bounds(raw: object, schema: SceneSchema, known: list[Place], origin: str, faults: Faults) -> dict[str, Bound]:
-    """Return [bounds]; known: places of the scene's numbers, any of which may be bounded.
+def labelled(cursor: Cursor, known: Iterable[str]) -> dict[str, Cursor]:
+    """Entries of a table whose keys are labels: see `flat`; known: the labels. Raises BadInput."""
+    return cursor.entries(flat(cursor.table(), known))
 
-    A bound on a number of an effect that is off waits for it: it is checked and left out.
+
+def bounds(cursor: Cursor, schema: SceneSchema, known: list[Place]) -> dict[str, Bound]:
+    """Table [bounds]; known: places of the scene's numbers, any of which may be bounded.
+
+    The bound of a number of an effect that is off is checked and left out.
     """
-    found = {}
-    given_bounds: dict[str, Any] = {}
-    with faults:
+    read: dict[str, Bound] = {}
+    entries: dict[str, Any] = {}
+    with cursor.faults:
         labels = {f"{place.table}.{place.key}".removeprefix("effects."): place.label for place in known}
-        whole = flat(table(raw, origin, "bounds"), [*schema.variables, *labels, *labels.values()])
-        for name, value in whole.items():
-            called = name if name in schema.variables else labels.get(name, name)
-            given_bounds[called] = _together(given_bounds.get(called), value)
-    missed = {fault.key for fault in faults.found}
-    for name, each in given_bounds.items():
-        if f"mechanism.{name}" in missed:
+        for name, value in flat(cursor.table(), [*schema.variables, *labels, *labels.values()]).items():
+            label = name if name in schema.variables else labels.get(name, name)
+            entries[label] = _together(entries.get(label), value)
+    misread = {fault.key for fault in cursor.faults.found}
+    for name, place in cursor.entries(entries).items():
+        if f"mechanism.{name}" in misread:
             continue
-        with faults:
-            waiting = [p for p in known if p.label == name and p.waits]
-            given = any(place.label == name and place.given for place in known)
-            key = f"bounds.{name}"
-            quantity = waiting[0].quantity if waiting and not given else bounded(name, schema, known, origin, key)
-            bound = _bound(each, quantity, origin, key)
-            if given or not waiting:
-                found[name] = bound
-    return found
+        with cursor.faults:
+            quantity, counts = number_or_waiting(place, schema, known)
+            bound = _bound(place, quantity)
+            if counts:
+                read[name] = bound
+    return read
 
 
-def bounded(
-    name: str, schema: SceneSchema, known: list[Place], origin: str, key: str, what: str = "number to bound"
-) -> Quantity:
-    """Return what a number to bound may be: a design variable, or the one number of that name; what: it is for.
+def number_or_waiting(
+    cursor: Cursor, schema: SceneSchema, known: Sequence[Place], sort: str = "number to bound"
+) -> tuple[Quantity, bool]:
+    """What the number of a label may be, and whether it counts: that of an effect that is off does not yet.
 
     Raises BadInput.
     """
-    found = [place for place in known if place.label == name]
-    given = [place for place in found if place.given]
+    label = cursor.label
+    waiting = [place for place in known if place.waits and place.label == label]
+    if waiting and not any(place.label == label and place.given for place in known):
+        return waiting[0].quantity, False
+    return quantity_of_label(cursor, schema, known, sort), True
+
+
+def quantity_of_label(
+    cursor: Cursor, schema: SceneSchema, known: Sequence[Place], sort: str = "number to bound"
+) -> Quantity:
+    """What a design variable, or the one number that is called so, may be; sort: what the label stands for.
+
+    Raises BadInput.
+    """
+    name, key = cursor.label, cursor.path
+    places = [place for place in known if place.label == name]
+    given = [place for place in places if place.given]
     if name in schema.variables:
         kind = Quantity(schema.variables[name])
-        return next((place.quantity for place in found if place.table == "mechanism"), kind)
-    if not found:
+        return next((place.quantity for place in places if place.table == "mechanism"), kind)
+    if not places:
         names = [*schema.variables, *sorted({place.label for place in known if place.given} - set(schema.variables))]
-        raise unknown(what, name, names, origin, key)
+        raise cursor.unknown(sort, name, names)
     if not given:
-        where = " or ".join(f"{place.table}.{place.key}" for place in found)
-        raise refusal(f"{name} has no value in this scene", origin, key, remedy=f"Give {where}, or take {key} out")
+        where = " or ".join(f"{place.table}.{place.key}" for place in places)
+        raise cursor.fault(f"{name} has no value in this scene", remedy=f"Give {where}, or take {key} out")
     if len(given) > 1:
         where = ", ".join(f"{place.table}.{place.key}" for place in given)
-        raise refusal(f"{name} may mean {where}", origin, key, remedy=f"Take {key} out")
+        raise cursor.fault(f"{name} may mean {where}", remedy=f"Take {key} out")
     return given[0].quantity
 
 
-def _bound(raw: object, quantity: Quantity, origin: str, key: str) -> Bound:
+def _bound(cursor: Cursor, quantity: Quantity) -> Bound:
+    """One bound: a value that fixes the number, or a table of its ends. Raises BadInput."""
+    raw, key = cursor.raw, cursor.path
     if not isinstance(raw, Mapping):
-        value = _value(quantity, raw, origin, key)
+        value = cursor.number(quantity)
         return Bound(value, value, True, _unit(raw))
-    faults = Faults()
-    _all_known(raw, ("min", "max", "free"), "key", origin, key, faults)
+    cursor = cursor.apart()
+    cursor.check_keys(raw, ("min", "max", "free"))
     given = raw.get("free", True)
     free = {"true": True, "false": False}.get(given.lower()) if isinstance(given, str) else given
     if not isinstance(free, bool):
         problem, allowed = "it is neither true nor false", "true, false"
-        faults.add(refusal(problem, origin, f"{key}.free", raw["free"], allowed, "Correct the value"))
-    found = _ends(raw, [end for end in ("min", "max") if end in raw], quantity, origin, key, faults)
+        cursor.faults.add(cursor.at("free").fault(problem, given, allowed, "Correct the value"))
+    ends = _ends(cursor, [end for end in ("min", "max") if end in raw], quantity)
     for end in ("min", "max"):
         if end not in raw and not any(nearest(name, (end,), least=SAME) for name in raw):
-            remedy = f"Give min and max of {key}, or one value to fix it"
             problem = f"{end} is missing: a bound has two ends"
-            faults.add(refusal(problem, origin, f"{key}.{end}", remedy=remedy, grade=GAP))
-    faults.tell()
-    return Bound(found["min"], found["max"], free is True, _unit(raw["min"]))
+            remedy = f"Give min and max of {key}, or one value to fix it"
+            cursor.faults.add(cursor.at(end).fault(problem, remedy=remedy, grade=GAP))
+    cursor.faults.tell()
+    return Bound(ends["min"], ends["max"], free is True, _unit(raw["min"]))
 
 
-def limits(
-    raw: object, schema: SceneSchema, active: Sequence[Effect], origin: str, faults: Faults
-) -> dict[str, LimitRange]:
-    """Return [limits]: figures of the job, and of the effects that are on."""
-    given_limits: Mapping[str, Any] = {}
+def limits(cursor: Cursor, schema: SceneSchema, active: Collection[Effect]) -> dict[str, LimitRange]:
+    """Table [limits]: figures of the job, and of the effects that are on."""
+    faults, inner = cursor.faults, dict[str, Cursor]()
     with faults:
-        given_limits = flat(table(raw, origin, "limits"), schema.figures)
+        inner = labelled(cursor, schema.figures)
     limitable = [name for name, figure in schema.figures.items() if figure.sides]
-    for name in (name for name in given_limits if name in schema.figures and name not in limitable):
-        problem, remedy = "this figure is told of a design, and no limit holds it", "Limit another, or take it out"
-        faults.add(refusal(problem, origin, f"limits.{name}", allowed=", ".join(limitable), remedy=remedy, grade=NAME))
-    strange = [name for name in given_limits if name not in schema.figures]
-    _all_known(strange, limitable, "figure to limit", origin, "limits", faults)
+    for name, place in inner.items():
+        if name in schema.figures and name not in limitable:
+            problem, remedy = "this figure is told of a design, and no limit holds it", "Limit another, or take it out"
+            faults.add(place.fault(problem, allowed=", ".join(limitable), remedy=remedy, grade=NAME))
+    cursor.check_keys([name for name in inner if name not in schema.figures], limitable, "figure to limit")
     on = {effect.name for effect in active}
-    found = {}
-    for name in (name for name in given_limits if name in limitable):
+    read = {}
+    for name in (name for name in inner if name in limitable):
         with faults:
             givers = [other for other, effect in schema.effects.items() if name in _told_by(effect)]
             if givers and not on.intersection(givers):
@@ -516,61 +447,50 @@ def limits(
                 )
                 problem = f"{off} gives {name}" if len(givers) == 1 else f"{off} each of them gives {name}"
                 remedy = f"Put {' or '.join(givers)} on, or take the limit out"
-                raise refusal(problem, origin, f"limits.{name}", remedy=remedy)
-            found[name] = _limit(given_limits[name], schema.figures[name], name, origin)
-    return found
+                raise inner[name].fault(problem, remedy=remedy)
+            read[name] = _limit(inner[name], schema.figures[name])
+    return read
 
 
 def _told_by(effect: Effect) -> Collection[str]:
-    """Return the figures that an effect gives by rows or over the cycle."""
+    """Figures that an effect gives by rows or over the cycle."""
     if isinstance(effect, Check):
         return {*effect.over_cycle, *effect.rows}
     return effect.rows if isinstance(effect, Speed) else ()
 
 
-def _limit(raw: object, figure: Figure, name: str, origin: str) -> LimitRange:
-    key = f"limits.{name}"
-    sides = " and ".join(figure.sides)
+def _limit(cursor: Cursor, figure: Figure) -> LimitRange:
+    """One limit of a figure. Raises BadInput."""
+    raw, sides = cursor.raw, " and ".join(figure.sides)
     if not isinstance(raw, Mapping):
-        remedy = f"Write a table with {sides}"
-        raise refusal("it is not a table", origin, key, raw, f"a table with {sides}", remedy)
+        raise cursor.fault("it is not a table", raw, f"a table with {sides}", f"Write a table with {sides}")
     if not raw:
-        raise refusal("the limit is empty", origin, key, allowed=sides, remedy="Give a side, or take the limit out")
-    faults = Faults()
-    _all_known(raw, ("min", "max"), "key", origin, key, faults)
+        raise cursor.fault("the limit is empty", allowed=sides, remedy="Give a side, or take the limit out")
+    cursor = cursor.apart()
+    cursor.check_keys(raw, ("min", "max"))
     given = [side for side in raw if side in ("min", "max")]
     for side in given:
         if side not in figure.sides:
-            problem, remedy = f"{name} has no limit {side}", f"Limit its {sides}"
-            faults.add(refusal(problem, origin, f"{key}.{side}", raw[side], sides, remedy))
-    given = [side for side in given if side in figure.sides]
-    found = _ends(raw, given, Quantity(figure.kind), origin, key, faults)
-    faults.tell()
-    return LimitRange(found.get("min"), found.get("max"), _unit(next(iter(raw.values()))))
+            problem, remedy = f"{figure.name} has no limit {side}", f"Limit its {sides}"
+            cursor.faults.add(cursor.at(side).fault(problem, raw[side], sides, remedy))
+    ends = _ends(cursor, [side for side in given if side in figure.sides], Quantity(figure.kind))
+    cursor.faults.tell()
+    return LimitRange(ends.get("min"), ends.get("max"), _unit(next(iter(raw.values()))))
 
 
-def _ends(
-    raw: Mapping[str, Any], given: Iterable[str], quantity: Quantity, origin: str, key: str, faults: Faults
-) -> dict[str, float]:
-    """Return the ends of a range that are given, in order."""
-    found = {}
+def _ends(cursor: Cursor, given: Iterable[str], quantity: Quantity) -> dict[str, float]:
+    """Ends of a range that are given, in order."""
+    ends = {}
     for end in given:
-        with faults:
-            found[end] = _value(quantity, raw[end], origin, f"{key}.{end}")
-    if len(found) == 2 and found["min"] > found["max"]:
-        ends = f"min {shown(raw['min'])}, max {shown(raw['max'])}"
-        problem, remedy = f"min is more than max ({ends})", "Exchange or correct them"
-        faults.add(refusal(problem, origin, key, allowed="min <= max", remedy=remedy))
-    return found
-
-
-def _value(quantity: Quantity, raw: object, origin: str, key: str) -> float:
-    try:
-        return quantity.validate(raw)
-    except QuantityError as error:
-        raise misread(error, origin, key, raw) from None
+        with cursor.faults:
+            ends[end] = cursor.at(end).number(quantity)
+    if len(ends) == 2 and ends["min"] > ends["max"]:
+        low, high = (shown(cursor.at(end).raw) for end in ("min", "max"))
+        problem = f"min is more than max (min {low}, max {high})"
+        cursor.faults.add(cursor.fault(problem, allowed="min <= max", remedy="Exchange or correct them"))
+    return ends
 
 
 def _unit(raw: object) -> str:
-    """Return the unit of a value that has been read."""
+    """Unit of a value that has been read."""
     return unit_of(raw) if isinstance(raw, str) else "1"

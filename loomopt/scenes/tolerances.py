@@ -5,11 +5,11 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from loomopt.base.errors import Faults, misread, nearest, refusal, unknown
+from loomopt.base.errors import refusal
 from loomopt.base.quantities import NUMBER_PATTERN, Quantity
-from loomopt.base.units import QuantityError
 from loomopt.scenes import iso_fits, tolerance_classes
-from loomopt.scenes.tables import Place, SceneSchema, bounded, flat, table
+from loomopt.scenes.cursor import Cursor
+from loomopt.scenes.tables import Place, SceneSchema, labelled, number_or_waiting
 
 SIGMAS = 3.0
 """Standard deviations that a plus_minus is worth where nothing is said."""
@@ -70,145 +70,122 @@ class Tolerance(NamedTuple):
         return self.plus_minus(nominal) * (UNIFORM if self.uniform else 1 / self.sigmas)
 
 
-def read(
-    raw: object, schema: SceneSchema, known: Sequence[Place], origin: str, faults: Faults
-) -> tuple[Tolerance, ...]:
-    """Return [tolerances]; known: places of the scene's numbers, any of which may have one.
+def read(cursor: Cursor, schema: SceneSchema, known: Sequence[Place]) -> tuple[Tolerance, ...]:
+    """Table [tolerances]; known: places of the scene's numbers, any of which may have one.
 
-    That of a number of an effect that is off waits for it: it is checked and left out.
+    The tolerance of a number of an effect that is off is checked and left out.
     """
     found = []
-    with faults:
-        given = flat(table(raw, origin, "tolerances"), [*schema.variables, *(place.label for place in known)])
-        for name, each in given.items():
-            with faults:
-                key = f"tolerances.{name}"
-                waiting = [place for place in known if place.label == name and place.waits]
-                there = any(place.label == name and place.given for place in known)
-                what = "number with a tolerance"
-                quantity = (
-                    waiting[0].quantity
-                    if waiting and not there
-                    else bounded(name, schema, list(known), origin, key, what)
-                )
-                made = _tolerance(name, each, quantity, origin, key)
-                if there or not waiting:
-                    found.append(made)
+    with cursor.faults:
+        labels = [*schema.variables, *(place.label for place in known)]
+        for place in labelled(cursor, labels).values():
+            with cursor.faults:
+                quantity, counts = number_or_waiting(place, schema, known, "number with a tolerance")
+                tolerance = _tolerance(place, quantity)
+                if counts:
+                    found.append(tolerance)
     return tuple(found)
 
 
-def accepted(raw: object, schema: SceneSchema, origin: str, faults: Faults) -> dict[str, float]:
-    """Return [accept]: half the band around an equality or a goal by which machines are judged, SI, by figure."""
+def bands(cursor: Cursor, schema: SceneSchema) -> dict[str, float]:
+    """Table [accept]: half the band around an equality or a goal by which machines are judged, SI, by figure."""
     found: dict[str, float] = {}
-    with faults:
-        given = flat(table(raw, origin, "accept"), schema.figures)
-        for name, each in given.items():
-            with faults:
+    with cursor.faults:
+        inner = labelled(cursor, schema.figures)
+        for name, place in inner.items():
+            with cursor.faults:
                 if name not in schema.figures:
-                    raise unknown("figure", name, schema.figures, origin, f"accept.{name}", given=given)
-                quantity = Quantity(schema.figures[name].kind, above=0)
-                found[name] = _number(each, origin, f"accept.{name}", quantity)
+                    raise place.unknown("figure", name, schema.figures, given=inner)
+                found[name] = place.number(Quantity(schema.figures[name].kind, above=0))
     return found
 
 
-def _tolerance(name: str, raw: object, quantity: Quantity, origin: str, key: str) -> Tolerance:
-    """Return the tolerance of one number. Raises BadInput."""
-    given = raw if isinstance(raw, Mapping) else {"plus_minus": raw}
-    for each in given:
-        if each not in KEYS:
-            raise unknown("key", each, KEYS, origin, f"{key}.{each}", given=given)
-    forms = [each for each in FORMS if each in given]
+def _tolerance(cursor: Cursor, quantity: Quantity) -> Tolerance:
+    """Tolerance of one number. Raises BadInput."""
+    given = cursor.raw if isinstance(cursor.raw, Mapping) else {"plus_minus": cursor.raw}
+    cursor = cursor._replace(raw=given)
+    for key in given:
+        if key not in KEYS:
+            raise cursor.at(key).unknown("key", key, KEYS, given=given)
+    forms = [form for form in FORMS if form in given]
     if len(forms) != 1:
         problem = f"{' and '.join(forms)} say the same twice" if forms else "plus_minus is missing"
-        raise refusal(problem, origin, key, remedy=f'Give one of {", ".join(FORMS)}, such as plus_minus = "0.06 mm"')
+        raise cursor.fault(problem, remedy=f'Give one of {", ".join(FORMS)}, such as plus_minus = "0.06 mm"')
     if ("plus" in given) != ("minus" in given):
         lacking = "minus" if "plus" in given else "plus"
         problem = f"{lacking} is missing: plus and minus together are the band"
-        raise refusal(problem, origin, f"{key}.{lacking}", remedy=f'Give {lacking} = "0" where there is none')
+        raise cursor.at(lacking).fault(problem, remedy=f'Give {lacking} = "0" where there is none')
     share, below, above, standard = False, 0.0, 0.0, ""
     if "class" in given:
-        standard = _standard(given["class"], quantity, origin, f"{key}.class")
+        standard = _standard(cursor.at("class"), quantity)
     elif "fit" in given:
-        standard = _fit(given["fit"], quantity, origin, f"{key}.fit")
+        standard = _fit(cursor.at("fit"), quantity)
     elif "plus" in given:
-        (of_above, above), (of_below, below) = (
-            _deviation(given[side], quantity, origin, f"{key}.{side}") for side in ("plus", "minus")
+        (above_is_share, above), (below_is_share, below) = (
+            _deviation(cursor.at(side), quantity) for side in ("plus", "minus")
         )
-        share = of_above or of_below
-        if (share and not (of_above or above == 0.0)) or (share and not (of_below or below == 0.0)):
+        share = above_is_share or below_is_share
+        if share and not ((above_is_share or above == 0.0) and (below_is_share or below == 0.0)):
             problem = "one side is a share of the nominal and the other is none"
-            raise refusal(problem, origin, key, remedy="Write both in % or both in a unit")
+            raise cursor.fault(problem, remedy="Write both in % or both in a unit")
         if above + below < 0.0:
             problem = "the upper end of the band lies below its lower end"
-            raise refusal(problem, origin, key, remedy="Write plus and minus so that plus + minus is not negative")
+            raise cursor.fault(problem, remedy="Write plus and minus so that plus + minus is not negative")
     else:
-        share, above = _half(given["plus_minus"], quantity, origin, f"{key}.plus_minus")
+        share, above = _half(cursor.at("plus_minus"), quantity)
         below = above
-    spread = _one_of(given.get("spread", SPREADS[0]), SPREADS, origin, f"{key}.spread")
+    spread = cursor.at("spread").word(SPREADS, "spread") if "spread" in given else SPREADS[0]
     if spread == "uniform" and "sigmas" in given:
         problem = "a uniform spread has no sigmas: its band is all there is"
-        raise refusal(problem, origin, f"{key}.sigmas", remedy="Take sigmas out")
-    sigmas = _number(given.get("sigmas", SIGMAS), origin, f"{key}.sigmas", Quantity("number", above=0))
+        raise cursor.at("sigmas").fault(problem, remedy="Take sigmas out")
+    sigmas = cursor.at("sigmas").number(Quantity("number", above=0)) if "sigmas" in given else SIGMAS
     group = given.get("group", "")
     if not isinstance(group, str):
-        raise refusal("it is no name", origin, f"{key}.group", group, remedy='Write group = "machine"')
+        raise cursor.at("group").fault("it is no name", group, remedy='Write group = "machine"')
     if bool(group) != ("correlation" in given):
         lacking = "correlation" if group else "group"
         problem = f"{lacking} is missing: numbers of one group are correlated"
-        raise refusal(problem, origin, f"{key}.{lacking}", remedy='Give group = "machine" and correlation = 0.5')
-    ends = Quantity("number", least=0)
-    correlation = _number(given.get("correlation", 0.0), origin, f"{key}.correlation", ends)
+        raise cursor.at(lacking).fault(problem, remedy='Give group = "machine" and correlation = 0.5')
+    place = cursor.at("correlation")
+    correlation = place.number(Quantity("number", least=0)) if "correlation" in given else 0.0
     if correlation > 1.0:
-        raise refusal("it is more than 1", origin, f"{key}.correlation", correlation, "0 to 1", "Correct the value")
-    return Tolerance(name, below, above, share, standard, sigmas, spread == "uniform", group, correlation)
+        raise place.fault("it is more than 1", correlation, "0 to 1", "Correct the value")
+    return Tolerance(cursor.label, below, above, share, standard, sigmas, spread == "uniform", group, correlation)
 
 
-def _half(raw: object, quantity: Quantity, origin: str, key: str) -> tuple[bool, float]:
-    """Return whether a half width is a share of the nominal, and it, SI or as a share."""
+def _half(cursor: Cursor, quantity: Quantity) -> tuple[bool, float]:
+    """Whether a half width is a share of the nominal, and the half width, SI or as a share."""
+    percent = _PERCENT.fullmatch(cursor.raw) if isinstance(cursor.raw, str) else None
+    if percent:
+        return True, cursor._replace(raw=percent[1]).number(Quantity("number", least=0)) / 100
+    return False, cursor.number(Quantity(quantity.kind, least=0))
+
+
+def _deviation(cursor: Cursor, quantity: Quantity) -> tuple[bool, float]:
+    """Whether an end of a band is a share of the nominal, and the end, SI or as a share; a bare 0 needs no unit."""
+    raw = cursor.raw
     percent = _PERCENT.fullmatch(raw) if isinstance(raw, str) else None
     if percent:
-        return True, _number(percent[1], origin, key, Quantity("number", least=0)) / 100
-    return False, _number(raw, origin, key, Quantity(quantity.kind, least=0))
-
-
-def _deviation(raw: object, quantity: Quantity, origin: str, key: str) -> tuple[bool, float]:
-    """Return whether an end of a band is a share of the nominal, and it, SI or as a share; a bare 0 needs no unit."""
-    percent = _PERCENT.fullmatch(raw) if isinstance(raw, str) else None
-    if percent:
-        return True, _number(percent[1], origin, key, Quantity("number")) / 100
+        return True, cursor._replace(raw=percent[1]).number(Quantity("number")) / 100
     if raw == 0 or (isinstance(raw, str) and raw.strip() in ("0", "+0", "-0", "0.0")):
         return False, 0.0
-    return False, _number(raw, origin, key, Quantity(quantity.kind))
+    return False, cursor.number(Quantity(quantity.kind))
 
 
-def _number(raw: object, origin: str, key: str, quantity: Quantity) -> float:
-    try:
-        return quantity.validate(raw)
-    except QuantityError as error:
-        raise misread(error, origin, key, raw) from None
-
-
-def _one_of(raw: object, known: tuple[str, ...], origin: str, key: str) -> str:
-    if raw in known:
-        return str(raw)
-    near = nearest(raw, known) if isinstance(raw, str) else ""
-    remedy = f'Perhaps "{near}" is meant' if near else "Choose one of them"
-    raise refusal("there is no such word here", origin, key, raw, ", ".join(known), remedy)
-
-
-def _standard(raw: object, quantity: Quantity, origin: str, key: str) -> str:
+def _standard(cursor: Cursor, quantity: Quantity) -> str:
     if quantity.kind != "length":
         problem = f"classes are of lengths, and this is of kind {quantity.kind}"
-        raise refusal(problem, origin, key, raw, remedy="Give plus_minus instead")
-    return _one_of(raw, tolerance_classes.CLASSES, origin, key)
+        raise cursor.fault(problem, cursor.raw, remedy="Give plus_minus instead")
+    return cursor.word(tolerance_classes.CLASSES, "tolerance class")
 
 
-def _fit(raw: object, quantity: Quantity, origin: str, key: str) -> str:
+def _fit(cursor: Cursor, quantity: Quantity) -> str:
+    raw = cursor.raw
     if quantity.kind != "length":
         problem = f"fits are of lengths, and this is of kind {quantity.kind}"
-        raise refusal(problem, origin, key, raw, remedy="Give plus and minus instead")
+        raise cursor.fault(problem, raw, remedy="Give plus and minus instead")
     if not isinstance(raw, str) or iso_fits.parted(raw) is None:
         allowed = f"a letter of {' '.join(iso_fits.LETTERS)} with a grade of {iso_fits.LEAST_GRADE} to "
         allowed += f"{iso_fits.MOST_GRADE}, k m n K M N to 8"
-        raise refusal("unknown tolerance class", origin, key, raw, allowed, 'Write fit = "H7", or plus and minus')
+        raise cursor.fault("unknown tolerance class", raw, allowed, 'Write fit = "H7", or plus and minus')
     return raw

@@ -2,9 +2,10 @@
 
 import pytest
 
-from loomopt.base.errors import BadInput, Faults
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
-from loomopt.scenes import tables, tolerances
+from loomopt.scenes import tolerances
+from loomopt.scenes.scene import cursor, places
 from loomopt.scenes.tolerance_classes import plus_minus
 
 BEATUP = registry.load("beatup")
@@ -12,9 +13,7 @@ BEATUP = registry.load("beatup")
 
 def made(**given):
     scene = BEATUP.update({"tolerances": given})
-    on = dict(zip(scene.active, scene.effects.values(), strict=True))
-    known = list(tables.places(scene.schema, scene.tables, on, {}))
-    return {e.number: e for e in tolerances.read(scene.document["tolerances"], scene.schema, known, "", Faults())}
+    return {e.number: e for e in tolerances.read(cursor(scene).at("tolerances"), scene.schema, places(scene))}
 
 
 def test_half_widths_and_standard_deviations():

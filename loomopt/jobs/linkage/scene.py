@@ -576,7 +576,7 @@ def _check_targets(scene: Scene, known: Reading) -> None:
         key = f"targets.{name}"
         if name in scene.document.get("targets", {}) and not table.sought:
             faults.add(refusal("the target seeks nothing", scene.origin, key, remedy='Such as least = ["peak_torque"]'))
-        for figure, sense in table.sought:
+        for figure, sense in dict.fromkeys(table.sought):
             path_ = f"{key}.{'point' if figure == PATH else sense}"
             axis = axes_.get(figure)
             if figure not in (*axes_, *bounded):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput, Broken, Faults, refusal
+from loomopt.base.errors import BadInput, Broken, refusal
 from loomopt.base.records import freeze
 from loomopt.jobs import registry
 from loomopt.physics.effects.kinds import Effect, Event, Fault, Speed, State, faults, needed, required
@@ -19,7 +19,7 @@ from loomopt.scenes import designs
 from loomopt.scenes.document import looked_up, replaced
 from loomopt.scenes.numbers import files
 from loomopt.scenes.provenance import versions
-from loomopt.scenes.scene import Scene, build
+from loomopt.scenes.scene import Scene, build, cursor
 from loomopt.scenes.tables import effects as read
 from loomopt.solving import engine
 from loomopt.solving.answer.solution import Words
@@ -41,7 +41,7 @@ class Together(NamedTuple):
 
 def known(scene: Scene) -> dict[Effect, Table]:
     """Return the effects of [effects] and [available] with their values, in the order of the job."""
-    off = read(scene.document.get("available", {}), scene.schema, scene.origin, "available", Faults())
+    off = read(cursor(scene).at("available"), scene.schema)
     found = {**off, **dict(zip(scene.active, scene.effects.values(), strict=True))}
     order = list(scene.schema.effects)
     return dict(sorted(found.items(), key=lambda pair: (order.index(pair[0].path[0]), pair[0].name)))

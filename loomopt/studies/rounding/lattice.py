@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from loomopt.base.errors import Faults, refusal
+from loomopt.base.errors import refusal
 from loomopt.base.records import lazy
 from loomopt.base.units import SI_UNIT
 from loomopt.jobs import registry
@@ -30,7 +30,7 @@ from loomopt.model.session import working
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
 from loomopt.scenes import designs, numbers, sizes
-from loomopt.scenes.scene import Scene
+from loomopt.scenes.scene import Scene, cursor
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Rounded, Solution, Words, risen
 from loomopt.solving.options import check_sought, target_name
@@ -170,7 +170,7 @@ def _check_goals(asked: Asked, nominal: Solution, answer: Solution) -> None:
     from loomopt.scenes import tolerances
 
     scene = asked.scene
-    bands = tolerances.accepted(scene.document.get("accept", {}), scene.schema, scene.origin, Faults())
+    bands = tolerances.bands(cursor(scene).at("accept"), scene.schema)
     for goal in asked.program.goals:
         name, value = goal.figure, answer.figures.get(goal.figure)
         lost = nominal.reached.get(name) and not answer.reached.get(name)

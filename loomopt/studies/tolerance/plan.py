@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput, Faults, refusal
+from loomopt.base.errors import BadInput, refusal
 from loomopt.base.records import lazy
 from loomopt.jobs import registry
 from loomopt.jobs.base import EVERY, Job
@@ -20,8 +20,8 @@ from loomopt.model.program import Goal, Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE
-from loomopt.scenes import tables, tolerances
-from loomopt.scenes.scene import Scene
+from loomopt.scenes import tolerances
+from loomopt.scenes.scene import Scene, cursor, places
 from loomopt.scenes.tolerances import Tolerance
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Evaluated
@@ -36,9 +36,7 @@ ASSEMBLED = 1e-9
 
 def toleranced(scene: Scene) -> dict[str, Tolerance]:
     """Return how the numbers of a scene are made, by full name."""
-    on = dict(zip(scene.active, scene.effects.values(), strict=True))
-    known = list(tables.places(scene.schema, scene.tables, on, {}))
-    found = tolerances.read(scene.document.get("tolerances", {}), scene.schema, known, scene.origin, Faults())
+    found = tolerances.read(cursor(scene).at("tolerances"), scene.schema, places(scene))
     return {scene.full(each.number): each for each in found}
 
 
@@ -93,8 +91,7 @@ class Plan:
     @lazy
     def accepted(self) -> dict[str, float]:
         """Half the band by which machines are judged, SI, by figure."""
-        scene = self.scene
-        return tolerances.accepted(scene.document.get("accept", {}), scene.schema, scene.origin, Faults())
+        return tolerances.bands(cursor(self.scene).at("accept"), self.scene.schema)
 
     @lazy
     def full(self) -> dict[str, float]:

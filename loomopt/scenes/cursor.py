@@ -1,0 +1,199 @@
+"""Cursor on the raw tables of a scene: a value, the key under which it stands, and the mistakes found so far.
+
+Whoever reads a table gets a cursor. A mistake is built here, so that every message names file and key in one way.
+"""
+
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any, NamedTuple, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from loomopt.base import errors
+from loomopt.base.errors import GAP, NOTHING, SAME, VALUE, WHOLE, BadInput, Faults, nearest, refusal, shown
+from loomopt.base.quantities import Quantity, described, quantity_of
+from loomopt.base.units import QuantityError
+
+_Model = TypeVar("_Model", bound=BaseModel)
+_NAN = float("nan")
+_PROBLEMS = {
+    "dict_type": ("it is not a table", "a table"),
+    "model_type": ("it is not a table", "a table"),
+    "tuple_type": ("it is not a list", "a list"),
+    "list_type": ("it is not a list", "a list"),
+    "string_type": ("it is not text", "text in quotes"),
+    "bool_type": ("it is neither true nor false", "true, false"),
+    "bool_parsing": ("it is neither true nor false", "true, false"),
+    "int_type": ("it is not a whole number", "a whole number"),
+    "int_parsing": ("it is not a whole number", "a whole number"),
+    "int_parsing_size": ("it is not a whole number", "a whole number"),
+    "int_from_float": ("it is not a whole number", "a whole number"),
+    "greater_than": ("it is out of range", ""),
+    "greater_than_equal": ("it is out of range", ""),
+    "less_than": ("it is out of range", ""),
+    "less_than_equal": ("it is out of range", ""),
+    "finite_number": ("it is not a finite number", "a finite number"),
+    "string_pattern_mismatch": ("it is empty", "a name in quotes"),
+    "extra_forbidden": ("unknown key", ""),
+}
+"""Type of a pydantic error → the mistake in words, and what is allowed."""
+_LIMITS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
+"""pydantic's names of a field's limits → in words."""
+
+
+class Cursor(NamedTuple):
+    """A value of a file, and where it stands.
+
+    raw: the value as TOML or JSON gives it, None where there is none; path: its dotted key, "" for the whole file;
+    faults: the list of mistakes, which knows the name of the file.
+    """
+
+    raw: object
+    path: str
+    faults: Faults
+
+    def at(self, key: str | int) -> "Cursor":
+        """Cursor on an entry of the table, or of the list, whose places count from 1."""
+        path = f"{self.path}.{key}" if self.path else str(key)
+        raw = self.raw
+        if isinstance(key, int):
+            return Cursor(raw[key - 1] if isinstance(raw, list | tuple) else None, path, self.faults)
+        return Cursor(raw.get(key) if isinstance(raw, Mapping) else None, path, self.faults)
+
+    def entries(self, values: Mapping[str, object] | None = None) -> dict[str, "Cursor"]:
+        """Cursors on the entries of the table, or on other values of its keys, by key. Raises BadInput for no table."""
+        start = f"{self.path}." if self.path else ""
+        inner = self.table() if values is None else values
+        return {key: Cursor(value, f"{start}{key}", self.faults) for key, value in inner.items()}
+
+    def apart(self) -> "Cursor":
+        """The same place with an empty list of mistakes, for a reader that raises its mistakes all at once."""
+        return self._replace(faults=Faults(self.faults.file))
+
+    @property
+    def label(self) -> str:
+        """Key inside the outermost table: rod.m of bounds.rod.m."""
+        return self.path.partition(".")[2]
+
+    # Mistakes.
+
+    def fault(
+        self, problem: str, value: object = NOTHING, allowed: str = "", remedy: str = "", grade: int = VALUE
+    ) -> BadInput:
+        """Mistake at this place; value: what the message repeats, if anything; grade: how bad it is."""
+        return refusal(problem, self.faults.file, self.path, value, allowed, remedy, grade)
+
+    def unknown(
+        self,
+        sort: str,
+        name: str,
+        known: Iterable[str],
+        remedy: str = "Correct the name or take it out",
+        given: Collection[str] = (),
+    ) -> BadInput:
+        """Mistake of a name that nothing has; sort: what the name stands for; the rest as in `errors.unknown`."""
+        return errors.unknown(sort, name, known, self.faults.file, self.path, remedy, given)
+
+    def missing(self, model: type[BaseModel], key: str, reason: str = "") -> BadInput:
+        """Mistake of a table that lacks a key; reason: what needs the key."""
+        quantity = quantity_of(model, key)
+        allowed = described(quantity.kind) if quantity else "text"
+        problem = f"{key} is missing{': ' if reason else ''}{reason}"
+        return self.at(key).fault(problem, allowed=allowed, remedy=f"Add {key} to [{self.path}]", grade=GAP)
+
+    # Values.
+
+    def table(self) -> Mapping[str, Any]:
+        """The value as a table. Raises BadInput."""
+        if not isinstance(self.raw, Mapping):
+            raise self.fault("it is not a table", self.raw, "a table", f"Write a table [{self.path}]", WHOLE)
+        return self.raw
+
+    def number(self, quantity: Quantity) -> float:
+        """The value as a number of a quantity, SI. Raises BadInput."""
+        try:
+            return quantity.validate(self.raw)
+        except QuantityError as error:
+            raise errors.misread(error, self.faults.file, self.path, self.raw) from None
+
+    def word(self, known: Collection[str], sort: str) -> str:
+        """The value as one of the known words; sort: what they are. Raises BadInput."""
+        if not isinstance(self.raw, str) or self.raw not in known:
+            raise self.unknown(sort, self.raw if isinstance(self.raw, str) else shown(self.raw), known)
+        return self.raw
+
+    def check_keys(self, keys: Collection[str], known: Collection[str], sort: str = "key") -> None:
+        """Add a mistake for every key that is not known; sort: what the keys stand for."""
+        for key in keys:
+            if key not in known:
+                self.faults.add(self.at(key).unknown(sort, key, known, given=keys))
+
+    def subtables(self, known: Collection[str], sort: str) -> dict[str, "Cursor"]:
+        """Tables inside the table; an unknown name stands for the known one that is near and not there."""
+        with self.faults:
+            given = self.table()
+            self.check_keys(given, known, sort)
+            near = {nearest(name, known, given, SAME): values for name, values in given.items() if name not in known}
+            return self.entries(near | dict(given))
+        return {}
+
+    def record(self, model: type[_Model]) -> _Model:
+        """Table as its model, with NaN for what cannot be read.
+
+        An unknown key stands for the missing one of a near name: that is one mistake, not two.
+        """
+        fields = model.model_fields
+        try:
+            given = self.table()
+        except BadInput as error:
+            self.faults.add(error)
+            return _readable({}, model).model_copy(update=dict.fromkeys(fields, _NAN))
+        known = {name: value for name, value in given.items() if name in fields}
+        near = {nearest(name, fields, given) for name in given if name not in fields} - {"", *known}
+        unread = dict.fromkeys(near, _NAN)
+        self.check_keys(given, fields)
+        try:
+            read = model.model_validate(known)
+        except ValidationError as error:
+            for detail in error.errors(include_url=False):
+                name = str(detail["loc"][0])
+                if detail["type"] != "missing" or len(detail["loc"]) > 1 or name not in near:
+                    self.faults.add(self._invalid(detail, model))
+                unread[name] = _NAN
+            read = _readable({name: value for name, value in known.items() if name not in unread}, model)
+        return read.model_copy(update=unread) if unread else read
+
+    def _invalid(self, error: ErrorDetails, model: type[BaseModel]) -> BadInput:
+        """Mistake that pydantic finds in a table."""
+        # Places in a list count from 1, as a caller's keys do.
+        names = [str(name + 1 if isinstance(name, int) else name) for name in error["loc"]]
+        if error["type"] == "missing" and len(names) == 1:
+            return self.missing(model, names[0])
+        place, value = Cursor(error["input"], ".".join((self.path, *names)), self.faults), error["input"]
+        cause = error.get("ctx", {}).get("error")
+        if isinstance(cause, QuantityError):
+            return place.fault(cause.problem, value, cause.allowed, cause.remedy)
+        choices = str(error.get("ctx", {}).get("expected", "")).replace("'", '"')
+        if choices:
+            return place.fault("it is none of the known choices", value, choices, "Correct the value")
+        problem, allowed = _PROBLEMS.get(error["type"], (error["msg"], ""))
+        remedy = f"Write [{shown(value)}]" if allowed == "a list" and isinstance(value, str) else "Correct the value"
+        return place.fault(problem, value, _limits(model, names) or allowed, remedy)
+
+
+def _readable(values: Mapping[str, Any], model: type[_Model]) -> _Model:
+    """Record of values that can be read, whatever else the model requires."""
+    try:
+        return model.model_validate(values)
+    except ValidationError:
+        return model.model_construct(**values)
+
+
+def _limits(model: type[BaseModel], names: list[str]) -> str:
+    """Limits of a field in words; "" where it has none."""
+    field = model.model_fields.get(names[0]) if len(names) == 1 else None
+    if field is None:
+        return ""
+    limits = ((word, getattr(each, name, None)) for name, word in _LIMITS.items() for each in field.metadata)
+    words = [f"{word} {limit}" for word, limit in limits if limit is not None]
+    return ", ".join([*(["a whole number"] if field.annotation is int else []), *words])
