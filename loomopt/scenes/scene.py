@@ -12,7 +12,7 @@ from loomopt.base.records import Frozen, Shown, freeze, lazy
 from loomopt.base.units import show
 from loomopt.physics.effects.kinds import Effect, Load, label, owned, required
 from loomopt.physics.schema import Table
-from loomopt.scenes import display
+from loomopt.scenes import display, former_names
 from loomopt.scenes import tables as read
 from loomopt.scenes.cursor import Cursor
 from loomopt.scenes.document import Paths, copied, looked_up, removed, replaced
@@ -241,7 +241,8 @@ class Scene(Shown):
 
     def called(self, call: Call, own: Iterable[str] = ()) -> "Scene":
         """Return the scene with what a call changes; own: keys whose paths are the caller's, not the scene's."""
-        values = Frozen(copied(call.set, self.origin))
+        keys = {key: former_names.current_key(key, self.schema.former_names) for key in call.set}
+        values = Frozen({keys[key]: value for key, value in copied(call.set, self.origin).items()})
         document = self._off(self._on(self._set(values), call.on), call.off)
         told = self.call.then(replace(call, set=values, free=()))
         if document is not self.document:
@@ -328,7 +329,7 @@ class Scene(Shown):
 
     def without_limit(self, name: str, sides: Iterable[str]) -> "Scene":
         """Return the scene without these sides, "min" and "max", of a limit that it has."""
-        place = "limits", *name.split(".")
+        place = "limits", *former_names.current(name, self.schema.former_names).split(".")
         own = looked_up(self.document, place)
         left = set(own) - set(sides) if isinstance(own, Mapping) else set()
         document: Mapping[str, Any] = self.document
@@ -451,6 +452,9 @@ def _built(
     named = [name for table in ("effects", "available") if isinstance(raw[table], Mapping) for name in raw[table]]
     try:
         schema = jobs.schema(problem.job, original, named)
+        current = former_names.current_document(original, schema.former_names, origin)
+        if current is not original:
+            original, schema = current, jobs.schema(problem.job, current, named)
     except BadInput as error:
         faults.add(error.placed(origin, original))
         raise faults.told() from None

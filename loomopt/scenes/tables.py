@@ -36,6 +36,7 @@ class SceneSchema:
     instead: keys of [mechanism] → those that each stands for: a scene gives it, or them.
     own_axes: axes that are read otherwise than under their own name.
     conflict: the two axes whose front stands among the reference results, for the scene that is named after its job.
+    former_names: today's names of figures by their former ones.
     """
 
     name: str
@@ -58,6 +59,7 @@ class SceneSchema:
     tables: Mapping[str, Callable[[], dict[str, Any]]] = field(default_factory=dict)
     instead: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     conflict: Conflict | None = None
+    former_names: Mapping[str, str] = field(default_factory=dict)
 
     @lazy
     def figures(self) -> dict[str, Figure]:

@@ -19,6 +19,7 @@ from loomopt.model.program import Program
 from loomopt.model.session import current
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import designs, numbers
+from loomopt.scenes.former_names import current_key
 from loomopt.scenes.numbers import files, quantity
 from loomopt.scenes.provenance import versions
 from loomopt.scenes.scene import Scene
@@ -395,7 +396,8 @@ def planned(scene: Scene, over: Over, target: str | None = None, *, accuracy: fl
     if not over:
         remedy = 'Name a number and its values: --over "operation.speed=300:600:50 rpm"'
         raise refusal("there is nothing to sweep over", scene.origin, "over", remedy=remedy)
-    listed = {key: _values(given, key) for key, given in over.items()}
+    former = scene.schema.former_names
+    listed = {current_key(key, former): _values(given, key) for key, given in over.items()}
     for key, texts in listed.items():
         if not texts:
             raise refusal("there is no value to sweep over", scene.origin, key, remedy="Give one at least")

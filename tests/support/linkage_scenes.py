@@ -43,7 +43,7 @@ sweep = { min = "177.8 deg", max = "182.2 deg" }
 mu.beat = { min = "56.5 deg" }
 
 [targets]
-balance.least = ["force.front", "peak_torque"]
+balance.least = ["moment.front", "peak_torque"]
 torque.least = ["peak_torque"]
 """
 )

@@ -41,7 +41,7 @@ def document(numbers, parts, output, load, draw):
         },
         "tolerances": {name: f"{draw.choice([0.02, 0.05, 0.1])} mm" for name in numbers},
         "bounds": {"l1": {"min": f"{numbers['l1'] * 0.9:.2f} mm", "max": f"{numbers['l1'] * 1.1:.2f} mm"}},
-        "limits": {"force.front": {"max": "100 kN" if slides else "10 kN*m"}},
+        "limits": {"force.front": {"max": "100 kN"}} if slides else {"moment.front": {"max": "10 kN*m"}},
         "targets": {"torque": {"least": ["peak_torque"]}},
     }
 

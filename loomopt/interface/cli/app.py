@@ -33,6 +33,7 @@ from loomopt.interface.cli.commands import (
 from loomopt.interface.cli.shell import (
     DIFFERS,
     call_progress,
+    former_names_as_remarks,
     mistake,
     only,
     read_number,
@@ -276,7 +277,8 @@ def run(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     words = sys.argv[1:] if arguments is None else arguments
     try:
-        status = int(application(words)(words, standalone_mode=False, prog_name="loomopt") or 0)
+        with former_names_as_remarks():
+            status = int(application(words)(words, standalone_mode=False, prog_name="loomopt") or 0)
     except typer.Exit as error:
         status = error.exit_code
     except BadInput as error:

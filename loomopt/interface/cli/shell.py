@@ -2,10 +2,13 @@
 
 import contextlib
 import sys
+import warnings
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 from loomopt.base.errors import BadInput, clean
+from loomopt.scenes.former_names import FormerNameWarning
 
 if TYPE_CHECKING:
     from loomopt.interface.progress import Progress
@@ -173,6 +176,31 @@ def remark(text: str) -> None:
     """Say something beside the result; where nobody can hear it, the exit status still tells."""
     with contextlib.suppress(OSError):
         print(text, file=sys.stderr)
+
+
+@contextlib.contextmanager
+def former_names_as_remarks() -> Iterator[None]:
+    """Context in which each former name that a scene or an option uses is remarked upon once."""
+    told = set[str]()
+
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        if not issubclass(category, FormerNameWarning):
+            usual(message, category, filename, lineno, file, line)
+        elif (text := f"Remark: {message}.") not in told:
+            told.add(text)
+            remark(text)
+
+    with warnings.catch_warnings():
+        usual, warnings.showwarning = warnings.showwarning, show
+        warnings.simplefilter("always", FormerNameWarning)
+        yield
 
 
 def worded(error: BadInput) -> BadInput:

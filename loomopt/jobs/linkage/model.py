@@ -327,6 +327,12 @@ class Linkage(Kinematics):
         return self.chain, self.output, self.places, self.path
 
     @lazy
+    def loads(self) -> Mapping[str, str]:
+        """Events by the name of the load there: a force of an output that slides, a moment of one that turns."""
+        load = "force" if self.output.slides else "moment"
+        return {f"{load}.{place.name}": place.name for place in self.places}
+
+    @lazy
     def groups(self) -> Mapping[str, Group]:
         """The parts that must close at every crank angle, by their names."""
         found = {}
@@ -849,9 +855,9 @@ def model(
     quantities |= {reach.name: CycleQuantity(reach.value, figure=False, signed=True) for reach in reaches}
     for window in windows:
         quantities[f"travel.{window.name}"] = CycleQuantity(functools.partial(_travelled, window))
-    for place in linkage.places:
-        rows[f"angle.{place.name}"] = DesignRow(functools.partial(_angle, place.name))
-        rows[f"force.{place.name}"] = DesignRow(_force, event=place.name)
+    for name, event in linkage.loads.items():
+        rows[f"angle.{event}"] = DesignRow(functools.partial(_angle, event))
+        rows[name] = DesignRow(_force, event=event)
     high, low = extremes(linkage.places)
     if high and low:
         rows["swing"] = DesignRow(functools.partial(_swing, high, low))

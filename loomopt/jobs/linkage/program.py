@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import final
 
@@ -172,7 +173,7 @@ class LinkageTask(Task):
         row = name if self._is_figure(name) else self.scene.full(name)
         if sense == "most":
             return Value(name, opposite(row), size)
-        return Magnitude(name, row, size) if name.startswith("force.") else Value(name, row, size)
+        return Magnitude(name, row, size) if name in self._loads else Value(name, row, size)
 
     def starts(self) -> tuple[dict[str, float], ...]:
         """Return today's linkage, and first one with half of each number of effects: none of it hides what it does."""
@@ -199,11 +200,16 @@ class LinkageTask(Task):
         """
         if name.startswith(("mu.", "angle.")):
             return 1.0
-        if name.startswith("force."):
-            return self._force(name.removeprefix("force."))
+        if name in self._loads:
+            return self._force(self._loads[name])
         if name == PATH:
             return self._extent()
         return size_read(self.sampler, name, self.scene.schema.figures)
+
+    @property
+    def _loads(self) -> Mapping[str, str]:
+        """Events by the name of the output's load there."""
+        return linkage_of(self.plain_model).loads
 
     def _force(self, event: str) -> float:
         """Return the largest term of the output at an event, N or N·m."""

@@ -303,9 +303,9 @@ def figures(known: Reading, document: Mapping[str, Any]) -> dict[str, Figure]:
     travel, load = ("length", "force") if slides else ("angle", "torque")
     rates = ("travel velocity", "travel acceleration", "travel jerk") if slides else ("number",) * 3
     found = [*drive.FIGURES, Figure(RMS_TORQUE, "torque", "rms crank torque over the cycle", sides=("max",))]
-    for place in linkage.places:
-        found.append(Figure(f"force.{place.name}", load, f"{load} at the output at {place.name}"))
-        found.append(Figure(f"angle.{place.name}", "angle", f"crank angle of {place.name}"))
+    for name, event in linkage.loads.items():
+        found.append(Figure(name, load, f"{load} at the output at {event}"))
+        found.append(Figure(f"angle.{event}", "angle", f"crank angle of {event}"))
     high, low = extremes(linkage.places)
     if high and low:
         found.append(Figure("swing", travel, f"{'stroke' if slides else 'swing'} of the output, {low} to {high}"))
@@ -344,7 +344,7 @@ def axes(known: Reading, document: Mapping[str, Any]) -> dict[str, Axis]:
             Axis(reach.name, "length", (), "peak", ("least",) if reach.sign > 0 else ("most",), reach.sign)
             for reach in reaches(document, known.linkage.chain)
         ),
-        *(Axis(f"force.{place.name}", load, form="magnitude", senses=("least",)) for place in known.linkage.places),
+        *(Axis(name, load, form="magnitude", senses=("least",)) for name in known.linkage.loads),
     ]
     if _pathed(document):
         found.append(Axis(PATH, "length", ("path_mean_square",), senses=("least",), power=2))
@@ -421,7 +421,13 @@ def _schema(text: str) -> SceneSchema:
         own_margins={said: "number" for group in known.linkage.groups.values() for said in group.closes},
         own_axes=axes(known, document),
         tables={name: functools.partial(_table_schema, name) for name in TABLES},
+        former_names=former_names(known.linkage),
     )
+
+
+def former_names(linkage: Linkage) -> dict[str, str]:
+    """Today's names of figures by their former ones: a moment at an event was called a force."""
+    return {} if linkage.output.slides else {f"force.{event}": name for name, event in linkage.loads.items()}
 
 
 def _fitted(effect: kinds.Effect, linkage: Linkage) -> kinds.Effect:

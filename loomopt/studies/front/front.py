@@ -15,6 +15,7 @@ from loomopt.model.axes import FORMS
 from loomopt.physics.schema import Sense
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import numbers
+from loomopt.scenes.former_names import current
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Words
 from loomopt.solving.options import check_numbers, check_sought, target_name
@@ -70,8 +71,13 @@ def trade(
     if target is not None:
         target_name(scene, target)
     first, second = _two(scene, axes)
-    maximise, minimise = _named(maximise, "maximise", axes), _named(minimise, "minimise", axes)
-    stray = [name for name in (*maximise, *minimise, *(ranges or {})) if name not in axes]
+    axes, former = (first, second), scene.schema.former_names
+    maximise, minimise = (
+        tuple(current(name, former) for name in _named(given, key, axes))
+        for given, key in ((maximise, "maximise"), (minimise, "minimise"))
+    )
+    ranges = {current(name, former): ends for name, ends in (ranges or {}).items()}
+    stray = [name for name in (*maximise, *minimise, *ranges) if name not in axes]
     if stray:
         remedy = "Name one of them, or trade it."
         raise BadInput(f"{stray[0]} is none of both axes", key=stray[0], allowed=", ".join(axes), remedy=remedy)
@@ -80,7 +86,7 @@ def trade(
     if not FEWEST <= wanted <= numbers.MOST_VALUES:
         problem = "a front needs more points" if wanted < FEWEST else "a front has no such number of points"
         raise BadInput(problem, key="points", value=shown(points), allowed=allowed, remedy="Correct the number.")
-    for name, (low, high) in (ranges or {}).items():
+    for name, (low, high) in ranges.items():
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             value, allowed = f"{low:g}:{high:g} in SI", "the smaller end, then the larger one"
             raise BadInput(
@@ -93,11 +99,11 @@ def trade(
     senses = _sense(scene, first, minimise, maximise), _sense(scene, second, minimise, maximise)
     open_ended, lifted = _lifted(scene, dict(zip((first, second), senses, strict=True)))
     found = Trade(
-        _freed(_bounded(open_ended, ranges or {}), axes),
+        _freed(_bounded(open_ended, ranges), axes),
         (first, second),
         senses,
         target,
-        tuple((ranges or {}).items()),
+        tuple(ranges.items()),
         wanted,
         float(accuracy),
         lifted,
@@ -138,7 +144,7 @@ def _sense(scene: Scene, name: str, minimise: Sequence[str], maximise: Sequence[
 def si(scene: Scene, given: Given) -> dict[str, tuple[float, float]]:
     """Return ranges that are given as text with units, or as SI numbers, in SI, rad. Raises BadInput."""
     table = arguments.table(given, "ranges", f"axis → {ENDS}", 'Write {"m4e": "0:5 kg"}')
-    return {name: _ends(scene, name, ends) for name, ends in table.items()}
+    return {name: _ends(scene, current(name, scene.schema.former_names), ends) for name, ends in table.items()}
 
 
 def _ends(scene: Scene, name: str, given: str | Sequence[float]) -> tuple[float, float]:
@@ -166,10 +172,11 @@ def _read(text: str, kind: str, name: str) -> float:
 def _two(scene: Scene, axes: Sequence[str]) -> tuple[str, str]:
     """Return two axes that differ. Raises BadInput."""
     allowed, remedy = ", ".join(scene.schema.axes), 'Write ("A", "B"): the axis that is sought, and the one that pays'
-    named = arguments.texts(axes, "axes", allowed, remedy)
+    given = arguments.texts(axes, "axes", allowed, remedy)
+    named = tuple(current(name, scene.schema.former_names) for name in given)
     if len(set(named)) != 2 or len(named) != 2:
-        given = ", ".join(named)
-        raise refusal("a front has two axes that differ", scene.origin, "axes", given, allowed, remedy)
+        problem, wrong = "a front has two axes that differ", ", ".join(given)
+        raise refusal(problem, scene.origin, "axes", wrong, allowed, remedy)
     return named[0], named[1]
 
 

@@ -49,7 +49,7 @@ def figures(**changes):
 def test_a_top_without_a_far_dwell_is_where_the_rise_ends(law):
     found = figures(parts={"sley": {"law": law}})
     assert found["angle.front"] == pytest.approx(math.radians(65), abs=RIGHT)
-    assert found["force.front"] == 300.0
+    assert found["moment.front"] == 300.0
 
 
 @pytest.mark.parametrize("begins", ["0 deg", "-65 deg", "300 deg", "-400 deg"])
@@ -57,7 +57,7 @@ def test_the_top_is_told_within_one_turn(begins):
     found = figures(parts={"sley": {"begins": begins}})
     top = (float(begins.split()[0]) + 65) % 360
     assert found["angle.front"] == pytest.approx(math.radians(top), abs=1e-13)
-    assert found["force.front"] == 300.0
+    assert found["moment.front"] == 300.0
 
 
 @pytest.mark.parametrize(

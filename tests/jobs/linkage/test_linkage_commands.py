@@ -104,9 +104,9 @@ def test_events_and_windows_are_marked():
 
 def test_a_front_holds_the_levels_before_what_is_traded():
     program, traded = JOB.traded(four_bar(), "balance", {"peak_torque": "least", "mass": "least"})
-    assert [level.figure for level in program.objectives] == ["force.front", "peak_torque", "mass"]
+    assert [level.figure for level in program.objectives] == ["moment.front", "peak_torque", "mass"]
     program, traded = JOB.traded(SIX.free(["end"]), "balance", {"peak_torque": "least", "end": "most"})
-    assert [level.figure for level in program.objectives] == ["force.front", "peak_torque", "end"]
+    assert [level.figure for level in program.objectives] == ["moment.front", "peak_torque", "end"]
     assert traded[1].objective.row == opposite("end")
 
 

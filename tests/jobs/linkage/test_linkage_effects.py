@@ -80,7 +80,9 @@ def test_a_resistance_may_be_a_table_about_its_event(tmp_path):
     document = changed(FOUR_BAR, {"effects": {"resistance": None}})
     document["effects"]["resistance"] = {"at": "front", "table": "cloth.csv"}
     found = in_folder(tmp_path, document, cloth=rows)
-    assert JOB.figures(found, {})["force.front"] == pytest.approx(JOB.figures(four_bar(), {})["force.front"], abs=1e-9)
+    assert JOB.figures(found, {})["moment.front"] == pytest.approx(
+        JOB.figures(four_bar(), {})["moment.front"], abs=1e-9
+    )
 
 
 def test_a_load_on_a_joint_may_be_a_table_of_both_components(tmp_path):

@@ -18,7 +18,7 @@ BEATUP = lo.load("beatup").update(
     }
 )
 SAME = {
-    "M3_fdc": "force.front",
+    "M3_fdc": "moment.front",
     "peak_torque": "peak_torque",
     "peak_power": "peak_power",
     "swing": "swing",

@@ -66,9 +66,9 @@ MISTAKES = [
         "begins where it ends",
     ),
     (
-        {"targets": {"balance": {"least": ["force.frnt"]}}},
+        {"targets": {"balance": {"least": ["moment.frnt"]}}},
         "targets.balance.least",
-        'unknown figure or bounded number "force.frnt"',
+        'unknown figure or bounded number "moment.frnt"',
     ),
     (
         {"targets": {"balance": {"least": None, "most": ["peak_torque"]}}},

@@ -35,7 +35,7 @@ def test_the_sley_is_balanced_without_its_rest():
     found = solved()
     assert found.status == "optimal"
     assert found.figures["peak_torque"] == pytest.approx(156.9927548, rel=1e-9)
-    assert abs(found.figures["force.front"]) <= 1e-7
+    assert abs(found.figures["moment.front"]) <= 1e-7
 
 
 @pytest.mark.slow

@@ -72,7 +72,7 @@ def test_a_box_in_which_an_event_may_be_another_is_left_open():
 @pytest.mark.slow
 def test_a_four_bar_with_a_pulse_about_its_front_is_decided():
     found = lo.tolerance(four_bar(tolerances=TOLERANCES), samples=16, worst=True).as_dict()["worst"]
-    assert {"swing", "sweep", "force.front", "peak_torque"} <= set(found)
+    assert {"swing", "sweep", "moment.front", "peak_torque"} <= set(found)
     for name, worst in found.items():
         assert worst["proven"], (name, worst["why"])
         assert worst["min"] <= worst["found"][0] <= worst["found"][1] <= worst["max"]
