@@ -96,8 +96,8 @@ def test_axes_and_ranges_of_a_front_and_keys_of_a_sweep_take_the_former_name():
         found = front.trade(scene, ("force.front", "mass"), "torque", minimise="force.front", ranges=ranges)
     assert found.key == front.trade(scene, ("moment.front", "mass"), "torque", ranges={"moment.front": (0.0, 5.0)}).key
     with pytest.warns(FormerNameWarning):
-        found = planned(scene, {"limits.force.front.max": ["1 N*m", "2 N*m"]}, "torque")
-    assert [axis.key for axis in found.axes] == ["limits.moment.front.max"]
+        sweep = planned(scene, {"limits.force.front.max": ["1 N*m", "2 N*m"]}, "torque")
+    assert [axis.key for axis in sweep.axes] == ["limits.moment.front.max"]
 
 
 @pytest.mark.filterwarnings("error")
