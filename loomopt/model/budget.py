@@ -142,7 +142,7 @@ def _share(load: Acting, at: Instant) -> Number:
             (force,) = (term for each, term in loading.terms if each is state)
             return force * (at.pose.q1 - moving)
         if isinstance(load, Load) and load.moved:
-            inertia = load.moved(at.given.values, at.given.own[load.name])
+            inertia = load.moved(at.given.inputs(at.maths, load))
             return inertia * loading.carried.acceleration * moving
         (force,) = (term for each, term in loading.terms if each is load)
         return force * moving

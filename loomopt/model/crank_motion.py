@@ -46,13 +46,14 @@ def turned(steady: Sampler, scene: Scene) -> Sampler:
 
 def _turned(steady: Sampler, motor: Speed) -> Sampler:
     model, given = steady.model, steady.given
-    own, loads, system = given.own[motor.name], model.loads, systems.numpy()
+    loads, system = model.loads, systems.numpy()
 
     def surplus(pieces: Pieces, u: Floats, no_load: float, omega: Floats, omega_dot: Floats) -> Floats:
-        node, known = steady.node(pieces, u), {**given.values, NO_LOAD: no_load}
+        node = steady.node(pieces, u)
+        at = given._replace(values={**given.values, NO_LOAD: no_load}).inputs(system, motor)
         pose = _posed(model.kinematics, system, given, node, (omega, omega_dot))
-        taken = balance.crank_torque(system, loads, pose, given, node.switch) + motor.flywheel(known, own) * omega_dot
-        return np.asarray(motor.motor(system, omega, known, own) - taken)
+        taken = balance.crank_torque(system, loads, pose, given, node.switch) + motor.flywheel(at) * omega_dot
+        return np.asarray(motor.motor(at, omega) - taken)
 
     turning = solved(steady.cycle.starts, float(given.values["speed"]), surplus)
     rows = {name: DesignRow(functools.partial(_row, motor, name)) for name in motor.rows}
@@ -76,7 +77,7 @@ def _posed(
 def _row(motor: Speed, name: str, at: Instant) -> float:
     kinematics = at.model.kinematics
     assert isinstance(kinematics, TurnedCrank)
-    return motor.rows[name](kinematics.turning, at.values, at.given.own[motor.name])
+    return motor.rows[name](at.given.inputs(at.maths, motor), kinematics.turning)
 
 
 @dataclass(frozen=True)

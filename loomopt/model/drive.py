@@ -52,7 +52,7 @@ def motor_torque(at: Instant, crank_torque: Number) -> Number:
     omega_dot, own = at.pose.omega_dot, motor(at.model.effects)
     if omega_dot is None or own is None:
         return crank_torque
-    return crank_torque + own.flywheel(at.values, at.given.own[own.name]) * omega_dot
+    return crank_torque + own.flywheel(at.given.inputs(at.maths, own)) * omega_dot
 
 
 def motor_power(at: Instant, crank_torque: Number) -> Number:

@@ -25,6 +25,7 @@ from loomopt.physics.effects.kinds import (
     Demand,
     Effect,
     Event,
+    Inputs,
     Load,
     Moved,
     Speed,
@@ -77,6 +78,10 @@ class Instant:
         """The torque on the crank, N·m."""
         return balance.crank_torque(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
 
+    def inputs(self, effect: Effect) -> Inputs[Any]:
+        """Inputs of an effect's formulas here."""
+        return self.given.inputs(self.maths, effect, self.pose, self.node.switch)
+
     def terms(self) -> dict[str, Number]:
         """Return each load's term by its name, N or N·m."""
         found = balance.terms(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
@@ -87,8 +92,7 @@ class Instant:
         if check.joints not in self._joints:
             loaded = balance.Loaded(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
             assert check.joints is not None
-            own = self.given.own[check.name]
-            self._joints[check.joints] = check.joints(self.maths, self.pose, self.values, own, loaded)
+            self._joints[check.joints] = check.joints(self.inputs(check), loaded)
         return self._joints[check.joints]
 
     def switched(self, **switch: Number) -> "Instant":
@@ -155,7 +159,7 @@ def group_value(formula: Callable[..., Number], at: Instant) -> Number:
 
 def check_value(check: Check[Any], name: str, at: Instant) -> Number:
     """Return a quantity of a check, SI."""
-    return check.quantities[name](at.maths, at.pose, at.values, at.given.own[check.name])
+    return check.quantities[name](at.inputs(check))
 
 
 def squared(name: str) -> str:
@@ -255,7 +259,7 @@ def design_value(formula: Callable[[Maths, Values], Number], at: Instant) -> Num
 
 def check_row(check: Check[Any], name: str, at: Instant) -> Number:
     """Return a row of a check, SI."""
-    return check.rows[name](at.maths, at.values, at.given.own[check.name])
+    return check.rows[name](at.given.inputs(at.maths, check))
 
 
 class Cornered(NamedTuple):
@@ -274,7 +278,7 @@ def cornered(model: "JobModel", maths: Maths, given: Given) -> list[Cornered]:
         found.append(Cornered(angles, arc.switch, arc.parting(maths, given) if arc.parting else angles))
     for load in model.loads:
         if isinstance(load, Load) and load.corners:
-            angles = load.corners(maths, given.values, given.own[load.name])
+            angles = load.corners(given.inputs(maths, load))
             # An event on a corner of the motion's own arcs would be that corner twice.
             events = model.kinematics.breaks.intersection(load.reads)
             there = {id(angle) for event in events for angle in given.values[event]}
@@ -286,7 +290,7 @@ def with_states_eliminated(maths: Maths, kinematics: Kinematics, loads: Sequence
     """Return the scene's numbers with what follows from them for each state."""
     for state in (load for load in loads if isinstance(load, State)):
         moving = carried_by(maths, kinematics, loads, found, state)
-        derived = state.derived(maths, found.values, found.own[state.name], moving)
+        derived = state.derived(found.inputs(maths, state), moving)
         found = found._replace(values={**found.values, **derived})
     return found
 
@@ -294,7 +298,7 @@ def with_states_eliminated(maths: Maths, kinematics: Kinematics, loads: Sequence
 def carried_by(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], given: Given, state: State) -> Carried:
     """Return what moves with a state's coordinate."""
     own = [load for load in loads if isinstance(load, Load) and load.name in state.carries]
-    inertias = [load.moved(given.values, given.own[load.name]) for load in own if load.moved]
+    inertias = [load.moved(given.inputs(maths, load)) for load in own if load.moved]
     smooth = [load for load in own if not load.corners]
 
     def weigh(angles: Sequence[Number], weights: Sequence[Sequence[Number]]) -> list[Number]:
@@ -313,9 +317,8 @@ def read_at(state: State, at: Instant) -> Moved:
     """Return what is read of a state at an instant."""
 
     def coordinate() -> Number:
-        given, pose = at.given, at.pose
-        reply = balance.replied(at.maths, state, at.model.loads, pose, given, at.node.switch)
-        return state.coordinate(at.maths, pose, given.values, given.own[state.name], reply)
+        reply = balance.replied(at.maths, state, at.model.loads, at.pose, at.given, at.node.switch)
+        return state.coordinate(at.inputs(state), reply)
 
     return Moved(at.pose, coordinate, lambda: at.force)
 
@@ -407,12 +410,12 @@ class JobModel:
     @lazy
     def labels(self) -> dict[str, str]:
         """Full name of every number of the effects' tables → what a designer calls it."""
-        return {owned(effect, key): label(effect, key) for effect in self.effects for key in keys(effect.own)}
+        return {owned(effect, key): label(effect, key) for effect in self.effects for key in keys(effect.table)}
 
     @lazy
     def _full(self) -> dict[str, dict[str, str]]:
         """Keys of each effect's table with the full names of their numbers."""
-        return {each.name: {key: owned(each, key) for key in keys(each.own)} for each in self.effects}
+        return {each.name: {key: owned(each, key) for key in keys(each.table)} for each in self.effects}
 
     def words_of(self, effect: str) -> dict[str, str]:
         """Return the words of an effect's table by key."""
@@ -572,7 +575,7 @@ class JobModel:
 
     def samples(self, given: Given) -> int:
         """Return how many samples of one turn the states of a design need; 0 without any."""
-        return max((math.ceil(each.samples(given.values, given.own[each.name])) for each in self.states), default=0)
+        return max((math.ceil(each.samples(given.inputs(FLOAT, each))) for each in self.states), default=0)
 
     def plain(self, maths: Maths, values: Values) -> Given:
         """Return the scene's numbers with what follows from the mechanism alone, SI."""
@@ -675,7 +678,7 @@ def with_words_fixed(model: JobModel, values: Mapping[str, float]) -> JobModel:
     words = {(effect, key): word for effect, key, word in model.words}
     for state in model.states:
         carried = carried_by(FLOAT, model.kinematics, model.loads, given, state)
-        fixed = state.fixed(given.values, given.own[state.name], carried)
+        fixed = state.fixed(given.inputs(FLOAT, state), carried)
         words |= {(state.name, key): word for key, word in fixed.items()}
     first = _with(model, tuple((*key, word) for key, word in words.items()), ())
     return _with(first, first.words, _parts(first, values))

@@ -19,7 +19,7 @@ def numbers(scene: Scene) -> dict[str, float]:
     """Return every number of the scene by full name, SI."""
     found = {**scene.mechanism, **scene.operation}
     for effect, own in zip(scene.active, scene.effects.values(), strict=True):
-        for key in keys(effect.own):
+        for key in keys(effect.table):
             value = value_at(own, key)
             if isinstance(value, float | int):
                 found[owned(effect, key)] = float(value)
@@ -99,7 +99,7 @@ def bounds(scene: Scene, known: Mapping[str, float]) -> dict[str, tuple[float, f
 
 def labels(scene: Scene) -> dict[str, str]:
     """Return what a designer calls each number of the effects that are on, by its full name."""
-    return {owned(effect, key): label(effect, key) for effect in scene.active for key in keys(effect.own)}
+    return {owned(effect, key): label(effect, key) for effect in scene.active for key in keys(effect.table)}
 
 
 def told(scene: Scene) -> tuple[str, ...]:

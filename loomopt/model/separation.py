@@ -113,7 +113,7 @@ def _corners(sampler: Sampler, event: Event) -> list[float]:
 def _cornered(sampler: Sampler, load: Load[Any]) -> tuple[float, ...]:
     """Return the crank angles, rad, where a load changes its formula; none for most."""
     given = sampler.given
-    return tuple(load.corners(FLOAT, given.values, given.own[load.name])) if load.corners else ()
+    return tuple(load.corners(given.inputs(FLOAT, load))) if load.corners else ()
 
 
 def _refused(event: Event, load: Acting, why: str) -> UnfollowedError:
@@ -150,13 +150,14 @@ def _switches(sampler: Sampler, load: Acting) -> Iterator[tuple[float, float]]:
 
 def _form(sampler: Sampler, event: Event, load: Acting, switch: float) -> Linear:
     """Return a load's linear form, tried at a few states. Raises UnfollowedError for one that has none."""
-    values, own = sampler.given.values, sampler.given.own[load.name]
+    assert isinstance(load, Load)
     extent, speed, push = sizes(sampler)
 
     def term(x: float, v: float, a: float, direction: float) -> float:
         try:
-            pose = event.free(values, x * extent, v * speed, a * push, direction)
-            return float(load.force(FLOAT, pose, values, own, switch))  # type: ignore[arg-type]  # states are refused
+            pose = event.free(sampler.given.values, x * extent, v * speed, a * push, direction)
+            at = sampler.given.inputs(FLOAT, load, pose, {load.name: switch})
+            return float(load.force(at))
         except AttributeError as error:
             raise _refused(event, load, f"it reads the mechanism's {error.name}") from None
 

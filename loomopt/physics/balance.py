@@ -10,15 +10,16 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from loomopt.base.records import lazy
+from loomopt.base.records import Frozen, lazy
 from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Applied, LinkMass, Load, Motion, State
+from loomopt.physics.effects.kinds import Applied, Effect, Inputs, LinkMass, Load, Motion, State
 from loomopt.physics.schema import Values
 
 if TYPE_CHECKING:
     from loomopt.physics.mechanisms.dyad import Vector
 
 Acting = Load[Any] | State
+NO_SWITCH: Values = Frozen()
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,10 @@ class Given(NamedTuple):
     known: frozenset[str] = frozenset()
     linkage: object = None
 
+    def inputs(self, maths: Maths, effect: Effect, pose: Motion | None = None, switch: Values = NO_SWITCH) -> Inputs[Any]:
+        """Inputs of an effect's formulas; switch: by a load's name, which of its formulas holds."""
+        return Inputs(maths, self.values, self.own[effect.name], pose, switch.get(effect.name, 0))
+
 
 def terms(
     maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values, gone: Collection[str] = ()
@@ -61,15 +66,14 @@ def terms(
     for load in loads:
         if load.name in gone:
             continue
-        own = given.own[load.name]
+        at = given.inputs(maths, load, pose, switch)
         if isinstance(load, State):
-            yield load, load.force(maths, pose, given.values, own, replied(maths, load, loads, pose, given, switch))
+            yield load, load.force(at, replied(maths, load, loads, pose, given, switch))
         elif load.upon:
             others = [each for each in loads if each is not load]
-            loaded = Loaded(maths, others, pose, given, switch)
-            yield load, load.upon(maths, pose, given.values, own, switch.get(load.name, 0), loaded)
+            yield load, load.upon(at, Loaded(maths, others, pose, given, switch))
         else:
-            yield load, load.force(maths, pose, given.values, own, switch.get(load.name, 0))
+            yield load, load.force(at)
 
 
 def replied(
@@ -79,9 +83,8 @@ def replied(
     found = []
     for load in loads:
         if isinstance(load, Load) and load.name in state.carries and load.response:
-            oscillator = state.oscillator(maths, given.values, given.own[state.name])
-            own = given.own[load.name]
-            found.append(load.response(maths, oscillator, pose, given.values, own, switch.get(load.name, 0)))
+            oscillator = state.oscillator(given.inputs(maths, state))
+            found.append(load.response(given.inputs(maths, load, pose, switch), oscillator))
     return total([position for position, _ in found]), total([rate for _, rate in found])
 
 
@@ -118,7 +121,7 @@ def crank_torque(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Giv
 def inside(maths: Maths, load: Acting, pose: Motion, given: Given) -> Number | None:
     """Crank torque that a load of the output takes inside the drive besides, N·m; None for nothing."""
     formula = load.inside if isinstance(load, Load) else None
-    return formula(maths, pose, given.values, given.own[load.name]) if formula else None
+    return formula(given.inputs(maths, load, pose)) if formula else None
 
 
 @dataclass(frozen=True)
@@ -148,14 +151,14 @@ class Loaded:
         state = next((load for load in self.loads if isinstance(load, State) and load.moved), None)
         if state is None or state.moved is None:
             return self.pose
-        values, own = self.given.values, self.given.own
+        at = self.given.inputs(self.maths, state, self.pose)
         reply = replied(self.maths, state, self.loads, self.pose, self.given, self.switch)
-        coordinate = state.coordinate(self.maths, self.pose, values, own[state.name], reply)
+        coordinate = state.coordinate(at, reply)
         moving = [(load, term) for load, term in self.terms if load.name in state.carries and isinstance(load, Load)]
-        inertia = total([load.moved(values, own[load.name]) for load, _ in moving if load.moved])
+        inertia = total([load.moved(self.given.inputs(self.maths, load)) for load, _ in moving if load.moved])
         pushed = total([term for load, term in moving if not load.moved])
         acceleration = (self.force - pushed) / inertia
-        found: Motion = state.moved(self.pose, own[state.name], coordinate, self.force, acceleration)
+        found: Motion = state.moved(at, coordinate, self.force, acceleration)
         return found
 
     @lazy
@@ -173,9 +176,8 @@ class Loaded:
         """Forces on links and joints by name."""
         found: list[Applied] = []
         for load in (load for load in self.loads if isinstance(load, Load) and load.applied):
-            own, switch = self.given.own[load.name], self.switch.get(load.name, 0)
             assert load.applied is not None
-            found += load.applied(self.maths, self.pose, self.given.values, own, switch)
+            found += load.applied(self.given.inputs(self.maths, load, self.pose, self.switch))
         return found
 
 
@@ -184,13 +186,13 @@ def masses(
 ) -> list[tuple[LinkMass, Motion]]:
     """Return what loads move, inertia alone where one tells no mass; motions: the output's, and of what is carried."""
     found = []
-    gone, values = carried(loads), given.values
+    gone = carried(loads)
     for load in (load for load in loads if isinstance(load, Load)):
-        own, motion = given.own[load.name], motions[load.name in gone]
+        at, motion = given.inputs(maths, load), motions[load.name in gone]
         if load.mass:
-            found.append((load.mass(maths, values, own), motion))
+            found.append((load.mass(at), motion))
         elif load.moved:
-            found.append((LinkMass("", 0, 0, 0, load.moved(values, own)), motion))
+            found.append((LinkMass("", 0, 0, 0, load.moved(at)), motion))
     return found
 
 
@@ -202,6 +204,6 @@ def pushes(
     gone = carried([load for load, _ in terms])
     for load, term in terms:
         if isinstance(load, Load) and load.push:
-            push = load.push(maths, motions[load.name in gone], given.values, given.own[load.name], term)
+            push = load.push(given.inputs(maths, load, motions[load.name in gone]), term)
             found += [] if push is None else [push]
     return found

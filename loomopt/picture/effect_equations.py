@@ -51,7 +51,7 @@ def given(model: JobModel, values: Values) -> Given:
     told = not model.known.isdisjoint(model.labels)
     for effect in model.effects:
         words = model.words_of(effect.name)
-        given_keys = [key for key in keys(effect.own) if not told or owned(effect, key) in model.known]
+        given_keys = [key for key in keys(effect.table) if not told or owned(effect, key) in model.known]
         own[effect.name] = own_values(effect, words, given_keys, taken)
         taken |= {str(value) for key, value in own[effect.name].items() if key not in words}
     asks = any(check.joints for check in model.checks)
@@ -99,15 +99,16 @@ def crank_motion(model: JobModel, pose: Motion, known: Given, torque: str) -> li
     own = motor(model.effects)
     if own is None:
         return []
-    system, sp, table = systems.sympy(), sympy(), known.own[own.name]
+    sp = sympy()
     own_names = {name: symbol(name) for name in ("speed", "no_load_speed")}
     values = ChainMap(own_names, known.values)  # type: ignore[arg-type]  # it is only read
+    at = known._replace(values=values).inputs(systems.sympy(), own)
     given_torque, omega, phi = symbol("M_motor"), symbol("omega"), pose.phi
     taken = [symbol(torque)] if model.loads else []
     once_round = sp.Integral(1 / sp.Function("omega")(phi), (phi, 0, 2 * sp.pi))
     return [
-        equation(own.name, given_torque, own.motor(system, omega, values, table)),
-        equation(own.name, given_torque, sum(taken) + own.flywheel(values, table) * pose.omega_dot),
+        equation(own.name, given_torque, own.motor(at, omega)),
+        equation(own.name, given_torque, sum(taken) + own.flywheel(at) * pose.omega_dot),
         equation(own.name, pose.omega_dot, omega * symbol("omega'")),
         equation("mean speed", once_round, 2 * sp.pi / values["speed"]),
     ]
@@ -117,7 +118,7 @@ def _written(model: JobModel, load: Acting, pose: Motion, known: Given, letter: 
     """Yield a load's term, after the equation of motion of a state."""
     if isinstance(load, State):
         own = [each for each in model.loads if isinstance(each, Load) and each.name in load.carries]
-        inertia = balance.total([each.moved(known.values, known.own[each.name]) for each in own if each.moved])
+        inertia = balance.total([each.moved(known.inputs(systems.sympy(), each)) for each in own if each.moved])
         carried = balance.total([symbol(f"{letter}_{each.name}") for each in own])
         left, right = load.motion(_in_symbols(pose, inertia, carried), known.own[load.name])
         yield equation(load.name, left, right)
@@ -169,7 +170,7 @@ def force(load: Acting, pose: Motion, known: Given, switch: float) -> Expression
     if isinstance(load, State):
         return load.term(_in_symbols(pose, 0, 0), known.own[load.name])
     sp = sympy()
-    found = load.force(systems.sympy(), pose, known.values, known.own[load.name], sp.Rational(switch))
+    found = load.force(known.inputs(systems.sympy(), load, pose, {load.name: sp.Rational(switch)}))
     return sp.sympify(found).replace(sp.floor, lambda turns: sp.Integer(0))
 
 
@@ -178,7 +179,7 @@ def pieces(load: Acting, pose: Motion, known: Given) -> list[Piece]:
     whole_turn = 2 * systems.sympy().pi
     if not isinstance(load, Load) or load.corners is None:
         return [(force(load, pose, known, 0), (0, whole_turn))]
-    corners = tuple(map(sympy().sympify, load.corners(systems.sympy(), known.values, known.own[load.name])))
+    corners = tuple(map(sympy().sympify, load.corners(known.inputs(systems.sympy(), load))))
     if not corners:
         return [(force(load, pose, known, 0), (0, whole_turn))]
     numbers = tuple(float(corner.subs(dict.fromkeys(corner.free_symbols, 1))) for corner in corners)
@@ -192,9 +193,8 @@ def pieces(load: Acting, pose: Motion, known: Given) -> list[Piece]:
 
 def check_equations(check: Check[Any], pose: Motion, known: Given) -> list[Equation]:
     """Write each figure and row of an effect that takes no part in the balance, and what it must keep."""
-    system, own = systems.sympy(), known.own[check.name]
-    found = {name: read(system, pose, known.values, own) for name, read in check.quantities.items()}
-    found |= {name: row(system, known.values, own) for name, row in check.rows.items()}
+    at = known.inputs(systems.sympy(), check, pose)
+    found = {name: read(at) for name, read in (*check.quantities.items(), *check.rows.items())}
     return [each for name, value in found.items() for each in _kept(check, name, value)]
 
 
@@ -226,7 +226,7 @@ def joint_equations(model: JobModel, pose: Motion, known: Given, total: Expressi
         if check.said:
             found[check.name] = Equation(check.name, check.said, rf"\text{{{check.said}}}")
             continue
-        joints = check.joints(system, pose, known.values, known.own[check.name], loading)
+        joints = check.joints(known.inputs(system, check, pose), loading)
         for name in check.between:
             found |= {each: equation(check.name, symbol(each), value) for each, value in _between(joints, name)}
         for name in (name for name in (*check.vectors, *check.scalars) if name in model.told):

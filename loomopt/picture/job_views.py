@@ -79,14 +79,15 @@ class JobViews(abc.ABC):
 
     def remarks(self, scene: "Scene", design: Numbers) -> tuple[str, ...]:
         """Return what to know beside the numbers, each a sentence without its full stop: curves, what checks remark."""
+        from loomopt.maths.systems import FLOAT
         from loomopt.model.numbers import numbers, told
-        from loomopt.physics.effects.kinds import Check, owned
+        from loomopt.physics.effects.kinds import Check, Inputs, owned
 
         known = numbers(scene) | {scene.full(name): value for name, value in design.items()}
         found = list(told(scene))
         for check in (effect for effect in scene.active if isinstance(effect, Check)):
-            own = {key: known.get(owned(check, key)) for key in check.own.model_fields}
-            found.append(check.remark(known, own, scene.show))
+            own = {key: known.get(owned(check, key)) for key in check.table.model_fields}
+            found.append(check.remark(Inputs(FLOAT, known, own, None), scene.show))
         return tuple(text for text in found if text)
 
     def missing(self, scene: "Scene") -> tuple[str, ...]:

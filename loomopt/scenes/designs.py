@@ -217,7 +217,7 @@ def _numbers(scene: Scene) -> dict[str, Quantity]:
     for model in (scene.schema.mechanism, scene.schema.operation):
         found |= quantities_of(model)
     for effect in scene.active:
-        found |= {label(effect, key): quantity_of(effect.own, key) for key in effect.own.model_fields}
+        found |= {label(effect, key): quantity_of(effect.table, key) for key in effect.table.model_fields}
     first = {name: found[name] for name in scene.schema.variables}
     return {name: quantity for name, quantity in {**first, **found}.items() if quantity}
 

@@ -88,7 +88,7 @@ def _written(
         (("mechanism",), schema.mechanism),
         (("operation",), schema.operation),
     ]
-    tables += [(("effects", *effect.path), effect.own) for effect in active]
+    tables += [(("effects", *effect.path), effect.table) for effect in active]
     for path, own in tables:
         for key, quantity in quantities_of(own).items():
             text = looked_up(document, (*path, *key.split(".")))

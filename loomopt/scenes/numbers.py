@@ -46,7 +46,7 @@ def _quantities(scene: Scene) -> Iterator[tuple[str, Quantity]]:
                         if getattr(each, name) is not None:
                             yield f"{table}.{key}.{k}.{name}", found
     for effect in scene.active:
-        for key, found in _fields(effect.own):
+        for key, found in _fields(effect.table):
             yield ".".join(("effects", *effect.path, key)), found
             if getattr(scene.effects[effect.name], key) is not None:
                 labels.setdefault(label(effect, key), found)

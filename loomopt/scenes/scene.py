@@ -182,7 +182,7 @@ class Scene(Shown):
         if name in self.mechanism or name in self.operation:
             return name
         tables = [(effect, self.effects[effect.name]) for effect in self.active]
-        called = [(e, key, own) for e, own in tables for key in e.own.model_fields if label(e, key) == name]
+        called = [(e, key, own) for e, own in tables for key in e.table.model_fields if label(e, key) == name]
         called.sort(key=lambda found: getattr(found[2], found[1]) is None)
         return owned(*called[0][:2]) if called else name
 
@@ -379,7 +379,7 @@ class Scene(Shown):
         known: dict[str, Iterable[str]] = {
             "operation": schema.operation.model_fields,
             "mechanism": schema.mechanism.model_fields,
-            **{f"effects.{e.name}": e.own.model_fields for e in schema.effects.values() if not e.many},
+            **{f"effects.{e.name}": e.table.model_fields for e in schema.effects.values() if not e.many},
             "bounds": {*schema.variables, *self.bounds},
         }
         sides = {figure.name: figure.sides for figure in schema.figures.values()}

@@ -199,14 +199,14 @@ def effects(cursor: Cursor, schema: SceneSchema) -> dict[Effect, Table]:
 
 def _effect(effect: Effect, cursor: Cursor) -> Table:
     """Table of an effect; one that may be given as a curve has either the curve or the numbers in its place."""
-    read = cursor.record(effect.own)
+    read = cursor.record(effect.table)
     curve = effect.tabulated if isinstance(effect, Load) else None
     if curve is None:
         return read
     if getattr(read, curve.key) is None:
         for key in required(effect):
             if getattr(read, key) is None:
-                raise cursor.missing(effect.own, key)
+                raise cursor.missing(effect.table, key)
         return read
     others = [key for key in curve.instead if key in read.model_fields_set]
     if others:
@@ -256,7 +256,7 @@ def _check_model(cursor: Cursor, effect: Effect, own: Table) -> None:
     model = model_of(effect, own)
     for key in model.keys:
         if getattr(own, key) is None:
-            cursor.faults.add(cursor.missing(effect.own, key))
+            cursor.faults.add(cursor.missing(effect.table, key))
     for word, other in effect.models.items():
         for key in set(other.keys) - {*model.keys, *model.may}:
             if getattr(own, key) is not None:
@@ -283,7 +283,7 @@ def places(
     known = [*active, *available, *(effect for effect in schema.effects.values() if not effect.many)]
     for effect in dict.fromkeys(known):
         path, waits = f"effects.{effect.name}", effect in available
-        for place in _places(path, effect.own, active.get(effect)):
+        for place in _places(path, effect.table, active.get(effect)):
             yield place._replace(label=label(effect, place.key), waits=waits)
 
 

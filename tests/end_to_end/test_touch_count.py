@@ -16,25 +16,30 @@ REFERENCE = "tests/physics/effects/test_effects_reference.py"
 EFFECT = '''"""Clock spring on the rocking shaft: output term T."""
 
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import Load
-from loomopt.maths.systems import Maths; from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs; from loomopt.physics.effects.kinds import Load
+from loomopt.maths.systems import Number
 from loomopt.base.quantities import Torque
-from loomopt.physics.schema import Table; from loomopt.physics.schema import Values
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """T: torque of the spring, N·m."""
 
     T: Torque
 
 
-def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[ReedPose]) -> Number:
     """Return T, N·m."""
-    return own["T"]
+    return at.table["T"]
 
 
 EFFECT = Load(
-    name="clock_spring", summary="clock spring", own=Own, acts="output", force=force, examples=({"T": "3 N*m"},)
+    name="clock_spring",
+    summary="clock spring",
+    table=Parameters,
+    acts="output",
+    force=force,
+    examples=({"T": "3 N*m"},),
 )
 '''
 ROWS = "beatup,clock_spring,0,today,30,term,3\nbeatup,clock_spring,0,other,200,term,3\n"

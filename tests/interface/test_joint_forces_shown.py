@@ -12,7 +12,7 @@ from loomopt.base.errors import BadInput
 from loomopt.interface.cli import app
 from loomopt.interface.forces import TurnedForce, found
 from loomopt.jobs import registry
-from loomopt.physics.effects.kinds import Check
+from loomopt.physics.effects.kinds import Check, Motion
 from loomopt.physics.schema import Figure, Table
 
 
@@ -20,17 +20,17 @@ def figures(*names):
     return tuple(Figure(name, "force", name, sides=("max",)) for name in names)
 
 
-PIN: Check[object] = Check(
+PIN: Check[Motion] = Check(
     name="pin",
     summary="a force of 100 N that turns with the crank, and one of |cos phi| 100 N along x",
-    own=Table,
+    table=Table,
     quantities={
-        "turns_x": lambda m, pose, given, own: 100 * m.cos(pose.phi),
-        "turns_y": lambda m, pose, given, own: 100 * m.sin(pose.phi),
-        "turns": lambda m, pose, given, own: 100 + 0 * pose.phi,
-        "along_x": lambda m, pose, given, own: 100 * m.cos(pose.phi),
-        "along_y": lambda m, pose, given, own: 0 * pose.phi,
-        "along": lambda m, pose, given, own: 100 * m.cos(pose.phi),
+        "turns_x": lambda at: 100 * at.maths.cos(at.pose.phi),
+        "turns_y": lambda at: 100 * at.maths.sin(at.pose.phi),
+        "turns": lambda at: 100 + 0 * at.pose.phi,
+        "along_x": lambda at: 100 * at.maths.cos(at.pose.phi),
+        "along_y": lambda at: 0 * at.pose.phi,
+        "along": lambda at: 100 * at.maths.cos(at.pose.phi),
     },
     figures=figures("turns_x", "turns_y", "turns", "along_x", "along_y", "along"),
 )

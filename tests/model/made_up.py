@@ -8,7 +8,7 @@ from loomopt.model.kinematics import Arcs, Group
 from loomopt.physics import balance
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
-from loomopt.physics.effects.kinds import Load
+from loomopt.physics.effects.kinds import Inputs, Load
 from loomopt.physics.schema import Table, Values
 
 FRONT, REAR = "front", "rear"
@@ -61,23 +61,23 @@ class ClothTable(Table):
     width: float
 
 
-def inertia(maths: Maths, pose: balance.Pose, given: Values, own: Values, switch: Number) -> Number:
-    return own["m"] * pose.acceleration
+def inertia(at: Inputs[balance.Pose]) -> Number:
+    return at.table["m"] * at.pose.acceleration
 
 
-def spring(maths: Maths, pose: balance.Pose, given: Values, own: Values, switch: Number) -> Number:
-    return own["k"] * (pose.q - own["p"])
+def spring(at: Inputs[balance.Pose]) -> Number:
+    return at.table["k"] * (at.pose.q - at.table["p"])
 
 
-def cloth(maths: Maths, pose: balance.Pose, given: Values, own: Values, switch: Number) -> Number:
+def cloth(at: Inputs[balance.Pose]) -> Number:
     """Return F, faded in from where the cloth is met to the front, where it is let go."""
-    met = -maths.cos(own["width"])
-    return switch * own["F"] * (-maths.cos(pose.phi) + met) / (1 + met)
+    met = -at.maths.cos(at.table["width"])
+    return at.switch * at.table["F"] * (-at.maths.cos(at.pose.phi) + met) / (1 + met)
 
 
-def pressed(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+def pressed(at: Inputs[object]) -> tuple[Number, ...]:
     """Return where the cloth is met and left, rad: it leaves at the front."""
-    return (maths.pi - own["width"], maths.pi)
+    return (at.maths.pi - at.table["width"], at.maths.pi)
 
 
 def presses(angle: float, corners: tuple[float, ...]) -> float:
@@ -85,9 +85,9 @@ def presses(angle: float, corners: tuple[float, ...]) -> float:
     return 1.0 if (angle - begin) % 6.283185307179586 < end - begin else 0.0
 
 
-INERTIA = Load(name="inertia", summary="", own=MassTable, acts="output", force=inertia)
-SPRING = Load(name="spring", summary="", own=SpringTable, acts="output", force=spring)
-CLOTH = Load(name="cloth", summary="", own=ClothTable, acts="output", force=cloth, corners=pressed, switch=presses)
+INERTIA = Load(name="inertia", summary="", table=MassTable, acts="output", force=inertia)
+SPRING = Load(name="spring", summary="", table=SpringTable, acts="output", force=spring)
+CLOTH = Load(name="cloth", summary="", table=ClothTable, acts="output", force=cloth, corners=pressed, switch=presses)
 NUMBERS = {
     "r": 0.05,
     "speed": 60.0,

@@ -86,8 +86,8 @@ def turned(term):
     """Return the packaged frame with one of its loads made another: term(pose, own)."""
     read = sampler(lo.load("shedding").with_effect("separation"))
 
-    def force(maths, pose, given, own, switch):
-        return term(pose, own)
+    def force(at):
+        return term(at.pose, at.table)
 
     loads = tuple(dataclasses.replace(e, force=force) if e.name == "inertia" else e for e in read.model.loads)
     return read, next(load for load in loads if load.name == "inertia")

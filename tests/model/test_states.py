@@ -34,27 +34,29 @@ class ArmTable(Table):
     ratio: float
 
 
-def harmonics(system, given, own, carried):
+def harmonics(at, carried):
     """Return mean and first harmonic of the carried force, the latter times 1 / (1 − ratio²)."""
-    angles = [2 * system.pi * k / SAMPLES for k in range(SAMPLES)]
-    weights = [[1 for _ in angles], [system.cos(angle) for angle in angles], [system.sin(angle) for angle in angles]]
+    angles = [2 * at.maths.pi * k / SAMPLES for k in range(SAMPLES)]
+    cosine, sine = at.maths.cos, at.maths.sin
+    weights = [[1 for _ in angles], [cosine(angle) for angle in angles], [sine(angle) for angle in angles]]
     mean, cosines, sines = carried.weigh(angles, weights)
-    share = 2 / (1 - own["ratio"] ** 2) / SAMPLES
+    share = 2 / (1 - at.table["ratio"] ** 2) / SAMPLES
     return {"arm.mean": mean / SAMPLES, "arm.cosine": share * cosines, "arm.sine": share * sines}
 
 
-def passed_on(system, pose, given, own, reply):
-    return given["arm.mean"] + given["arm.cosine"] * system.cos(pose.phi) + given["arm.sine"] * system.sin(pose.phi)
+def passed_on(at, reply):
+    mean, cosine, sine = (at.values[f"arm.{name}"] for name in ("mean", "cosine", "sine"))
+    return mean + cosine * at.maths.cos(at.pose.phi) + sine * at.maths.sin(at.pose.phi)
 
 
-def drag(system, pose, given, own, switch):
-    return 0 * pose.q + 0.7
+def drag(at):
+    return 0 * at.pose.q + 0.7
 
 
 ARM = State(
     name="arm",
     summary="an elastic arm",
-    own=ArmTable,
+    table=ArmTable,
     carries=("inertia", "spring"),
     derived=harmonics,
     force=passed_on,
@@ -64,7 +66,7 @@ ARM = State(
     between=("x_a", "x"),
     rests=lambda own: "two harmonics are all there are",
 )
-DRAG = Load(name="drag", summary="", own=Table, acts="drive", force=drag)
+DRAG = Load(name="drag", summary="", table=Table, acts="drive", force=drag)
 STIFF = JobModel(
     Yoke(),
     (INERTIA, SPRING, CLOTH, DRAG),

@@ -128,7 +128,7 @@ def without(combination, one):
 def combines(combination):
     """Say whether a combination may be on together."""
     effects = packaged(combination.job).schema.effects
-    own = {effects[n]: effects[n].own.model_validate(effects[n].examples[k]) for n, k in combination.ones}
+    own = {effects[n]: effects[n].table.model_validate(effects[n].examples[k]) for n, k in combination.ones}
     return not any(faults(own))
 
 
@@ -206,8 +206,9 @@ def read_by(combination):
     if motors:  # the formulas of all else are those at constant speed
         model = registry.find(combination.job).model(scene_of(combination))
     given = model.given(system, {**sampled.hints, **symbols})
-    turns = [(motor, {**given.values, "no_load_speed": 1}, given.own[motor.name]) for motor in motors]
-    graphs = [part for of, *known in turns for part in (of.motor(system, 2, *known), of.flywheel(*known))]
+    turning = given._replace(values={**given.values, "no_load_speed": 1})
+    known = [(motor, turning.inputs(system, motor)) for motor in motors]
+    graphs = [part for motor, at in known for part in (motor.motor(at, 2), motor.flywheel(at))]
     graphs += [*model.corners(system, given), *model.static(system, given, sampled.stills).values()]
     for piece in range(sampled.cycle.pieces):
         node = Node(phi, {DATUM: 0.0, **sampled.cycle.switch(piece)})
@@ -349,7 +350,7 @@ def test_the_motor_gives_what_the_crank_and_the_flywheel_take(combination):
 def test_an_absent_effect_leaves_no_symbol_in_the_graph(combination):
     """All numbers of all effects are offered as symbols; only those of active effects are taken up."""
     active = effects_of(combination)
-    own = {f"{effect.name}.{key}" for effect in active for key in effect.own.model_fields}
+    own = {f"{effect.name}.{key}" for effect in active for key in effect.table.model_fields}
     demanded = {f"{effect.name}.{demand.value}" for effect in active for demand in getattr(effect, "demands", ())}
     unread = demanded.union(*(UNREAD.get(str(one), set()) for one in combination.ones))
     expected = own.intersection(registry.find(combination.job).numbers(scene_of(combination))) - unread

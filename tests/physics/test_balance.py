@@ -19,10 +19,10 @@ NOTHING = Given({}, {})
 def load(name, value, acts="output"):
     """Return a load whose term is `value`, or `value(switch)`."""
 
-    def force(system, pose, given, own, switch):
-        return value(switch) if callable(value) else value
+    def force(at):
+        return value(at.switch) if callable(value) else value
 
-    return Load(name=name, summary="", own=Table, acts=acts, force=force)
+    return Load(name=name, summary="", table=Table, acts=acts, force=force)
 
 
 def given(*loads):
@@ -62,11 +62,11 @@ def test_a_drive_alone_needs_no_output_motion():
 def test_each_load_is_handed_its_own_switch_and_its_own_values():
     seen = []
 
-    def force(system, pose, given, own, switch):
-        seen.append((dict(given), dict(own), switch))
-        return switch
+    def force(at):
+        seen.append((dict(at.values), dict(at.table), at.switch))
+        return at.switch
 
-    loads = [Load(name=name, summary="", own=Table, acts="output", force=force) for name in ("a", "b")]
+    loads = [Load(name=name, summary="", table=Table, acts="output", force=force) for name in ("a", "b")]
     numbers = Given({"M0": 1.0}, {"a": {"x": 1.0}, "b": {"y": 2.0}})
     assert balance.output_force(systems.FLOAT, loads, POSE, numbers, {"b": 20.0, "a": 10.0, "c": 1.0}) == 30.0
     assert seen == [({"M0": 1.0}, {"x": 1.0}, 10.0), ({"M0": 1.0}, {"y": 2.0}, 20.0)]

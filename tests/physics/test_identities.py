@@ -20,7 +20,7 @@ from loomopt.jobs.beatup.scene import RESISTED
 from loomopt.maths import systems
 from loomopt.physics import balance
 from loomopt.physics.effects import kinds
-from loomopt.physics.effects.kinds import Load
+from loomopt.physics.effects.kinds import Inputs, Load
 from loomopt.physics.mechanisms import crank_rocker
 
 BEATUP = kinds.of("loomopt.physics.effects.beatup")
@@ -84,7 +84,10 @@ def torques(names, numbers, phi, rod="exact", omega_dot=None, system=systems.FLO
     given_ = found.given(system, {name: system.number(value) for name, value in numbers.items()})
     plain = found.given(systems.FLOAT, numbers)
     cornered = {load.name: load for load in found.loads if load.corners}
-    corners = {name: load.corners(systems.FLOAT, plain.values, plain.own[name]) for name, load in cornered.items()}
+    corners = {
+        name: load.corners(Inputs(systems.FLOAT, plain.values, plain.own[name], None))
+        for name, load in cornered.items()
+    }
     switches = {name: load.switch(phi, corners[name]) for name, load in cornered.items()}
     angle = system.number(phi)
     lengths = beatup.linked(given_).lengths

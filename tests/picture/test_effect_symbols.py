@@ -21,18 +21,18 @@ class PointTable(Table):
     phi: Length | None = None
 
 
-def force(maths, pose, given, own, switch):
-    found = own["m"] * own["at"] ** 2 * pose.acceleration
-    return found + sum(own[key] for key in ("J4", "phi") if key in own)
+def force(at):
+    found = at.table["m"] * at.table["at"] ** 2 * at.pose.acceleration
+    return found + sum(at.table[key] for key in ("J4", "phi") if key in at.table)
 
 
-MASS = Load(name="mass", summary="a mass", own=PointTable, rank=15, acts="output", force=force, many=True)
-SINGLE = Load(name="single", summary="one", own=PointTable, rank=16, acts="output", force=force)
+MASS = Load(name="mass", summary="a mass", table=PointTable, rank=15, acts="output", force=force, many=True)
+SINGLE = Load(name="single", summary="one", table=PointTable, rank=16, acts="output", force=force)
 DOTS: Check[object] = Check(
     name="dots",
     summary="names with dots",
-    own=Table,
-    rows={"mu.x": lambda maths, given, own: given["l2"] + given["l3"]},
+    table=Table,
+    rows={"mu.x": lambda at: at.values["l2"] + at.values["l3"]},
     figures=(Figure("mu.x", "length", "a row"),),
 )
 NAMES = {"mass": "MASS", "single": "SINGLE", "dots": "DOTS"}

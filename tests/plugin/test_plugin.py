@@ -179,25 +179,25 @@ from loomopt.base.quantities import Quantity
 from loomopt.physics.effects.kinds import Load
 from loomopt.physics.schema import Table
 
-class Own(Table):
+class Parameters(Table):
     k: Annotated[float, Quantity("number")]
 
-def force(maths, pose, given, own, switch):
+def force(at):
     {}
 
-EFFECT = Load(name="wind", summary="wind", own=Own, acts="output", force=force, examples=({{"k": 1}},))
+EFFECT = Load(name="wind", summary="wind", table=Parameters, acts="output", force=force, examples=({{"k": 1}},))
 """
 BODIES = {
     "raise SystemExit(0)": "fails in force, line 11 of failing_effect: SystemExit: 0",
     "import sys; sys.exit('bye')": "SystemExit: bye",
     "raise RuntimeError('no\\nmore')": "RuntimeError: no more",
     "return 1.0 / 0": "ZeroDivisionError",
-    "return own['speed']": "KeyError: 'speed'",
-    "return pose.wind": "AttributeError",
-    "return force(maths, pose, given, own, switch)": "RecursionError",
+    "return at.table['speed']": "KeyError: 'speed'",
+    "return at.pose.wind": "AttributeError",
+    "return force(at)": "RecursionError",
     "import nothing_of_this_name": "ModuleNotFoundError",
     "assert False": "AssertionError",
-    "return 1.0 if pose.q > 0 else 0.0": "ValueError: The truth value",
+    "return 1.0 if at.pose.q > 0 else 0.0": "ValueError: The truth value",
     "return None": "'NoneType'",
     "return 'strong'": "it fails: ",
 }

@@ -3,6 +3,7 @@
 import copy
 import pickle
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from together import combined
@@ -23,20 +24,20 @@ from loomopt.scenes.tables import Bound, LimitRange
 BEATUP = load("beatup")
 
 
-class Own(Table):
+class Parameters(Table):
     """m: a mass; at: where it sits; kg, m."""
 
     m: PositiveMass
     at: Length = 0.0
 
 
-MASS = Load(
+MASS: Load[Any] = Load(
     name="mass",
     summary="a mass on a link",
-    own=Own,
+    table=Parameters,
     rank=15,
     acts="output",
-    force=lambda maths, pose, given, own, switch: own["m"] * own["at"] ** 2 * pose.acceleration,
+    force=lambda at: at.table["m"] * at.table["at"] ** 2 * at.pose.acceleration,
     figures=(Figure("rod.tension", "force", "pull in the rod", sides=("max",)),),
     many=True,
 )
@@ -151,7 +152,7 @@ class Shaped(Table):
 
 def apart(name, own=Table, **declared):
     """Return an effect without a term of its own worth, that says beside what it stands."""
-    return Load(name=name, summary="", own=own, acts="drive", force=lambda *_: 0, **declared)
+    return Load(name=name, summary="", table=own, acts="drive", force=lambda *_: 0, **declared)
 
 
 def test_an_effect_that_another_needs_is_asked_for():
@@ -175,7 +176,7 @@ def test_effects_that_clash_are_refused_naming_both():
 @pytest.mark.parametrize(("shape", "stands"), [("round", True), ("square", False)])
 def test_effects_may_clash_only_by_a_word_of_the_other(shape, stands):
     lone = apart("lone", clashes=(EffectClash("shaped", "it has corners", "shape", ("square", "flat")),))
-    other = Load(name="shaped", summary="", own=Shaped, acts="drive", force=lambda *_: 0)
+    other: Load[Any] = Load(name="shaped", summary="", table=Shaped, acts="drive", force=lambda *_: 0)
     tables = {"effects": {"lone": {}, "shaped": {"shape": shape}}}
     if stands:
         assert "lone" in built(tables, lone, other).effects
@@ -185,15 +186,15 @@ def test_effects_may_clash_only_by_a_word_of_the_other(shape, stands):
 
 
 def test_tables_are_found_by_their_models():
-    assert BEATUP.own(inertia.Own).J4 == 0.62
-    assert BEATUP.own(rocker_inertia.Own) is None
-    assert BEATUP.with_effect("rocker_inertia").own(rocker_inertia.Own).J3 == 0.05
+    assert BEATUP.own(inertia.Parameters).J4 == 0.62
+    assert BEATUP.own(rocker_inertia.Parameters) is None
+    assert BEATUP.with_effect("rocker_inertia").own(rocker_inertia.Parameters).J3 == 0.05
     assert BEATUP.table(Operation).M0 == 745.0
     assert BEATUP.table(Mechanism).l1 == 0.031
     assert BEATUP.set("targets.torque.M3_tolerance", "5 N*m").table(TorqueTarget).M3_tolerance == 5.0
     assert BEATUP.table(RetrofitTarget) is BEATUP.targets["retrofit"]
     with pytest.raises(StopIteration):
-        BEATUP.table(inertia.Own)
+        BEATUP.table(inertia.Parameters)
 
 
 @pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
@@ -209,12 +210,12 @@ def test_a_scene_with_every_effect_pickles_to_the_same_scene(name):
 
 @pytest.mark.parametrize(("job", "refused"), [("beatup", True), ("rapier", True), ("shedding", False)])
 def test_a_load_known_in_part_of_the_cycle_is_refused_by_jobs_that_cannot_judge_it(job, refused, monkeypatch):
-    partly = Load(
+    partly: Load[Any] = Load(
         name="partly",
         summary="known in some stretch only",
-        own=Table,
+        table=Table,
         acts="output",
-        force=lambda maths, pose, given, own, switch: 0 * pose.q,
+        force=lambda at: 0 * at.pose.q,
         known_in=lambda words: (("segment", 1.0), ("segment", 3.0)),
     )
     monkeypatch.setattr(registry, "_brought", lambda job, name: partly)
@@ -242,7 +243,7 @@ def test_of_several_changes_only_the_outcome_has_to_hold():
 
 def test_a_value_set_in_available_is_what_goes_on():
     changed = BEATUP.change({"available.rocker_inertia.J3": "0.07 kg*m^2"}, on=("rocker_inertia",))
-    assert changed.own(rocker_inertia.Own).J3 == 0.07
+    assert changed.own(rocker_inertia.Parameters).J3 == 0.07
 
 
 @pytest.mark.parametrize(

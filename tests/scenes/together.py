@@ -14,4 +14,4 @@ def combined(effects):
 
 def goes(effects):
     """Say whether effects can be on together, each with its first example."""
-    return not list(faults({effect: effect.own(**effect.examples[0]) for effect in effects}))
+    return not list(faults({effect: effect.table(**effect.examples[0]) for effect in effects}))

@@ -101,7 +101,7 @@ def _tables(scene: Scene) -> dict[str, list[Symbol]]:
         "Values of effects": [
             each
             for effect in dict.fromkeys([*schema.effects.values(), *scene.active])
-            for each in _numbers(scene, effect.own, f"{effect.name}.")
+            for each in _numbers(scene, effect.table, f"{effect.name}.")
         ],
         "Columns of the curves": list(columns(scene)),
         "Figures": [each for figure in schema.figures.values() for each in _figure(figure, scene, words)],

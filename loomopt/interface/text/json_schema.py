@@ -89,7 +89,7 @@ def _problem(schema: SceneSchema) -> Json:
 def _effects(schema: SceneSchema) -> Json:
     found = {}
     for effect in schema.effects.values():
-        own = _model(effect.own, effect.summary) | _either(effect)
+        own = _model(effect.table, effect.summary) | _either(effect)
         found[effect.name] = {"type": "object", "additionalProperties": own} if effect.many else own
     return _closed(found)
 
@@ -103,7 +103,7 @@ def _by_number(schema: SceneSchema, made: Callable[[Quantity], Json]) -> Json:
     """Return a table with a key for every number; made: what stands there, of what the number may be."""
     kinds: dict[str, list[Quantity]] = {}
     effects = [effect for effect in schema.effects.values() if not effect.many]
-    for model in (schema.mechanism, schema.operation, *(effect.own for effect in effects)):
+    for model in (schema.mechanism, schema.operation, *(effect.table for effect in effects)):
         for name in model.model_fields:
             if quantity := quantity_of(model, name):
                 kinds.setdefault(name, []).append(quantity)

@@ -99,7 +99,7 @@ def _values(scene: Scene) -> Iterator[tuple[str, str, float | str | Sequence[flo
             else:
                 yield f"{table}.{name}", name, value
     for effect in scene.active:
-        for key in keys(effect.own):
+        for key in keys(effect.table):
             value = value_at(scene.effects[effect.name], key)
             if isinstance(value, int | float | str):
                 yield f"effects.{owned(effect, key)}", label(effect, key), value

@@ -5,7 +5,7 @@ q = −ψ, Q = M3 (positive pushes the reed toward the fell), crank torque = Md 
 
 import functools
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -160,11 +160,13 @@ def eccentricity(at: Instant) -> Number:
 
 def inertia(at: Instant) -> Number:
     """Return J4 of reed and counterweight, kg·m² [Yuan24, eq 10]: all that moves with the reed."""
-    return balance.total([moved(at.values, at.given.own[name]) for name, moved in _moved(at.model.effects).items()])
-
-
-def _moved(effects: Iterable[Effect]) -> dict[str, Callable[[Values, Values], Number]]:
-    return {e.name: e.moved for e in effects if isinstance(e, Load) and e.moved}
+    return balance.total(
+        [
+            load.moved(at.given.inputs(at.maths, load))
+            for load in at.model.loads
+            if isinstance(load, Load) and load.moved
+        ]
+    )
 
 
 def change(names: Collection[str], at: Instant) -> Number:
@@ -201,7 +203,7 @@ def model(
 
     pulse: the pieces of the cycle in which the cloth resists, which the figure pulse_rms is of.
     """
-    reed = any("s" in effect.reads for effect in effects if effect.name in _moved(effects))
+    reed = any("s" in effect.reads for effect in effects if isinstance(effect, Load) and effect.moved)
     rows = ROWS | ({"J4": DesignRow(inertia)} if reed else {})
     rows |= {"change": DesignRow(functools.partial(change, changing))} if changing else {}
     square = {"M3_square": CycleQuantity(lambda at: at.force**2, figure=False)}

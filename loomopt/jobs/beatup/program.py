@@ -10,6 +10,7 @@ from loomopt.jobs.base import Ends, Task, bound_limits, distinct, ends, size_rea
 from loomopt.jobs.beatup import model as beatup
 from loomopt.jobs.beatup.model import LENGTHS, today
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, BeatupTarget, RetrofitTarget, TorqueTarget
+from loomopt.maths.systems import FLOAT
 from loomopt.model.drive import TORQUE
 from loomopt.model.limits import Limit, RatioLimit
 from loomopt.model.model import JobModel, with_words_fixed
@@ -267,9 +268,9 @@ class BeatupTask(Task):
     def reed(self) -> float:
         """Inertia of the reed without a counterweight, kg·m²: the largest that a load reads s for."""
         given = self.sampler.given
-        loads = [load for load in self.sampler.model.loads if isinstance(load, Load)]
-        own = [(load.moved, given.own[load.name]) for load in loads if load.moved and "s" in load.reads]
-        return max((float(moved({**given.values, "s": 0.0}, values)) for moved, values in own), default=0.0)
+        bare = given._replace(values={**given.values, "s": 0.0})
+        loads = [load for load in self.sampler.model.loads if isinstance(load, Load) and "s" in load.reads]
+        return max((float(load.moved(bare.inputs(FLOAT, load))) for load in loads if load.moved), default=0.0)
 
     @lazy
     def counterweight(self) -> dict[str, Ends]:

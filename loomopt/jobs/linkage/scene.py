@@ -523,7 +523,7 @@ def _check_names(scene: Scene, known: Reading) -> None:
     taken |= {
         kinds.label(effect, key): f"a number of effect {effect.name}"
         for effect, own in zip(scene.active, scene.effects.values(), strict=True)
-        for key in effect.own.model_fields
+        for key in effect.table.model_fields
         if getattr(own, key) is not None
     }
     for name in known.numbers:

@@ -213,7 +213,7 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
     linkage = linkage_of(model)
     out, written = linkage.output, symbolic(linkage.chain, model.known)
     at = SymbolicPose(written.pose, out, symbol("omega"))
-    own_symbols = {f"{each.name}.{key}": _own(each, key) for each in model.effects for key in each.own.model_fields}
+    own_symbols = {f"{each.name}.{key}": _own(each, key) for each in model.effects for key in each.table.model_fields}
     numbers = Symbols({name: own for name, own in own_symbols.items() if name in model.known})
     numbers |= {event_value(place.name): symbol(f"phi_{place.name}") for place in linkage.places}
     known = Given(numbers, {each.name: _own_values(model, each) for each in model.effects})
@@ -230,7 +230,7 @@ def _own(effect: Effect, key: str) -> Expression:
 
 def _own_values(model: JobModel, effect: Effect) -> Values:
     """Return the symbols and words of an effect's table, of those keys that are given."""
-    given = {key: _own(effect, key) for key in effect.own.model_fields if f"{effect.name}.{key}" in model.known}
+    given = {key: _own(effect, key) for key in effect.table.model_fields if f"{effect.name}.{key}" in model.known}
     words = model.words_of(effect.name)
     return {**given, **words, **({"instance": effect.instance} if effect.instance else {})}
 

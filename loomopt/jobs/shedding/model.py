@@ -20,7 +20,7 @@ from loomopt.model.kinematics import Arcs, Chain, Group
 from loomopt.model.model import CycleQuantity, DesignRow, Instant, JobModel
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
-from loomopt.physics.effects.kinds import Effect, Load, Motion
+from loomopt.physics.effects.kinds import Effect, Inputs, Load, Motion
 from loomopt.physics.effects.shedding import FramePose as Frame
 from loomopt.physics.mechanisms.cam_follower import Contact, Follower
 from loomopt.physics.mechanisms.cam_laws import LawDerivatives
@@ -43,15 +43,15 @@ class NoTable(Table):
     """No values of its own: K1 and X0 are the mechanism's."""
 
 
-def spring_force(maths: Maths, pose: Frame, given: Values, own: Values, switch: Number) -> Number:
+def spring_force(at: Inputs[Frame]) -> Number:
     """Return K1 (X + X0), N [Qiu21, eq 4]; K1 is of both springs together."""
-    return given["K1"] * (pose.q + given["X0"])
+    return at.values["K1"] * (at.pose.q + at.values["X0"])
 
 
 RETURN_SPRING = Load(
     name="return_spring",
     summary="the return spring",
-    own=NoTable,
+    table=NoTable,
     acts="output",
     force=spring_force,
     reads=("K1", "X0"),

@@ -348,7 +348,7 @@ class SheddingTask(Task):
         ends["X0"] = self.limited["X0"]
         ends["K1"] = self.limited["K1"] if "K1" in scene.bounds else (0.0, math.inf)
         if self.target == "speed":
-            given = {owned(check, key) for check in self.checks for key in check.own.model_fields}
+            given = {owned(check, key) for check in self.checks for key in check.table.model_fields}
             ends |= {name: (known[name],) * 2 for name in ends if name in given}
             # A check's own numbers may give K1.
             tied = any("K1" in c.reads and any(d.sign == 0 for d in c.demands) for c in self.checks)

@@ -554,7 +554,7 @@ def _others(load: Load[Any], words: Mapping[str, str]) -> str:
     """Return the words of a load's table with which it is known all over the cycle."""
     found = []
     for key, word in words.items():
-        said = [each for each in get_args(load.own.model_fields[key].annotation) if each != word]
+        said = [each for each in get_args(load.table.model_fields[key].annotation) if each != word]
         found.append(f"{key} = " + " or ".join(f'"{each}"' for each in said if not load.known_in({**words, key: each})))
     return " and ".join(found)
 

@@ -45,24 +45,24 @@ class Motion:
 
 
 Pose = TypeVar("Pose", contravariant=True)
-Own = TypeVar("Own", bound=Table)
-Corners = Callable[[Maths, Values, Values], tuple[Number, ...]]
+AnyPose = TypeVar("AnyPose", covariant=True)
 Place = tuple[str, float]
 """A switch by name, and its value on the pieces that are meant."""
 
 
-class Force(Protocol[Pose]):
-    """force(maths, pose, given, own, switch): see `Load`."""
+class Inputs(NamedTuple, Generic[AnyPose]):
+    """What a formula of an effect reads, in one number system.
 
-    def __call__(self, maths: Maths, pose: Pose, given: Values, own: Values, switch: Number, /) -> Number:
-        """Return the term, N or N·m."""
+    values: the scene's numbers, SI, with what follows from them; table: the values of the effect's own table.
+    pose: the mechanism at the instant, None in a formula of the design alone.
+    switch: which of a load's formulas holds, as `Load.switch` gives it.
+    """
 
-
-class PushFormula(Protocol[Pose]):
-    """push(maths, pose, given, own, term): the force itself that a load's term is the moment, or the work, of."""
-
-    def __call__(self, maths: Maths, pose: Pose, given: Values, own: Values, term: Number, /) -> "Vector | None":
-        """Return it in the mechanism's axes, N; None where the table does not tell it."""
+    maths: Maths
+    values: Values
+    table: Values
+    pose: AnyPose
+    switch: Number = 0
 
 
 class LinkMass(NamedTuple):
@@ -114,22 +114,6 @@ class Loading(Protocol):
     @property
     def applied(self) -> Sequence[Applied]:
         """Forces on links and joints by name."""
-
-
-class ResponseFormula(Protocol[Pose]):
-    """response(maths, oscillator, pose, given, own, switch): the closed-form answer to a load with corners."""
-
-    def __call__(
-        self, maths: Maths, oscillator: "SteadyOscillator", pose: Pose, given: Values, own: Values, switch: Number, /
-    ) -> tuple[Number, Number]:
-        """Return z, rad or m, and z˙ in the periodic steady state."""
-
-
-class ReadingFormula(Protocol[Pose]):
-    """reading(maths, pose, given, own): a value read from the solved motion at one instant."""
-
-    def __call__(self, maths: Maths, pose: Pose, given: Values, own: Values, /) -> Number:
-        """Return the value, SI."""
 
 
 def constant_switch(angle: float, corners: tuple[float, ...]) -> float:
@@ -188,7 +172,7 @@ class Effect:
     """What all kinds declare.
 
     name: the table in a scene that turns it on; an instance of one that there may be many of is "kind.instance".
-    own: model of that table's values. rank: its place among the job's effects, the lowest first.
+    table: model of that table's values. rank: its place among the job's effects, the lowest first.
     reads: design variables it depends on beside the mechanism's lengths, and events of the motion that it calls in.
     needs: scene keys that must be given; beside: effects that must be on; clashes: those that must not.
     examples: tables it may have, as a scene writes them, for tests and templates.
@@ -204,7 +188,7 @@ class Effect:
 
     name: str
     summary: str
-    own: type[Table]
+    table: type[Table]
     rank: int = 100
     reads: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
@@ -264,7 +248,7 @@ def required(effect: "Effect") -> tuple[str, ...]:
     """Return the keys of an effect's table without which it is none, those that a curve may stand for included."""
     table = effect.tabulated if isinstance(effect, Load) else None
     for_curve = table.instead if table else ()
-    fields = effect.own.model_fields
+    fields = effect.table.model_fields
     usual = effect.models.get(str(fields["model"].default), ModelNeeds()) if effect.models else ModelNeeds()
     asked = {*for_curve, *usual.keys}
     return tuple(key for key, info in fields.items() if info.is_required() or (key in asked and info.default is None))
@@ -275,42 +259,42 @@ class Load(Effect, Generic[Pose]):
     """An algebraic effect: one term of the force the output needs, or of the crank torque inside the drive.
 
     acts: "output" (times q' it reaches the crank) or "drive" (it reaches the crank only).
-    force(maths, pose, given, own, switch): the term, N or N·m. `given` holds the scene's numbers, `own` its table's.
-    corners(maths, given, own): crank angles in rad where the formula changes; switch(angle, corners): which formula
-    holds at a crank angle inside a piece, as a number the force is handed.
-    response: what an oscillator that carries the load makes of it; one with corners cannot be carried without.
+    force(at): the term, N or N·m.
+    corners(at): crank angles in rad where the formula changes; switch(angle, corners): which formula holds at a crank
+    angle inside a piece, as the number `at.switch`.
+    response(at, oscillator): z, rad or m, and z˙ of an oscillator that carries the load, in the periodic steady state;
+    a load with corners cannot be carried without.
     known_in(words): where the term is known, by the words of its table; empty for all over the cycle.
-    inside(maths, pose, given, own): of an output term, what the effect takes inside the drive besides, N·m; None for
-    nothing.
-    upon(maths, pose, given, own, switch, loading): the term instead, where it depends on what all others do.
-    moved(given, own): the inertia, kg·m² or kg, that it adds to what moves with the output.
+    inside(at): of an output term, what the effect takes inside the drive besides, N·m; None for nothing.
+    upon(at, loading): the term instead, where it depends on what all others do.
+    moved(at): the inertia, kg·m² or kg, that it adds to what moves with the output.
     symbol: what its column of the curves is called, its name without one.
     told: switch → where that formula holds, in words for its equation; by its corners without them.
     tabulated: the curve of one's own that it may be; None for none.
-    mass(maths, given, own): what it moves of one link; push: the force on the output's link that its term is of;
-    applied(maths, pose, given, own, switch): its forces on links and joints, where those have names. All of them are
-    read where forces in joints are asked for, and nowhere else.
+    mass(at): what it moves of one link; push(at, term): the force on the output's link, N, that its term is the moment
+    or the work of, None where the table does not tell it; applied(at): its forces on links and joints, where those have
+    names. All of them are read for the forces in joints, and nowhere else.
     """
 
     acts: Literal["output", "drive"]
-    force: Force[Pose]
-    inside: "Callable[[Maths, Pose, Values, Values], Number | None] | None" = None
-    upon: "Callable[[Maths, Pose, Values, Values, Number, Loading], Number] | None" = None
-    corners: Corners | None = None
+    force: Callable[[Inputs[Pose]], Number]
+    inside: Callable[[Inputs[Pose]], Number | None] | None = None
+    upon: Callable[[Inputs[Pose], Loading], Number] | None = None
+    corners: Callable[[Inputs[None]], tuple[Number, ...]] | None = None
     switch: Callable[[float, tuple[float, ...]], float] = constant_switch
     known_in: Callable[[Mapping[str, str]], tuple[Place, ...]] = nothing_unknown
-    moved: Callable[[Values, Values], Number] | None = None
-    response: ResponseFormula[Pose] | None = None
+    moved: Callable[[Inputs[None]], Number] | None = None
+    response: "Callable[[Inputs[Pose], SteadyOscillator], tuple[Number, Number]] | None" = None
     symbol: str = ""
     told: Mapping[float, str] = field(default_factory=dict)
     tabulated: LoadTable | None = None
-    mass: Callable[[Maths, Values, Values], LinkMass] | None = None
-    push: PushFormula[Pose] | None = None
-    applied: Callable[[Maths, Pose, Values, Values, Number], Sequence[Applied]] | None = None
+    mass: Callable[[Inputs[None]], LinkMass] | None = None
+    push: "Callable[[Inputs[Pose], Number], Vector | None] | None" = None
+    applied: Callable[[Inputs[Pose]], Sequence[Applied]] | None = None
 
     def __post_init__(self) -> None:
         """Raise ValueError for what no job could make least."""
-        if self.least and self.least not in self.own.model_fields:
+        if self.least and self.least not in self.table.model_fields:
             raise ValueError(f"effect {self.name}: {self.least} is no key of the table")
 
 
@@ -319,7 +303,7 @@ def nothing_sold(own: Any) -> Mapping[str, Sequence[float]]:
     return {}
 
 
-def nothing_remarked(given: Values, own: Values, shown: ShowValue) -> str:
+def nothing_remarked(at: Inputs[None], shown: ShowValue) -> str:
     """Return nothing: the figures stand for themselves."""
     return ""
 
@@ -339,11 +323,10 @@ def nothing_explained(
 class Check(Effect, Generic[Pose]):
     """An effect that takes no part in the balance: figures and rows read from the solved motion, and their demands.
 
-    quantities: name → value(maths, pose, given, own) over the cycle; the figure is the largest |value|.
-    rows: name → value(maths, given, own) of the design alone; demands: what rows or quantities must keep while it is
-    on.
+    quantities: name → value(at) over the cycle; the figure is the largest |value|.
+    rows: name → value(at) of the design alone; demands: what rows or quantities must keep while it is on.
     sold(own): numbers of its table that come in sizes → those sold, SI, ascending.
-    joints(maths, pose, given, own, loading): an object whose attributes are read by their names: `vectors`, whose size
+    joints(at, loading): an object whose attributes are read by their names: `vectors`, whose size
     is the quantity and whose components stand beside it, and `scalars`; wanted: which of them, or of the quantities,
     needs scene keys, and has no value without; between: what acts on links by their mass, told apart in equations;
     sides: force → the parts that it is between, of the first on the second one, "frame" for what does not move; their
@@ -354,15 +337,15 @@ class Check(Effect, Generic[Pose]):
     its size, per rad of the crank.
     The same name in two checks is the same quantity. fitted(chain): the check of a linkage of one's own;
     said: its equations in words, where the symbols of a pose do not tell its links.
-    remark(given, own, shown): what to know beside its figures, "" for nothing, in the reader's units.
+    remark(at, shown): what to know beside its figures, "" for nothing, in the reader's units.
     explain(known, bounds, own, clash, shown): what physics says of why limits (names) clash, in the reader's units.
     """
 
-    quantities: Mapping[str, ReadingFormula[Pose]] = field(default_factory=dict)
-    rows: Mapping[str, Callable[[Maths, Values, Values], Number]] = field(default_factory=dict)
+    quantities: Mapping[str, Callable[[Inputs[Pose]], Number]] = field(default_factory=dict)
+    rows: Mapping[str, Callable[[Inputs[None]], Number]] = field(default_factory=dict)
     demands: tuple[Demand, ...] = ()
     sold: Callable[[Any], Mapping[str, Sequence[float]]] = nothing_sold
-    joints: Callable[[Maths, Pose, Values, Values, Loading], Any] | None = None
+    joints: Callable[[Inputs[Pose], Loading], Any] | None = None
     vectors: tuple[str, ...] = ()
     scalars: tuple[str, ...] = ()
     sides: Mapping[str, tuple[str, str]] = field(default_factory=dict)
@@ -374,7 +357,7 @@ class Check(Effect, Generic[Pose]):
     fitted: "Callable[[Chain], Check[Any]] | None" = None
     between: tuple[str, ...] = ()
     said: str = ""
-    remark: Callable[[Values, Values, ShowValue], str] = nothing_remarked
+    remark: Callable[[Inputs[None], ShowValue], str] = nothing_remarked
     explain: Callable[
         [Mapping[str, float], Mapping[str, tuple[float, float]], Any, Collection[str], ShowValue], str
     ] = nothing_explained
@@ -395,9 +378,9 @@ class Check(Effect, Generic[Pose]):
                 faults.append(f"quantity {demand.row} has no least")
             if demand.row not in {*self.over_cycle, *self.rows}:
                 faults.append(f"{demand.row} is neither a quantity nor a row")
-            if isinstance(demand.value, str) and demand.value not in self.own.model_fields:
+            if isinstance(demand.value, str) and demand.value not in self.table.model_fields:
                 faults.append(f"{demand.value} is no key of the table")
-        if self.least and self.least not in {*self.rows, *self.own.model_fields}:
+        if self.least and self.least not in {*self.rows, *self.table.model_fields}:
             faults.append(f"{self.least} is neither a row nor a key of the table")
         if faults:
             raise ValueError(f"effect {self.name}: {faults[0]}")
@@ -410,7 +393,7 @@ class StatePeak(NamedTuple):
     least: bool = False
 
 
-def no_oscillator(maths: Maths, given: Values, own: Values) -> "SteadyOscillator":
+def no_oscillator(at: Inputs[None]) -> "SteadyOscillator":
     """Raise LookupError: no load with corners is carried."""
     raise LookupError("the state answers no load with corners")
 
@@ -420,13 +403,13 @@ class State(Effect):
     """One linear coordinate between the output and the loads that move with it; eliminated before a formula reads it.
 
     carries: names of the loads that move with the coordinate: they leave the output force, and `force` stands there.
-    derived(maths, given, own, carried): values that follow from the scene's numbers, in the steady state.
-    force, coordinate: Q's term, N or N·m, and z itself, of derived values. oscillator(maths, given, own): what loads
-    with corners answer, of derived values too.
-    fixed(given, own, carried): words that choose formulas at a design, in floats; `own` has those of its neighbours, if
+    derived(at, carried): values that follow from the scene's numbers, in the steady state.
+    force(at, reply), coordinate(at, reply): Q's term, N or N·m, and z itself, of derived values; reply: z and z˙ in
+    answer to loads with corners. oscillator(at): what answers those loads, of derived values too.
+    fixed(at, carried): words that choose formulas at a design, in floats; `at.table` has those of its neighbours, if
     any, and what serves them is kept. Raises UnsteadyError.
-    samples(given, own): of one turn, from which extremes are refined.
-    moved(pose, own, coordinate, force, acceleration): the motion of what it carries, whose q¨ is known already.
+    samples(at): of one turn, from which extremes are refined.
+    moved(at, coordinate, force, acceleration): the motion of what it carries, whose q¨ is known already.
     peaks: figure → what it is of; columns: of the curves, with unit → what is read.
     motion(written, own): both sides of its equation of motion; term(written, own): `force` in the same symbols.
     between: the symbols that z is the difference of, what moves first. rests(own): what neither proofs nor studies of
@@ -434,17 +417,17 @@ class State(Effect):
     """
 
     carries: tuple[str, ...]
-    derived: "Callable[[Maths, Values, Values, Carried], Mapping[str, Number]]"
-    force: "Replied"
-    coordinate: "Replied"
+    derived: "Callable[[Inputs[None], Carried], Mapping[str, Number]]"
+    force: Callable[[Inputs[Any], tuple[Number, Number]], Number]
+    coordinate: Callable[[Inputs[Any], tuple[Number, Number]], Number]
     motion: "Callable[[Written, Values], tuple[Number, Number]]"
     term: "Callable[[Written, Values], Number]"
     between: tuple[str, str]
     rests: Callable[[Values], str]
-    oscillator: "Callable[[Maths, Values, Values], SteadyOscillator]" = no_oscillator
-    fixed: "Callable[[Values, Values, Carried], Mapping[str, str]]" = lambda given, own, carried: {}
-    samples: Callable[[Values, Values], float] = lambda given, own: 0.0
-    moved: Callable[[Motion, Values, Number, Number, Number], Any] | None = None
+    oscillator: "Callable[[Inputs[None]], SteadyOscillator]" = no_oscillator
+    fixed: "Callable[[Inputs[None], Carried], Mapping[str, str]]" = lambda at, carried: {}
+    samples: Callable[[Inputs[None]], float] = lambda at: 0.0
+    moved: Callable[[Inputs[Motion], Number, Number, Number], Any] | None = None
     peaks: Mapping[str, StatePeak] = field(default_factory=dict)
     columns: "Mapping[str, Callable[[Moved], Number]]" = field(default_factory=dict)
     acts: Literal["output"] = "output"
@@ -454,15 +437,15 @@ class State(Effect):
 class Speed(Effect):
     """The crank's own motion: its speed changes over the turn as the motor gives what the crank takes.
 
-    motor(maths, omega, given, own): the motor's torque, N·m, at a speed, rad/s; given["no_load_speed"] is the one that
-    follows from the mean speed over time. flywheel(given, own): inertia, kg·m², of all that turns with the crank.
-    rows: name → value(turning, given, own), SI, of the motion that is solved; most: the one that is the motor's largest
+    motor(at, omega): the motor's torque, N·m, at a speed, rad/s; at.values["no_load_speed"] is the one that follows
+    from the mean speed over time. flywheel(at): inertia, kg·m², of all that turns with the crank.
+    rows: name → value(at, turning), SI, of the motion that is solved; most: the one that is the motor's largest
     torque.
     """
 
-    motor: Callable[[Maths, Number, Values, Values], Number]
-    flywheel: Callable[[Values, Values], Number]
-    rows: Mapping[str, Callable[["Turning", Values, Values], float]] = field(default_factory=dict)
+    motor: Callable[[Inputs[None], Number], Number]
+    flywheel: Callable[[Inputs[None]], Number]
+    rows: Mapping[str, Callable[[Inputs[None], "Turning"], float]] = field(default_factory=dict)
     most: str = ""
 
 
@@ -579,15 +562,6 @@ class Written(NamedTuple):
     omega: Number
     inertia: Number
     force: Number
-
-
-class Replied(Protocol):
-    """formula(maths, pose, given, own, reply): of derived values; reply: z and z˙ in answer to loads with corners."""
-
-    def __call__(
-        self, maths: Maths, pose: Number, given: Values, own: Values, reply: tuple[Number, Number], /
-    ) -> Number:
-        """Return the value, SI."""
 
 
 @functools.lru_cache(maxsize=256)

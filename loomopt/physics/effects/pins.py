@@ -28,7 +28,7 @@ def own(pins: Mapping[str, str]) -> type[Table]:
     inner = create_model("Pins", __base__=Table, __module__=__name__, __doc__="Friction of each pin.", **fields)  # type: ignore[call-overload]
     whole = (inner | None, Field(None, description="friction of the pins, for what they lose: a figure only"))
     doc = "What only the loss by friction reads."
-    found: type[Table] = create_model("Own", __base__=Table, __module__=__name__, __doc__=doc, pins=whole)  # type: ignore[arg-type]
+    found: type[Table] = create_model("Parameters", __base__=Table, __module__=__name__, __doc__=doc, pins=whole)  # type: ignore[arg-type]
     return found
 
 

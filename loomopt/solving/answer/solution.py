@@ -686,7 +686,7 @@ class Words:
             known = quantities_of(model)
             if name in known:
                 return known[name].kind
-        places = [(e.own, key, label(e, key)) for e in self.scene.active for key in e.own.model_fields]
+        places = [(e.table, key, label(e, key)) for e in self.scene.active for key in e.table.model_fields]
         found = next((quantity_of(model, key) for model, key, called in places if called == name), None)
         return found.kind if found else UNKNOWN
 

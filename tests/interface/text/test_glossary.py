@@ -26,7 +26,7 @@ def test_every_number_word_and_figure_is_told_with_its_unit(job):
     scene = lo.load(scene_of(job))
     told, schema = symbols(scene), scene.schema
     models = [("", schema.operation), ("", schema.mechanism)]
-    models += [(f"{effect.name}.", effect.own) for effect in schema.effects.values()]
+    models += [(f"{effect.name}.", effect.table) for effect in schema.effects.values()]
     for path, own in models:
         for name in own.model_fields:
             quantity = quantity_of(own, name)

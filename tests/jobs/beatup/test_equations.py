@@ -215,7 +215,7 @@ def test_a_term_with_corners_says_where_each_formula_holds():
 def test_all_effects_together_stay_short_and_their_symbols_apart():
     found = beatup_equations.equations(model(*BEATUP))
     assert sum(len(equation.name) + len(equation.text) + 2 for equation in found) < 5600
-    keys = [key for effect in BEATUP.values() for key in effect.own.model_fields if key != "model"]
+    keys = [key for effect in BEATUP.values() for key in effect.table.model_fields if key != "model"]
     assert len(keys) == len(set(keys))
 
 

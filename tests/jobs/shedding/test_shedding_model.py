@@ -13,6 +13,7 @@ from loomopt.jobs.shedding.model import FrameMotion
 from loomopt.jobs.shedding.scene import HealdFrame
 from loomopt.maths import systems
 from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Inputs
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.cam_motion import Spline
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
@@ -291,7 +292,7 @@ def power(sampled, name, nodes_=48):
         switches = {each: np.full(theta.shape, value) for each, value in sampled.cycle.switch(piece).items()}
         pose = physics.kinematics.pose(systems.numpy(), sampled.given, Node(theta, switches))
         values, own = sampled.given.values, sampled.given.own[name]
-        term = load.force(systems.numpy(), pose, values, own, switches.get(name, 0))
+        term = load.force(Inputs(systems.numpy(), values, own, pose, switches.get(name, 0)))
         work += (end - start) / 2 * np.sum(weights * term * pose.q1)
         size += (end - start) / 2 * np.sum(weights * np.abs(term * pose.q1))
     return work, size

@@ -2,6 +2,7 @@
 
 import math
 from importlib.metadata import EntryPoint
+from typing import Any
 
 from loomopt.base.quantities import Coordinate, PositiveLength, PureNumber
 from loomopt.physics.effects.kinds import Check, Demand, FlatNumber, Load, Speed
@@ -34,27 +35,27 @@ def within(angle, corners):
     return 1.0 if begins <= angle % (2 * math.pi) < ends else 0.0
 
 
-def placed(maths, given, own):
+def placed(at):
     return (BEGINS, ENDS)
 
 
-OUTPUT = Load(
+OUTPUT: Load[Any] = Load(
     name="made_up_output",
     summary="drag in proportion to the speed, and a step between two angles",
-    own=OutputTable,
+    table=OutputTable,
     acts="output",
-    force=lambda m, pose, given, own, switch: own["c"] * pose.velocity + own["a"] * switch,
+    force=lambda at: at.table["c"] * at.pose.velocity + at.table["a"] * at.switch,
     needs=("operation.speed",),
     corners=placed,
     switch=within,
     examples=({"c": "0.02", "a": "0.3"},),
 )
-DRIVE = Load(
+DRIVE: Load[Any] = Load(
     name="made_up_drive",
     summary="drag in the drive",
-    own=DriveTable,
+    table=DriveTable,
     acts="drive",
-    force=lambda m, pose, given, own, switch: own["b"] * pose.omega * switch * m.sin(pose.phi) ** 2,
+    force=lambda at: at.table["b"] * at.pose.omega * at.switch * at.maths.sin(at.pose.phi) ** 2,
     needs=("operation.speed",),
     corners=placed,
     switch=within,
@@ -67,7 +68,7 @@ def check(quantity, row, reads):
     return Check(
         name="made_up_check",
         summary="a reading of the motion and one of the design",
-        own=CheckTable,
+        table=CheckTable,
         reads=reads,
         quantities={"made_up_peak": quantity},
         rows={"made_up_size": row},
@@ -80,9 +81,9 @@ def check(quantity, row, reads):
     )
 
 
-BEATUP = check(lambda m, pose, v, own: v["l3"] * pose.q2, lambda m, v, own: v["l2"] + v["l3"], ())
-RAPIER = check(lambda m, pose, v, own: pose.q1 + 0 * v["l4"], lambda m, v, own: v["l5"] + v["l6"], ("l4",))
-SHEDDING = check(lambda m, pose, v, own: pose.q + v["X0"], lambda m, v, own: v["X0"], ("X0",))
+BEATUP = check(lambda at: at.values["l3"] * at.pose.q2, lambda at: at.values["l2"] + at.values["l3"], ())
+RAPIER = check(lambda at: at.pose.q1 + 0 * at.values["l4"], lambda at: at.values["l5"] + at.values["l6"], ("l4",))
+SHEDDING = check(lambda at: at.pose.q + at.values["X0"], lambda at: at.values["X0"], ("X0",))
 
 
 def at_event(name, angles):
@@ -94,11 +95,11 @@ def at_event(name, angles):
     return Load(
         name="made_up_event",
         summary="a jump at an event",
-        own=EventTable,
+        table=EventTable,
         acts="output",
-        force=lambda m, pose, given, own, switch: own["jump"] * switch,
+        force=lambda at: at.table["jump"] * at.switch,
         reads=(name,),
-        corners=lambda m, given, own: angles(given),
+        corners=lambda at: angles(at.values),
         switch=switch,
         examples=({"jump": "0.5"},),
     )
@@ -113,8 +114,8 @@ class PlateTable(Table):
 PLATE: Check[object] = Check(
     name="made_up_plate",
     summary="a plate as thin as it may be, and a number that nothing reads",
-    own=PlateTable,
-    rows={"plate": lambda m, given, own: own["thickness"]},
+    table=PlateTable,
+    rows={"plate": lambda at: at.table["thickness"]},
     figures=(Figure("plate", "length", "thickness of the plate"),),
     demands=(Demand("plate", -1, "strong"),),
     least="plate",
@@ -131,11 +132,11 @@ class MotorTable(Table):
 MOTOR = Speed(
     name="made_up_motor",
     summary="a motor whose torque falls with the square of the speed, and a flywheel",
-    own=MotorTable,
+    table=MotorTable,
     rank=95,
-    motor=lambda m, omega, given, own: own["line"] * (given["no_load_speed"] ** 2 - omega**2),
-    flywheel=lambda given, own: own["wheel"],
-    rows={"made_up_fastest": lambda turning, given, own: turning.range[1]},
+    motor=lambda at, omega: at.table["line"] * (at.values["no_load_speed"] ** 2 - omega**2),
+    flywheel=lambda at: at.table["wheel"],
+    rows={"made_up_fastest": lambda at, turning: turning.range[1]},
     needs=("operation.speed",),
     figures=(Figure("made_up_fastest", "angular speed", "greatest speed of the shaft"),),
     examples=({"line": "0.05", "wheel": "20"},),

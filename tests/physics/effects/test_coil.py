@@ -18,7 +18,7 @@ CLASH = ("surge_ratio", "shear_share")
 
 
 def own(**values):
-    return SCENE.own(coil.Own).model_copy(update=values)
+    return SCENE.own(coil.Parameters).model_copy(update=values)
 
 
 def test_it_takes_no_part_in_the_balance():
@@ -33,7 +33,7 @@ def test_every_demand_is_of_one_of_its_rows_and_every_margin_is_demanded():
     assert set(coil.MARGINS) == {demand.row for demand in coil.EFFECT.demands if demand.value == 0.0}
     assert {figure.name for figure in coil.FIGURES} | set(coil.MARGINS) == set(coil.ROWS)
     named = {demand.value for demand in coil.EFFECT.demands if isinstance(demand.value, str)}
-    assert named <= set(coil.Own.model_fields)
+    assert named <= set(coil.Parameters.model_fields)
     assert [(d.sign, d.value) for d in coil.EFFECT.demands if d.row == "coil_index"] == [(-1, 4.0), (1, 12.0)]
     assert coil.EFFECT.least == "spring_mass"
 

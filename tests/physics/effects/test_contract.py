@@ -15,7 +15,7 @@ from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
-from loomopt.physics.effects.kinds import Check, Demand
+from loomopt.physics.effects.kinds import Check, Demand, Inputs
 from loomopt.physics.schema import Figure
 from loomopt.studies.check import served
 
@@ -63,9 +63,9 @@ def test_figures_are_told_of_today_and_of_an_answer(job):
         sampled = sampler(scene, found.design)
         pieces, u = sampled.grid(20000)
         pose = sampled.model.instant(systems.numpy(), sampled.given, sampled.node(pieces, u)).pose
-        values = check.quantities["made_up_peak"](systems.numpy(), pose, sampled.given.values, {})
+        values = check.quantities["made_up_peak"](Inputs(systems.numpy(), sampled.given.values, {}, pose))
         assert found.figures["made_up_peak"] == pytest.approx(np.max(np.abs(values)), rel=1e-6)
-        size = check.rows["made_up_size"](systems.FLOAT, sampled.given.values, {})
+        size = check.rows["made_up_size"](Inputs(systems.FLOAT, sampled.given.values, {}, None))
         assert found.figures["made_up_size"] == pytest.approx(size, rel=1e-14)
 
 
@@ -204,7 +204,7 @@ def test_an_event_that_an_effect_calls_in_is_there_and_parts_the_cycle(job):
     scene = lo.load(job).set("effects.made_up_event.jump", "0.5")
     sampled = sampler(scene)
     load = {"beatup": made_up.DEAD_CENTRE, "rapier": made_up.TURNS, "shedding": made_up.HALF_OPEN}[job]
-    angles = load.corners(systems.FLOAT, sampled.given.values, {})
+    angles = load.corners(Inputs(systems.FLOAT, sampled.given.values, {}, None))
     events = angles[: {"beatup": 1, "shedding": 2}.get(job)]
 
     def at(angle, beside=0.0):
@@ -268,6 +268,6 @@ def test_every_target_still_certifies_with_made_up_effects_on(job):
     ],
 )
 def test_a_check_that_no_job_could_keep_is_refused_where_it_is_declared(declared, said):
-    own = {name: getattr(made_up.BEATUP, name) for name in ("name", "summary", "own", "quantities", "rows", "figures")}
+    own = {name: getattr(made_up.BEATUP, name) for name in ("name", "summary", "table", "quantities", "rows", "figures")}
     with pytest.raises(ValueError, match=said):
         Check(**own | declared)

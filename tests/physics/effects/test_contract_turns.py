@@ -2,6 +2,7 @@
 
 import math
 from importlib.metadata import EntryPoint
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,14 +32,14 @@ class Angle(Table):
     at: PureNumber
 
 
-NOTHING = Load(
+NOTHING: Load[Any] = Load(
     name="nothing",
     summary="no torque, and one corner",
-    own=Angle,
+    table=Angle,
     rank=5,
     acts="drive",
-    force=lambda maths, pose, given, own, switch: 0 * pose.phi,
-    corners=lambda maths, given, own: (own["at"] + 0 * maths.pi,),
+    force=lambda at: 0 * at.pose.phi,
+    corners=lambda at: (at.table["at"] + 0 * at.maths.pi,),
     examples=({"at": "1"},),
 )
 

@@ -9,7 +9,7 @@ import pytest
 from loomopt.maths import systems
 from loomopt.physics.balance import Pose
 from loomopt.physics.effects import kinds
-from loomopt.physics.effects.kinds import Check, Load, Speed
+from loomopt.physics.effects.kinds import Check, Inputs, Load, Speed
 from loomopt.physics.mechanisms import crank_rocker
 
 BEATUP = {
@@ -54,7 +54,7 @@ G = 9.80665
 
 
 def cases():
-    """Yield (label, function(maths, pose, given, own), own values) of every term and every figure."""
+    """Yield (label, function(at), own values) of every term and every figure."""
     for name, effect in BEATUP.items():
         if isinstance(effect, Check):
             for key, quantity in effect.quantities.items():
@@ -72,17 +72,15 @@ def cases():
 
 
 def switched(effect, switch):
-    return lambda system, pose, given, own: effect.force(system, pose, given, own, switch)
+    return lambda at: effect.force(Inputs(at.maths, at.values, at.table, at.pose, switch))
 
 
 def driving(effect):
     """Return what a motor leaves for the crank."""
 
-    def left(system, pose, given, own):
-        flywheel = effect.flywheel(given, own)
-        return effect.motor(system, pose.omega, given, own) - flywheel * (
-            0 if pose.omega_dot is None else pose.omega_dot
-        )
+    def left(at):
+        flywheel = effect.flywheel(at)
+        return effect.motor(at, at.pose.omega) - flywheel * (0 if at.pose.omega_dot is None else at.pose.omega_dot)
 
     return left
 
@@ -102,13 +100,13 @@ def value(system, function, own, phi, omega_dot=None):
     angle, given, mine, rate = setting(lambda name, x: system.number(x), phi, omega_dot, own)
     joints = crank_rocker.CrankRockerPose(system, crank_rocker.Lengths(*(given[f"l{k}"] for k in (1, 2, 3, 4))), angle)
     pose = Pose(angle, given["speed"], -joints.psi, -joints.psi_1, -joints.psi_2, joints, rate)
-    return float(function(system, pose, given, mine))
+    return float(function(Inputs(system, given, mine, pose)))
 
 
 def test_every_effect_has_its_case():
     assert OWN.keys() == BEATUP.keys()
     assert all(
-        set(OWN[name]) == set(effect.own.model_fields) - {"model", "table", "digits"} - PLACING
+        set(OWN[name]) == set(effect.table.model_fields) - {"model", "table", "digits"} - PLACING
         for name, effect in BEATUP.items()
     )
 

@@ -12,6 +12,7 @@ from loomopt.jobs.beatup.model import ReedMotion
 from loomopt.maths import systems
 from loomopt.physics.balance import Given, Loaded, Pose
 from loomopt.physics.effects.beatup import bearing_friction, centrifugal, gravity, resistance, rod_inertia
+from loomopt.physics.effects.kinds import Inputs
 from loomopt.physics.mechanisms import crank_rocker
 
 MP = mpmath.MPContext()
@@ -58,7 +59,7 @@ def test_gravity_is_the_slope_of_the_potential(phi, tilt, offset):
         opposite = psi + MP.mpf(offset) + MP.pi + MP.mpf(tilt)
         return MP.mpf("9.80665") * (reed + MP.mpf(GIVEN["m4e"]) * GIVEN["r4e"] * MP.sin(opposite))
 
-    found = gravity.force(systems.FLOAT, pose(phi), GIVEN, own, 0)
+    found = gravity.force(Inputs(systems.FLOAT, GIVEN, own, pose(phi)))
     assert found == pytest.approx(-float(slope(potential, joints(MP.mpf(phi))[2])), rel=0, abs=1e-12 * 24)
 
 
@@ -91,9 +92,9 @@ def test_the_rods_torque_is_half_the_slope_of_its_inertia_plus_inertia_times_acc
     phi_mp, wide = MP.mpf(phi), MP.mpf(10) ** -9
     Je = rod_energy_at(phi_mp, own, model)
     half_slope = slope(lambda p: rod_energy_at(p, own, model), phi_mp, wide) / 2
-    steady = rod_inertia.force(systems.FLOAT, pose(phi), GIVEN, own, 0)
+    steady = rod_inertia.force(Inputs(systems.FLOAT, GIVEN, own, pose(phi)))
     assert steady == pytest.approx(float(half_slope) * SPEED**2, rel=1e-12, abs=1e-12 * 0.01 * SPEED**2)
-    changing = rod_inertia.force(systems.FLOAT, pose(phi, omega_dot), GIVEN, own, 0)
+    changing = rod_inertia.force(Inputs(systems.FLOAT, GIVEN, own, pose(phi, omega_dot)))
     assert changing - steady == pytest.approx(float(Je) * omega_dot, rel=1e-11, abs=1e-12 * 0.01 * SPEED**2)
 
 
@@ -105,7 +106,9 @@ def test_a_rod_whose_inertia_is_that_of_its_point_masses_has_one_model_only():
     for phi in np.linspace(0, TURN, 50):
         rod = crank_rocker.CrankRockerPose(systems.FLOAT, lengths, float(phi))
         here = ReedMotion(phi, SPEED, rod, 30.0)
-        lumped, exact = (rod_inertia.MODELS[name](systems.FLOAT, here, same, own) for name in ("lumped", "exact"))
+        lumped, exact = (
+            rod_inertia.MODELS[name](Inputs(systems.FLOAT, same, own, here)) for name in ("lumped", "exact")
+        )
         assert lumped == pytest.approx(exact, rel=1e-12, abs=1e-11)
 
 
@@ -118,21 +121,21 @@ def test_centrifugal_forces_are_those_of_the_centres_of_mass(phi, omega_dot):
     rate = slope(lambda p: joints(p)[2], phi_mp) * SPEED
     bend = slope(lambda p: slope(lambda r: joints(r)[2], p), phi_mp, MP.mpf(10) ** -10) * SPEED**2
     bend += slope(lambda p: joints(p)[2], phi_mp) * omega_dot
-    found = centrifugal.reed_centrifugal(systems.FLOAT, moving, GIVEN, own)
+    found = centrifugal.reed_centrifugal(Inputs(systems.FLOAT, GIVEN, own, moving))
     assert found == pytest.approx(float(moment * rate**2), rel=1e-11, abs=1e-12)
     inertia = moment * MP.hypot(rate**2, bend)
     loaded = Loaded(systems.FLOAT, (), moving, Given(GIVEN, {}), {})
     assert centrifugal.EFFECT.joints is not None
-    force = centrifugal.EFFECT.joints(systems.FLOAT, moving, GIVEN, own, loaded).shaking_force
+    force = centrifugal.EFFECT.joints(Inputs(systems.FLOAT, GIVEN, own, moving), loaded).shaking_force
     assert math.hypot(*force) == pytest.approx(float(inertia), rel=1e-12)
 
 
 def test_the_pulse_is_a_half_cosine_of_height_M0_and_area_two_over_pi():
     own = {"pulse": 0.52}
-    begin, end = resistance.corners(systems.FLOAT, GIVEN, own)
+    begin, end = resistance.corners(Inputs(systems.FLOAT, GIVEN, own, None))
     assert ((begin + end) / 2, end - begin) == (pytest.approx(GIVEN["beta"]), pytest.approx(0.52))
     phi = np.linspace(begin, end, 2001)
-    inside = resistance.force(systems.numpy(), pose(phi, system=systems.numpy()), GIVEN, own, 1)
+    inside = resistance.force(Inputs(systems.numpy(), GIVEN, own, pose(phi, system=systems.numpy()), 1))
     assert inside[1000] == np.max(inside) == pytest.approx(745.0, rel=1e-14)
     assert (inside[0], inside[-1]) == pytest.approx((0, 0), abs=1e-11)
     assert inside == pytest.approx(inside[::-1], abs=1e-10)
@@ -143,7 +146,7 @@ def test_the_pulse_is_a_half_cosine_of_height_M0_and_area_two_over_pi():
 @pytest.mark.parametrize("beta", [0.05, 1.15, 3.1, 6.2])
 @pytest.mark.parametrize("pulse", [1e-4, 0.52, 3.0, 6.2])
 def test_the_pulse_is_on_within_half_its_width_of_the_dead_centre_on_any_turn(beta, pulse):
-    corners = resistance.corners(systems.FLOAT, {"beta": beta}, {"pulse": pulse})
+    corners = resistance.corners(Inputs(systems.FLOAT, {"beta": beta}, {"pulse": pulse}, None))
     for turns in (-2, 0, 1):
         for share in (-0.499, -0.2, 0.0, 0.4, 0.499):
             assert resistance.switch(beta + share * pulse + turns * TURN, corners) == 1.0
@@ -153,11 +156,11 @@ def test_the_pulse_is_on_within_half_its_width_of_the_dead_centre_on_any_turn(be
 
 
 def test_friction_always_opposes_the_motion():
-    corners = bearing_friction.corners(systems.FLOAT, GIVEN, {})
+    corners = bearing_friction.corners(Inputs(systems.FLOAT, GIVEN, {}, None))
     assert corners == (GIVEN["beta"], math.pi + GIVEN["beta_r"])
     for phi in np.linspace(-TURN, 2 * TURN, 1000):
         here = pose(float(phi))
         switch = bearing_friction.switch(float(phi), corners)
         assert switch == math.copysign(1, here.q1)
         for own in ({"coulomb": 2.0, "viscous": 0.0}, {"coulomb": 0.0, "viscous": 0.3}):
-            assert bearing_friction.force(systems.FLOAT, here, GIVEN, own, switch) * here.velocity > 0
+            assert bearing_friction.force(Inputs(systems.FLOAT, GIVEN, own, here, switch)) * here.velocity > 0

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from importlib.metadata import EntryPoint
+from typing import Any
 
 import pytest
 
@@ -20,13 +21,13 @@ class BallastTable(Table):
     spare: Length = 0.004
 
 
-BALLAST = Load(
+BALLAST: Load[Any] = Load(
     name="ballast",
     summary="a counterweight on the rocker",
-    own=BallastTable,
+    table=BallastTable,
     rank=15,
     acts="output",
-    force=lambda maths, pose, given, own, switch: own["mass"] * own["radius"] ** 2 * pose.acceleration,
+    force=lambda at: at.table["mass"] * at.table["radius"] ** 2 * at.pose.acceleration,
     needs=("operation.speed",),
     least="mass",
     axes=(FlatNumber("spare", "spare"),),

@@ -8,6 +8,7 @@ import pytest
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
+from loomopt.physics.effects.kinds import Inputs
 
 PULSE = 29.8
 
@@ -150,12 +151,12 @@ def test_a_curve_is_the_same_on_every_turn(resisted, turns):
 
     ((_, curve),) = curves(resisted).items()
     given, own = {"beta": 1.1}, {"table": curve}
-    corners = resistance.corners(systems.FLOAT, given, own)
+    corners = resistance.corners(Inputs(systems.FLOAT, given, own, None))
     for phi in np.linspace(0.0, 2 * math.pi, 50):
         turned = float(phi) + 2 * math.pi * turns
         found = [
             resistance.force(
-                systems.FLOAT, SimpleNamespace(phi=angle), given, own, resistance.EFFECT.switch(angle, corners)
+                Inputs(systems.FLOAT, given, own, SimpleNamespace(phi=angle), resistance.EFFECT.switch(angle, corners))
             )
             for angle in (float(phi), turned)
         ]

@@ -13,7 +13,7 @@ from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.physics.balance import Pose
 from loomopt.physics.cycle import Node
-from loomopt.physics.effects.kinds import Motion
+from loomopt.physics.effects.kinds import Inputs, Motion
 from loomopt.physics.effects.rapier import head_inertia, tape_friction
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100)
@@ -30,16 +30,16 @@ numbers = st.floats(-1e3, 1e3)
 @given(st.floats(1e-3, 1e3), numbers, numbers, st.floats(0, 1e3))
 @REPEATABLE
 def test_head_inertia_is_mass_times_acceleration(mass, S_1, S_2, omega):
-    steady = head_inertia.force(systems.FLOAT, Pose(0.0, omega, 0.0, S_1, S_2), {}, {"mass": mass}, 0)
+    steady = head_inertia.force(Inputs(systems.FLOAT, {}, {"mass": mass}, Pose(0.0, omega, 0.0, S_1, S_2)))
     assert steady == pytest.approx(mass * S_2 * omega**2, rel=1e-14)
-    changing = head_inertia.force(systems.FLOAT, Pose(0.0, omega, 0.0, S_1, S_2, None, 7.0), {}, {"mass": mass}, 0)
+    changing = head_inertia.force(Inputs(systems.FLOAT, {}, {"mass": mass}, Pose(0.0, omega, 0.0, S_1, S_2, None, 7.0)))
     expected = mass * (S_2 * omega**2 + 7.0 * S_1)
     assert changing == pytest.approx(expected, rel=1e-14, abs=1e-14 * mass * (abs(S_2) * omega**2 + abs(S_1)))
 
 
 @pytest.mark.parametrize("switch", [-1.0, 0.0, 1.0])
 def test_tape_friction_is_its_force_with_the_sign_of_the_speed(switch):
-    assert tape_friction.force(systems.FLOAT, Motion(), {}, {"force": 15.0}, switch) == 15.0 * switch
+    assert tape_friction.force(Inputs(systems.FLOAT, {}, {"force": 15.0}, Motion(), switch)) == 15.0 * switch
 
 
 @given(st.lists(st.floats(0, TURN), min_size=2, max_size=6, unique=True).filter(lambda c: len(c) % 2 == 0))
@@ -57,7 +57,7 @@ def test_the_direction_changes_at_every_turn_the_first_of_them_outward(corners):
 
 def test_a_head_that_never_turns_has_no_friction_and_no_corner():
     assert tape_friction.direction(1.0, ()) == 0.0
-    assert tape_friction.corners(systems.FLOAT, {"turns": ()}, {"force": 15.0}) == ()
+    assert tape_friction.corners(Inputs(systems.FLOAT, {"turns": ()}, {"force": 15.0}, None)) == ()
 
 
 def paths(sampled):

@@ -102,8 +102,8 @@ def test_a_load_whose_force_flight_does_not_know_is_refused_by_name(monkeypatch)
 @pytest.mark.parametrize(
     ("force", "why"),
     [
-        (lambda maths, pose, given, own, switch: pose.u, "it reads the mechanism's u"),
-        (lambda maths, pose, given, own, switch: pose.velocity**2, "it is not linear"),
+        (lambda at: at.pose.u, "it reads the mechanism's u"),
+        (lambda at: at.pose.velocity**2, "it is not linear"),
     ],
 )
 def test_so_is_one_that_reads_the_cam_or_is_not_linear(force, why, monkeypatch):

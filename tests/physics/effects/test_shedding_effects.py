@@ -16,7 +16,7 @@ from loomopt.jobs.shedding.model import spring_force
 from loomopt.maths import systems
 from loomopt.physics import balance
 from loomopt.physics.effects import kinds
-from loomopt.physics.effects.kinds import Load
+from loomopt.physics.effects.kinds import Inputs, Load
 from loomopt.physics.effects.shedding import damping as frame_damping
 from loomopt.physics.effects.shedding import dry_friction, warp_tension, weight
 from loomopt.physics.effects.shedding import inertia as frame_inertia
@@ -72,30 +72,32 @@ def plain(value):
 @REPEATABLE
 def test_inertia_is_mass_times_acceleration(mass, q1, q2, omega):
     at = moving(q1, q2, omega)
-    assert frame_inertia.force(systems.FLOAT, at, {}, {"M": mass}, 0) == pytest.approx(mass * q2 * omega**2, rel=1e-14)
+    assert frame_inertia.force(Inputs(systems.FLOAT, {}, {"M": mass}, at)) == pytest.approx(
+        mass * q2 * omega**2, rel=1e-14
+    )
     changing = moving(q1, q2, omega, 7.0)
     expected = mass * (q2 * omega**2 + q1 * 7.0)
     size = mass * (abs(q2) * omega**2 + abs(q1) * 7.0)
-    assert abs(frame_inertia.force(systems.FLOAT, changing, {}, {"M": mass}, 0) - expected) <= 1e-14 * size
+    assert abs(frame_inertia.force(Inputs(systems.FLOAT, {}, {"M": mass}, changing)) - expected) <= 1e-14 * size
 
 
 @given(st.floats(0, 1e3), st.floats(-5, 5), st.floats(1, 100))
 @REPEATABLE
 def test_damping_pushes_against_the_velocity(damping, q1, omega):
-    found = frame_damping.force(systems.FLOAT, moving(q1, 0.0, omega), {}, {"C": damping}, 0)
+    found = frame_damping.force(Inputs(systems.FLOAT, {}, {"C": damping}, moving(q1, 0.0, omega)))
     assert found == pytest.approx(damping * q1 * omega, rel=1e-14)
 
 
 @given(force_values)
 @REPEATABLE
 def test_weight_relieves_the_cam_and_a_negative_one_presses(value):
-    assert weight.force(systems.FLOAT, pose(), {}, {"G": value}, 0) == -value
+    assert weight.force(Inputs(systems.FLOAT, {}, {"G": value}, pose())) == -value
 
 
 @given(st.floats(0, 1e6), st.floats(0, 1), st.floats(0, 1))
 @REPEATABLE
 def test_the_return_spring_is_its_stiffness_times_its_whole_elongation(stiffness, lowered, preload):
-    found = spring_force(systems.FLOAT, pose(q=lowered), {"K1": stiffness, "X0": preload}, {}, 0)
+    found = spring_force(Inputs(systems.FLOAT, {"K1": stiffness, "X0": preload}, {}, pose(q=lowered)))
     assert found == pytest.approx(stiffness * (lowered + preload), rel=1e-15)
 
 
@@ -103,7 +105,7 @@ def test_the_return_spring_is_its_stiffness_times_its_whole_elongation(stiffness
 @REPEATABLE
 def test_dry_friction_opposes_the_motion_and_is_the_worst_in_dwells(friction, u, worst):
     def term(segment):
-        return dry_friction.force(systems.FLOAT, pose(segment=segment, worst=worst), {}, {"F": friction}, 0)
+        return dry_friction.force(Inputs(systems.FLOAT, {}, {"F": friction}, pose(segment=segment, worst=worst)))
 
     assert [term(k) for k in (RISE, FAR, RETURN, NEAR)] == [friction, worst * friction, -friction, worst * friction]
 
@@ -113,7 +115,7 @@ def test_dry_friction_opposes_the_motion_and_is_the_worst_in_dwells(friction, u,
 def test_linear_tension_is_proportional_to_the_shed_on_either_side_of_its_middle(up, down, lowered):
     own = {"T1": up, "T2": down, "shape": "linear"}
     below = lowered > 0.5
-    found = warp_tension.force(systems.FLOAT, pose(lowered=lowered), {}, own, float(below))
+    found = warp_tension.force(Inputs(systems.FLOAT, {}, own, pose(lowered=lowered), float(below)))
     pull = -down * (2 * lowered - 1) if below else up * (1 - 2 * lowered)
     assert abs(found + pull) <= 1e-14 * max(up, down)
 
@@ -122,14 +124,14 @@ def test_linear_tension_is_proportional_to_the_shed_on_either_side_of_its_middle
 @REPEATABLE
 def test_stepped_tension_is_the_papers_cubic_step(up, down, u):
     """STEP: y0 + (y1 − y0)u²(3 − 2u) from T1 to −T2 [Qiu21, eq 8]."""
-    found = warp_tension.force(systems.FLOAT, pose(u=u), {}, {"T1": up, "T2": down, "shape": "step"}, 0)
+    found = warp_tension.force(Inputs(systems.FLOAT, {}, {"T1": up, "T2": down, "shape": "step"}, pose(u=u)))
     assert abs(found + (up + (-down - up) * u * u * (3 - 2 * u))) <= 1e-14 * (up + down)
 
 
 def test_a_step_starts_and_ends_level_and_is_halfway_in_the_middle():
     u = sp.Symbol("u")
     step = -warp_tension.force(
-        systems.sympy(), pose(u=u), {}, {"T1": sp.Integer(5), "T2": sp.Integer(3), "shape": "step"}, 0
+        Inputs(systems.sympy(), {}, {"T1": sp.Integer(5), "T2": sp.Integer(3), "shape": "step"}, pose(u=u))
     )
     assert [step.subs(u, at) for at in (0, sp.Rational(1, 2), 1)] == [5, 1, -3]
     assert [sp.diff(step, u).subs(u, at) for at in (0, 1)] == [0, 0]
@@ -137,7 +139,7 @@ def test_a_step_starts_and_ends_level_and_is_halfway_in_the_middle():
 
 def test_levels_pull_in_the_dwells_only():
     own = {"T1": 5.0, "T2": 3.0, "shape": "levels"}
-    found = [warp_tension.force(systems.FLOAT, pose(segment=k), {}, own, 0) for k in (RISE, FAR, RETURN, NEAR)]
+    found = [warp_tension.force(Inputs(systems.FLOAT, {}, own, pose(segment=k))) for k in (RISE, FAR, RETURN, NEAR)]
     assert found == [0, 3.0, 0, -5.0]
 
 
@@ -161,10 +163,14 @@ def test_every_effect_gives_the_same_number_in_every_system(system):
     own = {"G": wrap(G), "T1": wrap(T1), "T2": wrap(T2), "M": wrap(M), "C": wrap(C), "F": wrap(F)}
     given_ = {"K1": wrap(K1), "X0": wrap(X0)}
     linear, loads = own | {"shape": "linear"}, [SHEDDING[name] for name in LOADS]
-    found = {load.name: plain(load.force(system, at, given_, linear, 0)) for load in loads if isinstance(load, Load)}
-    found["spring"] = plain(spring_force(system, at, given_, {}, 0))
-    found["step"] = plain(warp_tension.force(system, at, given_, own | {"shape": "step"}, 0))
-    found["below"] = plain(warp_tension.force(system, pose(lowered=wrap(0.8)), {}, own | {"shape": "linear"}, 1))
+    found = {
+        load.name: plain(load.force(Inputs(system, given_, linear, at))) for load in loads if isinstance(load, Load)
+    }
+    found["spring"] = plain(spring_force(Inputs(system, given_, {}, at)))
+    found["step"] = plain(warp_tension.force(Inputs(system, given_, own | {"shape": "step"}, at)))
+    found["below"] = plain(
+        warp_tension.force(Inputs(system, {}, own | {"shape": "linear"}, pose(lowered=wrap(0.8)), 1))
+    )
     expected = {"weight": -G, "warp_tension": -T1 * 0.26, "inertia": M * 31, "damping": -C * 0.9, "dry_friction": -F}
     expected |= {"spring": K1 * 0.104, "step": (T1 + T2) * 0.41**2 * 2.18 - T1, "below": T2 * 0.6}
     assert found == {name: pytest.approx(value, rel=1e-12) for name, value in expected.items()}

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from loomopt.maths import systems
 from loomopt.physics.balance import Pose
 from loomopt.physics.effects.beatup import resistance
+from loomopt.physics.effects.kinds import Inputs
 from loomopt.physics.motion import harmonic
 
 EXACT = systems.mpmath(50)
@@ -43,7 +44,7 @@ def answer(system, damped, phi):
     own = {name: system.number(value) for name, value in OWN.items()}
     inside = float(abs(math.remainder(float(phi) - GIVEN["beta"], 2 * math.pi)) < OWN["pulse"] / 2)
     pose: Any = Pose(phi, system.number(OMEGA), None, None, None)
-    return resistance.response(system, oscillator(system, damped), pose, given, own, inside)
+    return resistance.response(Inputs(system, given, own, pose, inside), oscillator(system, damped))
 
 
 def pulse(phi):

@@ -11,7 +11,7 @@ from loomopt.physics.schema import Table
 from loomopt.scenes.scene import build
 
 
-class Own(Table):
+class Parameters(Table):
     """T: a torque, N·m."""
 
     T: Torque
@@ -26,10 +26,10 @@ def push(name, rank, kind=Load, sign=1, **declared):
     return kind(
         name=name,
         summary="",
-        own=Own,
+        table=Parameters,
         rank=rank,
         acts="output",
-        force=lambda maths, pose, given, own, switch: sign * own["T"],
+        force=lambda at: sign * at.table["T"],
         **declared,
     )
 

@@ -10,13 +10,13 @@ from typing import Literal
 from pydantic import Field
 
 from loomopt.base.quantities import PositiveLength, PureNumber, RotaryDamping, Torque
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Number
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import Load, Loading, ModelNeeds
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.effects.kinds import Inputs, Load, Loading, ModelNeeds
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the friction."""
 
     coulomb: Torque | None = Field(None, description="constant friction torque of the rocking shaft, T_c")
@@ -28,9 +28,9 @@ class Own(Table):
     )
 
 
-def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+def corners(at: Inputs[object]) -> tuple[Number, ...]:
     """Return front and rear dead centre, rad: β, π + β_r."""
-    return given["beta"], maths.pi + given["beta_r"]
+    return at.values["beta"], at.maths.pi + at.values["beta_r"]
 
 
 def switch(angle: float, corners: tuple[float, ...]) -> float:
@@ -40,38 +40,38 @@ def switch(angle: float, corners: tuple[float, ...]) -> float:
     return -1.0 if (angle - front) % turn < (rear - front) % turn else 1.0
 
 
-def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[ReedPose]) -> Number:
     """Return T_c sgn q˙ + c q˙, N·m; with the load T = μ r |F_D| where the force is known by its name."""
-    if own.get("model") != "load":
-        return own["coulomb"] * switch + own["viscous"] * pose.velocity
-    friction = own["mu"] * own["radius"] * given["force_D"] * switch
-    return friction + own["viscous"] * pose.velocity if "viscous" in own else friction
+    if at.table.get("model") != "load":
+        return at.table["coulomb"] * at.switch + at.table["viscous"] * at.pose.velocity
+    friction = at.table["mu"] * at.table["radius"] * at.values["force_D"] * at.switch
+    return friction + at.table["viscous"] * at.pose.velocity if "viscous" in at.table else friction
 
 
-def upon(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number, loading: Loading) -> Number:
+def upon(at: Inputs[ReedPose], loading: Loading) -> Number:
     """Return the term, N·m; with the load in closed form, for the force in D that friction itself adds to.
 
     F_D = H + T e, T = a |F_D|, a = μ r, e = −sgn q˙ r1/(r1 × r2), H what all else gives: one root, while a |e| < 1.
     """
-    if own.get("model") != "load":
-        return force(maths, pose, given, own, switch)
+    if at.table.get("model") != "load":
+        return force(at)
     from loomopt.physics.effects.beatup.joint_forces import CrankRockerForces
     from loomopt.physics.mechanisms.dyad import Vector, dot
 
-    found = CrankRockerForces(maths, pose, given, loading)
-    share, dyad = own["mu"] * own["radius"], found.linkage.dyad
+    found = CrankRockerForces(at.maths, at.pose, at.values, loading)
+    share, dyad = at.table["mu"] * at.table["radius"], found.linkage.dyad
     across, H = Vector(-2 * dyad.link1.x / dyad.area4, -2 * dyad.link1.y / dyad.area4), found.force_D
-    drag = own["viscous"] * pose.velocity if "viscous" in own else None
+    drag = at.table["viscous"] * at.pose.velocity if "viscous" in at.table else None
     H = H if drag is None else Vector(H.x + drag * across.x, H.y + drag * across.y)
-    along, left = switch * dot(H, across) * share, 1 - share**2 * dot(across, across)
-    torque = share * (along + maths.sqrt(along**2 + left * dot(H, H))) / left
-    return torque * switch if drag is None else torque * switch + drag
+    along, left = at.switch * dot(H, across) * share, 1 - share**2 * dot(across, across)
+    torque = share * (along + at.maths.sqrt(along**2 + left * dot(H, H))) / left
+    return torque * at.switch if drag is None else torque * at.switch + drag
 
 
 EFFECT = Load(
     name="bearing_friction",
     summary="Coulomb and viscous friction of the rocking shaft",
-    own=Own,
+    table=Parameters,
     letters={"coulomb": "T_c", "viscous": "c"},
     rank=70,
     acts="output",

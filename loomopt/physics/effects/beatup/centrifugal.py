@@ -5,26 +5,26 @@ reed alone, not what the bearing carries (effect joint_forces tells that);
 shaking_force = |Σ m a_S| of all that moves: with the reed alone (m4 + m4e) |r| sqrt(ψ˙⁴ + ψ¨²).
 """
 
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Number
 from loomopt.physics.effects.beatup import ReedPose
 from loomopt.physics.effects.beatup.joint_forces import PLACED, SHAKING_FORCE, forces
-from loomopt.physics.effects.kinds import Check
-from loomopt.physics.schema import Figure, Table, Values
+from loomopt.physics.effects.kinds import Check, Inputs
+from loomopt.physics.schema import Figure, Table
 
 
-class Own(Table):
+class Parameters(Table):
     """No values of its own."""
 
 
-def reed_centrifugal(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number:
+def reed_centrifugal(at: Inputs[ReedPose]) -> Number:
     """Return F4, N; negative where the counterweight outweighs the reed."""
-    return (given["m4"] * given["r4"] - given["m4e"] * given["r4e"]) * pose.velocity**2
+    return (at.values["m4"] * at.values["r4"] - at.values["m4e"] * at.values["r4e"]) * at.pose.velocity**2
 
 
 EFFECT = Check(
     name="centrifugal",
     summary="centrifugal force of the unbalanced reed, and shaking force",
-    own=Own,
+    table=Parameters,
     rank=80,
     quantities={"reed_centrifugal": reed_centrifugal},
     joints=forces,

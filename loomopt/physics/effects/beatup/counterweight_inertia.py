@@ -6,32 +6,32 @@ Output term JS q¨, the J_s,4e of [Yuan24, eq 10]; it does not change with the c
 from pydantic import Field
 
 from loomopt.base.quantities import PositiveInertia
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Number
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import Load
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.effects.kinds import Inputs, Load
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the counterweight."""
 
     JS: PositiveInertia = Field(description="inertia of the counterweight about its own centre of mass")
 
 
-def moved(given: Values, own: Values) -> Number:
+def moved(at: Inputs[object]) -> Number:
     """Return JS, kg·m²."""
-    return own["JS"]
+    return at.table["JS"]
 
 
-def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[ReedPose]) -> Number:
     """Return JS q¨, N·m."""
-    return moved(given, own) * pose.acceleration
+    return moved(at) * at.pose.acceleration
 
 
 EFFECT = Load(
     name="counterweight_inertia",
     summary="counterweight about its own centre",
-    own=Own,
+    table=Parameters,
     rank=40,
     acts="output",
     force=force,

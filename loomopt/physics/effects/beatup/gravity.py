@@ -11,7 +11,7 @@ from pydantic import Field
 from loomopt.base.quantities import Angle
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import LinkMass, Load
+from loomopt.physics.effects.kinds import Inputs, LinkMass, Load
 from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.mechanisms.moving import total
 from loomopt.physics.schema import Table, Values
@@ -20,19 +20,19 @@ STANDARD_GRAVITY = 9.80665
 """m/s²."""
 
 
-class Own(Table):
+class Parameters(Table):
     """Where the weight acts."""
 
     tilt: Angle = Field(description="angle of the line from A to D from the horizontal; negative where D lies below A")
     offset: Angle = Field(description="angle of the reed's centre of mass from the rocker's line, χ")
 
 
-def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[ReedPose]) -> Number:
     """Return −∂U/∂ψ, N·m (q = −ψ)."""
-    moment = given["m4"] * given["r4"] - given["m4e"] * given["r4e"]
-    reed = -STANDARD_GRAVITY * moment * maths.cos(own["offset"] + own["tilt"] - pose.q)
-    rocker = rocker_moment(given)
-    return reed if rocker is None else reed - STANDARD_GRAVITY * rocker * maths.cos(own["tilt"] - pose.q)
+    moment = at.values["m4"] * at.values["r4"] - at.values["m4e"] * at.values["r4e"]
+    reed = -STANDARD_GRAVITY * moment * at.maths.cos(at.table["offset"] + at.table["tilt"] - at.pose.q)
+    rocker = rocker_moment(at.values)
+    return reed if rocker is None else reed - STANDARD_GRAVITY * rocker * at.maths.cos(at.table["tilt"] - at.pose.q)
 
 
 def rocker_moment(given: Values) -> Number | None:
@@ -42,26 +42,28 @@ def rocker_moment(given: Values) -> Number | None:
     return given["rocker_inertia.m3"] * given["rocker_inertia.s3"]
 
 
-def inside(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number | None:
+def inside(at: Inputs[ReedPose]) -> Number | None:
     """Crank torque that lifts rod and crank, N·m: the rod as its shares at B and C; None where neither tells a mass."""
     at_crank, at_rocker = None, None
-    if "rod_inertia.m2" in given:
-        at_rocker = given["rod_inertia.m2"] * given["rod_inertia.s2"] / given["today.l2"]
-        at_crank = (given["rod_inertia.m2"] - at_rocker) * given["l1"]
-    if "crank.mass" in given:
-        at_crank = total(at_crank, given["crank.mass"] * given["crank.centre"])
+    if "rod_inertia.m2" in at.values:
+        at_rocker = at.values["rod_inertia.m2"] * at.values["rod_inertia.s2"] / at.values["today.l2"]
+        at_crank = (at.values["rod_inertia.m2"] - at_rocker) * at.values["l1"]
+    if "crank.mass" in at.values:
+        at_crank = total(at_crank, at.values["crank.mass"] * at.values["crank.centre"])
     if at_crank is None:
         return None
-    found = at_crank * maths.cos(pose.phi + own["tilt"])
+    found = at_crank * at.maths.cos(at.pose.phi + at.table["tilt"])
     if at_rocker is not None:
-        found = found - at_rocker * given["l3"] * pose.q1 * maths.cos(own["tilt"] - pose.q)
+        found = found - at_rocker * at.values["l3"] * at.pose.q1 * at.maths.cos(at.table["tilt"] - at.pose.q)
     return STANDARD_GRAVITY * found
 
 
-def push(maths: Maths, pose: ReedPose, given: Values, own: Values, term: Number) -> Vector:
+def push(at: Inputs[ReedPose], term: Number) -> Vector:
     """Return the weight of reed, counterweight and rocker, N; x along the line from A to D."""
-    mass = given["m4"] + given["m4e"]
-    return weight(maths, mass if rocker_moment(given) is None else mass + given["rocker_inertia.m3"], own["tilt"])
+    mass = at.values["m4"] + at.values["m4e"]
+    return weight(
+        at.maths, mass if rocker_moment(at.values) is None else mass + at.values["rocker_inertia.m3"], at.table["tilt"]
+    )
 
 
 def weight(maths: Maths, mass: Number, tilt: Number) -> Vector:
@@ -69,17 +71,17 @@ def weight(maths: Maths, mass: Number, tilt: Number) -> Vector:
     return Vector(-STANDARD_GRAVITY * mass * maths.sin(tilt), -STANDARD_GRAVITY * mass * maths.cos(tilt))
 
 
-def mass(maths: Maths, given: Values, own: Values) -> LinkMass:
+def mass(at: Inputs[object]) -> LinkMass:
     """Return reed and counterweight, whose centre lies aside of the rocker's line."""
-    moment = given["m4"] * given["r4"] - given["m4e"] * given["r4e"]
-    aside = maths.cos(own["offset"]), maths.sin(own["offset"])
-    return LinkMass("reed", given["m4"] + given["m4e"], moment * aside[0], moment * aside[1], 0)
+    moment = at.values["m4"] * at.values["r4"] - at.values["m4e"] * at.values["r4e"]
+    aside = at.maths.cos(at.table["offset"]), at.maths.sin(at.table["offset"])
+    return LinkMass("reed", at.values["m4"] + at.values["m4e"], moment * aside[0], moment * aside[1], 0)
 
 
 EFFECT = Load(
     name="gravity",
     summary="weight of reed system, counterweight, rocker, rod and crank",
-    own=Own,
+    table=Parameters,
     letters={"offset": "chi"},
     rank=60,
     acts="output",

@@ -6,13 +6,13 @@ Output term J4 q¨ with J4 = J4⁰ + m4e r4e² [Yuan24, eq 2 and 10]; rigid reed
 from pydantic import Field
 
 from loomopt.base.quantities import PositiveInertia
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Number
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import Load
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.effects.kinds import Inputs, Load
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the reed system."""
 
     J4: PositiveInertia = Field(
@@ -20,20 +20,20 @@ class Own(Table):
     )
 
 
-def moved(given: Values, own: Values) -> Number:
+def moved(at: Inputs[object]) -> Number:
     """Return J4 = J4⁰ + s, kg·m² [Yuan24, eq 10]."""
-    return own["J4"] + given["s"]
+    return at.table["J4"] + at.values["s"]
 
 
-def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[ReedPose]) -> Number:
     """Return (J4⁰ + s) q¨, N·m; s = m4e r4e² in kg·m²."""
-    return moved(given, own) * pose.acceleration
+    return moved(at) * at.pose.acceleration
 
 
 EFFECT = Load(
     name="inertia",
     summary="reed system about the rocking shaft",
-    own=Own,
+    table=Parameters,
     rank=10,
     acts="output",
     force=force,

@@ -14,7 +14,7 @@ from loomopt.base.units import ShowValue
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects import pins
 from loomopt.physics.effects.beatup import ReedPose, gravity
-from loomopt.physics.effects.kinds import Check, LinkMass, Loading
+from loomopt.physics.effects.kinds import Check, Inputs, LinkMass, Loading
 from loomopt.physics.schema import Figure, Values
 
 if TYPE_CHECKING:
@@ -233,14 +233,14 @@ class CrankRockerForces:
         return pins.works(self.maths, self.own, {joint: (f"force_{joint}", turn) for joint, turn in turned.items()})
 
 
-def forces(maths: Maths, pose: ReedPose, given: Values, own: Values, loading: Loading) -> CrankRockerForces:
+def forces(at: Inputs[ReedPose], loading: Loading) -> CrankRockerForces:
     """Return the forces at an instant."""
-    return CrankRockerForces(maths, pose, given, loading, own)
+    return CrankRockerForces(at.maths, at.pose, at.values, loading, at.table)
 
 
-def remark(given: Values, own: Values, shown: ShowValue) -> str:
+def remark(at: Inputs[object], shown: ShowValue) -> str:
     """Say that the cloth's couple has no place yet."""
-    if given.get("resistance.pulse") is None or given.get("resistance.reach") is not None:
+    if at.values.get("resistance.pulse") is None or at.values.get("resistance.reach") is not None:
         return ""
     return (
         "force_D takes the resistance of the cloth for a couple: where the cloth pushes is not told, and it changes "
@@ -251,7 +251,7 @@ def remark(given: Values, own: Values, shown: ShowValue) -> str:
 EFFECT = Check(
     name="joint_forces",
     summary="forces in the joints, and of all moving masses on the frame",
-    own=pins.own(PINS),
+    table=pins.own(PINS),
     rank=85,
     joints=forces,
     between=("rod", "rod_weight", "swung"),

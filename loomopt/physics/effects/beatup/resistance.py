@@ -13,15 +13,15 @@ from loomopt.base.quantities import Angle, PositiveLength, PulseAngle
 from loomopt.maths.periodic_cubic import TURN, PeriodicCubic, interval_at
 from loomopt.maths.systems import Maths, Number, within_turn
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import Load, LoadTable
+from loomopt.physics.effects.kinds import Inputs, Load, LoadTable
 from loomopt.physics.mechanisms.dyad import Vector
-from loomopt.physics.schema import DIGITS, Name, Table, Values
+from loomopt.physics.schema import DIGITS, Name, Table
 
 if TYPE_CHECKING:
     from loomopt.physics.effects.kinds import SteadyOscillator
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the cloth."""
 
     pulse: PulseAngle | None = Field(
@@ -37,11 +37,11 @@ class Own(Table):
     reach_angle: Angle | None = Field(None, description="angle of that place from the rocker's line D to C, 0 without")
 
 
-def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+def corners(at: Inputs[object]) -> tuple[Number, ...]:
     """Return where the pulse begins and ends, rad: β ∓ δ/2; of a table where its intervals begin."""
-    if "table" in own:
-        return tuple(given["beta"] + maths.number(begin) for begin in own["table"].begins)
-    return given["beta"] - own["pulse"] / 2, given["beta"] + own["pulse"] / 2
+    if "table" in at.table:
+        return tuple(at.values["beta"] + at.maths.number(begin) for begin in at.table["table"].begins)
+    return at.values["beta"] - at.table["pulse"] / 2, at.values["beta"] + at.table["pulse"] / 2
 
 
 def switch(angle: float, corners: tuple[float, ...]) -> float:
@@ -52,45 +52,45 @@ def switch(angle: float, corners: tuple[float, ...]) -> float:
     return 1.0 if (angle - begin) % TURN < end - begin else 0.0
 
 
-def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[ReedPose]) -> Number:
     """Return M_R, N·m."""
-    if "table" in own:
-        return own["table"].at(maths, pose.phi - given["beta"], switch)
-    return switch * given["M0"] * maths.cos(maths.pi * _from_front(maths, pose, given, switch) / own["pulse"])
+    if "table" in at.table:
+        return at.table["table"].at(at.maths, at.pose.phi - at.values["beta"], at.switch)
+    return at.switch * at.values["M0"] * at.maths.cos(at.maths.pi * _from_front(at) / at.table["pulse"])
 
 
-def _from_front(maths: Maths, pose: ReedPose, given: Values, switch: Number) -> Number:
+def _from_front(at: Inputs[ReedPose]) -> Number:
     """Return φ−β on any turn, rad: inside the pulse from −π to π, outside from 0 to 2π, so that it jumps in neither."""
-    return within_turn(maths, pose.phi - given["beta"], switch / 2)
+    return within_turn(at.maths, at.pose.phi - at.values["beta"], at.switch / 2)
 
 
-def push(maths: Maths, pose: ReedPose, given: Values, own: Values, term: Number) -> Vector | None:
+def push(at: Inputs[ReedPose], term: Number) -> Vector | None:
     """Return the force of the cloth on the reed, N, across the line from D to where it pushes; None: a couple."""
-    if "reach" not in own:
+    if "reach" not in at.table:
         return None
-    size, angle = term / own["reach"], own.get("reach_angle", 0) - pose.q
-    return Vector(-size * maths.sin(angle), size * maths.cos(angle))
+    size, angle = term / at.table["reach"], at.table.get("reach_angle", 0) - at.pose.q
+    return Vector(-size * at.maths.sin(angle), size * at.maths.cos(angle))
 
 
-def response(
-    maths: Maths, oscillator: "SteadyOscillator", pose: ReedPose, given: Values, own: Values, switch: Number
-) -> tuple[Number, Number]:
+def response(at: Inputs[ReedPose], oscillator: "SteadyOscillator") -> tuple[Number, Number]:
     """Return z, rad, and z˙ in answer to the pulse M0 cos Ωt, |t| ≤ τ, once a turn.
 
     A cos Ωt + B sin Ωt inside, and the free vibrations that begin at both corners, each with z = B and z˙ = −A Ω: there
     the answer to the cosine sets in, or falls away. The branch of t = (φ−β)/ω jumps where the other formula holds.
     """
-    if "table" in own:
-        return _tabulated(maths, oscillator, own["table"], pose.phi - given["beta"], pose.omega, switch)
-    frequency, half = maths.pi * pose.omega / own["pulse"], own["pulse"] / (2 * pose.omega)
-    along, across = (given["M0"] * share for share in oscillator.steady(frequency))
-    time = _from_front(maths, pose, given, switch) / pose.omega
-    cosine, sine = maths.cos(frequency * time), maths.sin(frequency * time)
+    if "table" in at.table:
+        return _tabulated(
+            at.maths, oscillator, at.table["table"], at.pose.phi - at.values["beta"], at.pose.omega, at.switch
+        )
+    frequency, half = at.maths.pi * at.pose.omega / at.table["pulse"], at.table["pulse"] / (2 * at.pose.omega)
+    along, across = (at.values["M0"] * share for share in oscillator.steady(frequency))
+    time = _from_front(at) / at.pose.omega
+    cosine, sine = at.maths.cos(frequency * time), at.maths.sin(frequency * time)
     corner = oscillator.repeated(across, -along * frequency)
     first = oscillator.ringing(corner, time + half)
-    second = oscillator.ringing(corner, time - half + switch * oscillator.turn)
-    position = switch * (along * cosine + across * sine) + first[0] + second[0]
-    rate = switch * frequency * (across * cosine - along * sine) + first[1] + second[1]
+    second = oscillator.ringing(corner, time - half + at.switch * oscillator.turn)
+    position = at.switch * (along * cosine + across * sine) + first[0] + second[0]
+    rate = at.switch * frequency * (across * cosine - along * sine) + first[1] + second[1]
     return position, rate
 
 
@@ -128,7 +128,7 @@ def _cubic(powers: Sequence[Number], time: Number) -> tuple[Number, Number]:
 EFFECT = Load(
     name="resistance",
     summary="beating-up resistance of the cloth",
-    own=Own,
+    table=Parameters,
     letters={"pulse": "delta"},
     rank=20,
     acts="output",

@@ -7,13 +7,13 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from loomopt.base.quantities import Length, Mass, PositiveInertia
 from loomopt.base.units import QuantityError
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Number
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import LinkMass, Load
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.effects.kinds import Inputs, LinkMass, Load
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the rocker."""
 
     J3: PositiveInertia = Field(description="inertia of the rocker about the rocking shaft D")
@@ -29,22 +29,22 @@ class Own(Table):
         return m3
 
 
-def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[ReedPose]) -> Number:
     """Return J3 q¨, N·m."""
-    return own["J3"] * pose.acceleration
+    return at.table["J3"] * at.pose.acceleration
 
 
-def mass(maths: Maths, given: Values, own: Values) -> LinkMass:
+def mass(at: Inputs[object]) -> LinkMass:
     """Return the rocker; one that tells no mass is balanced about D."""
-    if "m3" not in own or "s3" not in own:
-        return LinkMass("rocker", 0, 0, 0, own["J3"])
-    return LinkMass("rocker", own["m3"], own["m3"] * own["s3"], 0, own["J3"])
+    if "m3" not in at.table or "s3" not in at.table:
+        return LinkMass("rocker", 0, 0, 0, at.table["J3"])
+    return LinkMass("rocker", at.table["m3"], at.table["m3"] * at.table["s3"], 0, at.table["J3"])
 
 
 EFFECT = Load(
     name="rocker_inertia",
     summary="rocker about the rocking shaft",
-    own=Own,
+    table=Parameters,
     rank=30,
     acts="output",
     force=force,

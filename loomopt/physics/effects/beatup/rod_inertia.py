@@ -11,13 +11,13 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from loomopt.base.quantities import Length, PositiveInertia, PositiveMass
 from loomopt.base.units import QuantityError
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Number
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import LinkMass, Load
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.effects.kinds import Inputs, LinkMass, Load
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the rod."""
 
     m2: PositiveMass = Field(description="mass of the connecting rod BC")
@@ -34,50 +34,52 @@ class Own(Table):
         return model
 
 
-def lumped(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number:
+def lumped(at: Inputs[ReedPose]) -> Number:
     """Return the torque of the two point masses, N·m."""
-    at_rocker = own["m2"] * own["s2"] / given["today.l2"]
-    torque = at_rocker * given["l3"] ** 2 * pose.q1 * pose.acceleration
-    if pose.omega_dot is None:
+    at_rocker = at.table["m2"] * at.table["s2"] / at.values["today.l2"]
+    torque = at_rocker * at.values["l3"] ** 2 * at.pose.q1 * at.pose.acceleration
+    if at.pose.omega_dot is None:
         return torque
-    return torque + (own["m2"] - at_rocker) * given["l1"] ** 2 * pose.omega_dot
+    return torque + (at.table["m2"] - at_rocker) * at.values["l1"] ** 2 * at.pose.omega_dot
 
 
-def rigid_body_torque(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number:
+def rigid_body_torque(at: Inputs[ReedPose]) -> Number:
     """Return the torque of the rod as a rigid body, N·m."""
-    rod = pose.joints
-    s2 = own["s2"] * given["l2"] / given["today.l2"]
-    crank_arm = own["m2"] * given["l1"] * s2
-    spin = own["m2"] * s2**2 + own["JS2"]
+    rod = at.pose.joints
+    s2 = at.table["s2"] * at.values["l2"] / at.values["today.l2"]
+    crank_arm = at.table["m2"] * at.values["l1"] * s2
+    spin = at.table["m2"] * s2**2 + at.table["JS2"]
     half_slope = spin * rod.rod_1 * rod.rod_2 + crank_arm * (
         rod.rod_2 * rod.cos_crank_rod - rod.rod_1 * (1 - rod.rod_1) * rod.sin_crank_rod
     )
-    torque = half_slope * pose.omega**2
-    if pose.omega_dot is None:
+    torque = half_slope * at.pose.omega**2
+    if at.pose.omega_dot is None:
         return torque
-    inertia = spin * rod.rod_1**2 + own["m2"] * given["l1"] ** 2 + 2 * crank_arm * rod.rod_1 * rod.cos_crank_rod
-    return torque + inertia * pose.omega_dot
+    inertia = (
+        spin * rod.rod_1**2 + at.table["m2"] * at.values["l1"] ** 2 + 2 * crank_arm * rod.rod_1 * rod.cos_crank_rod
+    )
+    return torque + inertia * at.pose.omega_dot
 
 
-MODELS: dict[str, Callable[[Maths, ReedPose, Values, Values], Number]] = {"lumped": lumped, "exact": rigid_body_torque}
+MODELS: dict[str, Callable[[Inputs[ReedPose]], Number]] = {"lumped": lumped, "exact": rigid_body_torque}
 
 
-def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[ReedPose]) -> Number:
     """Return the crank torque that moves the rod, N·m, by the model the scene names."""
-    return MODELS[own["model"]](maths, pose, given, own)
+    return MODELS[at.table["model"]](at)
 
 
-def mass(maths: Maths, given: Values, own: Values) -> LinkMass:
+def mass(at: Inputs[object]) -> LinkMass:
     """Return the rod by its joint B; two point masses have the inertia m2 s2 (l2 − s2) about their centre."""
-    m2, s2 = own["m2"], own["s2"] * given["l2"] / given["today.l2"]
-    second = m2 * s2 * given["l2"] if own["model"] == "lumped" else m2 * s2**2 + own["JS2"]
+    m2, s2 = at.table["m2"], at.table["s2"] * at.values["l2"] / at.values["today.l2"]
+    second = m2 * s2 * at.values["l2"] if at.table["model"] == "lumped" else m2 * s2**2 + at.table["JS2"]
     return LinkMass("rod", m2, m2 * s2, 0, second)
 
 
 EFFECT = Load(
     name="rod_inertia",
     summary="connecting rod",
-    own=Own,
+    table=Parameters,
     rank=50,
     acts="drive",
     force=force,

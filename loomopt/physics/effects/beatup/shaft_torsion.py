@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from pydantic import Field
 
 from loomopt.base.quantities import PositiveRotaryDamping, PositiveRotaryStiffness
-from loomopt.maths.systems import FLOAT, Maths, Number
-from loomopt.physics.effects.kinds import EffectClash, State, StatePeak
+from loomopt.maths.systems import FLOAT, Number
+from loomopt.physics.effects.kinds import EffectClash, Inputs, State, StatePeak
 from loomopt.physics.schema import Figure, Table, Values
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ MOST_DECAYS = 2000
 pulse has faded within 0.1 degrees there."""
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the shaft between rocker and reed."""
 
     stiffness: PositiveRotaryStiffness = Field(description="torque that twists the reed against the rocker by a radian")
@@ -43,61 +43,67 @@ class Own(Table):
     )
 
 
-def fixed(given: Values, own: Values, carried: "Carried") -> Mapping[str, str]:
+def fixed(at: Inputs[object], carried: "Carried") -> Mapping[str, str]:
     """Return how the shaft is damped, and how many harmonics its motion needs. Raises UnsteadyError."""
     from loomopt.physics.effects.kinds import UnsteadyError
     from loomopt.physics.motion import harmonic
 
-    natural = (own["stiffness"] / carried.inertia) ** 0.5
-    if natural > QUICKEST * given["speed"]:
+    natural = (at.table["stiffness"] / carried.inertia) ** 0.5
+    if natural > QUICKEST * at.values["speed"]:
         raise UnsteadyError(
-            f"the shaft swings {natural / given['speed']:.4g} times a turn by itself, more than {QUICKEST}: it is as "
-            "good as rigid",
+            f"the shaft swings {natural / at.values['speed']:.4g} times a turn by itself, more than {QUICKEST}: it is "
+            "as good as rigid",
             "Use the rigid model: take the table out",
         )
     try:
-        count = harmonic.enough(carried.weigh, FLOAT, int(own.get("harmonics", harmonic.FEWEST)))
+        count = harmonic.enough(carried.weigh, FLOAT, int(at.table.get("harmonics", harmonic.FEWEST)))
     except ArithmeticError:
         raise UnsteadyError(
             f"the rocker's acceleration is too sharp for {harmonic.MOST} harmonics",
             "Keep the mechanism farther from where it jams, or use the rigid model",
         ) from None
-    damped = harmonic.regime(carried.inertia, own["damping"], own["stiffness"])
+    damped = harmonic.regime(carried.inertia, at.table["damping"], at.table["stiffness"])
     return {"regime": damped, "harmonics": str(count)}
 
 
-def derived(maths: Maths, given: Values, own: Values, carried: "Carried") -> dict[str, Number]:
+def derived(at: Inputs[object], carried: "Carried") -> dict[str, Number]:
     """Return the oscillator's constants, and the harmonics of z, rad, and of k z + c z˙, N·m."""
     from loomopt.physics.motion import harmonic
 
-    regime, count = own["regime"], int(own["harmonics"])
-    constants = harmonic.constants(maths, regime, carried.inertia, own["damping"], own["stiffness"], given["speed"])
-    force = harmonic.harmonics(maths, count, carried.weigh)
-    twist, torque = harmonic.answered(harmonic.Oscillator(maths, regime, constants), force)
+    regime, count = at.table["regime"], int(at.table["harmonics"])
+    constants = harmonic.constants(
+        at.maths, regime, carried.inertia, at.table["damping"], at.table["stiffness"], at.values["speed"]
+    )
+    force = harmonic.harmonics(at.maths, count, carried.weigh)
+    twist, torque = harmonic.answered(harmonic.Oscillator(at.maths, regime, constants), force)
     return harmonic.named(NAME, constants) | harmonic.named(TWIST, twist) | harmonic.named(TORQUE, torque)
 
 
-def oscillator(maths: Maths, given: Values, own: Values) -> "SteadyOscillator":
+def oscillator(at: Inputs[object]) -> "SteadyOscillator":
     """Return the shaft with what moves on it."""
     from loomopt.physics.motion import harmonic
 
-    return harmonic.Oscillator(maths, own["regime"], harmonic.read_constants(NAME, given))
+    return harmonic.Oscillator(at.maths, at.table["regime"], harmonic.read_constants(NAME, at.values))
 
 
-def _series(name: str, given: Values, own: Values) -> "harmonic.FourierSeries":
+def _series(name: str, at: "Inputs[Motion]") -> "harmonic.FourierSeries":
     from loomopt.physics.motion import harmonic
 
-    return harmonic.read_series(name, given, int(own["harmonics"]))
+    return harmonic.read_series(name, at.values, int(at.table["harmonics"]))
 
 
-def force(maths: Maths, pose: "Motion", given: Values, own: Values, reply: tuple[Number, Number]) -> Number:
+def force(at: "Inputs[Motion]", reply: tuple[Number, Number]) -> Number:
     """Return k z + c z˙, N·m."""
-    return _series(TORQUE, given, own).at(maths, pose.phi) + own["stiffness"] * reply[0] + own["damping"] * reply[1]
+    return (
+        _series(TORQUE, at).at(at.maths, at.pose.phi)
+        + at.table["stiffness"] * reply[0]
+        + at.table["damping"] * reply[1]
+    )
 
 
-def coordinate(maths: Maths, pose: "Motion", given: Values, own: Values, reply: tuple[Number, Number]) -> Number:
+def coordinate(at: "Inputs[Motion]", reply: tuple[Number, Number]) -> Number:
     """Return z, rad."""
-    return _series(TWIST, given, own).at(maths, pose.phi) + reply[0]
+    return _series(TWIST, at).at(at.maths, at.pose.phi) + reply[0]
 
 
 class Reed(NamedTuple):
@@ -109,18 +115,18 @@ class Reed(NamedTuple):
     acceleration: Number
 
 
-def moved(pose: "Motion", own: Values, coordinate: Number, force: Number, acceleration: Number) -> Reed:
+def moved(at: "Inputs[Motion]", coordinate: Number, force: Number, acceleration: Number) -> Reed:
     """Return the reed's motion: z˙ follows from k z + c z˙."""
-    rate = (force - own["stiffness"] * coordinate) / own["damping"]
-    return Reed(pose.phi, pose.q - coordinate, pose.velocity - rate, acceleration)
+    rate = (force - at.table["stiffness"] * coordinate) / at.table["damping"]
+    return Reed(at.pose.phi, at.pose.q - coordinate, at.pose.velocity - rate, acceleration)
 
 
-def samples(given: Values, own: Values) -> float:
+def samples(at: Inputs[object]) -> float:
     """Return how many samples of a turn show every swing of the shaft, or what decays faster than it would swing."""
-    square = given[f"{NAME}.stiffness"] / given[f"{NAME}.inertia"]
-    half = given[f"{NAME}.damping"] / given[f"{NAME}.inertia"] / 2
+    square = at.values[f"{NAME}.stiffness"] / at.values[f"{NAME}.inertia"]
+    half = at.values[f"{NAME}.damping"] / at.values[f"{NAME}.inertia"] / 2
     rate = half + (half**2 - square) ** 0.5 if half**2 > square else square**0.5
-    return float(SAMPLES * min(rate / given["speed"], MOST_DECAYS))
+    return float(SAMPLES * min(rate / at.values["speed"], MOST_DECAYS))
 
 
 def motion(written: "Written", own: Values) -> tuple[Number, Number]:
@@ -148,7 +154,7 @@ def rests(own: Values) -> str:
 EFFECT = State(
     name=NAME,
     summary="reed on a rocking shaft that twists",
-    own=Own,
+    table=Parameters,
     letters={"stiffness": "k", "damping": "c"},
     rank=90,
     needs=("operation.speed",),

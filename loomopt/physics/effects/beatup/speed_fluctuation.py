@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 from pydantic import Field
 
 from loomopt.base.quantities import PositiveInertia, PositiveTorque, Share
-from loomopt.maths.systems import FLOAT, Maths, Number
-from loomopt.physics.effects.kinds import Speed
-from loomopt.physics.schema import Figure, Table, Values
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs, Speed
+from loomopt.physics.schema import Figure, Table
 
 if TYPE_CHECKING:
     from loomopt.physics.motion.turning import Turning
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of motor and flywheel, all as they act at the crank."""
 
     motor_torque: PositiveTorque = Field(description="rated torque of the motor")
@@ -27,41 +27,41 @@ class Own(Table):
     flywheel: PositiveInertia = Field(description="inertia of all that turns with the crank, J_f")
 
 
-def motor(maths: Maths, omega: Number, given: Values, own: Values) -> Number:
+def motor(at: Inputs[object], omega: Number) -> Number:
     """Return D (ω_n − ω), N·m; negative where the motor brakes."""
-    return own["motor_torque"] / (own["slip"] * given["speed"]) * (given["no_load_speed"] - omega)
+    return at.table["motor_torque"] / (at.table["slip"] * at.values["speed"]) * (at.values["no_load_speed"] - omega)
 
 
-def flywheel(given: Values, own: Values) -> Number:
+def flywheel(at: Inputs[object]) -> Number:
     """Return J_f, kg·m²."""
-    return own["flywheel"]
+    return at.table["flywheel"]
 
 
-def fluctuation(turning: "Turning", given: Values, own: Values) -> float:
+def fluctuation(at: Inputs[object], turning: "Turning") -> float:
     """Return (greatest − least speed)/mean speed."""
     least, greatest = turning.range
-    return (greatest - least) / float(given["speed"])
+    return (greatest - least) / float(at.values["speed"])
 
 
-def speed_fdc(turning: "Turning", given: Values, own: Values) -> float:
+def speed_fdc(at: Inputs[object], turning: "Turning") -> float:
     """Return ω(β), rad/s."""
-    return turning.speed(float(given["beta"]))
+    return turning.speed(float(at.values["beta"]))
 
 
-def no_load_speed(turning: "Turning", given: Values, own: Values) -> float:
+def no_load_speed(at: Inputs[object], turning: "Turning") -> float:
     """Return ω_n, rad/s."""
     return turning.no_load
 
 
-def motor_torque_max(turning: "Turning", given: Values, own: Values) -> float:
+def motor_torque_max(at: Inputs[object], turning: "Turning") -> float:
     """Return the motor's torque where the crank is slowest, N·m."""
-    return float(motor(FLOAT, turning.range[0], given, own))
+    return float(motor(at, turning.range[0]))
 
 
 EFFECT = Speed(
     name="speed_fluctuation",
     summary="speed of the crank over the turn, by motor line and flywheel",
-    own=Own,
+    table=Parameters,
     letters={"motor_torque": "M_rated", "flywheel": "J_f"},
     rank=100,
     motor=motor,

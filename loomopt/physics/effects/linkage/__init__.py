@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.cycle import TURN
-from loomopt.physics.effects.kinds import Applied
+from loomopt.physics.effects.kinds import Applied, Inputs
 from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.mechanisms.moving import Joint, Link, plus, polar, scaled, times, total
 from loomopt.physics.schema import Values
@@ -117,21 +117,21 @@ class OutputMass(NamedTuple):
         return {"": vector, "x": Vector(vector.x, 0), "y": Vector(0, vector.y)}[self.axis]
 
 
-def output_masses(maths: Maths, pose: LinkagePose, given: Values) -> Iterator[OutputMass]:
+def output_masses(at: Inputs[LinkagePose]) -> Iterator[OutputMass]:
     """Masses of the effects `inertia` and `counterweight`, with their places; given: numbers by their full names."""
-    out = pose.output
+    out = at.pose.output
     if not out.carrier:
         return
     if out.measure == "angle":
-        if "inertia.m" in given:
-            place = on_output(maths, pose, given["inertia.centre"], given.get("inertia.offset"))
-            yield OutputMass(given["inertia.m"], out.carrier, place)
-        if "counterweight.mass" in given:
-            place = opposite(maths, pose, given["counterweight.radius"], given.get("counterweight.angle"))
-            yield OutputMass(given["counterweight.mass"], out.carrier, place)
-    elif "inertia.mass" in given:
+        if "inertia.m" in at.values:
+            place = on_output(at.maths, at.pose, at.values["inertia.centre"], at.values.get("inertia.offset"))
+            yield OutputMass(at.values["inertia.m"], out.carrier, place)
+        if "counterweight.mass" in at.values:
+            place = opposite(at.maths, at.pose, at.values["counterweight.radius"], at.values.get("counterweight.angle"))
+            yield OutputMass(at.values["counterweight.mass"], out.carrier, place)
+    elif "inertia.mass" in at.values:
         axis = "" if out.measure == "slide" else out.measure
-        yield OutputMass(given["inertia.mass"], out.carrier, pose.joints.joints[out.carrier], axis)
+        yield OutputMass(at.values["inertia.mass"], out.carrier, at.pose.joints.joints[out.carrier], axis)
 
 
 def opposite(maths: Maths, pose: LinkagePose, distance: Number, angle: Number | None) -> Joint:

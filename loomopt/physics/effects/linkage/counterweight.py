@@ -3,13 +3,13 @@
 from pydantic import Field
 
 from loomopt.base.quantities import Angle, Length, Mass
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Applied, Load
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Applied, Inputs, Load
 from loomopt.physics.effects.linkage import LinkagePose, opposite, resistance_of_mass
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the counterweight."""
 
     mass: Mass = Field(description="mass of the counterweight")
@@ -17,28 +17,28 @@ class Own(Table):
     angle: Angle | None = Field(None, description="its angle from the link's line; 180 deg, opposite, without it")
 
 
-def moved(given: Values, own: Values) -> Number:
+def moved(at: Inputs[object]) -> Number:
     """Return m r², kg·m²."""
-    return own["mass"] * own["radius"] ** 2
+    return at.table["mass"] * at.table["radius"] ** 2
 
 
-def force(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[LinkagePose]) -> Number:
     """Return m r² q¨, N·m."""
-    return moved(given, own) * pose.acceleration
+    return moved(at) * at.pose.acceleration
 
 
-def applied(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> list[Applied]:
+def applied(at: Inputs[LinkagePose]) -> list[Applied]:
     """Return what the mass resists with, in its place."""
-    if pose.output.carrier == "":
+    if at.pose.output.carrier == "":
         return []
-    at = opposite(maths, pose, own["radius"], own.get("angle"))
-    return [resistance_of_mass(pose, own["mass"], own["radius"], at)]
+    place = opposite(at.maths, at.pose, at.table["radius"], at.table.get("angle"))
+    return [resistance_of_mass(at.pose, at.table["mass"], at.table["radius"], place)]
 
 
 EFFECT = Load(
     name="counterweight",
     summary="counterweight on the output's axis",
-    own=Own,
+    table=Parameters,
     rank=30,
     acts="output",
     force=force,

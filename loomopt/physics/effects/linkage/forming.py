@@ -5,15 +5,15 @@ from dataclasses import replace
 from pydantic import Field
 
 from loomopt.base.quantities import Force, Torque
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs, Load
 from loomopt.physics.effects.linkage import LinkagePose, between, event_angle
-from loomopt.physics.schema import Name, Table, Values
+from loomopt.physics.schema import Name, Table
 
 BEGINS, ENDS = "event where it sets in", "event where it ceases"
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the resistance, of an output that turns."""
 
     torque: Torque = Field(description="torque")
@@ -29,20 +29,20 @@ class Sliding(Table):
     ends: Name = Field(description=ENDS)
 
 
-def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+def corners(at: Inputs[object]) -> tuple[Number, ...]:
     """Return where it begins and ends, rad."""
-    return event_angle(given, own["begins"]), event_angle(given, own["ends"])
+    return event_angle(at.values, at.table["begins"]), event_angle(at.values, at.table["ends"])
 
 
-def force(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[LinkagePose]) -> Number:
     """Return the resistance, N·m or N, against q."""
-    return switch * own["torque" if "torque" in own else "force"]
+    return at.switch * at.table["torque" if "torque" in at.table else "force"]
 
 
 EFFECT = Load(
     name="forming",
     summary="constant resistance at the output between two events",
-    own=Own,
+    table=Parameters,
     rank=21,
     acts="output",
     force=force,
@@ -51,4 +51,4 @@ EFFECT = Load(
     told={1.0: "from where it begins to where it ends", 0.0: "elsewhere"},
     examples=({"torque": "50 N*m", "begins": "rear", "ends": "front"},),
 )
-SLIDING = replace(EFFECT, own=Sliding, examples=({"force": "500 kN", "begins": "touch", "ends": "bottom"},))
+SLIDING = replace(EFFECT, table=Sliding, examples=({"force": "500 kN", "begins": "touch", "ends": "bottom"},))

@@ -5,48 +5,48 @@ from collections.abc import Iterator
 from pydantic import Field
 
 from loomopt.base.quantities import Angle
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Applied, Load
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Applied, Inputs, Load
 from loomopt.physics.effects.linkage import LinkagePose, OutputMass, centre, output_masses
 from loomopt.physics.mechanisms.dyad import Vector
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Table
 
 STANDARD_GRAVITY = 9.80665
 """m/s² [CGPM 1901]."""
 
 
-class Own(Table):
+class Parameters(Table):
     """Where down is."""
 
     down: Angle = Field(description="direction of gravity in the axes of the scene")
 
 
-def weighed(maths: Maths, pose: LinkagePose, given: Values) -> Iterator[OutputMass]:
+def weighed(at: Inputs[LinkagePose]) -> Iterator[OutputMass]:
     """Yield every mass of links, joints and output."""
-    for name in (*pose.joints.links, *pose.joints.joints):
-        mass = given.get(f"mass.{name}.mass")
+    for name in (*at.pose.joints.links, *at.pose.joints.joints):
+        mass = at.values.get(f"mass.{name}.mass")
         if mass is not None:
-            along, across = (given.get(f"mass.{name}.{key}") for key in ("along", "across"))
-            yield OutputMass(mass, name, centre(pose.joints, name, along, across))
-    yield from output_masses(maths, pose, given)
+            along, across = (at.values.get(f"mass.{name}.{key}") for key in ("along", "across"))
+            yield OutputMass(mass, name, centre(at.pose.joints, name, along, across))
+    yield from output_masses(at)
 
 
-def force(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[LinkagePose]) -> Number:
     """Return the crank torque that lifts what has a mass, N·m."""
-    x, y, found = maths.cos(own["down"]), maths.sin(own["down"]), 0
-    for weight in weighed(maths, pose, given):
+    x, y, found = at.maths.cos(at.table["down"]), at.maths.sin(at.table["down"]), 0
+    for weight in weighed(at):
         rate = weight.at.at(1)
         if rate is not None:
             rate = weight.along(rate)
-            found = found - maths.number(STANDARD_GRAVITY) * weight.mass * (x * rate.x + y * rate.y)
+            found = found - at.maths.number(STANDARD_GRAVITY) * weight.mass * (x * rate.x + y * rate.y)
     return found
 
 
-def applied(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> list[Applied]:
+def applied(at: Inputs[LinkagePose]) -> list[Applied]:
     """Return the weights, each in its centre of mass."""
-    x, y, found = maths.cos(own["down"]), maths.sin(own["down"]), []
-    for weight in weighed(maths, pose, given):
-        size = maths.number(STANDARD_GRAVITY) * weight.mass
+    x, y, found = at.maths.cos(at.table["down"]), at.maths.sin(at.table["down"]), []
+    for weight in weighed(at):
+        size = at.maths.number(STANDARD_GRAVITY) * weight.mass
         found.append(Applied(weight.on, weight.along(Vector(size * x, size * y)), weight.at.place))
     return found
 
@@ -54,7 +54,7 @@ def applied(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch:
 EFFECT = Load(
     name="gravity",
     summary="weight of links, joints and output with a mass",
-    own=Own,
+    table=Parameters,
     rank=60,
     acts="drive",
     force=force,

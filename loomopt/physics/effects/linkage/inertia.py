@@ -10,13 +10,13 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from loomopt.base.quantities import Angle, Length, Mass, PositiveInertia, PositiveMass
 from loomopt.base.units import QuantityError
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Applied, Load
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Applied, Inputs, Load
 from loomopt.physics.effects.linkage import LinkagePose, on_output, resistance_of_mass
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of what turns with the output."""
 
     J: PositiveInertia = Field(description="inertia about the output link's axis")
@@ -42,28 +42,28 @@ class Sliding(Table):
     mass: Mass = Field(description="mass of what slides with the output")
 
 
-def moved(given: Values, own: Values) -> Number:
+def moved(at: Inputs[object]) -> Number:
     """Return J, kg·m², or m, kg."""
-    return own["J"] if "J" in own else own["mass"]
+    return at.table["J"] if "J" in at.table else at.table["mass"]
 
 
-def force(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[LinkagePose]) -> Number:
     """Return J q¨, N·m, or m q¨, N."""
-    return moved(given, own) * pose.acceleration
+    return moved(at) * at.pose.acceleration
 
 
-def applied(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> list[Applied]:
+def applied(at: Inputs[LinkagePose]) -> list[Applied]:
     """Return what the mass resists with, in its centre; nothing without a mass."""
-    if "m" not in own or pose.output.carrier == "":
+    if "m" not in at.table or at.pose.output.carrier == "":
         return []
-    at = on_output(maths, pose, own["centre"], own.get("offset"))
-    return [resistance_of_mass(pose, own["m"], own["centre"], at)]
+    place = on_output(at.maths, at.pose, at.table["centre"], at.table.get("offset"))
+    return [resistance_of_mass(at.pose, at.table["m"], at.table["centre"], place)]
 
 
 EFFECT = Load(
     name="inertia",
     summary="inertia of what moves with the output",
-    own=Own,
+    table=Parameters,
     rank=10,
     acts="output",
     force=force,
@@ -75,7 +75,7 @@ EFFECT = Load(
 SLIDING = replace(
     EFFECT,
     summary="inertia of what slides with the output",
-    own=Sliding,
+    table=Sliding,
     applied=None,
     examples=({"mass": "400 kg"},),
 )

@@ -11,9 +11,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from loomopt.base.records import lazy
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Number
 from loomopt.physics.effects import pins
-from loomopt.physics.effects.kinds import Applied, Check, Loading
+from loomopt.physics.effects.kinds import Applied, Check, Inputs, Loading
 from loomopt.physics.effects.linkage import LinkagePose
 from loomopt.physics.schema import Figure, Table, Values
 
@@ -30,7 +30,7 @@ SAID = (
 )
 
 
-class Own(Table):
+class Parameters(Table):
     """No values of its own."""
 
 
@@ -134,12 +134,10 @@ class LinkageForces:
         return self._shaken.moment
 
 
-def forces(
-    linked: "Chain | None", maths: Maths, pose: LinkagePose, given: Values, own: Values, loading: Loading
-) -> LinkageForces:
+def forces(linked: "Chain | None", at: Inputs[LinkagePose], loading: Loading) -> LinkageForces:
     """Return the forces at an instant."""
     assert linked is not None
-    return LinkageForces(linked, pose, loading, own)
+    return LinkageForces(linked, at.pose, loading, at.table)
 
 
 @functools.lru_cache(maxsize=64)
@@ -162,7 +160,7 @@ def fitted(linked: "Chain") -> Check[LinkagePose]:
     moment = "peak moment of all moving masses about the crank shaft"
     return replace(
         EFFECT,
-        own=pins.own(rubbed),
+        table=pins.own(rubbed),
         sides={f"force_{name}": chain_forces.joined(linked, place) for place, name in places.items()},
         worked={pins.LOSS: "friction_work"},
         wanted={pins.LOSS: ("operation.speed", *pins.read("joint_forces", rubbed))},
@@ -177,7 +175,7 @@ def fitted(linked: "Chain") -> Check[LinkagePose]:
 EFFECT: Check[LinkagePose] = Check(
     name="joint_forces",
     summary="forces in the joints, and of all moving masses on the frame",
-    own=Own,
+    table=Parameters,
     rank=90,
     joints=functools.partial(forces, None),
     fitted=fitted,

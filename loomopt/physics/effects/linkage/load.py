@@ -7,15 +7,15 @@ from pydantic import Field
 
 from loomopt.base.quantities import SignedForce
 from loomopt.maths.periodic_cubic import interval_at
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Applied, Load, LoadTable
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Applied, Inputs, Load, LoadTable
 from loomopt.physics.effects.linkage import LinkagePose, between, event_angle
 from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.mechanisms.moving import total
-from loomopt.physics.schema import DIGITS, Name, Table, Values
+from loomopt.physics.schema import DIGITS, Name, Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the force."""
 
     x: SignedForce | None = Field(None, description="its component along x")
@@ -29,15 +29,15 @@ class Own(Table):
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
 
-def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+def corners(at: Inputs[object]) -> tuple[Number, ...]:
     """Return where it begins and ends, rad; of a table where its intervals begin; none where it acts all over."""
-    if "table" in own:
-        begins = own["table"].begins
-        start = event_angle(given, own["at"]) if "at" in own else 0
-        return tuple(start + maths.number(begin) for begin in begins)
-    if "begins" not in own:
+    if "table" in at.table:
+        begins = at.table["table"].begins
+        start = event_angle(at.values, at.table["at"]) if "at" in at.table else 0
+        return tuple(start + at.maths.number(begin) for begin in begins)
+    if "begins" not in at.table:
         return ()
-    return event_angle(given, own["begins"]), event_angle(given, own["ends"])
+    return event_angle(at.values, at.table["begins"]), event_angle(at.values, at.table["ends"])
 
 
 def switch(angle: float, corners: tuple[float, ...]) -> float:
@@ -47,36 +47,36 @@ def switch(angle: float, corners: tuple[float, ...]) -> float:
     return interval_at(angle, corners) if corners else 1.0
 
 
-def force(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[LinkagePose]) -> Number:
     """Return the crank torque against it, N·m."""
-    rate = pose.joints.joints[own["instance"]].at(1)
+    rate = at.pose.joints.joints[at.table["instance"]].at(1)
     if rate is None:
         return 0
-    if "table" in own:
-        angle = pose.phi - event_angle(given, own["at"]) if "at" in own else pose.phi
-        x, y = (curve.at(maths, angle, switch) for curve in own["table"].curves)
+    if "table" in at.table:
+        angle = at.pose.phi - event_angle(at.values, at.table["at"]) if "at" in at.table else at.pose.phi
+        x, y = (curve.at(at.maths, angle, at.switch) for curve in at.table["table"].curves)
         return -(x * rate.x + y * rate.y)
-    taken = total(*(own[key] * component for key, component in zip("xy", rate, strict=True) if key in own))
+    taken = total(*(at.table[key] * component for key, component in zip("xy", rate, strict=True) if key in at.table))
     if taken is None:
         return 0
-    return -(switch * taken) if "begins" in own else -taken
+    return -(at.switch * taken) if "begins" in at.table else -taken
 
 
-def applied(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> list[Applied]:
+def applied(at: Inputs[LinkagePose]) -> list[Applied]:
     """Return the force on its joint."""
-    if "table" in own:
-        angle = pose.phi - event_angle(given, own["at"]) if "at" in own else pose.phi
-        x, y = (curve.at(maths, angle, switch) for curve in own["table"].curves)
+    if "table" in at.table:
+        angle = at.pose.phi - event_angle(at.values, at.table["at"]) if "at" in at.table else at.pose.phi
+        x, y = (curve.at(at.maths, angle, at.switch) for curve in at.table["table"].curves)
     else:
-        share = switch if "begins" in own else 1
-        x, y = (share * own[key] if key in own else 0 for key in "xy")
-    return [Applied(own["instance"], Vector(x, y))]
+        share = at.switch if "begins" in at.table else 1
+        x, y = (share * at.table[key] if key in at.table else 0 for key in "xy")
+    return [Applied(at.table["instance"], Vector(x, y))]
 
 
 EFFECT = Load(
     name="load",
     summary="force on a joint",
-    own=Own,
+    table=Parameters,
     rank=50,
     acts="drive",
     force=force,

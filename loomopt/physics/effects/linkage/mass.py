@@ -7,15 +7,15 @@
 from pydantic import Field
 
 from loomopt.base.quantities import Coordinate, Inertia, PositiveMass
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Applied, Load
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Applied, Inputs, Load
 from loomopt.physics.effects.linkage import LinkagePose, centre
 from loomopt.physics.mechanisms.dyad import dot
 from loomopt.physics.mechanisms.moving import less, plus, scaled, times, total
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the link, or of what sits on the joint."""
 
     mass: PositiveMass = Field(description="mass")
@@ -24,38 +24,38 @@ class Own(Table):
     J: Inertia | None = Field(None, description="inertia about the centre of mass")
 
 
-def force(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[LinkagePose]) -> Number:
     """Return the crank torque that moves it, N·m."""
-    link = pose.joints.links.get(own["instance"])
-    at = centre(pose.joints, own["instance"], own.get("along"), own.get("across"))
-    p1, p2, inertia = at.at(1), at.at(2), own.get("J")
+    link = at.pose.joints.links.get(at.table["instance"])
+    body = centre(at.pose.joints, at.table["instance"], at.table.get("along"), at.table.get("across"))
+    p1, p2, inertia = body.at(1), body.at(2), at.table.get("J")
     w1, w2 = (link.rates(1), link.rates(2)) if link is not None else (None, None)
-    gained = total(None if p1 is None or p2 is None else own["mass"] * dot(p1, p2), times(inertia, w1, w2))
-    torque = None if gained is None else gained * pose.omega**2
-    if pose.omega_dot is not None:
-        carried = total(None if p1 is None else own["mass"] * dot(p1, p1), times(inertia, w1, w1))
-        torque = total(torque, times(carried, pose.omega_dot))
+    gained = total(None if p1 is None or p2 is None else at.table["mass"] * dot(p1, p2), times(inertia, w1, w2))
+    torque = None if gained is None else gained * at.pose.omega**2
+    if at.pose.omega_dot is not None:
+        carried = total(None if p1 is None else at.table["mass"] * dot(p1, p1), times(inertia, w1, w1))
+        torque = total(torque, times(carried, at.pose.omega_dot))
     return 0 if torque is None else torque
 
 
-def applied(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> list[Applied]:
+def applied(at: Inputs[LinkagePose]) -> list[Applied]:
     """Return what the mass resists with, in its centre."""
-    link = pose.joints.links.get(own["instance"])
-    at = centre(pose.joints, own["instance"], own.get("along"), own.get("across"))
-    square, change, inertia = pose.omega**2, pose.omega_dot, own.get("J")
-    p1, p2 = at.at(1), at.at(2)
+    link = at.pose.joints.links.get(at.table["instance"])
+    body = centre(at.pose.joints, at.table["instance"], at.table.get("along"), at.table.get("across"))
+    square, change, inertia = at.pose.omega**2, at.pose.omega_dot, at.table.get("J")
+    p1, p2 = body.at(1), body.at(2)
     faster = None if p1 is None or change is None else scaled(change, p1)
     pulled = plus(None if p2 is None else scaled(square, p2), faster)
-    push = None if pulled is None else scaled(-own["mass"], pulled)
+    push = None if pulled is None else scaled(-at.table["mass"], pulled)
     w1, w2 = (link.rates(1), link.rates(2)) if link is not None else (None, None)
     turned = total(times(square, w2), times(change, w1))
-    return [Applied(own["instance"], push, at.place, less(times(inertia, turned)), True)]
+    return [Applied(at.table["instance"], push, body.place, less(times(inertia, turned)), True)]
 
 
 EFFECT = Load(
     name="mass",
     summary="mass of a link or on a joint",
-    own=Own,
+    table=Parameters,
     rank=40,
     acts="drive",
     force=force,

@@ -10,17 +10,17 @@ from pydantic import Field
 
 from loomopt.base.quantities import Force, PulseAngle, Torque
 from loomopt.maths.periodic_cubic import interval_at
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Number
 from loomopt.physics.cycle import TURN
-from loomopt.physics.effects.kinds import Load, LoadTable
+from loomopt.physics.effects.kinds import Inputs, Load, LoadTable
 from loomopt.physics.effects.linkage import LinkagePose, event_angle
-from loomopt.physics.schema import DIGITS, Name, Table, Values
+from loomopt.physics.schema import DIGITS, Name, Table
 
 PULSE, AT = "crank angle δ through which it acts, about the event", "event about which it acts"
 SAID = "CSV file of it instead: angle [deg] from the event, {}, corner"
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the resistance, of an output that turns."""
 
     torque: Torque | None = Field(None, description="largest torque")
@@ -40,12 +40,12 @@ class Sliding(Table):
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
 
-def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+def corners(at: Inputs[object]) -> tuple[Number, ...]:
     """Return where the pulse begins and ends, rad; of a table where its intervals begin."""
-    middle = event_angle(given, own["at"])
-    if "table" in own:
-        return tuple(middle + maths.number(begin) for begin in own["table"].begins)
-    return middle - own["pulse"] / 2, middle + own["pulse"] / 2
+    middle = event_angle(at.values, at.table["at"])
+    if "table" in at.table:
+        return tuple(middle + at.maths.number(begin) for begin in at.table["table"].begins)
+    return middle - at.table["pulse"] / 2, middle + at.table["pulse"] / 2
 
 
 def switch(angle: float, corners: tuple[float, ...]) -> float:
@@ -56,24 +56,28 @@ def switch(angle: float, corners: tuple[float, ...]) -> float:
     return 1.0 if (angle - begin) % TURN < end - begin else 0.0
 
 
-def force(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[LinkagePose]) -> Number:
     """Return the resistance, N·m or N, against q.
 
     The branch of the angle since the event jumps where the other formula holds: half a turn away inside the pulse, at
     the event itself outside.
     """
-    angle = pose.phi - event_angle(given, own["at"])
-    if "table" in own:
-        return own["table"].at(maths, angle, switch)
-    side = 2 * switch - 1
-    since = maths.atan2(side * maths.sin(angle), side * maths.cos(angle))
-    return switch * own["torque" if "torque" in own else "force"] * maths.cos(maths.pi * since / own["pulse"])
+    angle = at.pose.phi - event_angle(at.values, at.table["at"])
+    if "table" in at.table:
+        return at.table["table"].at(at.maths, angle, at.switch)
+    side = 2 * at.switch - 1
+    since = at.maths.atan2(side * at.maths.sin(angle), side * at.maths.cos(angle))
+    return (
+        at.switch
+        * at.table["torque" if "torque" in at.table else "force"]
+        * at.maths.cos(at.maths.pi * since / at.table["pulse"])
+    )
 
 
 EFFECT = Load(
     name="resistance",
     summary="resistance at the output about an event",
-    own=Own,
+    table=Parameters,
     letters={"pulse": "delta"},
     rank=20,
     acts="output",
@@ -85,7 +89,7 @@ EFFECT = Load(
 )
 SLIDING = replace(
     EFFECT,
-    own=Sliding,
+    table=Sliding,
     tabulated=LoadTable("F", "force", "counted from the event", ("force", "pulse")),
     examples=({"force": "5 kN", "pulse": "60 deg", "at": "front"},),
 )

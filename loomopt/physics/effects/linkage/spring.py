@@ -9,12 +9,12 @@ from dataclasses import replace
 from pydantic import Field
 
 from loomopt.base.quantities import Force, Length, RotaryStiffness, Stiffness, Torque
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Applied, Load
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Applied, Inputs, Load
 from loomopt.physics.effects.linkage import LinkagePose
 from loomopt.physics.mechanisms.dyad import Vector, dot
 from loomopt.physics.mechanisms.moving import minus
-from loomopt.physics.schema import Name, Table, Values
+from loomopt.physics.schema import Name, Table
 
 AT = "event from which the output's travel counts"
 
@@ -28,7 +28,7 @@ class Joining(Table):
     free: Length = Field(description="its length without force")
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of a spring on an output that turns."""
 
     stiffness: RotaryStiffness = Field(description="stiffness")
@@ -44,31 +44,31 @@ class Sliding(Table):
     preload: Force = Field(0.0, description="its force at that event")
 
 
-def stretched(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+def stretched(at: Inputs[LinkagePose]) -> Number:
     """Return the crank torque that stretches a spring between two joints, N·m."""
-    a, b = (pose.joints.joints[own[key]] for key in ("begins", "ends"))
+    a, b = (at.pose.joints.joints[at.table[key]] for key in ("begins", "ends"))
     base, rate = minus(b.at(0), a.at(0)), minus(b.at(1), a.at(1))
     if base is None or rate is None:
         return 0
-    length = maths.sqrt(dot(base, base))
-    return own["stiffness"] * (length - own["free"]) * dot(base, rate) / length
+    length = at.maths.sqrt(dot(base, base))
+    return at.table["stiffness"] * (length - at.table["free"]) * dot(base, rate) / length
 
 
-def pulls(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> list[Applied]:
+def pulls(at: Inputs[LinkagePose]) -> list[Applied]:
     """Return what a spring between two joints pulls them with."""
-    a, b = (pose.joints.joints[own[key]].place for key in ("begins", "ends"))
+    a, b = (at.pose.joints.joints[at.table[key]].place for key in ("begins", "ends"))
     base = Vector(b.x - a.x, b.y - a.y)
-    length = maths.sqrt(dot(base, base))
-    share = own["stiffness"] * (length - own["free"]) / length
+    length = at.maths.sqrt(dot(base, base))
+    share = at.table["stiffness"] * (length - at.table["free"]) / length
     return [
-        Applied(own["begins"], Vector(share * base.x, share * base.y)),
-        Applied(own["ends"], Vector(-share * base.x, -share * base.y)),
+        Applied(at.table["begins"], Vector(share * base.x, share * base.y)),
+        Applied(at.table["ends"], Vector(-share * base.x, -share * base.y)),
     ]
 
 
-def pushed(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+def pushed(at: Inputs[LinkagePose]) -> Number:
     """Return what a spring on the output takes, N·m or N, against q."""
-    return own["preload"] + own["stiffness"] * pose.travelled(given, own["at"])
+    return at.table["preload"] + at.table["stiffness"] * at.pose.travelled(at.values, at.table["at"])
 
 
 PLACES = "output at events"
@@ -76,18 +76,18 @@ PLACES = "output at events"
 TURNING = Load(
     name="spring",
     summary="spring on the output",
-    own=Own,
+    table=Parameters,
     rank=65,
     acts="output",
     force=pushed,
     reads=(PLACES,),
     examples=({"stiffness": "50 N*m/rad", "at": "rear"},),
 )
-PUSHED = replace(TURNING, own=Sliding, examples=({"stiffness": "5 N/mm", "at": "top"},))
+PUSHED = replace(TURNING, table=Sliding, examples=({"stiffness": "5 N/mm", "at": "top"},))
 EFFECT = Load(
     name="spring",
     summary="spring between two joints, or on the output",
-    own=Joining,
+    table=Joining,
     rank=65,
     acts="drive",
     force=stretched,

@@ -6,26 +6,26 @@ Output term m S¨: the force the tape must carry; times S' it reaches the main s
 from pydantic import Field
 
 from loomopt.base.quantities import PositiveMass
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load, Motion
-from loomopt.physics.schema import Table, Values
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs, Load, Motion
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the head."""
 
     mass: PositiveMass = Field(description="mass of the head and of the tape that moves with it")
 
 
-def force(maths: Maths, pose: Motion, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[Motion]) -> Number:
     """Return m S¨, N."""
-    return own["mass"] * pose.acceleration
+    return at.table["mass"] * at.pose.acceleration
 
 
 EFFECT = Load(
     name="head_inertia",
     summary="rapier head and tape",
-    own=Own,
+    table=Parameters,
     rank=10,
     acts="output",
     force=force,

@@ -15,7 +15,7 @@ from loomopt.base.records import lazy
 from loomopt.base.units import ShowValue
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects import pins
-from loomopt.physics.effects.kinds import Check, Loading, Motion
+from loomopt.physics.effects.kinds import Check, Inputs, Loading, Motion
 from loomopt.physics.schema import Figure, Values
 
 if TYPE_CHECKING:
@@ -172,14 +172,14 @@ class RapierForces:
         return pins.works(self.maths, self.own, {joint: (f"force_{joint}", turn) for joint, turn in turned.items()})
 
 
-def forces(maths: Maths, pose: Motion, given: Values, own: Values, loading: Loading) -> RapierForces:
+def forces(at: Inputs[Motion], loading: Loading) -> RapierForces:
     """Return the forces at an instant."""
-    return RapierForces(maths, pose, given, loading, own)
+    return RapierForces(at.maths, at.pose, at.values, loading, at.table)
 
 
-def remark(given: Values, own: Values, shown: ShowValue) -> str:
+def remark(at: Inputs[object], shown: ShowValue) -> str:
     """Say that nothing of the head is in the forces."""
-    if "head_inertia.mass" in given or "tape_friction.force" in given:
+    if "head_inertia.mass" in at.values or "tape_friction.force" in at.values:
         return ""
     return "forces in the joints have nothing of the head in them: put on head_inertia or tape_friction"
 
@@ -187,7 +187,7 @@ def remark(given: Values, own: Values, shown: ShowValue) -> str:
 EFFECT: Check[Motion] = Check(
     name="joint_forces",
     summary="forces in the joints and in the gear mesh",
-    own=pins.own(PINS),
+    table=pins.own(PINS),
     rank=40,
     joints=forces,
     between=("sley",),

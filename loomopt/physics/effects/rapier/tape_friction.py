@@ -8,20 +8,20 @@ import math
 from pydantic import Field
 
 from loomopt.base.quantities import Force
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load, Motion
-from loomopt.physics.schema import Table, Values
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs, Load, Motion
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the guides."""
 
     force: Force = Field(description="friction of tape and head in their guides")
 
 
-def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+def corners(at: Inputs[object]) -> tuple[Number, ...]:
     """Return the crank angles where the head turns, rad, the first of them onto its way out."""
-    return tuple(given["turns"])
+    return tuple(at.values["turns"])
 
 
 def direction(angle: float, corners: tuple[float, ...]) -> float:
@@ -33,15 +33,15 @@ def direction(angle: float, corners: tuple[float, ...]) -> float:
     return 1.0 if passed % 2 else -1.0
 
 
-def force(maths: Maths, pose: Motion, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[Motion]) -> Number:
     """Return F sgn S˙, N."""
-    return own["force"] * switch
+    return at.table["force"] * at.switch
 
 
 EFFECT = Load(
     name="tape_friction",
     summary="friction of the tape in its guides",
-    own=Own,
+    table=Parameters,
     rank=20,
     acts="output",
     force=force,

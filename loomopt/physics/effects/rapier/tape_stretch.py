@@ -10,9 +10,9 @@ from pydantic import Field
 
 from loomopt.base.quantities import PositiveStiffness
 from loomopt.base.units import ShowValue
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Check, Motion
-from loomopt.physics.schema import Figure, Table, Values
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Check, Inputs, Motion
+from loomopt.physics.schema import Figure, Table
 
 MASS, ACCELERATION = "head_inertia.mass", "S''_stroke"
 """What it reads of the head: its mass, kg, and its acceleration at the hand-over, m/rad²."""
@@ -20,21 +20,21 @@ SLOW = 20.0
 """Least natural frequency of the head on its tape over the shaft's speed: below it the stretch lags behind."""
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the tape."""
 
     stiffness: PositiveStiffness = Field(description="stiffness of the tape between wheel and head")
 
 
-def head_overrun(maths: Maths, given: Values, own: Values) -> Number:
+def head_overrun(at: Inputs[object]) -> Number:
     """Return how far the head goes beyond its stroke, m."""
-    return -given[MASS] * given[ACCELERATION] * given["speed"] ** 2 / own["stiffness"]
+    return -at.values[MASS] * at.values[ACCELERATION] * at.values["speed"] ** 2 / at.table["stiffness"]
 
 
-def remark(given: Values, own: Values, shown: ShowValue) -> str:
+def remark(at: Inputs[object], shown: ShowValue) -> str:
     """Say where the stretch is no longer quasi-static."""
-    natural = math.sqrt(own["stiffness"] / given[MASS])
-    if natural >= SLOW * given["speed"]:
+    natural = math.sqrt(at.table["stiffness"] / at.values[MASS])
+    if natural >= SLOW * at.values["speed"]:
         return ""
     return (
         f"the head on its tape swings at {shown(natural, 'angular speed', 4)}, less than {SLOW:g} times the shaft's "
@@ -45,7 +45,7 @@ def remark(given: Values, own: Values, shown: ShowValue) -> str:
 EFFECT: Check[Motion] = Check(
     name="tape_stretch",
     summary="stretch of the tape at the hand-over",
-    own=Own,
+    table=Parameters,
     rank=30,
     reads=(ACCELERATION,),
     needs=("operation.speed",),

@@ -24,7 +24,7 @@ from loomopt.base.quantities import (
 from loomopt.base.quantities import read as quantity
 from loomopt.base.units import QuantityError, ShowValue, usual
 from loomopt.maths.systems import FLOAT, Maths, Number
-from loomopt.physics.effects.kinds import Check, Demand, FlatNumber
+from loomopt.physics.effects.kinds import Check, Demand, FlatNumber, Inputs
 from loomopt.physics.schema import Figure, Table, Values
 
 DECAY = math.exp(-0.105)
@@ -190,7 +190,7 @@ LEAST_INITIAL, MOST_INITIAL = (
 OPENED = "coils are drawn open at the top"
 
 
-class Own(Table):
+class Parameters(Table):
     """The coils of one return spring, their steel, and what they must keep."""
 
     springs: PositiveNumber = Field(2.0, description="how many springs share K1")
@@ -260,9 +260,9 @@ def coil(own: Values) -> Coil:
     )
 
 
-def load(given: Values, own: Values) -> Number:
+def load(at: Inputs[object]) -> Number:
     """Return the largest force on one coil, with the shed open downward, N."""
-    return given["K1"] * (given["X0"] + given["travel"]) / own["springs"]
+    return at.values["K1"] * (at.values["X0"] + at.values["travel"]) / at.table["springs"]
 
 
 def tensile(maths: Maths, own: Values) -> Number:
@@ -270,30 +270,30 @@ def tensile(maths: Maths, own: Values) -> Number:
     return strength(maths, own["wire"], own["strength"], own["strength_exponent"])
 
 
-def _length(maths: Maths, given: Values, own: Values) -> Number:
+def _length(at: Inputs[object]) -> Number:
     """Return the length inside the hooks with the shed open downward, m."""
-    own_coil = coil(own)
-    return own_coil.free_length + given["X0"] + given["travel"] - own_coil.initial_tension / own_coil.rate
+    own_coil = coil(at.table)
+    return own_coil.free_length + at.values["X0"] + at.values["travel"] - own_coil.initial_tension / own_coil.rate
 
 
-def _bending_share(maths: Maths, given: Values, own: Values) -> Number:
+def _bending_share(at: Inputs[object]) -> Number:
     """Return the bending stress of the hooks over the strength; 0 of free hooks, whose bend nothing tells."""
-    share = coil(own).hook_bending(maths, load(given, own)) / tensile(maths, own)
-    return 0 * share if own.get("hooks") == "free" else share
+    share = coil(at.table).hook_bending(at.maths, load(at)) / tensile(at.maths, at.table)
+    return 0 * share if at.table.get("hooks") == "free" else share
 
 
-ROWS: dict[str, Callable[[Maths, Values, Values], Number]] = {
-    "coil_index": lambda m, v, own: coil(own).index,
-    "shear_stress": lambda m, v, own: coil(own).shear_stress(m, load(v, own)),
-    "shear_share": lambda m, v, own: coil(own).shear_stress(m, load(v, own)) / tensile(m, own),
-    "bending_share": lambda m, v, own: _bending_share(m, v, own),
-    "surge_ratio": lambda m, v, own: 2 * m.pi * coil(own).surge_frequency(m) / v["speed"],
+ROWS: dict[str, Callable[[Inputs[None]], Number]] = {
+    "coil_index": lambda at: coil(at.table).index,
+    "shear_stress": lambda at: coil(at.table).shear_stress(at.maths, load(at)),
+    "shear_share": lambda at: coil(at.table).shear_stress(at.maths, load(at)) / tensile(at.maths, at.table),
+    "bending_share": _bending_share,
+    "surge_ratio": lambda at: 2 * at.maths.pi * coil(at.table).surge_frequency(at.maths) / at.values["speed"],
     "spring_length": _length,
-    "spring_mass": lambda m, v, own: own["springs"] * coil(own).mass(m),
-    RATE: lambda m, v, own: own["springs"] * coil(own).rate - v["K1"],
-    LEAST_INITIAL: lambda m, v, own: coil(own).initial_stress(m) - initial_band(m, own)[0],
-    MOST_INITIAL: lambda m, v, own: initial_band(m, own)[1] - coil(own).initial_stress(m),
-    OPENED: lambda m, v, own: v["K1"] * v["X0"] / own["springs"] - own["initial_tension"],
+    "spring_mass": lambda at: at.table["springs"] * coil(at.table).mass(at.maths),
+    RATE: lambda at: at.table["springs"] * coil(at.table).rate - at.values["K1"],
+    LEAST_INITIAL: lambda at: coil(at.table).initial_stress(at.maths) - initial_band(at.maths, at.table)[0],
+    MOST_INITIAL: lambda at: initial_band(at.maths, at.table)[1] - coil(at.table).initial_stress(at.maths),
+    OPENED: lambda at: at.values["K1"] * at.values["X0"] / at.table["springs"] - at.table["initial_tension"],
 }
 """Figures of the coils, then what they keep as margins that are never negative (the rate's is zero), SI."""
 
@@ -310,7 +310,7 @@ FIGURES = (
 )
 
 
-def sold(own: Own) -> Mapping[str, Sequence[float]]:
+def sold(own: Parameters) -> Mapping[str, Sequence[float]]:
     """Return the wire diameters that are sold, m, where the wire must be one of them."""
     return {"wire": WIRES} if own.sizes == "preferred" else {}
 
@@ -318,7 +318,7 @@ def sold(own: Own) -> Mapping[str, Sequence[float]]:
 def explain(
     known: Mapping[str, float],
     bounds: Mapping[str, tuple[float, float]],
-    own: Own,
+    own: Parameters,
     clash: Collection[str],
     shown: ShowValue = usual,
 ) -> str:
@@ -348,7 +348,7 @@ def explain(
 EFFECT: Check[object] = Check(
     name="coil",
     summary="tension springs that can be made: stresses, hooks, surge, space",
-    own=Own,
+    table=Parameters,
     rank=60,
     reads=("K1", "X0", "travel"),
     needs=("operation.speed",),

@@ -3,27 +3,27 @@
 from pydantic import Field
 
 from loomopt.base.quantities import Damping
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs, Load
 from loomopt.physics.effects.shedding import FramePose
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the guides."""
 
     C: Damping = Field(description="viscous damping of the frame in its guides")
 
 
-def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[FramePose]) -> Number:
     """Return C X˙, N."""
-    return own["C"] * pose.velocity
+    return at.table["C"] * at.pose.velocity
 
 
 EFFECT = Load(
     name="damping",
     summary="viscous damping of the frame",
-    own=Own,
+    table=Parameters,
     rank=40,
     acts="output",
     force=force,

@@ -7,27 +7,27 @@ It jumps where the frame starts and stops. In a dwell it is any value in [−F, 
 from pydantic import Field
 
 from loomopt.base.quantities import Force
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs, Load
 from loomopt.physics.effects.shedding import FramePose
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the guides."""
 
     F: Force = Field(description="Coulomb friction of the frame in its guides")
 
 
-def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[FramePose]) -> Number:
     """Return F sgn X˙, N; in a dwell its worst value."""
-    return own["F"] * pose.direction
+    return at.table["F"] * at.pose.direction
 
 
 EFFECT = Load(
     name="dry_friction",
     summary="Coulomb friction of the frame in its guides",
-    own=Own,
+    table=Parameters,
     rank=50,
     acts="output",
     force=force,

@@ -3,32 +3,32 @@
 from pydantic import Field
 
 from loomopt.base.quantities import Mass
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs, Load
 from loomopt.physics.effects.shedding import FramePose
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the frame."""
 
     M: Mass = Field(description="mass of the frame and of what moves with it")
 
 
-def moved(given: Values, own: Values) -> Number:
+def moved(at: Inputs[object]) -> Number:
     """Return M, kg."""
-    return own["M"]
+    return at.table["M"]
 
 
-def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[FramePose]) -> Number:
     """Return M X¨, N."""
-    return own["M"] * pose.acceleration
+    return at.table["M"] * at.pose.acceleration
 
 
 EFFECT = Load(
     name="inertia",
     summary="inertia of the heald frame",
-    own=Own,
+    table=Parameters,
     rank=30,
     acts="output",
     force=force,

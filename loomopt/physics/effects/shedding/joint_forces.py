@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from loomopt.base.records import lazy
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects import pins
-from loomopt.physics.effects.kinds import Check, Loading
+from loomopt.physics.effects.kinds import Check, Inputs, Loading
 from loomopt.physics.effects.shedding import FramePose
 from loomopt.physics.schema import Figure, Values
 
@@ -125,15 +125,15 @@ class CamForces:
         return pins.works(self.maths, self.own, turned)
 
 
-def forces(maths: Maths, pose: FramePose, given: Values, own: Values, loading: Loading) -> CamForces:
+def forces(at: Inputs[FramePose], loading: Loading) -> CamForces:
     """Return the forces at an instant."""
-    return CamForces(maths, pose, given, loading, own)
+    return CamForces(at.maths, at.pose, at.values, loading, at.table)
 
 
 EFFECT = Check(
     name="joint_forces",
     summary="forces of the roller, in its lever and the cam shaft, and of the moving masses",
-    own=pins.own(PINS),
+    table=pins.own(PINS),
     rank=95,
     joints=forces,
     vectors=("lever_pivot_force", "shaking_force"),

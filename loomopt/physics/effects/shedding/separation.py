@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 UNKNOWN = "the frame in flight goes by its travel X, where that pull is not known"
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the landing, and how long to go on."""
 
     restitution: Annotated[float, Quantity("number", least=0, below=1)] = Field(
@@ -121,7 +121,7 @@ def rules(terms: EventTerms) -> Sequence[Rule]:
 EFFECT = Event(
     name="separation",
     summary="flight of the frame where the roller leaves the cam",
-    own=Own,
+    table=Parameters,
     rank=70,
     needs=("operation.speed",),
     beside=("inertia",),

@@ -6,32 +6,32 @@ The spring's own waves are left out: with them the least stiffness moves by less
 from pydantic import Field
 
 from loomopt.base.quantities import Mass
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs, Load
 from loomopt.physics.effects.shedding import FramePose
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the spring."""
 
     mass: Mass = Field(description="mass of the return spring's coils, both springs together")
 
 
-def moved(given: Values, own: Values) -> Number:
+def moved(at: Inputs[object]) -> Number:
     """Return m_s/3, kg."""
-    return own["mass"] / 3
+    return at.table["mass"] / 3
 
 
-def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[FramePose]) -> Number:
     """Return (m_s/3) X¨, N."""
-    return own["mass"] / 3 * pose.acceleration
+    return at.table["mass"] / 3 * at.pose.acceleration
 
 
 EFFECT = Load(
     name="spring_inertia",
     summary="inertia of the return spring",
-    own=Own,
+    table=Parameters,
     rank=35,
     acts="output",
     force=force,

@@ -17,15 +17,15 @@ from pydantic import Field
 
 from loomopt.base.quantities import Force
 from loomopt.maths.periodic_cubic import interval_at
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load, LoadTable, Place
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs, Load, LoadTable, Place
 from loomopt.physics.effects.shedding import FramePose
-from loomopt.physics.schema import DIGITS, Name, Table, Values
+from loomopt.physics.schema import DIGITS, Name, Table
 
 TURN = 6.283185307179586
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the warp."""
 
     T1: Force | None = Field(None, description="pull of the warp with the shed open upward")
@@ -37,14 +37,14 @@ class Own(Table):
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
 
-def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+def corners(at: Inputs[object]) -> tuple[Number, ...]:
     """Return the cam angles where the shed is half open, rad, on the rise and on the return; none where none counts.
 
     Of a table those where its intervals begin.
     """
-    if "table" in own:
-        return tuple(map(maths.number, own["table"].begins))
-    return tuple(given["half_open"]) if own["shape"] == "linear" else ()
+    if "table" in at.table:
+        return tuple(map(at.maths.number, at.table["table"].begins))
+    return tuple(at.values["half_open"]) if at.table["shape"] == "linear" else ()
 
 
 def past_middle(angle: float, corners: tuple[float, ...]) -> float:
@@ -59,39 +59,39 @@ def known_in(words: Mapping[str, str]) -> tuple[Place, ...]:
     return (("segment", 1.0), ("segment", 3.0)) if words["shape"] == "levels" and "table" not in words else ()
 
 
-def linear(maths: Maths, pose: FramePose, own: Values, switch: Number) -> Number:
+def linear(at: Inputs[FramePose]) -> Number:
     """Return −T, N, in proportion to the shed; switch: 1 past the middle."""
-    return (2 * pose.lowered - 1) * maths.choose(switch, (own["T1"], own["T2"]))
+    return (2 * at.pose.lowered - 1) * at.maths.choose(at.switch, (at.table["T1"], at.table["T2"]))
 
 
-def step(maths: Maths, pose: FramePose, own: Values, switch: Number) -> Number:
+def step(at: Inputs[FramePose]) -> Number:
     """Return −T, N, by the cubic STEP of the law's argument u."""
-    return (own["T1"] + own["T2"]) * pose.u**2 * (3 - 2 * pose.u) - own["T1"]
+    return (at.table["T1"] + at.table["T2"]) * at.pose.u**2 * (3 - 2 * at.pose.u) - at.table["T1"]
 
 
-def levels(maths: Maths, pose: FramePose, own: Values, switch: Number) -> Number:
+def levels(at: Inputs[FramePose]) -> Number:
     """Return −T, N, in the dwells; 0 stands for what is not known between them."""
-    return maths.choose(pose.segment, (0, own["T2"], 0, -own["T1"]))
+    return at.maths.choose(at.pose.segment, (0, at.table["T2"], 0, -at.table["T1"]))
 
 
-SHAPES: dict[str, Callable[[Maths, FramePose, Values, Number], Number]] = {
+SHAPES: dict[str, Callable[[Inputs[FramePose]], Number]] = {
     "linear": linear,
     "step": step,
     "levels": levels,
 }
 
 
-def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[FramePose]) -> Number:
     """Return −T, N, by the shape the scene names, or by its table."""
-    if "table" in own:
-        return -own["table"].at(maths, pose.phi, switch)
-    return SHAPES[own["shape"]](maths, pose, own, switch)
+    if "table" in at.table:
+        return -at.table["table"].at(at.maths, at.pose.phi, at.switch)
+    return SHAPES[at.table["shape"]](at)
 
 
 EFFECT = Load(
     name="warp_tension",
     summary="pull of the warp on the heald frame",
-    own=Own,
+    table=Parameters,
     rank=20,
     acts="output",
     force=force,

@@ -6,27 +6,27 @@ A frame whose weight presses the roller on the cam instead has a negative G.
 from pydantic import Field
 
 from loomopt.base.quantities import SignedForce
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs, Load
 from loomopt.physics.effects.shedding import FramePose
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """Values of the frame."""
 
     G: SignedForce = Field(description="weight in the direction of the cam's push")
 
 
-def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[FramePose]) -> Number:
     """Return −G, N."""
-    return -own["G"]
+    return -at.table["G"]
 
 
 EFFECT = Load(
     name="weight",
     summary="weight of the heald frame",
-    own=Own,
+    table=Parameters,
     rank=10,
     acts="output",
     force=force,

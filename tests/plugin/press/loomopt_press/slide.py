@@ -1,26 +1,26 @@
 """Inertia of the slide and its die: output term m q¨."""
 
 from loomopt.base.quantities import PositiveMass
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load, Motion
-from loomopt.physics.schema import Table, Values
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs, Load, Motion
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """mass: of slide and upper die, kg."""
 
     mass: PositiveMass
 
 
-def force(maths: Maths, pose: Motion, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[Motion]) -> Number:
     """Return m q¨, N."""
-    return own["mass"] * pose.acceleration
+    return at.table["mass"] * at.pose.acceleration
 
 
 EFFECT = Load(
     name="slide",
     summary="inertia of the slide",
-    own=Own,
+    table=Parameters,
     rank=20,
     acts="output",
     force=force,

@@ -1,25 +1,25 @@
 """Forming of the sheet: output term F from where the slide meets it, `height` above its lowest position."""
 
 from loomopt.base.quantities import Force, PositiveLength
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load, Motion
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs, Load, Motion
 from loomopt.physics.mechanisms.dyad import heron
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Table
 
 
-class Own(Table):
+class Parameters(Table):
     """F: force that forms the sheet, N; height: of the slide above its lowest position where it meets it, m."""
 
     F: Force
     height: PositiveLength
 
 
-def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+def corners(at: Inputs[object]) -> tuple[Number, ...]:
     """Return the crank angles, rad, where the slide meets the sheet and where it turns."""
-    crank, rod = given["crank"], given["rod"]
-    reach = crank + rod - own["height"]
-    meets = maths.atan2(heron(maths, crank, rod, reach), crank * crank + (reach - rod) * (reach + rod))
-    return maths.pi - meets, maths.pi
+    crank, rod = at.values["crank"], at.values["rod"]
+    reach = crank + rod - at.table["height"]
+    meets = at.maths.atan2(heron(at.maths, crank, rod, reach), crank * crank + (reach - rod) * (reach + rod))
+    return at.maths.pi - meets, at.maths.pi
 
 
 def switch(angle: float, corners: tuple[float, ...]) -> float:
@@ -28,15 +28,15 @@ def switch(angle: float, corners: tuple[float, ...]) -> float:
     return 1.0 if meets <= angle % 6.283185307179586 < turns else 0.0
 
 
-def force(maths: Maths, pose: Motion, given: Values, own: Values, switch: Number) -> Number:
+def force(at: Inputs[Motion]) -> Number:
     """Return F or nothing, N."""
-    return own["F"] * switch
+    return at.table["F"] * at.switch
 
 
 EFFECT = Load(
     name="forming",
     summary="forming of the sheet",
-    own=Own,
+    table=Parameters,
     rank=10,
     acts="output",
     force=force,
