@@ -144,7 +144,7 @@ EXPECTED = {
 @pytest.mark.parametrize("label", EXPECTED)
 def test_a_term_is_its_formula(label):
     function, own = CASES[label]
-    assert function(systems.FLOAT, PLAIN, GIVEN, own) == pytest.approx(EXPECTED[label], rel=1e-14, abs=0)
+    assert function(Inputs(systems.FLOAT, GIVEN, own, PLAIN)) == pytest.approx(EXPECTED[label], rel=1e-14, abs=0)
 
 
 @pytest.mark.parametrize("label", CASES)
@@ -155,7 +155,7 @@ def test_terms_take_arrays_of_crank_angles(label):
         systems.numpy(), crank_rocker.Lengths(*(GIVEN[f"l{k}"] for k in (1, 2, 3, 4))), phi
     )
     pose = Pose(phi, GIVEN["speed"], -joints.psi, -joints.psi_1, -joints.psi_2, joints)
-    found = np.broadcast_to(function(systems.numpy(), pose, GIVEN, own), phi.shape)
+    found = np.broadcast_to(function(Inputs(systems.numpy(), GIVEN, own, pose)), phi.shape)
     assert found == pytest.approx([value(systems.FLOAT, function, own, angle) for angle in phi], rel=1e-12, abs=1e-12)
 
 
@@ -170,7 +170,7 @@ def names_read(function, own):
     rod = {name: number(f"joints.{name}", 0) for name in ("rod_1", "rod_2", "cos_crank_rod", "sin_crank_rod")}
     joints = type("Joints", (), rod)
     pose = Pose(angle, given["speed"], number("q", 0), number("q1", 0), number("q2", 0), joints, rate)
-    found = function(systems.casadi(), pose, given, mine)
+    found = function(Inputs(systems.casadi(), given, mine, pose))
     return {symbol.name() for symbol in ca.symvar(found)}
 
 
