@@ -51,7 +51,9 @@ class Given(NamedTuple):
     known: frozenset[str] = frozenset()
     linkage: object = None
 
-    def inputs(self, maths: Maths, effect: Effect, pose: Motion | None = None, switch: Values = NO_SWITCH) -> Inputs[Any]:
+    def inputs(
+        self, maths: Maths, effect: Effect, pose: Motion | None = None, switch: Values = NO_SWITCH
+    ) -> Inputs[Any]:
         """Inputs of an effect's formulas; switch: by a load's name, which of its formulas holds."""
         return Inputs(maths, self.values, self.own[effect.name], pose, switch.get(effect.name, 0))
 

@@ -268,6 +268,8 @@ def test_every_target_still_certifies_with_made_up_effects_on(job):
     ],
 )
 def test_a_check_that_no_job_could_keep_is_refused_where_it_is_declared(declared, said):
-    own = {name: getattr(made_up.BEATUP, name) for name in ("name", "summary", "table", "quantities", "rows", "figures")}
+    own = {
+        name: getattr(made_up.BEATUP, name) for name in ("name", "summary", "table", "quantities", "rows", "figures")
+    }
     with pytest.raises(ValueError, match=said):
         Check(**own | declared)
