@@ -82,6 +82,7 @@ def test_every_module_has_a_room():
     assert {room(name) for name in modules()} == set(FLOOR)
 
 
+@pytest.mark.slow
 def test_the_library_imports_nothing_of_the_command_line():
     own = ("interface.cli", "__main__")
     outside = {name: path for name, path in modules().items() if not name.startswith(own)}

@@ -83,6 +83,7 @@ def test_what_is_no_scene_is_one_message(scene):
         lo.solve(scene)
 
 
+@pytest.mark.slow
 def test_numbers_of_numpy_and_other_sequences_do_as_well():
     given: dict[str, Any] = {"axes": np.array(AXES), "points": np.int64(3), "ranges": {"m4e": np.array([0.0, 2.0])}}
     plain = lo.pareto("beatup-light", AXES, points=3, ranges={"m4e": (0.0, 2.0)})

@@ -13,6 +13,7 @@ def solve(capsys, *words):
     return status, *capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_a_proven_answer_says_so_and_exits_with_0(capsys):
     status, out, _ = solve(capsys, "beatup-light", "--global")
     assert status == 0
@@ -26,6 +27,7 @@ def test_a_vanishing_level_is_told_as_such(capsys):
     assert "Proven best, gap 1 %: |M3_fdc| is 0, less than which there is none" in " ".join(out.split())
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "words",
     [
@@ -76,6 +78,7 @@ def test_sizes_that_are_sold_are_not_told_by_boxes():
     assert "sizes" in answer.global_bound.why
 
 
+@pytest.mark.slow
 def test_python_has_the_same_proof():
     said: list[str] = []
     answer = lo.solve(lo.load("beatup-light"), global_proof=True, gap=1e-2, seconds=30.0, on_step=said.append)

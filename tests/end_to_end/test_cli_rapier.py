@@ -165,6 +165,7 @@ def test_show_names_targets_bounds_and_equations(cli):
     assert "rapier" in cli("list")[1]
 
 
+@pytest.mark.slow
 def test_free_sley_adds_the_four_bar_to_the_design_and_is_better(cli):
     held, freed = answered(cli, *SOLVE), answered(cli, *SOLVE, "--free", "sley")
     check_contract(freed, DESIGN + SLEY)

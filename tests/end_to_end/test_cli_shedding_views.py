@@ -174,6 +174,7 @@ def test_a_narrow_return_is_drawn_with_its_undercut(cli, tmp_path):
     assert (tmp_path / "cam.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.slow
 def test_the_figures_angle_is_the_cams(cli, tmp_path):
     cli("simulate", "shedding", "--out", "c.svg")
     assert "<!-- cam angle phi [deg] -->" in (tmp_path / "c.svg").read_text()

@@ -54,6 +54,7 @@ def words(text):
     return set(re.split(r"[\s,;:(){}\"']+", text))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("columns", WIDTHS)
 @pytest.mark.parametrize("command", ASKED, ids=" ".join)
 def test_no_digit_is_cut_and_what_is_asked_for_is_there(printed, command, columns):

@@ -107,7 +107,7 @@ def place(tmp_path, monkeypatch):
     return written
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("name", "on"), SUBJECTS)
 def test_cheap_commands(name, on, place, capsys):
     where = place(name)
@@ -116,7 +116,7 @@ def test_cheap_commands(name, on, place, capsys):
         assert status == 0 or words not in ALWAYS or on, words
 
 
-@pytest.mark.few(2, slow=14)
+@pytest.mark.few(1, slow=10)
 @pytest.mark.parametrize(("name", "on"), SUBJECTS)
 def test_pictures(name, on, place, capsys):
     where = place(name)
@@ -124,7 +124,7 @@ def test_pictures(name, on, place, capsys):
         called(words, where, on, capsys)
 
 
-@pytest.mark.few(1, slow=8)
+@pytest.mark.few(0, slow=6)
 @pytest.mark.parametrize(("name", "on"), SUBJECTS)
 def test_one_solve(name, on, place, capsys):
     where = place(name)

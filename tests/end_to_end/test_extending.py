@@ -49,6 +49,7 @@ def run(tmp_path_factory):
     return call
 
 
+@pytest.mark.slow
 def test_the_chapters_effects_are_served(run):
     solve, show, prove = commands("An effect")
     found = json.loads(run([*solve, "--json"]))
@@ -59,6 +60,7 @@ def test_the_chapters_effects_are_served(run):
     assert "tip_acceleration <= 200" in run(prove)
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_job_end_well_one_after_the_other(run):
     told = commands("A job")
     assert len(told) > 1

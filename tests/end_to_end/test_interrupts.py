@@ -127,7 +127,7 @@ if __name__ == "__main__":
 WORKING = {
     "sweep": ["sweep", "beatup", "--over", "operation.M0=600:900:50 N*m"],
     "pareto": ["pareto", "beatup", "--minimise", "peak_torque", "--against", "m4e", "--points", "5"],
-    "tolerance": ["tolerance", "beatup"],
+    "tolerance": ["tolerance", "beatup", "--set", 'tolerances.l1={ plus_minus = "0.05 mm" }'],
     "sensitivity": ["sensitivity", "beatup"],
 }
 SLOW_CHILD = "import sys, time\nif '--multiprocessing-fork' in sys.orig_argv:\n    time.sleep(1)\n"

@@ -51,6 +51,7 @@ def test_an_answer_is_drawn_beside_what_was_measured(measured):
     assert answer.simulate(measured=measured)["psi_measured [rad]"].notna().sum() == 24
 
 
+@pytest.mark.slow
 def test_the_command_tells_the_rms_and_writes_both(measured, tmp_path):
     out = [tmp_path / name for name in ("curves.csv", "curves.png")]
     words = ["simulate", "beatup", "--beside", str(measured), *(w for path in out for w in ("--out", str(path)))]

@@ -80,6 +80,7 @@ def test_what_cannot_be_compared_is_refused(given, light):
         lo.compare(light, lo.evaluate("rapier"))
 
 
+@pytest.mark.slow
 def test_the_command(light, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("a.json").write_text(outputs.document(light))

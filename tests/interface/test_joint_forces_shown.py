@@ -65,6 +65,7 @@ def test_on_the_crank_a_force_that_turns_with_it_stands_still():
     assert np.max(np.abs(y)) < 1e-12 * 100
 
 
+@pytest.mark.slow
 def test_the_figure_has_sizes_and_a_diagram_of_each_and_no_text_runs_into_anything(scene, tmp_path):
     drawn = lo.evaluate(scene).plot_forces(tmp_path / "forces.pdf")
     assert overlaps.found(drawn) == []

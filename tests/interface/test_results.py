@@ -57,6 +57,7 @@ def test_a_plot_is_a_figure_that_shows_itself_and_is_written_where_asked(found, 
     assert [path.name for path in tmp_path.iterdir()] == ["curves.svg"]
 
 
+@pytest.mark.slow
 def test_a_plot_is_the_picture_of_the_command(answer, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     answer.plot("python.png")

@@ -39,6 +39,7 @@ def test_springs_of_their_own_are_those_of_each_speed_alone():
         assert member.design["K1"] == pytest.approx(alone.design["K1"], rel=1e-7)
 
 
+@pytest.mark.slow
 def test_a_drive_at_two_speeds_is_the_drive():
     found = lo.solve(family("rapier", speeds(60, 80)), "family", starts=1)
     assert found.status == "optimal"

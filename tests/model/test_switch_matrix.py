@@ -359,6 +359,7 @@ def test_an_absent_effect_leaves_no_symbol_in_the_graph(combination):
     assert found == expected
 
 
+@pytest.mark.slow
 @every
 def test_a_combination_reads_what_its_effects_read_alone_and_no_more(combination):
     none, ones = alone(combination)

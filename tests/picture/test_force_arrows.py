@@ -75,6 +75,7 @@ OTHERS = {
 """Packaged scene → effects put on."""
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", OTHERS)
 def test_every_job_draws_its_pins_at_their_peaks_and_no_label_runs_into_anything(name):
     scene = lo.load(name).with_effect("joint_forces", *OTHERS[name])

@@ -29,6 +29,7 @@ def torque_all_round(model, values):
     return model.quantity(systems.numpy(), model.given(systems.FLOAT, values), "peak_torque", Node(phi, off))
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(reeds(ROUGH), crank_rockers(nearest=0.05))
 def test_masses_and_weight_of_a_beat_up_take_no_work(reed, lengths):

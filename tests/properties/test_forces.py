@@ -4,6 +4,7 @@ M3, Md, N, tape force and all else a target bounds over the cycle, to C times co
 with every dimension, mass and angle of the machine drawn anew.
 """
 
+import pytest
 from conditions import assert_right
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -45,6 +46,7 @@ def assert_cycle_right(model, values, quantities, place, inside, static=()):
     assert_right(formulas, values.values(), MOST, float(begin + (end - begin) * inside), terms)
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(reeds(), shares, shares)
 def test_reed_torque_and_crank_torque(reed, place, inside):
@@ -53,6 +55,7 @@ def test_reed_torque_and_crank_torque(reed, place, inside):
     assert_cycle_right(model, values, ("M3", "peak_torque", "obliquity"), place, inside, static)
 
 
+@pytest.mark.slow
 @settings(max_examples=80)
 @given(frames(), shares, shares)
 def test_cam_force_and_what_the_cam_is_judged_by(frame, place, inside):
@@ -61,6 +64,7 @@ def test_cam_force_and_what_the_cam_is_judged_by(frame, place, inside):
     assert_cycle_right(model, values, names, place, inside, ("spring_force_max", "spring_stretch", "near_dwell"))
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(drives(), st.data(), shares, shares)
 def test_travel_of_the_head_and_what_it_takes(d, data, place, inside):

@@ -81,6 +81,7 @@ def test_the_least_spring_grows_with_speed_demand_mass_weight_and_warp(name, dat
     assert least_spring(changes, less) <= least_spring(changes, more) * (1 + ALIKE)
 
 
+@pytest.mark.slow
 @settings(max_examples=10)
 @given(frames("bounds.X0.max"))
 def test_the_least_spring_falls_where_there_is_more_room_for_its_preload(frame):
@@ -88,6 +89,7 @@ def test_the_least_spring_falls_where_there_is_more_room_for_its_preload(frame):
     assert least_spring(changes, less) >= least_spring(changes, more) * (1 - ALIKE)
 
 
+@pytest.mark.slow
 @settings(max_examples=10)
 @given(frames("mechanism.travel"))
 def test_the_least_spring_grows_with_the_travel_where_inertia_alone_loads_it(frame):
@@ -97,6 +99,7 @@ def test_the_least_spring_grows_with_the_travel_where_inertia_alone_loads_it(fra
     assert 0 < one <= other * (1 + ALIKE)
 
 
+@pytest.mark.slow
 @settings(max_examples=10)
 @given(frames("mechanism.travel"))
 def test_the_least_spring_is_that_of_the_upper_dwell_where_nothing_has_mass(frame):

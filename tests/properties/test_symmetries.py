@@ -170,6 +170,7 @@ def frame(law, rise, back, size=1.0, heavier=1.0):
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(SPRINGS, st.integers(60, 140), st.integers(60, 140), powers(-3, 3), powers(-3, 3))
 def test_the_least_spring_of_a_frame_of_another_size_and_weight_is_in_proportion(law, rise, back, size, heavier):
@@ -180,6 +181,7 @@ def test_the_least_spring_of_a_frame_of_another_size_and_weight_is_in_proportion
     assert other.figures["contact_max"] == pytest.approx(one.figures["contact_max"] * heavier, rel=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(SPRINGS, st.integers(60, 140), st.integers(60, 140))
 def test_a_cam_that_runs_backward_needs_the_same_spring(law, rise, back):
@@ -194,6 +196,7 @@ def bounded(low, high, unit):
     return {"min": f"{low!r} {unit}", "max": f"{high!r} {unit}"}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("quarters", "target"), [(1, "stroke-dwell"), (2, "dwell")])
 def test_the_best_rapier_drive_of_a_loom_that_is_turned_is_the_best_one_turned(quarters, target):
     """By right angles, so that the bounds of C0 stay boxes; all angles are the old ones and the turn."""

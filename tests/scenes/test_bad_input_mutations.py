@@ -4,6 +4,7 @@ import copy
 import math
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -85,6 +86,7 @@ def test_mutated_tables_are_read_or_refused(document):
     read_or_refused(scene, document)
 
 
+@pytest.mark.slow
 @given(st.lists(st.sampled_from(paths(BEATUP.document)).map(".".join) | st.text(max_size=20), max_size=3), JUNK)
 @settings(deadline=None, derandomize=True, max_examples=100)
 def test_any_key_set_is_read_or_refused(keys, value):

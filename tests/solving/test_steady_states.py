@@ -35,6 +35,7 @@ def solved(scene, target):
     return SOLVED[scene.hash, target]
 
 
+@pytest.mark.slow
 def test_the_whole_search_finds_the_best_of_the_optima():
     found = lo.solve(SCENE)
     assert (found.status, found.certificate.passed) == ("optimal", True)
@@ -71,6 +72,7 @@ def test_every_target_of_the_job_is_served(target):
     assert reached <= {"balance": 1e-6, "retrofit": 1e-6, "torque": 8.0 + 1e-6, "pulse": 200.0}[target]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_reached_is_said():
     found = answer("retrofit")
     assert found.status == "infeasible"

@@ -61,11 +61,13 @@ def run(main):
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_the_solve_and_lets_the_thread_that_waits_go_on():
     done = run(SOLVES)
     assert (done.returncode, done.stdout.split()) == (0, ["stopped", "optimal"]), done.stderr
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_a_main_thread_that_waits_for_another():
     done = run(WAITS)
     assert done.returncode == 0, done.stderr

@@ -85,6 +85,7 @@ def test_few_tasks_are_solved_alone():
     assert not any(task.beside for task in enough_together(tasks[1:]))
 
 
+@pytest.mark.slow
 def test_what_is_no_scene_costs_the_others_nothing():
     """A task whose scene cannot be made is left to tell so by itself."""
     study = resistances(49)

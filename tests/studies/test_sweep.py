@@ -67,6 +67,7 @@ def test_torques_of_the_closed_form(serial):
         assert abs(row.figures["M3_fdc"]) == pytest.approx(expected, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_killed_at_twelve_rows_and_resumed_by_two_processes_it_has_the_same_digest(serial, tmp_path):
     script, store = tmp_path / "sweep.py", tmp_path / "s.db"
     script.write_text(KILLED)

@@ -86,6 +86,7 @@ def alike(one, other, share):
     return abs(one - other) <= share * max(1.0, abs(other))
 
 
+@pytest.mark.slow
 def test_torques_with_joint_forces_on_are_those_without_them():
     """A figure that reads mass and radius of the counterweight, where the solve knows their product alone."""
     over = {"operation.M0": "720:760:10 N*m"}
@@ -98,6 +99,7 @@ def test_torques_with_joint_forces_on_are_those_without_them():
         assert row.figures["force_A"] > 0.0
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("job", "name"), QUICK)
 def test_five_rows_with_an_effect_on_are_what_solves_give(job, name):
     key, values = next(iter(MACHINES[job][1].items()))

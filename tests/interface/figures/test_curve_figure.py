@@ -82,6 +82,7 @@ def test_nothing_runs_into_anything_and_all_panels_show_the_turn(name, kind):
     assert below[-1] == "360"
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "kind"), slow.after(4, SIZED))
 def test_nothing_runs_into_anything_at_any_size(name, kind):
     assert overlaps.found_at_every_size(drawn(name, kind)) == []

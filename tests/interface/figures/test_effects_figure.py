@@ -8,6 +8,8 @@ from support import inch, overlaps, uncoiled
 import loomopt as lo
 from loomopt.base.errors import BadInput
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def shedding():
@@ -48,12 +50,14 @@ def test_what_gets_less_has_a_bar_to_the_other_side(shedding):
     assert high > 100 * max(regrets)
 
 
+@pytest.mark.slow
 def test_nothing_meets(shedding):
     assert overlaps.found_at_every_size(shedding.plot()) == []
     long = replace(shedding, rows=tuple(replace(row, effect=row.effect * 3) for row in shedding.rows[:2]))
     assert overlaps.found(long.plot()) == []
 
 
+@pytest.mark.slow
 def test_an_inch_machine_at_350_rpm():
     found = lo.effects(uncoiled.scene(inch.scene("shedding-static", operation__speed="350 rpm")))
     assert overlaps.found(found.plot()) == []
@@ -69,6 +73,7 @@ def test_what_is_unknown_is_no_bar(shedding):
         replace(shedding, rows=()).plot()
 
 
+@pytest.mark.slow
 def test_it_is_written_the_same_each_time(shedding, tmp_path):
     paths = [tmp_path / name for name in ("a.svg", "b.svg")]
     for path in paths:

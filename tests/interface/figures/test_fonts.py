@@ -44,6 +44,7 @@ def test_a_title_in_any_script_is_drawn_without_a_warning(tmp_path, ending, titl
     assert (tmp_path / f"curves.{ending}").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_the_command_says_nothing_of_fonts(tmp_path, capfd):
     assert run(["simulate", "beatup", "--set", f"problem.title={CHINESE}", "--out", str(tmp_path / "curves.png")]) == 0
     sys.stderr.flush()

@@ -31,6 +31,7 @@ def row(point, certified=True):
     )
 
 
+@pytest.mark.slow
 def test_panels_show_the_objective_and_what_differs_with_gaps_and_three_designs():
     figure = study.plot(PLAN, [row(0), row(1), row(2, certified=False), row(3), row(4)])
     axes = figure.axes
@@ -87,6 +88,7 @@ JUMPING = (
 )
 
 
+@pytest.mark.slow
 def test_a_front_is_one_panel_with_its_changes_named_and_a_jump_left_open():
     figure = study.plot(FRONT, JUMPING)
     panel, listed, *designs = figure.axes
@@ -110,6 +112,7 @@ def test_a_front_is_one_panel_with_its_changes_named_and_a_jump_left_open():
     assert overlaps.found_at_every_size(figure) == []
 
 
+@pytest.mark.slow
 def test_many_changes_close_together_are_numbered_without_meeting():
     masses = [0.0, *(1.0 + 0.004 * k for k in range(24)), 2.0]
     rows = [spot(1, None, 0.0, 96.0, ["a 1"]), spot(0, None, 2.0, 90.0, ["a 0"])]
@@ -139,6 +142,7 @@ def test_one_design_that_is_best_in_both_is_drawn():
     assert overlaps.found_at_every_size(figure) == []
 
 
+@pytest.mark.slow
 def test_a_front_of_an_inch_machine_is_drawn_in_inches():
     scene = inch.scene("beatup", operation__speed="350 rpm")
     figure = study.plot(replace(FRONT, scene=front.trade(scene, FRONT.axes, ranges=RANGES).scene), JUMPING)
@@ -183,6 +187,7 @@ def two_ways(first, second):
     return study.plot(plan, rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("first", "second"), slow.after(2, [(2, 2), (3, 17), (5, 7), (1, 4)]))
 def test_nothing_of_a_two_way_sweep_runs_into_anything(first, second):
     figure = two_ways(first, second)
@@ -197,6 +202,7 @@ def test_nothing_of_a_two_way_sweep_runs_into_anything(first, second):
         assert legend.get_title().get_text() == "6 of 17 lines are drawn, one in 3; the table has all"
 
 
+@pytest.mark.slow
 def test_a_row_that_misses_its_goal_is_marked_and_named():
     rows = [replace(row(k), reached={"M3_fdc": k > 1}) for k in range(4)]
     figure = study.plot(PLAN, rows)
@@ -222,6 +228,7 @@ def test_a_size_that_is_given_is_the_figures_size_and_texts_are_as_large_as_ther
     assert sorted({text.get_fontsize() for text in figure.findobj(Text)}) == pytest.approx(sizes)
 
 
+@pytest.mark.slow
 def test_no_common_factor_stands_where_the_names_of_designs_do():
     figure = lo.pareto("shedding", ("K1", "X0"), points=3).plot()
     figure.canvas.draw()

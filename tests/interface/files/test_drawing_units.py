@@ -52,6 +52,7 @@ def strokes(found):
     ]
 
 
+@pytest.mark.slow
 def test_the_dxf_of_an_inch_scene_is_in_inches_and_has_the_lengths_of_the_one_in_mm(both, tmp_path):
     metric, imperial = (document(drawing, tmp_path) for _, drawing in both)
     assert (metric.header["$INSUNITS"], imperial.header["$INSUNITS"]) == (4, 1)

@@ -113,6 +113,7 @@ def test_a_stroke_through_many_points_is_one_polyline(tmp_path):
     assert [point[:2] for point in polyline.get_points()] == [pytest.approx((1e3 * x, 1e3 * y)) for x, y in points]
 
 
+@pytest.mark.slow
 def test_the_same_drawing_gives_the_same_bytes_in_any_process(tmp_path):
     for seed in ("1", "2"):
         path = tmp_path / f"{seed}.dxf"

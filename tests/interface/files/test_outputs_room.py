@@ -118,6 +118,7 @@ def test_an_earlier_answer_stays_whole_where_a_new_one_cannot_be_written(here, m
     assert json.loads((here / "answer" / "answer.json").read_text())["problem"] == "beatup-light"
 
 
+@pytest.mark.slow
 def test_a_folder_may_stand_deep(here):
     answer = lo.solve(lo.load("beatup"))
     deep = Path("x/" * 1200)

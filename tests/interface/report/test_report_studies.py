@@ -14,6 +14,8 @@ from loomopt.interface.report import charts, document, markup
 from loomopt.interface.text import budget, effects, scenes, sensitivity, tolerance
 from loomopt.interface.text.layout import Grid
 
+pytestmark = pytest.mark.slow
+
 MADE = {f"tolerances.{name}": {"plus_minus": "0.06 mm", "sigmas": 3} for name in ("l1", "l3")}
 
 
@@ -99,6 +101,7 @@ def test_forces_in_the_joints_are_told_where_an_effect_tells_them():
     assert "Forces in the joints" not in titles
 
 
+@pytest.mark.slow
 def test_a_family_has_a_chapter_of_its_own_for_each_member(tmp_path):
     speeds = {"targets.family.members": [{"speed": "500 rpm"}, {"speed": "600 rpm"}]}
     found = lo.solve(lo.load("shedding").update(speeds), "family", starts=1)
@@ -140,6 +143,7 @@ def files(answer, tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_one_page_holds_an_answer_with_stores_and_studies(files, tmp_path, monkeypatch):
     monkeypatch.chdir(files)
     page = tmp_path / "page.html"

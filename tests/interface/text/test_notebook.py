@@ -45,6 +45,7 @@ def test_text_from_outside_is_escaped(answer):
     assert "<script" not in notebook.table(Grid(EVIL, (EVIL,), ((EVIL,),)))
 
 
+@pytest.mark.slow
 def test_an_infeasible_answer_shows_what_helps():
     infeasible = lo.solve(lo.load("beatup-light"), "retrofit")
     words = "".join(tree(infeasible._repr_html_()).itertext()).replace("\xa0", " ")
@@ -52,6 +53,7 @@ def test_an_infeasible_answer_shows_what_helps():
     assert all(relaxation.text in words for relaxation in infeasible.relaxation)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
 def test_a_drawing_fits_a_page_whatever_the_machines_size(name):
     found = lo.evaluate(name)

@@ -149,6 +149,7 @@ def rested(scene, end):
     return lo.solve(scene.update({"mechanism.end": f"{float(end)!r} rad"}), "torque").figures["peak_torque"]
 
 
+@pytest.mark.slow
 def test_a_front_tells_how_long_a_rest_costs_how_much_torque():
     """The end of the rest is freed as an axis, and its most is sought, as a target of the scene does."""
     scene = with_a_rest()

@@ -31,6 +31,7 @@ def solved(target="", **changes):
     return lo.solve(six(**{name: dict(each) for name, each in changes.items()}), target or None)
 
 
+@pytest.mark.slow
 def test_the_sley_is_balanced_without_its_rest():
     found = solved()
     assert found.status == "optimal"
@@ -68,6 +69,7 @@ def test_the_least_torque_with_a_rest_and_the_longest_rest():
     assert freed.design["end"] == pytest.approx(longest.design["end"], abs=1e-10)
 
 
+@pytest.mark.slow
 def test_a_press_needs_the_least_torque():
     found = lo.solve(lo.load("knuckle-press"))
     assert found.status == "optimal"
@@ -120,6 +122,7 @@ def reference():
     return least(four_bar())
 
 
+@pytest.mark.slow
 def test_parts_may_stand_in_any_order():
     parts = dict(reversed(four_bar().document["parts"].items()))
     scene = registry.scene({**four_bar().document, "parts": parts})
@@ -132,6 +135,7 @@ def test_a_mirrored_linkage_turns_the_other_way():
     assert least(four_bar(parts=parts, output={"sense": "counter-clockwise"})) == pytest.approx(reference(), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_turned_linkage_has_the_same_optimum():
     fixed = {"bounds": {"l4": None}, "mechanism": {"l4": None}}
     plain = four_bar(**fixed, parts={"D": {"x": "167 mm"}})

@@ -185,6 +185,7 @@ def test_a_machine_that_is_balanced_already_has_its_size_from_other_forces():
     assert answer.figures["shaking_force"] <= 1e-7
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("least", [["peak_torque", "rms_torque"], ["rms_torque", "peak_torque"], ["peak_power"]])
 def test_a_spring_balances_a_weight(least):
     answer = lo.solve(scene(SPRING, least))

@@ -35,6 +35,7 @@ def test_longest_dwell_is_held_on_both_sides_at_the_exact_stroke(scene, longest)
     assert drive.mu_min() >= math.radians(30) - 1e-9
 
 
+@pytest.mark.slow
 def test_longest_dwell_lies_between_what_exists_and_what_does_not(scene, longest):
     near = math.radians(0.2)
     shorter, longer = (
@@ -70,6 +71,7 @@ def table(scene):
     return answers
 
 
+@pytest.mark.slow
 def test_longer_dwells_cost_acceleration_throughout_the_table(scene, table):
     assert [answer.status for answer in table] == ["optimal"] * len(TABLE)
     peaks = [Drive(scene, answer.design).peak(2) for answer in table]
@@ -77,6 +79,7 @@ def test_longer_dwells_cost_acceleration_throughout_the_table(scene, table):
     assert all(later > earlier + 1e-3 for earlier, later in itertools.pairwise(peaks))
 
 
+@pytest.mark.slow
 def test_table_of_dwells_is_what_cold_solves_give(scene, table):
     for place in (0, 5, 10):
         cold = lo.solve(dwelling(scene, math.radians(TABLE[place])), starts=1)

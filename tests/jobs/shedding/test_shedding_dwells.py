@@ -84,6 +84,7 @@ def test_a_limit_on_the_peak_force_holds_in_the_dwells_alone():
     assert all(limit.ok for limit in answer.limits)
 
 
+@pytest.mark.slow
 def test_a_free_law_is_chosen_by_contact_in_the_dwells_alone():
     """No law changes the dwells: the least spring is that of statics, whatever the law."""
     answer = lo.solve(STATIC.with_effect("inertia"), target="law")

@@ -85,6 +85,7 @@ def test_n_min_is_a_level_and_so_are_the_rollers_own_curvature_and_the_laws_limi
         assert any(np.allclose(ends, level) for ends in levels)
 
 
+@pytest.mark.slow
 def test_a_designs_least_force_stands_beside_todays():
     scene = lo.load("shedding")
     axes = axes_of(scene, LEAST)["cam force N [N]"]

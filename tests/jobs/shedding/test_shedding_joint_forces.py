@@ -150,6 +150,7 @@ def test_as_figures_alone_they_change_nothing_of_a_solve():
     assert own.figures["lever_couple"] == pytest.approx(6782.235694604, rel=1e-11)
 
 
+@pytest.mark.slow
 def test_a_limit_on_the_roller_s_force_binds_is_priced_and_proven():
     def answered(most):
         limited = scene_of("shedding").update({"limits.roller_force.max": f"{most!r} N", "bounds.X0.min": "40 mm"})

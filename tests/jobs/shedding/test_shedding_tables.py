@@ -101,6 +101,7 @@ def test_precision_misfit_change_and_uncertainty_are_told(tmp_path):
     assert "uncertain by" in remark
 
 
+@pytest.mark.slow
 def test_digits_say_that_zeros_were_cut_off(tmp_path):
     path = written(tmp_path / "law.csv", cycloid, 60, 120, 2, 3)
     (plain,), (exact,) = (

@@ -53,6 +53,7 @@ def test_every_pose_has_the_speed_that_a_motor_gives_the_shaft(job):
     assert pose.acceleration == pytest.approx(pose.q2 * pose.omega**2 + pose.q1 * pose.omega_dot, rel=1e-12)
 
 
+@pytest.mark.slow
 @every_job
 def test_what_a_motor_gives_is_told_drawn_and_written(job):
     scene = turned(job)

@@ -54,6 +54,7 @@ def weighted(monkeypatch, effect):
 SAID = BALLAST
 
 
+@pytest.mark.slow
 def test_the_least_of_a_load_s_number_is_a_level_after_the_target_s_own(monkeypatch):
     """The same inertia as of the job's own counterweight, at the largest radius: so the same mass."""
     own = lo.solve("beatup")
@@ -67,6 +68,7 @@ def test_the_least_of_a_load_s_number_is_a_level_after_the_target_s_own(monkeypa
     assert answer.design["spare"] == pytest.approx(0.004, rel=1e-9), "nothing reads it: today's"
 
 
+@pytest.mark.slow
 def test_a_load_that_says_nothing_keeps_nearest_to_today(monkeypatch):
     answer = lo.solve(weighted(monkeypatch, UNSAID))
     assert answer.certificate.passed

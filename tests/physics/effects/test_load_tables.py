@@ -163,6 +163,7 @@ def test_a_curve_is_the_same_on_every_turn(resisted, turns):
         assert found[1] == pytest.approx(found[0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_warp_as_samples_is_the_warp(tmp_path):
     """The linear pull over the packaged cam, a corner at each half open shed."""
     rows = ["angle [deg],T [N],corner"]

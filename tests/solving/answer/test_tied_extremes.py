@@ -29,6 +29,7 @@ def gain(case, *names):
     return (before.figures["peak_torque"] - after.figures["peak_torque"]) / (STEP * 1e-3)
 
 
+@pytest.mark.slow
 def test_mirror_images_bind_together_and_neither_gains_alone():
     answer = solved("mirrored_rams.toml", "torque")
     assert {price.limit: price.worth["peak_torque"] for price in answer.binding} == {"left": 0.0, "right": 0.0}
@@ -48,6 +49,7 @@ def test_unique_is_not_said_of_prices_that_are_not():
     assert solved("mirrored_rams.toml", "angles").as_dict()["certificate"]["unique"] is True
 
 
+@pytest.mark.slow
 def test_three_rams_of_which_each_gains_alone():
     """Of three a third one's peak is left: alone each gains less than its share of all."""
     answer = solved("three_rams.toml", "torque")
@@ -59,6 +61,7 @@ def test_three_rams_of_which_each_gains_alone():
     assert not answer.certificate.prices_unique
 
 
+@pytest.mark.slow
 def test_the_command_says_it():
     command = [sys.executable, "-m", "loomopt", "solve", str(CASES / "mirrored_rams.toml"), "--target", "torque"]
     text, data = (

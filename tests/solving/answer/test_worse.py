@@ -21,6 +21,7 @@ def answer(name):
 NAMES = ["beatup", pytest.param("rapier", marks=pytest.mark.slow), "shedding", "sixbar-sley", "path-18"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_what_is_worse_by_more_than_a_percent_is_told_once_and_nothing_else(name):
     found = answer(name)

@@ -45,6 +45,7 @@ def beside(program, x, share, count):
     return [dict(x), *({**x, **each} for each in moved)]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("job", "target"), TASKS)
 def test_derivatives_are_those_of_each_design_alone(job, target):
     program, x = optimum(job, target)
@@ -57,6 +58,7 @@ def test_derivatives_are_those_of_each_design_alone(job, target):
             assert np.abs(mine - own).max() <= ROUNDED * max(1.0, np.abs(own).max())
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("job", "target"), TASKS)
 def test_derivatives_are_the_same_bits_in_batches_of_any_size(job, target):
     program, x = optimum(job, target)

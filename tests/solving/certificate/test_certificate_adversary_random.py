@@ -82,6 +82,7 @@ def quadratics(draw):
     return Quadratic(best, hessian, gradient, rows, bound, prices, tuple(box))
 
 
+@pytest.mark.slow
 @fixed
 @given(quadratics())
 def test_the_optimum_of_a_convex_programme_passes(problem):
@@ -92,6 +93,7 @@ def test_the_optimum_of_a_convex_programme_passes(problem):
     assert certificate.feasibility == 0.0
 
 
+@pytest.mark.slow
 @fixed
 @given(quadratics(), st.integers(0, 2**32 - 1), st.floats(-4, -2))
 def test_a_perturbed_optimum_of_a_convex_programme_never_passes(problem, seed, exponent):
@@ -103,6 +105,7 @@ def test_a_perturbed_optimum_of_a_convex_programme_never_passes(problem, seed, e
     assert certificate.reasons
 
 
+@pytest.mark.slow
 @fixed
 @given(quadratics(), st.integers(0, 3), st.sampled_from((-1e-2, -1e-3, -1e-4, 1e-4, 1e-3, 1e-2)))
 def test_an_optimum_off_along_one_axis_never_passes(problem, axis, step):
@@ -114,6 +117,7 @@ def test_an_optimum_off_along_one_axis_never_passes(problem, axis, step):
     assert certificate.reasons
 
 
+@pytest.mark.slow
 @fixed
 @given(quadratics())
 def test_prices_said_hold_the_slope(problem):

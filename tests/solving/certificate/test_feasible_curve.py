@@ -98,6 +98,7 @@ def test_extremes_of_the_cycle_move_along(sign):
     assert found.at(np.array([0.02]))["x"] == pytest.approx(np.sqrt(1 - 0.02**2), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_rapier_with_little_room_that_may_be_turned_as_a_whole_is_certified():
     answer = lo.solve(lo.load("rapier").update(ROOM))
     assert answer.status == "optimal", answer.message

@@ -36,6 +36,7 @@ def test_a_minimum_over_the_cycle_is_a_bound_on_what_it_leaves_of_the_complement
     assert limit.bound == pytest.approx(math.radians(60), rel=1e-15)
 
 
+@pytest.mark.slow
 def test_prices_of_the_dwell_follow_the_arcs_ends_as_well():
     scene = RAPIER
     best = lo.solve(scene)

@@ -11,6 +11,7 @@ from loomopt.solving.nlp.point import sampler_at
 from loomopt.solving.nlp.transcribe import Buffered, transcribe
 
 
+@pytest.mark.slow
 def test_numbers_are_parameters_and_only_structure_is_built():
     first, _, sampler, *_ = put(program_of())
     for changes in (
@@ -37,6 +38,7 @@ def test_another_structure_is_another_program(effects, target, changes):
     assert put(program_of(effects, target, changes))[0] is not put(program_of())[0]
 
 
+@pytest.mark.slow
 def test_no_more_programs_are_kept_than_there_is_room_for():
     for slots in range(6, 6 + built.CACHE_SIZE + 3):
         program = program_of((), "torque")

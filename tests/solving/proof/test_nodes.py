@@ -1,6 +1,7 @@
 """Nodes of boxes: the worst of a middle, and certainty that all of a box has the same order of corners."""
 
 import numpy as np
+import pytest
 from machines_in_boxes import designs, solved
 
 from loomopt.maths import systems
@@ -14,6 +15,7 @@ def own_layout(task, at):
     return layout
 
 
+@pytest.mark.slow
 def test_the_worst_node_of_a_middle_is_close_to_its_true_peak():
     found = solved("beatup", "balance", "bearing_friction")
     task = found.task

@@ -27,6 +27,7 @@ def test_a_scale_that_an_effect_or_a_target_reads_is_not(given):
     assert silent(solved(*given).program) is None
 
 
+@pytest.mark.slow
 def test_every_design_has_a_place_without_its_scale_and_a_design_at_that_place():
     program = solved("beatup", "balance").program
     found = silent(program)

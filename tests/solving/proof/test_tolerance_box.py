@@ -43,6 +43,7 @@ def below(box, quantity, bound, work=tolerance_box.MOST_PARTS):
     return tolerance_box.all_at_most(pieces, bound, work)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("problem", "quantity", "names", "share"), CASES)
 def test_a_peak_is_bounded_by_the_farthest_corner_and_by_nothing_less(problem, quantity, names, share):
     box, machines = box_of(problem, names, share)

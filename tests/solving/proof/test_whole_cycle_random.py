@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from proofs import FULL, cam_force, dense, found, solved
@@ -27,6 +28,7 @@ def edged(scene, key, unit, value, design, name):
         yield proof, value * (1 + share)
 
 
+@pytest.mark.slow
 @settings(max_examples=10)
 @given(data=st.data())
 def test_random_beat_ups_are_proven_above_their_peak_and_refuted_below(data):
@@ -42,6 +44,7 @@ def test_random_beat_ups_are_proven_above_their_peak_and_refuted_below(data):
             assert abs(machine.torques(design, np.array([proof.angle]))[1][0]) > limit * (1 - 1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=3)
 @given(data=st.data())
 def test_random_rapiers_are_proven_above_their_peak_and_refuted_below(data):
@@ -57,6 +60,7 @@ def test_random_rapiers_are_proven_above_their_peak_and_refuted_below(data):
             assert abs(dense(drive, 2, np.array([proof.angle]))[0]) > limit * (1 - 1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=14)
 @given(data=st.data())
 def test_random_frames_are_proven_with_their_softest_spring_and_refuted_below(data):

@@ -52,6 +52,7 @@ def test_what_is_worth_more_stays_and_nothing_is_told():
     assert (answer.beside, "indifference" in answer.as_dict()) == (None, False)
 
 
+@pytest.mark.slow
 def test_a_share_that_is_asked_for_is_traded_for_mass_and_a_goal_that_is_met_stays_met():
     answer = lo.solve(lo.load("beatup").set("targets.balance.indifference", "0.01"))
     assert answer.status == "optimal"

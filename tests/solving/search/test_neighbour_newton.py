@@ -35,6 +35,7 @@ def digits(found):
     return [(dict(each.best.x), each.best.certificate) for each in found]
 
 
+@pytest.mark.slow
 def test_what_comes_of_it_is_what_a_solve_alone_comes_to(optima):
     resistances = 755.0, 771.0
     made = neighbour_newton.solved([asked(resistance, ENDS, optima) for resistance in resistances])
@@ -50,6 +51,7 @@ def test_what_comes_of_it_is_what_a_solve_alone_comes_to(optima):
             assert prices[each.limit] == pytest.approx(sum(each.worth.values()), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_it_is_the_same_bits_in_batches_of_any_size(optima):
     several = [asked(float(m), ENDS, optima) for m in np.linspace(*ENDS, 12)[1:-1]]
     whole = neighbour_newton.solved(several * 20)
@@ -83,6 +85,7 @@ def test_what_a_target_reads_in_a_model_of_its_own_tells_no_figures():
     assert neighbour_answer.told_peaks(scene, job, job.program(scene, "stroke-dwell")) == ()
 
 
+@pytest.mark.slow
 def test_beyond_a_change_of_what_binds_the_other_neighbours_rows_are_tried():
     """At 700 N*m other limits begin to stop it: on either side it is what stops the neighbour there."""
     ends = 695.0, 705.0

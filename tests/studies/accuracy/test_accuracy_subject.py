@@ -9,6 +9,7 @@ from loomopt.studies.accuracy.subject import Subject
 J4 = {"bounds.J4.min": "0.6 kg*m^2", "bounds.J4.max": "0.64 kg*m^2"}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("values", [{}, J4, {"bounds.pulse.min": "28 deg", "bounds.pulse.max": "30 deg"}])
 def test_variables_of_an_answer_are_named_in_full(values):
     """J4 of the design is inertia.J4 of the program."""

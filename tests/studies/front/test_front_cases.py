@@ -19,6 +19,7 @@ from loomopt.studies.front.solver import Asking
 CASES = Path(__file__).parent / "cases"
 
 
+@pytest.mark.slow
 def test_an_end_whose_second_level_leaves_one_design_is_certified():
     """Two pieces of the largest force and two of the least meet: each is held by one of them, none may rise."""
     scene = lo.load(CASES / "second_level_of_one_point.toml")
@@ -33,6 +34,7 @@ def test_an_end_whose_second_level_leaves_one_design_is_certified():
     assert stiffness[3] == pytest.approx(line, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_between_points_very_close_together_a_price_rests_on_what_is_met_exactly():
     scene = lo.load(CASES / "corners_that_coincide.toml")
     trade = front.trade(scene, ("l4", "mu_min"), maximise=("mu_min",))
@@ -43,6 +45,7 @@ def test_between_points_very_close_together_a_price_rests_on_what_is_met_exactly
         assert found.status == "optimal", found.reason
 
 
+@pytest.mark.slow
 def test_a_jump_is_told_as_one_and_beside_it_the_neighbours_design_stands():
     scene = lo.load(CASES / "jump.toml")
     found = lo.pareto(scene, ("l1", "M3_fdc"), "none", points=5)
@@ -104,6 +107,7 @@ def test_a_point_whose_second_level_is_not_certified_keeps_what_the_first_came_t
     assert found.warm["axes"]["contact_max"] == pytest.approx(2327.2748160284, rel=1e-9)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("intervals", slow.after(1, [6, 9]))
 def test_a_cap_far_beyond_its_natural_size_is_met_though_its_multiplier_is_small(intervals):
     """The torque may be forty times its natural size: what it costs there is small, what its slope balances is not."""

@@ -36,6 +36,7 @@ def test_a_limit_on_what_is_not_sought_is_held():
     assert found.lifted == ()
 
 
+@pytest.mark.slow
 def test_a_front_of_a_figure_that_a_scene_holds_at_one_value_goes_beyond_it():
     scene = lo.load("beatup").update({"limits.swing.min": "23 deg", "limits.swing.max": "23 deg"})
     found = lo.pareto(scene, ("peak_torque", "swing"), "none", ranges={"swing": "22:23.3 deg"}, points=3)

@@ -16,6 +16,7 @@ def heavy():
     return lo.load("beatup").with_effect("gravity")
 
 
+@pytest.mark.slow
 def test_ends_that_agree_to_the_accuracy_that_was_asked_do_not_conflict(heavy):
     trade = front.trade(heavy, AXES, accuracy=1e-6)
     found = read_front(trade, run.run(trade))
@@ -23,6 +24,7 @@ def test_ends_that_agree_to_the_accuracy_that_was_asked_do_not_conflict(heavy):
     assert "do not conflict: one design is best in both. Its ends are 3e-07 of their size apart" in found.message
 
 
+@pytest.mark.slow
 def test_a_front_that_shown_digits_do_not_tell_from_one_design_says_so(heavy):
     trade = front.trade(heavy, AXES, points=4)
     found = read_front(trade, run.run(trade))

@@ -62,6 +62,7 @@ def test_an_end_is_sought_in_every_basin_at_its_second_level_too(axes):
     assert plan.value(shortest, "peak_acceleration") == pytest.approx(0.606149142, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_an_axis_that_a_limit_alone_stops_is_certified_after_the_other():
     """The least l3 needs the shortest crank, whose price what is held of l3 may carry too."""
     trade = front.trade(lo.load("beatup"), ("l1", "l3"))

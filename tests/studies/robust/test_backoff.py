@@ -43,6 +43,7 @@ def close(found, value, se):
     return abs(found.value - value) <= SE * math.hypot(found.se, se)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("sigmas", "peak", "share", "se"),
     [
@@ -159,6 +160,7 @@ def loom(tolerance):
     )
 
 
+@pytest.mark.slow
 def test_a_yield_whose_spread_falls_along_the_back_off_settles():
     """One side binds alone: 95 % are at the quantile of the normal distribution, 1.645 sigma of theta."""
     found = lo.solve(loom("0.06 mm"), min_yield=0.95)

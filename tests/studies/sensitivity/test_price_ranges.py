@@ -68,6 +68,7 @@ def _check(plan, price, end, why):
         assert beyond is None or others != bound or abs(beyond - inside) > 0.01, (price.limit, end, why)
 
 
+@pytest.mark.slow
 def test_the_shedding():
     assert checked(registry.load("shedding"), only={"X0", "N_min"}) == 3
 

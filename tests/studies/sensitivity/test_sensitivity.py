@@ -123,6 +123,7 @@ def test_a_weight_that_has_its_mass_and_a_spring_that_has_one():
     assert row.value == pytest.approx(888.196229, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_effects_that_begin_have_derivatives_on_one_side():
     """Damping and friction part rise from return: each side has its own active set; less than none there is not."""
     here = found("shedding", **{"effects.damping.C": "0 N*s/m", "effects.dry_friction.F": "0 N"})

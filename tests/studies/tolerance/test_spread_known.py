@@ -53,6 +53,7 @@ def correlation(own, one, other):
     return float(moved[0] @ moved[1] / math.sqrt((moved[0] @ moved[0]) * (moved[1] @ moved[1])))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("made", "stroke", "after", "before", "mu", "peak"),
     [

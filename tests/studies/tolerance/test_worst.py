@@ -63,6 +63,7 @@ def unexceeded(own, found, values):
         assert read[name].max() <= case.max, name
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("problem", "names"),
     [("beatup", ()), ("shedding", ()), ("rapier", ("dwell_after",))],
@@ -105,6 +106,7 @@ def test_what_cannot_be_boxed_is_undecided_and_says_why():
     assert (told["min"], told["max"], told["proven"], told["found"]) == (None, None, False, [None, None])
 
 
+@pytest.mark.slow
 def test_the_same_bits_whoever_proves():
     own = plan("shedding", {"K1": "5 %"})
     alone = study.conducted(own, worst=True).as_dict()
