@@ -298,6 +298,36 @@ class Load(Effect, Generic[Pose]):
             raise ValueError(f"effect {self.name}: {self.least} is no key of the table")
 
 
+def _inertial(moved: Callable[[Inputs[object]], Number], at: Inputs[Motion]) -> Number:
+    """Inertia times acceleration of the output."""
+    return moved(at) * at.pose.acceleration
+
+
+def inertia_load(
+    name: str,
+    summary: str,
+    table: type[Table],
+    rank: int,
+    moved: Callable[[Inputs[object]], Number],
+    example: Mapping[str, str],
+) -> Load[Any]:
+    """Load of what moves with the output: output term moved · q¨, N·m or N.
+
+    moved(at): its inertia, kg·m² or kg; example: a table that it may have. The rest as in `Load`.
+    """
+    return Load(
+        name=name,
+        summary=summary,
+        table=table,
+        rank=rank,
+        acts="output",
+        force=functools.partial(_inertial, moved),
+        moved=moved,
+        needs=("operation.speed",),
+        examples=(example,),
+    )
+
+
 def nothing_sold(own: Any) -> Mapping[str, Sequence[float]]:
     """Return nothing: no number of the effect comes in sizes."""
     return {}

@@ -30,9 +30,11 @@ numbers = st.floats(-1e3, 1e3)
 @given(st.floats(1e-3, 1e3), numbers, numbers, st.floats(0, 1e3))
 @REPEATABLE
 def test_head_inertia_is_mass_times_acceleration(mass, S_1, S_2, omega):
-    steady = head_inertia.force(Inputs(systems.FLOAT, {}, {"mass": mass}, Pose(0.0, omega, 0.0, S_1, S_2)))
+    steady = head_inertia.EFFECT.force(Inputs(systems.FLOAT, {}, {"mass": mass}, Pose(0.0, omega, 0.0, S_1, S_2)))
     assert steady == pytest.approx(mass * S_2 * omega**2, rel=1e-14)
-    changing = head_inertia.force(Inputs(systems.FLOAT, {}, {"mass": mass}, Pose(0.0, omega, 0.0, S_1, S_2, None, 7.0)))
+    changing = head_inertia.EFFECT.force(
+        Inputs(systems.FLOAT, {}, {"mass": mass}, Pose(0.0, omega, 0.0, S_1, S_2, None, 7.0))
+    )
     expected = mass * (S_2 * omega**2 + 7.0 * S_1)
     assert changing == pytest.approx(expected, rel=1e-14, abs=1e-14 * mass * (abs(S_2) * omega**2 + abs(S_1)))
 

@@ -72,13 +72,13 @@ def plain(value):
 @REPEATABLE
 def test_inertia_is_mass_times_acceleration(mass, q1, q2, omega):
     at = moving(q1, q2, omega)
-    assert frame_inertia.force(Inputs(systems.FLOAT, {}, {"M": mass}, at)) == pytest.approx(
+    assert frame_inertia.EFFECT.force(Inputs(systems.FLOAT, {}, {"M": mass}, at)) == pytest.approx(
         mass * q2 * omega**2, rel=1e-14
     )
     changing = moving(q1, q2, omega, 7.0)
     expected = mass * (q2 * omega**2 + q1 * 7.0)
     size = mass * (abs(q2) * omega**2 + abs(q1) * 7.0)
-    assert abs(frame_inertia.force(Inputs(systems.FLOAT, {}, {"M": mass}, changing)) - expected) <= 1e-14 * size
+    assert abs(frame_inertia.EFFECT.force(Inputs(systems.FLOAT, {}, {"M": mass}, changing)) - expected) <= 1e-14 * size
 
 
 @given(st.floats(0, 1e3), st.floats(-5, 5), st.floats(1, 100))

@@ -7,8 +7,7 @@ from pydantic import Field
 
 from loomopt.base.quantities import PositiveInertia
 from loomopt.maths.systems import Number
-from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import Inputs, Load
+from loomopt.physics.effects.kinds import Inputs, inertia_load
 from loomopt.physics.schema import Table
 
 
@@ -19,23 +18,10 @@ class Parameters(Table):
 
 
 def moved(at: Inputs[object]) -> Number:
-    """Return JS, kg·m²."""
+    """JS, kg·m²."""
     return at.table["JS"]
 
 
-def force(at: Inputs[ReedPose]) -> Number:
-    """Return JS q¨, N·m."""
-    return moved(at) * at.pose.acceleration
-
-
-EFFECT = Load(
-    name="counterweight_inertia",
-    summary="counterweight about its own centre",
-    table=Parameters,
-    rank=40,
-    acts="output",
-    force=force,
-    moved=moved,
-    needs=("operation.speed",),
-    examples=({"JS": "0.01 kg*m^2"},),
+EFFECT = inertia_load(
+    "counterweight_inertia", "counterweight about its own centre", Parameters, 40, moved, {"JS": "0.01 kg*m^2"}
 )

@@ -3,13 +3,14 @@
 Output term J3 q¨ [Yuan24, eq 2]; rigid rocker, fixed axis. Its mass m3 at s3 along D→C loads the joint D alone.
 """
 
+from dataclasses import replace
+
 from pydantic import Field, ValidationInfo, field_validator
 
 from loomopt.base.quantities import Length, Mass, PositiveInertia
 from loomopt.base.units import QuantityError
 from loomopt.maths.systems import Number
-from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import Inputs, LinkMass, Load
+from loomopt.physics.effects.kinds import Inputs, LinkMass, inertia_load
 from loomopt.physics.schema import Table
 
 
@@ -29,26 +30,21 @@ class Parameters(Table):
         return m3
 
 
-def force(at: Inputs[ReedPose]) -> Number:
-    """Return J3 q¨, N·m."""
-    return at.table["J3"] * at.pose.acceleration
+def moved(at: Inputs[object]) -> Number:
+    """J3, kg·m²."""
+    return at.table["J3"]
 
 
 def mass(at: Inputs[object]) -> LinkMass:
-    """Return the rocker; one that tells no mass is balanced about D."""
+    """Rocker; one that tells no mass is balanced about D."""
     if "m3" not in at.table or "s3" not in at.table:
         return LinkMass("rocker", 0, 0, 0, at.table["J3"])
     return LinkMass("rocker", at.table["m3"], at.table["m3"] * at.table["s3"], 0, at.table["J3"])
 
 
-EFFECT = Load(
-    name="rocker_inertia",
-    summary="rocker about the rocking shaft",
-    table=Parameters,
-    rank=30,
-    acts="output",
-    force=force,
+EFFECT = replace(
+    inertia_load("rocker_inertia", "rocker about the rocking shaft", Parameters, 30, moved, {"J3": "0.05 kg*m^2"}),
+    moved=None,
     mass=mass,
-    needs=("operation.speed",),
-    examples=({"J3": "0.05 kg*m^2"},),
 )
+"""`moved` is of what turns with the reed alone: the rocker is no part of that."""

@@ -1,10 +1,12 @@
 """A counterweight of an output that turns: output term m r² q¨; it loads the joints, and is weighed, in its place."""
 
+from dataclasses import replace
+
 from pydantic import Field
 
 from loomopt.base.quantities import Angle, Length, Mass
 from loomopt.maths.systems import Number
-from loomopt.physics.effects.kinds import Applied, Inputs, Load
+from loomopt.physics.effects.kinds import Applied, Inputs, inertia_load
 from loomopt.physics.effects.linkage import LinkagePose, opposite, resistance_of_mass
 from loomopt.physics.schema import Table
 
@@ -18,13 +20,8 @@ class Parameters(Table):
 
 
 def moved(at: Inputs[object]) -> Number:
-    """Return m r², kg·m²."""
+    """m r², kg·m²."""
     return at.table["mass"] * at.table["radius"] ** 2
-
-
-def force(at: Inputs[LinkagePose]) -> Number:
-    """Return m r² q¨, N·m."""
-    return moved(at) * at.pose.acceleration
 
 
 def applied(at: Inputs[LinkagePose]) -> list[Applied]:
@@ -35,17 +32,12 @@ def applied(at: Inputs[LinkagePose]) -> list[Applied]:
     return [resistance_of_mass(at.pose, at.table["mass"], at.table["radius"], place)]
 
 
-EFFECT = Load(
-    name="counterweight",
-    summary="counterweight on the output's axis",
-    table=Parameters,
-    rank=30,
-    acts="output",
-    force=force,
+EXAMPLE = {"mass": "3 kg", "radius": "80 mm"}
+EFFECT = replace(
+    inertia_load("counterweight", "counterweight on the output's axis", Parameters, 30, moved, EXAMPLE),
     applied=applied,
-    moved=moved,
-    needs=("operation.speed",),
-    examples=({"mass": "3 kg", "radius": "80 mm"}, {"mass": "3 kg", "radius": "80 mm", "angle": "150 deg"}),
+    examples=(EXAMPLE, {**EXAMPLE, "angle": "150 deg"}),
 )
+
 SLIDING = None
 """What slides has no axis."""

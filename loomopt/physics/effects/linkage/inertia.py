@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from loomopt.base.quantities import Angle, Length, Mass, PositiveInertia, PositiveMass
 from loomopt.base.units import QuantityError
 from loomopt.maths.systems import Number
-from loomopt.physics.effects.kinds import Applied, Inputs, Load
+from loomopt.physics.effects.kinds import Applied, Inputs, inertia_load
 from loomopt.physics.effects.linkage import LinkagePose, on_output, resistance_of_mass
 from loomopt.physics.schema import Table
 
@@ -43,13 +43,8 @@ class Sliding(Table):
 
 
 def moved(at: Inputs[object]) -> Number:
-    """Return J, kg·m², or m, kg."""
+    """J, kg·m², or m, kg."""
     return at.table["J"] if "J" in at.table else at.table["mass"]
-
-
-def force(at: Inputs[LinkagePose]) -> Number:
-    """Return J q¨, N·m, or m q¨, N."""
-    return moved(at) * at.pose.acceleration
 
 
 def applied(at: Inputs[LinkagePose]) -> list[Applied]:
@@ -60,18 +55,12 @@ def applied(at: Inputs[LinkagePose]) -> list[Applied]:
     return [resistance_of_mass(at.pose, at.table["m"], at.table["centre"], place)]
 
 
-EFFECT = Load(
-    name="inertia",
-    summary="inertia of what moves with the output",
-    table=Parameters,
-    rank=10,
-    acts="output",
-    force=force,
+EFFECT = replace(
+    inertia_load("inertia", "inertia of what moves with the output", Parameters, 10, moved, {"J": "0.62 kg*m^2"}),
     applied=applied,
-    moved=moved,
-    needs=("operation.speed",),
     examples=({"J": "0.62 kg*m^2"}, {"J": "0.62 kg*m^2", "m": "56.8 kg", "centre": "45 mm", "offset": "0 deg"}),
 )
+
 SLIDING = replace(
     EFFECT,
     summary="inertia of what slides with the output",

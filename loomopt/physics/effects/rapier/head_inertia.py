@@ -7,7 +7,7 @@ from pydantic import Field
 
 from loomopt.base.quantities import PositiveMass
 from loomopt.maths.systems import Number
-from loomopt.physics.effects.kinds import Inputs, Load, Motion
+from loomopt.physics.effects.kinds import Inputs, inertia_load
 from loomopt.physics.schema import Table
 
 
@@ -17,18 +17,9 @@ class Parameters(Table):
     mass: PositiveMass = Field(description="mass of the head and of the tape that moves with it")
 
 
-def force(at: Inputs[Motion]) -> Number:
-    """Return m S¨, N."""
-    return at.table["mass"] * at.pose.acceleration
+def moved(at: Inputs[object]) -> Number:
+    """Mass m, kg."""
+    return at.table["mass"]
 
 
-EFFECT = Load(
-    name="head_inertia",
-    summary="rapier head and tape",
-    table=Parameters,
-    rank=10,
-    acts="output",
-    force=force,
-    needs=("operation.speed",),
-    examples=({"mass": "0.35 kg"},),
-)
+EFFECT = inertia_load("head_inertia", "rapier head and tape", Parameters, 10, moved, {"mass": "0.35 kg"})

@@ -4,8 +4,7 @@ from pydantic import Field
 
 from loomopt.base.quantities import Mass
 from loomopt.maths.systems import Number
-from loomopt.physics.effects.kinds import Inputs, Load
-from loomopt.physics.effects.shedding import FramePose
+from loomopt.physics.effects.kinds import Inputs, inertia_load
 from loomopt.physics.schema import Table
 
 
@@ -16,23 +15,8 @@ class Parameters(Table):
 
 
 def moved(at: Inputs[object]) -> Number:
-    """Return M, kg."""
+    """M, kg."""
     return at.table["M"]
 
 
-def force(at: Inputs[FramePose]) -> Number:
-    """Return M X¨, N."""
-    return at.table["M"] * at.pose.acceleration
-
-
-EFFECT = Load(
-    name="inertia",
-    summary="inertia of the heald frame",
-    table=Parameters,
-    rank=30,
-    acts="output",
-    force=force,
-    moved=moved,
-    needs=("operation.speed",),
-    examples=({"M": "37.68361265059934 kg"},),
-)
+EFFECT = inertia_load("inertia", "inertia of the heald frame", Parameters, 30, moved, {"M": "37.68361265059934 kg"})
