@@ -6,15 +6,15 @@ quantity a name stands for follows from its uses.
 
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
-from loomopt.base.errors import GAP, WHOLE, BadInput, Faults, misread, nearest, refusal, shown, unknown
+from loomopt.base.errors import GAP, WHOLE, BadInput, Faults, nearest, shown
 from loomopt.base.quantities import Angle, Coordinate, PositiveLength, Quantity, described
-from loomopt.base.units import QuantityError
 from loomopt.physics.mechanisms import chain
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.chain import FRAME_NAME, Chain, Part, Ref
+from loomopt.scenes.cursor import Cursor
 
 PositiveAngle = Annotated[float, Quantity("angle", above=0, below=2 * math.pi)]
 DwellAngle = Annotated[float, Quantity("angle", least=0, below=2 * math.pi)]
@@ -127,65 +127,70 @@ KEYS: Mapping[str, Keys] = {
 NAME_ALLOWED = f"up to {LONGEST_NAME} letters, digits and _, a letter first"
 
 
-def check_name(name: str, key: str, taken: Mapping[str, str] | None = None) -> None:
-    """Raise BadInput for what can be no name; key: where it stands; taken: what else is called so, by name."""
+def check_name(cursor: Cursor, name: str, taken: Mapping[str, str] | None = None) -> None:
+    """Raise BadInput for what can be no name; taken: names that mean something else, with what they mean."""
     if not _NAME.fullmatch(name) or len(name) > LONGEST_NAME:
-        raise refusal("it is not a name", "", key, name, NAME_ALLOWED, "Give it another name")
+        raise cursor.fault("it is not a name", name, NAME_ALLOWED, "Give it another name")
     if taken and name in taken:
-        raise refusal(f"{name} is the name of {taken[name]}", "", key, remedy="Give it another name")
+        raise cursor.fault(f"{name} is the name of {taken[name]}", remedy="Give it another name")
 
 
-def reference(raw: object, key: str, kind: Kind, names: Collection[str]) -> Ref:
-    """Return the number that a part or event names, or a literal with its unit; names: those of [mechanism]."""
-    quantity: Quantity = kind.__metadata__[0]
-    if not isinstance(raw, str):
-        if quantity.kind == "number" and isinstance(raw, int | float) and not isinstance(raw, bool):
-            return Ref("", 1, _validated(quantity, raw, key))
-        allowed = f"the name of a number of [mechanism], or {described(quantity.kind)}"
-        problem = "it is neither the name of a number nor a quantity"
-        raise refusal(problem, "", key, raw, allowed, "Write either, in quotes")
-    text = raw.strip()
-    name = text.removeprefix("-").strip()
-    if name in names:
-        positive = quantity.least >= 0 or quantity.above >= 0
-        if positive and name != text:
-            raise refusal("it cannot be negative", "", key, raw, remedy=f'Write "{name}"')
-        return Ref(name, 1 if name == text else -1)
-    if name[:1] in (*"+.0123456789", ""):
-        return Ref("", 1, _validated(quantity, text, key))
-    raise unknown("number of [mechanism]", name, names, "", key, remedy="Add it to [mechanism], or correct the name")
+class Numbers:
+    """Numbers of [mechanism] by name, and what they are used as, in the order of their first use."""
 
+    def __init__(self, names: Mapping[str, object]) -> None:
+        self.names = names
+        self.uses: Used = {}
 
-def _validated(quantity: Quantity, raw: object, key: str) -> float:
-    try:
-        return quantity.validate(raw)
-    except QuantityError as error:
-        raise misread(error, "", key, raw) from None
+    def read(self, cursor: Cursor, kind: Kind, text: str) -> Ref:
+        """Number that a part or event names, or a literal with its unit; text: what it is in words. Raises BadInput."""
+        number = self._reference(cursor, kind)
+        if number.name:
+            self._use(cursor, number.name, kind, text)
+        return number
 
+    def _reference(self, cursor: Cursor, kind: Kind) -> Ref:
+        quantity: Quantity = kind.__metadata__[0]
+        raw = cursor.raw
+        if not isinstance(raw, str):
+            if quantity.kind == "number" and isinstance(raw, int | float) and not isinstance(raw, bool):
+                return Ref("", 1, cursor.number(quantity))
+            allowed = f"the name of a number of [mechanism], or {described(quantity.kind)}"
+            problem = "it is neither the name of a number nor a quantity"
+            raise cursor.fault(problem, raw, allowed, "Write either, in quotes")
+        text = raw.strip()
+        name = text.removeprefix("-").strip()
+        if name in self.names:
+            positive = quantity.least >= 0 or quantity.above >= 0
+            if positive and name != text:
+                raise cursor.fault("it cannot be negative", raw, remedy=f'Write "{name}"')
+            return Ref(name, 1 if name == text else -1)
+        if name[:1] in (*"+.0123456789", ""):
+            return Ref("", 1, cursor._replace(raw=text).number(quantity))
+        remedy = "Add it to [mechanism], or correct the name"
+        raise cursor.unknown("number of [mechanism]", name, self.names, remedy)
 
-def use(used: Used, ref: Ref, kind: Kind, text: str, key: str) -> None:
-    """Note what a number is used as; text: what it is in words. Raises BadInput for one of two kinds."""
-    if not ref.name:
-        return
-    if ref.name not in used:
-        used[ref.name] = kind, text
-        return
-    known, said = used[ref.name]
-    one, other = known.__metadata__[0], kind.__metadata__[0]
-    if one.kind != other.kind:
-        problem = f"{ref.name} is used as two kinds of quantity: {one.kind} ({said}) and {other.kind} ({text})"
-        raise refusal(problem, "", key, remedy="Give each a number of its own")
-    narrower = kind if (other.least, other.above, -other.below) > (one.least, one.above, -one.below) else known
-    used[ref.name] = narrower, f"{said}; {text}"
+    def _use(self, cursor: Cursor, name: str, kind: Kind, text: str) -> None:
+        """Note a use of a number. Raises BadInput where it is used as two kinds of quantity."""
+        if name not in self.uses:
+            self.uses[name] = kind, text
+            return
+        known, words = self.uses[name]
+        one, other = known.__metadata__[0], kind.__metadata__[0]
+        if one.kind != other.kind:
+            problem = f"{name} is used as two kinds of quantity: {one.kind} ({words}) and {other.kind} ({text})"
+            raise cursor.fault(problem, remedy="Give each a number of its own")
+        narrower = kind if (other.least, other.above, -other.below) > (one.least, one.above, -one.below) else known
+        self.uses[name] = narrower, f"{words}; {text}"
 
 
 # What one key holds: how it is read, and how an editor checks it.
 
 
 class Sort(NamedTuple):
-    """What a word may be: read(raw, key) returns it or raises BadInput; schema() returns its JSON Schema."""
+    """What a word may be: read(cursor) returns it or raises BadInput; schema() returns its JSON Schema."""
 
-    read: Callable[[object, str], Any]
+    read: Callable[[Cursor], Any]
     schema: Callable[[], Json]
 
 
@@ -194,48 +199,44 @@ NAME_SCHEMA: Json = {"type": "string", "pattern": rf"^[^\s!-@\[-`{{-~][^\s!-/:-@
 
 
 def text_of(raw: object) -> str:
-    """Return a raw word as a message shows it."""
+    """A raw word as a message shows it."""
     return raw if isinstance(raw, str) else shown(raw)
 
 
-def _choice(*names: str, what: str = "choice") -> Sort:
-    def read(raw: object, key: str) -> str:
-        if not isinstance(raw, str) or raw not in names:
-            raise unknown(what, text_of(raw), names, "", key)
-        return raw
-
-    return Sort(read, lambda: {"enum": list(names)})
+def _choice(*names: str, sort: str = "choice") -> Sort:
+    return Sort(lambda cursor: cursor.word(names, sort), lambda: {"enum": list(names)})
 
 
-def _called(raw: object, key: str) -> str:
-    if not isinstance(raw, str):
-        raise refusal("it is not a name", "", key, raw, NAME_ALLOWED, 'Write a name in quotes, such as "B"')
-    check_name(raw, key)
-    return raw
+def _name(cursor: Cursor) -> str:
+    if not isinstance(cursor.raw, str):
+        raise cursor.fault("it is not a name", cursor.raw, NAME_ALLOWED, 'Write a name in quotes, such as "B"')
+    check_name(cursor, cursor.raw)
+    return cursor.raw
 
 
-def _new(raw: object, key: str) -> str:
-    name = _called(raw, key)
-    check_name(name, key, {FRAME_NAME: "what does not move"})
+def _new_name(cursor: Cursor) -> str:
+    name = _name(cursor)
+    check_name(cursor, name, {FRAME_NAME: "what does not move"})
     return name
 
 
-def _pair(raw: object, key: str) -> tuple[str, ...]:
+def _pair(cursor: Cursor) -> tuple[str, ...]:
+    raw = cursor.raw
     if not isinstance(raw, list | tuple) or len(raw) != 2:
         remedy, allowed = 'Write two, such as ["B", "D"]', "a list of two joints"
-        raise refusal("a dyad joins two joints", "", key, raw, allowed, remedy)
-    first, second = (_called(each, f"{key}.{place}") for place, each in enumerate(raw, 1))
+        raise cursor.fault("a dyad joins two joints", raw, allowed, remedy)
+    first, second = (_name(cursor.at(place)) for place in (1, 2))
     if first == second:
-        raise refusal(f"both ends of the dyad hang on {first}", "", key, remedy="Name two joints")
+        raise cursor.fault(f"both ends of the dyad hang on {first}", remedy="Name two joints")
     return first, second
 
 
-def _links(count: int, such_as: str) -> Sort:
-    def read(raw: object, key: str) -> tuple[str, ...]:
-        if not isinstance(raw, Mapping) or len(raw) != count:
-            wanted = f"it has {count} link{'s' * (count > 1)}, each with its length"
-            raise refusal(wanted, "", key, raw, f"a table such as {such_as}", "Write one")
-        return tuple(_new(name, f"{key}.{name}") for name in raw)
+def _links(count: int, example: str) -> Sort:
+    def read(cursor: Cursor) -> tuple[str, ...]:
+        if not isinstance(cursor.raw, Mapping) or len(cursor.raw) != count:
+            problem = f"it has {count} link{'s' * (count > 1)}, each with its length"
+            raise cursor.fault(problem, cursor.raw, f"a table such as {example}", "Write one")
+        return tuple(_new_name(cursor.at(name)._replace(raw=name)) for name in cursor.raw)
 
     def schema() -> Json:
         lengths = number_schema(Number(PositiveLength, "its length"))
@@ -245,24 +246,20 @@ def _links(count: int, such_as: str) -> Sort:
     return Sort(read, schema)
 
 
-def _ratio(raw: object, key: str) -> int | float:
-    value = _validated(Quantity("number"), raw, key)
+def _ratio(cursor: Cursor) -> int | float:
+    value = cursor.number(Quantity("number"))
     if value == 0 or abs(value) > MOST_PARTS:
         allowed = f"a number but 0, at most {MOST_PARTS} in size; negative where it turns the other way"
-        raise refusal("it is no ratio", "", key, raw, allowed, "Correct it")
+        raise cursor.fault("it is no ratio", cursor.raw, allowed, "Correct it")
     return int(value) if value == int(value) else value
 
 
-def _whole_ratio(raw: object, key: str) -> int:
-    found = _ratio(raw, key)
-    if not isinstance(found, int):
+def _whole_ratio(cursor: Cursor) -> int:
+    ratio = _ratio(cursor)
+    if not isinstance(ratio, int):
         remedy = "After a turn of the main shaft it must stand as before: a whole number, negative the other way round"
-        raise refusal("it is not a whole number", "", key, raw, remedy=remedy)
-    return found
-
-
-def _angle(raw: object, key: str) -> float:
-    return _validated(Quantity("angle"), raw, key)
+        raise cursor.fault("it is not a whole number", cursor.raw, remedy=remedy)
+    return ratio
 
 
 def number_schema(number: Number) -> Json:
@@ -281,26 +278,26 @@ def _pair_schema() -> Json:
     return {"type": "array", "items": NAME_SCHEMA, "minItems": 2, "maxItems": 2, "uniqueItems": True}
 
 
-_NAMED, _OWN_NAME = Sort(_called, _name_schema), Sort(_new, _name_schema)
+_KNOWN_NAME, _FRESH_NAME = Sort(_name, _name_schema), Sort(_new_name, _name_schema)
 _SORTS: Mapping[str, Sort] = {
-    JOINT: _NAMED,
-    LINK: _NAMED,
-    SLIDE: _NAMED,
-    EVENT: _NAMED,
-    NEW_JOINT: _OWN_NAME,
-    NEW_LINK: _OWN_NAME,
+    JOINT: _KNOWN_NAME,
+    LINK: _KNOWN_NAME,
+    SLIDE: _KNOWN_NAME,
+    EVENT: _KNOWN_NAME,
+    NEW_JOINT: _FRESH_NAME,
+    NEW_LINK: _FRESH_NAME,
     RATIO: Sort(_ratio, Quantity("number").schema),
     WHOLE_RATIO: Sort(_whole_ratio, Quantity("number").schema),
-    ANGLE: Sort(_angle, Quantity("angle").schema),
+    ANGLE: Sort(lambda cursor: cursor.number(Quantity("angle")), Quantity("angle").schema),
     LAW: _choice(*LAWS),
     PAIR: Sort(_pair, _pair_schema),
     ONE_LINK: _links(1, '{ rod = "l2" }'),
     TWO_LINKS: _links(2, '{ rod = "l2", rocker = "l3" }'),
     LEFT_RIGHT: _choice("left", "right"),
     AHEAD_BEHIND: _choice("ahead", "behind"),
-    SENSE: _choice(*SENSES, what=SENSE),
-    EXTREME: _choice("max", "min", what=EXTREME),
-    REST: _choice("begins", "ends", what=REST),
+    SENSE: _choice(*SENSES, sort=SENSE),
+    EXTREME: _choice("max", "min", sort=EXTREME),
+    REST: _choice("begins", "ends", sort=REST),
 }
 
 
@@ -338,171 +335,155 @@ class Entries(NamedTuple):
     numbers: Mapping[str, Ref]
 
 
-def entries(
-    table: Mapping[str, Any], known: Keys, path: str, names: Collection[str], used: Used, of: str = "", name: str = ""
-) -> Entries:
-    """Return what a table holds that may hold these keys. Raises BadInput with all mistakes.
+def entries(cursor: Cursor, known: Keys, numbers: Numbers, of: str = "", name: str = "") -> Entries:
+    """Words and numbers of a table. Raises BadInput with all mistakes.
 
-    names: the numbers of [mechanism], whose uses `used` notes; of: what the table is, in words, and its name.
+    known: the keys that it may hold; numbers: those of [mechanism]; of: what the table is, in words; name: its name.
     """
-    faults, words, numbers = Faults(), dict[str, Any](), dict[str, Ref]()
+    cursor = cursor.apart()
+    table, words, read = cursor.entries(), dict[str, Any](), dict[str, Ref]()
     strange = [key for key in table if key not in known and key != "kind"]
     for key in strange:
-        faults.add(unknown(f"key of {of}" if of else "key", key, known, "", f"{path}.{key}", given=table))
-    meant = {nearest(key, known, table) for key in strange}
-    said = {key: text_of(table.get(key, "")) for key, each in known.items() if isinstance(each, Word)}
-    for key, each in known.items():
-        where = f"{path}.{key}"
+        cursor.faults.add(table[key].unknown(f"key of {of}" if of else "key", key, known, given=table))
+    near = {nearest(key, known, table) for key in strange}
+    texts = {key: text_of(table[key].raw if key in table else "") for key in known if isinstance(known[key], Word)}
+    for key, sort in known.items():
         if key not in table:
-            if each.needed and key not in meant:
-                faults.add(refusal(f"{of or 'the table'} needs {key}", "", where, remedy="Add it", grade=GAP))
+            if sort.needed and key not in near:
+                cursor.faults.add(cursor.at(key).fault(f"{of or 'the table'} needs {key}", remedy="Add it", grade=GAP))
             continue
-        with faults:
-            if isinstance(each, Number):
-                numbers[key] = _noted(table[key], where, each.kind, each.text.format(name, **said), names, used)
+        with cursor.faults:
+            if isinstance(sort, Number):
+                read[key] = numbers.read(table[key], sort.kind, sort.text.format(name, **texts))
             else:
-                words[key] = _SORTS[each.sort].read(table[key], where)
-        if key == "links" and isinstance(table[key], Mapping):
-            for link, length in table[key].items():
-                with faults:
-                    text = f"length of {link}"
-                    numbers[link] = _noted(length, f"{where}.{link}", PositiveLength, text, names, used)
-    faults.tell()
-    return Entries(words, numbers)
+                words[key] = _SORTS[sort.sort].read(table[key])
+        if key == "links" and isinstance(table[key].raw, Mapping):
+            for link, length in table[key].entries().items():
+                with cursor.faults:
+                    read[link] = numbers.read(length, PositiveLength, f"length of {link}")
+    cursor.faults.tell()
+    return Entries(words, read)
 
 
 # One part.
 
 
-def _part(name: str, raw: object, names: Collection[str], used: Used, faults: Faults) -> Part | None:
-    """Return one part; None where its mistakes, which `faults` keeps, leave none."""
-    path = f"parts.{name}"
+def _part(name: str, cursor: Cursor, numbers: Numbers) -> Part | None:
+    """One part; None where its mistakes leave none."""
+    faults = cursor.faults
     before = len(faults.found)
     with faults:
-        check_name(name, path, {FRAME_NAME: "what does not move"})
+        check_name(cursor, name, {FRAME_NAME: "what does not move"})
     with faults:
-        kind, table = _kind(raw, path)
-        words, numbers = entries(table, KEYS[kind], path, names, used, f"a {kind}", name)
-        found = Part(kind, name, tuple(words.items()), tuple(numbers.items()))
+        kind = _kind(cursor)
+        read = entries(cursor, KEYS[kind], numbers, f"a {kind}", name)
+        part = Part(kind, name, tuple(read.words.items()), tuple(read.numbers.items()))
         if len(faults.found) == before:
-            _sense(found, path)
-            return found
+            _check_sense(cursor, part)
+            return part
     return None
 
 
-def _noted(raw: object, key: str, kind: Kind, text: str, names: Collection[str], used: Used) -> Ref:
-    ref = reference(raw, key, kind, names)
-    use(used, ref, kind, text, key)
-    return ref
+def _kind(cursor: Cursor) -> str:
+    """Kind of a part. Raises BadInput."""
+    if not isinstance(cursor.raw, Mapping):
+        raise cursor.fault("a part is a table", cursor.raw, 'a table, such as { kind = "pivot" }', "Write one")
+    place = cursor.at("kind")
+    if "kind" not in cursor.raw:
+        raise place.fault("the part has no kind", allowed=", ".join(KEYS), remedy="Add it", grade=GAP)
+    return place.word(KEYS, "kind of part")
 
 
-def _kind(raw: object, path: str) -> tuple[str, Mapping[str, Any]]:
-    """Return a part's kind and its table. Raises BadInput."""
-    if not isinstance(raw, Mapping):
-        allowed = 'a table, such as { kind = "pivot" }'
-        raise refusal("a part is a table", "", path, raw, allowed, "Write one")
-    if "kind" not in raw:
-        allowed = ", ".join(KEYS)
-        raise refusal("the part has no kind", "", f"{path}.kind", allowed=allowed, remedy="Add it", grade=GAP)
-    kind = raw["kind"]
-    if not isinstance(kind, str) or kind not in KEYS:
-        raise unknown("kind of part", text_of(kind), KEYS, "", f"{path}.kind")
-    return kind, raw
-
-
-def _sense(part: Part, path: str) -> None:
+def _check_sense(cursor: Cursor, part: Part) -> None:
     """Raise BadInput for keys that mean nothing together."""
     numbers, pin = part.numbers, part.word("pin")
     if "length" in KEYS[part.kind] and bool(pin) != ("length" in numbers):
         missing, problem = ("length", f"pin {pin} needs a length") if pin else ("pin", "length is that of a pin")
-        raise refusal(problem, "", f"{path}.{missing}", remedy=f"Add {missing}", grade=GAP)
+        raise cursor.at(missing).fault(problem, remedy=f"Add {missing}", grade=GAP)
     if part.kind == "point":
         polar = {"radius", "angle"} & numbers.keys()
         cartesian = {"along", "across"} & numbers.keys()
         if polar and cartesian:
             problem = f"{' and '.join(sorted(polar))} and {' and '.join(sorted(cartesian))} say the same twice"
-            raise refusal(problem, "", path, remedy="Give radius and angle, or along and across")
+            raise cursor.fault(problem, remedy="Give radius and angle, or along and across")
         if "radius" not in numbers and not cartesian:
-            raise refusal("the point has no place", "", path, remedy="Add radius and angle, or along and across")
+            raise cursor.fault("the point has no place", remedy="Add radius and angle, or along and across")
     if part.kind == "gear" and part.word("with") == (part.word("carrier") or FRAME_NAME):
         remedy = "Name another link, or another carrier (without one it is the frame)"
-        raise refusal("its mate does not turn against its carrier", "", f"{path}.with", remedy=remedy)
+        raise cursor.at("with").fault("its mate does not turn against its carrier", remedy=remedy)
     if part.kind == "cam":
         spent = sum(numbers[key].value for key in ("rise", "far_dwell", "return") if key in numbers)
         if numbers["lift"] == Ref(""):
-            raise refusal("the cam lifts nothing", "", f"{path}.lift", remedy="Give an angle other than 0")
+            raise cursor.at("lift").fault("the cam lifts nothing", remedy="Give an angle other than 0")
         if spent > 2 * math.pi:
-            raise refusal("rise, far_dwell and return are more than a turn", "", path, remedy="Make them shorter")
+            raise cursor.fault("rise, far_dwell and return are more than a turn", remedy="Make them shorter")
     same = [key for key in ("from", "at") if part.word(key) and part.word(key) == part.word("through")]
     if same:
-        raise refusal(f"{same[0]} and through are one joint", "", f"{path}.through", remedy="Name two joints")
+        raise cursor.at("through").fault(f"{same[0]} and through are one joint", remedy="Name two joints")
 
 
 # All parts.
 
 
-def linked(raw: object, names: Collection[str]) -> tuple[Chain, Used]:
-    """Return the parts in an order that can be evaluated, and what the numbers they name are used as.
-
-    raw: the table [parts] as given; names: the numbers of [mechanism]. Raises BadInput with all mistakes.
-    """
+def linked(cursor: Cursor, numbers: Numbers) -> Chain:
+    """Table [parts], in an order that can be evaluated; numbers: those of [mechanism]. Raises BadInput."""
+    raw, cursor = cursor.raw, cursor.apart()
     if not isinstance(raw, Mapping):
-        raise refusal("it is not a table", "", "parts", raw, remedy="Write a table [parts]", grade=WHOLE)
+        raise cursor.fault("it is not a table", raw, remedy="Write a table [parts]", grade=WHOLE)
     if len(raw) > MOST_PARTS:
         problem = f"{len(raw)} parts are no linkage of one freedom"
-        raise refusal(problem, "", "parts", allowed=f"up to {MOST_PARTS}", remedy="Take out what moves nothing")
-    faults, used = Faults(), Used()
-    read = [_part(name, each, names, used, faults) for name, each in raw.items()]
+        raise cursor.fault(problem, allowed=f"up to {MOST_PARTS}", remedy="Take out what moves nothing")
+    read = [_part(name, place, numbers) for name, place in cursor.entries().items()]
     parts = [part for part in read if part is not None]
     if len(parts) == len(read):
-        for fault in _misnamed(parts):
-            faults.add(fault)
-    faults.tell()
-    return ordered(parts), used
+        for fault in _name_faults(cursor, parts):
+            cursor.faults.add(fault)
+    cursor.faults.tell()
+    return _chain(cursor, parts)
 
 
-def _misnamed(parts: Sequence[Part]) -> Iterator[BadInput]:
-    """Yield what is wrong with the names that parts place and hang on."""
+def _name_faults(cursor: Cursor, parts: Sequence[Part]) -> Iterator[BadInput]:
+    """Mistakes in the names that parts place and hang on."""
     joints = {name: part.name for part in reversed(parts) for name in chain.joints_of(part)}
     links = {name: part.name for part in reversed(parts) for name in chain.links_of(part)}
     placed: dict[str, tuple[str, str]] = {}
     for part in parts:
+        place = cursor.at(part.name)
         for sort, own in (("joint", chain.joints_of(part)), ("link", chain.links_of(part))):
             for name in own:
                 if name in placed:
-                    yield _twice(name, sort, part, *placed[name])
+                    yield _twice(place, name, sort, part, *placed[name])
                 else:
                     placed[name] = part.name, sort
-        for sort, wanted, known, others in (
+        for sort, names, known, others in (
             ("joint", chain.wanted_joints(part), joints, links),
             ("link", chain.wanted_links(part), links, joints),
         ):
-            for name in wanted:
-                where = f"parts.{part.name}.{_key_of(part, name)}"
+            for name in names:
                 if name in known:
                     continue
+                where = place.at(_key_of(part, name))
                 if name in others or name == FRAME_NAME:
                     other = "the frame" if name == FRAME_NAME else f"a {'link' if sort == 'joint' else 'joint'}"
                     problem = f"{name} is {other}, and a {sort} is wanted"
-                    yield refusal(problem, "", where, allowed=", ".join(known), remedy=f"Name a {sort}")
+                    yield where.fault(problem, allowed=", ".join(known), remedy=f"Name a {sort}")
                 else:
-                    yield unknown(sort, name, known, "", where, remedy=f"Add a part that places {name}")
+                    yield where.unknown(sort, name, known, f"Add a part that places {name}")
     if parts and not any(part.kind in ("crank", "cam") for part in parts):
         remedy = 'Add a part such as crank = { kind = "crank", at = "A", pin = "B", length = "l1" }'
-        yield refusal("nothing is driven: there is no crank", "", "parts", remedy=remedy, grade=GAP)
+        yield cursor.fault("nothing is driven: there is no crank", remedy=remedy, grade=GAP)
     if not parts:
-        yield refusal("there are no parts", "", "parts", remedy="Add a pivot, a crank and a dyad", grade=GAP)
+        yield cursor.fault("there are no parts", remedy="Add a pivot, a crank and a dyad", grade=GAP)
 
 
-def _twice(name: str, sort: str, part: Part, first: str, before: str) -> BadInput:
-    path = f"parts.{part.name}"
+def _twice(cursor: Cursor, name: str, sort: str, part: Part, first: str, before: str) -> BadInput:
+    """Mistake of a name that two parts place; first: the other part; before: what it places, a joint or a link."""
     if before != sort:
-        return refusal(f"{name} is the name of a {before} and of a {sort}", "", path, remedy="Rename one")
+        return cursor.fault(f"{name} is the name of a {before} and of a {sort}", remedy="Rename one")
     if sort == "link":
-        return refusal(f"{name} is a link of {first} and of {part.name}", "", path, remedy="Rename one")
+        return cursor.fault(f"{name} is a link of {first} and of {part.name}", remedy="Rename one")
     problem = f"{name} is placed by {first} and by {part.name}: a loop too many, it cannot move"
-    remedy = f"Give {part.name} a joint of its own, or take one of the two out"
-    return refusal(problem, "", path, remedy=remedy)
+    return cursor.fault(problem, remedy=f"Give {part.name} a joint of its own, or take one of the two out")
 
 
 def _key_of(part: Part, name: str) -> str:
@@ -512,21 +493,21 @@ def _key_of(part: Part, name: str) -> str:
     return next(keys, "kind")
 
 
-def ordered(parts: Iterable[Part]) -> Chain:
-    """Return parts in an order in which each hangs on those before it, otherwise in that given. Raises BadInput."""
+def _chain(cursor: Cursor, parts: Sequence[Part]) -> Chain:
+    """Parts in an order in which each hangs on those before it, otherwise in that given. Raises BadInput."""
     waiting, known, order = list(parts), set[str](), list[Part]()
     while waiting:
         ready = next((part for part in waiting if known.issuperset(chain.wants(part))), None)
         if ready is None:
-            raise _waiting(waiting, known)
+            raise _waiting(cursor, waiting, known)
         known.update(chain.provides(ready))
         order.append(ready)
         waiting.remove(ready)
     return Chain(tuple(order))
 
 
-def _waiting(waiting: Sequence[Part], known: Collection[str]) -> BadInput:
-    """Return the error for parts that wait for each other, without those that only wait for them."""
+def _waiting(cursor: Cursor, waiting: Sequence[Part], known: Collection[str]) -> BadInput:
+    """Mistake of parts that wait for each other, without those that only wait for them."""
     while True:
         wanted = {name for part in waiting for name in chain.wants(part)}
         ring = [part for part in waiting if wanted.intersection(chain.provides(part))]
@@ -537,7 +518,7 @@ def _waiting(waiting: Sequence[Part], known: Collection[str]) -> BadInput:
     problem = f"parts wait for each other ({lacking}): together they are an Assur group of class III or higher"
     remedy = "Only chains of dyads, sliders and slots close in closed form: drive it at another link"
     allowed = "parts of which each hangs on joints and links that others place before it"
-    return refusal(problem, "", f"parts.{waiting[0].name}", allowed=allowed, remedy=remedy)
+    return cursor.at(waiting[0].name).fault(problem, allowed=allowed, remedy=remedy)
 
 
 SAYS_NOTHING = ("problem", "mechanism", "parts")
@@ -545,21 +526,21 @@ SAYS_NOTHING = ("problem", "mechanism", "parts")
 
 
 def demand_used(linked: Chain, document: Mapping[str, Any]) -> None:
-    """Raise BadInput for parts that move nothing that anything reads; document: the raw scene.
+    """Raise BadInput for parts that nothing reads; document: the raw scene.
 
     A part is read where another hangs on it or where a table beside [parts] says its name, or that of a joint or link
     of it. A point is drawn with its path, so it may stand for that alone.
     """
     said = {word for name, own in document.items() if name not in SAYS_NOTHING for word in _said(own)}
-    faults, wanted = Faults(), set[str]()
+    table, wanted = Cursor(linked, "parts", Faults()), set[str]()
     for part in reversed(linked.parts):
         own = {part.name, *chain.provides(part)}
         if part.kind == "point" or own & (said | wanted):
             wanted.update(chain.wants(part))
             continue
         problem = f"nothing reads the part {part.name}: no other part hangs on it, and no table names it"
-        faults.add(refusal(problem, "", f"parts.{part.name}", remedy="Take it out, or name it where it is read"))
-    faults.tell()
+        table.faults.add(table.at(part.name).fault(problem, remedy="Take it out, or name it where it is read"))
+    table.faults.tell()
 
 
 def _said(raw: object) -> Iterator[str]:

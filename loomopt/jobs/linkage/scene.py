@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import Field, create_model
 
-from loomopt.base.errors import WHOLE, Faults, refusal, unknown
+from loomopt.base.errors import Faults, refusal, unknown
 from loomopt.base.quantities import Angle, PositiveLength, PositiveNumber, Speed, read
 from loomopt.base.units import QuantityError, ShowValue, usual
 from loomopt.jobs.linkage import parts
@@ -31,7 +31,7 @@ from loomopt.jobs.linkage.model import (
     extremes,
     number,
 )
-from loomopt.jobs.linkage.parts import KEYS, SENSES, Json, Number, Used, Word
+from loomopt.jobs.linkage.parts import KEYS, SENSES, Json, Number, Numbers, Word
 from loomopt.maths import systems
 from loomopt.model import drive
 from loomopt.physics.balance import Given
@@ -42,7 +42,8 @@ from loomopt.physics.mechanisms.chain import Chain
 from loomopt.physics.schema import DIGITS, Axis, Figure, Name, Table, Target
 from loomopt.physics.schema import TargetTable as AnyTarget
 from loomopt.scenes import csv_tables
-from loomopt.scenes.scene import Scene
+from loomopt.scenes.cursor import Cursor
+from loomopt.scenes.scene import Scene, cursor
 from loomopt.scenes.tables import SceneSchema
 
 
@@ -151,29 +152,23 @@ class Reading(NamedTuple):
 Known = Mapping[str, Place]
 
 
-def _given(raw: object, path: str) -> Mapping[str, Any]:
-    if not isinstance(raw, Mapping):
-        raise refusal("it is not a table", "", path, raw, "a table", f"Write a table [{path}]", WHOLE)
-    return raw
-
-
-def _output(raw: Mapping[str, Any], linked: Chain, names: Mapping[str, Any], used: Used) -> Output:
-    own = [form for form in FORMS if form in raw]
-    if len(own) != 1:
-        problem = f"the output is one of {', '.join(FORMS)}: {'none' if not own else ' and '.join(own)} is given"
-        raise refusal(problem, "", "output", remedy='Such as angle = "rocker", slide = "ram" or y = "P"')
-    form = own[0]
-    kind, slides_now = _scale(raw.get("scale", ""), form, names)
-    found = parts.entries(raw, {**OUTPUT_KEYS, "scale": Number(kind, SCALE)}, "output", names, used)
+def _output(cursor: Cursor, linked: Chain, numbers: Numbers) -> Output:
+    raw = cursor.table()
+    forms = [form for form in FORMS if form in raw]
+    if len(forms) != 1:
+        problem = f"the output is one of {', '.join(FORMS)}: {'none' if not forms else ' and '.join(forms)} is given"
+        raise cursor.fault(problem, remedy='Such as angle = "rocker", slide = "ram" or y = "P"')
+    form = forms[0]
+    kind, slides_now = _scale(raw.get("scale", ""), form, numbers.names)
+    read = parts.entries(cursor, {**OUTPUT_KEYS, "scale": Number(kind, SCALE)}, numbers)
     joints, links, slides = parts.kinds_of(linked)
-    known = {"angle": links, "slide": slides}.get(form, joints)
-    name = _one_of(found, form, known, FORMS[form], "output")
+    name = _one_of(cursor.at(form), {"angle": links, "slide": slides}.get(form, joints), FORMS[form])
     for key in ("against", "zero"):
         if key in raw and form != "angle":
-            raise refusal(f"{key} is for an angle alone", "", f"output.{key}", remedy="Take it out")
-    against = _one_of(found, "against", links, "link", "output") if "against" in raw else ""
-    sense = SENSES[found.words.get("sense", "forward")]
-    scale, zero = found.numbers.get("scale"), found.numbers.get("zero")
+            raise cursor.at(key).fault(f"{key} is for an angle alone", remedy="Take it out")
+    against = _one_of(cursor.at("against"), links, "link") if "against" in raw else ""
+    sense = SENSES[read.words.get("sense", "forward")]
+    scale, zero = read.numbers.get("scale"), read.numbers.get("zero")
     carrier = "" if against or scale else _carrier(linked, form, name)
     return Output(form, name, against, sense, scale, zero, slides_now, carrier)
 
@@ -189,16 +184,13 @@ def _carrier(linked: Chain, form: str, name: str) -> str:
     return part.word("pin") if on_frame else ""
 
 
-def _one_of(found: parts.Entries, key: str, known: Iterable[str], what: str, path: str) -> str:
-    """Return a word that names one of those that are known. Raises BadInput."""
-    name = str(found.words[key])
-    if name not in (names := sorted(known)):
-        raise unknown(what, name, names, "", f"{path}.{key}")
-    return name
+def _one_of(cursor: Cursor, known: Iterable[str], sort: str) -> str:
+    """Name of one of those that are known. Raises BadInput."""
+    return cursor.word(sorted(known), sort)
 
 
-def _scale(raw: object, form: str, names: Mapping[str, Any]) -> tuple[Any, bool]:
-    """Return the kind of an output's scale, and whether the output then slides: an angle times a length is one."""
+def _scale(raw: object, form: str, names: Mapping[str, object]) -> tuple[Any, bool]:
+    """Kind of an output's scale, and whether the output then slides: an angle times a length is one."""
     text = names.get(raw, raw) if isinstance(raw, str) else raw
     if form != "angle":
         return PositiveNumber, True
@@ -209,67 +201,66 @@ def _scale(raw: object, form: str, names: Mapping[str, Any]) -> tuple[Any, bool]
     return PositiveLength, True
 
 
-def _places(raw: Mapping[str, Any], names: Mapping[str, Any], output: Output, used: Used) -> tuple[Place, ...]:
+def _places(cursor: Cursor, numbers: Numbers, output: Output) -> tuple[Place, ...]:
     found: dict[str, Place] = {}
     travel = Number(PositiveLength if output.slides else parts.PositiveAngle, TRAVEL, True)
     forms = {**EVENT_KEYS, "travel": {**EVENT_KEYS["travel"], "travel": travel}}
-    for name, each in raw.items():
-        key = f"events.{name}"
-        table = _given(each, key)
-        parts.check_name(name, key)
-        own = [form for form in forms if form in table]
-        if len(own) != 1:
+    for name, place in cursor.entries().items():
+        table = place.table()
+        parts.check_name(place, name)
+        given = [form for form in forms if form in table]
+        if len(given) != 1:
             problem = "an event is one of an extreme, a travel from another event, and an angle"
-            raise refusal(problem, "", key, remedy='Such as { extreme = "max", near = "60 deg" }')
-        held = parts.entries(table, forms[own[0]], key, names, used, name=name)
-        if own[0] == "travel":
-            found[name] = _travel(name, held, found)
+            raise place.fault(problem, remedy='Such as { extreme = "max", near = "60 deg" }')
+        read = parts.entries(place, forms[given[0]], numbers, name=name)
+        if given[0] == "travel":
+            found[name] = _travel(place, name, read, found)
         else:
-            extreme = held.words.get("extreme", "")
-            rest, near = held.words.get("rest", ""), held.words.get("near")
-            found[name] = Place(name, extreme, near, angle=held.numbers.get("angle"), rest=rest)
+            extreme = read.words.get("extreme", "")
+            rest, near = read.words.get("rest", ""), read.words.get("near")
+            found[name] = Place(name, extreme, near, angle=read.numbers.get("angle"), rest=rest)
     return tuple(found.values())
 
 
-def _travel(name: str, held: parts.Entries, known: Known) -> Place:
-    key = f"events.{name}"
-    sides = [side for side in ("before", "after") if side in held.words]
+def _travel(cursor: Cursor, name: str, read: parts.Entries, known: Known) -> Place:
+    sides = [side for side in ("before", "after") if side in read.words]
     if len(sides) != 1:
-        raise refusal("a travel lies before or after another event", "", key, remedy='Such as before = "bottom"')
-    beside = _one_of(held, sides[0], known, "event above it", key)
+        raise cursor.fault("a travel lies before or after another event", remedy='Such as before = "bottom"')
+    side = cursor.at(sides[0])
+    beside = _one_of(side, known, "event above it")
     if known[beside].extreme != "max":
         problem = f"a travel is short of a maximum of the output, and {beside} is none"
-        raise refusal(problem, "", f"{key}.{sides[0]}", remedy="Name an event with extreme = max")
-    return Place(name, travel=held.numbers["travel"], beside=beside, side=-1 if sides[0] == "before" else 1)
+        raise side.fault(problem, remedy="Name an event with extreme = max")
+    return Place(name, travel=read.numbers["travel"], beside=beside, side=-1 if sides[0] == "before" else 1)
 
 
-def _windows(
-    raw: Mapping[str, Any], names: Mapping[str, Any], places: Sequence[Place], used: Used
-) -> tuple[Window, ...]:
+def _windows(cursor: Cursor, numbers: Numbers, places: Sequence[Place]) -> tuple[Window, ...]:
     known, found = [place.name for place in places], []
-    for name, each in raw.items():
-        key = f"windows.{name}"
-        table = _given(each, key)
-        parts.check_name(name, key)
-        held = parts.entries(table, WINDOW_KEYS, key, names, used, "a window", name)
-        after, level = (_one_of(held, word, known, "event", key) for word in ("after", "level"))
-        found.append(Window(name, after, held.numbers["begins"], held.numbers["ends"], level))
+    for name, place in cursor.entries().items():
+        place.table()
+        parts.check_name(place, name)
+        read = parts.entries(place, WINDOW_KEYS, numbers, "a window", name)
+        after, level = (_one_of(place.at(word), known, "event") for word in ("after", "level"))
+        found.append(Window(name, after, read.numbers["begins"], read.numbers["ends"], level))
     return tuple(found)
 
 
 @functools.lru_cache(maxsize=64)
 def _read(text: str) -> Reading:
-    raw = json.loads(text)
-    names = _given(raw.get("mechanism", {}), "mechanism")
-    linked, used = parts.linked(_given(raw["parts"], "parts"), names)
-    output = _output(_given(raw["output"], "output"), linked, names, used)
-    places = _places(_given(raw["events"], "events"), names, output, used)
-    windows = _windows(_given(raw["windows"], "windows"), names, places, used)
-    for name in names:
-        parts.check_name(name, f"mechanism.{name}")
-        if name not in used:
-            raise refusal(f"nothing uses the number {name}", "", f"mechanism.{name}", remedy="Use it, or take it out")
-    return Reading(Linkage(linked, output, places), {name: used[name] for name in names}, windows)
+    scene = Cursor({"mechanism": {}} | json.loads(text), "", Faults())
+    mechanism = scene.at("mechanism").table()
+    numbers = Numbers(mechanism)
+    scene.at("parts").table()
+    linked = parts.linked(scene.at("parts"), numbers)
+    output = _output(scene.at("output"), linked, numbers)
+    places = _places(scene.at("events"), numbers, output)
+    windows = _windows(scene.at("windows"), numbers, places)
+    for name in mechanism:
+        place = scene.at("mechanism").at(name)
+        parts.check_name(place, name)
+        if name not in numbers.uses:
+            raise place.fault(f"nothing uses the number {name}", remedy="Use it, or take it out")
+    return Reading(Linkage(linked, output, places), {name: numbers.uses[name] for name in mechanism}, windows)
 
 
 def reading(document: Mapping[str, Any]) -> Reading:
@@ -370,9 +361,9 @@ def _sought(document: Mapping[str, Any], *ends: str) -> Iterator[str]:
 
 def targets(document: Mapping[str, Any]) -> dict[str, Target]:
     """Return the scene's own targets, in its order."""
-    raw, found = _given(document.get("targets", {}), "targets") or DEFAULT, {}
-    for name, own in raw.items():
-        own, said = _given(own, f"targets.{name}"), []
+    table, found = Cursor(document.get("targets", {}), "targets", Faults()), {}
+    for name, place in table.entries(table.table() or DEFAULT).items():
+        own, said = place.table(), []
         if own.get("point") is not None:
             said.append(f"{own['point']} on its path")
         for key in ("least", "most"):
@@ -526,8 +517,9 @@ def _check_names(scene: Scene, known: Reading) -> None:
         for key in effect.table.model_fields
         if getattr(own, key) is not None
     }
+    mechanism = cursor(scene).at("mechanism")
     for name in known.numbers:
-        parts.check_name(name, f"mechanism.{name}", taken)
+        parts.check_name(mechanism.at(name), name, taken)
 
 
 def _check_effects(scene: Scene, known: Reading) -> None:

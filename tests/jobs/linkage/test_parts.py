@@ -4,10 +4,11 @@ import copy
 
 import pytest
 
-from loomopt.base.errors import BadInput
+from loomopt.base.errors import BadInput, Faults
 from loomopt.base.quantities import Angle, Coordinate, PositiveLength
 from loomopt.jobs.linkage import parts
 from loomopt.physics.mechanisms.chain import Part, Ref, wants
+from loomopt.scenes.cursor import Cursor
 
 NAMES = ("l1", "l2", "l3", "l4", "e", "epsilon")
 PIVOTS = {"A": {"kind": "pivot"}, "D": {"kind": "pivot", "x": "l4"}}
@@ -20,6 +21,17 @@ SLOT = {"kind": "slot", "at": "A", "through": "C", "link": "arm"}
 GEAR = {"kind": "gear", "at": "C", "with": "rod", "carrier": "rocker", "ratio": -2}
 CAM = {"kind": "cam", "at": "D", "law": "cycloidal", "lift": "20 deg", "rise": "90 deg", "return": "90 deg"}
 POINT = {"kind": "point", "on": "rocker", "radius": "e", "angle": "epsilon"}
+
+
+def at(path, raw=None):
+    """Return a cursor on a value of a file without a name."""
+    return Cursor(raw, path, Faults())
+
+
+def linked(raw, names):
+    """Return the chain that a table of parts describes, and the uses of the numbers that it names."""
+    numbers = parts.Numbers(dict.fromkeys(names))
+    return parts.linked(at("parts", raw), numbers), numbers.uses
 
 
 def with_part(name, given, **changed):
@@ -35,9 +47,9 @@ def changed(name, **keys):
 
 def test_a_four_bar_is_read_in_an_order_that_can_be_evaluated_whatever_its_own():
     backwards = dict(reversed(FOUR_BAR.items()))
-    chain, used = parts.linked(backwards, NAMES)
+    chain, used = linked(backwards, NAMES)
     assert [part.name for part in chain.parts] == ["D", "A", "crank", "drive"]
-    assert parts.linked(FOUR_BAR, NAMES)[0].parts[-1] == Part(
+    assert linked(FOUR_BAR, NAMES)[0].parts[-1] == Part(
         "dyad",
         "drive",
         (("joins", ("B", "D")), ("pin", "C"), ("side", "left"), ("links", ("rod", "rocker"))),
@@ -55,7 +67,7 @@ def test_a_four_bar_is_read_in_an_order_that_can_be_evaluated_whatever_its_own()
 
 def test_a_number_used_twice_is_a_tie_and_one_with_a_minus_its_mirror_image():
     tied = changed("D", x="-l4", y="l1")
-    chain, used = parts.linked(tied, NAMES)
+    chain, used = linked(tied, NAMES)
     pivot = next(part for part in chain.parts if part.name == "D")
     assert pivot.numbers == {"x": Ref("l4", -1), "y": Ref("l1")}
     assert used["l1"] == (PositiveLength, "y of pivot D; length of crank")
@@ -63,7 +75,7 @@ def test_a_number_used_twice_is_a_tie_and_one_with_a_minus_its_mirror_image():
 
 @pytest.mark.parametrize(("text", "value"), [("25 mm", 0.025), ("-25 mm", -0.025), (" 0 m ", 0.0), ("1 in", 0.0254)])
 def test_a_literal_keeps_its_value_in_SI(text, value):
-    assert parts.reference(text, "parts.D.x", Coordinate, NAMES) == Ref("", 1, value)
+    assert parts.Numbers(dict.fromkeys(NAMES)).read(at("parts.D.x", text), Coordinate, "x") == Ref("", 1, value)
 
 
 def test_every_kind_of_part_is_read():
@@ -74,7 +86,7 @@ def test_every_kind_of_part_is_read():
         "wheel": GEAR | {"ratio": "-18/27", "zero": "20 deg"},
         "follower": CAM | {"pin": "F", "length": "e"},
     }
-    chain, used = parts.linked(document, NAMES)
+    chain, used = linked(document, NAMES)
     assert len(chain.parts) == 9
     assert used["epsilon"][0] is Angle
     assert next(part for part in chain.parts if part.name == "wheel").ratio == -18 / 27
@@ -227,7 +239,7 @@ MISTAKES = {
 def test_a_mistake_is_one_message_that_names_part_and_key(mistake):
     raw, begins = copy.deepcopy(MISTAKES[mistake])
     with pytest.raises(BadInput) as caught:
-        parts.linked(raw, NAMES)
+        linked(raw, NAMES)
     error = caught.value
     assert str(error).startswith(begins)
     assert len(error.faults) == 1
@@ -247,13 +259,13 @@ def test_a_mistake_is_one_message_that_names_part_and_key(mistake):
 )
 def test_the_nearest_name_is_told(mistake, meant):
     with pytest.raises(BadInput, match=f'Perhaps "{meant}" is meant'):
-        parts.linked(copy.deepcopy(MISTAKES[mistake][0]), NAMES)
+        linked(copy.deepcopy(MISTAKES[mistake][0]), NAMES)
 
 
 def test_several_mistakes_are_a_line_each():
     wrong = changed("crank", length="l7", at=3) | {"E": {"kind": "pint", "on": "rod"}}
     with pytest.raises(BadInput) as caught:
-        parts.linked(wrong, NAMES)
+        linked(wrong, NAMES)
     assert {each.key for each in caught.value.faults} == {"parts.crank.at", "parts.crank.length", "parts.E.kind"}
 
 
@@ -272,9 +284,9 @@ def test_what_nothing_reads_is_refused_and_what_a_table_names_is_read():
         "side": {"kind": "dyad", "joins": ["C", "G"], "pin": "S", "side": "left", "links": {"m": "l2", "n": "l3"}},
         "E": POINT,
     }
-    parts.demand_used(parts.linked(read, NAMES)[0], DOCUMENT)
+    parts.demand_used(linked(read, NAMES)[0], DOCUMENT)
     idle = read | {"I": {"kind": "pivot"}, "fast": {"kind": "crank", "at": "I", "ratio": 3}, "slotted": SLOT}
-    chain, _ = parts.linked(idle, NAMES)
+    chain, _ = linked(idle, NAMES)
     with pytest.raises(BadInput) as caught:
         parts.demand_used(chain, DOCUMENT)
     assert [each.key for each in caught.value.faults] == ["parts.slotted", "parts.fast", "parts.I"]
@@ -284,15 +296,15 @@ def test_what_nothing_reads_is_refused_and_what_a_table_names_is_read():
 @pytest.mark.parametrize("name", ["", "a b", "a.b", "-d", "1a", "_a", "a" * 41, "l\n1"])
 def test_what_is_no_name_is_told(name):
     with pytest.raises(BadInput, match="it is not a name"):
-        parts.check_name(name, f"mechanism.{name}")
+        parts.check_name(at(f"mechanism.{name}"), name)
 
 
 def test_a_name_that_is_taken_is_told():
-    parts.check_name("ε", "mechanism.ε")
+    parts.check_name(at("mechanism.ε"), "ε")
     with pytest.raises(BadInput, match=r"mechanism\.speed: speed is the name of the crank's speed"):
-        parts.check_name("speed", "mechanism.speed", {"speed": "the crank's speed"})
+        parts.check_name(at("mechanism.speed"), "speed", {"speed": "the crank's speed"})
 
 
 def test_wants_of_a_gear_leave_out_the_frame():
-    chain, _ = parts.linked(with_part("g", GEAR, **{"with": "frame"}), NAMES)
+    chain, _ = linked(with_part("g", GEAR, **{"with": "frame"}), NAMES)
     assert wants(chain.parts[-1]) == ("C", "rocker")
