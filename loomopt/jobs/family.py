@@ -7,7 +7,7 @@ from typing import final
 from loomopt.base.errors import refusal, unknown
 from loomopt.jobs.base import Figures, Job
 from loomopt.model.curves import Columns
-from loomopt.model.family import Family, Part, of_member, standing_for, together
+from loomopt.model.family import Family, MemberShare, of_member, standing_for, together
 from loomopt.model.model import JobModel
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler
@@ -36,7 +36,7 @@ class FamilyJob(Job):
         return kept(self.scene, (FAMILY, FAMILY), self._family)
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[MemberShare, ...]:
         """The share of each member."""
         return self.family.parts
 

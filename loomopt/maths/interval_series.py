@@ -22,7 +22,7 @@ class SeriesTerms(NamedTuple):
     bend: Number
 
 
-class Series(Enclosure):
+class IntervalSeries(Enclosure):
     """A number along u; what stands beside it in a formula, an enclosure of the design, has no slope in u.
 
     An enclosure's own class steps back for it, for Python asks a subclass first.
@@ -33,56 +33,58 @@ class Series(Enclosure):
     def __init__(self, terms: SeriesTerms) -> None:
         self.terms = terms
 
-    def __add__(self, other: Number) -> "Series":
+    def __add__(self, other: Number) -> "IntervalSeries":
         """Return the sum."""
-        if isinstance(other, Series):
-            return Series(SeriesTerms(*(a + b for a, b in zip(self.terms, other.terms, strict=True))))
-        return Series(self.terms._replace(value=self.terms.value + other))
+        if isinstance(other, IntervalSeries):
+            return IntervalSeries(SeriesTerms(*(a + b for a, b in zip(self.terms, other.terms, strict=True))))
+        return IntervalSeries(self.terms._replace(value=self.terms.value + other))
 
     __radd__ = __add__
 
-    def __neg__(self) -> "Series":
+    def __neg__(self) -> "IntervalSeries":
         """Return the opposite."""
-        return Series(SeriesTerms(*(-a for a in self.terms)))
+        return IntervalSeries(SeriesTerms(*(-a for a in self.terms)))
 
-    def __pos__(self) -> "Series":
+    def __pos__(self) -> "IntervalSeries":
         """Return the number itself."""
         return self
 
-    def __sub__(self, other: Number) -> "Series":
+    def __sub__(self, other: Number) -> "IntervalSeries":
         """Return the difference."""
-        if isinstance(other, Series):
-            return Series(SeriesTerms(*(a - b for a, b in zip(self.terms, other.terms, strict=True))))
-        return Series(self.terms._replace(value=self.terms.value - other))
+        if isinstance(other, IntervalSeries):
+            return IntervalSeries(SeriesTerms(*(a - b for a, b in zip(self.terms, other.terms, strict=True))))
+        return IntervalSeries(self.terms._replace(value=self.terms.value - other))
 
-    def __rsub__(self, other: Number) -> "Series":
+    def __rsub__(self, other: Number) -> "IntervalSeries":
         """Return the difference, the other number first."""
         return (-self).__add__(other)
 
-    def __mul__(self, other: Number) -> "Series":
+    def __mul__(self, other: Number) -> "IntervalSeries":
         """Return the product."""
-        if not isinstance(other, Series):
-            return Series(SeriesTerms(*(a * other for a in self.terms)))
+        if not isinstance(other, IntervalSeries):
+            return IntervalSeries(SeriesTerms(*(a * other for a in self.terms)))
         a, b = self.terms, other.terms
         slope = a.value * b.slope + a.slope * b.value
-        return Series(SeriesTerms(a.value * b.value, slope, a.value * b.bend + a.slope * b.slope + a.bend * b.value))
+        return IntervalSeries(
+            SeriesTerms(a.value * b.value, slope, a.value * b.bend + a.slope * b.slope + a.bend * b.value)
+        )
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Number) -> "Series":
+    def __truediv__(self, other: Number) -> "IntervalSeries":
         """Return the quotient."""
-        if not isinstance(other, Series):
-            return Series(SeriesTerms(*(a / other for a in self.terms)))
+        if not isinstance(other, IntervalSeries):
+            return IntervalSeries(SeriesTerms(*(a / other for a in self.terms)))
         a, b = self.terms, other.terms
         value = a.value / b.value
         slope = (a.slope - value * b.slope) / b.value
-        return Series(SeriesTerms(value, slope, (a.bend - value * b.bend - slope * b.slope) / b.value))
+        return IntervalSeries(SeriesTerms(value, slope, (a.bend - value * b.bend - slope * b.slope) / b.value))
 
-    def __rtruediv__(self, other: Number) -> "Series":
+    def __rtruediv__(self, other: Number) -> "IntervalSeries":
         """Return the quotient, the other number on top."""
-        return Series(SeriesTerms(other, interval(0.0), interval(0.0))) / self
+        return IntervalSeries(SeriesTerms(other, interval(0.0), interval(0.0))) / self
 
-    def __pow__(self, power: int) -> "Series":
+    def __pow__(self, power: int) -> "IntervalSeries":
         """Return a power of a whole number above 0."""
         found = self
         for _ in range(power - 1):
@@ -91,69 +93,71 @@ class Series(Enclosure):
 
 
 def _whole(x: Number) -> SeriesTerms:
-    return x.terms if isinstance(x, Series) else SeriesTerms(x, interval(0.0), interval(0.0))
+    return x.terms if isinstance(x, IntervalSeries) else SeriesTerms(x, interval(0.0), interval(0.0))
 
 
-def _waves(x: Series) -> tuple[Series, Series]:
+def _waves(x: IntervalSeries) -> tuple[IntervalSeries, IntervalSeries]:
     """Return sine and cosine."""
     angle, slope, bend = x.terms
     sine, cosine, half = intervals.sin(angle), intervals.cos(angle), slope * slope / 2
     return (
-        Series(SeriesTerms(sine, cosine * slope, cosine * bend - sine * half)),
-        Series(SeriesTerms(cosine, -sine * slope, -sine * bend - cosine * half)),
+        IntervalSeries(SeriesTerms(sine, cosine * slope, cosine * bend - sine * half)),
+        IntervalSeries(SeriesTerms(cosine, -sine * slope, -sine * bend - cosine * half)),
     )
 
 
 def sin(x: Number) -> Number:
     """Return the sine."""
-    return _waves(x)[0] if isinstance(x, Series) else intervals.sin(x)
+    return _waves(x)[0] if isinstance(x, IntervalSeries) else intervals.sin(x)
 
 
 def cos(x: Number) -> Number:
     """Return the cosine."""
-    return _waves(x)[1] if isinstance(x, Series) else intervals.cos(x)
+    return _waves(x)[1] if isinstance(x, IntervalSeries) else intervals.cos(x)
 
 
 def sqrt(x: Number) -> Number:
     """Return the square root."""
-    if not isinstance(x, Series):
+    if not isinstance(x, IntervalSeries):
         return intervals.sqrt(x)
     root = intervals.sqrt(x.terms.value)
     slope = x.terms.slope / (root * 2)
-    return Series(SeriesTerms(root, slope, (x.terms.bend - slope * slope) / (root * 2)))
+    return IntervalSeries(SeriesTerms(root, slope, (x.terms.bend - slope * slope) / (root * 2)))
 
 
 def atan2(y: Number, x: Number) -> Number:
     """Return the angle of (x, y) in (−π, π]."""
-    if not isinstance(y, Series) and not isinstance(x, Series):
+    if not isinstance(y, IntervalSeries) and not isinstance(x, IntervalSeries):
         return intervals.atan2(y, x)
     up, right = _whole(y), _whole(x)
     square = right.value * right.value + up.value * up.value
     slope = (right.value * up.slope - up.value * right.slope) / square
     swell = right.value * right.slope + up.value * up.slope
     bend = (right.value * up.bend - up.value * right.bend - slope * swell) / square
-    return Series(SeriesTerms(intervals.atan2(up.value, right.value), slope, bend))
+    return IntervalSeries(SeriesTerms(intervals.atan2(up.value, right.value), slope, bend))
 
 
 def floor(x: Number) -> Number:
     """Return the largest whole numbers up to what x may be; where these are several, slopes are without bound."""
-    if not isinstance(x, Series):
+    if not isinstance(x, IntervalSeries):
         return intervals.floor(x)
     found = intervals.floor(x.terms.value)
     worth = found.v if isinstance(found, Enclosure) else found
     if not (several := worth.low != worth.high).any():
         return found
     endless = Interval(np.where(several, -np.inf, 0.0), np.where(several, np.inf, 0.0))
-    return Series(SeriesTerms(found, endless, endless))
+    return IntervalSeries(SeriesTerms(found, endless, endless))
 
 
 def chosen(place: Number, values: Sequence[Number]) -> Number:
     """Return the value at a place that is data: one for all, or one for each node and box."""
-    if not any(isinstance(value, Series) for value in values):
+    if not any(isinstance(value, IntervalSeries) for value in values):
         return intervals.chosen(place, values)
-    return Series(SeriesTerms(*(intervals.chosen(place, part) for part in zip(*map(_whole, values), strict=True))))
+    return IntervalSeries(
+        SeriesTerms(*(intervals.chosen(place, part) for part in zip(*map(_whole, values), strict=True)))
+    )
 
 
-def along(low: Floats, high: Floats) -> Series:
+def along(low: Floats, high: Floats) -> IntervalSeries:
     """Return u itself between two ends, (nodes, 1)."""
-    return Series(SeriesTerms(Interval(low, high), interval(np.ones_like(low)), interval(0.0)))
+    return IntervalSeries(SeriesTerms(Interval(low, high), interval(np.ones_like(low)), interval(0.0)))

@@ -155,7 +155,7 @@ def _share(load: Acting, at: Instant) -> Number:
     return term * at.pose.q1 if beside is None else term * at.pose.q1 + beside
 
 
-class _Rule(NamedTuple):
+class _Quadrature(NamedTuple):
     """Nodes (pieces, u) of stretches one after another, GAUSS_NODES each, and their weights in the crank angle, rad."""
 
     pieces: Pieces
@@ -172,13 +172,13 @@ Edges = Sequence[Floats]
 """Of each piece of the cycle the u from 0 to 1 at which it is parted."""
 
 
-def _rule(cycle: Cycle, edges: Edges) -> _Rule:
+def _rule(cycle: Cycle, edges: Edges) -> _Quadrature:
     nodes, weights = gauss()
     widths = np.diff(cycle.starts)
     pieces = np.concatenate([np.full((len(u) - 1) * len(nodes), piece) for piece, u in enumerate(edges)])
     begins, ends = (np.concatenate([u[part] for u in edges]) for part in (slice(None, -1), slice(1, None)))
     u = (begins[:, None] + (ends - begins)[:, None] * nodes).ravel()
-    return _Rule(pieces, u, widths[pieces] * ((ends - begins)[:, None] * weights).ravel())
+    return _Quadrature(pieces, u, widths[pieces] * ((ends - begins)[:, None] * weights).ravel())
 
 
 def _integrated(sampler: Sampler, names: Sequence[str]) -> tuple[Edges, dict[str, float], dict[str, float]]:

@@ -17,7 +17,7 @@ from loomopt.physics import balance
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Cycle, Floats, Node, Pieces
 from loomopt.physics.effects.kinds import Motion, Speed
-from loomopt.physics.motion.turning import NoTurn, Turning, solved
+from loomopt.physics.motion.turning import CrankTurn, NoTurn, solved
 from loomopt.physics.schema import Values
 from loomopt.scenes.scene import Scene
 
@@ -86,7 +86,7 @@ class TurnedCrank(Kinematics):
 
     steady: Kinematics
     cycle: Cycle
-    turning: Turning
+    turning: CrankTurn
 
     @property
     def structure(self) -> Hashable:

@@ -63,7 +63,7 @@ def members_of(given: Given) -> tuple[Given, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
+class FamilyKinematics:
     """The motions of all members; events: of which (member, name) each event of the whole is."""
 
     scenarios: tuple[Scenario, ...]
@@ -244,7 +244,7 @@ class WorstMagnitude(WorstOf):
 # The members' programs as one.
 
 
-class Part(NamedTuple):
+class MemberShare(NamedTuple):
     """A member's share of the whole: its program, and what the whole calls its variables and limits.
 
     names: of variables; limits: of those of its limits that are its own, by name.
@@ -267,7 +267,7 @@ class Family(NamedTuple):
     """The program of all members, and the share of each."""
 
     program: Program
-    parts: tuple[Part, ...]
+    parts: tuple[MemberShare, ...]
 
 
 def standing_for(program: Program, name: str) -> frozenset[str]:
@@ -284,7 +284,7 @@ def together(programs: Sequence[Program], own: Collection[str], combine: Combine
     """
     if len(programs) == 1:
         names = {variable.name: variable.name for variable in programs[0].variables}
-        return Family(programs[0], (Part(programs[0], names, {}),))
+        return Family(programs[0], (MemberShare(programs[0], names, {}),))
     return _Combining(programs, own, combine).family()
 
 
@@ -458,7 +458,7 @@ class _Combining:
         scenarios = tuple(
             (each.model.key, tuple(each.values.items()), tuple(each.switches.items())) for each in self.scenarios
         )
-        motion = Together(
+        motion = FamilyKinematics(
             self.scenarios,
             ("family", scenarios),
             groups,
@@ -613,10 +613,10 @@ class _Combining:
         )
         return Family(replace(whole, starts=self.starts(whole)), parts)
 
-    def part(self, member: int) -> Part:
+    def part(self, member: int) -> MemberShare:
         """Return a member's share."""
         own = {limit.name: self.limit(member, limit).name for limit in self.programs[member].limits}
-        return Part(
+        return MemberShare(
             self.programs[member],
             {name: self.name(member, name) for name in self.variables},
             {name: whole for name, whole in own.items() if name != whole},
@@ -660,7 +660,7 @@ def _wished(wishes: Iterable[Preference]) -> tuple[Preference, ...]:
 
 
 def _followed(
-    parts: Sequence[Part], measured: Mapping[str, tuple[int, Objective]], model: JobModel, values: Numbers
+    parts: Sequence[MemberShare], measured: Mapping[str, tuple[int, Objective]], model: JobModel, values: Numbers
 ) -> dict[str, float]:
     """Return the variables that follow from the others: the members' own, and what is no less than what they seek."""
     found: dict[str, float] = {}

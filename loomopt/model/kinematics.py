@@ -70,7 +70,7 @@ def _tops(squares: Callable[[Floats], Sequence[Floats]]) -> Iterator[tuple[float
             yield found, float(height(np.array([found]))[0])
 
 
-class Chain(NamedTuple):
+class DerivedChain(NamedTuple):
     """Derived values of which each follows from a few before it: an NLP may have them for variables, and sparse rows.
 
     roots: numbers they follow from in the end; follow(maths, values): each from roots and values before it, by name in
@@ -92,7 +92,7 @@ class Arcs(NamedTuple):
     switch: Callable[[float, tuple[float, ...]], float]
     structure: Hashable = None
     """What distinguishes stretches of one name."""
-    chain: Chain | None = None
+    chain: DerivedChain | None = None
     """What their formulas are made of, where that is a chain."""
     parting: Callable[[Maths, Given], tuple[Number, ...]] | None = None
     """Those of the corners that part the cycle, where others of its corners do so already."""

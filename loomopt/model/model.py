@@ -27,9 +27,9 @@ from loomopt.physics.effects.kinds import (
     Event,
     Inputs,
     Load,
-    Moved,
     Speed,
     State,
+    StateInstant,
     UnsteadyError,
     asked,
     keys,
@@ -313,17 +313,17 @@ def carried_by(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], gi
     return Carried(balance.total(inertias), weigh)
 
 
-def read_at(state: State, at: Instant) -> Moved:
+def read_at(state: State, at: Instant) -> StateInstant:
     """Return what is read of a state at an instant."""
 
     def coordinate() -> Number:
         reply = balance.replied(at.maths, state, at.model.loads, at.pose, at.given, at.node.switch)
         return state.coordinate(at.inputs(state), reply)
 
-    return Moved(at.pose, coordinate, lambda: at.force)
+    return StateInstant(at.pose, coordinate, lambda: at.force)
 
 
-def state_value(state: State, formula: Callable[[Moved], Number], sign: int, at: Instant) -> Number:
+def state_value(state: State, formula: Callable[[StateInstant], Number], sign: int, at: Instant) -> Number:
     """Return what a formula reads of a state, SI."""
     return formula(read_at(state, at)) if sign > 0 else -formula(read_at(state, at))
 

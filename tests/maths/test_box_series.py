@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from loomopt.maths import intervals, systems
-from loomopt.maths.interval_series import Series, along
+from loomopt.maths.interval_series import IntervalSeries, along
 from loomopt.maths.intervals import Interval, variable
 
 M, MP = systems.box_series(), systems.mpmath()
@@ -58,6 +58,6 @@ def test_what_stands_beside_a_series_steps_back_for_it():
     x = variable(0, 1, np.array([1.0]), np.array([2.0]))
     for number in (x, Interval(1.0, 2.0), 1.5, 2):
         for found in (number + u, number - u, number * u, number / u, u + number, u - number, u * number, u / number):
-            assert isinstance(found, Series)
-    assert not isinstance(M.sin(x), Series)
-    assert not isinstance(M.sqrt(x), Series)
+            assert isinstance(found, IntervalSeries)
+    assert not isinstance(M.sin(x), IntervalSeries)
+    assert not isinstance(M.sqrt(x), IntervalSeries)

@@ -25,7 +25,7 @@ MASSES = {REED: ("m4", "r4"), COUNTERWEIGHT: ("m4e", "r4e")}
 
 
 @dataclass(frozen=True)
-class LinkageDrawing:
+class CrankRockerDrawing:
     """The crank-rocker in both dead centres: lengths in m, angles in rad.
 
     masses: by joint; offset: of the reed's centre of mass from the rocker's line, rad.
@@ -69,7 +69,7 @@ class LinkageDrawing:
         return 0.02 * float(self.lengths.l4 + self.lengths.l1)
 
 
-def of(design: Mapping[str, float]) -> LinkageDrawing:
+def of(design: Mapping[str, float]) -> CrankRockerDrawing:
     """Return the crank-rocker l1, l2, l3, l4 (m) with its masses where it has any (kg, m; offset in rad).
 
     Raises BadInput when it is none.
@@ -81,7 +81,7 @@ def of(design: Mapping[str, float]) -> LinkageDrawing:
     lengths = crank_rocker.Lengths(*metres)
     masses = {at: Mass(*(design.get(name, 0.0) for name in names)) for at, names in MASSES.items()}
     there = {at: own for at, own in masses.items() if own.mass and own.radius}
-    return LinkageDrawing(lengths, crank_rocker.DeadCentres(FLOAT, lengths), there, design.get("offset", 0.0))
+    return CrankRockerDrawing(lengths, crank_rocker.DeadCentres(FLOAT, lengths), there, design.get("offset", 0.0))
 
 
 def linkage(
@@ -124,14 +124,14 @@ def motion(design: Mapping[str, float], angles: Floats) -> MechanismMotion:
     return MechanismMotion(angles, skeleton.pivots, at, skeleton.links, skeleton.guides)
 
 
-def _measures(found: LinkageDrawing) -> tuple[Measure, ...]:
+def _measures(found: CrankRockerDrawing) -> tuple[Measure, ...]:
     """Return the lengths of crank, rod, rocker and frame, at front dead centre."""
     at = found.skeleton.at(FRONT)
     ends = (("A", "B"), ("B", "C"), ("D", "C"), ("A", "D"))
     return tuple(Measure(name, at[one], at[other]) for name, (one, other) in zip(LENGTHS, ends, strict=True))
 
 
-def _angles(found: LinkageDrawing) -> list[Primitive]:
+def _angles(found: CrankRockerDrawing) -> list[Primitive]:
     """Draw β at A, the swing at D, and the arrow toward the fell."""
     skeleton, centres, h, (beta, swing) = found.skeleton, found.centres, found.height, found.radii
     return [
@@ -141,7 +141,7 @@ def _angles(found: LinkageDrawing) -> list[Primitive]:
     ]
 
 
-def _labels(found: LinkageDrawing, units: Units) -> list[Label]:
+def _labels(found: CrankRockerDrawing, units: Units) -> list[Label]:
     """Name joints, links with lengths, angles in degrees, masses; joints first: they must stand closest."""
     sides, centres, (beta, swing) = found.lengths, found.centres, found.radii
     at, line, quarter, fell = found.skeleton.at(FRONT), centres.beta, math.pi / 2, found.toward_fell
@@ -176,7 +176,7 @@ def _mass_text(name: str, own: Mass, units: Units) -> str:
     return f"{mass} = {show(own.mass, units.mass)}, {radius} = {units.size(own.radius)}"
 
 
-def _legend(found: LinkageDrawing, units: Units) -> tuple[tuple[str, str], ...]:
+def _legend(found: CrankRockerDrawing, units: Units) -> tuple[tuple[str, str], ...]:
     """Return the lines below a drawing, each with its layer."""
     centres = found.centres
     theta, rear = math.degrees(centres.theta), 180 + math.degrees(centres.beta_r)

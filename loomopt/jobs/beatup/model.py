@@ -55,17 +55,17 @@ class ReedMotion(Motion):
         return -self.joints.psi_2
 
 
-class Linkage(NamedTuple):
+class FourBar(NamedTuple):
     """What poses read at once of the four lengths."""
 
     lengths: crank_rocker.Lengths
     centres: crank_rocker.DeadCentres
 
 
-def linked(given: Given) -> Linkage:
+def linked(given: Given) -> FourBar:
     """Return what poses read at once."""
     found = given.linkage
-    assert isinstance(found, Linkage)
+    assert isinstance(found, FourBar)
     return found
 
 
@@ -74,7 +74,7 @@ class FrontPose(Motion):
     """The pose at front dead centre, exact: ψ' = 0, and ψ'' in closed form; joints from the positions at β."""
 
     maths: Maths
-    linkage: Linkage
+    linkage: FourBar
     phi: Number
     omega: Number
     omega_dot: Number
@@ -120,10 +120,10 @@ class CrankRocker:
         )
         return {"": Group(found.quantities, found.closes, found.rows, found.margins, (0.0, math.pi))}
 
-    def linkage(self, maths: Maths, values: Values) -> Linkage:
+    def linkage(self, maths: Maths, values: Values) -> FourBar:
         """Return lengths and dead centres."""
         lengths = crank_rocker.Lengths(values["l1"], values["l2"], values["l3"], values["l4"])
-        return Linkage(lengths, crank_rocker.dead_centres(maths, lengths))
+        return FourBar(lengths, crank_rocker.dead_centres(maths, lengths))
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """Return s = m4e r4e², kg·m², and both dead centres, rad."""

@@ -181,13 +181,13 @@ def number(maths: Maths, values: Values, ref: Ref) -> Number:
 
 
 @dataclass(frozen=True)
-class LinkagePose(Motion):
+class LinkageMotion(Motion):
     """The linkage at crank angles φ, rad, any shape; what nobody reads is not computed.
 
     joints: its parts; factor: what the output is multiplied by, None for 1; zero: the direction an angle counts from.
     """
 
-    joints: chain.Pose
+    joints: chain.ChainPose
     output: Output
     omega: Number
     omega_dot: Number = None
@@ -241,7 +241,7 @@ class LinkagePose(Motion):
             return -other if other is not None else 0 if own is None else own
         return own - other
 
-    def since(self, there: "LinkagePose") -> Number:
+    def since(self, there: "LinkageMotion") -> Number:
         """Return how far the output is from its place in another pose; of an angle as one atan2."""
         if self.output.measure != "angle":
             return self.q - there.q
@@ -355,7 +355,7 @@ class Linkage(Kinematics):
     def _cornered(self, cam: Part, maths: Maths, given: Given) -> tuple[Number, ...]:
         return self.chain.corners(cam, maths, given.values)
 
-    def at(self, maths: Maths, given: Given, phi: Number) -> LinkagePose:
+    def at(self, maths: Maths, given: Given, phi: Number) -> LinkageMotion:
         """Return the pose at crank angles, rad, of a design in floats; maths: of the angles."""
         return self.pose(maths, given, self._at(given, phi))
 
@@ -649,19 +649,19 @@ class Linkage(Kinematics):
             found.append((f"{low} and {high} follow in the other order", sign * later))
         return found
 
-    def pose(self, maths: Maths, given: Given, node: Node) -> LinkagePose:
+    def pose(self, maths: Maths, given: Given, node: Node) -> LinkageMotion:
         """Return the pose at crank angles φ, rad."""
         values, out = given.values, self.output
         joints = self.chain.pose(maths, values, node.phi, node.switch)
         factor = None if out.scale is None else number(maths, values, out.scale)
         zero = None if out.zero is None else number(maths, values, out.zero)
-        return LinkagePose(joints, out, values.get("speed"), values.get("omega_dot"), factor, zero)
+        return LinkageMotion(joints, out, values.get("speed"), values.get("omega_dot"), factor, zero)
 
-    def at_event(self, maths: Maths, given: Given, event: str) -> LinkagePose:
+    def at_event(self, maths: Maths, given: Given, event: str) -> LinkageMotion:
         """Return the pose at an event."""
         return self.pose(maths, given, self._there(given, event, given.values[event_value(event)]))
 
-    def at_place(self, maths: Maths, given: Given, name: str) -> LinkagePose:
+    def at_place(self, maths: Maths, given: Given, name: str) -> LinkageMotion:
         """Return the pose at a place of the path that has no timing; name: of its crank angle."""
         return self.pose(maths, given, self._there(given, name, given.values[name]))
 
@@ -750,7 +750,7 @@ def _obliquity(group: str, m: Maths, given: Given, phi: Number, pose: Callable[[
 # Quantities and rows.
 
 
-def _at(at: Instant, event: str) -> LinkagePose:
+def _at(at: Instant, event: str) -> LinkageMotion:
     """Return the pose at an event."""
     return _linkage(at).at_event(at.maths, at.given, event)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
-from loomopt.jobs.linkage.model import LinkagePose, Output, end_of_rest, event_value
+from loomopt.jobs.linkage.model import LinkageMotion, Output, end_of_rest, event_value
 from loomopt.jobs.linkage.program import linkage_of
 from loomopt.jobs.linkage.scene import reading
 from loomopt.maths import systems
@@ -41,13 +41,13 @@ LITERAL, FINEST = 1e-14, 720
 
 
 @dataclass
-class _Written:
+class _SymbolicParts:
     """Parts as symbols: what they close by, in order.
 
     pose: joints and links whose angles are symbols; taken: names of numbers; angles: those that move, by name.
     """
 
-    pose: chain.Pose
+    pose: chain.ChainPose
     taken: Collection[str] = ()
     angles: dict[str, Angle] = field(default_factory=dict)
     found: list[Equation] = field(default_factory=list)
@@ -80,10 +80,10 @@ class _Written:
         self.found += loop(pairs, symbol("phi"), [self.angles[name] for name in unknown], known, f"{part.name}: ")
 
 
-def symbolic(linked: Chain, taken: Collection[str] = ()) -> _Written:
+def symbolic(linked: Chain, taken: Collection[str] = ()) -> _SymbolicParts:
     """Return the parts as symbols, and what they close by; taken: names of numbers, which no angle has."""
     exact = replace(systems.sympy(), number=_exact)
-    written = _Written(chain.Pose(exact, Symbols(), symbol("phi")), taken)
+    written = _SymbolicParts(chain.ChainPose(exact, Symbols(), symbol("phi")), taken)
     for part in linked.parts:
         WRITTEN.get(part.kind, _placed)(written, part)
     return written
@@ -96,12 +96,12 @@ def _exact(value: float) -> Expression:
     return turned * sp.pi if turned.q <= FINEST else sp.nsimplify(value, rational=True, tolerance=LITERAL)
 
 
-def _placed(written: _Written, part: Part) -> None:
+def _placed(written: _SymbolicParts, part: Part) -> None:
     """Run the part's own formula."""
     written.pose.place(part)
 
 
-def _crank(written: _Written, part: Part) -> None:
+def _crank(written: _SymbolicParts, part: Part) -> None:
     start = written.pose.number(part, "start")
     turned = part.ratio * symbol("phi")
     angle = Angle(written.angle(part.name), sympy().Integer(part.ratio), sympy().Integer(0))
@@ -110,7 +110,7 @@ def _crank(written: _Written, part: Part) -> None:
     written.pin(part, link, "length")
 
 
-def _gear(written: _Written, part: Part) -> None:
+def _gear(written: _SymbolicParts, part: Part) -> None:
     sp, pose = sympy(), written.pose
     mate, carrier = symbol(written.angle(part.word("with"))), part.word("carrier")
     ratio, zero, start = sp.nsimplify(part.ratio), pose.number(part, "zero"), pose.number(part, "start")
@@ -124,7 +124,7 @@ def _gear(written: _Written, part: Part) -> None:
     written.pin(part, link, "length")
 
 
-def _cam(written: _Written, part: Part) -> None:
+def _cam(written: _SymbolicParts, part: Part) -> None:
     pose, sp = written.pose, sympy()
     lift, start = pose.number(part, "lift"), pose.number(part, "start")
     risen = lift * sp.Function(f"s_{part.word('law')}")(symbol("phi"))
@@ -135,7 +135,7 @@ def _cam(written: _Written, part: Part) -> None:
     written.pin(part, link, "length")
 
 
-def _dyad(written: _Written, part: Part) -> None:
+def _dyad(written: _SymbolicParts, part: Part) -> None:
     pose, names = written.pose, part.names("links")
     ends = [pose.joints[joint] for joint in part.names("joins")]
     links = [written.link(name, end, moving(written.angle(name))) for name, end in zip(names, ends, strict=True)]
@@ -144,7 +144,7 @@ def _dyad(written: _Written, part: Part) -> None:
     written.pin(part, links[1], names[1])
 
 
-def _guide(written: _Written, part: Part) -> Vector:
+def _guide(written: _SymbolicParts, part: Part) -> Vector:
     """Return the direction of a slider's guide."""
     sp, guide, tilt = sympy(), part.word("guide"), written.pose.number(part, "direction")
     angle = sp.Integer(0) if tilt is None else tilt
@@ -153,7 +153,7 @@ def _guide(written: _Written, part: Part) -> Vector:
     return Vector(sp.cos(angle), sp.sin(angle))
 
 
-def _slider(written: _Written, part: Part) -> None:
+def _slider(written: _SymbolicParts, part: Part) -> None:
     pose, (name,) = written.pose, part.names("links")
     link = written.link(name, pose.joints[part.word("from")], moving(written.angle(name)))
     written.angles[part.name] = moving(written.angle(part.name))
@@ -167,7 +167,7 @@ def _slider(written: _Written, part: Part) -> None:
     written.pin(part, link, name)
 
 
-def _slot(written: _Written, part: Part) -> None:
+def _slot(written: _SymbolicParts, part: Part) -> None:
     pose, name = written.pose, part.word("link")
     link = written.link(name, pose.joints[part.word("at")], moving(written.angle(name)))
     written.angles[part.name] = moving(written.angle(part.name))
@@ -182,7 +182,7 @@ WRITTEN = {"crank": _crank, "gear": _gear, "cam": _cam, "dyad": _dyad, "slider":
 """How each kind of part is written; the others by their own formula."""
 
 
-class SymbolicPose(LinkagePose):
+class SymbolicPose(LinkageMotion):
     """The linkage as symbols, its output q with primes."""
 
     def order(self, order: int) -> Number:
@@ -194,7 +194,7 @@ class SymbolicPose(LinkagePose):
         return symbol("q") - symbol(f"q_{event}")
 
 
-def _output(out: Output, written: _Written) -> Expression:
+def _output(out: Output, written: _SymbolicParts) -> Expression:
     """Return what the output is."""
     if out.measure in ("x", "y"):
         found = getattr(written.pose.joints[out.name].place, out.measure)

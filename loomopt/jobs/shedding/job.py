@@ -328,13 +328,13 @@ def _today(scene: Scene, sampler: Sampler) -> str:
     return f"{spring} would lift off: {lost}." if least < 0.0 else f"{spring} is too soft: {lost}."
 
 
-def _frame(scene: Scene, model: JobModel, numbers: Numbers) -> cam_limit.Frame | None:
+def _frame(scene: Scene, model: JobModel, numbers: Numbers) -> cam_limit.SymmetricFrame | None:
     """Return the frame that the loads make of it; None where their sum is another."""
     number, known = systems.mpmath(cam_limit.DIGITS).number, scene.mechanism
     force = _force(model, numbers)
     middle, inertia = force(RISE, 0.5, 0.5, 0.0, 0.0), force(RISE, 0.5, 0.5, 0.0, 1.0)
     limit = scene.limits.get(LIMIT)
-    found = cam_limit.Frame(
+    found = cam_limit.SymmetricFrame(
         most=number(limit.max if limit and limit.max else scene.table(LawTarget).acceleration),
         travel=number(known["travel"]),
         preload=number(scene.bounds["X0"].max if "X0" in scene.bounds else known["X0"]),

@@ -16,7 +16,7 @@ from loomopt.maths.periodic_cubic import interval_at
 from loomopt.maths.systems import Maths, Number
 from loomopt.maths.turning_points import followed
 from loomopt.model import drive
-from loomopt.model.kinematics import Arcs, Chain, Group
+from loomopt.model.kinematics import Arcs, DerivedChain, Group
 from loomopt.model.model import CycleQuantity, DesignRow, Instant, JobModel
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
@@ -156,13 +156,13 @@ class CamFrame:
         )
 
     @lazy
-    def _chain(self) -> Chain | None:
+    def _chain(self) -> DerivedChain | None:
         """The knots of a spline law."""
         if not isinstance(self.law, Spline):
             return None
         inner = range(1, self.law.intervals)
         stations = tuple({SEGMENT: float(segment), LAW: float(k)} for segment in (RISE, RETURN) for k in inner)
-        return Chain(frozenset(self.law.names), self.law.recurrent, self.law.followed, stations)
+        return DerivedChain(frozenset(self.law.names), self.law.recurrent, self.law.followed, stations)
 
     def _begins(self, maths: Maths, given: Given) -> tuple[Number, ...]:
         begins = (0, *(given.values[f"begin.{name}"] for name in ("far", "return", "near")))

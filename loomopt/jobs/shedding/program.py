@@ -229,7 +229,7 @@ def demand_moving(scene: Scene, instead: str) -> None:
 
 
 @final
-class Sizes:
+class SpringScale:
     """force, N: the largest sum of the loads' magnitudes, the spring apart; stiffness, N/m: what keeps contact.
 
     sampler: the frame today; stretch: the largest elongation its spring may have, m; most: its largest stiffness.
@@ -534,10 +534,10 @@ class SheddingTask(Task):
     # Natural sizes.
 
     @lazy
-    def sizes(self) -> Sizes:
+    def sizes(self) -> SpringScale:
         """Of the spring and of forces, from the frame today."""
         most = self.limited["K1"][1] if "K1" in self.scene.bounds else math.inf
-        return Sizes(self.sampler, self.limited["X0"][1] + self.known["travel"], most)
+        return SpringScale(self.sampler, self.limited["X0"][1] + self.known["travel"], most)
 
     def figure_size(self, name: str) -> float:
         """Return the natural size of a figure."""

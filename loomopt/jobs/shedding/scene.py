@@ -31,7 +31,7 @@ from loomopt.physics.cycle import Where
 from loomopt.physics.effects import kinds
 from loomopt.physics.effects.kinds import Load
 from loomopt.physics.mechanisms import cam_follower, cam_spline
-from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
+from loomopt.physics.mechanisms.cam_motion import CamLaw, NamedLaw, Spline, Tabulated, knots
 from loomopt.physics.schema import Axis, Conflict, Figure, Name, Table, Target, TargetTable
 from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.scenes import csv_tables
@@ -226,7 +226,9 @@ def moves(scene: Scene) -> tuple[Segment, ...]:
     found, before = [], heights(scene)[-1]
     for each, end in zip(own.segments, heights(scene), strict=True):
         still = end == before
-        found.append(Segment(None) if still else Segment(Named(each.law) if each.law else chosen(scene), end > before))
+        found.append(
+            Segment(None) if still else Segment(NamedLaw(each.law) if each.law else chosen(scene), end > before)
+        )
         before = end
     return tuple(found)
 
@@ -257,7 +259,7 @@ def chosen(scene: Scene) -> CamLaw:
     name = scene.table(HealdFrame).law
     if name == "spline":
         return Spline(len(_coefficients(scene)) - 1)
-    return Tabulated(read_law(scene).law) if name == "table" else Named(name)
+    return Tabulated(read_law(scene).law) if name == "table" else NamedLaw(name)
 
 
 def check_known(scene: Scene, there: Collection[Where], called: str) -> None:

@@ -41,7 +41,7 @@ from loomopt.physics.effects.kinds import Load, Motion
 from loomopt.physics.mechanisms import cam_spline
 from loomopt.physics.mechanisms.cam_follower import Contact, Follower
 from loomopt.physics.mechanisms.cam_laws import LawDerivatives
-from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, of_knots
+from loomopt.physics.mechanisms.cam_motion import CamLaw, NamedLaw, Spline, Tabulated, of_knots
 from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.schema import Values
 from loomopt.picture import effect_equations
@@ -89,7 +89,7 @@ def law(found: CamLaw) -> list[Equation]:
         return _spline(found)
     if isinstance(found, Tabulated):
         return _table(found.table)
-    assert isinstance(found, Named)
+    assert isinstance(found, NamedLaw)
     u, ends = symbol("u"), [Fraction(0), *found.breaks, Fraction(1)]
     pieces = [found.at(systems.sympy(), {}, u, k) for k in range(len(ends) - 1)]
     sp = sympy()

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from loomopt.physics.mechanisms.dyad import Vector
     from loomopt.physics.motion.flight import Cam, Course
     from loomopt.physics.motion.free import Body
-    from loomopt.physics.motion.turning import Turning
+    from loomopt.physics.motion.turning import CrankTurn
 
 
 class Motion:
@@ -419,7 +419,7 @@ class Check(Effect, Generic[Pose]):
 class StatePeak(NamedTuple):
     """A figure of a state: the largest |value| over the cycle, or the least value, of what is read."""
 
-    read: "Callable[[Moved], Number]"
+    read: "Callable[[StateInstant], Number]"
     least: bool = False
 
 
@@ -459,7 +459,7 @@ class State(Effect):
     samples: Callable[[Inputs[None]], float] = lambda at: 0.0
     moved: Callable[[Inputs[Motion], Number, Number, Number], Any] | None = None
     peaks: Mapping[str, StatePeak] = field(default_factory=dict)
-    columns: "Mapping[str, Callable[[Moved], Number]]" = field(default_factory=dict)
+    columns: "Mapping[str, Callable[[StateInstant], Number]]" = field(default_factory=dict)
     acts: Literal["output"] = "output"
 
 
@@ -475,7 +475,7 @@ class Speed(Effect):
 
     motor: Callable[[Inputs[None], Number], Number]
     flywheel: Callable[[Inputs[None]], Number]
-    rows: Mapping[str, Callable[[Inputs[None], "Turning"], float]] = field(default_factory=dict)
+    rows: Mapping[str, Callable[[Inputs[None], "CrankTurn"], float]] = field(default_factory=dict)
     most: str = ""
 
 
@@ -577,7 +577,7 @@ class UnsteadyError(ArithmeticError):
         self.problem, self.remedy = problem, remedy
 
 
-class Moved(NamedTuple):
+class StateInstant(NamedTuple):
     """What is read of a state at one instant; force(): Q, N or N·m; coordinate(): z, the reply of corners included."""
 
     pose: Number

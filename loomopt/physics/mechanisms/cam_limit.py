@@ -15,7 +15,7 @@ DIGITS, ROUNDS = 40, 400
 
 
 @dataclass(frozen=True)
-class Frame:
+class SymmetricFrame:
     """A frame that rises and falls alike, numbers of one number system, SI.
 
     most: largest |s''|; travel, preload: of the spring, m; steady: least cam force and weight, N; before, after: pull
@@ -38,7 +38,7 @@ class Frame:
         return above, below
 
 
-def least_stiffness(frame: Frame, high: Number) -> Number | None:
+def least_stiffness(frame: SymmetricFrame, high: Number) -> Number | None:
     """Return the stiffness between 0 and `high`, N/m, where bang and arc take the whole rise; frame: in mpmath.
 
     By halving: exact, and never astray. None where `high` is too low, or the arc leaves the bound.
@@ -55,7 +55,7 @@ def least_stiffness(frame: Frame, high: Number) -> Number | None:
     return high if alpha + beta <= frame.most else None
 
 
-def _duration(frame: Frame, stiffness: Number) -> Number:
+def _duration(frame: SymmetricFrame, stiffness: Number) -> Number:
     """Return the share of the rise that bang and arc take, infinite where the spring cannot hold the frame up."""
     context = systems.mpmath(DIGITS)
     (a, b), (c, d) = frame.slopes(stiffness)

@@ -41,7 +41,7 @@ class CamLaw(Hashable, Protocol):
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedLaw:
     """A law with a name."""
 
     name: str

@@ -101,7 +101,7 @@ class Part:
 
 
 @dataclass
-class Pose:
+class ChainPose:
     """The linkage at crank angles φ, rad, any shape; values: numbers by name, SI; switch: the cams' pieces there."""
 
     maths: Maths
@@ -136,14 +136,14 @@ class Pose:
         KINDS[part.kind](self, part)
 
 
-def _pivot(pose: Pose, part: Part) -> None:
+def _pivot(pose: ChainPose, part: Part) -> None:
     """Place a point of the frame; without coordinates it is the origin, whose zeros are in no formula."""
     x, y = pose.number(part, "x"), pose.number(part, "y")
     here = None if x is None and y is None else Vector(0 if x is None else x, 0 if y is None else y)
     pose.joints[part.name] = Joint(lambda order: None if order else here)
 
 
-def _crank(pose: Pose, part: Part) -> None:
+def _crank(pose: ChainPose, part: Part) -> None:
     """Place what turns with φ: angle = start + ratio φ. Another ratio is a gear on the main shaft."""
     ratio, start, phi = part.ratio, pose.number(part, "start"), pose.phi
 
@@ -154,21 +154,21 @@ def _crank(pose: Pose, part: Part) -> None:
 
 
 def _by_angle(
-    pose: Pose, part: Part, angle: Callable[[], Number | None], rates: Callable[[int], Number | None]
+    pose: ChainPose, part: Part, angle: Callable[[], Number | None], rates: Callable[[int], Number | None]
 ) -> None:
     """Place a link whose angle from x is known, rad, with its derivatives."""
     maths = pose.maths
     _turning(pose, part, Link(pose.joints[part.word("at")], lambda: polar(maths, angle()), rates, angle=angle))
 
 
-def _turning(pose: Pose, part: Part, link: Link) -> None:
+def _turning(pose: ChainPose, part: Part, link: Link) -> None:
     """Add a link that turns about a joint, and the pin at its end."""
     pose.links[part.name] = link
     if part.word("pin"):
         pose.joints[part.word("pin")] = link.point(pose.number(part, "length"))
 
 
-def _gear(pose: Pose, part: Part) -> None:
+def _gear(pose: ChainPose, part: Part) -> None:
     """Place a gear: its angle from the carrier is start + ratio (angle of its mate from the carrier − zero).
 
     ratio < 0: they mesh from outside. A whole ratio needs no angle: unit vectors are multiplied as complex numbers.
@@ -215,7 +215,7 @@ def _power(unit: Vector, exponent: int) -> Vector:
     return found
 
 
-def _cam(pose: Pose, part: Part) -> None:
+def _cam(pose: ChainPose, part: Part) -> None:
     """Place a link that a cam turns; which stretch of its turn it is in is data of the node: `Chain.corners`."""
     start, lift = pose.number(part, "start"), pose.number(part, "lift")
     at = DwellCam(pose.maths, _lasts(pose, part), lift, pose.phi, pose.switch[cam_switch(part)])
@@ -227,12 +227,12 @@ def cam_switch(part: Part) -> str:
     return f"cam {part.name}"
 
 
-def _lasts(pose: Pose, part: Part) -> Stretches:
+def _lasts(pose: ChainPose, part: Part) -> Stretches:
     begins, rise, dwell, fall = (pose.number(part, key) for key in ("begins", "rise", "far_dwell", "return"))
     return Stretches(part.word("law"), 0 if begins is None else begins, rise, 0 if dwell is None else dwell, fall)
 
 
-def _point(pose: Pose, part: Part) -> None:
+def _point(pose: ChainPose, part: Part) -> None:
     """Place a point of a link: by radius and angle from its line, or along its line and across it to the left."""
     link, radius = pose.links[part.word("on")], pose.number(part, "radius")
     if radius is None:
@@ -243,7 +243,7 @@ def _point(pose: Pose, part: Part) -> None:
         pose.joints[part.name] = link.point(*scaled(radius, polar(pose.maths, pose.number(part, "angle"))))
 
 
-def _dyad(pose: Pose, part: Part) -> None:
+def _dyad(pose: ChainPose, part: Part) -> None:
     """Place an Assur group RRR."""
     (first, second), names = (pose.joints[name] for name in part.names("joins")), part.names("links")
     r1, r2 = (pose.number(part, name) for name in names)
@@ -255,7 +255,7 @@ def _dyad(pose: Pose, part: Part) -> None:
     pose.margins[part.name] = group
 
 
-def _slider(pose: Pose, part: Part) -> None:
+def _slider(pose: ChainPose, part: Part) -> None:
     """Place an Assur group RRP."""
     (name,) = part.names("links")
     group = OnGuide(
@@ -273,7 +273,7 @@ def _slider(pose: Pose, part: Part) -> None:
     pose.slides[part.name], pose.margins[part.name] = group.slide(), group
 
 
-def _slot(pose: Pose, part: Part) -> None:
+def _slot(pose: ChainPose, part: Part) -> None:
     """Place an Assur group RPR."""
     pivot, through = pose.joints[part.word("at")], pose.joints[part.word("through")]
     group = Slotted(pose.maths, pivot, through, pose.number(part, "offset"))
@@ -283,7 +283,7 @@ def _slot(pose: Pose, part: Part) -> None:
         pose.joints[part.word("pin")] = link.point(pose.number(part, "length"))
 
 
-KINDS: Mapping[str, Callable[[Pose, Part], None]] = {
+KINDS: Mapping[str, Callable[[ChainPose, Part], None]] = {
     "pivot": _pivot,
     "crank": _crank,
     "gear": _gear,
@@ -364,9 +364,9 @@ class Chain:
 
     parts: tuple[Part, ...]
 
-    def pose(self, maths: Maths, values: Values, phi: Number, switch: Values = NO_SWITCH) -> Pose:
+    def pose(self, maths: Maths, values: Values, phi: Number, switch: Values = NO_SWITCH) -> ChainPose:
         """Return the linkage at crank angles φ, rad, of any shape; values: numbers by name, SI."""
-        pose = Pose(maths, values, phi, switch)
+        pose = ChainPose(maths, values, phi, switch)
         for part in self.parts:
             KINDS[part.kind](pose, part)
         return pose
@@ -378,7 +378,7 @@ class Chain:
 
     def corners(self, cam: Part, maths: Maths, values: Values) -> tuple[Number, ...]:
         """Return the crank angles, rad, between the stretches of a cam, for `dwell_cam.stretch`."""
-        return _lasts(Pose(maths, values, None), cam).corners(maths)
+        return _lasts(ChainPose(maths, values, None), cam).corners(maths)
 
     def switch(self, values: Values, phi: "Floats") -> dict[str, Number]:
         """Return the stretches in which all cams are at crank angles φ, rad, as a node has them."""

@@ -14,7 +14,7 @@ from loomopt.base.records import lazy
 from loomopt.maths.systems import Number
 from loomopt.physics.effects.kinds import Applied
 from loomopt.physics.mechanisms import joint_forces
-from loomopt.physics.mechanisms.chain import FRAME_NAME, Chain, Part, Pose
+from loomopt.physics.mechanisms.chain import FRAME_NAME, Chain, ChainPose, Part
 from loomopt.physics.mechanisms.dyad import Dyad, Vector, dot
 from loomopt.physics.mechanisms.joint_forces import Wrench, cross, minus, plus
 from loomopt.physics.mechanisms.moving import known, less, polar, total, turned_by
@@ -103,7 +103,7 @@ def guides(linked: Chain) -> dict[str, str]:
     return {slider_of(part.name): part.word("guide") or FRAME_NAME for part in sliders}
 
 
-def turned(linked: Chain, pose: Pose, place: tuple[str, str]) -> Number:
+def turned(linked: Chain, pose: ChainPose, place: tuple[str, str]) -> Number:
     """Return how the second body of a pin turns from the first one, per rad of the crank."""
     with_it = guides(linked)
     first, second = (pose.links[with_it.get(body, body)].rates(1) for body in joined(linked, place))
@@ -126,7 +126,7 @@ class Walk:
     """
 
     linked: Chain
-    pose: Pose
+    pose: ChainPose
     loads: dict[str, list[Wrench]] = field(default_factory=dict)
     forces: dict[tuple[str, str], Vector] = field(default_factory=dict)
     teeth: dict[str, Number] = field(default_factory=dict)
@@ -233,7 +233,7 @@ class Walk:
         self.given(joint, part, minus(plus(own.force, push)))
 
 
-def walked(linked: Chain, pose: Pose, applied: Sequence[Applied]) -> Walk:
+def walked(linked: Chain, pose: ChainPose, applied: Sequence[Applied]) -> Walk:
     """Return a chain with the forces in all its joints, N, and what the main shaft must give."""
     walk = Walk(linked, pose)
     for load in applied:
@@ -246,7 +246,7 @@ def walked(linked: Chain, pose: Pose, applied: Sequence[Applied]) -> Walk:
     return walk
 
 
-def shaken(applied: Sequence[Applied], pose: Pose, about: Vector) -> Wrench:
+def shaken(applied: Sequence[Applied], pose: ChainPose, about: Vector) -> Wrench:
     """Return what all moving masses do to the frame: force, N, and moment about a point, N·m."""
     found = []
     for load in (load for load in applied if load.inertial):

@@ -67,7 +67,7 @@ class Landing(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Turn:
+class FlightTurn:
     """One turn: its stretches in order, where contact is lost, the landings, and the state at its end."""
 
     stretches: tuple[Stretch, ...]
@@ -82,11 +82,11 @@ class Course:
 
     body: Body
     cam: Cam
-    turns: tuple[Turn, ...]
+    turns: tuple[FlightTurn, ...]
     period: int | None
 
     @property
-    def periodic(self) -> tuple[Turn, ...]:
+    def periodic(self) -> tuple[FlightTurn, ...]:
         """The turns of one period, the last one where there is none."""
         return self.turns[-(self.period or 1) :]
 
@@ -145,7 +145,7 @@ def follow(body: Body, cam: Cam, restitution: float, turns: int) -> Course:
     Raises ArithmeticError where a turn does not end in a reasonable number of pieces.
     """
     states: list[FlightState | None] = [None]
-    found: list[Turn] = []
+    found: list[FlightTurn] = []
     rule = _Rule(body, cam, restitution)
     while len(found) < turns:
         found.append(rule.turn(states[-1]))
@@ -173,7 +173,7 @@ class _Rule:
     cam: Cam
     restitution: float
 
-    def turn(self, state: FlightState | None) -> Turn:
+    def turn(self, state: FlightState | None) -> FlightTurn:
         """Return the turn from a state, None for contact."""
         angle, stretches, lifts, landings = 0.0, list[Stretch](), list[float](), list[Landing]()
         blind = 0.0
@@ -183,7 +183,7 @@ class _Rule:
                 if angle < min(begin, TURN):
                     stretches.append(Stretch(angle, min(begin, TURN), None))
                 if begin >= TURN:
-                    return Turn(tuple(stretches), tuple(lifts), tuple(landings), None)
+                    return FlightTurn(tuple(stretches), tuple(lifts), tuple(landings), None)
                 angle = max(begin, angle)
                 lifts.append(angle)
                 there = self.cam.motion(angle)
@@ -196,7 +196,7 @@ class _Rule:
             blind = max(0.0, blind - time)
             angle, state = end_angle, FlightState(at.x, at.v)
             if how == "turn":
-                return Turn(tuple(stretches), tuple(lifts), tuple(landings), state)
+                return FlightTurn(tuple(stretches), tuple(lifts), tuple(landings), state)
             if how == "landing":
                 state, blind, landing = self._landed(angle, state)
                 landings.append(landing)

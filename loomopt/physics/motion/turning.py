@@ -36,7 +36,7 @@ class NoTurn(ArithmeticError):  # noqa: N818 (it names what was found)
 
 
 @dataclass(frozen=True)
-class Turning:
+class CrankTurn:
     """The crank's motion over one turn.
 
     starts: (pieces + 1,) crank angles, rad; no_load: speed, rad/s, at which the motor gives no torque; changes, halves:
@@ -85,7 +85,7 @@ def _extremes(change: Floats, half: Floats) -> Floats:
     return np.asarray(chebyshev.chebval(np.concatenate([x, low]), half))
 
 
-def solved(starts: Floats, mean: float, surplus: Surplus) -> Turning:
+def solved(starts: Floats, mean: float, surplus: Surplus) -> CrankTurn:
     """Return the periodic motion with no surplus at any angle and ∮dφ/ω = 2π/mean.
 
     starts: (pieces + 1,) crank angles, rad, between which the surplus is smooth; mean: speed, rad/s. Raises NoTurn.
@@ -96,7 +96,7 @@ def solved(starts: Floats, mean: float, surplus: Surplus) -> Turning:
         return _resolved(starts, mean, surplus, MANY)
 
 
-def _resolved(starts: Floats, mean: float, surplus: Surplus, points_first: int) -> Turning:
+def _resolved(starts: Floats, mean: float, surplus: Surplus, points_first: int) -> CrankTurn:
     """Return the motion, with so many points on each piece at first, and twice as many where that is too few."""
     degrees = [points_first] * (len(starts) - 1)
     guess = _Motion(np.zeros(sum(degrees)), mean**2 / 2, mean)
@@ -111,7 +111,7 @@ def _resolved(starts: Floats, mean: float, surplus: Surplus, points_first: int) 
             halves = points.integrated(series, found.half)
             if min(float(chebyshev.chebval(np.linspace(-1, 1, 8 * len(each)), each).min()) for each in halves) <= 0.0:
                 raise NoTurn
-            return Turning(starts, found.no_load, tuple(series), tuple(halves))
+            return CrankTurn(starts, found.no_load, tuple(series), tuple(halves))
         degrees = [2 * degree if more else degree for degree, more in zip(degrees, coarse, strict=True)]
         if max(degrees) > MOST:
             raise NoTurn

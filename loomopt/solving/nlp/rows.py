@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from loomopt.base.records import lazy
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
-from loomopt.model.kinematics import Chain
+from loomopt.model.kinematics import DerivedChain
 from loomopt.model.limits import CycleLimit
 from loomopt.model.model import Integral, JobModel
 from loomopt.model.program import Program
@@ -164,7 +164,7 @@ def station_switches(model: JobModel, variables: Collection[str]) -> list[Values
     return [switch for chain in _chains(model, variables).values() for switch in chain.stations]
 
 
-def _chains(model: JobModel, variables: Collection[str]) -> dict[str, Chain]:
+def _chains(model: JobModel, variables: Collection[str]) -> dict[str, DerivedChain]:
     """Chains that depend on `variables`, by the name of their arc."""
     chains = {arc.name: arc.chain for arc in model.kinematics.arcs if arc.chain}
     return {name: chain for name, chain in chains.items() if chain.roots.intersection(variables)}

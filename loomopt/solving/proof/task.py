@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from loomopt.maths import intervals, systems
-from loomopt.maths.interval_series import Series, along
+from loomopt.maths.interval_series import IntervalSeries, along
 from loomopt.maths.intervals import Enclosure, Floats, Interval, interval
 from loomopt.maths.systems import Maths, Number
 from loomopt.maths.systems import boxes as box_system
@@ -84,7 +84,7 @@ class BoxRows(Rows):
         whole = along(middles - half, middles + half)
         series = Quantities(self.model, (self.maths, systems.box_series()), self.given)
         found = series((name,), Node(begin + whole * width, switch))[0]
-        bends = found.terms.bend if isinstance(found, Series) else interval(0.0)
+        bends = found.terms.bend if isinstance(found, IntervalSeries) else interval(0.0)
         return _summed(values * (2 * half), count) + _summed(bends * (interval(half) ** 3 * 2.0 / 3.0), count)
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from loomopt.maths import intervals, systems
-from loomopt.maths.interval_series import Series, along
+from loomopt.maths.interval_series import IntervalSeries, along
 from loomopt.maths.intervals import PI, Enclosure, Floats, Interval, interval
 from loomopt.maths.systems import Number
 from loomopt.model.kinematics import Follows
@@ -228,7 +228,7 @@ class OverPiece(Function):
         begin, width = self.ends(given)
         quantities = Quantities(self.box.model, self._both, given)
         found = quantities((self.quantity,), Node(begin + along(low, high) * width, self.switch))[0] * self.sign
-        terms = found.terms if isinstance(found, Series) else (found, interval(0.0), interval(0.0))
+        terms = found.terms if isinstance(found, IntervalSeries) else (found, interval(0.0), interval(0.0))
         return _Terms(*terms)
 
 

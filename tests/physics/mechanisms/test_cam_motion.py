@@ -10,7 +10,7 @@ from loomopt.physics.mechanisms import cam_spline
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.cam_motion import (
     LawColumn,
-    Named,
+    NamedLaw,
     Spline,
     Tabulated,
     accelerations,
@@ -52,7 +52,7 @@ def test_a_spline_law_chooses_its_inner_knots_and_is_the_spline_of_all(mirror):
 
 def test_named_and_tabulated_laws_are_those_of_their_formulas():
     for name, law in LAWS.items():
-        named = Named(name)
+        named = NamedLaw(name)
         assert (named.key, named.breaks, named.symmetric) == (name, law.breaks, law.symmetric)
         assert named.at(FLOAT, named.prepared(FLOAT, {}), 0.02, 0) == law.formula(FLOAT, 0.02, 0)
     table = cam_spline.tabulated(*POINTS)
@@ -63,7 +63,7 @@ def test_named_and_tabulated_laws_are_those_of_their_formulas():
 
 @pytest.mark.parametrize("name", ["cycloidal", "modified_sine", "modified_trapezoid"])
 def test_a_law_is_sampled_at_knots_wherever_its_own_breaks_are(name):
-    law, n = Named(name), 16
+    law, n = NamedLaw(name), 16
     ends = [float(end) for end in law.breaks]
     sampled = accelerations(law, {}, n)
     assert len(sampled) == n + 1
@@ -186,7 +186,8 @@ def test_a_choice_among_knots_reads_one():
 
 
 @pytest.mark.parametrize(
-    "law", [Spline(5), Spline(16), Spline(256), Tabulated(cam_spline.tabulated(*POINTS)), Named("modified_trapezoid")]
+    "law",
+    [Spline(5), Spline(16), Spline(256), Tabulated(cam_spline.tabulated(*POINTS)), NamedLaw("modified_trapezoid")],
 )
 def test_the_middle_is_where_the_law_passes_a_half_on_its_piece(law):
     n = getattr(law, "intervals", 0)

@@ -281,7 +281,7 @@ def test_balls_and_boxes_hold_what_60_digits_say(case):
                 assert found == exact[order][name] or found.overlaps(enclosed(exact[order][name])), (angle, order, name)
         for order in range(2):
             for name, found in readings(series, order, only):
-                terms = found.terms if isinstance(found, interval_series.Series) else (found,)
+                terms = found.terms if isinstance(found, interval_series.IntervalSeries) else (found,)
                 for more, term in enumerate(terms):
                     assert holds(term, exact[order + more][name] / (1 + (more == 2))), (angle, order, more, name)
 

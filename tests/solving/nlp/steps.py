@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from loomopt.maths.systems import Maths, Number
-from loomopt.model.kinematics import Arcs, Chain, Group
+from loomopt.model.kinematics import Arcs, DerivedChain, Group
 from loomopt.model.limits import CycleLimit, DesignLimit
 from loomopt.model.model import CycleQuantity, DesignRow, JobModel
 from loomopt.model.objectives import Value
@@ -48,7 +48,7 @@ class Steps:
     def arcs(self) -> tuple[Arcs, ...]:
         """One stretch for each step, after those of the half of the turn that is raised."""
         stations = tuple({STEP: float(k)} for k in range(COUNT))
-        follow = Chain(frozenset(NAMES), HEIGHTS, lambda m, v: heights(m, v, self.bend), stations)
+        follow = DerivedChain(frozenset(NAMES), HEIGHTS, lambda m, v: heights(m, v, self.bend), stations)
         raised = Arcs(RAISED, lambda maths, given: tuple(map(maths.number, HALF)), raised_at)
         return raised, Arcs(STEP, corners, step_at, chain=follow if self.lifted else None)
 

@@ -16,7 +16,7 @@ from loomopt.physics.effects.kinds import Inputs, Speed
 from loomopt.physics.schema import Figure, Table
 
 if TYPE_CHECKING:
-    from loomopt.physics.motion.turning import Turning
+    from loomopt.physics.motion.turning import CrankTurn
 
 
 class Parameters(Table):
@@ -37,23 +37,23 @@ def flywheel(at: Inputs[object]) -> Number:
     return at.table["flywheel"]
 
 
-def fluctuation(at: Inputs[object], turning: "Turning") -> float:
+def fluctuation(at: Inputs[object], turning: "CrankTurn") -> float:
     """Return (greatest − least speed)/mean speed."""
     least, greatest = turning.range
     return (greatest - least) / float(at.values["speed"])
 
 
-def speed_fdc(at: Inputs[object], turning: "Turning") -> float:
+def speed_fdc(at: Inputs[object], turning: "CrankTurn") -> float:
     """Return ω(β), rad/s."""
     return turning.speed(float(at.values["beta"]))
 
 
-def no_load_speed(at: Inputs[object], turning: "Turning") -> float:
+def no_load_speed(at: Inputs[object], turning: "CrankTurn") -> float:
     """Return ω_n, rad/s."""
     return turning.no_load
 
 
-def motor_torque_max(at: Inputs[object], turning: "Turning") -> float:
+def motor_torque_max(at: Inputs[object], turning: "CrankTurn") -> float:
     """Return the motor's torque where the crank is slowest, N·m."""
     return float(motor(at, turning.range[0]))
 
