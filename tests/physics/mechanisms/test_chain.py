@@ -519,7 +519,7 @@ def test_what_is_not_read_is_not_computed():
     assert pose.joints["B"].place.x == math.cos(0.5)
     with pytest.raises(ValueError, match=r"math domain|nonnegative"):
         _ = pose.joints["C"].place
-    assert chains.Pose is type(pose)
+    assert chains.ChainPose is type(pose)
 
 
 @every_case
