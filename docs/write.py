@@ -23,8 +23,8 @@ from loomopt.interface.cli.app import run
 from loomopt.interface.files import outputs, svg
 from loomopt.interface.tables import rows
 from loomopt.interface.text import glossary
-from loomopt.interface.text.layout import Grid
 from loomopt.jobs import registry
+from loomopt.picture.table import TextTable
 from loomopt.solving.answer.solution import Words
 
 DOCS = Path(__file__).parent
@@ -61,11 +61,11 @@ def glossary_text() -> str:
         parts.append(
             f"## {str(title).removeprefix(f'{scene.name}: ').capitalize()}\n\n![Sketch](../sketch-{job}.svg)\n"
         )
-        parts += [f"### {grid.title}\n\n{table(grid)}" for grid in grids if isinstance(grid, Grid)]
+        parts += [f"### {grid.title}\n\n{table(grid)}" for grid in grids if isinstance(grid, TextTable)]
     return "\n".join(parts)
 
 
-def table(grid: Grid) -> str:
+def table(grid: TextTable) -> str:
     """Return a table as Markdown."""
     lines = [grid.columns, ("---",) * len(grid.columns), *grid.lines]
     return "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |\n" for line in lines)
@@ -145,14 +145,14 @@ def symbols(name: str) -> str:
     words = Words(scene)
     shown = [row["name"] for row in rows(api.evaluate(scene), scene)]
     lines = tuple((f"`{each}`", words.unit(each).removeprefix("1"), said[each]) for each in shown)
-    return table(Grid("", ("symbol", "unit", "what it is"), lines))
+    return table(TextTable("", ("symbol", "unit", "what it is"), lines))
 
 
 def effects(name: str) -> str:
     """Return the effects that scenes of a job may call for, as Markdown."""
     known = registry.load(SHOWN.get(name, name)).schema.effects.values()
     lines = tuple((f"`{each.name}`", type(each).__name__.lower(), each.summary) for each in known)
-    return table(Grid("", ("effect", "kind", "what it is"), lines))
+    return table(TextTable("", ("effect", "kind", "what it is"), lines))
 
 
 def rewritten(match: re.Match[str]) -> str:

@@ -15,8 +15,8 @@ from loomopt.base.units import factor
 from loomopt.interface import results
 from loomopt.interface.files import outputs
 from loomopt.interface.results import PICTURE, Evaluation
-from loomopt.interface.text.layout import Grid
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
+from loomopt.picture.table import TextTable
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Finding, Words
@@ -125,7 +125,7 @@ class Comparison:
         found = [{"name": name, **{key: each[key] for key in kept}} for name, each in told]
         return {"designs": found, "units": units, "differs": [row.name for row in self.rows if row.differs]}
 
-    def parts(self) -> list[str | Grid]:
+    def parts(self) -> list[str | TextTable]:
         """Return the parts that a terminal shows."""
         names = tuple(each.name for each in self.designs)
         lines = []
@@ -134,7 +134,7 @@ class Comparison:
             lines.append((row.name, *cells, "" if row.unit == "1" else row.unit, "differs" if row.differs else ""))
         right = tuple(range(1, len(names) + 1))
         heads = ("", *names, "unit", "")
-        grid = Grid("", heads, tuple(lines), right, first=(0, *right, len(names) + 1), more="--json")
+        grid = TextTable("", heads, tuple(lines), right, first=(0, *right, len(names) + 1), more="--json")
         told = []
         for each in self.designs:
             broken = [limit.name for limit in each.found.limits if not limit.ok and not limit.rounding]

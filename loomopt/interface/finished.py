@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from loomopt.interface.report.animation import MovingPicture
     from loomopt.interface.report.markup import Part
-    from loomopt.interface.text.layout import Grid
+    from loomopt.picture.table import TextTable
 
 EXECUTORS = "an executor of concurrent.futures, or a function that makes one"
 
@@ -224,7 +224,7 @@ def study_identity(study: SceneStudy) -> Mapping[str, object]:
 class Printed:
     """A study that prints as in a terminal, and shows the same in Jupyter."""
 
-    def parts(self) -> "list[str | Grid]":
+    def parts(self) -> "list[str | TextTable]":
         """Return what a terminal shows of it."""
         raise NotImplementedError
 
@@ -263,7 +263,7 @@ class EffectsStudy(Printed, study.Found):
 
         return beside.effects(self)
 
-    def parts(self) -> "list[str | Grid]":
+    def parts(self) -> "list[str | TextTable]":
         """Return what a terminal shows of it."""
         from loomopt.interface.text import effects
 
@@ -296,7 +296,7 @@ class AccuracyStudy(Printed, AccuracyResult):
             accuracy.write(self, place)
         return made
 
-    def parts(self) -> "list[str | Grid]":
+    def parts(self) -> "list[str | TextTable]":
         """Return what a terminal shows of it."""
         from loomopt.interface.figures import accuracy
 
@@ -323,7 +323,7 @@ def accuracy_found(scene: Scene, full: bool, on_step: Callable[[str], None] | No
     return AccuracyStudy(**{each.name: getattr(found, each.name) for each in fields(found)})
 
 
-def printed(parts: "Sequence[str | Grid]") -> str:
+def printed(parts: "Sequence[str | TextTable]") -> str:
     """Return parts as the terminal shows them."""
     from loomopt.interface.text import layout
 
@@ -360,7 +360,7 @@ class ToleranceStudy(Printed, tolerance.Found):
         share = self.yields[tolerance.ALL].value
         return f"<ToleranceStudy {self.plan.scene.name}, {self.plan.target}: all limits hold on {100 * share:.4g} %>"
 
-    def parts(self) -> "list[str | Grid]":
+    def parts(self) -> "list[str | TextTable]":
         """Return what a terminal shows of it."""
         from loomopt.interface.text import tolerance as text
 
@@ -397,7 +397,7 @@ class SensitivityStudy(Printed, sensitivity.Found):
         told = self.refused or f"{len(self.rows)} derivatives, {len(self.prices)} prices"
         return f"<SensitivityStudy {self.scene.name}, {self.target}: {told}>"
 
-    def parts(self) -> "list[str | Grid]":
+    def parts(self) -> "list[str | TextTable]":
         """Return what a terminal shows of it."""
         from loomopt.interface.text import sensitivity as text
 

@@ -6,6 +6,7 @@ import pytest
 
 from loomopt.interface.cli.app import run
 from loomopt.interface.text import layout
+from loomopt.picture.table import TextTable, spaced
 
 M0 = ("--over", "operation.M0=700:760:60 N*m", "--over", "operation.speed=500:600:100 rpm", "--with", "gravity")
 FRONT = ("shedding-static", "--minimise", "K1", "--against", "contact_max", "--points", "3")
@@ -73,7 +74,7 @@ def test_no_digit_is_cut_and_what_is_asked_for_is_there(printed, command, column
 @pytest.mark.parametrize("command", [command for command in ASKED if command[0] != "simulate"], ids=" ".join)
 def test_columns_that_have_gone_are_named_with_how_to_see_them(printed, command, columns):
     texts, parts = printed(command)
-    for grid in (part for part in parts if isinstance(part, layout.Grid)):
+    for grid in (part for part in parts if isinstance(part, TextTable)):
         shown, told = layout.narrowed(grid, columns)
         missing = len(grid.columns) - len(shown.columns)
         assert bool(missing) == bool(told)
@@ -83,7 +84,7 @@ def test_columns_that_have_gone_are_named_with_how_to_see_them(printed, command,
             assert layout.narrowed(grid, wide) == (grid, "")
             assert layout.narrowed(grid, wide - 1)[1]
             said = " ".join(texts[columns].split())
-            assert " ".join(layout.spaced(told).split()) in said
+            assert " ".join(spaced(told).split()) in said
     assert "Not shown here" not in texts[None]
 
 

@@ -14,6 +14,7 @@ from loomopt.interface.cli.app import run
 from loomopt.interface.text import answers, layout, scenes
 from loomopt.interface.text.scenes import curves, parts
 from loomopt.jobs import registry
+from loomopt.picture.table import TextTable
 from loomopt.scenes import packaged
 from loomopt.solving.answer.solution import Words
 
@@ -136,7 +137,7 @@ def test_show_and_evaluate_differ_in_units_only(name):
     drawn = [masked(curves(scene, {}, None)[1:]) for scene in scenes]
     assert drawn[0].count("U") == drawn[1].count("U") > 2
     shown = [parts(scene) for scene in scenes]
-    own, inches = ([part for part in parts if isinstance(part, layout.Grid)] for parts in shown)
+    own, inches = ([part for part in parts if isinstance(part, TextTable)] for parts in shown)
     numbers = [[(line[0], line[2], line[3]) for line in grids[0].lines if line[2]] for grids in (own, inches)]
     assert numbers[0] == numbers[1], "SI is the same"
     given = {line[0]: line[1] for line in inches[0].lines}
@@ -169,7 +170,7 @@ def seen(scene):
     """Return the tables of a scene that a person sees, each as its units."""
     found = lo.evaluate(scene)
     yield [row["unit"] for row in tables.rows(found, scene)]
-    grids = [part for part in scenes.curves(scene, {}, None) if isinstance(part, layout.Grid)]
+    grids = [part for part in scenes.curves(scene, {}, None) if isinstance(part, TextTable)]
     heads = [head for grid in grids for head in grid.columns]
     yield [head.partition("[")[2].rstrip("]") for head in heads]
     yield [scene.shown_in(kind) for kind in SI_UNIT]

@@ -12,11 +12,11 @@ import pytest
 import loomopt as lo
 from loomopt.base.units import DISPLAY_UNIT
 from loomopt.interface.text import scenes
-from loomopt.interface.text.layout import Grid
 from loomopt.jobs import registry
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.picture.job_views import JobViews, Span
 from loomopt.picture.shapes import LAYERS
+from loomopt.picture.table import TextTable
 from loomopt.scenes import packaged
 
 
@@ -54,7 +54,7 @@ def shown(monkeypatch, marks):
     monkeypatch.setattr(registry, "of", lambda scene: job)
     drive: Any = SimpleNamespace(title="Drive", shown_in=DISPLAY_UNIT.__getitem__, unit_for=lambda si: si)
     head, table = scenes.curves(drive, {}, None)
-    assert isinstance(table, Grid)
+    assert isinstance(table, TextTable)
     return head, [float(line[0]) for line in table.lines]
 
 

@@ -42,6 +42,7 @@ from loomopt.interface.cli.shell import (
     remark,
     worded,
 )
+from loomopt.picture.table import TextTable
 
 HEADER = Path("include", "coin-or", "IpoptConfig.h")
 """Where IPOPT says its version: beside CasADi's library in its wheel, below the prefix where both were built apart."""
@@ -214,7 +215,7 @@ def check(
     finally:
         if outcomes:
             lines = tuple((o.problem, o.target, o.status, "; ".join(o.differences) or "reproduces") for o in outcomes)
-            layout.show(layout.Grid("", ("problem", "target", "status", "against the reference"), lines))
+            layout.show(TextTable("", ("problem", "target", "status", "against the reference"), lines))
     differ = [outcome for outcome in outcomes if outcome.differences]
     if differ:
         remark(f"loomopt: {len(differ)} of {len(outcomes)} differ from the reference")

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from loomopt.interface.cli.shell import DIFFERS, call_progress, read_number, read_request, remark
+from loomopt.picture.table import TextTable
 
 if TYPE_CHECKING:
-    from loomopt.interface.text.layout import Grid
     from loomopt.scenes.designs import Design as DesignGiven
     from loomopt.scenes.scene import Scene
     from loomopt.solving.answer.solution import Evaluated
@@ -45,7 +45,7 @@ def checked(figures: Sequence[Path] | None, tables: Sequence[Path] | None = None
 
 
 def tell(
-    as_json: bool, document: Callable[[], Mapping[str, object]], parts: "Callable[[], Sequence[str | Grid]]"
+    as_json: bool, document: Callable[[], Mapping[str, object]], parts: Callable[[], Sequence[str | TextTable]]
 ) -> None:
     """Print what was found as one JSON object, or its parts."""
     if as_json:
@@ -102,7 +102,7 @@ def list_problems(as_json: Json = False) -> None:
                 ("", f"source: {head.source or 'not given'}"),
             )
         ]
-        layout.show(layout.Grid("", ("problem", "what it is"), tuple(lines)))
+        layout.show(TextTable("", ("problem", "what it is"), tuple(lines)))
     for fault in faults:
         remark(f"loomopt: {fault}")
 
@@ -165,7 +165,7 @@ def show(
         for path in animate:
             animation.checked(path)
         write(animate, lambda path: animation.animated(scene, given, path, said))
-    shown: list[str | layout.Grid] = [*scenes.equations(scene)] if equations else []
+    shown: list[str | TextTable] = [*scenes.equations(scene)] if equations else []
     shown += glossary.parts(scene) if symbols else []
     shown += glossary.printed(scene) if sources else []
     if shown or not (figure or animate):

@@ -10,7 +10,7 @@ from loomopt.base.files import atomically, suffix
 from loomopt.base.files import check as check_file
 from loomopt.interface.figures.figure import COLOURS, STYLES, Entry, frame, head, own_style, page, save
 from loomopt.interface.files import sheets
-from loomopt.interface.text.layout import Grid, joined
+from loomopt.picture.table import TextTable, joined
 from loomopt.studies.accuracy.accuracy import AccuracyResult, in_time
 from loomopt.studies.accuracy.readings import NUMBERS
 from loomopt.studies.accuracy.subject import LadderRow, grouped, setting_text
@@ -22,7 +22,7 @@ COLUMNS = 2
 MARKS = "os^Dv"
 
 
-def parts(study: AccuracyResult) -> list[str | Grid]:
+def parts(study: AccuracyResult) -> list[str | TextTable]:
     """Return the parts of a study in a terminal: a table of rows, the measured orders, the advice."""
     lines = []
     for rows in grouped(study.rows).values():
@@ -35,8 +35,8 @@ def parts(study: AccuracyResult) -> list[str | Grid]:
     found = tuple((joined(name), _order(study, name), _knee(study, name)) for name in named)
     return [
         f"{study.problem}: relative errors against references at least 100 times tighter, and what they cost",
-        Grid("", head, tuple(lines), right=(2, 3, 4, 5), first=(0, 1, 2, 3, 4, 6), more="--json, --out F.csv"),
-        Grid(
+        TextTable("", head, tuple(lines), right=(2, 3, 4, 5), first=(0, 1, 2, 3, 4, 6), more="--json, --out F.csv"),
+        TextTable(
             "Measured orders, and the settings from which on errors stop falling", ("", "order", "knee"), found, (1, 2)
         ),
         *(text for text in (study.advice, in_time(study.rows)) if text),

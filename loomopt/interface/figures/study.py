@@ -18,9 +18,9 @@ from loomopt.interface.figures.figure import COLOURS, STYLES, below, frame, head
 from loomopt.interface.files import outputs
 from loomopt.interface.study_table import Column
 from loomopt.interface.text import studies
-from loomopt.interface.text.layout import spaced
 from loomopt.jobs import registry
 from loomopt.picture.shapes import Drawing, Text, extent, plain
+from loomopt.picture.table import spaced
 from loomopt.studies.run.rows import Change, Findings, Row, SceneStudy
 
 ROOM = 0.16

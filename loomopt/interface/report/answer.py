@@ -10,9 +10,9 @@ from loomopt.interface.files import outputs, svg
 from loomopt.interface.report import machine, mathml, turn
 from loomopt.interface.report.markup import Block, Markup, Part
 from loomopt.interface.text import answers, scenes
-from loomopt.interface.text.layout import Grid
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import FEASIBLE, STATIONARY
+from loomopt.picture.table import TextTable
 from loomopt.scenes import family as family_table
 from loomopt.scenes.designs import flat
 from loomopt.scenes.scene import Scene, kept
@@ -192,7 +192,7 @@ def _certificate(subject: Subject) -> Iterator[Part]:
         unique += "; prices are not unique, for limits bind only together"
     told: list[Block] = [
         f"{head}. It was checked apart from the solver, by {found.by}: {curved}, and it is {unique}.",
-        Grid("", ("what was checked", "found", "at most"), tuple(lines), right=(1, 2)),
+        TextTable("", ("what was checked", "found", "at most"), tuple(lines), right=(1, 2)),
         *(f"Reason: {reason}." for reason in found.reasons),
     ]
     told += [f"Chosen among equals: {'; '.join(found.choices)}."] if found.choices else []

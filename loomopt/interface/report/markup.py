@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-from loomopt.interface.text.layout import JOINED, Grid, spaced
+from loomopt.picture.table import JOINED, TextTable, spaced
 
 NUMBER = re.compile(r"[-+]?\d")
 """How a cell begins that stands to the right."""
@@ -20,7 +20,7 @@ class Markup:
     html: str
 
 
-Block = str | Grid | Markup
+Block = str | TextTable | Markup
 """A paragraph, a table, or markup."""
 
 
@@ -46,12 +46,12 @@ def block(shown: Block) -> str:
     """Return a paragraph, a table or markup."""
     if isinstance(shown, Markup):
         return shown.html
-    if isinstance(shown, Grid):
+    if isinstance(shown, TextTable):
         return table(shown)
     return "".join(f"<p>{text(line)}</p>" for line in shown.split("\n") if line.strip())
 
 
-def table(grid: Grid) -> str:
+def table(grid: TextTable) -> str:
     """Return a table that scrolls by itself where it is too wide, and breaks between rows on paper."""
     dense = " denser" if len(grid.columns) > DENSER else " dense" if len(grid.columns) > DENSE else ""
     heads = "".join(

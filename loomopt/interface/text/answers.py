@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 from loomopt.base.quantities import shortest_text
 from loomopt.base.units import factor
 from loomopt.interface.tables import largest, rows
-from loomopt.interface.text.layout import Grid, joined
 from loomopt.jobs import registry
 from loomopt.model.program import Alias
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
+from loomopt.picture.table import TextTable, joined
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Evaluated, Solution, Words, changed, named, remedies
 from loomopt.solving.certificate.records import GlobalBound
@@ -23,10 +23,10 @@ HEADINGS = {"infeasible": "relaxed", "failed": "stopped"}
 """Status of an answer → what the column of its design is called, where it is no answer's."""
 
 
-def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
+def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
     """Return the parts of a solved target: sentence, table, what binds, certificate, time."""
     heading = HEADINGS.get(answer.status, "design")
-    parts: list[str | Grid] = [f"{answer.problem}, {answer.sought}: {answer.outcome}"]
+    parts: list[str | TextTable] = [f"{answer.problem}, {answer.sought}: {answer.outcome}"]
     if answer.relaxation:
         clash = ", ".join(joined(limit) for limit in answer.clash)
         parts += [f"No admissible design exists near any start. Limits that clash: {clash}.", relaxation(answer)]
@@ -55,7 +55,7 @@ def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
     return parts
 
 
-def evaluation(found: Evaluated, scene: Scene, before: Evaluated | None) -> list[str | Grid]:
+def evaluation(found: Evaluated, scene: Scene, before: Evaluated | None) -> list[str | TextTable]:
     """Return the parts of an evaluated design; before: today's machine, where the design is another."""
     broken = ", ".join(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
     rounded = ", ".join(limit.name for limit in found.limits if limit.rounding)
@@ -66,7 +66,7 @@ def evaluation(found: Evaluated, scene: Scene, before: Evaluated | None) -> list
     return [f"{found.problem}: {held}", table, *lists(found, scene)]
 
 
-def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading: str) -> Grid:
+def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading: str) -> TextTable:
     """Return design and figures beside today's machine and the limits; what binds and what is reached is marked."""
     table = [row for row in rows(found, scene, before) if not (found.members and _of_member(row["name"], found))]
     words = Words(scene)
@@ -102,7 +102,7 @@ def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading
     count = len(first)
     right = tuple(range(1, count + 1))
     asked = (0, *range(count, count + 3 + len(marked)))
-    return Grid("", (*first, heading, "unit", "limits", *marked), tuple(lines), right, first=asked, more="--json")
+    return TextTable("", (*first, heading, "unit", "limits", *marked), tuple(lines), right, first=asked, more="--json")
 
 
 def _of_member(name: str, found: Evaluated) -> bool:
@@ -121,7 +121,7 @@ def lists(found: Evaluated, scene: Scene) -> list[str]:
     ]
 
 
-def members(found: Solution, scene: Scene) -> Grid:
+def members(found: Solution, scene: Scene) -> TextTable:
     """Return what each member of a family changes, and what it reaches of what is sought."""
     words, levels = Words(scene), found.certificate.levels if found.certificate else ()
     own = [name for name in found.members[0].design if name not in found.design]
@@ -141,7 +141,7 @@ def members(found: Solution, scene: Scene) -> Grid:
         lines.append((str(place + 1), joined(changed(member)), *cells, f"{missed} not" if missed else ""))
     units = ["" if words.unit(name) == "1" else f" [{words.unit(name)}]" for name in names]
     head = ("member", "change", *(f"{name}{unit}" for name, unit in zip(names, units, strict=True)), "reached")
-    return Grid("Each member by itself", head, tuple(lines), right=tuple(range(2, 2 + len(names))))
+    return TextTable("Each member by itself", head, tuple(lines), right=tuple(range(2, 2 + len(names))))
 
 
 def retyped(found: Evaluated, scene: Scene) -> str:
@@ -163,23 +163,23 @@ def _limit(low: float | None, high: float | None) -> str:
     return f">= {low:.6g}" if low is not None else f"<= {high:.6g}" if high is not None else ""
 
 
-def relaxation(answer: Solution) -> Grid:
+def relaxation(answer: Solution) -> TextTable:
     """Return what would have to give way."""
     lines: list[tuple[str, str]] = []
     for remedy in remedies(answer.relaxation):
         label = "this alone" if remedy[0].alone else "all of these" if len(remedy) > 1 else "this"
         heads = [f"or {label}" if lines else label, *([""] * (len(remedy) - 1))]
         lines += [(head, joined(each.text)) for head, each in zip(heads, remedy, strict=True)]
-    return Grid("The least relaxation that helps", ("loosen", "limit"), tuple(lines))
+    return TextTable("The least relaxation that helps", ("loosen", "limit"), tuple(lines))
 
 
-def binding(answer: Solution) -> str | Grid:
+def binding(answer: Solution) -> str | TextTable:
     """Return the limits that bind, each with its price, then those that are worth more together."""
     if not answer.binding:
         return "No limit binds beside the sizes." if answer.rounded else "No limit binds."
     lines = tuple((price.text, next(iter(price.worth)), price.reading) for price in answer.binding)
     lines += tuple((f"{named(price.limits)} together", price.figure, price.reading) for price in answer.bind_together)
-    return Grid("What binds, and what loosening it is worth", ("limit", "moves", "by"), lines)
+    return TextTable("What binds, and what loosening it is worth", ("limit", "moves", "by"), lines)
 
 
 def certificate(answer: Solution) -> list[str]:
@@ -250,7 +250,7 @@ def proven(found: "Proofs") -> list[str]:
     return told + [f"Not covered: {text}." for text in found.uncovered]
 
 
-def proofs(found: "Proofs") -> list[str | Grid]:
+def proofs(found: "Proofs") -> list[str | TextTable]:
     """Return the parts of a proof: a sentence, and what was shown of each limit."""
     words, angle, lines = Words(found.scene), found.scene.shown_in("angle"), []
     for proof in found.proofs:
@@ -260,7 +260,7 @@ def proofs(found: "Proofs") -> list[str | Grid]:
         text = joined(proof.text) if COMPARED.search(proof.text) else proof.text
         lines.append((text, proof.status, *sizes, unit, str(proof.boxes), place))
     head = ("limit", "status", "margin", "up to", "unit", "boxes", f"fails at [{angle}]")
-    table = Grid("", head, tuple(lines), right=(2, 3, 5, 6), first=(0, 1, 2, 4, 6), more="--json")
+    table = TextTable("", head, tuple(lines), right=(2, 3, 5, 6), first=(0, 1, 2, 4, 6), more="--json")
     open_ = [
         f"{joined(proof.said)} is left open from crank angle {proof.open / factor(angle):.4g} {angle} on, "
         f"after {proof.boxes} boxes."

@@ -4,9 +4,9 @@ import math
 from typing import TYPE_CHECKING
 
 from loomopt.base.units import factor
-from loomopt.interface.text.layout import Grid
 from loomopt.model.budget import TorqueShare
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
+from loomopt.picture.table import TextTable
 from loomopt.scenes.provenance import provenance
 from loomopt.studies.budget import Found
 
@@ -24,7 +24,7 @@ SAID = {
 """What of the motor is told: how it is called, its kind of quantity."""
 
 
-def parts(found: Found) -> list[str | Grid]:
+def parts(found: Found) -> list[str | TextTable]:
     """Return the parts of a budget in a terminal: a line per effect, their sum, the motor, what to know beside it."""
     scene, own = found.scene, found.found
     peak = scene.show(_shown(own.total.at_peak, own.total.peak), "torque")
@@ -40,9 +40,9 @@ def parts(found: Found) -> list[str | Grid]:
     )
     lines = tuple(_line(row, found) for row in (*own.rows, own.total))
     names = ("effect", "there", "of it", "rms", "largest", "energy a turn")
-    grid = Grid("", heads, lines, tuple(range(1, 6)), (0, 1, 5), names=names, more="--json")
+    grid = TextTable("", heads, lines, tuple(range(1, 6)), (0, 1, 5), names=names, more="--json")
     motor = tuple((said, _motor(found, name)) for name, (said, _) in SAID.items())
-    return [first, grid, Grid("Motor", ("", ""), motor), *(f"Remark: {text}." for text in found.remarks)]
+    return [first, grid, TextTable("Motor", ("", ""), motor), *(f"Remark: {text}." for text in found.remarks)]
 
 
 def _line(row: TorqueShare, found: Found) -> tuple[str, ...]:

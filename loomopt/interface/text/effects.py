@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from loomopt.base.units import factor
-from loomopt.interface.text.layout import Grid, call
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
+from loomopt.picture.table import TextTable, call
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words
 from loomopt.studies.effects.study import Found
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def parts(found: Found, timed: bool = True) -> list[str | Grid]:
+def parts(found: Found, timed: bool = True) -> list[str | TextTable]:
     """Return the parts of a study in a terminal: a line per effect, what may be left out, and what was not measured.
 
     timed: whether it is told how long each solve took.
@@ -37,7 +37,7 @@ def _shown(found: Found, name: str) -> str:
     return Words(found.scene).shown(name, 0.0 if abs(value) <= SHOWN_AS_ZERO * scale else value)
 
 
-def _grid(found: Found, timed: bool) -> Grid:
+def _grid(found: Found, timed: bool) -> TextTable:
     words, scales = Words(found.scene), found.reference.scales
     heads, times = ["without"], ["build\ns", "solve\ns"] if timed else []
     names = ["without"]
@@ -53,7 +53,7 @@ def _grid(found: Found, timed: bool) -> Grid:
     last = len(heads) - 1  # what came of the solve, where that is not an optimum
     asked = (0, last - 1, last) if any(line[-1] for line in lines) else (0, last - 1)
     right = tuple(range(1, last - 1))
-    return Grid("", tuple(heads), lines, right, first=asked, names=tuple(names), more="--json")
+    return TextTable("", tuple(heads), lines, right, first=asked, names=tuple(names), more="--json")
 
 
 def _line(found: Found, row: Worth, timed: bool) -> tuple[str, ...]:

@@ -12,7 +12,6 @@ from loomopt.base.errors import BadInput
 from loomopt.base.quantities import quantity_of, table_inside
 from loomopt.base.units import SI_UNIT
 from loomopt.interface.tables import PER_SECOND
-from loomopt.interface.text.layout import Grid
 from loomopt.jobs import registry
 from loomopt.model.curves import split
 from loomopt.model.model import COMPONENTS
@@ -20,6 +19,7 @@ from loomopt.physics.effects.kinds import Check, Load
 from loomopt.physics.schema import Figure
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import Text
+from loomopt.picture.table import TextTable
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Words
 
@@ -80,7 +80,7 @@ class Symbol(NamedTuple):
     text: str
 
 
-def parts(scene: Scene) -> list[str | Grid]:
+def parts(scene: Scene) -> list[str | TextTable]:
     """Return the tables of `loomopt show --symbols`; units are those of the scene's tables, of curves SI."""
     drawn = labels(scene)
     grids = (_grid(title, symbols, drawn) for title, symbols in _tables(scene).items())
@@ -115,12 +115,12 @@ def _figure(figure: Figure, scene: Scene, words: Words) -> Iterator[Symbol]:
         yield Symbol(f"{figure.name}_t", scene.shown_in(PER_SECOND[figure.kind][0]), f"{figure.text}, in time")
 
 
-def _grid(title: str, symbols: list[Symbol], drawn: frozenset[str]) -> Grid:
+def _grid(title: str, symbols: list[Symbol], drawn: frozenset[str]) -> TextTable:
     lines = tuple(
         (each.name, "" if each.unit == "1" else each.unit, each.text, DRAWN if each.name in drawn else "")
         for each in symbols
     )
-    return Grid(title, ("symbol", "unit", "what it is", "in the sketch"), lines)
+    return TextTable(title, ("symbol", "unit", "what it is", "in the sketch"), lines)
 
 
 def _numbers(scene: Scene, model: type[BaseModel], path: str = "") -> list[Symbol]:
@@ -189,7 +189,7 @@ def labels(scene: Scene) -> frozenset[str]:
     return frozenset(named | {name for name, letter in GREEK.items() if letter in named})
 
 
-def printed(scene: Scene) -> list[str | Grid]:
+def printed(scene: Scene) -> list[str | TextTable]:
     """Return the tables of `loomopt show --sources`: what is printed, what is computed, the verdict and why.
 
     Of a scene that is not packaged, whose machine no source prints, it is what the scene itself says.
@@ -207,6 +207,6 @@ def printed(scene: Scene) -> list[str | Grid]:
         source.citation,
         "The source's own machines, in its units, whatever this scene has otherwise. The suite computes every one of "
         "these figures again.",
-        Grid("Printed and computed", ("figure", "printed", "computed", "unit", "verdict"), lines, right=(1, 2)),
-        Grid("What each is, from what, and why", ("figure", "what it is", "from", "why"), why),
+        TextTable("Printed and computed", ("figure", "printed", "computed", "unit", "verdict"), lines, right=(1, 2)),
+        TextTable("What each is, from what, and why", ("figure", "what it is", "from", "why"), why),
     ]

@@ -6,16 +6,13 @@ import re
 import shutil
 import sys
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
 from io import StringIO
 from itertools import zip_longest
 from typing import Any
 
+from loomopt.picture.table import JOINED, OPTION, TextTable, joined, spaced
+
 GAP = "  "
-JOINED = "\ue000"
-"""A space at which no line breaks: it is printed as a space, but no white space to Rich."""
-OPTION = "\ue001"
-"""A space before an option of a call of the shell, where a call that is too long goes on in the next line."""
 RULED = "    \n    \n -- \n    \n    \n    \n    \n    \n"
 """One rule under the heading and no other line, in Rich's terms."""
 LONGEST_WORD = 30
@@ -33,55 +30,20 @@ ONE_CELL = re.compile(
 """Text whose characters take one cell of a terminal each, and are no white space but the space."""
 
 
-@dataclass(frozen=True)
-class Grid:
-    """A table; right: places of right-aligned columns, the others may be wrapped; a heading may have lines.
-
-    Where a terminal is too narrow columns go, the last of what is asked for first. first: places in the order in which
-    they are asked for, those that it does not name after them, from the left; units: places of columns that are the
-    unit of the one before, and go with it; names: what columns are called that have gone, their headings without; more:
-    where else all columns are.
-    """
-
-    title: str
-    columns: tuple[str, ...]
-    lines: tuple[tuple[str, ...], ...]
-    right: tuple[int, ...] = ()
-    first: tuple[int, ...] = ()
-    units: tuple[int, ...] = ()
-    names: tuple[str, ...] = ()
-    more: str = ""
-
-
-def joined(text: str) -> str:
-    """Return text that stays on one line, such as "l1 >= 30 mm"."""
-    return text.replace(" ", JOINED)
-
-
-def call(text: str) -> str:
-    """Return a call of the shell that, where it is too long for a line, goes on in the next as the shell reads it."""
-    return joined(text).replace(f"{JOINED}--", f"{OPTION}--")
-
-
-def spaced(text: str) -> str:
-    """Return text as it is printed."""
-    return text.replace(JOINED, " ").replace(OPTION, " ")
-
-
 def width() -> int | None:
     """Return the terminal's width, or COLUMNS; None for a pipe or a file, where nothing is wrapped."""
     known = sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdigit()
     return max(40, shutil.get_terminal_size().columns) if known else None
 
 
-def show(*parts: str | Grid) -> None:
+def show(*parts: str | TextTable) -> None:
     """Print paragraphs and tables to stdout, a blank line around each table."""
     print(render(parts, width()))
 
 
-def render(parts: Sequence[str | Grid], columns: int | None) -> str:
+def render(parts: Sequence[str | TextTable], columns: int | None) -> str:
     """Return paragraphs and tables as text no wider than `columns` where that can be."""
-    blocks = [_spread(part) if isinstance(part, Grid) else part.split("\n") for part in parts]
+    blocks = [_spread(part) if isinstance(part, TextTable) else part.split("\n") for part in parts]
     if all(_fits(block, columns or UNWRAPPED) for block in blocks):
         text = "\n".join(line for block in blocks for line in block)
     else:
@@ -95,7 +57,7 @@ def _fits(lines: list[str], columns: int) -> bool:
     return bool(lines) and all(len(line) <= columns and ONE_CELL.fullmatch(line) for line in lines)
 
 
-def _spread(grid: Grid) -> list[str]:
+def _spread(grid: TextTable) -> list[str]:
     """Return a table's lines unwrapped, a blank one around it; none for a wider title, no heading, an empty column."""
     rows = [[cell.split("\n") for cell in row] for row in (grid.columns, *grid.lines)]
     widths = [max(len(line) for cell in column for line in cell) for column in zip(*rows, strict=True)]
@@ -114,7 +76,7 @@ def _spread(grid: Grid) -> list[str]:
     return ["", *([grid.title] if grid.title else []), *lines[:below], "-" * len(lines[0]), *lines[below:], ""]
 
 
-def narrowed(grid: Grid, columns: int) -> tuple[Grid, str]:
+def narrowed(grid: TextTable, columns: int) -> tuple[TextTable, str]:
     """Return a table with as many of its columns as fit without cutting a word, and which are not among them; or ""."""
     least = _least(grid, columns)
     rank = [*grid.first, *(place for place in range(len(least)) if place not in grid.first)]
@@ -132,20 +94,20 @@ def narrowed(grid: Grid, columns: int) -> tuple[Grid, str]:
     )
     taken = [tuple(row[place] for place in places) for row in (grid.columns, *grid.lines)]
     right = tuple(place for place, old in enumerate(places) if old in grid.right)
-    return Grid(grid.title, taken[0], tuple(taken[1:]), right), f"Not shown here: {told}. All columns: {there}."
+    return TextTable(grid.title, taken[0], tuple(taken[1:]), right), f"Not shown here: {told}. All columns: {there}."
 
 
-def _enough(grid: Grid, columns: int) -> int:
+def _enough(grid: TextTable, columns: int) -> int:
     """Return how wide a terminal is, wider than `columns`, that shows all columns of a table."""
     return next(wide for wide in itertools.count(columns + 1) if _total(_least(grid, wide)) <= wide)
 
 
-def _with_units(grid: Grid, kept: Collection[int]) -> list[int]:
+def _with_units(grid: TextTable, kept: Collection[int]) -> list[int]:
     """Return the places of columns with those of their units, from the left."""
     return [p for p in range(len(grid.columns)) if (p - 1 if p in grid.units else p) in kept]
 
 
-def _least(grid: Grid, columns: int) -> list[int]:
+def _least(grid: TextTable, columns: int) -> list[int]:
     """Return how wide each column is at least: of what may be wrapped its longest word, else its longest line.
 
     The first column is wrapped only where not all columns fit otherwise.
@@ -167,7 +129,7 @@ def _total(widths: Iterable[int]) -> int:
     return sum(width + len(GAP) for width in widths) - len(GAP)
 
 
-def _widths(grid: Grid, columns: int) -> list[int]:
+def _widths(grid: TextTable, columns: int) -> list[int]:
     """Return how wide columns are where not all words stand on one line: the widest that may wrap gives way first."""
     least = _least(grid, columns)
     widths = [
@@ -179,14 +141,14 @@ def _widths(grid: Grid, columns: int) -> list[int]:
     return widths
 
 
-def _wrapped(parts: Sequence[str | Grid], columns: int) -> str:
+def _wrapped(parts: Sequence[str | TextTable], columns: int) -> str:
     """Return paragraphs and tables as Rich lays them out, wrapped where they are wider than `columns`."""
     from rich.console import Console
     from rich.text import Text
 
     console = Console(file=StringIO(), width=columns, color_system=None, highlight=False, markup=False)
     for part in parts:
-        if isinstance(part, Grid):
+        if isinstance(part, TextTable):
             grid, gone = narrowed(part, columns)
             for line in ["", grid.title] if grid.title else [""]:  # a title may be wider than its table
                 console.print(_paragraph(line), crop=False)
@@ -232,7 +194,7 @@ def _paragraph(line: str) -> Any:
     return Padding(Text(line.strip()), (0, 0, 0, indent)) if indent else Text(line)
 
 
-def _table(grid: Grid, widths: Sequence[int]) -> Any:
+def _table(grid: TextTable, widths: Sequence[int]) -> Any:
     """Return a table in Rich's terms without its title, a blank line after it; widths: of its columns."""
     from rich import box
     from rich.padding import Padding

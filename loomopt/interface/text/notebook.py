@@ -7,9 +7,9 @@ from html import escape
 
 from loomopt.interface.files import outputs, svg
 from loomopt.interface.text import answers, scenes
-from loomopt.interface.text.layout import Grid, spaced
 from loomopt.jobs import registry
 from loomopt.picture.shapes import Drawing
+from loomopt.picture.table import TextTable, spaced
 from loomopt.scenes.designs import Design
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Evaluated, Proofs, Solution
@@ -82,13 +82,13 @@ def _on_page(size: re.Match[str]) -> str:
     return f'width="{width}" height="{height}"'
 
 
-def page(parts: Sequence[str | Grid], drawn: str = "") -> str:
+def page(parts: Sequence[str | TextTable], drawn: str = "") -> str:
     """Return paragraphs and tables, then a drawing."""
-    told = (table(part) if isinstance(part, Grid) else f"<p>{_escaped(part)}</p>" for part in parts)
+    told = (table(part) if isinstance(part, TextTable) else f"<p>{_escaped(part)}</p>" for part in parts)
     return f"<div>{''.join(told)}{drawn}</div>"
 
 
-def table(grid: Grid) -> str:
+def table(grid: TextTable) -> str:
     """Return a table as HTML, numbers to the right."""
     head = "".join(f"<th>{_escaped(heading)}</th>" for heading in grid.columns)
     rows = ("".join(_cell(cell, place in grid.right) for place, cell in enumerate(line)) for line in grid.lines)

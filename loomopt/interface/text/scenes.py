@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from loomopt.base.units import factor
-from loomopt.interface.text.layout import GAP, Grid
+from loomopt.interface.text.layout import GAP
 from loomopt.jobs import registry
 from loomopt.model.curves import split
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import keys, label, owned, value_at
 from loomopt.physics.schema import Table
 from loomopt.picture.job_views import Marks, Span
+from loomopt.picture.table import TextTable
 from loomopt.scenes import family
 from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.display import KINDS
@@ -29,7 +30,7 @@ STEP = 15
 """Crank angle between printed rows, deg."""
 
 
-def parts(scene: Scene) -> list[str | Grid]:
+def parts(scene: Scene) -> list[str | TextTable]:
     """Return the tables of `loomopt show`."""
     words = Words(scene)
     lines = []
@@ -46,13 +47,13 @@ def parts(scene: Scene) -> list[str | Grid]:
         f"Job: {scene.job}, {scene.schema.title}",
         f"Source: {scene.source or 'not given'}",
         f"Tables show {', '.join(f'{key} in {scene.shown_in(kind)}' for key, kind in _kinds(scene).items())}",
-        Grid("Numbers", ("key", "as given", "SI", ""), tuple(lines), right=(1, 2), units=(3,)),
-        Grid("Effects that are on", ("effect", "what it is"), effects) if effects else "No effect is on",
+        TextTable("Numbers", ("key", "as given", "SI", ""), tuple(lines), right=(1, 2), units=(3,)),
+        TextTable("Effects that are on", ("effect", "what it is"), effects) if effects else "No effect is on",
         *(record.said for record in registry.of(scene).tables(scene, scene.schema.default_target)),
         f"Effects that are off, and not in the equations: {', '.join(off) or 'none'}",
-        Grid("Targets", ("target", "what it asks", "expected"), tuple(_targets(scene))),
+        TextTable("Targets", ("target", "what it asks", "expected"), tuple(_targets(scene))),
         *_family(scene),
-        Grid("Figures", ("figure", "what it is"), figures),
+        TextTable("Figures", ("figure", "what it is"), figures),
     ]
 
 
@@ -72,7 +73,7 @@ def _targets(scene: Scene) -> list[tuple[str, str, str]]:
     return lines
 
 
-def _family(scene: Scene) -> list[str | Grid]:
+def _family(scene: Scene) -> list[str | TextTable]:
     """Return the members of the scene's family, where it has one. Raises BadInput for one that is no scene."""
     if FAMILY not in scene.schema.targets:
         return []
@@ -81,7 +82,7 @@ def _family(scene: Scene) -> list[str | Grid]:
     lines = tuple((str(place + 1), changes[place]) for place in range(len(members)))
     own = f"; each has its own {', '.join(table.own)}" if table.own else ""
     said = f"A family of target {family.of_target(scene)}: the least {table.combine} of its members{own}"
-    return [said, Grid("Members of the family", ("member", "what it changes"), lines)]
+    return [said, TextTable("Members of the family", ("member", "what it changes"), lines)]
 
 
 def listed(values: str | Sequence[float]) -> str:
@@ -121,7 +122,7 @@ def equations(scene: Scene) -> list[str]:
     return ["\n".join([name, *(f"    {equation.text}" for equation in group)]) for name, group in groups]
 
 
-def curves(scene: Scene, design: Design, width: int | None) -> list[str | Grid]:
+def curves(scene: Scene, design: Design, width: int | None) -> list[str | TextTable]:
     """Return the curves every 15 degrees and at the marks, both sides of a jump, in the scene's display units.
 
     More tables where one is too wide.
@@ -150,7 +151,7 @@ def curves(scene: Scene, design: Design, width: int | None) -> list[str | Grid]:
     return [f"{scene.title}: {marks}", *tables]
 
 
-def beside(scene: Scene, frame: "pd.DataFrame") -> Grid:
+def beside(scene: Scene, frame: "pd.DataFrame") -> TextTable:
     """Return how far curves, SI, lie off what was measured, in the scene's display units."""
     lines = []
     for column in frame.columns:
@@ -167,7 +168,7 @@ def beside(scene: Scene, frame: "pd.DataFrame") -> Grid:
             lines.append((name, shown, str(len(there)), f"{rms:.4g}", f"{off[worst]:.4g}", angle, known))
     heads = ("curve", "unit", "samples", "rms", "largest", "at", "digits to \u00b1")
     file = "; ".join(str(frame.attrs[key]) for key in ("measured", "read") if key in frame.attrs)
-    return Grid(f"Curves less what was measured ({file})", heads, tuple(lines), right=(2, 3, 4, 5, 6))
+    return TextTable(f"Curves less what was measured ({file})", heads, tuple(lines), right=(2, 3, 4, 5, 6))
 
 
 def _angles(marks: Marks) -> dict[str, float]:
@@ -175,10 +176,10 @@ def _angles(marks: Marks) -> dict[str, float]:
     return {name: mark for name, mark in marks.items() if not isinstance(mark, Span) and math.isfinite(mark)}
 
 
-def _table(some: Sequence[tuple[str, list[str]]], rows: Sequence[int]) -> Grid:
+def _table(some: Sequence[tuple[str, list[str]]], rows: Sequence[int]) -> TextTable:
     """Return some curves as a table; rows: places of the rows it shows."""
     lines = tuple(tuple(texts[k] for _, texts in some) for k in rows)
-    return Grid("", tuple(head for head, _ in some), lines, right=tuple(range(len(some))))
+    return TextTable("", tuple(head for head, _ in some), lines, right=tuple(range(len(some))))
 
 
 def _width(curve: tuple[str, list[str]]) -> int:
@@ -199,7 +200,7 @@ def _curve(scene: Scene, name: str, values: Floats) -> tuple[str, list[str]]:
     return f"{symbol}\n[{unit}]", texts
 
 
-def forces(scene: Scene, frame: "pd.DataFrame", design: Mapping[str, float]) -> list[str | Grid]:
+def forces(scene: Scene, frame: "pd.DataFrame", design: Mapping[str, float]) -> list[str | TextTable]:
     """Return a line for each force of curves (SI): its peak, where that is, and the means that bearings go by."""
     from loomopt.interface.forces import CUBIC, ROLLER, found
 
@@ -211,4 +212,4 @@ def forces(scene: Scene, frame: "pd.DataFrame", design: Mapping[str, float]) -> 
     sizes = f"peak\n{force}", f"at\n{angle}", f"mean\n{force}", f"p = 3\n{force}", f"p = 10/3\n{force}"
     heads = "force", "turning\nparts", *sizes
     said = f"{scene.name}: forces over the turn; p: mean of their powers, for the life of ball and of roller bearings"
-    return [said, Grid("", heads, tuple(lines), tuple(range(2, 7)))]
+    return [said, TextTable("", heads, tuple(lines), tuple(range(2, 7)))]

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from loomopt.base.units import factor
-from loomopt.interface.text.layout import Grid
+from loomopt.picture.table import TextTable
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words
 from loomopt.studies.sensitivity.study import Found, Row
@@ -18,7 +18,7 @@ PERCENT = 0.01
 ARROWS = {None: "", "up": "upward", "down": "downward"}
 
 
-def parts(found: Found) -> list[str | Grid]:
+def parts(found: Found) -> list[str | TextTable]:
     """Return the parts of a study in a terminal: what moves each figure that is sought, and prices with ranges."""
     head = f"{found.scene.name}, {found.target}: how the optimum moves with each number"
     if found.refused:
@@ -50,7 +50,7 @@ def ordered(found: Found, name: str) -> list[Row]:
     return sorted(rows, key=lambda row: -abs(effect(found, row)))
 
 
-def _moves(found: Found, name: str) -> Grid:
+def _moves(found: Found, name: str) -> TextTable:
     words, lines = Words(found.scene), []
     unit = words.unit(name)
     for row in ordered(found, name):
@@ -61,17 +61,17 @@ def _moves(found: Found, name: str) -> Grid:
         moved = effect(found, row) / factor(unit)
         lines.append((row.number, ARROWS[row.side], f"{slope:.7g}", per, f"{by:.4g}", f"{moved:.4g}"))
     heads = ("number", "", f"d {name}", "unit", "by", f"{name}\n{unit}")
-    return Grid("", heads, tuple(lines), (2, 4, 5), first=(0, 2, 3, 5), more="--json")
+    return TextTable("", heads, tuple(lines), (2, 4, 5), first=(0, 2, 3, 5), more="--json")
 
 
-def _prices(found: Found) -> Grid:
+def _prices(found: Found) -> TextTable:
     words, lines = Words(found.scene), []
     for price in found.prices:
         unit = words.unit(price.limit)
         ends = [(f"{x / factor(unit):+.6g}" if x else "0") if math.isfinite(x) else "" for x in price.range]
         lines.append((f"{price.limit} {price.side}", ends[0], price.ends[0], ends[1], price.ends[1], unit))
     heads = ("price of", "holds\nfrom", "for then", "to", "for then", "unit")
-    return Grid("", heads, tuple(lines), (1, 3), first=(0, 1, 3, 5), more="--json")
+    return TextTable("", heads, tuple(lines), (1, 3), first=(0, 1, 3, 5), more="--json")
 
 
 def _holding(found: Found) -> list[str]:

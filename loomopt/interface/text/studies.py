@@ -10,7 +10,7 @@ from loomopt.base.units import show
 from loomopt.interface import study_table, tables
 from loomopt.interface.files import outputs, sheets
 from loomopt.interface.study_table import Column
-from loomopt.interface.text.layout import Grid, joined
+from loomopt.picture.table import TextTable, joined
 from loomopt.studies.run.rows import Change, Row, SceneStudy, counted
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def _differs(column: Column) -> bool:
     return max(known) - min(known) > SAME * max(map(abs, known))
 
 
-def parts(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str | Grid]:
+def parts(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str | TextTable]:
     """Return the parts of a study in a terminal: a line per row, what changes along it, and what came of it.
 
     rows: of all points that were solved.
@@ -84,7 +84,9 @@ def parts(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str 
     count += f" and {narrowing} that narrow{'s' * (narrowing == 1)} changes down ({NARROWS})" if narrowing else ""
     asked = range(min(len(study.kinds) + 2, len(heads)))  # the point, its place, what is sought there
     right = tuple(range(len(heads)))
-    grid = Grid("", (*heads, "status"), tuple(lines), right, first=(*asked, len(heads)), more="--out F.csv, --json")
+    grid = TextTable(
+        "", (*heads, "status"), tuple(lines), right, first=(*asked, len(heads)), more="--out F.csv, --json"
+    )
     reasons = [f"point {row.point}, {row.status}: {row.reason}" for row in found.rows if row.reason]
     more = [f"and {len(reasons) - MOST_REASONS} more, in the table's last column"] if reasons[MOST_REASONS:] else []
     count += f", {found.bettered} bettered from a neighbour's design" if found.bettered else ""

@@ -4,8 +4,8 @@ import math
 from typing import TYPE_CHECKING
 
 from loomopt.base.units import factor
-from loomopt.interface.text.layout import Grid
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
+from loomopt.picture.table import TextTable
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words
 from loomopt.studies.tolerance.study import ALL, Found, Spread
@@ -19,17 +19,17 @@ MOST_TOLD = 3
 """Numbers whose shares are told."""
 
 
-def parts(found: Found) -> list[str | Grid]:
+def parts(found: Found) -> list[str | TextTable]:
     """Return the parts of a study in a terminal: spreads, yields, and what to tighten first."""
     plan = found.plan
     numbers = ", ".join(each.number for each in plan.made.values())
     head = f"{plan.scene.name}, limits of {plan.target}: {found.samples} machines, {numbers} as they are made"
     lost = f"{found.bad} of them do not assemble or lack a figure" if found.bad else "all of them assemble"
-    worst: list[str | Grid] = [_worst(found)] if found.worst else []
+    worst: list[str | TextTable] = [_worst(found)] if found.worst else []
     return [f"{head}; {lost}", _spreads(found), _yields(found), *worst, *_told(found)]
 
 
-def _spreads(found: Found) -> Grid:
+def _spreads(found: Found) -> TextTable:
     words, lines = Words(found.plan.scene), []
     for name, each in found.figures.items():
         unit = words.unit(name)
@@ -39,7 +39,7 @@ def _spreads(found: Found) -> Grid:
         shown = (f"{nominal:.6g}", _size(each.sigma_linear / size), _size(sigma))
         lines.append((name, *shown, "" if unit == "1" else unit, _shares(each)))
     heads = ("figure", "nominal", "sigma\nlinear", "sigma\nsampled", "unit", "shares")
-    return Grid("", heads, tuple(lines), (1, 2, 3), first=(0, 1, 3, 4, 2), more="--json")
+    return TextTable("", heads, tuple(lines), (1, 2, 3), first=(0, 1, 3, 4, 2), more="--json")
 
 
 def _size(value: float) -> str:
@@ -52,15 +52,15 @@ def _shares(each: Spread) -> str:
     return f"{text} (a corner)" if each.corner and text else text
 
 
-def _yields(found: Found) -> Grid:
+def _yields(found: Found) -> TextTable:
     lines = []
     for name, each in found.yields.items():
         called = "all together" if name == ALL else name
         lines.append((called, f"{100 * each.value:.4g}", f"{100 * each.se:.2g}"))
-    return Grid("", ("machines that hold", "%", "standard error\n%"), tuple(lines), (1, 2), more="--json")
+    return TextTable("", ("machines that hold", "%", "standard error\n%"), tuple(lines), (1, 2), more="--json")
 
 
-def _worst(found: Found) -> Grid:
+def _worst(found: Found) -> TextTable:
     """Return the worst cases: the least and the most of each figure within the tolerances, and whether it is proven."""
     words, lines = Words(found.plan.scene), []
     for name, each in found.worst.items():
@@ -70,7 +70,7 @@ def _worst(found: Found) -> Grid:
         shown = [_end(end, beyond, size, sign, more) for end, beyond, sign, more in sides]
         lines.append((name, *shown, "" if unit == "1" else unit, "proven" if each.proven else each.why))
     heads = ("within all tolerances", "at least", "at most", "unit", "")
-    return Grid("", heads, tuple(lines), (1, 2), first=(0, 1, 2, 4, 3), more="--json")
+    return TextTable("", heads, tuple(lines), (1, 2), first=(0, 1, 2, 4, 3), more="--json")
 
 
 def _end(end: float | None, found: float, size: float, sign: float, more: str) -> str:

@@ -12,7 +12,7 @@ import loomopt as lo
 from loomopt.interface.cli.app import run
 from loomopt.interface.report import charts, document, markup
 from loomopt.interface.text import budget, effects, scenes, sensitivity, tolerance
-from loomopt.interface.text.layout import Grid
+from loomopt.picture.table import TextTable
 
 pytestmark = pytest.mark.slow
 
@@ -50,7 +50,7 @@ def test_a_page_shows_the_terminals_tables_of_each_study(answer, studies, tmp_pa
     assert len(shown.encode()) < 300_000
     for how, found in studies.items():
         parts = how.parts(found)
-        grids = [part for part in parts if isinstance(part, Grid)]
+        grids = [part for part in parts if isinstance(part, TextTable)]
         assert grids
         for cell in (cell for grid in grids for line in grid.lines for cell in line):
             assert cell.replace("\ue000", "\xa0") in shown, (how.__name__, cell)

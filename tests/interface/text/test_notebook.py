@@ -7,7 +7,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.interface.text import notebook
-from loomopt.interface.text.layout import Grid
+from loomopt.picture.table import TextTable
 
 EVIL = 'A "loom" <script>alert(1)</script> & more'
 
@@ -42,7 +42,7 @@ def test_text_from_outside_is_escaped(answer):
     html = evil._repr_html_()
     assert "<script" not in html
     assert EVIL in "".join(tree(html).itertext())
-    assert "<script" not in notebook.table(Grid(EVIL, (EVIL,), ((EVIL,),)))
+    assert "<script" not in notebook.table(TextTable(EVIL, (EVIL,), ((EVIL,),)))
 
 
 @pytest.mark.slow

@@ -13,16 +13,16 @@ import loomopt as lo
 from loomopt.base.quantities import read
 from loomopt.interface import api
 from loomopt.interface.text import answers, layout, scenes
-from loomopt.interface.text.layout import Grid, spaced
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import kinds
+from loomopt.picture.table import TextTable, call, joined, spaced
 from loomopt.solving.answer.solution import Words
 
 SCENE = load("beatup-light")
 EFFECTS = kinds.of("loomopt.physics.effects.beatup")
 WORDS = st.text(st.characters(codec="ascii", exclude_categories=["C", "Z"]), min_size=1, max_size=9)
 CELLS = st.lists(WORDS, max_size=12).map(" ".join)
-GRID = Grid("", ("name", "", "what"), (("a", "12", "one two three four"), ("bb", "3", "five")), right=(1,))
+GRID = TextTable("", ("name", "", "what"), (("a", "12", "one two three four"), ("bb", "3", "five")), right=(1,))
 
 
 @pytest.fixture(scope="module")
@@ -61,20 +61,20 @@ def test_a_table_aligns_and_wraps_text_but_no_numbers():
 
 
 def test_headings_stand_in_two_lines_on_the_rule():
-    grid = Grid("Title", ("phi\n[deg]", "plain"), (("1", "2"),), right=(0, 1))
+    grid = TextTable("Title", ("phi\n[deg]", "plain"), (("1", "2"),), right=(0, 1))
     assert text(grid).splitlines() == ["Title", "  phi", "[deg]  plain", "------------", "    1      2"]
 
 
 @given(st.lists(st.tuples(WORDS, CELLS, CELLS), max_size=5), st.integers(50, 120))
 @settings(deadline=None, derandomize=True)
 def test_a_table_fits_the_width_and_keeps_every_word(lines, columns):
-    shown = text(Grid("", ("name", "x", "y"), tuple(lines)), columns=columns)
+    shown = text(TextTable("", ("name", "x", "y"), tuple(lines)), columns=columns)
     assert all(len(line) <= columns for line in shown.splitlines())
     assert sorted(shown.split()[4:]) == sorted(word for line in lines for cell in line for word in cell.split())
 
 
 def test_a_title_that_is_wider_than_its_table_stands_on_one_line():
-    grid = Grid("What binds, and what loosening it is worth", ("limit", "by"), (("X0 <= 80 mm", "740 N/m"),))
+    grid = TextTable("What binds, and what loosening it is worth", ("limit", "by"), (("X0 <= 80 mm", "740 N/m"),))
     assert text(grid, columns=60).splitlines()[0] == grid.title
 
 
@@ -89,7 +89,7 @@ def test_a_paragraph_fits_the_width_and_keeps_every_word(sentence, columns):
 
 def test_a_joined_phrase_is_never_broken():
     phrases = [f"l{k} >= {k}00 mm" for k in range(1, 9)]
-    lines = text("Limits: " + ", ".join(layout.joined(phrase) for phrase in phrases), columns=40).splitlines()
+    lines = text("Limits: " + ", ".join(joined(phrase) for phrase in phrases), columns=40).splitlines()
     assert len(lines) > 2
     assert all(any(phrase in line for line in lines) for phrase in phrases)
 
@@ -98,7 +98,7 @@ def test_a_joined_phrase_is_never_broken():
 def test_a_call_of_the_shell_that_is_longer_than_the_screen_goes_on_in_the_next_line(columns):
     words = ["loomopt", "solve", "my loom.toml", "--set", "operation.speed=560 rpm", "--without", "bearing_friction"]
     words += ["--with", "counterweight_inertia", "--with", "rod_inertia", "--free", "J4"]
-    shown = text(f"At 1 %, that may go: {layout.call(shlex.join(words))}", columns=columns)
+    shown = text(f"At 1 %, that may go: {call(shlex.join(words))}", columns=columns)
     assert all(len(line) <= columns for line in shown.splitlines())
     assert shlex.split(shown[shown.index("loomopt") :].replace("\\\n", "")) == words
 
@@ -113,7 +113,7 @@ def test_an_option_longer_than_the_screen_is_not_broken():
         "--with",
         "coil",
     ]
-    shown = text(f"That may go: {layout.call(shlex.join(words))}", columns=40)
+    shown = text(f"That may go: {call(shlex.join(words))}", columns=40)
     assert shlex.split(shown[shown.index("loomopt") :].replace("\\\n", "")) == words
 
 
@@ -268,7 +268,7 @@ def test_points_that_narrow_a_change_down_are_marked_and_counted_apart():
 
     front = lo.pareto("beatup", ("peak_torque", "m4e"), target="balance", points=5)
     parts = studies.parts(front.study, front.solved)
-    head, (grid,) = str(parts[0]), [part for part in parts if isinstance(part, Grid)]
+    head, (grid,) = str(parts[0]), [part for part in parts if isinstance(part, TextTable)]
     marked = [line[0] for line in grid.lines if line[0].endswith(studies.NARROWS)]
     assert marked
     assert len(grid.lines) - len(marked) <= 5

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loomopt.interface.text import layout
-from loomopt.interface.text.layout import Grid
+from loomopt.picture.table import JOINED, TextTable, spaced
 
-LETTERS = st.text("ab  φ²·-≤˙1" + layout.JOINED, max_size=9)
+LETTERS = st.text("ab  φ²·-≤˙1" + JOINED, max_size=9)
 CELLS = st.lists(LETTERS, min_size=1, max_size=2).map("\n".join)
 
 
@@ -20,11 +20,11 @@ def grids(draw):
     places = range(draw(st.integers(1, 4)))
     row = st.tuples(*(CELLS for _ in places))
     right = draw(st.sets(st.sampled_from(places)))
-    return Grid(draw(LETTERS), draw(row), tuple(draw(st.lists(row, max_size=3))), tuple(right))
+    return TextTable(draw(LETTERS), draw(row), tuple(draw(st.lists(row, max_size=3))), tuple(right))
 
 
 def by_rich(parts, columns):
-    text = layout.spaced(layout._wrapped(parts, columns or layout.UNWRAPPED))
+    text = spaced(layout._wrapped(parts, columns or layout.UNWRAPPED))
     return re.sub(r"\n{3,}", "\n\n", "\n".join(line.rstrip() for line in text.split("\n"))).strip("\n")
 
 
@@ -34,7 +34,7 @@ def test_text_is_what_rich_makes_of_it(parts, columns):
     assert layout.render(parts, columns) == by_rich(parts, columns)
 
 
-PLAIN = (Grid("Numbers", ("", "M3\nN·m"), (("l1", "2"), ("mu_min", "13"))), "Time: 1 s")
+PLAIN = (TextTable("Numbers", ("", "M3\nN·m"), (("l1", "2"), ("mu_min", "13"))), "Time: 1 s")
 
 
 @pytest.mark.parametrize("columns", [None, 11])
@@ -52,9 +52,9 @@ def test_what_fits_needs_no_rich(columns, monkeypatch):
         ("e\u0301", None),
         ("a\tb", None),
         ("a\u3000", None),
-        (Grid("a wide title", ("a",), (("1",),)), None),
-        (Grid("", ("", ""), (("a", "1"),)), None),
-        (Grid("", ("a", ""), (("1", ""),)), None),
+        (TextTable("a wide title", ("a",), (("1",),)), None),
+        (TextTable("", ("", ""), (("a", "1"),)), None),
+        (TextTable("", ("a", ""), (("1", ""),)), None),
         (PLAIN[0], 10),
     ],
     ids=repr,

@@ -10,9 +10,9 @@ from loomopt.interface import tables
 from loomopt.interface.figures import figure
 from loomopt.interface.files import outputs
 from loomopt.interface.text import scenes
-from loomopt.interface.text.layout import Grid
 from loomopt.model.curves import split
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
+from loomopt.picture.table import TextTable
 from loomopt.scenes import designs
 
 LEAST = {"K1": 102602.609425357, "X0": 0.08}
@@ -153,7 +153,7 @@ def test_a_columns_unit_is_what_stands_in_brackets():
 def test_the_table_of_curves_leaves_unknown_forces_empty():
     head, table = scenes.curves(lo.load("shedding-static"), {}, None)
     assert isinstance(head, str)
-    assert isinstance(table, Grid)
+    assert isinstance(table, TextTable)
     assert "least cam force at 300.000 deg" in head
     place = [column.split("\n")[0] for column in table.columns].index("N")
     cells = {line[0]: line[place] for line in table.lines}

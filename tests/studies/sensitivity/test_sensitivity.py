@@ -10,8 +10,8 @@ import pytest
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface.text import sensitivity as text
-from loomopt.interface.text.layout import Grid
 from loomopt.jobs import registry
+from loomopt.picture.table import TextTable
 from loomopt.solving import engine
 from loomopt.studies.sensitivity import study
 from loomopt.studies.sensitivity.active import least
@@ -162,7 +162,7 @@ def test_another_angle_ends_it_at_the_printed_travel_too():
 
 
 def test_a_price_range_that_is_0_is_told_as_0():
-    grids = [part for part in text.parts(found("shedding")) if isinstance(part, Grid)]
+    grids = [part for part in text.parts(found("shedding")) if isinstance(part, TextTable)]
     (line,) = [line for grid in grids for line in grid.lines if line[0] == "N_min min"]
     assert line[1] == "0"
 
