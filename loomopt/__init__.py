@@ -30,31 +30,29 @@ if TYPE_CHECKING:
         sweep,
         tolerance,
     )
-    from loomopt.interface.finished import (
-        AccuracyStudy,
-        EffectsStudy,
-        SensitivityStudy,
-        StudyTable,
-        ToleranceStudy,
-    )
-    from loomopt.interface.torque_budget import Budget
+    from loomopt.interface.study.accuracy import AccuracyStudy
+    from loomopt.interface.study.budget import Budget
+    from loomopt.interface.study.effects import EffectsStudy
+    from loomopt.interface.study.points import StudyTable
+    from loomopt.interface.study.sensitivity import SensitivityStudy
+    from loomopt.interface.study.tolerance import ToleranceStudy
     from loomopt.scenes.scene import Scene
     from loomopt.solving.answer.solution import Proofs
 
 _HOMES = {
     "Answer": "loomopt.interface.api",
     "BadInput": "loomopt.base.errors",
-    "Budget": "loomopt.interface.torque_budget",
-    "EffectsStudy": "loomopt.interface.finished",
+    "Budget": "loomopt.interface.study.budget",
+    "EffectsStudy": "loomopt.interface.study.effects",
     "Evaluation": "loomopt.interface.api",
     "Proofs": "loomopt.solving.proof.whole_cycle",
     "Scene": "loomopt.scenes.scene",
     "accuracy": "loomopt.interface.api",
     "compare": "loomopt.interface.api",
-    "AccuracyStudy": "loomopt.interface.finished",
-    "SensitivityStudy": "loomopt.interface.finished",
-    "StudyTable": "loomopt.interface.finished",
-    "ToleranceStudy": "loomopt.interface.finished",
+    "AccuracyStudy": "loomopt.interface.study.accuracy",
+    "SensitivityStudy": "loomopt.interface.study.sensitivity",
+    "StudyTable": "loomopt.interface.study.points",
+    "ToleranceStudy": "loomopt.interface.study.tolerance",
     "budget": "loomopt.interface.api",
     "effects": "loomopt.interface.api",
     "evaluate": "loomopt.interface.api",

@@ -24,9 +24,13 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from loomopt.interface.comparison import Comparison
-    from loomopt.interface.finished import AccuracyStudy, EffectsStudy, SensitivityStudy, StudyTable, ToleranceStudy
-    from loomopt.interface.torque_budget import Budget
+    from loomopt.interface.study.accuracy import AccuracyStudy
+    from loomopt.interface.study.budget import Budget
+    from loomopt.interface.study.comparison import Comparison
+    from loomopt.interface.study.effects import EffectsStudy
+    from loomopt.interface.study.points import StudyTable
+    from loomopt.interface.study.sensitivity import SensitivityStudy
+    from loomopt.interface.study.tolerance import ToleranceStudy
     from loomopt.scenes.packaged import Head
     from loomopt.solving.answer.solution import Proofs
     from loomopt.studies.front.front import Given as Ranges
@@ -241,9 +245,9 @@ def budget(
     mapping, or an answer, of which the design alone is taken. fluctuation: (largest − least)/mean speed that a flywheel
     is sized for. Raises BadInput, also where nothing acts on the crank.
     """
-    from loomopt.interface.torque_budget import drawn_up
+    from loomopt.interface.study.budget import compute
 
-    return drawn_up(*_request(scene, design), fluctuation)
+    return compute(*_request(scene, design), fluctuation)
 
 
 def sweep(
@@ -266,11 +270,11 @@ def sweep(
     computes them. store: a file that each row is written to as it comes; resume: takes those that are there. accuracy,
     seed: as in `solve`. on_row(row): called as each is there. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
-    from loomopt.interface.finished import conducted
+    from loomopt.interface.study.points import run_study
     from loomopt.studies.sweep import planned
 
     study = planned(_scene(scene), over, target, accuracy=accuracy, seed=seed)
-    return conducted(study, executor, workers, store, resume, on_row)
+    return run_study(study, executor, workers, store, resume, on_row)
 
 
 def effects(
@@ -291,11 +295,11 @@ def effects(
     computes it. accuracy, seed: as in `solve`. on_row(row): called as each solve is there. Raises BadInput, and
     KeyboardInterrupt on Ctrl-C.
     """
-    from loomopt.interface.finished import conducted_effects
+    from loomopt.interface.study.effects import run_effects
     from loomopt.studies.effects.study import planned
 
     study = planned(_scene(scene), target, tolerance, accuracy=accuracy, seed=seed)
-    return conducted_effects(study, executor, workers, on_row)
+    return run_effects(study, executor, workers, on_row)
 
 
 def sensitivity(
@@ -306,7 +310,7 @@ def sensitivity(
     answer: what `solve` returned; a scene, or what `load` takes, is solved first, for `target`. on_step(what):
     progress. Raises BadInput, also for an answer that is not certified, and KeyboardInterrupt on Ctrl-C.
     """
-    from loomopt.interface.finished import conducted_sensitivity
+    from loomopt.interface.study.sensitivity import run_sensitivity
     from loomopt.studies.sensitivity.study import planned
 
     if on_step is not None:
@@ -314,7 +318,7 @@ def sensitivity(
     solved = answer if isinstance(answer, solution.Solution) and answer.point else solve(_scene(answer), target)
     if solved.scene is None:
         raise refusal("the answer knows no scene", "", "scene", remedy="Solve it again")
-    return conducted_sensitivity(planned(solved.scene, solved), on_step)
+    return run_sensitivity(planned(solved.scene, solved), on_step)
 
 
 def tolerance(
@@ -338,7 +342,7 @@ def tolerance(
     executor, workers, store, resume: as in `sweep`, a scramble a row; the study is the same whoever computes it.
     on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
-    from loomopt.interface.finished import conducted_tolerance
+    from loomopt.interface.study.tolerance import run_tolerance
     from loomopt.studies.tolerance.plan import planned
 
     own, given = _request(scene, design)
@@ -346,7 +350,7 @@ def tolerance(
         arguments.called(on_step, "on_step", "a function", "Give a function, or leave it out")
     proving, going_on = arguments.flag(worst, "worst"), arguments.flag(resume, "resume")
     plan = planned(own, given, target, samples, seed)
-    return conducted_tolerance(plan, executor, workers, on_step, proving, store, going_on)
+    return run_tolerance(plan, executor, workers, on_step, proving, store, going_on)
 
 
 def pareto(
@@ -374,14 +378,14 @@ def pareto(
     changes down come beside them. The rest is as in `sweep`. Raises BadInput, also for an end that has no least value,
     and KeyboardInterrupt on Ctrl-C.
     """
-    from loomopt.interface.finished import conducted
+    from loomopt.interface.study.points import run_study
     from loomopt.studies.front import front
 
     own = _scene(scene)
     asked = front.si(own, {} if ranges is None else ranges)
     whose = front.demanding(own, target)
     study = front.trade(own, axes, whose, maximise=maximise, ranges=asked, points=points, accuracy=accuracy)
-    return conducted(study, executor, workers, store, resume, on_row)
+    return run_study(study, executor, workers, store, resume, on_row)
 
 
 def accuracy(scene: Given, *, full: bool = False, on_step: Callable[[str], None] | None = None) -> "AccuracyStudy":
@@ -389,9 +393,9 @@ def accuracy(scene: Given, *, full: bool = False, on_step: Callable[[str], None]
 
     on_step(what): called before each step. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
-    from loomopt.interface.finished import accuracy_found
+    from loomopt.interface.study.accuracy import run_accuracy
 
-    return accuracy_found(_scene(scene), arguments.flag(full, "full"), on_step)
+    return run_accuracy(_scene(scene), arguments.flag(full, "full"), on_step)
 
 
 def problems() -> "tuple[Head, ...]":
@@ -425,7 +429,7 @@ def compare(*answers: "Evaluation | str", scene: Given | None = None) -> "Compar
     answers: answers or evaluations of one job, and "today" for the first one's machine as it is. scene: in which all
     are judged; each in its own without it. Raises BadInput.
     """
-    from loomopt.interface import comparison
+    from loomopt.interface.study import comparison
 
     return comparison.compared(answers, None if scene is None else _scene(scene))
 

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from loomopt.interface.report.animation import MovingPicture
+    from loomopt.interface.study.budget import Budget
     from loomopt.interface.text.notebook import Sketch
-    from loomopt.interface.torque_budget import Budget
     from loomopt.solving.answer.solution import Proofs
 
 PICTURE = arguments.PICTURE
@@ -151,9 +151,9 @@ class Evaluation(solution.Evaluated, records.Shown):
     def budget(self, *, fluctuation: float | None = None) -> "Budget":
         """Return where the crank torque of the design comes from; fluctuation: as in `loomopt.budget`."""
         solution.demand_single(self, "torque budget")
-        from loomopt.interface.torque_budget import drawn_up
+        from loomopt.interface.study.budget import compute
 
-        return drawn_up(self.scene, designs.checked(self.design, self.scene), fluctuation)
+        return compute(self.scene, designs.checked(self.design, self.scene), fluctuation)
 
     def prove(self, *, slack: float = SLACK) -> "Proofs":
         """Return proofs of the limits of its own scene and target; slack: as in `loomopt.prove`. Raises BadInput."""

@@ -1,25 +1,31 @@
-"""A study as a table: a row per point, units in the column names, provenance once for all."""
+"""Fronts and sweeps: their tables, a row per point, and their charts, over the number that varies."""
 
 import itertools
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from loomopt.base import arguments
 from loomopt.base.errors import refusal
 from loomopt.base.quantities import read
-from loomopt.base.units import SI_UNIT, QuantityError, factor
+from loomopt.base.units import SI_UNIT, QuantityError, factor, show
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
+from loomopt.picture.chart import COLOURS, Axis, Chart, Charts, Series, fitted
+from loomopt.picture.shapes import Floats
+from loomopt.picture.table import TextTable, joined
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words, grouped
-from loomopt.studies.run.rows import Multiplier, Row, SceneStudy
+from loomopt.studies.run.rows import Change, Findings, Multiplier, Row, SceneStudy, counted
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-class Column(NamedTuple):
+class NumberColumn(NamedTuple):
     """A column of numbers: its name, its unit, and its values, SI, None where a row has none; size: of the unit, SI."""
 
     name: str
@@ -55,7 +61,7 @@ class ColumnUnits:
         return (over if under == "1" else f"{over}/{grouped(under)}"), factor(over) / factor(under)
 
 
-def columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> dict[str, list[Column]]:
+def columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> dict[str, list[NumberColumn]]:
     """Return the numbers of rows as columns: "place", "sought", "design", "figures", "multipliers"; none that is empty.
 
     In the units of the scene, where what is only rounding beside the largest of its unit is 0; si: in SI, as they are.
@@ -66,18 +72,19 @@ def columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> dict[st
         "design": [row.design for row in rows],
         "figures": [row.figures for row in rows],
     }
-    units, found = ColumnUnits(study, si), dict[str, list[Column]]()
+    units, found = ColumnUnits(study, si), dict[str, list[NumberColumn]]()
     for part, numbers in numbers_of.items():
         taken = {column.name for columns in found.values() for column in columns}
         taken |= {"change"} if part == "figures" else set()
         names = dict.fromkeys(name for each in numbers for name in each if name not in taken)
         found[part] = _filled(
-            Column(name, units.of(name), factor(units.of(name)), tuple(each.get(name) for each in numbers))
+            NumberColumn(name, units.of(name), factor(units.of(name)), tuple(each.get(name) for each in numbers))
             for name in names
         )
     multipliers = dict.fromkeys(multiplier for row in rows for multiplier in row.multipliers)
     found["multipliers"] = _filled(
-        Column(each.text, *units.price(each), tuple(row.multipliers.get(each) for row in rows)) for each in multipliers
+        NumberColumn(each.text, *units.price(each), tuple(row.multipliers.get(each) for row in rows))
+        for each in multipliers
     )
     return found if si else _without_rounding(found)
 
@@ -115,7 +122,7 @@ def labelled_point(
 
 def _named_places(
     study: SceneStudy, rows: Sequence[Row], label: str | Mapping[str, str | float], allowed: str
-) -> list[tuple[Column, float]]:
+) -> list[tuple[NumberColumn, float]]:
     """Return the columns that a label names, each with the value that it gives, SI. Raises BadInput."""
     made, remedy = columns(study, rows), "Write the number of the row, or its place with its unit"
     known = {column.name: column for part in made.values() for column in part}
@@ -143,7 +150,7 @@ def _named_places(
     return found
 
 
-def _is_there(column: Column, at: int, value: float) -> bool:
+def _is_there(column: NumberColumn, at: int, value: float) -> bool:
     own, largest = column.values[at], max((abs(each) for each in column.values if each is not None), default=0.0)
     return own is not None and abs(own - value) <= PRINTED * largest
 
@@ -168,18 +175,18 @@ def _place_example(study: SceneStudy, rows: Sequence[Row]) -> str:
     return f'"{value:.6g}{"" if column.unit == "1" else f" {column.unit}"}"'
 
 
-def _filled(columns: Iterable[Column]) -> list[Column]:
+def _filled(columns: Iterable[NumberColumn]) -> list[NumberColumn]:
     return [column for column in columns if any(value is not None for value in column.values)]
 
 
-def _without_rounding(found: dict[str, list[Column]]) -> dict[str, list[Column]]:
+def _without_rounding(found: dict[str, list[NumberColumn]]) -> dict[str, list[NumberColumn]]:
     sizes: dict[str, float] = {}
     for column in itertools.chain(*found.values()):
         sizes[column.unit] = max(sizes.get(column.unit, 0.0), *(abs(value or 0.0) for value in column.values))
     return {part: [_cleaned(column, sizes[column.unit]) for column in each] for part, each in found.items()}
 
 
-def _cleaned(column: Column, largest: float) -> Column:
+def _cleaned(column: NumberColumn, largest: float) -> NumberColumn:
     tiny = SHOWN_AS_ZERO * largest
     return column._replace(values=tuple(v if v is None or abs(v) > tiny else 0.0 for v in column.values))
 
@@ -206,7 +213,7 @@ def frame(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> "pd.DataF
     return found
 
 
-def _floats(column: Column) -> list[float]:
+def _floats(column: NumberColumn) -> list[float]:
     return [math.nan if value is None else value for value in column.shown]
 
 
@@ -218,3 +225,153 @@ def study_provenance(study: SceneStudy) -> dict[str, str]:
 def units(study: SceneStudy, rows: Sequence[Row]) -> dict[str, str]:
     """Return the SI unit of everything that rows name."""
     return {column.name: column.unit for part in columns(study, rows, si=True).values() for column in part}
+
+
+SAME = 1e-9
+"""Relative spread of a column below which its number is the same in all rows."""
+
+KINDS = {"jump": "jump", "kink": "kink", "active set": "what binds changes"}
+"""Kind of a change, as it is told."""
+NARROWS = "*"
+"""What marks a point that was not asked for, but narrows a change down."""
+MOST_REASONS = 5
+"""Reasons that are told below a table."""
+
+
+def shown_columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[NumberColumn]:
+    """Columns that a study is about: what it seeks and shows, and what differs of the design."""
+    made = columns(study, rows, si)
+    known = [*made["design"], *made["figures"], *made["multipliers"]]
+    shown = [column for name in study.shown for column in known if column.name == name]
+    differing = [column for column in made["design"] if _differs(column) and column not in shown]
+    return [*made["sought"], *shown, *differing]
+
+
+def _differs(column: NumberColumn) -> bool:
+    known = [value for value in column.values if value is not None]
+    return max(known) - min(known) > SAME * max(map(abs, known))
+
+
+def tables(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str | TextTable]:
+    """A line per row, what changes along it, and what came of it.
+
+    rows: of all points that were solved.
+    """
+    found = study.read(rows)
+    shown = [*columns(study, found.rows, si)["place"], *shown_columns(study, found.rows, si)]
+    heads = ["", *(column.name if column.unit == "1" else f"{column.name}\n{column.unit}" for column in shown)]
+    lines = []
+    for place, row in enumerate(found.rows):
+        cells = ["" if each is None else f"{each:.6g}" for each in (column.shown[place] for column in shown)]
+        mark = f"{row.point}{NARROWS}" if row.narrows else str(row.point)
+        lines.append((mark, *cells, row.shortfall or ("" if row.status == "optimal" else row.status)))
+    counts = Counter(row.outcome for row in found.rows)
+    outcome = ", ".join(f"{count} {status}" for status, count in counts.items())
+    whole = study.size is None or len(rows) == study.size
+    narrowing = sum(row.narrows for row in found.rows)
+    number = len(found.rows) - narrowing
+    count = f"{number} point{'' if number == 1 else 's'}" if whole else counted(study, len(rows))
+    count += f" and {narrowing} that narrow{'s' * (narrowing == 1)} changes down ({NARROWS})" if narrowing else ""
+    asked = range(min(len(study.kinds) + 2, len(heads)))  # the point, its place, what is sought there
+    right = tuple(range(len(heads)))
+    grid = TextTable(
+        "", (*heads, "status"), tuple(lines), right, first=(*asked, len(heads)), more="--out F.csv, --json"
+    )
+    reasons = [f"point {row.point}, {row.status}: {row.reason}" for row in found.rows if row.reason]
+    more = [f"and {len(reasons) - MOST_REASONS} more, in the table's last column"] if reasons[MOST_REASONS:] else []
+    count += f", {found.bettered} bettered from a neighbour's design" if found.bettered else ""
+    message = [found.message] if found.message else []
+    said = [change_said(study, change, si) for change in found.changes]
+    conditions = study.conditions
+    held = "".join(f"; {name} {conditions[name]}" for name in ("held", "not held") if name in conditions)
+    return [f"{study.heading}: {count}, {outcome}{held}", *message, grid, *said, *reasons[:MOST_REASONS], *more]
+
+
+def change_said(study: SceneStudy, change: Change, si: bool) -> str:
+    """A change as a sentence."""
+    key = next(iter(study.kinds))
+    unit = ColumnUnits(study, si).of(key)
+    limits = [joined(side.text) for side in change.limits]
+    low, high = (joined(show(value, unit)) for value in change.between)
+    if change.at is None:
+        return f"{joined(key)} from {low} to {high}: what binds changes, {', '.join(limits)}"
+    where = f"{low} to {high}" if change.kind == "jump" else joined(show(change.at, unit))
+    return f"{joined(key)} {where}: {', '.join([KINDS[change.kind], *limits])}"
+
+
+LINES = 7
+"""Lines of a chart at most: of more every second, third, ..."""
+
+
+def charts(study: SceneStudy, findings: Findings) -> Charts:
+    """What a study is about over the first number that varies, a line for each combination of the others."""
+    rows = findings.rows
+    made = columns(study, rows)
+    places = made["place"]
+    missing = "no row is certified"
+    if not places or not any(row.certified for row in rows):
+        return Charts(study.heading, [], missing=missing)
+    panels = made["sought"] or shown_columns(study, rows)
+    others = [column for column in shown_columns(study, rows) if column not in panels]
+    drawn = [_chart(panel, places, findings) for panel in [*panels, *others]]
+    notes = [change_said(study, change, False) for change in findings.changes if change.at is not None]
+    return Charts(study.heading, drawn, shared=True, first=len(panels), notes=notes, missing=missing)
+
+
+def _chart(panel: NumberColumn, places: Sequence[NumberColumn], findings: Findings) -> Chart:
+    """A number over the first that varies; where there is no certified design its line has a gap."""
+    first, others, rows = places[0], places[1:], findings.rows
+    x = np.array([math.nan if value is None else value for value in first.shown])
+    known = zip(panel.shown, rows, strict=True)
+    y = np.array([value if value is not None and row.certified else math.nan for value, row in known])
+    gaps = [(low / first.size, high / first.size) for low, high in findings.gaps]
+    lines: dict[tuple[float, ...], list[int]] = {}
+    for k in (k for k in np.argsort(x, kind="stable").tolist() if np.isfinite(x[k])):
+        lines.setdefault(tuple(column.shown[k] or 0.0 for column in others), []).append(k)
+    step = max(1, -(-len(lines) // LINES))
+    series, key = list[Series](), list[tuple[str, str]]()
+    dots = list[tuple[float, float, str]]()
+    for place, (values, own) in enumerate(sorted(lines.items())[::step]):
+        kind = f"c{place % COLOURS}"
+        label = ", ".join(valued(column, own[0]) for column, _ in zip(others, values, strict=True))
+        series += [Series(*_broken(x[own], y[own], gaps), kind, label), Series(x[own], y[own], kind, points=True)]
+        key += [(kind, label)] if label else []
+        missed = [k for k in own if rows[k].shortfall]
+        dots += [(x[k], y[k], "missed") for k in missed]
+        key += [("dot missed", " and ".join(dict.fromkeys(rows[k].shortfall for k in missed)))] if missed else []
+    if step > 1:
+        key.append(("", f"{-(-len(lines) // step)} of {len(lines)} lines are drawn, one in {step}; the table has all"))
+    changes = [change for change in findings.changes if change.at is not None]
+    at = [(change.at or 0.0) / first.size for change in changes]
+    if not others:
+        curve = series[0]
+        seen = np.isfinite(curve.y)
+        kinks = [place for place, change in zip(at, changes, strict=True) if change.kind != "jump"]
+        dots += [(place, float(np.interp(place, curve.x[seen], curve.y[seen])), "kink") for place in kinks]
+    across = _axis(x, first.heading)
+    return Chart(
+        panel.heading, across, series, (), gaps, at, dots, list(dict.fromkeys(key)),
+        numbered=True, upright=_axis(y) if len(set(x[np.isfinite(x)])) == 1 else None,
+    )  # fmt: skip
+
+
+def _axis(values: Floats, name: str = "") -> Axis:
+    """Axis that shows all values; of one or two alone that are all at one place, numbered where they are."""
+    known = sorted({round(value, 12) for value in values[np.isfinite(values)].tolist()})
+    if len(known) != 1:
+        return fitted([values], name=name)
+    room = 0.1 * abs(known[0]) or 1.0
+    return Axis(known[0] - room, known[0] + room, known, name)
+
+
+def _broken(x: Floats, y: Floats, gaps: Sequence[tuple[float, float]]) -> tuple[Floats, Floats]:
+    """A line with a break in every gap between two of its points, in the units of x."""
+    middles = [(low + high) / 2 for low, high in gaps]
+    places = {int(np.searchsorted(x, middle)): middle for middle in middles}
+    inner = {k: middle for k, middle in places.items() if 0 < k < len(x) and np.isfinite([y[k - 1], y[k]]).all()}
+    return np.insert(x, list(inner), list(inner.values())), np.insert(y, list(inner), np.nan)
+
+
+def valued(column: NumberColumn, at: int, digits: int = 6) -> str:
+    """A number of a row with its name and its unit."""
+    return f"{column.name} {column.shown[at] or 0.0:.{digits}g}{'' if column.unit == '1' else ' ' + column.unit}"

@@ -1,6 +1,10 @@
 """A table that a person reads: six digits in each cell, whatever stands in the others."""
 
+from collections.abc import Mapping, Sequence
+
 import pandas as pd
+
+from loomopt.picture.table import Column
 
 
 class TableFrame(pd.DataFrame):
@@ -17,3 +21,12 @@ class TableFrame(pd.DataFrame):
     def _repr_html_(self) -> str | None:
         with pd.option_context("display.float_format", "{:.6g}".format):
             return super()._repr_html_()  # type: ignore[misc,no-any-return]
+
+
+def frame(columns: Sequence[Column], attrs: Mapping[str, str], index: str | None = None) -> TableFrame:
+    """Table of those columns that files have; attrs: where it comes from; index: the column that names the rows."""
+    table = TableFrame({column.name: column.values for column in columns if column.name})
+    table = table.astype({column.name: column.kind for column in columns if column.kind})
+    table = table if index is None else table.set_index(index)
+    table.attrs.update(attrs)
+    return table

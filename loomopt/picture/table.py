@@ -1,5 +1,7 @@
 """Tables as plain data, and how words of a cell hold together: studies and answers fill them, renderers write them."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 JOINED = "\ue000"
@@ -41,3 +43,47 @@ def call(text: str) -> str:
 def spaced(text: str) -> str:
     """Return text as it is printed."""
     return text.replace(JOINED, " ").replace(OPTION, " ")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a study's table, for files and for people.
+
+    name: its heading in files, with the unit; "" for people alone. values: one a row, as pandas takes them. head: above
+    it where people read it; None for files alone. cells: what people read; right: whether numbers stand there; called:
+    its heading in a sentence; kind: pandas type of the values, where they do not tell it.
+    """
+
+    name: str
+    values: Sequence[object] = ()
+    head: str | None = None
+    cells: Sequence[str] = ()
+    right: bool = True
+    called: str = ""
+    kind: str = ""
+
+
+def text_table(
+    columns: Sequence[Column], first: tuple[int, ...] = (), more: str = "--json", title: str = ""
+) -> TextTable:
+    """Table for people of those columns that they read; first, more: as of `TextTable`."""
+    read = [column for column in columns if column.head is not None]
+    return TextTable(
+        title,
+        tuple(column.head or "" for column in read),
+        tuple(zip(*(column.cells for column in read), strict=True)),
+        tuple(place for place, column in enumerate(read) if column.right),
+        first,
+        names=tuple(column.called or column.head or "" for column in read),
+        more=more,
+    )
+
+
+def words(name: str, values: Sequence[str], head: str | None = None) -> Column:
+    """Column of words, the same in files and for people."""
+    return Column(name, values, name if head is None else head, values, right=False)
+
+
+def written(value: float | None, digits: int = 6) -> str:
+    """Number as people read it; "" for none."""
+    return "" if value is None or math.isnan(value) else f"{value:.{digits}g}"

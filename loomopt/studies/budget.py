@@ -28,7 +28,7 @@ MOTOR_UNITS = {
 
 
 @dataclass(frozen=True, repr=False)
-class Found:
+class BudgetResult:
     """Where the crank torque of a design comes from, and what it asks of motor and flywheel; SI and rad.
 
     remarks: what to know beside it; undefined: what of the motor is not known, and why.
@@ -71,7 +71,7 @@ class Found:
 
 
 @working()
-def drawn_up(scene: Scene, design: designs.Design, fluctuation: float | None = None) -> Found:
+def compute(scene: Scene, design: designs.Design, fluctuation: float | None = None) -> BudgetResult:
     """Return the torque budget of a design, checked (SI; what it does not name is today's). Raises BadInput."""
     allowed = "more than 0, at most 1"
     if fluctuation is not None:
@@ -91,7 +91,7 @@ def drawn_up(scene: Scene, design: designs.Design, fluctuation: float | None = N
             remedy = f"Take it off (--without {load.name}), or choose other values"
             raise refusal(problem, scene.origin, f"effects.{load.name}", remedy=remedy)
     found = budget.budget(sampler, fluctuation)
-    return Found(scene, found, tuple(_remarks(scene, sampler.model.loads)), _undefined(found))
+    return BudgetResult(scene, found, tuple(_remarks(scene, sampler.model.loads)), _undefined(found))
 
 
 def _acts(effect: object) -> bool:

@@ -150,7 +150,7 @@ OF_SCENE += ["shown_in", "unit_for"]
 OF_ANSWER = ["plot", "export", "to_frame", "simulate", "prove"]
 OF_STUDY = ["table", "answer", "plot"]
 ENGINES = ["loomopt.solving.engine.solve", "loomopt.studies.run.run.run", "loomopt.solving.proof.whole_cycle._readings"]
-ENGINES += ["loomopt.interface.tables.curves", "loomopt.interface.figures.study.plot"]
+ENGINES += ["loomopt.interface.tables.curves", "loomopt.interface.figures.charts.draw"]
 
 
 @pytest.fixture(scope="module")

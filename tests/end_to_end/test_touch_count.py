@@ -132,7 +132,7 @@ def test_a_new_job_is_its_folders_its_scene_and_its_reference_rows(copy):
 
 COMMAND = '''"""The command that counts the effects of a scene."""
 
-from loomopt.interface.cli.commands import Problem; from loomopt.interface.cli.commands import Set
+from loomopt.interface.cli.options import Problem; from loomopt.interface.cli.options import Set
 from loomopt.interface.cli.shell import read_scene
 
 

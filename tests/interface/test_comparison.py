@@ -67,7 +67,7 @@ def test_limits_that_are_not_held_are_marked(light):
     table = made.table()
     assert table.loc["l1", "not held by"] == SECOND
     assert table.loc["l2", "not held by"] == ""
-    assert any("NOT admissible" in part for part in made.parts() if isinstance(part, str))
+    assert any("NOT admissible" in part for part in made.tables() if isinstance(part, str))
 
 
 @pytest.mark.parametrize("given", [(), ("today",), (3, 4)])

@@ -3,13 +3,13 @@
 import json
 import math
 
+import numpy as np
 import pytest
 from support import overlaps
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface.cli import app
-from loomopt.interface.figures import budget as figures
 
 MORE = ["--with", "gravity", "--with", "bearing_friction", "--fluctuation", "0.02"]
 
@@ -69,7 +69,7 @@ def test_a_table_has_a_line_per_effect_and_one_for_their_sum():
     assert repr(found) == "<Budget beatup: crank torque -830.638 lbf*in at its peak, of 2 effects>"
 
 
-def test_the_figure_stacks_the_shares_and_no_text_runs_into_anything(tmp_path):
+def test_the_figure_has_a_curve_for_each_share_and_no_text_runs_into_anything(tmp_path):
     scene = lo.load("beatup")
     for effect in scene.schema.effects.values():
         if effect.name not in scene.effects and effect.name not in ("shaft_torsion", "speed_fluctuation"):
@@ -79,10 +79,13 @@ def test_the_figure_stacks_the_shares_and_no_text_runs_into_anything(tmp_path):
     drawn = found.plot(tmp_path / "budget.svg")
     assert overlaps.found(drawn) == []
     (axes,) = drawn.axes
-    assert len(axes.collections) == 2 * len(found.rows), "above zero and below"
+    curves = [y for y in (np.asarray(line.get_ydata()) for line in axes.lines) if len(y) > 2]
+    assert len(curves) == len(found.rows) + 1, "the shares and their sum"
+    sums = np.sum(curves[:-1], axis=0)
+    assert curves[-1] == pytest.approx(sums, abs=1e-9)
     assert (tmp_path / "budget.svg").stat().st_size > 1000
     with pytest.raises(BadInput, match="svg"):
-        figures.plot(found, tmp_path / "budget.gif")
+        found.plot(tmp_path / "budget.gif")
 
 
 def test_figures_are_written_from_the_command_line(tmp_path, capsys):

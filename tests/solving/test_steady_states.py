@@ -172,5 +172,5 @@ def test_every_limit_and_peak_is_proven_and_what_the_proof_rests_on_is_said():
 def test_a_study_of_accuracy_says_what_it_does_not_vary():
     from loomopt.studies.accuracy import accuracy
 
-    assert "Not covered: the steady state of shaft_torsion" in accuracy.concluded(SCENE, []).advice
-    assert "Not covered" not in accuracy.concluded(lo.load("beatup"), []).advice
+    assert "Not covered: the steady state of shaft_torsion" in accuracy.summarise(SCENE, []).advice
+    assert "Not covered" not in accuracy.summarise(lo.load("beatup"), []).advice

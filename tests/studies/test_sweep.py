@@ -14,8 +14,8 @@ from support import inch
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
+from loomopt.interface import study_table
 from loomopt.interface.files import outputs
-from loomopt.interface.text import studies
 from loomopt.picture.table import TextTable
 from loomopt.solving.answer.solution import Solution
 from loomopt.studies import sweep
@@ -144,7 +144,7 @@ def test_a_row_that_misses_its_goal_is_nowhere_called_optimal_alone(serial):
         said = "optimal but M3_fdc not reached" if row in missed else "optimal"
         assert table.loc[row.point, "status"] == row.outcome == said
         assert row.status == "optimal"
-    heading, grid, *_ = studies.parts(serial.study, serial.solved)
+    heading, grid, *_ = study_table.tables(serial.study, serial.solved)
     assert isinstance(grid, TextTable)
     assert heading == "beatup, balance: 21 points, 8 optimal but M3_fdc not reached, 13 optimal"
     assert [line[-1] for line in grid.lines] == ["M3_fdc not reached" if row in missed else "" for row in serial.rows]

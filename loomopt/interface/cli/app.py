@@ -17,19 +17,8 @@ import typer
 from loomopt.base import __version__, interrupts
 from loomopt.base.errors import BadInput, blamed, clean
 from loomopt.interface.cli import commands, pages, studies
-from loomopt.interface.cli.commands import (
-    Decimal,
-    Free,
-    Json,
-    Problem,
-    Set,
-    With,
-    Without,
-    printed,
-    remarked,
-    tell,
-    write,
-)
+from loomopt.interface.cli.commands import printed, remarked, tell
+from loomopt.interface.cli.options import NO_CHANGES, Decimal, Json, Problem, SceneOptions, Target, expanded
 from loomopt.interface.cli.shell import (
     DIFFERS,
     call_progress,
@@ -37,7 +26,6 @@ from loomopt.interface.cli.shell import (
     mistake,
     only,
     read_number,
-    read_scene,
     read_steps,
     remark,
     worded,
@@ -97,11 +85,8 @@ def start(
 
 def solve(
     problem: Problem,
-    target: Annotated[str | None, typer.Option(help="What to optimise; the job's default without it.")] = None,
-    sets: Set = None,
-    free: Free = None,
-    on: With = None,
-    off: Without = None,
+    target: Target = None,
+    changes: SceneOptions = NO_CHANGES,
     accuracy: Annotated[str, typer.Option(metavar="R", help="Relative accuracy, 1e-11 to 0.1.")] = "1e-8",
     starts: Annotated[str | None, typer.Option(metavar="N", help="So many starts; a wide search without it.")] = None,
     proven: Annotated[bool, typer.Option("--prove", help="Prove every limit at every crank angle too.")] = False,
@@ -126,7 +111,7 @@ def solve(
     """Solve a problem and certify the answer."""
     from loomopt.interface import api
 
-    scene = read_scene(problem, sets, on, off, free)
+    scene = changes.scene(problem)
     settings: dict[str, Any] = {"accuracy": read_number("--accuracy", accuracy, float)}
     settings["starts"] = None if starts is None else read_number("--starts", starts, int)
     settings |= {"gap": read_number("--gap", gap, float), "seconds": read_number("--time", seconds, float)}
@@ -163,10 +148,7 @@ def solve(
 
 def accuracy(
     problem: Problem,
-    sets: Set = None,
-    on: With = None,
-    off: Without = None,
-    free: Free = None,
+    changes: SceneOptions = NO_CHANGES,
     full: Annotated[bool, typer.Option("--full", help="More settings, more repeats: minutes.")] = False,
     as_json: Json = False,
     out: Annotated[
@@ -176,23 +158,30 @@ def accuracy(
     decimal: Decimal = "point",
 ) -> None:
     """Show what accuracy costs in time, method by method."""
-    from loomopt.interface.figures import accuracy
-    from loomopt.interface.files import sheets
+    from loomopt.base import files
+    from loomopt.interface.files import outputs, sheets
+    from loomopt.interface.study.accuracy import AccuracyStudy
     from loomopt.studies.accuracy import accuracy as study
 
     comma = sheets.decimal_comma(decimal)
     for path in out or ():
-        accuracy.check(path)
-    scene = read_scene(problem, sets, on, off, free)
+        files.suffix(path, (*outputs.PICTURES, ".csv", ".xlsx"))
+        files.check(path)
+    scene = changes.scene(problem)
     climbs: list[study.Climb] = []
     try:
         with call_progress() as progress:
             climbs.extend(study.climbs(scene, full, progress.say))
     finally:
         if climbs:
-            found = study.concluded(scene, climbs, full)
-            tell(as_json, found.as_dict, lambda: accuracy.parts(found))
-    write(out, lambda path: accuracy.write(found, path, comma))
+            found = AccuracyStudy(study.summarise(scene, climbs, full))
+            tell(as_json, found.as_dict, found.tables)
+    for path in out or ():
+        if path.suffix.lower() in outputs.PICTURES:
+            found.plot(path)
+        else:
+            sheets.write(path, {"accuracy": found.table()}, comma)
+        remark(f"Wrote {path}")
 
 
 def check(
@@ -270,7 +259,7 @@ def application(words: list[str]) -> typer.Typer:
     app.callback(invoke_without_command=True)(start)
     for name in set(words[:1]) & COMMANDS.keys() or COMMANDS:
         epilog = f"For example: {EXAMPLES[name]}" if name in EXAMPLES else None
-        app.command(name, epilog=epilog)(COMMANDS[name])
+        app.command(name, epilog=epilog)(expanded(COMMANDS[name]))
     return app
 
 

@@ -6,6 +6,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from loomopt.interface.cli.options import (
+    NO_CHANGES,
+    Decimal,
+    Design,
+    Figure,
+    Json,
+    Limits,
+    Problem,
+    SceneOptions,
+)
 from loomopt.interface.cli.shell import DIFFERS, call_progress, read_number, read_request, remark
 from loomopt.picture.table import TextTable
 
@@ -13,35 +23,6 @@ if TYPE_CHECKING:
     from loomopt.scenes.designs import Design as DesignGiven
     from loomopt.scenes.scene import Scene
     from loomopt.solving.answer.solution import Evaluated
-
-Problem = Annotated[
-    str, typer.Argument(help="A packaged scene (see `loomopt list`), the path of a TOML scene, or an answer's JSON.")
-]
-Set = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set a scene key by its dotted path.")
-]
-With = Annotated[list[str] | None, typer.Option("--with", metavar="EFFECT", help="Put on an effect from [available].")]
-Without = Annotated[list[str] | None, typer.Option("--without", metavar="EFFECT", help="Take an effect off.")]
-Free = Annotated[list[str] | None, typer.Option("--free", metavar="NAMES", help="Free bounds that are held.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Design = Annotated[
-    Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON; - for a pipe.")
-]
-
-Decimal = Annotated[str, typer.Option(metavar="point|comma", help="The decimal sign of CSV files.")]
-Target = Annotated[
-    str | None, typer.Option(help="Whose limits count; the answer's own, or the job's default, without it.")
-]
-
-
-def checked(figures: Sequence[Path] | None, tables: Sequence[Path] | None = None) -> None:
-    """Raise BadInput for files that cannot be written, before anything is computed."""
-    from loomopt.interface.text import studies
-
-    for path in figures or ():
-        studies.check_figure(path)
-    for path in tables or ():
-        studies.check_table(path)
 
 
 def tell(
@@ -143,20 +124,17 @@ def show(
     equations: Annotated[bool, typer.Option("--equations", help="Print the equations the scene really uses.")] = False,
     symbols: Annotated[bool, typer.Option("--symbols", help="Print what every symbol of its tables means.")] = False,
     sources: Annotated[bool, typer.Option("--sources", help="Print its source's figures, and as computed.")] = False,
-    figure: Annotated[list[Path] | None, typer.Option(metavar="F", help="Draw it: .png, .svg or .pdf.")] = None,
+    figure: Figure = None,
     animate: Annotated[list[Path] | None, typer.Option(metavar="F", help="Have it move: .html, .gif or .mp4.")] = None,
     design: Design = None,
-    sets: Set = None,
-    on: With = None,
-    off: Without = None,
-    free: Free = None,
+    changes: SceneOptions = NO_CHANGES,
 ) -> None:
     """Show a scene as read, its equations, symbols, sources."""
     from loomopt.interface import api
     from loomopt.interface.files import outputs
     from loomopt.interface.text import glossary, layout, scenes
 
-    scene, given, name, status = read_request(problem, design, None, sets, on, off, free)
+    scene, given, name, status = read_request(problem, design, None, changes.call)
     said = outputs.what(api.evaluate(scene, given, name), name, status) if given and (figure or animate) else None
     write(figure, lambda path: outputs.picture(path, scene, given, said))
     if animate:
@@ -175,17 +153,14 @@ def show(
 def evaluate(
     problem: Problem,
     design: Design = None,
-    target: Target = None,
-    sets: Set = None,
-    on: With = None,
-    off: Without = None,
-    free: Free = None,
+    target: Limits = None,
+    changes: SceneOptions = NO_CHANGES,
     as_json: Json = False,
 ) -> None:
     """Show the figures of a design (today's without one)."""
     from loomopt.interface import api
 
-    scene, given, name, _ = read_request(problem, design, target, sets, on, off, free)
+    scene, given, name, _ = read_request(problem, design, target, changes.call)
     found = api.evaluate(scene, given, name)
     remarked(scene, given)
     if as_json:
@@ -199,19 +174,16 @@ def evaluate(
 def prove(
     problem: Problem,
     design: Design = None,
-    target: Target = None,
+    target: Limits = None,
     slack: Annotated[str, typer.Option(metavar="R", help="What binding limits leave open, relative.")] = "1e-8",
-    sets: Set = None,
-    on: With = None,
-    off: Without = None,
-    free: Free = None,
+    changes: SceneOptions = NO_CHANGES,
     as_json: Json = False,
 ) -> None:
     """Prove limits and peaks at every crank angle, or refute."""
     from loomopt.interface import api
     from loomopt.interface.text import answers
 
-    scene, given, name, _ = read_request(problem, design, target, sets, on, off, free)
+    scene, given, name, _ = read_request(problem, design, target, changes.call)
     with call_progress() as progress:
         progress.say("proving")
         found = api.prove(scene, given, name, slack=read_number("--slack", slack, float))
@@ -222,7 +194,7 @@ def prove(
 def simulate(
     problem: Problem,
     design: Design = None,
-    target: Target = None,
+    target: Limits = None,
     out: Annotated[
         list[Path] | None,
         typer.Option(metavar="F", help="Write curves (.csv, .xlsx, .parquet) or a figure (.png, .svg, .pdf)."),
@@ -235,10 +207,7 @@ def simulate(
     ] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Forces in joints; pictures are their diagrams.")] = False,
     decimal: Decimal = "point",
-    sets: Set = None,
-    on: With = None,
-    off: Without = None,
-    free: Free = None,
+    changes: SceneOptions = NO_CHANGES,
 ) -> None:
     """Compute curves over the cycle; print them without --out."""
     from loomopt.interface import api
@@ -247,7 +216,7 @@ def simulate(
     from loomopt.solving.options import check_numbers
 
     comma = sheets.decimal_comma(decimal)
-    scene, given, name, status = read_request(problem, design, target, sets, on, off, free)
+    scene, given, name, status = read_request(problem, design, target, changes.call)
     asked = None if accuracy is None else read_number("--accuracy", accuracy, float)
     if asked is not None:
         check_numbers(asked, 1)
@@ -278,22 +247,19 @@ def budget(
     figures: Annotated[
         list[Path] | None, typer.Option("--figure", metavar="F", help="Draw the shares: .png, .svg or .pdf.")
     ] = None,
-    sets: Set = None,
-    on: With = None,
-    off: Without = None,
-    free: Free = None,
+    changes: SceneOptions = NO_CHANGES,
     as_json: Json = False,
 ) -> None:
     """Show where the crank torque comes from; size the motor."""
-    from loomopt.interface import torque_budget
-    from loomopt.interface.text import budget
+    from loomopt.interface.files import outputs
+    from loomopt.interface.study.budget import compute
 
-    checked(figures)
-    scene, given, _, _ = read_request(problem, design, None, sets, on, off, free)
+    outputs.check_files(figures or ())
+    scene, given, _, _ = read_request(problem, design, None, changes.call)
     asked = None if fluctuation is None else read_number("--fluctuation", fluctuation, float)
-    found = torque_budget.drawn_up(scene, given, asked)
+    found = compute(scene, given, asked)
     remarked(scene, given)
-    tell(as_json, found.as_dict, lambda: budget.parts(found))
+    tell(as_json, found.as_dict, found.tables)
     write(figures, found.plot)
 
 
@@ -304,24 +270,21 @@ def export(
         typer.Option(metavar="F", help="The file: .svg, .dxf; .csv, .xlsx for joints or profile; any number."),
     ],
     design: Design = None,
-    target: Target = None,
+    target: Limits = None,
     decimal: Decimal = "point",
     dxf: Annotated[str | None, typer.Option(metavar="V", help="Version of DXF: r2010 or r12.")] = None,
     arcs: Annotated[
         str | None, typer.Option(metavar="T", help='Closed curves as arcs within a tolerance: "0.01 mm".')
     ] = None,
     only: Annotated[str | None, typer.Option(metavar="L", help="Draw one layer alone, such as profile.")] = None,
-    sets: Set = None,
-    on: With = None,
-    off: Without = None,
-    free: Free = None,
+    changes: SceneOptions = NO_CHANGES,
 ) -> None:
     """Export linkage or cam at true scale, for the workshop."""
     from loomopt.interface import api
     from loomopt.interface.files import outputs, sheets
 
     comma = sheets.decimal_comma(decimal)
-    scene, given, name, status = read_request(problem, design, target, sets, on, off, free)
+    scene, given, name, status = read_request(problem, design, target, changes.call)
     said = outputs.what(api.evaluate(scene, given, name), name, status) if given else None
     how = outputs.workshop(dxf, arcs, only)
     outputs.check_workshop(out, how)

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from loomopt.interface.cli.commands import Decimal, Free, Json, Set, With, Without, checked, remarked, tell, write
-from loomopt.interface.cli.shell import call_progress, only, read_scene, remark
+from loomopt.interface.cli.commands import remarked, tell, write
+from loomopt.interface.cli.options import NO_CHANGES, NO_TABLE, Json, SceneOptions, TableOptions
+from loomopt.interface.cli.shell import call_progress, only, remark
 
 if TYPE_CHECKING:
     from loomopt.interface.report.page import Chapter
@@ -24,7 +25,6 @@ Beside = Annotated[
     list[str] | None,
     typer.Option("--study", metavar="S", help="Beside each: budget, tolerance, sensitivity, effects, accuracy, proof."),
 ]
-Out = Annotated[list[Path] | None, typer.Option(metavar="F", help="Write the table: .csv, .xlsx or .parquet.")]
 Answers = Annotated[
     list[str], typer.Argument(metavar="A.json B.json ... [today]", help="Answers; today for the machine as it is.")
 ]
@@ -34,10 +34,7 @@ def report(
     things: Problems,
     out: Page,
     target: Annotated[str | None, typer.Option(help="What scenes are solved for; their job's default without.")] = None,
-    sets: Set = None,
-    free: Free = None,
-    on: With = None,
-    off: Without = None,
+    changes: SceneOptions = NO_CHANGES,
     proven: Annotated[
         bool, typer.Option("--prove", help="Prove every limit of scenes at every crank angle too.")
     ] = False,
@@ -56,7 +53,7 @@ def report(
     for name in wanted:
         if name not in STUDIES:
             raise refusal("there is no such study", "", "--study", name, ", ".join(STUDIES), "Choose one of them")
-    inputs = [_checked_input(thing, target, (sets, on, off, free), wanted, proven) for thing in things]
+    inputs = [_checked_input(thing, target, changes, wanted, proven) for thing in things]
     if wanted and not any(each.scene for each in inputs):
         remedy = "Leave out --study, or name an answer or a scene too"
         raise refusal(
@@ -91,7 +88,7 @@ class Input(NamedTuple):
 def _checked_input(
     thing: str,
     target: str | None,
-    changes: "tuple[list[str] | None, list[str] | None, list[str] | None, list[str] | None]",
+    changes: SceneOptions,
     studies: Sequence[str],
     prove: bool = False,
 ) -> Input:
@@ -102,7 +99,7 @@ def _checked_input(
     from loomopt.jobs import registry
 
     answer, store = registry.answer_path(thing), store_file.is_store(Path(thing))
-    if (answer or store) and (target or any(changes)):
+    if (answer or store) and (target or changes):
         remedy = "Leave out --target, --set, --with, --without and --free, or evaluate the design in a scene of its own"
         raise refusal("it is judged as it was found", "", thing, remedy=remedy)
     if store:
@@ -115,8 +112,7 @@ def _checked_input(
             lambda say: document.of_answer(found.found, _beside(found.found, studies, say), found.doubts),
             found.found.scene,
         )
-    sets, on, off, free = changes
-    scene = read_scene(thing, sets, on, off, free)
+    scene = changes.scene(thing)
     _check_studies(scene, target, studies)
     return Input(lambda say: _solved(scene, target, prove, studies, say), scene)
 
@@ -137,7 +133,7 @@ def _check_studies(scene: "Scene", target: str | None, studies: Sequence[str]) -
         remedy = "Leave out --study, or report one design by itself"
         raise refusal("studies are of one design in its scene", "", "--study", studies[0], remedy=remedy)
     if "budget" in studies:
-        budget.drawn_up(scene, {})
+        budget.compute(scene, {})
     if "tolerance" in studies:
         tolerance.planned(scene, None, name)
     if "effects" in studies:
@@ -208,26 +204,24 @@ def compare(
     figure: Annotated[
         list[Path] | None, typer.Option(metavar="F", help="Lay their curves over each other: .png, .svg or .pdf.")
     ] = None,
-    out: Out = None,
-    decimal: Decimal = "point",
+    files: TableOptions = NO_TABLE,
     as_json: Json = False,
 ) -> None:
     """Show designs side by side, what differs marked."""
-    from loomopt.interface import comparison
-    from loomopt.interface.files import answer_file, sheets
-    from loomopt.interface.text import studies
+    from loomopt.interface.files import answer_file, outputs
+    from loomopt.interface.study import comparison
     from loomopt.jobs import registry
 
-    comma = sheets.decimal_comma(decimal)
-    checked(figure, out)
+    comma = files.comma
+    outputs.check_files(figure or (), files.out or ())
     found: list[Any] = [
         each if each == comparison.TODAY else answer_file.recalled(_answer(each)).found for each in answers
     ]
     scene = registry.load(within) if within else None
     names = ["" if each == comparison.TODAY else Path(each).stem for each in answers]
     made = comparison.compared(found, scene, names)
-    tell(as_json, made.as_dict, made.parts)
-    write(out, lambda path: studies.table(path, made.table(), "designs", comma))
+    tell(as_json, made.as_dict, made.tables)
+    write(files.out, lambda path: outputs.write_table(path, made.table(), "designs", comma))
     write(figure, made.plot)
 
 

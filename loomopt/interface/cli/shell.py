@@ -3,7 +3,7 @@
 import contextlib
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
@@ -26,39 +26,6 @@ OPTIONS = {
     "measured": "--beside",
 }
 """Option of each argument of the Python functions."""
-
-
-def read_scene(
-    problem: str,
-    sets: list[str] | None,
-    on: list[str] | None,
-    off: list[str] | None,
-    free: list[str] | None = None,
-) -> "Scene":
-    """Return a scene with what the command line changes in it."""
-    from loomopt.jobs.registry import load
-
-    scene = load(problem)
-    call = read_call(scene, sets, on, off, free)
-    return scene.called(call, call.set)
-
-
-def read_call(
-    scene: "Scene", sets: list[str] | None, on: list[str] | None, off: list[str] | None, free: list[str] | None
-) -> "Call":
-    """Return what the command line changes in a scene: numbers set, then effects on, then off, then bounds freed."""
-    from loomopt.base.errors import refusal
-    from loomopt.scenes.scene import Call
-
-    values: dict[str, object] = {}
-    for item in sets or ():
-        key, equals, value = item.partition("=")
-        if not equals:
-            remedy = 'Write --set operation.M0="800 N*m"'
-            raise refusal("it is not KEY=VALUE", scene.origin, "--set", item, remedy=remedy)
-        values[key.strip()] = read_value(value)
-    freed = (name for names in free or () for name in names.replace(",", " ").split())
-    return Call(values, tuple(on or ()), tuple(off or ()), tuple(freed))
 
 
 def read_value(text: str) -> object:
@@ -90,15 +57,12 @@ def read_request(
     problem: str,
     design: Path | None,
     target: str | None,
-    sets: list[str] | None,
-    on: list[str] | None,
-    off: list[str] | None,
-    free: list[str] | None,
+    read_call: "Callable[[Scene], Call]",
 ) -> DesignRequest:
     """Return the scene of the file, as an answer's own call has changed it, with what the command line changes.
 
     An answer in place of the file is judged in its own scene. A remark names what is otherwise than in the file, and
-    what the answer was found in that does not count.
+    what the answer was found in that does not count. read_call: reads the changes.
     """
     from loomopt.jobs import registry
     from loomopt.scenes import designs
@@ -110,7 +74,7 @@ def read_request(
         handed = found if design is None else handed
     else:
         scene = registry.load(problem)
-    call = read_call(scene, sets, on, off, free)
+    call = read_call(scene)
     if design is None:
         origin, scene = scene.origin, scene.called(call, call.set)
     else:

@@ -1,66 +1,92 @@
 """The commands that solve many times: a row of a table each, by as many workers as there are, kept as they come."""
 
-import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from loomopt.interface.cli.commands import (
-    Decimal,
+from loomopt.interface.cli.commands import tell, write
+from loomopt.interface.cli.options import (
+    ALONE,
+    NO_CHANGES,
+    NO_STORE,
+    NO_TABLE,
+    ComputerOptions,
     Design,
-    Free,
+    Figure,
     Json,
+    Options,
     Problem,
-    Set,
-    With,
-    Without,
-    checked,
-    tell,
-    write,
+    SceneOptions,
+    StoreOptions,
+    TableOptions,
+    Target,
 )
-from loomopt.interface.cli.shell import call_progress, read_number, read_scene, remark
+from loomopt.interface.cli.shell import call_progress, read_number, remark
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
-    from loomopt.interface.finished import StudyTable
+    from loomopt.interface.study.points import StudyTable
     from loomopt.studies.run.rows import Row, SceneStudy
 
-Target = Annotated[str | None, typer.Option(help="What to optimise; the job's default without it.")]
-Workers = Annotated[str | None, typer.Option(metavar="N", help="So many processes on this machine.")]
-Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help="The scheduler of a Dask cluster instead.")]
-StoreFile = Annotated[Path | None, typer.Option("--store", metavar="FILE", help="Keep each row there as it comes.")]
-Resume = Annotated[bool, typer.Option("--resume", help="Go on with what the store holds.")]
-Out = Annotated[list[Path] | None, typer.Option(metavar="F", help="Write the table: .csv, .xlsx or .parquet.")]
-Figure = Annotated[
-    list[Path] | None, typer.Option(metavar="F", help="Draw it, with designs beside: .png, .svg or .pdf.")
-]
-Animate = Annotated[
-    list[Path] | None, typer.Option(metavar="F", help="Have the designs along it move: .html, .gif or .mp4.")
-]
-Bars = Annotated[list[Path] | None, typer.Option("--figure", metavar="F", help="Draw it: .png, .svg or .pdf.")]
-Si = Annotated[bool, typer.Option("--si", help="Tables in SI, not in the scene's own units.")]
 OK, NOT_CERTIFIED, INFEASIBLE = 0, 4, 3
 """Exit statuses."""
 ANSWERED = "needed", "evaluated"
 """Statuses of rows that are answered without a solve."""
 
 
-class Run(NamedTuple):
-    """How a study runs and where it goes: what all of these commands take."""
+@dataclass(frozen=True)
+class RunOptions(Options):
+    """How a front or a sweep is run, and the files that it goes into."""
 
-    workers: str | None
-    dask: str | None
-    store: Path | None
-    resume: bool
-    out: list[Path] | None
-    figure: list[Path] | None
-    si: bool
-    as_json: bool
-    decimal: str = "point"
-    animate: list[Path] | None = None
+    computer: ComputerOptions = ALONE
+    rows: StoreOptions = NO_STORE
+    table: TableOptions = NO_TABLE
+    figure: Annotated[
+        list[Path] | None, typer.Option(metavar="F", help="Draw it, with designs beside: .png, .svg or .pdf.")
+    ] = None
+    animate: Annotated[
+        list[Path] | None, typer.Option(metavar="F", help="Have the designs along it move: .html, .gif or .mp4.")
+    ] = None
+    si: Annotated[bool, typer.Option("--si", help="Tables in SI, not in the scene's own units.")] = False
+    as_json: Json = False
+
+    def check(self) -> None:
+        """Raise BadInput, before anything is computed, for files that cannot be written, or are the store's."""
+        from loomopt.base.errors import refusal
+        from loomopt.interface.files import outputs
+
+        _ = self.table.comma
+        outputs.check_files(self.figure or (), self.table.out or ())
+        if self.animate:
+            from loomopt.interface.report import animation
+
+            for path in self.animate:
+                animation.checked(path)
+        store = self.rows.store
+        for path in (*(self.table.out or ()), *(self.figure or ()), *(self.animate or ())):
+            if store and path.resolve() == store.resolve():
+                remedy = "Name another file for one of them"
+                raise refusal("it is the store's own file", str(path), "--store", remedy=remedy)
+
+    def hand_over(self, found: "StudyTable", more: str = "") -> None:
+        """Print a study and write its files; more: what is said of them beside their name."""
+        from loomopt.interface.files import outputs
+
+        tell(self.as_json, found.as_dict, lambda: found.tables(si=self.si))
+        for path in self.table.out or ():
+            outputs.write_table(path, found.table(si=self.si), comma=self.table.comma)
+            remark(f"Wrote {path}{more}")
+        drawn = any(row.certified for row in found.rows)
+        for paths, draw in ((self.figure, found.plot), (self.animate, found.animate)):
+            for path in paths or ():
+                if drawn:
+                    draw(path)
+                remark(f"Wrote {path}{more}" if drawn else f"{path} is not written: no row is certified")
+
+
+USUAL = RunOptions()
 
 
 def sweep(
@@ -69,28 +95,15 @@ def sweep(
         list[str], typer.Option(metavar="KEY=LO:HI:STEP UNIT", help='Such as "operation.M0=600:900:25 N*m".')
     ],
     target: Target = None,
-    sets: Set = None,
-    free: Free = None,
-    on: With = None,
-    off: Without = None,
-    workers: Workers = None,
-    dask: Dask = None,
-    store: StoreFile = None,
-    resume: Resume = False,
-    out: Out = None,
-    figure: Figure = None,
-    animate: Animate = None,
-    decimal: Decimal = "point",
-    si: Si = False,
-    as_json: Json = False,
+    changes: SceneOptions = NO_CHANGES,
+    how: RunOptions = USUAL,
 ) -> None:
     """Solve for every combination of scene numbers."""
     from loomopt.studies.sweep import planned
 
-    how = Run(workers, dask, store, resume, out, figure, si, as_json, decimal, animate)
-    scene = read_scene(problem, sets, on, off, free)
+    scene = changes.scene(problem)
     ranges = _parted(over, "--over", "operation.M0=600:900:25 N*m", "KEY=LO:HI:STEP UNIT")
-    raise typer.Exit(carried_out(planned(scene, ranges, target), how))
+    raise typer.Exit(run(planned(scene, ranges, target), how))
 
 
 def pareto(
@@ -113,26 +126,13 @@ def pareto(
     target: Annotated[
         str | None, typer.Option(help="Whose demands hold, of all but the axes; the job's default without it, or none.")
     ] = None,
-    sets: Set = None,
-    free: Free = None,
-    on: With = None,
-    off: Without = None,
-    workers: Workers = None,
-    dask: Dask = None,
-    store: StoreFile = None,
-    resume: Resume = False,
-    out: Out = None,
-    figure: Figure = None,
-    animate: Animate = None,
-    decimal: Decimal = "point",
-    si: Si = False,
-    as_json: Json = False,
+    changes: SceneOptions = NO_CHANGES,
+    how: RunOptions = USUAL,
 ) -> None:
     """Show what two figures cost each other: the whole front."""
     from loomopt.studies.front import front
 
-    how = Run(workers, dask, store, resume, out, figure, si, as_json, decimal, animate)
-    scene = read_scene(problem, sets, on, off, free)
+    scene = changes.scene(problem)
     axes = _axes(minimise or [], maximise or [], against)
     ranges = front.si(scene, _parted(bounds or [], "--range", "m4e=0:5 kg", "B=LO:HI UNIT"))
     count = None if points is None else read_number("--points", points, int)
@@ -140,7 +140,7 @@ def pareto(
     study = front.trade(
         scene, axes, whose, maximise=maximise or (), minimise=minimise or (), ranges=ranges, points=count
     )
-    raise typer.Exit(carried_out(study, how))
+    raise typer.Exit(run(study, how))
 
 
 def _axes(minimise: list[str], maximise: list[str], against: str) -> tuple[str, str]:
@@ -173,91 +173,32 @@ def _parted(items: list[str], option: str, example: str, form: str) -> dict[str,
     return found
 
 
-def carried_out(study: "SceneStudy", how: Run) -> int:
+def run(study: "SceneStudy", how: RunOptions) -> int:
     """Run a study, print and write it; return the exit status. What is finished is printed after Ctrl-C too."""
     from concurrent.futures import BrokenExecutor
 
-    from loomopt.interface.files import sheets
-    from loomopt.interface.finished import StudyTable, conducted
+    from loomopt.interface.study.points import StudyTable, run_study
     from loomopt.studies.run.rows import counted
 
-    sheets.decimal_comma(how.decimal)
-    checked(how.figure, how.out)
-    if how.animate:
-        from loomopt.interface.report import animation
-
-        for path in how.animate:
-            animation.checked(path)
-    _apart(how)
+    how.check()
     rows: dict[int, Row] = {}
 
-    def kept(row: "Row") -> None:
+    def on_row(row: "Row") -> None:
         rows[row.point] = row
         progress.say(counted(study, len(rows)))
 
-    count = None if how.workers is None else read_number("--workers", how.workers, int)
+    count = how.computer.count
     try:
-        with _executor(how.dask, count) as executor, call_progress() as progress:
+        with how.computer.executor() as executor, call_progress() as progress:
             progress.say(counted(study, 0))
-            found = conducted(study, executor, count, how.store, how.resume, kept)
+            found = run_study(study, executor, count, how.rows.store, how.rows.resume, on_row)
     except (KeyboardInterrupt, BrokenExecutor):
         if rows:
-            done = StudyTable(study, tuple(rows[point] for point in sorted(rows)))
-            _print(done, how)
-            _write(done, how, f", {counted(study, len(rows), 'of the')}, as far as they were finished")
+            finished = StudyTable(study, tuple(rows[point] for point in sorted(rows)))
+            how.hand_over(finished, f", {counted(study, len(rows), 'of the')}, as far as they were finished")
         raise
-    _print(found, how)
-    _write(found, how)
+    how.hand_over(found)
     return status(found.rows)
-
-
-def _write(found: "StudyTable", how: Run, more: str = "") -> None:
-    """Write tables and figures; more: what is said of them beside their name."""
-    from loomopt.interface.files import sheets
-    from loomopt.interface.text import studies
-
-    for path in how.out or ():
-        studies.table(path, found.table(si=how.si), comma=sheets.decimal_comma(how.decimal))
-        remark(f"Wrote {path}{more}")
-    drawn = any(row.certified for row in found.rows)
-    for paths, draw in ((how.figure, found.plot), (how.animate, found.animate)):
-        for path in paths or ():
-            if drawn:
-                draw(path)
-            remark(f"Wrote {path}{more}" if drawn else f"{path} is not written: no row is certified")
-
-
-def _apart(how: Run) -> None:
-    """Raise BadInput where a table or a figure would be written over the store."""
-    from loomopt.base.errors import refusal
-
-    for path in (*(how.out or ()), *(how.figure or ()), *(how.animate or ())):
-        if how.store and path.resolve() == how.store.resolve():
-            raise refusal(
-                "it is the store's own file", str(path), "--store", remedy="Name another file for one of them"
-            )
-
-
-@contextlib.contextmanager
-def _executor(dask: str | None, count: int | None) -> "Iterator[Executor | None]":
-    """Yield the executor of a Dask cluster, where one is named. Raises BadInput beside a number of workers."""
-    if dask is None:
-        yield None
-        return
-    if count is not None:
-        from loomopt.base.errors import refusal
-
-        raise refusal("there are a cluster and a number of workers", "", "--workers", count, remedy="Give one of them")
-    from loomopt.studies.run import run
-
-    with run.dask(dask) as executor:
-        yield executor
-
-
-def _print(found: "StudyTable", how: Run) -> None:
-    from loomopt.interface.text import studies
-
-    tell(how.as_json, found.as_dict, lambda: studies.parts(found.study, found.solved, how.si))
 
 
 def status(rows: "tuple[Row, ...]") -> int:
@@ -273,42 +214,38 @@ def effects(
     tolerance: Annotated[
         str, typer.Option(metavar="R", help="What an effect may change, relative to natural sizes.")
     ] = "0.01",
-    sets: Set = None,
-    free: Free = None,
-    on: With = None,
-    off: Without = None,
-    workers: Workers = None,
-    dask: Dask = None,
-    figure: Bars = None,
+    changes: SceneOptions = NO_CHANGES,
+    computer: ComputerOptions = ALONE,
+    figure: Figure = None,
     as_json: Json = False,
 ) -> None:
     """Show what each effect is worth, and what may be left out."""
-    from loomopt.interface import finished
-    from loomopt.interface.text import effects
+    from loomopt.interface.files import outputs
+    from loomopt.interface.study.effects import EffectsStudy, run_effects, summarise_effects
     from loomopt.studies.effects.study import planned
 
-    checked(figure)
-    count = None if workers is None else read_number("--workers", workers, int)
-    scene = read_scene(problem, sets, on, off, free)
+    outputs.check_files(figure or ())
+    count = computer.count
+    scene = changes.scene(problem)
     study = planned(scene, target, read_number("--tolerance", tolerance, float))
     rows: dict[int, Row] = {}
 
-    def kept(row: "Row") -> None:
+    def on_row(row: "Row") -> None:
         rows[row.point] = row
         progress.say(f"{len(rows)} solved")
 
-    def told(found: finished.EffectsStudy) -> None:
-        tell(as_json, found.as_dict, lambda: effects.parts(found))
+    def show(found: EffectsStudy) -> None:
+        tell(as_json, found.as_dict, found.tables)
 
     try:
-        with _executor(dask, count) as executor, call_progress() as progress:
+        with computer.executor() as executor, call_progress() as progress:
             progress.say("solving with all effects on")
-            found = finished.conducted_effects(study, executor, count, kept)
+            found = run_effects(study, executor, count, on_row)
     except KeyboardInterrupt:
         if rows:
-            told(finished.concluded_effects(study, tuple(rows.values())))
+            show(summarise_effects(study, tuple(rows.values())))
         raise
-    told(found)
+    show(found)
     for path in figure or ():
         if found.reference.scales:
             found.plot(path)
@@ -319,24 +256,20 @@ def effects(
 def sensitivity(
     problem: Problem,
     target: Target = None,
-    sets: Set = None,
-    on: With = None,
-    off: Without = None,
-    free: Free = None,
-    figure: Bars = None,
-    out: Out = None,
-    decimal: Decimal = "point",
+    changes: SceneOptions = NO_CHANGES,
+    figure: Figure = None,
+    table: TableOptions = NO_TABLE,
     as_json: Json = False,
 ) -> None:
     """Show how the optimum moves with every number."""
-    from loomopt.interface import api, finished
-    from loomopt.interface.files import outputs, sheets
-    from loomopt.interface.text import sensitivity, studies
+    from loomopt.interface import api
+    from loomopt.interface.files import outputs
+    from loomopt.interface.study.sensitivity import run_sensitivity
     from loomopt.studies.sensitivity.study import planned
 
-    checked(figure, out)
-    comma = sheets.decimal_comma(decimal)
-    scene = read_scene(problem, sets, on, off, free)
+    outputs.check_files(figure or (), table.out or ())
+    comma = table.comma
+    scene = changes.scene(problem)
     with call_progress() as progress:
         answer = api.solve(scene, target, on_step=progress.say)
         if answer.status != "optimal":
@@ -346,9 +279,9 @@ def sensitivity(
             else:
                 remark(answer.message)
             raise typer.Exit(INFEASIBLE if answer.status == "infeasible" else NOT_CERTIFIED)
-        found = finished.conducted_sensitivity(planned(scene, answer), progress.say)
-    tell(as_json, found.as_dict, lambda: sensitivity.parts(found))
-    write(out, lambda path: studies.table(path, found.table(), comma=comma))
+        found = run_sensitivity(planned(scene, answer), progress.say)
+    tell(as_json, found.as_dict, found.tables)
+    write(table.out, lambda path: outputs.write_table(path, found.table(), comma=comma))
     write(figure, found.plot)
     raise typer.Exit(NOT_CERTIFIED if found.refused else OK)
 
@@ -360,36 +293,28 @@ def tolerance(
     samples: Annotated[str, typer.Option(metavar="N", help="So many machines are drawn.")] = "100000",
     seed: Annotated[str, typer.Option(metavar="S", help="Of the scrambled points they are drawn by.")] = "0",
     worst: Annotated[bool, typer.Option(help="Prove the worst case of each figure within all tolerances.")] = True,
-    sets: Set = None,
-    on: With = None,
-    off: Without = None,
-    free: Free = None,
-    workers: Workers = None,
-    dask: Dask = None,
-    store: StoreFile = None,
-    resume: Resume = False,
-    figure: Bars = None,
-    out: Out = None,
-    decimal: Decimal = "point",
+    changes: SceneOptions = NO_CHANGES,
+    computer: ComputerOptions = ALONE,
+    rows: StoreOptions = NO_STORE,
+    figure: Figure = None,
+    table: TableOptions = NO_TABLE,
     as_json: Json = False,
 ) -> None:
     """Show how machines spread as they are made, and how many hold."""
-    from loomopt.interface import finished
     from loomopt.interface.cli.shell import read_request
-    from loomopt.interface.files import sheets
-    from loomopt.interface.text import studies, tolerance
+    from loomopt.interface.files import outputs
+    from loomopt.interface.study.tolerance import run_tolerance
     from loomopt.studies.tolerance.plan import planned
 
-    checked(figure, out)
-    comma = sheets.decimal_comma(decimal)
-    count = None if workers is None else read_number("--workers", workers, int)
+    outputs.check_files(figure or (), table.out or ())
+    comma, count = table.comma, computer.count
     drawn, begin = read_number("--samples", samples, int), read_number("--seed", seed, int)
-    scene, given, name, _ = read_request(problem, design, target, sets, on, off, free)
+    scene, given, name, _ = read_request(problem, design, target, changes.call)
     plan = planned(scene, given, name, drawn, begin)
-    with _executor(dask, count) as executor, call_progress() as progress:
-        found = finished.conducted_tolerance(plan, executor, count, progress.say, worst, store, resume)
-    tell(as_json, found.as_dict, lambda: tolerance.parts(found))
-    write(out, lambda path: studies.table(path, found.table(), comma=comma))
+    with computer.executor() as executor, call_progress() as progress:
+        found = run_tolerance(plan, executor, count, progress.say, worst, rows.store, rows.resume)
+    tell(as_json, found.as_dict, found.tables)
+    write(table.out, lambda path: outputs.write_table(path, found.table(), comma=comma))
     write(figure, found.plot)
 
 

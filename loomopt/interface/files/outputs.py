@@ -193,6 +193,23 @@ def _no_folder(folder: Path, reason: str) -> BadInput:
     return BadInput(f"the answer cannot be written there: {reason}", file=str(folder), key="--out", remedy=remedy)
 
 
+def check_files(figures: Sequence[Path] = (), tables: Sequence[Path] = ()) -> None:
+    """Raise BadInput, before anything is computed, where figures or tables cannot be written as these files."""
+    for paths, endings in ((figures, PICTURES), (tables, sheets.ENDINGS)):
+        for path in paths:
+            suffix(path, endings)
+            check(path)
+
+
+def write_table(path: Path, frame: "pd.DataFrame", name: str = "points", comma: bool = False) -> None:
+    """Write a table as its file's ending says, its provenance in it. Raises BadInput.
+
+    name: of its sheet in a workbook; comma: whether CSV has decimal commas.
+    """
+    shown = frame if suffix(path, sheets.ENDINGS) == ".parquet" else tables.meaningful(frame)
+    sheets.write(path, {name: shown}, comma)
+
+
 def curves(
     path: Path,
     scene: Scene,

@@ -6,7 +6,7 @@ from typing import Any
 
 from loomopt.base.errors import BadInput, refusal
 from loomopt.base.units import factor
-from loomopt.interface.finished import StudyTable
+from loomopt.interface.study.points import StudyTable
 from loomopt.jobs.registry import REGISTERED
 from loomopt.scenes.document import Paths
 from loomopt.scenes.numbers import quantity

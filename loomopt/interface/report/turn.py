@@ -9,11 +9,11 @@ import numpy as np
 from loomopt.base.units import factor, show
 from loomopt.interface import tables
 from loomopt.interface.figures.curves import ROUNDING, SAME, WORDS, DrawnTurn, marked_row, shown_unit, turned
-from loomopt.interface.report.charts import COLOURS, Axis, Chart, Series, figure, headed
+from loomopt.interface.report.charts import block
 from loomopt.interface.report.markup import Markup, Part, text
 from loomopt.jobs import registry
 from loomopt.model.session import working
-from loomopt.physics.cycle import Floats
+from loomopt.picture.chart import COLOURS, TICKS, Axis, Chart, Series, headed, thinned
 from loomopt.picture.job_views import Span
 from loomopt.picture.panels import Panel, in_units
 from loomopt.scenes.designs import Design, flat
@@ -21,11 +21,6 @@ from loomopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-EVERY = 2.0
-"""Degrees between the points that a curve is drawn through; corners and marked points are drawn all the same."""
-TICKS = 90.0
-"""Degrees between the numbers below a chart."""
 
 
 @working()
@@ -39,12 +34,10 @@ def part(scene: Scene, design: Design) -> Part:
     before = None if full == now else _turn(scene, now, unit)
     known = view.panels(scene, own, tuple(shown.columns.columns))
     panels = [in_units(scene, panel) for panel in sorted(known, key=lambda panel: not panel.wide)]
-    charts = "".join(figure(chart(panel, shown, before)) for panel in panels)
     key = _key(shown, before is not None)
     said = f"Over the {view.angle} phi, {unit}."
-    return Part(
-        "Curves over the turn", (Markup(f'<p class="marks">{text(said)} {key}</p><div class="charts">{charts}</div>'),)
-    )
+    charts = block([chart(panel, shown, before) for panel in panels])
+    return Part("Curves over the turn", (Markup(f'<p class="marks">{text(said)} {key}</p>'), *charts))
 
 
 def _turn(scene: Scene, full: Design, unit: str) -> DrawnTurn:
@@ -121,16 +114,6 @@ def _kept(panel: Panel, turn: DrawnTurn) -> "NDArray[np.intp]":
         if row is not None:
             kept[row] = True
     return np.flatnonzero(kept)
-
-
-def thinned(angles: Floats) -> "NDArray[np.bool_]":
-    """Return which rows at angles, deg, a curve is drawn through: every so many degrees, corners, and both ends."""
-    near = np.abs(angles / EVERY - np.round(angles / EVERY)) < 1e-9
-    half = np.abs(2 * angles - np.round(2 * angles)) < 1e-7
-    again = np.concatenate([[False], np.diff(angles) < 1e-6])
-    kept = near | ~half | again | np.append(again[1:], False)
-    kept[[0, -1]] = True
-    return np.asarray(kept)
 
 
 def _marked(panel: Panel, turn: DrawnTurn, unit: str) -> list[tuple[float, float, str]]:

@@ -29,7 +29,7 @@ from loomopt.studies.accuracy.subject import (
 )
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 QUICK_REPEATS, FULL_REPEATS = 3, 7
 COARSE, USUAL = 1e-3, 1e-6
@@ -71,16 +71,6 @@ class AccuracyResult:
         rows = [dict(vars(row)) for row in self.rows]
         return {"problem": self.problem, "rows": rows, "orders": dict(self.orders), "advice": self.advice}
 
-    def table(self) -> "pd.DataFrame":
-        """Return one line per row; times in seconds."""
-        import pandas as pd
-
-        columns = {"error": "error [1]", "seconds": "time [s]"}
-        frame = pd.DataFrame([dict(vars(row)) | {"setting": setting_text(row.setting)} for row in self.rows])
-        frame = frame.rename(columns=columns)
-        frame.attrs.update(self.provenance)
-        return frame
-
 
 def study(
     scene: Scene,
@@ -89,7 +79,7 @@ def study(
     ladders: Sequence[Ladders] = LADDERS,
 ) -> AccuracyResult:
     """Return the study of a scene; full: more settings and repeats; on_run: called with each run's name."""
-    return concluded(scene, list(climbs(scene, full, on_run, ladders)), full)
+    return summarise(scene, list(climbs(scene, full, on_run, ladders)), full)
 
 
 def climbs(
@@ -108,7 +98,7 @@ def climbs(
             yield ladder, rows
 
 
-def concluded(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> AccuracyResult:
+def summarise(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> AccuracyResult:
     """Return what ladders and their rows come to."""
     orders: dict[str, float] = {}
     knees: dict[str, Setting] = {}

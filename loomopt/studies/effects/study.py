@@ -417,7 +417,7 @@ class Omission:
 
 
 @dataclass(frozen=True, repr=False)
-class Found:
+class EffectsResult:
     """What each effect of a scene is worth for a target.
 
     tolerance: share of natural sizes within which an effect may go. rows: one per effect that is measured; together:
@@ -485,7 +485,7 @@ class Found:
         }
 
 
-def concluded(study: Effects, rows: Sequence[Row]) -> Found:
+def summarise(study: Effects, rows: Sequence[Row]) -> EffectsResult:
     """Return what rows of a study show, not all of which need be there. Raises BadInput where solve takes nothing."""
     course = EffectsCourse(study, rows)
     first = course.reference or course.rows[frozenset()]
@@ -497,7 +497,7 @@ def concluded(study: Effects, rows: Sequence[Row]) -> Found:
     kept = tuple(name for name in on if name not in course.left_out)
     left = [worth for worth in worths if worth.effect in course.left_out]
     why = f"with it no design is admissible; {course.rows[off - course.aside].reason}" if course.aside else ""
-    return Found(
+    return EffectsResult(
         scene=study.scene,
         target=study.target,
         tolerance=study.tolerance,

@@ -95,7 +95,7 @@ class Holding(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Found:
+class SensitivityResult:
     """What a study of sensitivity shows; refused: why there is nothing, and which limits are in the way."""
 
     scene: Scene
@@ -235,7 +235,7 @@ def planned(scene: Scene, answer: Solution) -> Study:
 
 
 @working()
-def conducted(study: Study, on_step: Callable[[str], None] | None = None) -> Found:
+def run(study: Study, on_step: Callable[[str], None] | None = None) -> SensitivityResult:
     """Return derivatives and ranges of prices of an answer; on_step(what): called before each number and each price."""
     say = on_step or (lambda text: None)
     optimum, rows, prices = study.optimum, list[Row](), list[PriceRange]()
@@ -252,7 +252,7 @@ def conducted(study: Study, on_step: Callable[[str], None] | None = None) -> Fou
     if not rows:
         touched = ", ".join(dict.fromkeys(row.name for row in optimum.rows if row.limit))
         why = f"no active set of independent rows was found that holds the optimum: {touched}"
-        return Found(study.scene, study.target, study.answer, (), (), why, {}, {})
+        return SensitivityResult(study.scene, study.target, study.answer, (), (), why, {}, {})
     for price in study.answer.binding if held else ():
         say(f"following the price of {price.limit}")
         found = _priced(study, held, chosen.get(_key_of(study, price) or "", {}), price)
@@ -262,7 +262,9 @@ def conducted(study: Study, on_step: Callable[[str], None] | None = None) -> Fou
     worth = {name: abs(value) for name, value in study.answer.figures.items() if value}
     rows.sort(key=lambda row: -abs(row.value * sizes[row.number]) / worth.get(row.of, 1.0))
     holds = tuple(each for key in _unpriced(study, rows) if held and (each := _holding(study, chosen[key], key)))
-    return Found(study.scene, study.target, study.answer, tuple(rows), tuple(prices), None, sizes, kinds, holds)
+    return SensitivityResult(
+        study.scene, study.target, study.answer, tuple(rows), tuple(prices), None, sizes, kinds, holds
+    )
 
 
 # Derivatives.

@@ -20,7 +20,7 @@ from loomopt.scenes.numbers import files
 from loomopt.scenes.provenance import versions
 from loomopt.scenes.tolerances import UNIFORM
 from loomopt.solving.answer.solution import Yield
-from loomopt.studies.run import run
+from loomopt.studies.run import run as runner
 from loomopt.studies.run.rows import Row, StudyTask
 from loomopt.studies.run.store import Store
 from loomopt.studies.tolerance import worst as worst_cases
@@ -57,7 +57,7 @@ class Spread(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Found:
+class ToleranceResult:
     """What a study of tolerances shows."""
 
     plan: Plan
@@ -299,13 +299,13 @@ ALL = "all"
 """What the yield of all limits together is called."""
 
 
-def conducted(
+def run(
     plan: Plan,
     executor: Executor | None = None,
     on_step: Callable[[str], None] | None = None,
     worst: bool = False,
     store: Store | None = None,
-) -> Found:
+) -> ToleranceResult:
     """Return the study after drawing its machines, the same bits whoever computes.
 
     on_step(what): called before each step that may take long; worst: whether the worst cases are proven too; store:
@@ -319,7 +319,7 @@ def conducted(
     told = on_step or (lambda text: None)
     told("drawing machines")
     count = itertools.count(1)
-    rows = run.run(
+    rows = runner.run(
         Drawing(plan, sigmas), executor, store, lambda row: told(f"{next(count)} of {SCRAMBLES} scrambles drawn")
     )
     judged = [ALL, *(each.name for each in plan.judged)]
@@ -330,16 +330,16 @@ def conducted(
         for name, case in worst_cases.told(plan, executor):
             cases[name] = case
             told(f"{name}: worst case {'proven' if case.proven else 'undecided'}")
-    return concluded(plan, slope, linear, sums, cases)
+    return summarise(plan, slope, linear, sums, cases)
 
 
-def concluded(
+def summarise(
     plan: Plan,
     slope: Mapping[str, Slopes],
     linear: Mapping[str, tuple[float, Mapping[str, float]]],
     sums: Sequence[Sums],
     worst: Mapping[str, Worst],
-) -> Found:
+) -> ToleranceResult:
     """Return what scrambles show together."""
     figures = {}
     for name, nominal in plan.figures.items():
@@ -357,7 +357,7 @@ def concluded(
     yields = {name: yielded([each.holding[name] / each.machines for each in sums]) for name in sums[0].holding}
     bad = sum(each.bad for each in sums)
     first = tightened(plan, {name: shares for name, (_, shares) in linear.items()}, yields)
-    return Found(plan, figures, yields, first, sum(each.machines for each in sums), bad, worst)
+    return ToleranceResult(plan, figures, yields, first, sum(each.machines for each in sums), bad, worst)
 
 
 def yielded(shares: Iterable[float]) -> Yield:

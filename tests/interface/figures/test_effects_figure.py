@@ -7,6 +7,7 @@ from support import inch, overlaps, uncoiled
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
+from loomopt.interface.study.effects import EffectsStudy
 
 pytestmark = pytest.mark.slow
 
@@ -53,7 +54,9 @@ def test_what_gets_less_has_a_bar_to_the_other_side(shedding):
 @pytest.mark.slow
 def test_nothing_meets(shedding):
     assert overlaps.found_at_every_size(shedding.plot()) == []
-    long = replace(shedding, rows=tuple(replace(row, effect=row.effect * 3) for row in shedding.rows[:2]))
+    long = EffectsStudy(
+        replace(shedding.result, rows=tuple(replace(row, effect=row.effect * 3) for row in shedding.rows[:2]))
+    )
     assert overlaps.found(long.plot()) == []
 
 
@@ -67,10 +70,10 @@ def test_an_inch_machine_at_350_rpm():
 
 def test_what_is_unknown_is_no_bar(shedding):
     gone = replace(shedding.rows[0], shift={"K1": None}, regret={"K1": None}, excess=None, may_go=False)
-    figure = replace(shedding, rows=(gone, *shedding.rows[1:])).plot()
+    figure = EffectsStudy(replace(shedding.result, rows=(gone, *shedding.rows[1:]))).plot()
     assert [text.get_text() for text in figure.axes[0].texts].count("none") == 2
     with pytest.raises(BadInput, match="nothing to draw"):
-        replace(shedding, rows=()).plot()
+        EffectsStudy(replace(shedding.result, rows=())).plot()
 
 
 @pytest.mark.slow

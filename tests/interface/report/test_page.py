@@ -16,8 +16,9 @@ import pytest
 import loomopt as lo
 from loomopt.interface.cli.app import run
 from loomopt.interface.files import outputs
-from loomopt.interface.report import answer, charts, document, mathml, report_path
+from loomopt.interface.report import answer, document, mathml, report_path
 from loomopt.interface.report.answer import Subject
+from loomopt.picture import chart
 from loomopt.picture.motion import POSES
 
 PROBLEMS = ("beatup-light", "shedding")
@@ -291,11 +292,11 @@ def test_what_cannot_be_reported_is_one_message(words, answers, tmp_path, monkey
     ],
 )
 def test_numbers_of_an_axis_have_the_digits_that_tell_them_apart(ticks, told):
-    assert " ".join(charts.number(each, ticks) for each in ticks) == told
+    assert " ".join(chart.number(each, ticks) for each in ticks) == told
 
 
 def test_round_numbers_stand_on_an_axis():
     for low, high in ((0.0, 1.0), (-3.2e5, 7.7e4), (1e-7, 1.3e-7), (140.02, 140.05)):
-        found = charts.ticks(low, high, 4)
+        found = chart.ticks(low, high, 4)
         assert 3 <= len(found) <= 6
         assert all(low - 1e-9 * abs(high) <= each <= high + 1e-9 * abs(high) for each in found)

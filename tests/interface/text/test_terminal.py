@@ -264,12 +264,12 @@ def test_the_proofs_stand_in_the_json_as_prove_prints_them():
 
 
 def test_points_that_narrow_a_change_down_are_marked_and_counted_apart():
-    from loomopt.interface.text import studies
+    from loomopt.interface import study_table
 
     front = lo.pareto("beatup", ("peak_torque", "m4e"), target="balance", points=5)
-    parts = studies.parts(front.study, front.solved)
+    parts = study_table.tables(front.study, front.solved)
     head, (grid,) = str(parts[0]), [part for part in parts if isinstance(part, TextTable)]
-    marked = [line[0] for line in grid.lines if line[0].endswith(studies.NARROWS)]
+    marked = [line[0] for line in grid.lines if line[0].endswith(study_table.NARROWS)]
     assert marked
     assert len(grid.lines) - len(marked) <= 5
     assert f"{len(grid.lines) - len(marked)} points and {len(marked)} that narrow" in head

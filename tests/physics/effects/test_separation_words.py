@@ -140,7 +140,7 @@ def test_proofs_and_the_study_of_accuracy_say_what_they_leave_out():
     assert proofs.passed
     assert told in "".join(proofs.uncovered)
     assert told in proofs.as_dict()["uncovered"][0]
-    assert f"Not covered: {told}" in accuracy.concluded(ON, []).advice
+    assert f"Not covered: {told}" in accuracy.summarise(ON, []).advice
     without = stiff.without_effect("separation")
     assert "uncovered" not in lo.prove(without).as_dict()
 

@@ -9,7 +9,7 @@ from few_settings import SMALL
 from support import overlaps
 
 import loomopt as lo
-from loomopt.interface.figures import accuracy as accuracy_figure
+from loomopt.interface.study.accuracy import AccuracyStudy
 from loomopt.jobs.shedding.job import JOB
 from loomopt.studies.accuracy import accuracy, optima
 from loomopt.studies.accuracy.subject import NO_ORDER, grouped
@@ -51,7 +51,7 @@ def ladders(studies):
 
 def test_no_text_of_the_figure_runs_into_anything(studies):
     for study in studies.values():
-        figure = accuracy_figure.drawn(study)
+        figure = AccuracyStudy(study).plot()
         assert figure.axes
         assert overlaps.found(figure) == []
 
@@ -200,7 +200,7 @@ def test_everything_but_seconds_is_the_same_again(studies):
 
 
 def test_the_table_carries_units_and_provenance(studies):
-    frame = studies["rapier"].table()
+    frame = AccuracyStudy(studies["rapier"]).table()
     assert list(frame) == ["quantity", "method", "setting", "error [1]", "time [s]", "evaluations", "status"]
     assert len(frame) == len(studies["rapier"].rows)
     assert frame.attrs["scene"] == "rapier"

@@ -11,8 +11,7 @@ from support import inch, slow, uncoiled
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.interface import finished
-from loomopt.interface.text import effects as effects_text
+from loomopt.interface.study import effects as effects_text
 from loomopt.solving import engine
 from loomopt.studies.effects import study
 from loomopt.studies.run import run
@@ -45,7 +44,7 @@ def rows(plan):
 
 @pytest.fixture(scope="module")
 def beatup(plan, rows):
-    return finished.concluded_effects(plan, rows)
+    return effects_text.summarise_effects(plan, rows)
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +86,7 @@ def test_shift_and_regret_of_the_reference_table(beatup, name):
 @pytest.mark.parametrize("name", ["shaft_torsion", "speed_fluctuation"])
 def test_an_effect_that_the_reference_leaves_off_changes_no_share(beatup, rows, name):
     """Shares are of the machine that is weighed: the same as with the effect in [available]."""
-    found = finished.concluded_effects(study.planned(lo.load("beatup").with_effect(name)), rows)
+    found = effects_text.summarise_effects(study.planned(lo.load("beatup").with_effect(name)), rows)
     assert name not in found.reference.effects
     assert found.reference.scales == pytest.approx(SCALES, abs=6e-4)
     assert alike(found) == alike(beatup)
@@ -341,7 +340,7 @@ def test_what_an_omitted_effect_takes_away_is_told_though_the_target_reads_none(
     reads = kinematic.reference.reads
     assert {"peak_acceleration", "stroke", "dwell_after"} <= set(reads)
     assert not set(kinematic.together.lost) & set(reads)
-    (told,) = [line for line in effects_text.verdict(kinematic) if line.startswith("Of the other figures: ")]
+    (told,) = [line for line in effects_text.verdict(kinematic.result) if line.startswith("Of the other figures: ")]
     assert "without tape_stretch head_overrun is gone; " in told
     assert "without them all tape_force, peak_torque, peak_power and head_overrun are gone" in told
     assert told.endswith("Target stroke-dwell reads none of these figures.")
@@ -355,10 +354,10 @@ def test_what_an_omitted_effect_takes_away_is_told_though_the_target_reads_none(
 
 def test_what_the_target_reads_and_an_effect_takes_away_is_told_as_such(kinematic):
     lost = dataclasses.replace(kinematic.rows[0], lost=("stroke", "tape_force"))
-    (told,) = effects_text.omitted(dataclasses.replace(kinematic, rows=(lost,)))
+    (told,) = effects_text.omitted(dataclasses.replace(kinematic.result, rows=(lost,)))
     assert told.endswith("Target stroke-dwell reads stroke of them.")
     none = dataclasses.replace(lost, lost=(), moved=())
-    assert effects_text.omitted(dataclasses.replace(kinematic, rows=(none,))) == []
+    assert effects_text.omitted(dataclasses.replace(kinematic.result, rows=(none,))) == []
 
 
 def test_figures_of_an_effect_that_may_go_are_named_for_a_target_of_forces_too(beatup):
@@ -366,5 +365,5 @@ def test_figures_of_an_effect_that_may_go_are_named_for_a_target_of_forces_too(b
     assert set(centrifugal.lost) == {"reed_centrifugal", "shaking_force"}
     assert any(
         "without centrifugal reed_centrifugal and shaking_force are gone" in line
-        for line in effects_text.verdict(beatup)
+        for line in effects_text.verdict(beatup.result)
     )

@@ -15,7 +15,7 @@ from support import inch
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface import results
-from loomopt.interface.finished import StudyTable
+from loomopt.interface.study.points import StudyTable
 from loomopt.jobs import registry
 from loomopt.studies.front import front, plan
 from loomopt.studies.run.store import Store

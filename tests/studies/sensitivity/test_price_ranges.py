@@ -26,7 +26,7 @@ def checked(scene, target=None, only=None):
     """Check both ends of every price's range; only: of some limits."""
     answer = engine.solve(scene, target)
     plan = study.planned(scene, answer)
-    found = study.conducted(plan)
+    found = study.run(plan)
     prices = {(each.limit, each.side): each for each in answer.binding}
     count = 0
     for price in found.prices:

@@ -9,7 +9,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.interface.text import sensitivity as text
+from loomopt.interface.study import sensitivity as text
 from loomopt.jobs import registry
 from loomopt.picture.table import TextTable
 from loomopt.solving import engine
@@ -27,7 +27,7 @@ RANGE = 2e-5
 def found(problem, **changes):
     scene = registry.load(problem)
     scene = scene.update(dict(changes)) if changes else scene
-    return study.conducted(study.planned(scene, engine.solve(scene)))
+    return study.run(study.planned(scene, engine.solve(scene)))
 
 
 def derivative(problem, number, of):
@@ -117,7 +117,7 @@ def test_a_weight_that_has_its_mass_and_a_spring_that_has_one():
         "shedding", "effects.inertia.M", "K1"
     ).value / 9.80665 == pytest.approx(278.921618, abs=6e-7)
     scene = registry.load("shedding").with_effect("spring_inertia").set("effects.spring_inertia.mass", "0 kg")
-    here = study.conducted(study.planned(scene, engine.solve(scene)))
+    here = study.run(study.planned(scene, engine.solve(scene)))
     (row,) = [row for row in here.rows if (row.number, row.of) == ("effects.spring_inertia.mass", "K1")]
     assert row.side == "up"
     assert row.value == pytest.approx(888.196229, rel=1e-8)
@@ -162,7 +162,7 @@ def test_another_angle_ends_it_at_the_printed_travel_too():
 
 
 def test_a_price_range_that_is_0_is_told_as_0():
-    grids = [part for part in text.parts(found("shedding")) if isinstance(part, TextTable)]
+    grids = [part for part in text.SensitivityStudy(found("shedding")).tables() if isinstance(part, TextTable)]
     (line,) = [line for grid in grids for line in grid.lines if line[0] == "N_min min"]
     assert line[1] == "0"
 
@@ -170,7 +170,7 @@ def test_a_price_range_that_is_0_is_told_as_0():
 @functools.cache
 def rams(target):
     answer = lo.solve(lo.load(RAMS), target=target)
-    return study.conducted(study.planned(lo.load(RAMS), answer))
+    return study.run(study.planned(lo.load(RAMS), answer))
 
 
 def test_bounds_that_bind_only_together_have_derivatives_of_their_own_on_each_side():
@@ -210,7 +210,7 @@ def test_a_free_cam_law_which_more_rows_hold_than_it_has_knots():
     """Confirmed by solving again on both sides; N_min may only grow, and counts as the weight does."""
     scene = registry.load("shedding")
     answer = engine.solve(scene, "law")
-    found = study.conducted(study.planned(scene, answer))
+    found = study.run(study.planned(scene, answer))
     assert found.refused is None
     rows = {row.number: row for row in found.rows if row.of == "K1"}
     for key, unit, here, step, si in (

@@ -144,17 +144,17 @@ YIELDS = [
 @pytest.mark.parametrize(("problem", "made", "value", "error", "name", "changes"), YIELDS)
 def test_yields_by_correlation_spread_class_and_spring(problem, made, value, error, name, changes):
     own = plan(problem, made, 20_000 if problem == "beatup" else 4000, **changes)
-    share = study.conducted(own).yields[name]
+    share = study.run(own).yields[name]
     assert abs(share.value - value) <= ERRORS * math.hypot(share.se, error)
 
 
 @pytest.mark.slow
 def test_yields_of_the_rapier_one_by_one_and_together():
-    found = study.conducted(plan("rapier", DRIVE, 10_000, {"stroke": "1 mm"})).yields
-    wider = study.conducted(plan("rapier", DRIVE, 1600, {"stroke": "2 mm"})).yields
+    found = study.run(plan("rapier", DRIVE, 10_000, {"stroke": "1 mm"})).yields
+    wider = study.run(plan("rapier", DRIVE, 1600, {"stroke": "2 mm"})).yields
     expected = {"dwell_after": (0.500099, 203e-6), "dwell_before": (0.499971, 75e-6), "mu_min": (0.499828, 187e-6)}
     for name, (value, error) in {**expected, "stroke": (0.998323, 44e-6)}.items():
         assert abs(found[name].value - value) <= ERRORS * math.hypot(found[name].se, error), name
-    without = study.conducted(plan("rapier", DRIVE, 10_000)).yields["all"]
+    without = study.run(plan("rapier", DRIVE, 10_000)).yields["all"]
     assert abs(without.value - 0.182192) <= ERRORS * math.hypot(without.se, 217e-6)
     assert wider["stroke"].value == 1.0

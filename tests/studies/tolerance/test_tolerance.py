@@ -48,7 +48,7 @@ def plan(problem, made, accept=None, samples=20_000, seed=0):
 
 @functools.cache
 def beatup():
-    return study.conducted(plan("beatup", LINKS, {"M3_fdc": "1 N*m"}))
+    return study.run(plan("beatup", LINKS, {"M3_fdc": "1 N*m"}))
 
 
 def linear(problem, made):
@@ -141,34 +141,34 @@ def test_yields_of_the_balanced_beatup():
 
 
 def test_yield_of_all_limits_without_a_band():
-    found = study.conducted(plan("beatup", LINKS))
+    found = study.run(plan("beatup", LINKS))
     assert close(found.yields["all"], 0.307458, 16e-6)
     assert found.plan.unjudged == ("M3_fdc",)
     assert "M3_fdc" not in found.yields
 
 
 def test_yields_of_shedding_and_rapier():
-    shedding = study.conducted(plan("shedding", {"K1": "5 %", "X0": "1 mm"}, samples=4000))
+    shedding = study.run(plan("shedding", {"K1": "5 %", "X0": "1 mm"}, samples=4000))
     assert close(shedding.yields["N_min"], 0.49987, 1e-4)
-    rapier = study.conducted(plan("rapier", DRIVE, {"stroke": "1 mm"}, samples=4000))
+    rapier = study.run(plan("rapier", DRIVE, {"stroke": "1 mm"}, samples=4000))
     assert close(rapier.yields["dwell_after"], 0.500099, 203e-6)
     assert close(rapier.yields["stroke"], 0.998323, 44e-6)
 
 
 def test_the_same_bits_whoever_computes_and_others_by_another_seed():
     own = plan("beatup", LINKS, samples=1600)
-    alone = study.conducted(own)
+    alone = study.run(own)
     with ThreadPoolExecutor(2) as executor:
-        assert study.conducted(own, executor).as_dict() == alone.as_dict()
-    other = study.conducted(replace(own, seed=1)).as_dict()
+        assert study.run(own, executor).as_dict() == alone.as_dict()
+    other = study.run(replace(own, seed=1)).as_dict()
     assert other["figures"]["swing"]["sigma"] != alone.figures["swing"].sigma
 
 
 def test_the_same_bits_from_processes():
     own = plan("shedding", {"K1": "5 %"}, samples=1600)
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as executor:
-        found = study.conducted(own, executor, worst=True).as_dict()
-    assert found == study.conducted(own, worst=True).as_dict()
+        found = study.run(own, executor, worst=True).as_dict()
+    assert found == study.run(own, worst=True).as_dict()
 
 
 def test_memory_does_not_grow_with_the_machines():
@@ -187,12 +187,12 @@ def test_memory_does_not_grow_with_the_machines():
 
 def test_a_demand_that_is_made_itself_follows():
     """A travel that is made shorter is not held against the travel that was asked for."""
-    found = study.conducted(plan("shedding", {"travel": "0.2 mm"}, samples=1600))
+    found = study.run(plan("shedding", {"travel": "0.2 mm"}, samples=1600))
     assert found.yields["travel"].value == 1.0
 
 
 def test_machines_that_do_not_assemble_are_bad():
-    found = study.conducted(plan("rapier", {"l4": "25 mm", "l5": "25 mm"}, samples=160))
+    found = study.run(plan("rapier", {"l4": "25 mm", "l5": "25 mm"}, samples=160))
     assert 0 < found.bad < 160
     assert found.yields["all"].value <= 1 - found.bad / 160
 
@@ -252,7 +252,7 @@ def test_what_cannot_be_studied_is_refused():
     ],
 )
 def test_yields_of_many_machines(problem, made, accept, expected):
-    found = study.conducted(plan(problem, made, accept, samples=100_000))
+    found = study.run(plan(problem, made, accept, samples=100_000))
     for name, value in expected.items():
         assert close(found.yields[name], value, 2.2e-4 if problem == "rapier" else 6e-5), name
 

@@ -109,11 +109,11 @@ def test_what_cannot_be_boxed_is_undecided_and_says_why():
 @pytest.mark.slow
 def test_the_same_bits_whoever_proves():
     own = plan("shedding", {"K1": "5 %"})
-    alone = study.conducted(own, worst=True).as_dict()
+    alone = study.run(own, worst=True).as_dict()
     with ThreadPoolExecutor(2) as executor:
-        assert study.conducted(own, executor, worst=True).as_dict() == alone
+        assert study.run(own, executor, worst=True).as_dict() == alone
     assert json.loads(json.dumps(alone["worst"])) == alone["worst"]
-    assert study.conducted(own).as_dict() == {**alone, "worst": {}}
+    assert study.run(own).as_dict() == {**alone, "worst": {}}
 
 
 @pytest.mark.slow

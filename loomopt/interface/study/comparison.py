@@ -1,29 +1,34 @@
 """Designs side by side in one unit: dimensions, figures, limits, curves laid over each other, what differs marked."""
 
 import functools
-import os
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.base import arguments
 from loomopt.base.errors import refusal
-from loomopt.base.files import atomically, suffix
 from loomopt.base.units import factor
-from loomopt.interface import results
-from loomopt.interface.files import outputs
-from loomopt.interface.results import PICTURE, Evaluation
+from loomopt.interface import results, tables
+from loomopt.interface.figures.curves import shown_unit, turned
+from loomopt.interface.results import Evaluation
+from loomopt.interface.study_result import Presentation
+from loomopt.jobs import registry
+from loomopt.model.session import working
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
-from loomopt.picture.table import TextTable
+from loomopt.picture.chart import COLOURS, TICKS, Axis, Chart, Charts, Series, headed
+from loomopt.picture.job_views import Marks
+from loomopt.picture.panels import each as each_alone
+from loomopt.picture.panels import in_units
+from loomopt.picture.table import Column, TextTable, text_table, words
 from loomopt.scenes import designs
+from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Finding, Words
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 DIFFERS = 1e-6
 """Share of the largest from which on numbers of a row differ; an answer is right to 1e-8, and machines round."""
@@ -51,10 +56,11 @@ class ComparedRow(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class Comparison:
+class Comparison(Presentation):
     """Designs side by side, in the units of the first one's scene."""
 
     designs: tuple[Named, ...]
+    heading = "Designs side by side"
 
     @property
     def scene(self) -> Scene:
@@ -83,39 +89,34 @@ class Comparison:
         return tuple(_cleaned(rows))
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
-        """Return one row per number, a column per design, with whether they differ; si: in SI."""
-        from loomopt.interface.table_frame import TableFrame
+        """Table of one row per number, a column per design, with whether they differ; si: in SI."""
+        from loomopt.interface.table_frame import frame
         from loomopt.scenes.provenance import provenance
 
-        whole, words = arguments.flag(si, "si"), Words(self.scene)
-        cells: dict[str, list[object]] = {"name": [], "unit": []}
-        cells |= {each.name: [] for each in self.designs} | {"differs": [], "not held by": []}
-        for row in self.rows:
-            size = factor(row.unit) if whole else 1.0
-            cells["name"].append(row.name)
-            cells["unit"].append(words.si(row.name) if whole else row.unit)
-            for each, value in zip(self.designs, row.values, strict=True):
-                cells[each.name].append(None if value is None else value * size)
-            cells["differs"].append(row.differs)
-            cells["not held by"].append(", ".join(_broken(row, self.designs)))
-        frame = TableFrame(cells).set_index("name")
-        frame.attrs.update(provenance(self.scene, designs=", ".join(each.name for each in self.designs)))
-        return frame
+        attrs = provenance(self.scene, designs=", ".join(each.name for each in self.designs))
+        return frame(self._columns(arguments.flag(si, "si")), attrs, "name")
 
-    def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
-        """Return the curves of all designs laid over each other; path: a file to write them to as well.
+    def _columns(self, si: bool = False) -> list[Column]:
+        rows, units = self.rows, Words(self.scene)
+        shown = [units.si(row.name) if si else row.unit for row in rows]
+        sizes = [factor(row.unit) if si else 1.0 for row in rows]
+        columns = [words("name", [row.name for row in rows], ""), Column("unit", shown)]
+        for place, each in enumerate(self.designs):
+            values = [row.values[place] for row in rows]
+            in_unit = [None if value is None else value * size for value, size in zip(values, sizes, strict=True)]
+            cells = [_cell(value, row.held[place]) for value, row in zip(values, rows, strict=True)]
+            columns.append(Column(each.name, in_unit, each.name, cells))
+        names = ["" if row.unit == "1" else row.unit for row in rows]
+        return [
+            *columns,
+            Column("", (), "unit", names, right=False),
+            Column("differs", [row.differs for row in rows], "", ["differs" if r.differs else "" for r in rows], False),
+            Column("not held by", [", ".join(_broken(row, self.designs)) for row in rows]),
+        ]
 
-        .png, .svg or .pdf. Raises BadInput.
-        """
-        from loomopt.interface.figures import compare, figure
-
-        place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
-        if place:
-            suffix(place, outputs.PICTURES)
-        drawn: Figure = compare.overlaid([(each.name, each.found.scene, each.found.design) for each in self.designs])
-        if place:
-            atomically(place, functools.partial(figure.save, drawn))
-        return drawn
+    def charts(self) -> Charts:
+        """Curves over the cycle of all designs laid over each other, a chart for each."""
+        return _overlaid([(each.name, each.found.scene, each.found.design) for each in self.designs])
 
     def as_dict(self) -> dict[str, object]:
         """Return the object that `compare --json` prints, SI."""
@@ -125,38 +126,21 @@ class Comparison:
         found = [{"name": name, **{key: each[key] for key in kept}} for name, each in told]
         return {"designs": found, "units": units, "differs": [row.name for row in self.rows if row.differs]}
 
-    def parts(self) -> list[str | TextTable]:
-        """Return the parts that a terminal shows."""
-        names = tuple(each.name for each in self.designs)
-        lines = []
-        for row in self.rows:
-            cells = [_cell(value, held) for value, held in zip(row.values, row.held, strict=True)]
-            lines.append((row.name, *cells, "" if row.unit == "1" else row.unit, "differs" if row.differs else ""))
-        right = tuple(range(1, len(names) + 1))
-        heads = ("", *names, "unit", "")
-        grid = TextTable("", heads, tuple(lines), right, first=(0, *right, len(names) + 1), more="--json")
-        told = []
+    def tables(self) -> list[str | TextTable]:
+        """Which limits each design holds, and all numbers side by side."""
+        lines: list[str | TextTable] = []
         for each in self.designs:
             broken = [limit.name for limit in each.found.limits if not limit.ok and not limit.rounding]
             held = f"NOT admissible (!): {', '.join(broken)}" if broken else "all limits held"
-            told.append(f"{each.name}: {each.found.problem}, {each.found.sought or 'no target'}: {held}")
-        return [*told, grid]
-
-    def __str__(self) -> str:
-        from loomopt.interface.text import layout
-
-        return layout.render(self.parts(), layout.width())
+            lines.append(f"{each.name}: {each.found.problem}, {each.found.sought or 'no target'}: {held}")
+        count = len(self.designs)
+        return [*lines, text_table(self._columns(), (0, *range(1, count + 1), count + 1))]
 
     def __repr__(self) -> str:
         count = sum(row.differs for row in self.rows)
         return (
             f"<Comparison of {', '.join(each.name for each in self.designs)}: {count} of {len(self.rows)} rows differ>"
         )
-
-    def _repr_html_(self) -> str:
-        from loomopt.interface.text import notebook
-
-        return notebook.page(self.parts())
 
 
 def _number(value: object) -> float | None:
@@ -237,3 +221,36 @@ def _within(found: Evaluation, scene: Scene) -> Evaluation:
 
 def _called(each: object) -> str:
     return f"{each.problem}, {each.sought}" if isinstance(each, Evaluation) else TODAY
+
+
+@working()
+def _overlaid(designs: Sequence[tuple[str, Scene, Design]]) -> Charts:
+    """Curves of designs, named, in their scenes and in the units of the first one's scene."""
+    scene, first = designs[0][1:]
+    view, unit = registry.of(scene).views, scene.shown_in("angle")
+    angle = math.degrees(factor(unit))
+    turns = [turned(tables.curves(home, design), _marks(home, design), unit) for _, home, design in designs]
+    columns = tuple(dict.fromkeys(column for turn in turns for column in turn.columns.columns))
+    known = view.panels(scene, flat(first), tuple(turns[0].columns.columns))
+    panels = [*known, *(panel for panel in each_alone(columns) if panel.columns[0] not in turns[0].columns)]
+    ends = min(float(turn.angles.min()) for turn in turns), max(float(turn.angles.max()) for turn in turns)
+    step = TICKS * turns[0].whole / 360.0
+    numbered = [step * k / angle for k in range(math.ceil(ends[0] / step), math.floor(ends[1] / step + 1e-9) + 1)]
+    axis = Axis(ends[0] / angle, ends[1] / angle, numbered, f"{view.angle} phi [{unit}]")
+    key = [(f"c{place % COLOURS}", name) for place, (name, *_) in enumerate(designs)]
+    shown = []
+    for panel in (in_units(scene, panel) for panel in panels):
+        for column, label in zip(panel.columns, panel.labels, strict=True):
+            size = factor(shown_unit(panel))
+            drawn = [
+                Series(turn.angles / angle, turn.of(column) / size, kind, name)
+                for turn, (kind, name) in zip(turns, key, strict=True)
+                if column in turn.columns
+            ]
+            shown.append(Chart(headed(label, shown_unit(panel)), axis, drawn, key=key, cursor=True))
+    return Charts(f"{scene.name}: designs compared, curves over the cycle", shown, shared=True)
+
+
+def _marks(scene: Scene, design: Design) -> Marks:
+    job = registry.of(scene)
+    return job.views.marks(scene, {**job.today(scene), **flat(design)})

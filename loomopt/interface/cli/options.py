@@ -1,0 +1,175 @@
+"""Options that commands share, each declared once: a command takes a group of them as one object."""
+
+import contextlib
+import functools
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeGuard
+
+import typer
+
+from loomopt.interface.cli.shell import read_number
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from loomopt.scenes.scene import Call, Scene
+
+Problem = Annotated[
+    str, typer.Argument(help="A packaged scene (see `loomopt list`), the path of a TOML scene, or an answer's JSON.")
+]
+Set = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set a scene key by its dotted path.")
+]
+With = Annotated[list[str] | None, typer.Option("--with", metavar="EFFECT", help="Put on an effect from [available].")]
+Without = Annotated[list[str] | None, typer.Option("--without", metavar="EFFECT", help="Take an effect off.")]
+Free = Annotated[list[str] | None, typer.Option("--free", metavar="NAMES", help="Free bounds that are held.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Design = Annotated[
+    Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON; - for a pipe.")
+]
+Decimal = Annotated[str, typer.Option(metavar="point|comma", help="The decimal sign of CSV files.")]
+Limits = Annotated[
+    str | None,
+    typer.Option("--target", help="Whose limits count; the answer's own, or the job's default, without it."),
+]
+Target = Annotated[str | None, typer.Option(help="What to optimise; the job's default without it.")]
+Out = Annotated[list[Path] | None, typer.Option(metavar="F", help="Write the table: .csv, .xlsx or .parquet.")]
+Figure = Annotated[list[Path] | None, typer.Option("--figure", metavar="F", help="Draw it: .png, .svg or .pdf.")]
+
+
+@dataclass(frozen=True)
+class Options:
+    """A group of options; its fields are declared as a command's parameters are."""
+
+
+@dataclass(frozen=True)
+class SceneOptions(Options):
+    """What a call changes in a scene."""
+
+    sets: Set = None
+    free: Free = None
+    on: With = None
+    off: Without = None
+
+    def __bool__(self) -> bool:
+        return any((self.sets, self.free, self.on, self.off))
+
+    def scene(self, problem: str) -> "Scene":
+        """Scene with the changes. Raises BadInput."""
+        from loomopt.jobs.registry import load
+
+        scene = load(problem)
+        call = self.call(scene)
+        return scene.called(call, call.set)
+
+    def call(self, scene: "Scene") -> "Call":
+        """Changes of a scene: numbers set, then effects on, then off, then bounds freed. Raises BadInput."""
+        from loomopt.base.errors import refusal
+        from loomopt.interface.cli.shell import read_value
+        from loomopt.scenes.scene import Call
+
+        values: dict[str, object] = {}
+        for item in self.sets or ():
+            key, equals, value = item.partition("=")
+            if not equals:
+                remedy = 'Write --set operation.M0="800 N*m"'
+                raise refusal("it is not KEY=VALUE", scene.origin, "--set", item, remedy=remedy)
+            values[key.strip()] = read_value(value)
+        freed = (name for names in self.free or () for name in names.replace(",", " ").split())
+        return Call(values, tuple(self.on or ()), tuple(self.off or ()), tuple(freed))
+
+
+@dataclass(frozen=True)
+class ComputerOptions(Options):
+    """Who computes a study."""
+
+    workers: Annotated[str | None, typer.Option(metavar="N", help="So many processes on this machine.")] = None
+    dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="The scheduler of a Dask cluster instead.")] = None
+
+    @property
+    def count(self) -> int | None:
+        """Number of processes. Raises BadInput."""
+        return None if self.workers is None else int(read_number("--workers", self.workers, int))
+
+    @contextlib.contextmanager
+    def executor(self) -> "Iterator[Executor | None]":
+        """Executor of a Dask cluster, where one is named. Raises BadInput beside a number of workers."""
+        if self.dask is None:
+            yield None
+            return
+        if self.workers is not None:
+            from loomopt.base.errors import refusal
+
+            problem, remedy = "there are a cluster and a number of workers", "Give one of them"
+            raise refusal(problem, "", "--workers", self.count, remedy=remedy)
+        from loomopt.studies.run import run
+
+        with run.dask(self.dask) as executor:
+            yield executor
+
+
+@dataclass(frozen=True)
+class StoreOptions(Options):
+    """Where finished rows stay."""
+
+    store: Annotated[Path | None, typer.Option("--store", metavar="FILE", help="Keep each row there as it comes.")] = (
+        None
+    )
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with what the store holds.")] = False
+
+
+@dataclass(frozen=True)
+class TableOptions(Options):
+    """Files of a study's table."""
+
+    out: Out = None
+    decimal: Decimal = "point"
+
+    @property
+    def comma(self) -> bool:
+        """Whether CSV has decimal commas. Raises BadInput."""
+        from loomopt.interface.files import sheets
+
+        return sheets.decimal_comma(self.decimal)
+
+
+NO_CHANGES, ALONE, NO_STORE, NO_TABLE = SceneOptions(), ComputerOptions(), StoreOptions(), TableOptions()
+"""Defaults of commands."""
+
+
+def expanded(command: Callable[..., None]) -> Callable[..., None]:
+    """Command whose groups of options are parameters of their own, as Typer reads them."""
+    known = inspect.signature(command).parameters.values()
+    groups = {each.name: each.annotation for each in known if _is_group(each.annotation)}
+    flat = [option for each in known for option in _flat(each.name, each.default, each.annotation)]
+
+    @functools.wraps(command)
+    def call(**given: object) -> None:
+        made = {name: _group(kind, given) for name, kind in groups.items()}
+        command(**given, **made)
+
+    del call.__wrapped__
+    call.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
+    call.__annotations__ = {option.name: option.annotation for option in flat}
+    return call
+
+
+def _is_group(annotation: object) -> TypeGuard[type[Options]]:
+    return isinstance(annotation, type) and issubclass(annotation, Options)
+
+
+def _flat(name: str, default: object, annotation: object) -> Iterator[inspect.Parameter]:
+    """Parameters of an option, or of all options of a group."""
+    if _is_group(annotation):
+        for each in fields(annotation):
+            yield from _flat(each.name, each.default, each.type)
+    else:
+        yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def _group(kind: type[Options], given: dict[str, object]) -> Options:
+    """Group made of the options that are its own, which are taken away."""
+    return kind(**{f.name: _group(f.type, given) if _is_group(f.type) else given.pop(f.name) for f in fields(kind)})

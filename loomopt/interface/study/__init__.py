@@ -1,0 +1,1 @@
+"""Each study to work with: its result, its tables and its charts."""

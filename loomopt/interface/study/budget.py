@@ -1,0 +1,121 @@
+"""The torque budget of a design to work with: its tables, its chart, and the motor that it takes."""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from loomopt.base import arguments
+from loomopt.base.units import factor
+from loomopt.interface.study_result import StudyResult
+from loomopt.physics.cycle import TURN
+from loomopt.physics.tolerances import SHOWN_AS_ZERO
+from loomopt.picture.chart import COLOURS, TICKS, Axis, Chart, Charts, Series, headed, thinned
+from loomopt.picture.table import Column, TextTable, text_table, words, written
+from loomopt.scenes.designs import Design
+from loomopt.scenes.provenance import provenance
+from loomopt.scenes.scene import Scene
+from loomopt.studies import budget
+from loomopt.studies.budget import BudgetResult
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SAID = {
+    "rms_torque": ("rms torque", "torque"),
+    "mean_power": ("mean power", "power"),
+    "peak_power": ("peak power, driving or braking", "power"),
+    "regenerated": ("given back to the motor, mean power", "power"),
+    "energy_swing": ("a flywheel takes in and gives back each turn", "energy"),
+    "flywheel": ("flywheel at the crank", "inertia"),
+}
+"""What of the motor is told: how it is called, its kind of quantity."""
+
+
+class Budget(StudyResult[BudgetResult]):
+    """Where the crank torque of a design comes from, and what it asks of motor and flywheel; SI and rad."""
+
+    heading = "Where the crank torque comes from"
+
+    def table(self, *, si: bool = False) -> "pd.DataFrame":
+        """Table of a line per effect and one for their sum; si: in SI, else in the scene's own units."""
+        from loomopt.interface.table_frame import frame
+
+        motor = {name: value for name, value in self.result.motor._asdict().items() if value is not None}
+        attrs = provenance(self.result.scene, study="budget", **motor)
+        return frame(_columns(self.result, arguments.flag(si, "si")), attrs, "effect")
+
+    def tables(self) -> list[str | TextTable]:
+        """A line per effect, their sum, the motor, and remarks."""
+        result, scene = self.result, self.result.scene
+        peak = scene.show(_rounded(result.total.at_peak, result.total.peak), "torque")
+        first = f"{scene.name}: the crank torque is largest, {peak}, at {scene.show(result.found.angle, 'angle')}"
+        motor = tuple((said, _motor(result, name)) for name, (said, _) in SAID.items())
+        shares = text_table(_columns(result), first=(0, 1, 5))
+        return [first, shares, TextTable("Motor", ("", ""), motor), *(f"Remark: {text}." for text in result.remarks)]
+
+    def charts(self) -> Charts:
+        """Each effect's share over the turn, and their sum."""
+        scene, found = self.result.scene, self.result.found
+        unit, shown = scene.shown_in("torque"), scene.shown_in("angle")
+        size, angle = factor(unit), factor(shown)
+        rows = thinned(np.degrees(found.phi))
+        phi = found.phi[rows] / angle
+        shares = {name: curve[rows] / size for name, curve in found.curves.items()}
+        total = Series(phi, np.sum(list(shares.values()), axis=0), "c0", "crank torque")
+        series = [Series(phi, y, f"c{(k + 1) % COLOURS}", name) for k, (name, y) in enumerate(shares.items())]
+        step = math.radians(TICKS)
+        numbered = [step * k / angle for k in range(round(TURN / step) + 1)]
+        chart = Chart(
+            headed("torque", unit),
+            Axis(float(phi.min()), float(phi.max()), numbered, f"crank angle phi [{shown}]"),
+            [*series, total],
+            dots=[(found.angle / angle, found.total.at_peak / size, "c0")],
+            key=[
+                *((each.kind, each.label) for each in (total, *series)),
+                ("dot c0", f"peak {scene.show(found.total.at_peak, 'torque')}"),
+            ],
+            cursor=True,
+        )
+        return Charts(f"{scene.name}: where the crank torque comes from", [chart])
+
+    def __repr__(self) -> str:
+        scene = self.result.scene
+        size = scene.show(self.result.total.at_peak, "torque")
+        return f"<Budget {scene.name}: crank torque {size} at its peak, of {len(self.result.rows)} effects>"
+
+
+def compute(scene: Scene, design: Design, fluctuation: float | None = None) -> Budget:
+    """Torque budget of a design, checked (SI; what it does not name is today's). Raises BadInput."""
+    return Budget(budget.compute(scene, design, fluctuation))
+
+
+def _columns(result: BudgetResult, si: bool = False) -> list[Column]:
+    torque, energy = ("N*m", "J") if si else (result.scene.shown_in(kind) for kind in ("torque", "energy"))
+    rows, size, joule = [*result.rows, result.total], factor(torque), factor(energy)
+    shares = [math.nan if row.share is None else 100 * row.share for row in rows]
+    energies = [row.energy / joule for row in rows]
+    columns = [words("effect", [row.effect for row in rows])]
+    for name, head in (("at_peak", "there"), ("rms", "rms"), ("peak", "largest")):
+        values = [getattr(row, name) / size for row in rows]
+        cells = [written(_rounded(value, result.total.peak / size)) for value in values]
+        columns.append(Column(f"{name} [{torque}]", values, f"{head}\n{torque}", cells, called=head))
+    cells = ["" if math.isnan(share) else f"{_rounded(share, 100.0):.4g}" for share in shares]
+    columns.insert(2, Column("share [%]", shares, "of it\n%", cells, called="of it"))
+    head = f"energy a turn\n{energy}"
+    return [
+        *columns,
+        Column(f"energy [{energy}]", energies, head, list(map(written, energies)), called="energy a turn"),
+    ]
+
+
+def _rounded(value: float, size: float) -> float:
+    return 0.0 if abs(value) <= SHOWN_AS_ZERO * size else value
+
+
+def _motor(result: BudgetResult, name: str) -> str:
+    value, scene = getattr(result.motor, name), result.scene
+    if value is None:
+        return f"not known: {result.undefined[name]}"
+    told = scene.show(value, SAID[name][1])
+    return f"{told} for a fluctuation of {result.found.fluctuation:g}" if name == "flywheel" else told

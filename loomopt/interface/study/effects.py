@@ -1,0 +1,278 @@
+"""What each effect is worth, to work with: tables, bars of shift and regret, a sentence on what may be left out."""
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from typing import TYPE_CHECKING
+
+from loomopt.base import arguments
+from loomopt.base.units import factor
+from loomopt.interface.study_result import StudyResult, row_hook, workers
+from loomopt.physics.tolerances import SHOWN_AS_ZERO
+from loomopt.picture.chart import Bars, Charts, both_sides
+from loomopt.picture.table import Column, TextTable, call, text_table, words, written
+from loomopt.scenes.provenance import provenance
+from loomopt.solving.answer.solution import Words
+from loomopt.studies.effects.study import Effects, EffectsResult, summarise
+from loomopt.studies.effects.worth import LIMITS, Worth
+from loomopt.studies.run import run
+from loomopt.studies.run.rows import Row
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+DECADES = 4
+"""Powers of ten on either side of 0, at most: below them, and below a tenth of the tolerance, bars are linear."""
+ROOMY = 1.3
+"""Share of the longest bars that the axis is long."""
+
+
+class EffectsStudy(StudyResult[EffectsResult]):
+    """What each effect of a scene is worth for a target; shares of natural sizes inside, units for a reader."""
+
+    heading = "What each effect is worth"
+
+    def table(self, *, si: bool = False) -> "pd.DataFrame":
+        """Table of one line per effect, units in the column names; si: in SI, else in the scene's own units."""
+        from loomopt.interface.table_frame import frame
+
+        result = self.result
+        settings = {"reference": ", ".join(result.reference.effects), "tolerance": result.tolerance}
+        attrs = provenance(result.scene, study="effects", target=result.target, **settings)
+        return frame(_columns(result, result.rows, si=arguments.flag(si, "si")), attrs, "without")
+
+    def tables(self, *, timed: bool = True) -> list[str | TextTable]:
+        """A line per effect, what may be left out, and what was not measured; timed: with the time of each solve."""
+        result, reference = self.result, self.result.reference
+        values = ", ".join(f"{name} {_reference_value(result, name)}" for name in reference.scales)
+        first = f"{result.scene.name}, {result.target}, with {listed(reference.effects) or 'no effect'} on: "
+        lines = [first + (values if reference.status == "optimal" else f"{reference.status}, {reference.why}")]
+        sizes = ", ".join(f"{name} {Words(result.scene).shown(name, size)}" for name, size in reference.scales.items())
+        lines += [f"Shares are of natural sizes: {sizes}"] if sizes else []
+        table: list[str | TextTable] = []
+        if result.rows:
+            base = Worth("nothing", {}, {}, None, True, reference.status, **reference.cost)
+            columns = _columns(result, (base, *result.rows), timed)
+            last = sum(column.head is not None for column in columns) - 1  # what came of the solve, if no optimum
+            table = [text_table(columns, (0, last - 1, last) if any(columns[-2].cells) else (0, last - 1))]
+        return [*lines, *table, *verdict(result), *_notes(result)]
+
+    def charts(self) -> Charts:
+        """Bars of shift and regret for each objective beside the tolerance, and of limits where any is exceeded."""
+        result = self.result
+        shown = [_bars(result, name) for name in result.reference.scales] if result.rows else []
+        excesses = [row.excess for row in result.rows]
+        if shown and any(value is not None and value > SHOWN_AS_ZERO for value in excesses):
+            key = [("c3", "worst excess of the design found without it")]
+            shown.append(
+                _bars_of(result, "limits without an effect", key, [(value,) for value in excesses], signed=False)
+            )
+        title = f"{result.scene.name}, {result.target}: what each effect is worth"
+        return Charts(title, shown, missing="no effect was measured")
+
+    def __repr__(self) -> str:
+        left = ", ".join(self.result.left_out) or "nothing"
+        share = f"{100 * self.result.tolerance:g} %"
+        return f"<EffectsStudy {self.result.scene.name}, {self.result.target}: at {share} {left} may be left out>"
+
+    def _repr_html_(self) -> str:
+        from loomopt.interface.text import notebook
+
+        return notebook.page(self.tables(timed=False))
+
+
+def run_effects(
+    study: Effects,
+    executor: Executor | run.Making | None = None,
+    count: int | None = None,
+    on_row: run.OnRow | None = None,
+) -> EffectsStudy:
+    """Run a study; count: of worker processes, where there is no executor.
+
+    Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    """
+    with row_hook(lambda count: f"{count} solved" if count else "solving with all effects on", on_row) as hook:
+        return summarise_effects(study, run.run(study, workers(executor, count), None, hook))
+
+
+def summarise_effects(study: Effects, rows: Sequence[Row]) -> EffectsStudy:
+    """What rows of a study show, not all of which need be there. Raises BadInput where solve takes nothing."""
+    return EffectsStudy(summarise(study, rows))
+
+
+def _columns(result: EffectsResult, rows: Sequence[Worth], timed: bool = True, si: bool = False) -> list[Column]:
+    units, columns = Words(result.scene), [words("without", [row.effect for row in rows])]
+    for name, scale in result.reference.scales.items():
+        unit = units.si(name) if si else units.unit(name)
+        size = scale / factor(unit)
+        shift = [_known(row.shift.get(name)) for row in rows]
+        regret = [_known(row.regret.get(name)) for row in rows]
+        head = f"{name}\nshift" + ("" if unit == "1" else f"\n{unit}")
+        sizes = [value * size for value in shift]
+        cells = ["0" if abs(value) <= SHOWN_AS_ZERO else written(value * size) for value in shift]
+        columns += [
+            Column(f"{name} shift [{unit}]", sizes, head, cells, called=f"{name} shift"),
+            Column(f"{name} shift [%]", *_percent(shift, "\n\n%"), called=f"{name} shift %"),
+            Column(f"{name} regret [{unit}]", [value * size for value in regret]),
+            Column(f"{name} regret [%]", *_percent(regret, "\nregret\n%"), called=f"{name} regret %"),
+        ]
+    nodes = ["" if row.nodes is None else str(row.nodes) for row in rows]
+    build, solve = [_known(row.build_s) for row in rows], [_known(row.solve_s) for row in rows]
+    going = ["" if row.effect == "nothing" else "yes" if row.may_go else "no" for row in rows]
+    return [
+        *columns,
+        Column("limits exceeded [%]", *_percent([_known(row.excess) for row in rows], "limits\nexceeded\n%")),
+        Column("may go", [row.may_go for row in rows]),
+        Column("takes away", [", ".join(row.lost) for row in rows]),
+        Column("changes", [", ".join(row.moved) for row in rows]),
+        Column("nodes", [row.nodes for row in rows], "graph\nnodes", nodes, kind="Int64"),
+        Column("build [s]", build, "build\ns" if timed else None, [_seconds(value) for value in build]),
+        Column("solve [s]", solve, "solve\ns" if timed else None, [_seconds(value) for value in solve]),
+        Column("", (), "may go", going, right=False),
+        Column(
+            "status", [row.status for row in rows], "", ["" if r.status == "optimal" else r.status for r in rows], False
+        ),
+        Column("why", [row.why for row in rows]),
+    ]
+
+
+def _known(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _percent(shares: Sequence[float], head: str) -> tuple[list[float], str, list[str]]:
+    """Shares in %, the heading of their column, and as people read them."""
+    cells = ["0" if abs(share) <= SHOWN_AS_ZERO else written(100 * share, 3) for share in shares]
+    return [100 * share for share in shares], head, cells
+
+
+def _seconds(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.3f}"
+
+
+def _reference_value(result: EffectsResult, name: str) -> str:
+    value, scale = result.reference.figures[name], result.reference.scales[name]
+    if value is None:
+        return "undefined"
+    return Words(result.scene).shown(name, 0.0 if abs(value) <= SHOWN_AS_ZERO * scale else value)
+
+
+def _bars(result: EffectsResult, name: str) -> Bars:
+    """Bars of shift and regret of an objective's figure."""
+    key = [("c0", "shift at the reference's design"), ("c1", "regret of the design found without it")]
+    shares = [(row.shift.get(name), row.regret.get(name)) for row in result.rows]
+    return _bars_of(result, f"{name} without an effect", key, shares)
+
+
+def _bars_of(
+    result: EffectsResult,
+    title: str,
+    key: Sequence[tuple[str, str]],
+    shares: Sequence[Sequence[float | None]],
+    signed: bool = True,
+) -> Bars:
+    """Bars of shares in %, a row for each effect; signed: to both sides of 0."""
+    names = [f"{row.effect}{' (may go)' if row.effect in result.left_out else ''}" for row in result.rows]
+    rows = [[_end(share, signed) for share in row] for row in shares]
+    known, tolerance = [end for row in rows for end in row if end is not None], 100 * result.tolerance
+    least, most = min([-tolerance * signed, *known]), max([tolerance, *known])
+    linear = max(tolerance / 10, max(most, -least) / 10**DECADES)
+    axis = both_sides(ROOMY * least, ROOMY * most, linear, "share of the natural size [%]")
+    numbers = [[_number(share) for share in row] for row in shares]
+    places = [tolerance, -tolerance] if signed else [tolerance]
+    lines = list(zip(names, rows, strict=True))
+    return Bars(title, lines, key, axis, places, f"tolerance {tolerance:g} %", numbers)
+
+
+def _end(share: float | None, signed: bool) -> float | None:
+    """Where a bar ends, %: at 0 where all is rounding, and where limits hold."""
+    if share is None or not math.isfinite(share):
+        return None
+    return 0.0 if abs(share) <= SHOWN_AS_ZERO or (share < 0.0 and not signed) else 100 * share
+
+
+def _number(share: float | None) -> str:
+    """Share as the number beside a bar."""
+    if share is None:
+        return "none"
+    return "0" if abs(share) <= SHOWN_AS_ZERO else f"{100 * share:+.3g} %"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names as a sentence has them."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def verdict(result: EffectsResult) -> list[str]:
+    """Sentences on what may be left out, how that was verified, and what else to know."""
+    share, solve = f"{100 * result.tolerance:g} %", call(result.command or "")
+    if not result.finished:
+        return ["Not finished: what may be left out is not known."]
+    if not result.reference.scales:
+        return ["Without a design for the reference nothing can be measured."]
+    said = f"{listed(result.left_out)} may be left out" if result.left_out else "no effect may be left out"
+    lines = [f"At {share}, {said}{': ' if solve else ''}{solve}"]
+    if result.together and result.largest_omission:
+        lines.append(
+            f"Left out together, and what is found so judged with all on: {_largest_change(result.together.largest)}."
+        )
+        if len(result.left_out) > 1 and abs(result.largest_omission.value) > SHOWN_AS_ZERO:
+            by, of, value = result.largest_omission.by, result.largest_omission.of, result.largest_omission.value
+            lines[-1] += f" Most comes from {result.largest_omission.effect}: {_moved(by, of, value)}."
+    lines += omitted(result)
+    alone = [row.effect for row in result.rows if row.may_go and row.effect not in result.left_out]
+    if alone:
+        lines.append(f"By itself {listed(alone)} may go, but not together with what else is left out.")
+    same = [row.effect for row in result.rows if _only_figures(row, result.tolerance)]
+    if same:
+        lines.append(f"Without {listed(same)} as good a design is found, but its figures are wrong by more than that.")
+    if result.judged:
+        lines.append(f"Evaluate the design with {listed(result.judged)}, which solve does not take.")
+    return lines
+
+
+def omitted(result: EffectsResult) -> list[str]:
+    """Sentences on which figures are gone or others without what is left out, and which of them the target reads."""
+    rows = [row for row in result.rows if row.effect in result.left_out]
+    told, names = list[str](), dict[str, None]()
+    for row in (*rows, *([result.together] if result.together and len(rows) > 1 else [])):
+        single = row in rows
+        parts = [f"{listed(row.lost)} {'is' if len(row.lost) == 1 else 'are'} gone"] if row.lost else []
+        parts += (
+            [f"{listed(row.moved)} {'changes' if len(row.moved) == 1 else 'change'}"] if row.moved and single else []
+        )
+        told += [f"{f'without {row.effect}' if single else 'without them all'} {' and '.join(parts)}"] if parts else []
+        names |= dict.fromkeys((*row.lost, *row.moved))
+    if not told:
+        return []
+    read = [name for name in names if name in result.reference.reads]
+    which = f"reads {listed(read)} of them" if read else "reads none of these figures"
+    return [f"Of the other figures: {'; '.join(told)}. Target {result.target} {which}."]
+
+
+def _largest_change(largest: tuple[str, str, float]) -> str:
+    """The largest change in words."""
+    return f"at most {_moved(*largest)}" if abs(largest[2]) > SHOWN_AS_ZERO else "nothing changes"
+
+
+def _moved(by: str, of: str, value: float) -> str:
+    """A change in words: by "shift" or "regret", of a figure or of the limits."""
+    share = f"{100 * value:.3g} %"
+    if of == LIMITS:
+        return f"a limit is exceeded by {share}"
+    return f"{of} {'shifts by' if by == 'shift' else 'is worse by'} {share}"
+
+
+def _only_figures(row: Worth, tolerance: float) -> bool:
+    """Say whether a design found without an effect is good, and only its figures are wrong."""
+    told = (*row.regret.values(), row.excess)
+    known = [value for value in row.shift.values() if value is not None]
+    good = bool(known) and all(value is not None and value <= tolerance for value in told)
+    return good and max(map(abs, known)) > tolerance
+
+
+def _notes(result: EffectsResult) -> list[str]:
+    """Sentences on why rows are not what one would think, and what was not measured."""
+    lines = [f"{row.effect}: {row.why}" for row in result.rows if row.why]
+    lines += [f"{name} is not measured: {why}" for name, why in result.out.items()]
+    return lines + [f"{name}: {why}" for name, why in result.unknown.items()]

@@ -1,0 +1,220 @@
+"""Machines as they are made, to work with: how figures spread, how often limits hold, what to tighten first."""
+
+import contextlib
+import math
+import os
+from collections.abc import Callable
+from concurrent.futures import Executor
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from loomopt.base import arguments
+from loomopt.base.units import factor
+from loomopt.interface.progress import cell_progress
+from loomopt.interface.study_result import StudyResult, check_resume, opened_store, workers
+from loomopt.physics.tolerances import SHOWN_AS_ZERO
+from loomopt.picture.chart import Axis, Chart, Charts, Series, headed, ticks
+from loomopt.picture.table import Column, TextTable, text_table, words, written
+from loomopt.scenes.provenance import provenance
+from loomopt.solving.answer.solution import Words
+from loomopt.studies.run import run
+from loomopt.studies.tolerance import study
+from loomopt.studies.tolerance.plan import SCRAMBLES, Plan
+from loomopt.studies.tolerance.study import ALL, BINS, REACH, Spread, ToleranceResult
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LEAST_SHARE = 0.005
+"""Of a figure's variance: what is not told in a terminal."""
+MOST_TOLD = 3
+"""Numbers whose shares are told."""
+
+
+class ToleranceStudy(StudyResult[ToleranceResult]):
+    """Machines as they are made: how figures spread, how often limits hold; SI inside."""
+
+    heading = "Machines as they are made"
+
+    def table(self, *, si: bool = False) -> "pd.DataFrame":
+        """Table of one line per figure with its spread and shares; si: in SI, else in the scene's own units."""
+        from loomopt.interface.table_frame import frame
+
+        plan = self.result.plan
+        attrs = provenance(plan.scene, samples=self.result.samples, seed=plan.seed)
+        return frame(_spreads(self.result, arguments.flag(si, "si")), attrs)
+
+    def tables(self) -> list[str | TextTable]:
+        """Spreads, yields, worst cases, and what to tighten first."""
+        result, plan = self.result, self.result.plan
+        numbers = ", ".join(each.number for each in plan.made.values())
+        head = f"{plan.scene.name}, limits of {plan.target}: {result.samples} machines, {numbers} as they are made"
+        lost = f"{result.bad} of them do not assemble or lack a figure" if result.bad else "all of them assemble"
+        worst: list[str | TextTable] = [_worst(result)] if result.worst else []
+        spreads = text_table(_spreads(result), first=(0, 1, 3, 4, 2))
+        return [f"{head}; {lost}", spreads, _yields(result), *worst, *_advice(result)]
+
+    def charts(self) -> Charts:
+        """How each figure spreads that judges machines or is sought."""
+        plan = self.result.plan
+        names = dict.fromkeys(
+            [*(each.name for each in plan.judged), *(each.figure for each in plan.program.objectives)]
+        )
+        spreads = ((name, self.result.figures.get(name)) for name in names)
+        shown = [
+            _histogram(self.result, name, each) for name, each in spreads if each and each.sigma and each.sigma_linear
+        ]
+        title = f"{plan.scene.name}: {self.result.samples} machines as they are made"
+        return Charts(title, shown, missing="no figure that judges machines spreads")
+
+    def __repr__(self) -> str:
+        share, plan = self.result.yields[ALL].value, self.result.plan
+        return f"<ToleranceStudy {plan.scene.name}, {plan.target}: all limits hold on {100 * share:.4g} %>"
+
+
+def run_tolerance(
+    plan: Plan,
+    executor: Executor | run.Making | None = None,
+    count: int | None = None,
+    on_step: Callable[[str], None] | None = None,
+    worst: bool = True,
+    store: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+) -> ToleranceStudy:
+    """Draw the machines of a plan and judge them; count: of worker processes, without an executor.
+
+    worst: whether the worst cases are proven too; store, resume: as in `run_study`, a scramble a row.
+    Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    """
+    computer = workers(executor, count)
+    with cell_progress() as cell, contextlib.ExitStack() as opened:
+        say = on_step or cell or (lambda text: None)
+        rows = None
+        if store is None:
+            check_resume(resume)
+        else:
+            drawing = study.Drawing(plan, {})
+            known = "{} of the {} scrambles".format
+            rows = opened.enter_context(
+                opened_store(store, drawing.key, drawing.settings, resume, lambda count: known(count, SCRAMBLES))
+            )
+        pool = computer if isinstance(computer, Executor) or computer is None else opened.enter_context(computer())
+        return ToleranceStudy(study.run(plan, pool, say, worst, rows))
+
+
+def _spreads(result: ToleranceResult, si: bool = False) -> list[Column]:
+    units, figures = Words(result.plan.scene), result.figures
+    shown = [units.si(name) if si else units.unit(name) for name in figures]
+    pairs = [(each, factor(unit)) for each, unit in zip(figures.values(), shown, strict=True)]
+    nominal, linear, sigma = (
+        [getattr(each, part) / size for each, size in pairs] for part in ("nominal", "sigma_linear", "sigma")
+    )
+    centres = [
+        written(0.0 if abs(each.nominal) <= SHOWN_AS_ZERO * each.sigma else each.nominal / size) for each, size in pairs
+    ]
+    columns = [
+        words("figure", list(figures)),
+        Column("unit", shown),
+        Column("nominal", nominal, "nominal", centres),
+        Column("sigma_linear", linear, "sigma\nlinear", [_size(value) for value in linear]),
+        Column("sigma", sigma, "sigma\nsampled", [_size(value) for value in sigma]),
+        Column("", (), "unit", ["" if unit == "1" else unit for unit in shown], right=False),
+        Column("", (), "shares", [_shares(each) for each in figures.values()], right=False),
+    ]
+    for place, side in enumerate(("min", "max")) if result.worst else ():
+        worst = [result.worst.get(name) for name in figures]
+        ends = [(each.min, each.max)[place] if each else None for each in worst]
+        values = [math.nan if end is None else end / size for end, (_, size) in zip(ends, pairs, strict=True)]
+        columns.append(Column(f"worst {side}", values))
+    shared = dict.fromkeys(number for each in figures.values() for number in each.shares)
+    columns += [Column(f"share {n}", [each.shares.get(n, math.nan) for each in figures.values()]) for n in shared]
+    return columns
+
+
+def _size(value: float) -> str:
+    return "0" if value == 0.0 else f"{value:.4g}"
+
+
+def _shares(each: Spread) -> str:
+    told = sorted(each.shares.items(), key=lambda pair: -pair[1])[:MOST_TOLD]
+    text = ", ".join(f"{name} {100 * share:.3g} %" for name, share in told if share >= LEAST_SHARE)
+    return f"{text} (a corner)" if each.corner and text else text
+
+
+def _yields(result: ToleranceResult) -> TextTable:
+    names = ["all together" if name == ALL else name for name in result.yields]
+    shares = [f"{100 * each.value:.4g}" for each in result.yields.values()]
+    errors = [f"{100 * each.se:.2g}" for each in result.yields.values()]
+    columns = [
+        words("", names, "machines that hold"),
+        Column("", (), "%", shares),
+        Column("", (), "standard error\n%", errors),
+    ]
+    return text_table(columns)
+
+
+def _histogram(result: ToleranceResult, name: str, spread: Spread) -> Chart:
+    """How one figure spreads; what no machine may have is shaded."""
+    units, judged = Words(result.plan.scene), next((each for each in result.plan.judged if each.name == name), None)
+    unit = units.unit(name)
+    size = factor(unit)
+    edges = (spread.nominal + REACH * spread.sigma_linear * np.linspace(-1, 1, BINS + 1)) / size
+    low, high = float(edges[0]), float(edges[-1])
+    shares = np.array(spread.counts) / result.samples * 100
+    steps = np.concatenate([[0.0], np.repeat(shares, 2), [0.0]])
+    least, most = (
+        None if end is None else min(max(end / size, low), high)
+        for end in ((judged.low, judged.high) if judged else (None, None))
+    )
+    outside = [(low, least)] if least is not None and least > low else []
+    outside += [(most, high)] if most is not None and most < high else []
+    nominal = 0.0 if abs(spread.nominal) <= SHOWN_AS_ZERO * spread.sigma else spread.nominal
+    key = [("k-place", f"nominal {units.shown(name, nominal)}")]
+    key += [("k-span", f"does not hold; {100 * result.yields[name].value:.4g} % hold")] if outside else []
+    axis = Axis(low, high, ticks(low, high, 4), headed(name, unit))
+    curve = Series(np.repeat(edges, 2), steps, "c0", filled=True)
+    return Chart("machines [%]", axis, [curve], spans=outside, places=[nominal / size], key=key)
+
+
+def _worst(result: ToleranceResult) -> TextTable:
+    """Worst cases: the least and the most of each figure within the tolerances, and whether it is proven."""
+    words, lines = Words(result.plan.scene), []
+    for name, each in result.worst.items():
+        unit = words.unit(name)
+        size = factor(unit)
+        sides = zip((each.min, each.max), each.found, (-1.0, 1.0), ("or less", "or more"), strict=True)
+        shown = [_end(end, beyond, size, sign, more) for end, beyond, sign, more in sides]
+        lines.append((name, *shown, "" if unit == "1" else unit, "proven" if each.proven else each.why))
+    heads = ("within all tolerances", "at least", "at most", "unit", "")
+    return TextTable("", heads, tuple(lines), (1, 2), first=(0, 1, 2, 4, 3), more="--json")
+
+
+def _end(end: float | None, found: float, size: float, sign: float, more: str) -> str:
+    """A proven end, outward of itself; of one that is undecided the farthest machine."""
+    if end is not None:
+        return _outward(end / size, sign)
+    return f"{found / size:.{DIGITS}g} {more}" if math.isfinite(found) else ""
+
+
+DIGITS = 7
+"""Digits of a worst case: more than its gap has."""
+
+
+def _outward(value: float, sign: float) -> str:
+    """The nearest number of so many digits that is no less, or no more, than a value."""
+    if value == 0.0:
+        return "0"
+    step = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - DIGITS)
+    return f"{(math.ceil if sign > 0 else math.floor)(value / step) * step:.{DIGITS}g}"
+
+
+def _advice(result: ToleranceResult) -> list[str]:
+    first = [f"{name} ({100 * share:.3g} %)" for name, share in result.tighten[:MOST_TOLD] if share >= LEAST_SHARE]
+    lost = any(result.yields[each.name].value < 1.0 for each in result.plan.judged)
+    of = "what is lost" if lost else "what is sought spreads by; no machine that was drawn is lost"
+    said = [f"Tighten first: {', '.join(first)} of {of}."] if first else []
+    names = result.plan.unjudged
+    if names:
+        said.append(f"No machine is judged by {', '.join(names)}, an equality or a goal: [accept] gives it a band.")
+    return said

@@ -1,0 +1,226 @@
+"""Charts as plain data: curves, bars and marks over axes; studies say them, renderers draw them."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loomopt.base.records import lazy
+from loomopt.picture.shapes import Floats
+
+COLOURS = 7
+"""Colours of curves, "c0" to "c6" among the kinds of style."""
+EVERY = 2.0
+"""Degrees between the points that a curve over the turn is drawn through."""
+TICKS = 90.0
+"""Degrees between the numbers below a curve over the turn."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One side of a chart: its two ends, where it is numbered, its name with the unit.
+
+    linear: size of a value up to which the axis is linear; beyond it is logarithmic.
+    """
+
+    low: float
+    high: float
+    ticks: Sequence[float] = ()
+    name: str = ""
+    linear: float = math.inf
+
+    def share(self, values: Floats | float) -> Floats:
+        """Where values lie between the ends, from 0 to 1."""
+        low, high, at = (self._scaled(np.asarray(each, dtype=float)) for each in (self.low, self.high, values))
+        return np.asarray((at - low) / (high - low))
+
+    def text(self, value: float) -> str:
+        """Number that stands beside the axis."""
+        return (
+            number(value, self.ticks)
+            if math.isinf(self.linear)
+            else f"{value:g}".replace("e-0", "e-").replace("-", "−")
+        )
+
+    def _scaled(self, values: Floats) -> Floats:
+        """Values on the scale of the axis: the linear part to either side is as long as one decade and a ninth."""
+        if math.isinf(self.linear):
+            return values
+        if self.linear == 0.0:
+            return np.asarray(np.log10(values))
+        beyond = np.log10(np.maximum(np.abs(values) / self.linear, 1.0))
+        return np.asarray(np.clip(values / self.linear, -1.0, 1.0) / 0.9 + np.sign(values) * beyond)
+
+
+@dataclass(frozen=True)
+class Series:
+    """One curve or a row of points: x and y in the units shown.
+
+    kind: its classes of style, such as "c0" or "today"; label: "" for none; points: circles in place of a line;
+    filled: the area down to 0 is filled.
+    """
+
+    x: Floats
+    y: Floats
+    kind: str
+    label: str = ""
+    points: bool = False
+    filled: bool = False
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Curves over an axis, with what is marked on them.
+
+    levels: horizontal lines; spans: shaded stretches of x; places: vertical lines, numbered from 1 in their order where
+    a list that stands with the chart is; dots: (x, y, kind); key: kind and words, of kind "" the heading of all;
+    names: x and what stands above the chart there; cursor: whether a script may move one over it; upright: the vertical
+    axis, fitted to curves and levels without one.
+    """
+
+    title: str
+    x: Axis
+    series: Sequence[Series]
+    levels: Sequence[float] = ()
+    spans: Sequence[tuple[float, float]] = ()
+    places: Sequence[float] = ()
+    dots: Sequence[tuple[float, float, str]] = ()
+    key: Sequence[tuple[str, str]] = ()
+    names: Sequence[tuple[float, str]] = ()
+    cursor: bool = False
+    numbered: bool = False
+    upright: Axis | None = None
+
+    @lazy
+    def y(self) -> Axis:
+        """The vertical axis."""
+        return self.upright or fitted([each.y for each in self.series], self.levels)
+
+    @property
+    def caption(self) -> str:
+        """What is drawn, and over what."""
+        return f"{self.title} over {self.x.name}" if self.x.name else self.title
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Bars from 0 to either side, a row of them for each name.
+
+    key: kind and words of the first, second, ... of a row; axis: fitted without one; places: vertical lines; place:
+    what they are; numbers: what stands beside each bar.
+    """
+
+    title: str
+    rows: Sequence[tuple[str, Sequence[float | None]]]
+    key: Sequence[tuple[str, str]] = ()
+    axis: Axis | None = None
+    places: Sequence[float] = ()
+    place: str = ""
+    numbers: Sequence[Sequence[str]] = ()
+
+    @property
+    def kinds(self) -> list[str]:
+        """The styles of the bars of a row."""
+        count = max((len(values) for _, values in self.rows), default=0)
+        return [kind for kind, _ in self.key] or [f"c{place % COLOURS}" for place in range(count)]
+
+    @lazy
+    def x(self) -> Axis:
+        """The axis that bars are measured along."""
+        if self.axis:
+            return self.axis
+        known = [value for _, values in self.rows for value in values if value is not None and math.isfinite(value)]
+        low, high = min([0.0, *known]), max([0.0, *known])
+        low, high = (low, high) if high > low else (0.0, 1.0)
+        room = 0.05 * (high - low)
+        return Axis(low - room * (low < 0.0), high + room * (high > 0.0), ticks(low, high, 4))
+
+
+@dataclass(frozen=True)
+class Charts:
+    """The charts of a study.
+
+    shared: whether all stand over the same axis, with the same key; first: how many of them a figure of one page shows;
+    notes: what its numbered places are; missing: why there is nothing to draw.
+    """
+
+    title: str
+    charts: Sequence[Chart | Bars]
+    shared: bool = False
+    first: int | None = None
+    notes: Sequence[str] = ()
+    missing: str = ""
+
+
+def fitted(values: Sequence[Floats], levels: Iterable[float] = (), name: str = "") -> Axis:
+    """Axis that shows all values, and levels no farther off than they reach."""
+    some = np.concatenate([*values, [math.nan]])
+    some = some[np.isfinite(some)]
+    low, high = (float(some.min()), float(some.max())) if some.size else (0.0, 1.0)
+    if high - low <= 1e-9 * max(abs(low), abs(high)):
+        room = abs(high) or 1.0
+        low, high = low - room, high + room
+    near = [level for level in levels if low - (high - low) <= level <= high + (high - low)]
+    low, high = min([low, *near]), max([high, *near])
+    room = 0.05 * (high - low)
+    return Axis(low - room, high + room, ticks(low - room, high + room, 4), name)
+
+
+def ticks(low: float, high: float, count: int) -> list[float]:
+    """Round numbers between two ends; count: of the steps between them, roughly."""
+    raw = (high - low) / count
+    size = 10.0 ** math.floor(math.log10(raw))
+    step = next(factor * size for factor in (1, 2, 2.5, 5, 10) if factor * size >= raw * 0.999)
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [step * k for k in range(first, last + 1)]
+
+
+def decades(values: Iterable[float], name: str = "") -> Axis:
+    """Logarithmic axis of whole decades around positive values, numbered at no more than six of them."""
+    known = [value for value in values if value > 0.0]
+    low = math.floor(math.log10(min(known, default=1.0)))
+    high = max(math.ceil(math.log10(max(known, default=1.0))), low + 1)
+    step = -(-(high - low) // 5)
+    return Axis(10.0**low, 10.0**high, [10.0**k for k in range(low, high + 1, step)], name, 0.0)
+
+
+def both_sides(low: float, high: float, linear: float, name: str = "") -> Axis:
+    """Axis from below 0 to above, logarithmic beyond a size to either side, numbered at 0 and at powers of ten."""
+    first, last = math.ceil(math.log10(linear)), math.floor(math.log10(max(high, -low, linear)))
+    sizes = [10.0**k for k in range(last, first - 1, -max(1, -(-(last - first) // 2)))]
+    numbered = [0.0, *(sign * size for size in sizes for sign in (-1, 1))]
+    return Axis(low, high, sorted(at for at in numbered if low <= at <= high), name, linear)
+
+
+TELLING = 0.02
+"""Share of the step between numbers of an axis by which one may be rounded."""
+
+
+def number(value: float, others: Sequence[float]) -> str:
+    """Number of an axis in as few digits as tell it from the others; a huge or tiny one by its power of ten."""
+    largest, step = max(map(abs, others), default=0.0), abs(others[-1] - others[0]) / max(1, len(others) - 1)
+    if abs(value) <= 1e-9 * largest:
+        return "0"
+    if not 1e-3 <= largest < 1e5:
+        text = f"{value:.2e}".replace("e+0", "e").replace("e-0", "e-").replace(".00e", "e")
+        return text.replace("-", "−")
+    enough = (d for d in range(3, 9) if all(abs(float(f"{other:.{d}g}") - other) <= TELLING * step for other in others))
+    rounded = float(f"{value:.{next(enough, 9)}g}")
+    return f"{rounded:.9g}".replace("-", "−")
+
+
+def thinned(angles: Floats) -> NDArray[np.bool_]:
+    """Whether a curve is drawn through each of its rows at angles, deg: every 2 degrees, at corners, at both ends."""
+    near = np.abs(angles / EVERY - np.round(angles / EVERY)) < 1e-9
+    half = np.abs(2 * angles - np.round(2 * angles)) < 1e-7
+    again = np.concatenate([[False], np.diff(angles) < 1e-6])
+    kept = near | ~half | again | np.append(again[1:], False)
+    kept[[0, -1]] = True
+    return np.asarray(kept)
+
+
+def headed(title: str, unit: str) -> str:
+    """Title with its unit, where it has one."""
+    return title if unit == "1" else f"{title} [{unit}]"
