@@ -92,7 +92,7 @@ class ComputerOptions(Options):
     @property
     def count(self) -> int | None:
         """Number of processes. Raises BadInput."""
-        return None if self.workers is None else int(read_number("--workers", self.workers, int))
+        return None if self.workers is None else read_number("--workers", self.workers, int)
 
     @contextlib.contextmanager
     def executor(self) -> "Iterator[Executor | None]":

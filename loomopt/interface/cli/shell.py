@@ -5,7 +5,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
+from typing import TYPE_CHECKING, Any, NamedTuple, TextIO, TypeVar
 
 from loomopt.base.errors import BadInput, clean
 from loomopt.scenes.former_names import FormerNameWarning
@@ -13,6 +13,8 @@ from loomopt.scenes.former_names import FormerNameWarning
 if TYPE_CHECKING:
     from loomopt.interface.progress import Progress
     from loomopt.scenes.scene import Call, Scene
+
+Number = TypeVar("Number", int, float)
 
 DIFFERS = 1
 """Exit status where a comparison or a proof does not come out as it should."""
@@ -100,7 +102,7 @@ def only(option: str, given: list[Path] | None) -> Path | None:
     return given[0] if given else None
 
 
-def read_number(option: str, text: str, kind: type[int] | type[float]) -> Any:
+def read_number(option: str, text: str, kind: type[Number]) -> Number:
     """Return an option's number. Raises BadInput."""
     from loomopt.base.errors import refusal
 
