@@ -314,7 +314,7 @@ class Sweep:
             figures={name: _finite(value) for name, value in here.figures.items()},
             multipliers={
                 Multiplier(each[0].objective.figure, Side(each[0].limit.name, SIDES[each[0].side])): worth_of(each)
-                for each in best.certificate.priced
+                for each in best.certificate.binding_groups
             },
             reached=here.reached,
             certified=True,

@@ -129,7 +129,7 @@ def _certificate(told: Mapping[str, Any]) -> Certificate:
         bool(told.get("design_unique", told["unique"])),
         by=str(told["by"]),
         whole_cycle=str(told["whole_cycle"]["by"]),
-        settled=tuple(map(str, told.get("settled", ()))),
+        tie_breaks=tuple(map(str, told.get("settled", ()))),
         prices_unique=bool(told.get("prices_unique", True)),
     )
 

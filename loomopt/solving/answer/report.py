@@ -399,7 +399,7 @@ def _left_open(certificate: Certificate) -> str:
 
 def prices(words: Words, certificate: Certificate) -> tuple[Price, ...]:
     """Return one price per limit and side."""
-    return tuple(map(words.price, certificate.priced))
+    return tuple(map(words.price, certificate.binding_groups))
 
 
 def joint_prices(words: Words, certificate: Certificate) -> tuple[JointPrice, ...]:

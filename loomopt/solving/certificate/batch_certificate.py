@@ -1,7 +1,7 @@
-"""Certificates of many designs: slopes and curvatures of all in one pass, each design judged as it would be alone.
+"""Certificates of a batch of designs: slopes and curvatures of all in one pass, then one certificate for each.
 
-Only the derivatives are taken together. What a design comes to does not depend on those beside it, nor on how many
-these are, to the last bit: no sum runs over designs, and a matrix is factored by itself.
+Only the derivatives are computed in a batch. The result of a design does not depend on the rest of the batch or on its
+size, to the last bit: no sum runs over designs, and matrices are factored one by one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,33 +22,33 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Floats, Node, Pieces
 from loomopt.physics.tolerances import JET_ERROR, NEWTON_SHIFT
-from loomopt.solving.certificate.certificate import NUMBERLESS, certified, certify, drafted, prepared
+from loomopt.solving.certificate.certificate import NO_NUMBER, certify, certify_by, draft_from, prepare
 from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet
 from loomopt.solving.certificate.records import Certificate
 
-MOST = 16
-"""Designs that are read at once, at most: of more each takes no less, and what is kept of them grows."""
+MOST_DESIGNS = 16
+"""Most designs of a batch: larger batches take as long per design and need more memory."""
 
 
 class DesignsReading(Reading):
-    """So many designs read at once: their numbers are (designs, 1), whole-cycle quantities (designs, nodes)."""
+    """A batch of designs: their numbers are (designs, 1), whole-cycle quantities (designs, nodes)."""
 
-    def __init__(self, model: JobModel, given: Given, of: Sampler, count: int) -> None:
-        super().__init__(model, systems.jets(), given, of.cycle, of.stills)
+    def __init__(self, model: JobModel, given: Given, sampler: Sampler, count: int) -> None:
+        super().__init__(model, systems.jets(), given, sampler.cycle, sampler.stills)
         self.count = count
 
     @lazy
     def _begins(self) -> Number:
-        return _beside(self.starts, self.count)
+        return _columns(self.starts, self.count)
 
     def along(self, name: str, pieces: Pieces, u: Number) -> Number:
-        """Return a whole-cycle quantity at nodes of each design, their pieces (nodes,), u (designs, nodes), SI."""
+        """A whole-cycle quantity at nodes of all designs, SI: pieces (nodes,), u (designs, nodes)."""
         begin, end = self._begins[:, pieces], self._begins[:, pieces + 1]
         return self._quantities((name,), Node(begin + u * (end - begin), self.cycle.switch(pieces)))[0]
 
     def mean(self, integral: Integral) -> Number:
-        """Return a mean by its rule, all nodes at once, (designs, 1), SI."""
+        """A mean by its quadrature rule, (designs, 1), SI."""
         if integral.angles:
             phi, switch = fixed_nodes(self.cycle, integral)
             values = self.quantity(
@@ -65,13 +65,13 @@ def _plain(value: Number) -> Number:
     return value.v if isinstance(value, Jet) else value
 
 
-def _beside(values: Sequence[Number], designs: int) -> Number:
-    """Return numbers (designs, 1) side by side, (designs, count); a jet where one of them is."""
+def _columns(values: Sequence[Number], designs: int) -> Number:
+    """Numbers (designs, 1) as columns of one, (designs, count); a jet if any of them is."""
     plain = np.concatenate([np.broadcast_to(_plain(value), (designs, 1)) for value in values], axis=1)
-    own = next((value for value in values if isinstance(value, Jet)), None)
-    if own is None:
+    jet = next((value for value in values if isinstance(value, Jet)), None)
+    if jet is None:
         return plain
-    width = own.g.shape[-1]
+    width = jet.g.shape[-1]
     jets = [_jet(value, width) for value in values]
     slopes = np.concatenate([np.broadcast_to(jet.g, (designs, 1, width)) for jet in jets], axis=1)
     bends = np.concatenate([np.broadcast_to(jet.curvature, (designs, 1, width, width)) for jet in jets], axis=1)
@@ -79,7 +79,7 @@ def _beside(values: Sequence[Number], designs: int) -> Number:
 
 
 def _total(values: Number, count: int) -> Number:
-    """Return the sum over nodes, (designs, 1); a value that is the same at all nodes stands at each of `count`."""
+    """Sum over nodes, (designs, 1); a value that is equal at all nodes counts `count` times."""
     if np.ndim(_plain(values)) == 0 or np.shape(_plain(values))[-1] == 1:
         return count * values
     if not isinstance(values, Jet):
@@ -93,14 +93,14 @@ def _total(values: Number, count: int) -> Number:
 
 
 def _jet(value: Number, width: int) -> Jet:
-    """Return a number as a jet along so many directions, none of which moves what is no jet."""
+    """A number as a jet of `width` directions; a plain number has slope 0."""
     return value if isinstance(value, Jet) else Jet(value, np.zeros(width), np.zeros((width, width)))
 
 
-class Bent(NamedTuple):
-    """Rows of several designs in their natural sizes: values (designs, rows), slopes and second derivatives.
+class RowDerivatives(NamedTuple):
+    """Rows of a batch in their scales: values (designs, rows), slopes and second derivatives.
 
-    Directions are the variables that are not held, then each row's own u, for itself.
+    Directions are the variables that are not fixed; the last direction is the u of the row itself.
     """
 
     values: Floats
@@ -108,13 +108,13 @@ class Bent(NamedTuple):
     bends: Floats
 
     @property
-    def own(self) -> tuple[Floats, Floats]:
-        """Slopes and curvatures along each row's own u, (designs, rows)."""
+    def along_u(self) -> tuple[Floats, Floats]:
+        """Slopes and curvatures of the rows along their u, (designs, rows)."""
         return self.slopes[:, :, -1], self.bends[:, :, -1, -1]
 
 
-def without_extremes(bent: Bent, inner: Floats) -> Floats:
-    """Return second derivatives in the variables, (designs, rows, n, n), of extremes that move along.
+def without_extremes(bent: RowDerivatives, inner: Floats) -> Floats:
+    """Second derivatives in the variables, (designs, rows, n, n), with extremes that move with the design.
 
     inner: (rows,) 1 where a row's extreme moves: g_xx − g_xφ g_φx / g_φφ [Hettich and Kortanek, SIAM Review 35 (1993),
     380-429].
@@ -124,16 +124,16 @@ def without_extremes(bent: Bent, inner: Floats) -> Floats:
     return np.asarray(bent.bends[:, :, :-1, :-1] - share * mixed[:, :, :, None] * mixed[:, :, None, :])
 
 
-def shares(bent: Bent, inner: Floats) -> Floats:
-    """Return 1 over how each row bends along its own u, (designs, rows); 0 where its extreme does not move."""
-    _, bend = bent.own
+def shares(bent: RowDerivatives, inner: Floats) -> Floats:
+    """Reciprocal of each row's curvature along its u, (designs, rows); 0 where its extreme does not move."""
+    _, bend = bent.along_u
     moves = (inner > 0.0) & (bend != 0.0)
     return np.asarray(np.where(moves, 1.0, 0.0) / np.where(moves, bend, 1.0))
 
 
 @dataclass(frozen=True)
 class DesignAt:
-    """A design whose rows are read: variables, SI, its sampler, and the rows."""
+    """A design with rows: variables, SI, its sampler, and the rows."""
 
     program: Program
     x: Mapping[str, float]
@@ -142,57 +142,61 @@ class DesignAt:
 
     @lazy
     def names(self) -> tuple[str, ...]:
-        """The variables that are not held."""
+        """Names of the variables that are not fixed."""
         return tuple(v.name for v in self.program.variables if v.name not in self.program.held)
 
     @lazy
-    def alike(self) -> object:
-        """Equal for designs that can be read together: of one structure, one order of corners, the same rows."""
+    def batch_key(self) -> object:
+        """Key of designs of one batch: equal structure, order of corners and rows."""
         model, cycle = self.program.model, self.sampler.cycle
-        rules = tuple(len(quadrature(cycle, each)[1]) for each in model.integrals if not each.angles)
+        rules = tuple(len(quadrature(cycle, integral)[1]) for integral in model.integrals if not integral.angles)
         fixed = frozenset(self.program.held), cycle.order, cycle.switches.tobytes(), rules
         return id(model), self.program.structure, fixed, repr(self.sampler.stills), tuple(map(kind, self.rows))
 
     @lazy
     def corners(self) -> Floats:
-        """1 for each row whose extreme moves along its piece, 0 for one of no node and at a piece's end."""
+        """1 for each row whose extreme moves along its piece; 0 without a node and at a piece's end."""
         return np.array([float(moves(row, self.sampler)) for row in self.rows])
 
 
 def moves(row: ActiveRow, sampler: Sampler) -> bool:
-    """Say whether a row stands at an extreme that moves along its piece."""
+    """Whether a row has an extreme that moves along its piece."""
     return row.node is not None and (row.node.u not in (0.0, 1.0) or not sampler.cycle.order)
 
 
 def kind(row: ActiveRow) -> tuple[object, ...]:
-    """Return what is the same of a row at designs that are read together."""
+    """Properties of a row that are equal within a batch."""
     sign = row.limit.sign if row.limit else None
     end = row.node.u if row.node and row.node.u in (0.0, 1.0) else None
     return row.limit is None, row.place, row.reads, row.sign, sign, row.node.piece if row.node else None, end
 
 
 class Designs:
-    """Designs of one kind (`DesignAt.alike`), to be read at any variables near their own."""
+    """Designs of equal `DesignAt.alike`, evaluated at any variables near their own."""
 
     def __init__(self, designs: Sequence[DesignAt]) -> None:
-        self.each, self.first = tuple(designs), designs[0]
+        self.designs, self.first = tuple(designs), designs[0]
         self.names, self.model = self.first.names, self.first.program.model
-        sizes = [{v.name: v.scale for v in of.program.variables} for of in self.each]
-        self.sizes = np.array([[own[name] for name in self.names] for own in sizes])
+        sizes = [{v.name: v.scale for v in design.program.variables} for design in self.designs]
+        self.sizes = np.array([[design_sizes[name] for name in self.names] for design_sizes in sizes])
         self.inner = self.first.corners
-        known = [
-            {**of.program.parameters, **{name: of.x[name] for name in of.program.held}, **of.sampler.hints}
-            for of in self.each
+        known_numbers = [
+            {
+                **design.program.parameters,
+                **{name: design.x[name] for name in design.program.held},
+                **design.sampler.hints,
+            }
+            for design in self.designs
         ]
         self.known: dict[str, Number] = {}
-        for name, value in known[0].items():
-            values = [of[name] for of in known]
+        for name, value in known_numbers[0].items():
+            values = [design[name] for design in known_numbers]
             same = all(other is value or other == value for other in values)
             self.known[name] = value if same else np.array(values)[:, None]
-        rows = [of.rows for of in self.each]
-        self.factors = np.array([[row.sign / row.scale for row in of] for of in rows])
-        self.scales = np.array([[row.scale for row in of] for of in rows])
-        self.bounds = np.array([[row.limit.bound if row.limit else 0.0 for row in of] for of in rows])
+        rows = [design.rows for design in self.designs]
+        self.factors = np.array([[row.sign / row.scale for row in design] for design in rows])
+        self.scales = np.array([[row.scale for row in design] for design in rows])
+        self.bounds = np.array([[row.limit.bound if row.limit else 0.0 for row in design] for design in rows])
         self.groups: dict[str, Pieces] = {}
         nodes: dict[str, list[int]] = {}
         for k, row in enumerate(self.first.rows):
@@ -203,32 +207,32 @@ class Designs:
 
     @property
     def x(self) -> Floats:
-        """The designs' own variables, (designs, n) SI."""
-        return np.array([[of.x[name] for name in self.names] for of in self.each])
+        """Variables of the designs, (designs, n) SI."""
+        return np.array([[design.x[name] for name in self.names] for design in self.designs])
 
     @property
     def u(self) -> Floats:
-        """Where their rows stand on their pieces, (designs, rows)."""
-        return np.array([[row.node.u if row.node else 0.0 for row in of.rows] for of in self.each])
+        """Places of the rows on their pieces, (designs, rows)."""
+        return np.array([[row.node.u if row.node else 0.0 for row in design.rows] for design in self.designs])
 
-    def settled(self, x: Floats, u: Floats) -> Floats:
-        """Return u after one Newton step along each row's own; an extreme at a piece's end stays."""
+    def newton_step(self, x: Floats, u: Floats) -> Floats:
+        """u after one Newton step along each row's u; an extreme at a piece's end stays."""
         if not self.groups:
             return u
         with np.errstate(all="ignore"):
-            slope, bend = self._read(x, u, directions=0).own
+            slope, bend = self._read(x, u, directions=0).along_u
             shift = np.where(bend != 0.0, -slope, 0.0) / np.where(bend != 0.0, bend, 1.0)
         near = (self.inner > 0.0) & (np.abs(shift) < float(NEWTON_SHIFT))
         return np.where(near, u + np.where(near, shift, 0.0), u)
 
-    def bent(self, x: Floats, u: Floats) -> Bent:
-        """Return all rows at variables (designs, n) SI and places (designs, rows)."""
+    def derivatives(self, x: Floats, u: Floats) -> RowDerivatives:
+        """All rows at variables (designs, n) SI and places (designs, rows)."""
         with np.errstate(all="ignore"):
             return self._read(x, u, len(self.names))
 
-    def _read(self, x: Floats, u: Floats, directions: int) -> Bent:
-        """Return rows along so many variables, all or none of them, and each row's own u."""
-        count, width = len(self.each), directions + 1
+    def _read(self, x: Floats, u: Floats, directions: int) -> RowDerivatives:
+        """Rows along the first `directions` variables (all or none), and each row's u."""
+        count, width = len(self.designs), directions + 1
         shape = count, len(self.first.rows)
         columns: list[Number] = [column[:, None] for column in x.T]
         if directions:
@@ -242,112 +246,121 @@ class Designs:
         reading = DesignsReading(self.model, given, self.first.sampler, count)
         values, slopes, bends = np.zeros(shape), np.zeros((*shape, width)), np.zeros((*shape, width, width))
 
-        def put(place: Number, jet: Jet, factor: Floats, less: Floats) -> None:
-            values[:, place] = factor * jet.v - less
+        def assign(place: Number, jet: Jet, factor: Floats, shift: Floats) -> None:
+            values[:, place] = factor * jet.v - shift
             slopes[:, place] = factor[..., None] * jet.g
             bends[:, place] = factor[..., None, None] * jet.curvature
 
         for k, row in enumerate(self.first.rows):
             if row.node is None and directions:
-                one = slice(k, k + 1)
-                put(one, _jet(self._static(reading, k, row), width), 1 / self.scales[:, one], np.zeros((count, 1)))
+                column_slice = slice(k, k + 1)
+                assign(
+                    column_slice,
+                    _jet(self._static(reading, k, row), width),
+                    1 / self.scales[:, column_slice],
+                    np.zeros((count, 1)),
+                )
         for name, places in self.groups.items():
             moving = np.zeros((count, len(places), width))
             moving[:, :, -1] = 1.0
             at = Jet(u[:, places], moving, np.zeros((1, 1, width, width)))
             jet = _jet(reading.along(name, self.pieces[places], at), width)
-            put(places, jet, self.factors[:, places], self.bounds[:, places] / self.scales[:, places])
-        return Bent(values, slopes, bends)
+            assign(places, jet, self.factors[:, places], self.bounds[:, places] / self.scales[:, places])
+        return RowDerivatives(values, slopes, bends)
 
     def _static(self, reading: DesignsReading, k: int, row: ActiveRow) -> Number:
-        """Return a row of no node, SI."""
+        """A row without a node, SI."""
         if isinstance(row.limit, SingleLimit):
             return row.limit.residual(reading, self.bounds[:, k : k + 1])
         return row.limit.residual(reading) if row.limit else row.sign * reading.single(row.reads)
 
 
-class DerivativesTogether(Derivatives):
-    """Derivatives of one design that were taken together with others'."""
+class BatchDerivatives(Derivatives):
+    """Derivatives of one design from a batch."""
 
     by, error = "jets", JET_ERROR
 
-    def __init__(self, of: DesignAt, slopes: Floats, bends: Floats) -> None:
-        super().__init__(of.program, of.x, of.sampler, of.rows)
+    def __init__(self, design: DesignAt, slopes: Floats, bends: Floats) -> None:
+        super().__init__(design.program, design.x, design.sampler, design.rows)
         self._slopes, self.bends = slopes, bends
 
     def gradients(self) -> Floats:
-        """Return (rows, variables): first derivatives."""
+        """First derivatives, (rows, variables)."""
         return self._slopes
 
     def curvatures(self, basis: Floats) -> Floats:
-        """Return (rows, k, k): second derivatives along the columns of basis (variables, k); extremes move along."""
+        """Second derivatives (rows, k, k) along the columns of basis (variables, k), with moving extremes."""
         return np.asarray(basis.T @ self.bends @ basis)
 
     def thirds(self, line: Floats, basis: Floats) -> tuple[Floats, Floats]:
-        """Return (rows, k, k), third derivatives, and their errors, (rows,): of this design alone."""
-        return self._alone.thirds(line, basis)
+        """Third derivatives (rows, k, k), and their errors (rows,), of this design alone."""
+        return self._single.thirds(line, basis)
 
     @lazy
-    def _alone(self) -> JetDerivatives:
+    def _single(self) -> JetDerivatives:
         return JetDerivatives(self.program, self.x, self.sampler, self.rows)
 
 
-def derivatives(designs: Sequence[DesignAt]) -> list[DerivativesTogether | None]:
-    """Return the derivatives of designs of any kinds, None of one where a slope or a curvature is no number."""
-    found: list[DerivativesTogether | None] = [None] * len(designs)
-    for places in grouped([of.alike for of in designs]):
-        own = Designs([designs[k] for k in places])
-        x = own.x
-        bent = own.bent(x, own.settled(x, own.u))
-        slopes, bends = bent.slopes[:, :, :-1], without_extremes(bent, own.inner)
+def derivatives(designs: Sequence[DesignAt]) -> list[BatchDerivatives | None]:
+    """Derivatives of designs of any kinds; None for a design where a slope or a curvature is no number."""
+    results: list[BatchDerivatives | None] = [None] * len(designs)
+    for places in group_equal([design.batch_key for design in designs]):
+        batch = Designs([designs[k] for k in places])
+        x = batch.x
+        bent = batch.derivatives(x, batch.newton_step(x, batch.u))
+        slopes, bends = bent.slopes[:, :, :-1], without_extremes(bent, batch.inner)
         for lane, k in enumerate(places):
             if all(np.isfinite(part[lane]).all() for part in (bent.values, slopes, bends)):
-                found[k] = DerivativesTogether(designs[k], slopes[lane], bends[lane])
-    return found
+                results[k] = BatchDerivatives(designs[k], slopes[lane], bends[lane])
+    return results
 
 
-def grouped(kinds: Sequence[object]) -> list[list[int]]:
-    """Return the places of equal kinds, at most `MOST` of them together."""
+def group_equal(kinds: Sequence[object]) -> list[list[int]]:
+    """Places of equal kinds, at most `MOST` in one group."""
     groups: dict[object, list[int]] = {}
-    for k, own in enumerate(kinds):
-        groups.setdefault(own, []).append(k)
-    return [of[begin : begin + MOST] for of in groups.values() for begin in range(0, len(of), MOST)]
+    for k, key in enumerate(kinds):
+        groups.setdefault(key, []).append(k)
+    return [
+        places[begin : begin + MOST_DESIGNS]
+        for places in groups.values()
+        for begin in range(0, len(places), MOST_DESIGNS)
+    ]
 
 
-def certify_together(asked: Sequence[tuple[Program, Mapping[str, float]]], accuracy: float) -> list[Certificate]:
-    """Return the certificate of each program's variables (SI).
+def certify_batch(requests: Sequence[tuple[Program, Mapping[str, float]]], accuracy: float) -> list[Certificate]:
+    """Certificates of variables (SI) of several programs.
 
-    By the very steps of `certify`; what the shared pass leaves in doubt is judged by 40 digits, what it gives no number
-    for alone.
+    The steps are those of `certify`. A design that floats leave in doubt is certified in 40 digits, and one without a
+    number in the batch is certified alone. requests: program and variables of each. Returns one certificate for each.
     """
-    ready: list[tuple[Sampler, ActiveSet] | None] = []
-    for program, x in asked:
+    samplers: list[tuple[Sampler, ActiveSet] | None] = []
+    for program, x in requests:
         try:
-            ready.append(prepared(program, x, accuracy))
-        except NUMBERLESS:
-            ready.append(None)
-    known = [k for k, each in enumerate(ready) if each]
-    designs = [DesignAt(*asked[k], each[0], each[1].rows) for k in known if (each := ready[k])]
-    taken = dict(zip(known, derivatives(designs), strict=True))
-    return [_judged(*asked[k], ready[k], taken.get(k), accuracy) for k in range(len(asked))]
+            samplers.append(prepare(program, x, accuracy))
+        except NO_NUMBER:
+            samplers.append(None)
+    places = [k for k, pair in enumerate(samplers) if pair]
+    designs = [DesignAt(*requests[k], pair[0], pair[1].rows) for k in places if (pair := samplers[k])]
+    batch_derivatives = dict(zip(places, derivatives(designs), strict=True))
+    return [_certify_one(*requests[k], samplers[k], batch_derivatives.get(k), accuracy) for k in range(len(requests))]
 
 
-def _judged(
+def _certify_one(
     program: Program,
     x: Mapping[str, float],
-    ready: tuple[Sampler, ActiveSet] | None,
-    found: DerivativesTogether | None,
+    prepare: tuple[Sampler, ActiveSet] | None,
+    slopes: BatchDerivatives | None,
     accuracy: float,
 ) -> Certificate:
-    """Return the certificate of one design by derivatives that were taken together, if they were."""
-    if ready is None or found is None:
+    """Certificate of one design from the derivatives of the batch, if it has any."""
+    if prepare is None or slopes is None:
         return certify(program, x, accuracy)
     try:
-        made = drafted(program, x, *ready, found, accuracy).whole
-    except NUMBERLESS:
+        certificate = draft_from(program, x, *prepare, slopes, accuracy).whole
+    except NO_NUMBER:
         return certify(program, x, accuracy)
-    if made.clear:
-        return made
+    if certificate.clear:
+        return certificate
     from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 
-    return certified(MpmathDerivatives, program, x, accuracy)
+    return certify_by(MpmathDerivatives, program, x, accuracy)

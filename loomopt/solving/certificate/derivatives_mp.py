@@ -1,6 +1,6 @@
 """Rows of a program at one design, in mpmath: values, gradients and curvatures by differences at 40 digits.
 
-Nothing here comes from the solver or from CasADi: the same formulas, run in another number system.
+Nothing here depends on the solver or on CasADi: the same formulas run in another number system.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -39,10 +39,10 @@ class MpmathDerivatives(Derivatives):
         self.scales = [number(size) for size in self.sizes]
         self.base: Vector = [number(self.x[n]) / scale for n, scale in zip(self.names, self.scales, strict=True)]
         here = self._reading(self.base)
-        self.u = {k: self._settled(row, row.node, here) for k, row in enumerate(self.rows) if row.node}
+        self.u = {k: self._newton_step(row, row.node, here) for k, row in enumerate(self.rows) if row.node}
 
     def gradients(self) -> Floats:
-        """Return (rows, variables): first derivatives; at an extreme, those of the extreme's value."""
+        """First derivatives, (rows, variables); at an extreme, those of the extreme's value."""
         base = self._values(self.base)
         columns = []
         for k in range(len(self.base)):
@@ -52,7 +52,7 @@ class MpmathDerivatives(Derivatives):
         return np.array(columns).T.reshape(len(self.rows), len(self.base))
 
     def curvatures(self, basis: Floats) -> Floats:
-        """Return (rows, k, k): second derivatives along the columns of basis (variables, k), by central differences."""
+        """Second derivatives, (rows, k, k), along the columns of basis (variables, k)."""
         step, width = self.number(SECOND_STEP), basis.shape[1]
         directions = [[self.number(float(entry)) for entry in column] for column in basis.T]
         result = np.zeros((len(self.rows), width, width))
@@ -72,7 +72,7 @@ class MpmathDerivatives(Derivatives):
         return result
 
     def thirds(self, line: Floats, basis: Floats) -> tuple[Floats, Floats]:
-        """Return (rows, k, k), third derivatives, and their errors, (rows,): by central differences."""
+        """Third derivatives (rows, k, k), and their errors (rows,), by central differences."""
         step, width = self.number(THIRD_STEP), basis.shape[1]
         *ways, ahead = self._ways([*basis.T, line])
 
@@ -91,7 +91,7 @@ class MpmathDerivatives(Derivatives):
         return result, self.error * np.maximum(1.0, np.abs(result).max(axis=(1, 2), initial=0.0))
 
     def _ways(self, directions: Sequence[Floats]) -> list[Floats]:
-        """Return directions in 40 digits, each with how far u of each row's extreme moves along it."""
+        """Directions in 40 digits, each with the shift of u of every row's extreme along it."""
         many = [[self.number(float(entry)) for entry in direction] for direction in directions]
         shifts = np.zeros((len(directions), len(self.rows)))
         for k, row in enumerate(self.rows):
@@ -101,12 +101,12 @@ class MpmathDerivatives(Derivatives):
         return [np.array([*way, *map(self.number, shift)]) for way, shift in zip(many, shifts, strict=True)]
 
     def _at(self, step: Floats) -> Floats:
-        """Return every row's value a step away in the variables and in the rows' own u."""
+        """Every row's value a step away in the variables and in the rows' u."""
         count = len(self.base)
         return np.array(self._values(np.array(self.base) + step[:count], step[count:]))
 
     def _second(self, direction: Vector, base: Sequence[Number], step: Number) -> list[Number]:
-        """Return each row's second derivative along a direction; base: the rows at the design itself."""
+        """Second derivative of each row along a direction; base: the rows at the design itself."""
         ahead, behind = (self._values(self._along(direction, sign * step)) for sign in (1, -1))
         return [(a - 2 * b + c) / step**2 for a, b, c in zip(ahead, base, behind, strict=True)]
 
@@ -114,14 +114,14 @@ class MpmathDerivatives(Derivatives):
         return [x + step * d for x, d in zip(self.base, direction, strict=True)]
 
     def _reading(self, scaled: Vector) -> Reading:
-        """Return the design at variables in their own scale, ready to be read."""
+        """Reading of the design at scaled variables."""
         model = self.program.model
         x = {name: value * scale for name, value, scale in zip(self.names, scaled, self.scales, strict=True)}
         given = model.given(self.maths, {**self.parameters, **x})
         return Reading(model, self.maths, given, self.sampler.cycle, self.sampler.stills)
 
     def _values(self, scaled: Vector, moves: Vector = ()) -> list[Number]:
-        """Return every row's value at variables in their own scale; moves: of each row's own u, none without."""
+        """Every row's value at scaled variables; moves: of each row's u, none if empty."""
         reading = self._reading(scaled)
         return [self._value(k, row, reading, moves[k] if len(moves) else 0) for k, row in enumerate(self.rows)]
 
@@ -134,8 +134,8 @@ class MpmathDerivatives(Derivatives):
             return row.limit.residual(reading) / size
         return self.number(row.sign) * reading.single(row.reads) / size
 
-    def _settled(self, row: ActiveRow, node: Extreme, here: Reading) -> Number:
-        """Return u of an extreme after one Newton step in 40 digits; an extreme at a piece's end stays."""
+    def _newton_step(self, row: ActiveRow, node: Extreme, here: Reading) -> Number:
+        """u of an extreme after one Newton step in 40 digits; an extreme at a piece's end stays."""
         u, step = self.number(node.u), self.number(SECOND_STEP)
         if self.at_corner(node):
             return u
@@ -145,7 +145,7 @@ class MpmathDerivatives(Derivatives):
         return u + shift if abs(shift) < self.number(NEWTON_SHIFT) else u
 
     def _moving(self, k: int, row: ActiveRow, node: Extreme, directions: Sequence[Vector]) -> tuple[Floats, float]:
-        """Return g_xu along each direction, and g_uu, of a row at an interior extreme."""
+        """g_xu along each direction, and g_uu, of a row at an interior extreme."""
         u, step = self.u[k], self.number(SECOND_STEP)
         factor = self.number(row.sign) / self.number(row.scale)
 

@@ -1,7 +1,7 @@
-"""One KKT system per level: multipliers ≥ 0 that balance the slopes of the objective and of what holds it.
+"""One KKT system per level: multipliers ≥ 0 that balance the slopes of the objective and of the active rows.
 
-An objective is the largest of its smooth pieces: its subgradients weigh them by multipliers that sum to 1. A limit or
-an earlier objective that binds is an equality of free sign at later levels.
+An objective is the largest of its smooth pieces: a subgradient is their mean with weights that sum to 1. A binding
+limit or earlier objective is an equality of free sign at later levels.
 """
 
 import math
@@ -22,16 +22,16 @@ from loomopt.physics.tolerances import ACTIVE, FEASIBLE, POSITIVE, RANK, SAME_NO
 from loomopt.solving.certificate.multiplier_set import MultiplierSet
 from loomopt.solving.certificate.records import Binding
 
-MOVED = 100 * SAME_NODE
-"""How far, in u, an extreme may move with a design: what is farther is another."""
+FARTHEST_MOVE = 100 * SAME_NODE
+"""Farthest, in u, that an extreme may move with a design; a farther one is another extreme."""
 
 
 class ActiveRow(NamedTuple):
-    """One smooth function of the design, in its natural size.
+    """One smooth function of the design, in its scale.
 
-    A limit's residual or an objective's piece, either of them maybe at an extreme of the cycle (`node`). reads: the
-    value it is made of; place: of its limit, or of its objective (`limit` is None), in the program; excess: by how
-    much it is off its bound, or below the largest piece of its objective.
+    A limit's residual or an objective's piece, possibly at an extreme of the cycle (`node`). reads: name of its value;
+    place: of its limit, or of its objective (`limit` is None), in the program; excess: its distance to the bound, or to
+    the largest piece of its objective.
     """
 
     name: str
@@ -47,9 +47,8 @@ class ActiveRow(NamedTuple):
 class ActiveSet(NamedTuple):
     """Rows of a program at one design: those of limits first, then the pieces of each objective.
 
-    limits: how many rows limits have; levels: places of each objective's pieces; zero: whether an objective
-    vanishes that is never less; excess: of every limit of the program, in its natural size,
-    of an equality the magnitude.
+    limits: number of rows of limits; levels: places of each objective's pieces; zero: whether an objective is at its
+    lower bound 0; excess: of every limit of the program, in its scale; the magnitude for an equality.
     """
 
     rows: tuple[ActiveRow, ...]
@@ -60,7 +59,7 @@ class ActiveSet(NamedTuple):
 
 
 def active_set(program: Program, sampler: Sampler) -> ActiveSet:
-    """Return the active set of a design."""
+    """Active set of a design."""
     excess = tuple(limit.violation(sampler) for limit in program.limits)
     rows = [row for k, limit in enumerate(program.limits) for row in _limit_rows(sampler, k, limit)]
     count, levels, zero = len(rows), [], []
@@ -73,59 +72,64 @@ def active_set(program: Program, sampler: Sampler) -> ActiveSet:
 
 
 def _limit_rows(sampler: Sampler, place: int, limit: Limit) -> list[ActiveRow]:
-    """Return the rows of a limit that is touched; each touching extreme of a whole-cycle limit is one."""
+    """Rows of a limit that is touched, one for each touching extreme of a whole-cycle limit."""
     return [
-        ActiveRow(of.name, of.row, of.scale, node.sign if node else 1.0, place, excess, of, node)
-        for of, excess, node in limit.touches(sampler)
+        ActiveRow(touched.name, touched.row, touched.scale, node.sign if node else 1.0, place, excess, touched, node)
+        for touched, excess, node in limit.touches(sampler)
     ]
 
 
 def _pieces(sampler: Sampler, place: int, objective: Objective) -> list[ActiveRow]:
-    """Return the smooth pieces the largest of which is what an objective is worth."""
-    found = objective.pieces(sampler)
-    top, scale = max(piece.value for piece in found), objective.scale
+    """Smooth pieces of an objective, which is the largest of them."""
+    pieces = objective.pieces(sampler)
+    top, scale = max(piece.value for piece in pieces), objective.scale
     return [
         ActiveRow(objective.figure, name, scale, sign, place, (value - top) / scale, node=node)
-        for name, value, sign, node in found
-        if len(found) == 1 or value >= top - ACTIVE * scale
+        for name, value, sign, node in pieces
+        if len(pieces) == 1 or value >= top - ACTIVE * scale
     ]
 
 
-def moved(rows: Sequence[ActiveRow], sampler: Sampler) -> tuple[ActiveRow, ...] | None:
-    """Return rows with their extremes as they are at another design; None where one is gone."""
-    ends = _at_ends(rows, sampler)
-    found = list[ActiveRow]()
+def move_rows(rows: Sequence[ActiveRow], sampler: Sampler) -> tuple[ActiveRow, ...] | None:
+    """Rows with their extremes at another design; None if an extreme is gone."""
+    ends = _values_at_ends(rows, sampler)
+    moved_rows = list[ActiveRow]()
     for k, row in enumerate(rows):
         node = row.node
         if node:
-            node = node._replace(value=ends[k]) if k in ends else _moved(node, sampler.extremes(row.reads))
+            node = node._replace(value=ends[k]) if k in ends else _move_extreme(node, sampler.extremes(row.reads))
             if node is None:
                 return None
-        found.append(row._replace(node=node))
-    return tuple(found)
+        moved_rows.append(row._replace(node=node))
+    return tuple(moved_rows)
 
 
-def _at_ends(rows: Sequence[ActiveRow], sampler: Sampler) -> dict[int, float]:
-    """Return the value, SI, of each row that stands at a piece's end, by place; those of one quantity in one pass."""
+def _values_at_ends(rows: Sequence[ActiveRow], sampler: Sampler) -> dict[int, float]:
+    """Value, SI, of each row at a piece's end, by place; one pass for each quantity."""
     ends = {k: (row.reads, row.node) for k, row in enumerate(rows) if row.node and row.node.u in (0.0, 1.0)}
-    found: dict[int, float] = {}
+    values: dict[int, float] = {}
     for name in {name: None for name, _ in ends.values()}:
-        own = {k: node for k, (reads, node) in ends.items() if reads == name}
-        pieces, u = np.array([node.piece for node in own.values()]), np.array([node.u for node in own.values()])
-        found |= dict(zip(own, sampler.at(name, pieces, u).tolist(), strict=True))
-    return found
+        quantity_nodes = {k: node for k, (reads, node) in ends.items() if reads == name}
+        pieces, u = (
+            np.array([node.piece for node in quantity_nodes.values()]),
+            np.array([node.u for node in quantity_nodes.values()]),
+        )
+        values |= dict(zip(quantity_nodes, sampler.at(name, pieces, u).tolist(), strict=True))
+    return values
 
 
-def _moved(node: Extreme, extremes: Sequence[Extreme]) -> Extreme | None:
-    """Return the extreme that a node has become; None where it is gone."""
-    own = [each for each in extremes if each.piece == node.piece and abs(each.u - node.u) <= MOVED]
-    return min(own, key=lambda each: abs(each.u - node.u)) if own else None
+def _move_extreme(node: Extreme, extremes: Sequence[Extreme]) -> Extreme | None:
+    """Extreme into which a node has moved; None if it is gone."""
+    candidates = [
+        extreme for extreme in extremes if extreme.piece == node.piece and abs(extreme.u - node.u) <= FARTHEST_MOVE
+    ]
+    return min(candidates, key=lambda extreme: abs(extreme.u - node.u)) if candidates else None
 
 
-def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: float) -> Binding:
-    """Return a binding limit with its multiplier in SI units of objective per limit.
+def price_limit(sampler: Sampler, limit: Limit, objective: Objective, multiplier: float) -> Binding:
+    """Binding limit with its multiplier in SI units of objective per limit.
 
-    A number that is kept, and would rather be on the other side of its limit, is told as a limit of that side.
+    An equality with a negative multiplier is reported as a limit of the other side.
     """
     limit = replace(limit, sign=-limit.sign) if multiplier < 0.0 else limit
     worth = abs(multiplier) * objective.scale / limit.scale * limit.factor(sampler.rows)
@@ -138,140 +142,151 @@ def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: flo
 
 
 class System(NamedTuple):
-    """What one level's slopes are balanced from, as places of rows.
+    """Rows that balance the slopes of one level, by place.
 
     pieces: of the objective; inequalities: of limits, and of earlier objectives' pieces that must not rise; equalities:
-    of limits; held: (n, rows) sums of earlier objectives' pieces that must not change.
+    of limits; higher_levels: (n, rows) sums of earlier objectives' pieces that must not change.
     """
 
     pieces: tuple[int, ...]
     inequalities: tuple[int, ...]
     equalities: tuple[int, ...]
-    held: Floats
+    higher_levels: Floats
 
     @property
     def limits(self) -> tuple[int, ...]:
-        """All rows of limits, and of what earlier objectives may not exceed."""
+        """Rows of limits, and of earlier objectives that must not rise."""
         return self.inequalities + self.equalities
 
     def without(self, *rows: int) -> "System":
-        """Return the system without some inequalities."""
-        kept = tuple(k for k in self.inequalities if k not in rows)
-        return System(self.pieces, kept, self.equalities, self.held)
+        """The system without some inequalities."""
+        remaining = tuple(k for k in self.inequalities if k not in rows)
+        return System(self.pieces, remaining, self.equalities, self.higher_levels)
 
-    def without_held(self) -> "System":
-        """Return the system without what earlier objectives hold."""
-        return System(self.pieces, self.inequalities, self.equalities, self.held[:0])
+    def without_higher_levels(self) -> "System":
+        """The system without the equalities of earlier objectives."""
+        return System(self.pieces, self.inequalities, self.equalities, self.higher_levels[:0])
 
 
 class LevelMultipliers(NamedTuple):
-    """Multipliers of all rows, in natural sizes, and the slope they leave."""
+    """Multipliers of all rows, scaled, and the residual slope."""
 
-    of: Floats
+    values: Floats
     residual: float
 
     @property
     def positive(self) -> set[int]:
-        """Rows that bind."""
-        return set(np.flatnonzero(np.abs(self.of) > POSITIVE).tolist())
+        """Places of the binding rows."""
+        return set(np.flatnonzero(np.abs(self.values) > POSITIVE).tolist())
 
     def normalised(self, system: System) -> Floats:
-        """Return the multipliers of the Lagrangian in which the objective's pieces weigh 1 together.
+        """Multipliers of the Lagrangian, scaled so that those of the objective's pieces sum to 1.
 
-        Least squares leave a little of that sum where a slope is left; the limits' share it.
+        With a residual slope, least squares make that sum a little less than 1, and the limits' multipliers as much
+        smaller.
         """
-        return np.asarray(self.of / (self.of[list(system.pieces)].sum() or 1.0))
+        return np.asarray(self.values / (self.values[list(system.pieces)].sum() or 1.0))
 
 
 def system(
     active: ActiveSet, level: int, earlier: Sequence[LevelMultipliers], fixed: Collection[str] = frozenset()
 ) -> System:
-    """Return one level's system; earlier: the multipliers of the levels before it; fixed: variables without room."""
-    bound = {k for each in earlier for k in each.positive}
+    """KKT system of one level; earlier: multipliers of the levels before it; fixed: variables without room."""
+    bound = {k for multipliers in earlier for k in multipliers.positive}
     limits = [row.limit for row in active.rows[: active.limits]]
     equal = tuple(
         k for k, limit in enumerate(limits) if limit and (limit.sign == 0 or limit.row in fixed or k in bound)
     )
-    # A piece as high as those that bind, though none holds it, may fall, but not rise.
-    beside = (k for of in range(level) if not active.zero[of] for k in active.levels[of] if k not in bound)
-    unequal = (*(k for k in range(active.limits) if k not in equal), *beside)
-    held = [sums for place in range(level) for sums in _held(active, place, bound)]
-    return System(active.levels[level], unequal, equal, np.array(held).reshape(-1, len(active.rows)))
+    # A piece as high as the binding ones, without a multiplier, may fall but not rise.
+    not_rising = (
+        k
+        for other_level in range(level)
+        if not active.zero[other_level]
+        for k in active.levels[other_level]
+        if k not in bound
+    )
+    unequal = (*(k for k in range(active.limits) if k not in equal), *not_rising)
+    sum_rows = [sums for place in range(level) for sums in _higher_level_rows(active, place, bound)]
+    return System(active.levels[level], unequal, equal, np.array(sum_rows).reshape(-1, len(active.rows)))
 
 
-def _held(active: ActiveSet, level: int, bound: set[int]) -> list[Floats]:
-    """Return what an earlier objective keeps: each piece that binds; where it is zero, both."""
+def _higher_level_rows(active: ActiveSet, level: int, bound: set[int]) -> list[Floats]:
+    """Equalities of an earlier objective: each piece that binds; both pieces where it is zero."""
     unit = np.eye(len(active.rows))
     return [unit[k] for k in active.levels[level] if active.zero[level] or k in bound]
 
 
-def vanishing(system: System, rows: int) -> LevelMultipliers:
-    """Return the multipliers, of so many rows, of a magnitude that vanishes: its two pieces balance each other."""
-    found = np.zeros(rows)
-    found[list(system.pieces)] = 1.0 / len(system.pieces)
-    return LevelMultipliers(found, 0.0)
+def vanishing_multipliers(system: System, rows: int) -> LevelMultipliers:
+    """Multipliers of a magnitude that vanishes: its two pieces balance each other; rows: their number."""
+    values = np.zeros(rows)
+    values[list(system.pieces)] = 1.0 / len(system.pieces)
+    return LevelMultipliers(values, 0.0)
 
 
-def solved(gradients: Floats, system: System) -> LevelMultipliers:
-    """Return one level's multipliers by non-negative least squares; gradients: (rows, variables)."""
+def solve_system(gradients: Floats, system: System) -> LevelMultipliers:
+    """Multipliers of one level by non-negative least squares; gradients: (rows, variables)."""
     slopes, target, one_sided = _equations(gradients, system)
     matrix = np.hstack([slopes, -slopes[:, one_sided:]])
     weights = nnls(matrix, target)
     signed = weights[: slopes.shape[1]].copy()
     signed[one_sided:] -= weights[slopes.shape[1] :]
     free = one_sided + len(system.equalities)
-    found = signed[free:] @ system.held
-    found[[*system.pieces, *system.inequalities]] += signed[:one_sided]
-    found[list(system.equalities)] += signed[one_sided:free]
-    return LevelMultipliers(found, float(np.abs(matrix @ weights - target).max()))
+    values = signed[free:] @ system.higher_levels
+    values[[*system.pieces, *system.inequalities]] += signed[:one_sided]
+    values[list(system.equalities)] += signed[one_sided:free]
+    return LevelMultipliers(values, float(np.abs(matrix @ weights - target).max()))
 
 
-def replaceable(gradients: Floats, system: System, found: LevelMultipliers, most: float) -> list[int]:
-    """Return the inequalities with a multiplier without which others might leave a residual of at most `most`.
+def replaceable_rows(gradients: Floats, system: System, multipliers: LevelMultipliers, most: float) -> list[int]:
+    """Inequalities with a multiplier without which other rows might leave a residual of at most `most`.
 
-    Without row k of multiplier y_k what is left is no less than y_k times the distance of its slope from the span of
-    the others', less what y leaves. Slopes A = U S V' of length 1 have it as 1/‖(S⁻¹ V')_k‖; singular values that
-    vanish count as rounding, so that a row in a sum that vanishes has none.
+    Without row k of multiplier y_k the residual is at least y_k times the distance of its slope from the span of the
+    other slopes, less the residual of y. For slopes A = U S V' of length 1 that distance is 1/‖(S⁻¹ V')_k‖; zero
+    singular values are replaced by rounding, so that a row in a vanishing sum has distance 0.
     """
     slopes, _, one_sided = _equations(gradients, system)
     lengths = np.linalg.norm(slopes, axis=0)
     _, sizes, turned = np.linalg.svd(slopes / np.where(lengths > 0.0, lengths, 1.0))
     sizes = np.maximum(np.pad(sizes, (0, len(turned) - len(sizes))), sys.float_info.epsilon)
-    apart = lengths / np.linalg.norm(turned / sizes[:, None], axis=0)
-    reach = math.sqrt(len(slopes)) * (found.residual + most)
-    places = zip([*system.pieces, *system.inequalities], apart[:one_sided], strict=True)
-    near = [k for k, distance in places if found.of[k] > POSITIVE and distance * found.of[k] <= reach]
+    distances = lengths / np.linalg.norm(turned / sizes[:, None], axis=0)
+    reach = math.sqrt(len(slopes)) * (multipliers.residual + most)
+    places = zip([*system.pieces, *system.inequalities], distances[:one_sided], strict=True)
+    near = [
+        k for k, distance in places if multipliers.values[k] > POSITIVE and distance * multipliers.values[k] <= reach
+    ]
     return [k for k in near if k in system.inequalities]
 
 
-def multiplier_set(active: ActiveSet, gradients: Floats, system: System, found: LevelMultipliers) -> MultiplierSet:
-    """All multipliers of one level, of which `found` are some; gradients: (rows, variables).
+def multiplier_set(
+    active: ActiveSet, gradients: Floats, system: System, multipliers: LevelMultipliers
+) -> MultiplierSet:
+    """All multipliers of one level; multipliers: one set of them; gradients: (rows, variables).
 
-    Rows that only come near take no part, unless `found` rests on them.
+    Rows that are near but do not touch are left out, unless they have a multiplier.
     """
-    away = [row.excess < -FEASIBLE and abs(found.of[k]) <= POSITIVE for k, row in enumerate(active.rows)]
-    rows = [k for k in (*system.pieces, *system.inequalities, *system.equalities) if not away[k]]
-    held = [int(np.argmax(row)) for row in system.held]
-    columns = np.vstack([gradients[[*rows, *held]].T, np.isin([*rows, *held], system.pieces)])
+    apart = [row.excess < -FEASIBLE and abs(multipliers.values[k]) <= POSITIVE for k, row in enumerate(active.rows)]
+    rows = [k for k in (*system.pieces, *system.inequalities, *system.equalities) if not apart[k]]
+    held_pieces = [int(np.argmax(row)) for row in system.higher_levels]
+    columns = np.vstack([gradients[[*rows, *held_pieces]].T, np.isin([*rows, *held_pieces], system.pieces)])
     lengths = np.linalg.norm(columns, axis=0)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
     _, sizes, turned = np.linalg.svd(columns / lengths)
-    open_ways = turned[int(np.sum(sizes > RANK)) :].T / lengths[:, None]
-    ways = np.zeros((len(active.rows), open_ways.shape[1]))
-    ways[[*rows, *held]] = open_ways
+    null_space = turned[int(np.sum(sizes > RANK)) :].T / lengths[:, None]
+    directions = np.zeros((len(active.rows), null_space.shape[1]))
+    directions[[*rows, *held_pieces]] = null_space
     signed = np.isin(np.arange(len(active.rows)), [*system.pieces, *system.inequalities])
-    return MultiplierSet(np.where(signed, np.maximum(found.of, 0.0), found.of), ways, signed)
+    return MultiplierSet(np.where(signed, np.maximum(multipliers.values, 0.0), multipliers.values), directions, signed)
 
 
 def _equations(gradients: Floats, system: System) -> tuple[Floats, Floats, int]:
-    """Return the slopes to be balanced, by column, what they must add up to, and how many columns have one sign.
+    """Columns of the slopes to be balanced, their sum, and the number of columns with a sign.
 
-    Those of free sign come last: equalities, then what earlier levels hold.
+    Columns of free sign come last: equalities, then the sums of earlier levels.
     """
     count, size = gradients.shape
     norm = np.zeros(count)
     norm[list(system.pieces)] = 1.0
     slopes = np.vstack([gradients.T, norm])
     one_sided = [*system.pieces, *system.inequalities]
-    columns = np.hstack([slopes[:, one_sided], slopes[:, list(system.equalities)], slopes @ system.held.T])
+    columns = np.hstack([slopes[:, one_sided], slopes[:, list(system.equalities)], slopes @ system.higher_levels.T])
     return columns, np.append(np.zeros(size), 1.0), len(one_sided)

@@ -1,4 +1,4 @@
-"""All multipliers that balance one level's slopes, and what limits are worth by them, alone and together."""
+"""All multipliers that balance one level's slopes, and the worth of limits by them, alone and together."""
 
 import math
 from collections.abc import Sequence
@@ -15,8 +15,8 @@ from loomopt.physics.cycle import Floats
 class MultiplierSet(NamedTuple):
     """All multipliers that balance one level's slopes: start + ways · y, the signed ones not negative.
 
-    start: (rows,), those that were found; ways: (rows, k), what may be added to them, k = 0 where they are the only
-    ones; signed: (rows,), the rows whose multipliers have a sign.
+    start: (rows,), one set of multipliers; ways: (rows, k), directions that may be added, k = 0 if `start` is the only
+    set; signed: (rows,), mask of the rows whose multipliers have a sign.
     """
 
     start: Floats
@@ -26,14 +26,14 @@ class MultiplierSet(NamedTuple):
     def least(self, cost: Floats) -> float:
         """Least of cost · multipliers, cost: (rows,); minus infinity where it falls without end.
 
-        It is what the level's objective falls by where the limits are loosened by `cost`, each in its natural size: the
+        It is the fall of the level's objective when the limits are loosened by `cost`, each in its scale: the
         directional derivative of the least value [Gauvin and Dubeau, Mathematical Programming Study 19 (1982),
         101-119].
         """
-        found = self.at_least(cost)
-        return -math.inf if found is None else float(cost @ found)
+        multipliers = self.minimiser(cost)
+        return -math.inf if multipliers is None else float(cost @ multipliers)
 
-    def at_least(self, cost: Floats) -> Floats | None:
+    def minimiser(self, cost: Floats) -> Floats | None:
         """Multipliers (rows,) at which cost · multipliers is least; None where it falls without end."""
         if not self.ways.shape[1]:
             return self.start
@@ -42,42 +42,42 @@ class MultiplierSet(NamedTuple):
 
 @dataclass(frozen=True)
 class KnownMultipliers:
-    """The multipliers of a set that were met so far: what they show needs no linear program.
+    """Multipliers of a set from earlier linear programs; a bound from them needs no linear program.
 
-    every: the set; met: its start, and what least costs were reached at, (rows,) each.
+    all_multipliers: the set; known: its start, and the minimisers of earlier linear programs, (rows,) each.
     """
 
-    every: MultiplierSet
-    met: list[Floats] = field(default_factory=list)
+    all_multipliers: MultiplierSet
+    known: list[Floats] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.met.append(self.every.start)
+        self.known.append(self.all_multipliers.start)
 
     def bound(self, cost: Floats) -> float:
-        """Least of cost · multipliers over those met: the least of all is no more."""
-        return float(min(cost @ each for each in self.met))
+        """Least of cost · multipliers over the known ones; the least over all is not larger."""
+        return float(min(cost @ multipliers for multipliers in self.known))
 
     def least(self, cost: Floats) -> float:
         """Least of cost · multipliers over all, as of the set."""
-        found = self.every.at_least(cost)
-        if found is None:
+        multipliers = self.all_multipliers.minimiser(cost)
+        if multipliers is None:
             return -math.inf
-        self.met.append(found)
-        return float(cost @ found)
+        self.known.append(multipliers)
+        return float(cost @ multipliers)
 
     def range(self, places: Sequence[int], apart: float) -> tuple[float, float]:
         """Least and largest sum of the multipliers of some rows.
 
-        Of rows with a sign the largest is one that was met where that is more than the least by the share `apart` of
-        the larger of it and 1: that there is more than one price is then shown, and the least is exact.
+        For rows with a sign the largest sum is that of known multipliers, where it exceeds the least by the share
+        `apart` of the larger of it and 1: then there is more than one price, and the least is exact.
         """
-        own, ways = list(places), self.every.ways
+        row_places, ways = list(places), self.all_multipliers.ways
         shortest = np.linalg.norm(ways, axis=0).min(initial=math.inf)
-        if np.abs(ways[own].sum(axis=0)).max(initial=0.0) <= linear_program.LEVEL * shortest:
-            only = float(self.every.start[own].sum())
+        if np.abs(ways[row_places].sum(axis=0)).max(initial=0.0) <= linear_program.LEVEL * shortest:
+            only = float(self.all_multipliers.start[row_places].sum())
             return only, only
-        cost = np.isin(np.arange(len(self.every.start)), places).astype(np.float64)
-        signed = bool(self.every.signed[own].all())
+        cost = np.isin(np.arange(len(self.all_multipliers.start)), places).astype(np.float64)
+        signed = bool(self.all_multipliers.signed[row_places].all())
         low = 0.0 if signed and self.bound(cost) <= 0.0 else self.least(cost)
         high = -self.bound(-cost)
         if signed and high - low > apart * max(1.0, high):

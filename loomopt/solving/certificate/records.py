@@ -1,4 +1,4 @@
-"""What a certificate says, and a proof of all designs: plain records."""
+"""Records of a certificate and of a global proof."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -15,21 +15,22 @@ from loomopt.solving.certificate.multiplier_set import MultiplierSet
 
 
 class Level(NamedTuple):
-    """The KKT residuals of one objective; held: the multiplier of the objectives before it.
+    """KKT residuals of one objective.
 
-    price: the largest multiplier of a limit, dearest: that limit's name.
+    higher_levels: sum of the multipliers of the objectives before it; price: largest multiplier of a limit; dearest:
+    name of that limit.
     """
 
     objective: str
     stationarity: float
     complementarity: float
-    held: float
+    higher_levels: float
     price: float = 0.0
     dearest: str = ""
 
 
 class Binding(NamedTuple):
-    """A limit that binds, and the fall of the first objective it moves per unit it is loosened (SI)."""
+    """A binding limit, and the fall of the first objective that it moves per unit of loosening (SI)."""
 
     limit: Limit
     side: int
@@ -39,10 +40,10 @@ class Binding(NamedTuple):
 
 @dataclass(frozen=True)
 class JointBinding:
-    """Limits that are worth more together than each alone, as where extremes tie.
+    """Limits that are worth more together than alone, for example at equal extremes.
 
-    bindings: one of each limit, with its worth alone, SI; costs: (limits, rows), the multipliers that count for each
-    limit, times the fall of the objective's figure per SI unit; multipliers: all that balance the slopes.
+    bindings: one of each limit, with its worth alone, SI; costs: (limits, rows), mask of each limit's multipliers,
+    times the fall of the objective's figure per SI unit; multipliers: all that balance the slopes.
     """
 
     bindings: tuple[Binding, ...]
@@ -50,20 +51,20 @@ class JointBinding:
     multipliers: MultiplierSet = field(compare=False, repr=False)
 
     def worth(self, steps: Sequence[float]) -> float:
-        """Fall of the objective's figure, SI, where each limit is loosened by its step, SI, in proportion."""
+        """Fall of the objective's figure, SI, when each limit is loosened by its step, SI."""
         return self.multipliers.least(np.array(steps) @ self.costs)
 
 
 def worth_of(bindings: Sequence[Binding]) -> float:
-    """Return what all rows of a limit are worth together for the first objective that the first of them moves, SI."""
+    """Worth of all rows of a limit together, for the first objective that the first of them moves, SI."""
     return sum(binding.worth for binding in bindings if binding.objective == bindings[0].objective)
 
 
 class FrameRow(NamedTuple):
-    """A row that stops an optimum, by what is the same of it at its neighbours.
+    """A row that stops an optimum, by its properties that neighbours share.
 
     level: whether it is a piece of an objective, else of a limit; place: of either in the program; side: the limit's
-    sign; piece, u: where it stands in the cycle, None of no node; signed: whether the quantity's value counts.
+    sign; piece, u: place in the cycle, None without a node; signed: whether the value counts, not its magnitude.
     """
 
     level: bool
@@ -77,13 +78,13 @@ class FrameRow(NamedTuple):
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """What must be the same of two optima for a way between them."""
+        """Key that must be equal in two optima for a path between them."""
         return *self[:6], self.u if self.u in (0.0, 1.0) else None
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """What was verified of a design; reasons say why it did not pass."""
+    """Results of the checks of a design; `reasons` says why it did not pass."""
 
     passed: bool
     reasons: tuple[str, ...]
@@ -94,38 +95,39 @@ class Certificate:
     unique: bool
     binding: tuple[Binding, ...] = ()
     by: str = "40 digits"
-    """Where its slopes come from: "jets" or "40 digits"."""
+    """Kind of derivatives: "jets" or "40 digits"."""
     clear: bool = True
-    """Whether every figure that decides is far enough from its threshold for that."""
+    """Whether every quantity is far enough from its threshold for these derivatives."""
     whole_cycle: str = "refined"
-    """How whole-cycle values are held between points: "refined", "bounded" or "proven"."""
-    settled: tuple[str, ...] = field(default=())
+    """How whole-cycle values are checked between points: "refined", "bounded" or "proven"."""
+    tie_breaks: tuple[str, ...] = field(default=())
     correction: Mapping[str, float] = field(default_factory=dict)
-    """Newton's step, SI, toward the stationary point nearby; empty where there is no curvature to follow."""
+    """Newton's step, SI, to the stationary point nearby; empty without curvature."""
     step: float = 0.0
-    """The length of that step, in natural sizes."""
+    """Length of Newton's step, scaled."""
     level: tuple[Mapping[str, float], ...] = ()
-    """Directions, in natural sizes and orthonormal, along which nothing curves at the last level that was judged."""
+    """Directions, scaled and orthonormal, without curvature at the last level."""
     change: Level | None = None
-    """The residuals of least change from today, where that was a level of its own."""
+    """Residuals of the level of least change from today, if there is one."""
     frame: tuple[FrameRow, ...] = field(default=(), repr=False)
-    """What stops it: limits that are touched, objectives that vanish, the pieces that the level which chooses weighs;
-    nothing where levels before that one do not vanish, for then it hangs on how they curve."""
+    """Rows that stop the design: touched limits, vanishing objectives, and the pieces of the deciding level; empty
+    where levels before that one do not vanish, because their curvature then decides.
+    """
     open: tuple[str, ...] = ()
-    """Variables, as a designer calls them, that are left as they came, though others are as good."""
+    """Variables, by the designer's names, whose values are arbitrary: other values are as good."""
     bind_together: tuple[JointBinding, ...] = field(default=(), repr=False)
-    """Limits that are worth more together than each alone."""
+    """Limits that are worth more together than alone."""
     prices_unique: bool = True
-    """Whether every limit has one price: what it is worth to loosen it a little is what tightening it costs."""
+    """Whether every limit has one price: loosening it a little gains as much as tightening it costs."""
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """What chose among equally good designs, and what was left open."""
-        return (*self.settled, *([f"open: {', '.join(self.open)}"] if self.open else []))
+        """Rules that chose among equally good designs, and the variables that are left open."""
+        return (*self.tie_breaks, *([f"open: {', '.join(self.open)}"] if self.open else []))
 
     @property
-    def priced(self) -> tuple[tuple[Binding, ...], ...]:
-        """The limits that bind: all rows of each limit and side together."""
+    def binding_groups(self) -> tuple[tuple[Binding, ...], ...]:
+        """Binding limits, all rows of each limit and side together."""
         groups: dict[tuple[str, int], tuple[Binding, ...]] = {}
         for binding in self.binding:
             key = binding.limit.name, binding.side
@@ -134,26 +136,25 @@ class Certificate:
 
     @property
     def error(self) -> float:
-        """Estimate of the relative error of what the answer says, in natural sizes.
+        """Estimate of the relative error of the answer, scaled.
 
-        What limits are exceeded by, what lies between points, prices where nothing touches, and how far Newton's
-        method would still move the design.
+        The largest of: excess of limits, excess between points, complementarity, and the length of Newton's step.
         """
-        amiss = max((level.complementarity for level in self.levels), default=0.0)
-        return max(self.feasibility, self.violation, amiss, self.step, ROUNDED)
+        complementarity = max((level.complementarity for level in self.levels), default=0.0)
+        return max(self.feasibility, self.violation, complementarity, self.step, ROUNDED)
 
     @property
     def residual(self) -> float:
-        """The largest KKT residual of all levels."""
+        """Largest KKT residual of all levels."""
         return max((max(level.stationarity, level.complementarity) for level in self.levels), default=0.0)
 
 
 class GlobalLevel(NamedTuple):
-    """What is shown of one objective at all admissible designs that are as good at the levels before it.
+    """Bound of one objective over all admissible designs that are as good at the levels before it.
 
-    objective: its figure; sense: what of it is sought; best: the answer's, bound: what no design is below, or above
-    where the most is sought, SI; gap: between them, relative; band: by how much designs may be worse than `best` and
-    still be asked at later levels, SI; proven: whether the gap is the one that was asked for.
+    objective: its figure; sense: whether the least or the most is sought; best: value of the answer, SI; bound: bound
+    of all designs, SI; gap: between the two, relative; band: by how much a design may be worse than `best` and still
+    count at later levels, SI; proven: whether the gap is small enough.
     """
 
     objective: str
@@ -166,7 +167,7 @@ class GlobalLevel(NamedTuple):
 
 
 class GlobalBound(NamedTuple):
-    """What is proven of all admissible designs; boxes, seconds: what it took; why: why it is not proven."""
+    """Proven bounds of all admissible designs; boxes, seconds: cost of the proof; why: reason if it is not proven."""
 
     levels: tuple[GlobalLevel, ...]
     boxes: int
@@ -175,16 +176,16 @@ class GlobalBound(NamedTuple):
 
     @property
     def proven(self) -> bool:
-        """Whether no admissible design is better, level by level, by more than the gap that was asked for."""
+        """Whether no admissible design is better, level by level, by more than the required gap."""
         return not self.why
 
     @property
     def gap(self) -> float:
-        """The gap of the level that has come least far, relative; infinite without a bound."""
+        """Largest gap of all levels, relative; infinite without a bound."""
         return max((level.gap for level in self.levels), default=math.inf)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the object `solve --json` prints."""
+        """Object that `solve --json` prints."""
         return {
             "proven": self.proven,
             "gap": self.gap if math.isfinite(self.gap) else None,

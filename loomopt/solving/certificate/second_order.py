@@ -1,17 +1,17 @@
-"""Second order: does the Lagrangian curve upward along every direction that binding rows leave open?
+"""Second order: does the Lagrangian curve upward along every direction that binding rows leave free?
 
-Tested is the sufficient condition d'Hd > 0 for every d ≠ 0 of the critical cone [Nocedal and Wright, Numerical
-Optimization, 2nd ed., Theorem 12.6], H the Hessian of the level's Lagrangian; at an extreme of the cycle a row's own
+The test is the sufficient condition d'Hd > 0 for every d ≠ 0 of the critical cone [Nocedal and Wright, Numerical
+Optimization, 2nd ed., Theorem 12.6], H the Hessian of the level's Lagrangian; that of a row at an extreme
 is g_xx − g_xφ g_φx / g_φφ [Hettich and Kortanek, SIAM Review 35 (1993), 380-429]. Binding rows are equalities; touching
 ones without a multiplier bound the cone.
 
 Where H is positive on the whole subspace of the equalities the verdict is proven to the tolerances. Two cases are
-decided by a heuristic: H indefinite there, where the least curvature over the cone is sought from eigenvectors
-(`nnls.least_on_cone`: a fall that is found is one, none found proves nothing); and H level along a direction, where the
-Lagrangian is read at a few steps along the line and at designs beside it that keep the binding rows
-(`FeasibleCurve`); of many such directions only what falls along a straight line is followed. A level that pulls along
-what an earlier one closes by its curvature alone is read where that level stays least (`valley`); its curvature is then
-known to an error of its own, within which it counts as none.
+decided by a heuristic. If H is indefinite there, the least curvature over the cone is searched from eigenvectors
+(`nnls.least_on_cone`): a fall that is seen exists, but a fall may be missed. If H is flat along a direction, the
+Lagrangian is evaluated at a few steps along the line and at nearby designs that keep the binding rows
+(`FeasibleCurve`); of many such directions only those with a fall along a straight line are used. Where a level has a
+slope along a direction that an earlier level closes by its curvature, it is evaluated where the earlier level stays
+least (`valley`); the curvature then has an error, and is zero if it is within that error.
 """
 
 import functools
@@ -30,29 +30,29 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE, FLAT, POLISH_DONE, POLISH_MET, RANK
 from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
-from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet, LevelMultipliers, System, moved
+from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet, LevelMultipliers, System, move_rows
 from loomopt.solving.nlp.point import sampler_at
 from loomopt.solving.search import tie_break
 
 SLOPE_ERROR = 1e-12
-"""Error of a slope by jets, relative to the largest of a row where that exceeds 1: five times what is seen of
-JET_ERROR. Where an earlier level stays least is found to that over its curvature."""
+"""Error of a slope by jets, relative to the largest of a row where that exceeds 1: five times the largest one observed
+(JET_ERROR). The valley of an earlier level is known to this over its curvature."""
 
 
-class Moves(NamedTuple):
-    """Second derivatives (c, k, k) of where a level is least, and their errors (c,)."""
+class ValleyCurvature(NamedTuple):
+    """Second derivatives (c, k, k) of the valley of a level, and their errors (c,)."""
 
     values: Floats
     errors: Floats
 
 
 @dataclass(frozen=True)
-class Closed:
-    """Directions that a level closes to those after it: it rises along them, though to second order only.
+class ClosedDirections:
+    """Directions that a level closes to later levels: it rises along them to second order.
 
     directions: (c, variables), orthonormal, eigenvectors of its curvature; bends: (c,), how much it curves along them;
-    weights: (rows,), of its Lagrangian; sums: (m, rows), what its binding rows keep; gradients: (rows, variables), at
-    the design; first: whether no level before it closes any.
+    weights: (rows,), of its Lagrangian; sums: (m, rows), sums of binding rows that stay constant; gradients: (rows,
+    variables), at the design; first: whether no level before it closes a direction.
     """
 
     program: Program
@@ -65,8 +65,8 @@ class Closed:
     sums: Floats
     first: bool
 
-    def moves(self, basis: Floats) -> Moves | None:
-        """Return how the valley bends along directions (variables, k); None where an earlier one bends it too."""
+    def moves(self, basis: Floats) -> ValleyCurvature | None:
+        """Curvature of the valley along directions (variables, k); None where an earlier level curves it too."""
         if not self.first:
             return None
         count, width = len(self.bends), basis.shape[1]
@@ -74,27 +74,27 @@ class Closed:
         for k, (line, bend) in enumerate(zip(self.directions, self.bends, strict=True)):
             third, error = self._thirds(line, basis)
             largest = float(np.abs(third).max(initial=0.0))
-            # Where the level is truly least, off by so much, its derivatives differ by the next ones times that.
-            unsure = self._bend_error + self.off[k] * max(1.0, largest)
+            # The true minimum of the level is `off` away: its derivatives differ by the next order times that.
+            derivative_error = self._bend_error + self.off[k] * max(1.0, largest)
             values[k] = -third / bend
-            errors[k] = (error + unsure * max(1.0, largest / bend)) / bend
-        return Moves(values, errors)
+            errors[k] = (error + derivative_error * max(1.0, largest / bend)) / bend
+        return ValleyCurvature(values, errors)
 
     @lazy
     def off(self) -> Floats:
-        """How far (c,), in natural sizes, the design is from where the level is least along each direction."""
+        """Distance (c,), scaled, of the design from the level's minimum along each direction."""
         return np.abs(self.directions @ self._slope) / self.bends
 
     @lazy
     def step_errors(self) -> Floats:
-        """Errors (c,) of `step`: one that is no longer leads nowhere."""
+        """Errors (c,) of `step`: a smaller step is zero."""
         size = np.abs(self.weights) @ np.abs(self.gradients).max(axis=1, initial=1.0)
         return np.asarray(SLOPE_ERROR * size / self.bends)
 
     def step(self, x: Mapping[str, float]) -> Floats | None:
-        """Return the step (c,) along the directions from a design (SI) to the valley; None where a row is gone."""
+        """Step (c,) along the directions from a design (SI) to the valley; None where a row is gone."""
         sampler = sampler_at(self.program, x)
-        rows = moved(self.rows, sampler) if sampler else None
+        rows = move_rows(self.rows, sampler) if sampler else None
         if sampler is None or rows is None:
             return None
         try:
@@ -102,19 +102,19 @@ class Closed:
         except ArithmeticError:
             return None
         slope, jacobian = self.weights @ gradients, self.sums @ gradients
-        # A step along a direction is led back onto the binding rows, along their slopes at the design.
-        prices = inverted(jacobian @ self._back).T @ (self._back.T @ slope)
+        # A step along a direction returns to the binding rows along their slopes at the design.
+        prices = pseudo_inverse(jacobian @ self._back).T @ (self._back.T @ slope)
         return np.asarray(-self.directions @ (slope - jacobian.T @ prices - self._slope) / self.bends)
 
     @lazy
     def _slope(self) -> Floats:
-        """The slope (variables,) that the multipliers leave at the design."""
+        """Slope (variables,) that the multipliers leave at the design."""
         return np.asarray(self.weights @ self.gradients)
 
     @lazy
     def _back(self) -> Floats:
-        """The shortest step (variables, m) that changes each sum of binding rows by 1."""
-        return inverted(self.sums @ self.gradients)
+        """Shortest step (variables, m) that changes each sum of binding rows by 1."""
+        return pseudo_inverse(self.sums @ self.gradients)
 
     @lazy
     def _curvatures(self) -> Floats:
@@ -126,69 +126,70 @@ class Closed:
         return float(self.derivatives.error * (np.abs(self.weights) @ sizes))
 
     def _thirds(self, line: Floats, basis: Floats) -> tuple[Floats, float]:
-        """Return (k, k): third derivatives of L, once along a line and twice along a basis, and their error."""
+        """Third derivatives of L (k, k), once along a line and twice along a basis, and their error."""
         # Designs that keep the binding rows bend away from their tangents by n_ab = −J⁺ g_ab.
-        ways = np.column_stack([line, basis])
-        away = -np.tensordot(self._back @ self.sums, ways.T @ self._curvatures @ ways, axes=1)
-        found, errors = self.derivatives.thirds(line, basis)
-        along = np.einsum("a,rab,bij->rij", line, self._curvatures, away[:, 1:, 1:])
-        across = np.einsum("ai,rab,bj->rij", basis, self._curvatures, away[:, 0, 1:])
-        # The slope that is left across the binding rows is a share of their multipliers.
+        directions = np.column_stack([line, basis])
+        bending = -np.tensordot(self._back @ self.sums, directions.T @ self._curvatures @ directions, axes=1)
+        thirds, errors = self.derivatives.thirds(line, basis)
+        along = np.einsum("a,rab,bij->rij", line, self._curvatures, bending[:, 1:, 1:])
+        across = np.einsum("ai,rab,bj->rij", basis, self._curvatures, bending[:, 0, 1:])
+        # The residual slope across the binding rows is a part of their multipliers.
         weights = self.weights - self._slope @ self._back @ self.sums
-        whole = np.tensordot(weights, found + along + across + across.swapaxes(1, 2), axes=1)
-        return whole, float(np.abs(weights) @ errors)
+        total = np.tensordot(weights, thirds + along + across + across.swapaxes(1, 2), axes=1)
+        return total, float(np.abs(weights) @ errors)
 
 
-def inverted(slopes: Floats) -> Floats:
-    """Return the pseudo-inverse (variables, m) of slopes (m, variables), of which those below RANK are none."""
+def pseudo_inverse(slopes: Floats) -> Floats:
+    """Pseudo-inverse (variables, m) of slopes (m, variables); singular values below RANK are zero."""
     largest = float(np.linalg.norm(slopes, 2)) if slopes.size else 0.0
     return np.asarray(np.linalg.pinv(slopes, rcond=RANK * max(1.0, 1 / largest) if largest else RANK), dtype=np.float64)
 
 
 PROBES = 1e-2, 3e-3
-"""Steps along a direction without curvature at which the Lagrangian is read: at both of them it must fall."""
+"""Steps along a direction without curvature at which the Lagrangian is evaluated: a fall is one at both steps."""
 
-FALLEN, FALL_MARGIN = 1e-12, 10.0
-"""Fall of the Lagrangian that counts: a thousand times rounding, and this many times what the slope left explains."""
+LEAST_FALL, FALL_MARGIN = 1e-12, 10.0
+"""Least fall of the Lagrangian: a thousand times rounding, and the factor on the fall by the residual slope."""
 
 ROUNDINGS = 16.0
-"""Units in the last place of all terms of a Lagrangian together that its value may be off by: beyond FALLEN where terms
-are hundreds, as where a force is thousands of times the one that is natural."""
+"""Rounding error of a Lagrangian in units in the last place of all its terms: larger than FALLEN where terms are
+hundreds, for example with a force of thousands of times its scale."""
 
 FALL_GROWTH = 18.0
-"""How many times a fall within the error of an earlier level's valley must grow from the second probe to the first
-to be doubted: of third order it grows 37 times, of higher more, an error by chance (test_valley.py)."""
+"""Growth of a fall from the second probe to the first above which it may be real, although it is within the error of an
+earlier level's valley: a fall of third order grows 37 times, of higher order more, an error at random
+(test_valley.py)."""
 
 
 @dataclass(frozen=True)
 class Lagrangian:
-    """One level's objective and what holds it, in natural sizes.
+    """Lagrangian of one level, scaled.
 
-    x: variables, SI; level: the objective's place; prices: multiplier of each limit by its place, and of each earlier
-    objective by its own.
+    x: variables, SI; level: the objective's place; prices: multiplier of each limit, by place; level_prices: multiplier
+    of each earlier objective, by place.
     """
 
     program: Program
     x: Mapping[str, float]
     level: int
     prices: Mapping[int, float]
-    held: Mapping[int, float]
+    level_prices: Mapping[int, float]
 
     def falls(self, direction: Mapping[str, float], slope: float) -> bool:
-        """Say whether it falls along a direction (SI), more than a slope left at x explains, at every probe."""
-        found = ((step, {n: v + step * direction.get(n, 0.0) for n, v in self.x.items()}) for step in PROBES)
-        return all(self.is_lower(there, step, slope) for step, there in found)
+        """Whether it falls along a direction (SI) at every probe by more than the residual slope at x explains."""
+        probes = ((step, {n: v + step * direction.get(n, 0.0) for n, v in self.x.items()}) for step in PROBES)
+        return all(self.is_lower(design, step, slope) for step, design in probes)
 
-    def is_lower(self, there: Mapping[str, float], step: float, slope: float, unsure: float = 0.0) -> bool:
-        """Say whether it is lower at a design (SI) a step away, more than a slope left at x explains.
+    def is_lower(self, design: Mapping[str, float], step: float, slope: float, error: float = 0.0) -> bool:
+        """Whether it is lower at a design (SI) a step away by more than the residual slope at x explains.
 
-        unsure: what it may differ by there, beside rounding.
+        error: error of the value there, besides rounding.
         """
-        return self.fall(there) > FALL_MARGIN * slope * step + max(FALLEN, self._rounding) + unsure
+        return self.fall(design) > FALL_MARGIN * slope * step + max(LEAST_FALL, self._rounding) + error
 
-    def fall(self, there: Mapping[str, float]) -> float:
-        """Return by how much it is lower at a design (SI); −∞ where either value is unknown."""
-        base, value = self._base, self.value(there)
+    def fall(self, design: Mapping[str, float]) -> float:
+        """Its fall from x to a design (SI); −∞ where either value is unknown."""
+        base, value = self._base, self.value(design)
         return -math.inf if base is None or value is None else base - value
 
     @functools.cached_property
@@ -197,16 +198,16 @@ class Lagrangian:
 
     @functools.cached_property
     def _rounding(self) -> float:
-        """What its value may be off by: that of its terms, each that is weighed of one natural size."""
-        weights = sum(map(abs, (*self.prices.values(), *self.held.values())))
+        """Rounding error of its value, from its terms, each of size 1 times its weight."""
+        weights = sum(map(abs, (*self.prices.values(), *self.level_prices.values())))
         return ROUNDINGS * sys.float_info.epsilon * (abs(self._base or 0.0) + weights)
 
-    def value(self, there: Mapping[str, float]) -> float | None:
-        """Return its value at a design (SI); None where the linkage has no real position."""
-        sampler = sampler_at(self.program, there)
+    def value(self, design: Mapping[str, float]) -> float | None:
+        """Its value at a design (SI); None where the linkage has no real position."""
+        sampler = sampler_at(self.program, design)
         if sampler is None:
             return None
-        weights = {self.level: 1.0, **self.held}
+        weights = {self.level: 1.0, **self.level_prices}
         objectives = ((weight, self.program.objectives[k]) for k, weight in weights.items())
         value = sum(weight * (objective.merit(sampler) / objective.scale) for weight, objective in objectives)
         return value + sum(price * self.program.limits[k].excess(sampler) for k, price in self.prices.items())
@@ -215,16 +216,16 @@ class Lagrangian:
 Design = dict[str, float]
 Verdict = Literal["holds", "falls", "open"]
 STEPS = 40
-"""Corrections onto the rows, each of which leaves the step's share of what was missed: of 1e-2 eight are enough."""
+"""Most corrections onto the rows; each reduces the residual by the relative step: for 1e-2 eight suffice."""
 
 
 @dataclass(frozen=True)
 class FeasibleCurve:
-    """Designs around x (SI) at which sums (m, rows) of rows are what they are at x.
+    """Designs around x (SI) at which sums (m, rows) of rows have the same value as at x.
 
-    jacobian: (m, variables), slopes of the sums in natural sizes; basis: (variables, k), orthonormal, the directions
-    that no sum forbids; curved: (k, c), those of them along which the Lagrangian curves by bends (c,); valley: of an
-    earlier level, that counts, and the Lagrangian's slopes (v,) along its directions.
+    jacobian: (m, variables), scaled slopes of the sums; basis: (variables, k), orthonormal, the directions that no sum
+    forbids; curved: (k, c), those of them along which the Lagrangian curves by bends (c,); valley: of an earlier level,
+    with the Lagrangian's slopes (v,) along its directions, if these are not zero.
     """
 
     program: Program
@@ -236,17 +237,17 @@ class FeasibleCurve:
     basis: Floats
     curved: Floats
     bends: Floats
-    valley: tuple[Closed, Floats] | None = None
+    valley: tuple[ClosedDirections, Floats] | None = None
 
-    def judged(self, lagrangian: Lagrangian, way: Floats, slope: float) -> Verdict:
-        """Say whether the Lagrangian falls along a direction (k,) at every probe, more than a slope explains.
+    def verdict(self, lagrangian: Lagrangian, way: Floats, slope: float) -> Verdict:
+        """Whether the Lagrangian falls along a direction (k,) at every probe by more than the slope explains.
 
-        "open" where the rows cannot be kept, or where every design that is better breaks another limit: it falls, but
-        only within the first probe; or by less than an earlier level's valley is known to. That such a fall does not
-        grow with the step, as one of third order would, shows it to be that valley's error.
+        Returns "holds", "falls" or "open". It is open where the rows cannot be kept, where every better design violates
+        another limit (the fall is shorter than the first probe), or where the fall is within the error of an earlier
+        level's valley. A fall that does not grow with the step as one of third order does is that error.
         """
         better: list[Design] = []
-        falls, sure = list[float](), list[bool]()
+        falls, clear = list[float](), list[bool]()
         for step in PROBES:
             designs = self._lowest(lagrangian, step, way)
             if not designs:
@@ -254,46 +255,46 @@ class FeasibleCurve:
             lower = [x for x in designs if lagrangian.is_lower(x, step, slope)]
             if not lower:
                 return "holds"
-            surely = [x for x in lower if lagrangian.is_lower(x, step, slope, self._unsure)]
+            clearly_lower = [x for x in lower if lagrangian.is_lower(x, step, slope, self._value_error)]
             falls.append(max(map(lagrangian.fall, lower)))
-            sure.append(bool(surely))
-            better += surely
-        if all(sure):
-            return "falls" if any(map(self._is_kept, better)) else "open"
-        return "holds" if not any(sure) and falls[0] < FALL_GROWTH * falls[-1] else "open"
+            clear.append(bool(clearly_lower))
+            better += clearly_lower
+        if all(clear):
+            return "falls" if any(map(self._keeps_limits, better)) else "open"
+        return "holds" if not any(clear) and falls[0] < FALL_GROWTH * falls[-1] else "open"
 
     def _slopes(self, lagrangian: Lagrangian, lines: Floats, place: Floats) -> Floats | None:
-        """Return the Lagrangian's slopes along lines (k, c) at coordinates in the basis."""
-        step, found = PROBES[-1], []
+        """Slopes of the Lagrangian along lines (k, c) at coordinates in the basis."""
+        step, slopes = PROBES[-1], []
         for line in lines.T:
             ends = [self.at(place + sign * step * line) for sign in (1.0, -1.0)]
             high, low = (lagrangian.value(x) if x else None for x in ends)
             if high is None or low is None:
                 return None
-            found.append((high - low) / (2 * step))
-        return np.array(found)
+            slopes.append((high - low) / (2 * step))
+        return np.array(slopes)
 
     def at(self, place: Floats) -> Design | None:
-        """Return the design (SI) at coordinates (k,) in the basis that keeps the rows; None where none is found."""
-        moved, before = self.basis @ place, math.inf
+        """Design (SI) at coordinates (k,) in the basis that keeps the rows; None where the iteration fails."""
+        step, last_residual = self.basis @ place, math.inf
         for _ in range(STEPS):
-            x = self._moved(moved)
+            x = self._design(step)
             sampler = sampler_at(self.program, x)
             values = None if sampler is None else self._values(sampler)
-            along = self._along(x)
-            if values is None or self._here is None or along is None:
+            valley_step = self._valley_step(x)
+            if values is None or self._here is None or valley_step is None:
                 return None
-            missed = self.sums @ (values - self._here)
-            largest = float(np.abs(missed).max(initial=0.0))
-            if not np.any(along) and (largest <= POLISH_DONE or before <= 2 * largest):
+            residuals = self.sums @ (values - self._here)
+            largest = float(np.abs(residuals).max(initial=0.0))
+            if not np.any(valley_step) and (largest <= POLISH_DONE or last_residual <= 2 * largest):
                 return x if largest <= POLISH_MET else None
-            moved, before = moved - self._back @ missed + along, largest
+            step, last_residual = step - self._back @ residuals + valley_step, largest
         return None
 
-    def _along(self, x: Mapping[str, float]) -> Floats | None:
-        """Return the step (variables,) from a design (SI) to the valley, 0 where there is none left to take.
+    def _valley_step(self, x: Mapping[str, float]) -> Floats | None:
+        """Step (variables,) from a design (SI) to the valley, 0 where it is reached; None where unknown.
 
-        What an earlier level holds is kept there alone. None where it is not known.
+        The rows of the earlier level hold only in its valley.
         """
         if self.valley is None:
             return np.zeros(len(self.basis))
@@ -304,25 +305,25 @@ class FeasibleCurve:
         return np.where(np.abs(steps) > closed.step_errors, steps, 0.0) @ closed.directions
 
     @lazy
-    def _unsure(self) -> float:
-        """What the Lagrangian may differ by on the valley."""
+    def _value_error(self) -> float:
+        """Error of the Lagrangian in the valley."""
         if self.valley is None:
             return 0.0
         closed, pull = self.valley
         return FALL_MARGIN * float(np.abs(pull) @ closed.step_errors)
 
     def _lowest(self, lagrangian: Lagrangian, step: float, way: Floats) -> list[Design]:
-        """Return the design a step along a direction, and the one moved along what is curved to the least there."""
+        """Designs a step along a direction: the plain one, and one moved to the least along curved directions."""
         slopes = self._slopes(lagrangian, self.curved, step * way)
         places = [step * way]
         if slopes is not None and np.any(slopes):
             places.append(step * way - self.curved @ (slopes / self.bends))
         return [x for x in map(self.at, places) if x]
 
-    def _is_kept(self, x: Mapping[str, float]) -> bool:
-        """Say whether a design keeps every limit as well as x itself."""
-        here, there = (self._excess(each) for each in (self.x, x))
-        return bool(np.all(there <= np.maximum(here, FEASIBLE)))
+    def _keeps_limits(self, x: Mapping[str, float]) -> bool:
+        """Whether a design keeps every limit as well as x does."""
+        excess_at_x, excess = (self._excess(design) for design in (self.x, x))
+        return bool(np.all(excess <= np.maximum(excess_at_x, FEASIBLE)))
 
     def _excess(self, x: Mapping[str, float]) -> Floats:
         sampler = sampler_at(self.program, x)
@@ -332,22 +333,25 @@ class FeasibleCurve:
 
     @lazy
     def _back(self) -> Floats:
-        """The shortest step (variables, m) that changes each sum by 1."""
-        return inverted(self.jacobian)
+        """Shortest step (variables, m) that changes each sum by 1."""
+        return pseudo_inverse(self.jacobian)
 
     @lazy
     def _here(self) -> Floats | None:
         sampler = sampler_at(self.program, self.x)
         return None if sampler is None else self._values(sampler)
 
-    def _moved(self, moved: Floats) -> Design:
-        """Return x moved by a step in natural sizes."""
+    def _design(self, step: Floats) -> Design:
+        """Design x moved by a scaled step."""
         sizes = self.scales.items()
-        return {**self.x, **{n: self.x[n] + size * float(by) for (n, size), by in zip(sizes, moved, strict=True)}}
+        return {
+            **self.x,
+            **{n: self.x[n] + size * float(shift) for (n, size), shift in zip(sizes, step, strict=True)},
+        }
 
     def _values(self, sampler: Sampler) -> Floats | None:
-        """Return every row at a design, in its natural size; extremes move along. None where one is gone."""
-        rows = moved(self.rows, sampler)
+        """Every row at a design, scaled, with moving extremes; None where an extreme is gone."""
+        rows = move_rows(self.rows, sampler)
         return None if rows is None else np.array([_value(row, sampler) for row in rows])
 
 
@@ -357,23 +361,23 @@ def _value(row: ActiveRow, sampler: Sampler) -> float:
     return row.sign * (row.node.value if row.node else sampler.single(row.reads)) / row.scale
 
 
-FAINT = 1e-4
-"""Curvature up to which a direction is looked along at PROBES, for what higher orders do there: at a step of 1e-2 a
+FLAT_ENOUGH = 1e-4
+"""Curvature up to which higher orders are tested along a direction at PROBES: at a step of 1e-2 a
 cubic term of size 1 outweighs it (toys of tests/solving/certificate/test_certificate_adversary.py)."""
 
 NEWTON_CURVED, NEWTON_DONE = 1e-5, 1e-13
-"""Curvature that Newton's step may follow: a slope of STATIONARY then moves a design by 0.1 at most. Slope and distance
-that leave nothing to correct: a hundred times rounding."""
+"""Least curvature for Newton's step: a slope of STATIONARY then moves a design by 0.1 at most. Slope and distance below
+which there is nothing to correct: a hundred times rounding."""
 
-FOLLOWED = 3
-"""Directions without curvature all of which are followed: of more, whose lines grow as their square, those that fall
+MOST_CURVES = 3
+"""Most flat directions that are all tested on curves; with more, whose lines grow as their square, only those that fall
 along a straight line."""
 
 
 class Local(NamedTuple):
-    """A program around one design x (SI): its active set with slopes (rows, variables), and what curves them.
+    """A program around one design x (SI): its active set, slopes (rows, variables) and derivatives.
 
-    closed: by each earlier level; shown: of how many first levels it is known that none falls to higher order.
+    closed: directions closed by each earlier level; shown: number of first levels that are known not to fall.
     """
 
     program: Program
@@ -382,187 +386,195 @@ class Local(NamedTuple):
     active: ActiveSet
     derivatives: Derivatives
     gradients: Floats
-    closed: tuple[Closed, ...] = ()
+    closed: tuple[ClosedDirections, ...] = ()
     shown: int = 0
 
     @property
-    def shut(self) -> Floats:
-        """The closed directions (c, variables) of all earlier levels."""
-        return np.vstack([np.zeros((0, len(self.derivatives.names))), *(each.directions for each in self.closed)])
+    def closed_directions(self) -> Floats:
+        """Closed directions (c, variables) of all earlier levels."""
+        return np.vstack([np.zeros((0, len(self.derivatives.names))), *(closed.directions for closed in self.closed)])
 
     @property
     def slopes(self) -> Floats:
-        """The slopes (rows, variables) along what is not closed."""
-        return self.gradients - (self.gradients @ self.shut.T) @ self.shut
+        """Slopes (rows, variables) along the directions that are not closed."""
+        return self.gradients - (self.gradients @ self.closed_directions.T) @ self.closed_directions
 
     @property
     def scales(self) -> Floats:
-        """Natural sizes of the variables that slopes are with respect to."""
+        """Scales of the variables that are not fixed."""
         sizes = {v.name: v.scale for v in self.program.variables}
         return np.array([sizes[name] for name in self.derivatives.names])
 
 
 @dataclass(frozen=True)
 class Curvature:
-    """What second order says of one level.
+    """Second order of one level.
 
-    minimum: nothing falls along a curved direction; unique: along every open direction something rises; higher: what
-    higher orders do along directions without curvature; settled: a single design is left, but for moves that change
-    nothing; step: Newton's, in natural sizes, empty where there is nothing to correct; error: of the curvature; closed:
-    to later levels; level: directions (k, variables) that no binding row forbids and along which nothing curves,
-    orthonormal in natural sizes.
+    minimum: whether no curved direction falls; unique: whether every open direction rises; higher: verdict of higher
+    orders along flat directions; determined: whether a single design is left, except for moves without effect; step:
+    Newton's, scaled, empty where there is nothing to correct; ratios: ratios of quantities to their thresholds; error:
+    of the curvature; closed: directions closed to later levels; level: flat directions (k, variables) that no binding
+    row forbids, orthonormal, scaled.
     """
 
     minimum: bool = True
     unique: bool = True
     higher: Verdict = "holds"
-    settled: bool = False
+    determined: bool = False
     step: Floats = field(default_factory=lambda: np.zeros(0))
-    figures: Floats = field(default_factory=lambda: np.zeros(0))
+    ratios: Floats = field(default_factory=lambda: np.zeros(0))
     error: float = 0.0
-    closed: Closed | None = None
+    closed: ClosedDirections | None = None
     level: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 @dataclass(frozen=True)
-class Critical:
-    """What binding rows leave open: basis (variables, k) of the directions that none forbids.
+class CriticalCone:
+    """Critical cone: basis (variables, k) of the directions that no binding row forbids.
 
     back: the shortest step onto the binding rows; slopes: of touching rows without a multiplier, along the basis;
-    figures: what was compared with a threshold, each over its own; sums: (m, rows), sums of binding rows, each of which
-    stays as it is.
+    ratios: ratios of quantities to their thresholds; sums: (m, rows), sums of binding rows that stay constant.
     """
 
     basis: Floats
     back: Floats
     slopes: Floats
-    figures: Floats = field(default_factory=lambda: np.zeros(0))
+    ratios: Floats = field(default_factory=lambda: np.zeros(0))
     sums: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
-    def ways(self, line: Floats) -> list[Floats]:
-        """Return the directions (variables) of a line, in the cone's basis, that touching rows leave open."""
+    def directions(self, line: Floats) -> list[Floats]:
+        """Directions (variables) of a line, given in the cone's basis, that touching rows allow."""
         return [self.basis @ way for way in (line, -line) if np.max(self.slopes @ way, initial=-np.inf) <= FLAT]
 
 
-def critical(local: Local, system: System, multipliers: LevelMultipliers) -> Critical:
-    """Return the critical cone of one level.
+def critical_cone(local: Local, system: System, multipliers: LevelMultipliers) -> CriticalCone:
+    """Critical cone of one level.
 
-    Binding are limits with a multiplier, equalities, what earlier levels hold, and the differences between pieces that
-    share the largest value.
+    Binding rows are limits with a multiplier, equalities, the sums of earlier levels, and the differences between
+    pieces that share the largest value.
     """
     active, bound = local.active, multipliers.positive
     fixed = {k for k, row in enumerate(active.rows) if row.limit and row.limit.row in local.program.fixed}
     touching = {*range(active.limits), *system.inequalities}
     limits = sorted({*system.equalities, *fixed, *(touching & bound)})
     unit = np.eye(len(active.rows))
-    shared = [k for k in system.pieces if k in bound]
-    apart = [unit[k] - unit[shared[0]] for k in shared[1:]]
-    sums = np.array([*(unit[k] for k in limits), *system.held, *apart]).reshape(-1, len(active.rows))
-    jacobian = np.vstack([sums @ local.slopes, local.shut])
+    largest_pieces = [k for k in system.pieces if k in bound]
+    differences = [unit[k] - unit[largest_pieces[0]] for k in largest_pieces[1:]]
+    sums = np.array([*(unit[k] for k in limits), *system.higher_levels, *differences]).reshape(-1, len(active.rows))
+    jacobian = np.vstack([sums @ local.slopes, local.closed_directions])
     left, sizes, rows = np.linalg.svd(jacobian)
     least = RANK * max(1.0, sizes.max(initial=0.0))
     rank = int(np.sum(sizes > least))
     basis = rows[rank:].T
     excess = np.array([row.excess for row in active.rows])
-    missed = np.append(sums @ np.where(np.isfinite(excess), excess, 0.0), np.zeros(len(local.shut)))
-    back = -rows[:rank].T @ (left[:, :rank].T @ missed / sizes[:rank])
+    residuals = np.append(sums @ np.where(np.isfinite(excess), excess, 0.0), np.zeros(len(local.closed_directions)))
+    back = -rows[:rank].T @ (left[:, :rank].T @ residuals / sizes[:rank])
     slopes = local.gradients[sorted(touching.difference(limits))] @ basis
     rises = np.abs(slopes).max(axis=1, initial=0.0)
-    return Critical(basis, back, slopes[rises > FLAT], np.concatenate([sizes / least, rises / FLAT]), sums)
+    return CriticalCone(basis, back, slopes[rises > FLAT], np.concatenate([sizes / least, rises / FLAT]), sums)
 
 
-def judged(local: Local, level: int, system: System, multipliers: LevelMultipliers) -> Curvature:
-    """Return what second order says of one level with one set of multipliers."""
-    cone = critical(local, system, multipliers)
+def second_order_of(local: Local, level: int, system: System, multipliers: LevelMultipliers) -> Curvature:
+    """Second order of one level with one set of multipliers."""
+    cone = critical_cone(local, system, multipliers)
     weights = multipliers.normalised(system)
     slope = weights @ local.gradients
     if cone.basis.shape[1] == 0:
         step = _newton(cone, np.zeros((0, 0)), np.zeros(0), slope)
-        return Curvature(settled=True, step=step, figures=cone.figures)
+        return Curvature(determined=True, step=step, ratios=cone.ratios)
     bends = local.derivatives.curvatures(cone.basis)
     hessian = np.tensordot(weights, bends, axes=1)
-    gained = _followed(local, cone.basis, slope)
-    if gained is None:
-        return Curvature(unique=False, higher="open", figures=cone.figures)
-    followed, unsure = gained
-    values, vectors = np.linalg.eigh(hessian + followed)
-    error = local.derivatives.error * float(np.abs(weights) @ np.abs(bends).max(axis=(1, 2), initial=1.0)) + unsure
-    flat, curved = FLAT + unsure, values > max(NEWTON_CURVED, 2 * unsure)
-    found = Curvature(
-        settled=bool(values.min() > flat) or _settled_but_for_moves(local, level, cone.basis, hessian + followed, flat),
+    valley_gain = _valley_gain(local, cone.basis, slope)
+    if valley_gain is None:
+        return Curvature(unique=False, higher="open", ratios=cone.ratios)
+    valley_hessian, valley_error = valley_gain
+    values, vectors = np.linalg.eigh(hessian + valley_hessian)
+    error = (
+        local.derivatives.error * float(np.abs(weights) @ np.abs(bends).max(axis=(1, 2), initial=1.0)) + valley_error
+    )
+    flat, curved = FLAT + valley_error, values > max(NEWTON_CURVED, 2 * valley_error)
+    curvature = Curvature(
+        determined=bool(values.min() > flat)
+        or _determined_except_moves(local, level, cone.basis, hessian + valley_hessian, flat),
         step=_newton(cone, vectors[:, curved], values[curved], slope),
-        figures=np.concatenate([cone.figures, np.abs(values) / flat]),
+        ratios=np.concatenate([cone.ratios, np.abs(values) / flat]),
         error=error,
     )
     if values.min() < -flat:
-        least = least_on_cone(hessian + followed, cone.slopes)
-        found = replace(found, figures=np.append(found.figures, abs(least) / flat))
+        least = least_on_cone(hessian + valley_hessian, cone.slopes)
+        curvature = replace(curvature, ratios=np.append(curvature.ratios, abs(least) / flat))
         if least < -flat:
-            return replace(found, minimum=False, unique=False)
-    still = vectors.T[values <= flat]
-    found = replace(found, unique=not any(map(cone.ways, still)), level=still @ cone.basis.T)
-    bent, rising = values > max(FAINT, flat), values > flat
+            return replace(curvature, minimum=False, unique=False)
+    flat_vectors = vectors.T[values <= flat]
+    curvature = replace(
+        curvature, unique=not any(map(cone.directions, flat_vectors)), level=flat_vectors @ cone.basis.T
+    )
+    bent, rising = values > max(FLAT_ENOUGH, flat), values > flat
     if rising.any() and values.min() >= -flat:
-        found = replace(found, closed=_closed(local, cone, weights, vectors[:, rising], values[rising]))
+        curvature = replace(
+            curvature, closed=_closed_directions(local, cone, weights, vectors[:, rising], values[rising])
+        )
     if level < local.shown:
-        return found
+        return curvature
     lagrangian = _lagrangian(local, level, multipliers)
-    curve = _curve(local, cone, vectors[:, bent], values[bent], next(iter(_pulled(local, slope)), None))
+    curve = _curve(local, cone, vectors[:, bent], values[bent], next(iter(_pulling_levels(local, slope)), None))
     faint = vectors.T[~bent]
     if not bent.any():
-        # A whole line along which nothing changes, and beside which nothing curves, need not be looked along.
-        faint = _beside(_moves(local, cone.basis, FALLEN / (1.0 + float(np.abs(multipliers.of).sum())))).T
-    ways = [way for line in _lines(faint) for way in cone.ways(line)]
-    higher = _higher(lagrangian, curve, ways, multipliers.residual, len(faint) <= FOLLOWED)
+        # A line along which nothing changes, and around which nothing curves, needs no test.
+        faint = _complement(_moves(local, cone.basis, LEAST_FALL / (1.0 + float(np.abs(multipliers.values).sum())))).T
+    directions = [direction for line in _lines(faint) for direction in cone.directions(line)]
+    higher = _higher(lagrangian, curve, directions, multipliers.residual, len(faint) <= MOST_CURVES)
     if higher == "falls" and curve.valley:
-        # A design that is better here may be worse at an earlier level, which rises to higher order along the valley.
+        # A better design may be worse at an earlier level, which rises to higher order along the valley.
         higher = "open"
-    return replace(found, higher=higher)
+    return replace(curvature, higher=higher)
 
 
-def _pulled(local: Local, slope: Floats) -> list[tuple[Closed, Floats]]:
-    """Return the earlier levels that close directions along which a later one's slope (variables,) does not vanish."""
+def _pulling_levels(local: Local, slope: Floats) -> list[tuple[ClosedDirections, Floats]]:
+    """Earlier levels that close directions along which the slope (variables,) of a later one does not vanish."""
     pulls = [(closed, closed.directions @ slope) for closed in local.closed]
     return [(closed, pull) for closed, pull in pulls if np.abs(pull).max(initial=0.0) > FLAT]
 
 
-def _followed(local: Local, basis: Floats, slope: Floats) -> tuple[Floats, float] | None:
-    """Return (k, k): what a level gains along a basis by following where earlier levels are least, and its error.
+def _valley_gain(local: Local, basis: Floats, slope: Floats) -> tuple[Floats, float] | None:
+    """Hessian (k, k) that a level gains along a basis in the valley of earlier levels, and its error.
 
-    slope: of its Lagrangian; along closed directions it need not vanish. None where the gain is not known.
+    slope: of its Lagrangian, which need not vanish along closed directions. None where the gain is unknown.
     """
     width = basis.shape[1]
-    found, error = np.zeros((width, width)), 0.0
-    for closed, pull in _pulled(local, slope):
+    gain, error = np.zeros((width, width)), 0.0
+    for closed, pull in _pulling_levels(local, slope):
         moves = closed.moves(basis)
         if moves is None:
             return None
-        found += np.tensordot(pull, moves.values, axes=1)
+        gain += np.tensordot(pull, moves.values, axes=1)
         most = np.abs(moves.values).max(axis=(1, 2), initial=0.0)
         error += width * float(np.abs(pull) @ moves.errors + closed.off @ most)
-    return found, error
+    return gain, error
 
 
-def _closed(local: Local, cone: Critical, weights: Floats, rising: Floats, bends: Floats) -> Closed:
-    """Return what a level closes: directions in the cone's basis along which it rises, with their curvatures."""
+def _closed_directions(
+    local: Local, cone: CriticalCone, weights: Floats, rising: Floats, bends: Floats
+) -> ClosedDirections:
+    """Directions that a level closes: those in the cone's basis along which it rises, with their curvatures."""
     rows, directions, first = local.active.rows, (cone.basis @ rising).T, not local.closed
     derivatives, gradients = local.derivatives, local.gradients
-    return Closed(local.program, rows, derivatives, gradients, directions, bends, weights, cone.sums, first)
+    return ClosedDirections(local.program, rows, derivatives, gradients, directions, bends, weights, cone.sums, first)
 
 
 def _lines(level: Floats) -> list[Floats]:
-    """Return the lines along which a level subspace, its basis in rows, is looked at: its axes and their diagonals.
+    """Lines of a flat subspace, its basis in rows: its axes and their diagonals.
 
-    Which basis it has is chance, and a product of two variables is level along both their axes.
+    The basis of the subspace is arbitrary, and a product of two variables is flat along both axes.
     """
-    pairs = [(one, other) for k, one in enumerate(level) for other in level[:k]]
-    return [*level, *((one + sign * other) / math.sqrt(2) for one, other in pairs for sign in (1.0, -1.0))]
+    pairs = [(first, second) for k, first in enumerate(level) for second in level[:k]]
+    return [*level, *((first + sign * second) / math.sqrt(2) for first, second in pairs for sign in (1.0, -1.0))]
 
 
-def _newton(cone: Critical, vectors: Floats, bends: Floats, slope: Floats) -> Floats:
-    """Return Newton's step: back onto the binding rows, and along curved directions down the slope.
+def _newton(cone: CriticalCone, vectors: Floats, bends: Floats, slope: Floats) -> Floats:
+    """Newton's step: back onto the binding rows, and along curved directions down the slope.
 
-    vectors: (k, curved) in the cone's basis; bends: their curvatures; slope: what the multipliers leave.
+    vectors: (k, curved) in the cone's basis; bends: their curvatures; slope: that the multipliers leave.
     """
     directions = cone.basis @ vectors
     pull = directions.T @ slope
@@ -571,50 +583,56 @@ def _newton(cone: Critical, vectors: Floats, bends: Floats, slope: Floats) -> Fl
     return np.asarray(cone.back - directions @ (pull / bends))
 
 
-def _settled_but_for_moves(local: Local, level: int, basis: Floats, hessian: Floats, flat: float = FLAT) -> bool:
-    """Say whether all but moves that change nothing curves, more than flat: later levels have nothing to choose."""
+def _determined_except_moves(local: Local, level: int, basis: Floats, hessian: Floats, flat: float = FLAT) -> bool:
+    """Whether every direction curves by more than `flat`, except moves without effect: later levels then choose
+    nothing.
+    """
     if level == len(local.program.objectives) - 1:
         return False
 
     moves = _moves(local, basis)
     if not moves.size:
         return False
-    rest = _beside(moves)
+    rest = _complement(moves)
     return bool(np.linalg.eigvalsh(rest.T @ hessian @ rest).min(initial=np.inf) > flat)
 
 
 def _moves(local: Local, basis: Floats, most: float = tie_break.UNCHANGED) -> Floats:
-    """Return the directions (k, m), in a basis, of the moves that it leaves open and that change `most` at most."""
+    """Directions (k, m), in a basis, of the moves that it leaves open and that change at most `most`."""
 
     def along(move: Mapping[str, float]) -> Floats:
-        way = np.array([move.get(name, 0.0) for name in local.derivatives.names]) / local.scales
-        return np.asarray(way / (np.linalg.norm(way) or 1.0))
+        direction = np.array([move.get(name, 0.0) for name in local.derivatives.names]) / local.scales
+        return np.asarray(direction / (np.linalg.norm(direction) or 1.0))
 
-    def asked(move: Mapping[str, float]) -> bool:
-        # What moves may be held: there is no direction then.
+    def is_possible(move: Mapping[str, float]) -> bool:
+        # The variables of a move may be fixed: it has no direction then.
         return bool(np.any(along(move))) and _is_open(basis, along(move))
 
-    moves = tie_break.unchanging(local.program, local.x, asked, most)
+    moves = tie_break.unchanging(local.program, local.x, is_possible, most)
     return np.array([basis.T @ along(move) for move in moves]).reshape(len(moves), basis.shape[1]).T
 
 
-def _beside(moves: Floats) -> Floats:
-    """Return an orthonormal basis (k, rest) of what directions (k, m) leave."""
+def _complement(moves: Floats) -> Floats:
+    """Orthonormal basis (k, rest) of the complement of directions (k, m)."""
     turned, sizes, _ = np.linalg.svd(moves)
     return np.asarray(turned[:, int(np.sum(sizes > RANK)) :])
 
 
 def _is_open(basis: Floats, way: Floats) -> bool:
-    """Say whether a unit direction lies among those that no binding row forbids."""
+    """Whether no binding row forbids a unit direction."""
     return bool(np.linalg.norm(way - basis @ (basis.T @ way)) <= RANK)
 
 
 def _curve(
-    local: Local, cone: Critical, curved: Floats, bends: Floats, valley: tuple[Closed, Floats] | None = None
+    local: Local,
+    cone: CriticalCone,
+    curved: Floats,
+    bends: Floats,
+    valley: tuple[ClosedDirections, Floats] | None = None,
 ) -> FeasibleCurve:
-    """Return the designs that keep the binding rows, and an earlier level's valley if it counts.
+    """Designs that keep the binding rows, and an earlier level's valley if there is one.
 
-    curved, bends: directions in the cone's basis that curve.
+    curved, bends: curved directions in the cone's basis, and their curvatures.
     """
     scales = dict(zip(local.derivatives.names, map(float, local.scales), strict=True))
     jacobian = cone.sums @ local.slopes
@@ -623,36 +641,40 @@ def _curve(
 
 
 def _lagrangian(local: Local, level: int, multipliers: LevelMultipliers) -> Lagrangian:
-    """Return one level's Lagrangian as the program's own values have it."""
+    """Lagrangian of one level, from the program's values."""
     active = local.active
     prices: dict[int, float] = {}
     for k in sorted(multipliers.positive):
         if k < active.limits:
             place = active.rows[k].place
-            prices[place] = prices.get(place, 0.0) + float(multipliers.of[k])
-    held = {k: held_multiplier(active, k, multipliers) for k in range(level)}
-    return Lagrangian(local.program, local.x, level, prices, {k: weight for k, weight in held.items() if weight})
+            prices[place] = prices.get(place, 0.0) + float(multipliers.values[k])
+    level_prices = {k: level_multiplier(active, k, multipliers) for k in range(level)}
+    return Lagrangian(
+        local.program, local.x, level, prices, {k: weight for k, weight in level_prices.items() if weight}
+    )
 
 
-def _higher(lagrangian: Lagrangian, curve: FeasibleCurve, ways: list[Floats], slope: float, every: bool) -> Verdict:
-    """Return what higher orders do along directions (variables) without curvature.
+def _higher(
+    lagrangian: Lagrangian, curve: FeasibleCurve, directions: list[Floats], slope: float, every: bool
+) -> Verdict:
+    """Verdict of higher orders along directions (variables) without curvature.
 
-    every: whether each is followed, not only what falls along a straight line.
+    every: whether all directions are tested, not only those that fall along a straight line.
     """
-    found: set[Verdict] = set()
-    for way in ways:
-        along = dict(zip(curve.scales, map(float, way * np.array(list(curve.scales.values()))), strict=True))
-        # A straight line leaves an earlier level's valley: what it does tells nothing.
+    verdicts: set[Verdict] = set()
+    for direction in directions:
+        along = dict(zip(curve.scales, map(float, direction * np.array(list(curve.scales.values()))), strict=True))
+        # A straight line leaves an earlier level's valley, so its values show nothing.
         crooked = curve.valley is not None
         if not every and not crooked and not lagrangian.falls(along, slope):
             continue
-        verdict = curve.judged(lagrangian, curve.basis.T @ way, slope)
-        # Where designs beside the line tell nothing, the line itself must fall for doubt.
+        verdict = curve.verdict(lagrangian, curve.basis.T @ direction, slope)
+        # Where nearby designs decide nothing, the verdict stays open only if the line itself falls.
         if verdict == "falls" or (verdict == "open" and (crooked or not every or lagrangian.falls(along, slope))):
-            found.add(verdict)
-    return next((verdict for verdict in ("falls", "open") if verdict in found), "holds")
+            verdicts.add(verdict)
+    return next((verdict for verdict in ("falls", "open") if verdict in verdicts), "holds")
 
 
-def held_multiplier(active: ActiveSet, level: int, multipliers: LevelMultipliers) -> float:
-    """Return the multiplier by which an earlier objective is held."""
-    return float(sum(multipliers.of[k] for k in active.levels[level]))
+def level_multiplier(active: ActiveSet, level: int, multipliers: LevelMultipliers) -> float:
+    """Multiplier of an earlier objective."""
+    return float(sum(multipliers.values[k] for k in active.levels[level]))

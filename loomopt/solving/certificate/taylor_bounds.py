@@ -1,7 +1,7 @@
-"""A bound between all points: whole-cycle rows proven on boxes of crank angle, by truncated Taylor series over balls.
+"""Bounds between all points: whole-cycle rows proven on boxes of crank angle by truncated Taylor series over balls.
 
 On a box of half-width r around c, f(c + h) = f(c) + f'(c) h + k h² with k enclosed over the whole box. Where the
-bound is too coarse the box is halved. The formulas are the model's own, run in Arb's ball arithmetic: rounding is
+bound is too coarse the box is halved. The formulas are those of the model, in Arb's ball arithmetic: rounding is
 inside the balls.
 """
 
@@ -22,8 +22,8 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Where
 
 MOST_BOXES, MEAN_BOXES = 20_000, 2048
-"""Boxes of crank angle after which a bound is undecided (every packaged row takes under 2000), and over which a mean is
-enclosed: the cube of a width of 1/2048 is 1e-10."""
+"""Boxes of crank angle after which a bound is undecided (every packaged row takes under 2000), and boxes of a mean: the
+cube of a width of 1/2048 is 1e-10."""
 
 NEAR_TOP = 1.5
 """Widths between a box's middle and a refined top within which the box is expanded at the top, or at its end toward it.
@@ -34,9 +34,9 @@ CycleRow = tuple[str, float, Where | None]
 
 
 class CycleBound(NamedTuple):
-    """What the boxes show of one row: proven, violated at `angle` (rad), or neither within the boxes allowed.
+    """Status of one row's bound: proven, violated at `angle` (rad), or undecided within the boxes allowed.
 
-    open: the crank angle, rad, up to which an undecided one is bounded, piece by piece from the first.
+    open: crank angle, rad, up to which an undecided row is bounded, piece by piece from the first.
     """
 
     status: str
@@ -46,26 +46,26 @@ class CycleBound(NamedTuple):
 
 
 class AngleBox(NamedTuple):
-    """Shares of a piece from low to high; bend: what holds f''/2 all over it, where a box around it has shown that."""
+    """Shares of a piece from low to high; bend: enclosure of f''/2 over it, from a box around it, if known."""
 
     low: float
     high: float
     bend: Number = None
 
     def nearest(self, tops: Sequence[float]) -> float:
-        """Return where to expand: at the top that lies in the box, or so near that its end is; else in its middle."""
+        """Point of expansion: the top in the box, the end nearest to a close top, else the middle."""
         middle, width = (self.low + self.high) / 2, self.high - self.low
         top = min(tops, key=lambda u: abs(u - middle), default=math.inf)
         return min(max(top, self.low), self.high) if abs(top - middle) <= NEAR_TOP * width else middle
 
     def halves(self, bend: Number) -> "list[AngleBox]":
-        """Return both halves, the left one last; bend: theirs."""
+        """Both halves, the left one last; bend: their enclosure."""
         middle = (self.low + self.high) / 2
         return [AngleBox(middle, self.high, bend), AngleBox(self.low, middle, bend)]
 
 
 class Boxes(Reading):
-    """One design read in balls, ready to be bounded."""
+    """One design in ball arithmetic, with bounds of its rows."""
 
     def __init__(self, sampler: Sampler) -> None:
         system, model = systems.balls(), sampler.model
@@ -77,7 +77,7 @@ class Boxes(Reading):
 
     @lazy
     def _switches(self) -> list[dict[str, float]]:
-        """The switches on each piece."""
+        """Switches on each piece."""
         pieces = map(self.cycle.switch, range(self.cycle.pieces))
         return [{name: float(value) for name, value in switch.items()} for switch in pieces]
 
@@ -89,40 +89,42 @@ class Boxes(Reading):
         where: Where | None = None,
         stop: Callable[[int], bool] | None = None,
     ) -> CycleBound:
-        """Say whether sign · quantity ≤ limit (SI) all over the cycle, or over the pieces `where`.
+        """Whether sign · quantity ≤ limit (SI) over the whole cycle, or over the pieces `where`.
 
-        What has a corner at 0, where no series is, is bounded by its square. stop(boxes): whether to leave it undecided
-        after so many; after MOST_BOXES without it.
+        A quantity with a corner at 0 has no series there and is bounded by its square. stop(boxes): whether to stop
+        undecided after that number of boxes; MOST_BOXES without it.
         """
-        ended = stop or (lambda boxes: boxes >= MOST_BOXES)
-        cycle, used, square = self.cycle, 0, self.model.square(name)
-        read, limit = (square, limit * abs(limit)) if square else (name, limit)
+        is_over = stop or (lambda boxes: boxes >= MOST_BOXES)
+        cycle, box_count, square = self.cycle, 0, self.model.square(name)
+        row, limit = (square, limit * abs(limit)) if square else (name, limit)
         for piece in map(int, np.flatnonzero(self.sampler.on(name, where))):
             tops = self._tops(name, sign, piece)
             boxes = [AngleBox(0.0, 1.0)]
             while boxes:
                 box = boxes.pop()
-                used += 1
-                at = box.nearest(tops)
-                holds, bend = judged_box(functools.partial(self._signed, read, sign, piece), limit, box, at)
+                box_count += 1
+                point = box.nearest(tops)
+                holds, bend = box_verdict(functools.partial(self._signed, row, sign, piece), limit, box, point)
                 if holds is False:
                     return CycleBound(
-                        "violated", used, float(cycle.starts[piece] * (1 - at) + cycle.starts[piece + 1] * at)
+                        "violated",
+                        box_count,
+                        float(cycle.starts[piece] * (1 - point) + cycle.starts[piece + 1] * point),
                     )
                 if holds is None:
-                    if ended(used):
-                        at = cycle.starts[piece] * (1 - box.low) + cycle.starts[piece + 1] * box.low
-                        return CycleBound("undecided", used, open=float(at))
+                    if is_over(box_count):
+                        point = cycle.starts[piece] * (1 - box.low) + cycle.starts[piece + 1] * box.low
+                        return CycleBound("undecided", box_count, open=float(point))
                     boxes += box.halves(bend)
-        return CycleBound("proven" if used else "undecided", used)
+        return CycleBound("proven" if box_count else "undecided", box_count)
 
     def _tops(self, name: str, sign: float, piece: int) -> list[float]:
-        """Return where sign · quantity is highest on a piece, as refined in floats: no more than a hint."""
-        found = [extreme for extreme in self.sampler.extremes(name) if extreme.piece == piece]
-        return [extreme.u for extreme in found if sign * extreme.sign > 0]
+        """Places at which sign · quantity is highest on a piece, from floats: hints only."""
+        extremes = [extreme for extreme in self.sampler.extremes(name) if extreme.piece == piece]
+        return [extreme.u for extreme in extremes if sign * extreme.sign > 0]
 
     def _signed(self, name: str, sign: float, piece: int, centre: float, half: float) -> Number:
-        """Return sign · quantity's series around a ball; the last quantity's are kept, for its other sign."""
+        """Series of sign · quantity around a ball; that of the last quantity is cached for its other sign."""
         if name != self._read_of:
             self._read, self._read_of = {}, name
         ball = piece, centre, half
@@ -132,9 +134,9 @@ class Boxes(Reading):
         return sign * self._read[ball]
 
     def mean(self, integral: Integral) -> Number:
-        """Return a ball around an integral's mean over its pieces.
+        """Ball around an integral's mean over its pieces.
 
-        On each box the Taylor polynomial is integrated, what is left of it enclosed.
+        On each box the Taylor polynomial is integrated, and its remainder is enclosed.
         """
         if integral.angles:
             return super().mean(integral)
@@ -151,7 +153,7 @@ class Boxes(Reading):
         return total / width
 
     def _series(self, name: str, piece: int, centre: float, half: float) -> Number:
-        """Return a quantity's Taylor series in u, to second order, around a ball of u on a piece."""
+        """Taylor series of a quantity in u, to second order, around a ball of u on a piece."""
         u = systems.ball_series(centre, half)
         begin, end = self.starts[piece : piece + 2]
         angle = begin + (end - begin) * u
@@ -159,76 +161,76 @@ class Boxes(Reading):
         return systems.ball_series(0.0, 0.0) * 0 + value
 
 
-def judged_box(
+def box_verdict(
     series: Callable[[float, float], Number], limit: float, box: AngleBox, at: float
 ) -> tuple[bool | None, Number]:
-    """Return True where f ≤ limit on a box, False where f(at) breaks it, None where that is open; then its bend.
+    """Verdict on a box: True if f ≤ limit, False if f(at) exceeds it, None if open; and the enclosure of f''/2.
 
     series(centre, half): f's Taylor series in u, to second order, around a ball.
     """
     try:
         if box.bend is not None:
-            here = series(at, 0.0)
-            if here[0] > limit:
+            value_series = series(at, 0.0)
+            if value_series[0] > limit:
                 return False, None
-            if _keeps(here, box.bend, box, at, limit):
+            if _is_below(value_series, box.bend, box, at, limit):
                 return True, None
-        around = series((box.low + box.high) / 2, (box.high - box.low) / 2)
-        if around[0] <= limit:
+        box_series = series((box.low + box.high) / 2, (box.high - box.low) / 2)
+        if box_series[0] <= limit:
             return True, None
-        here = series(at, 0.0)
-        if here[0] > limit:
+        value_series = series(at, 0.0)
+        if value_series[0] > limit:
             return False, None
-        return _keeps(here, around[2], box, at, limit) or None, around[2]
+        return _is_below(value_series, box_series[2], box, at, limit) or None, box_series[2]
     except (ValueError, ZeroDivisionError):
         return None, box.bend
 
 
-def _keeps(here: Number, bend: Number, box: AngleBox, at: float, limit: float) -> bool:
-    """Say whether f(at) + f'(at) h + k h² ≤ limit all over a box; k ≤ bend, h from low − at to high − at.
+def _is_below(here: Number, bend: Number, box: AngleBox, at: float, limit: float) -> bool:
+    """Whether f(at) + f'(at) h + k h² ≤ limit over a whole box; k ≤ bend, h from low − at to high − at.
 
-    What is no number keeps nothing.
+    False for what is no number.
     """
     ball = systems.balls().number
     value, slope, bend = here[0], here[1], bend.upper()
     low, high = (ball(end) - ball(at) for end in (box.low, box.high))
     if bend < 0 and not (slope + 2 * bend * low < 0 or slope + 2 * bend * high > 0):
-        # The parabola's own top: what touches its bound from below is proven in a wide box.
+        # The parabola's top lies in the box: a row that touches its bound from below is proven in a wide box.
         return bool(value - slope * slope / (4 * bend) <= limit)
     return all(value + h * (slope + bend * h) <= limit for h in (low, ball(0.0), high))
 
 
-def judged(sampler: Sampler, rows: Sequence[CycleRow], accuracy: float) -> str:
-    """Return "proven" where boxes bound the refined peak of every row, "violated" where one is exceeded.
+def peaks_verdict(sampler: Sampler, rows: Sequence[CycleRow], accuracy: float) -> str:
+    """Verdict on the refined peaks of rows: "proven" if boxes bound every one, "violated" if one is exceeded.
 
-    accuracy: what a peak may be exceeded by, in the row's natural size. "undecided" where boxes run out, and where a
-    formula does not run on balls.
+    accuracy: allowed excess over a peak, in the row's scale. "undecided" where boxes run out, and where a formula has
+    no ball arithmetic.
     """
     if not rows or not {name for name, _, _ in rows} <= sampler.model.bounded:
         return "undecided"
     boxes = Boxes(sampler)
-    found = []
+    statuses = []
     for name, scale, where in rows:
         peak = sampler.peak(name, where) + accuracy * scale
         signs = (1.0,) if name in sampler.model.signed else (1.0, -1.0)
-        found += [boxes.bound(name, sign, peak, where).status for sign in signs]
-    return next((status for status in ("violated", "undecided") if status in found), "proven")
+        statuses += [boxes.bound(name, sign, peak, where).status for sign in signs]
+    return next((status for status in ("violated", "undecided") if status in statuses), "proven")
 
 
 def cycle_rows(program: Program) -> list[CycleRow]:
-    """Return each whole-cycle quantity of a program that counts, with its natural size and the pieces it counts on."""
-    found: list[CycleRow] = [(row, o.scale, None) for o in program.objectives for row in o.quantities]
-    found += [(limit.row, limit.scale, limit.where) for limit in program.cycle_limits.values()]
-    return list(dict.fromkeys(found))
+    """Whole-cycle quantities of a program's objectives and limits, with scale and pieces."""
+    rows: list[CycleRow] = [(row, o.scale, None) for o in program.objectives for row in o.quantities]
+    rows += [(limit.row, limit.scale, limit.where) for limit in program.cycle_limits.values()]
+    return list(dict.fromkeys(rows))
 
 
-def between_points(sampler: Sampler, rows: Sequence[CycleRow], points: int) -> float:
-    """Return by how much an independent dense scan exceeds the refined peaks, relative to the row's size."""
+def scan_excess(sampler: Sampler, rows: Sequence[CycleRow], points: int) -> float:
+    """Excess of an independent dense scan over the refined peaks, relative to the row's scale."""
     pieces, u = sampler.grid(points)
     values = sampler.together(list(dict.fromkeys(name for name, _, _ in rows)), pieces, u)
     worst = 0.0
     for name, scale, where in rows:
-        on = sampler.on(name, where)[pieces]
-        highest = float(sampler.heights(name, values[name][on]).max(initial=-np.inf))
+        on_piece = sampler.on(name, where)[pieces]
+        highest = float(sampler.heights(name, values[name][on_piece]).max(initial=-np.inf))
         worst = max(worst, (highest - sampler.peak(name, where)) / scale)
     return worst

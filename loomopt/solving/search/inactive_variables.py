@@ -75,7 +75,7 @@ def freed(search: Search, program: Program) -> Search:
     for x in (_back(search.program, best.x, names, today), best.x):
         certificate = certify(search.program, as_read(search, x), search.settings.accuracy)
         if certificate.passed:
-            certificate = replace(certificate, settled=(*best.certificate.settled, said))
+            certificate = replace(certificate, tie_breaks=(*best.certificate.tie_breaks, said))
             return replace(search, best=best._replace(moved=x, certificate=certificate))
     return search
 

@@ -128,7 +128,7 @@ def _named(found: tuple[Candidate, Certificate], best: Candidate, task: Program,
     certificate = replace(
         alone,
         unique=best.certificate.unique,
-        settled=(*best.certificate.settled, said),
+        tie_breaks=(*best.certificate.tie_breaks, said),
         change=moved.certificate.levels[-1],
         open=() if moved.certificate.unique else _called(task, left(task, moved.x, moved.certificate, ()), moved),
     )

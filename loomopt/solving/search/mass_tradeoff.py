@@ -97,7 +97,7 @@ def _with_less(search: Search, best: Candidate, added: Added) -> Search | None:
 def _taken(search: Search, task: Program, ended: Candidate, spared: Spared) -> Search:
     """Return the search with a design that adds less as its best, and the task that it is the best of."""
     said = f"{spared.added.least.figure}: least added mass, every figure held to {100 * spared.share:g} %"
-    certificate = replace(ended.certificate, settled=(*ended.certificate.settled, said))
+    certificate = replace(ended.certificate, tie_breaks=(*ended.certificate.tie_breaks, said))
     best = search.best
     assert best is not None
     own = ended._replace(objectives=best.objectives, value=best.value, certificate=certificate)

@@ -20,11 +20,11 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE, POSITIVE, PRECISE, ROUNDING
 from loomopt.solving.certificate.batch_certificate import (
-    Bent,
     DesignAt,
     Designs,
-    certify_together,
-    grouped,
+    RowDerivatives,
+    certify_batch,
+    group_equal,
     shares,
     without_extremes,
 )
@@ -145,7 +145,7 @@ def _stationary(asked: Sequence[tuple[Between, Frame]]) -> list[dict[str, float]
     found: list[dict[str, float] | None] = [None] * len(asked)
     begun = [_begun(each, frame) for each, frame in asked]
     known = [(k, each) for k, each in enumerate(begun) if each]
-    for places in grouped([(each.design.alike, tuple(row.level for row in each.frame)) for _, each in known]):
+    for places in group_equal([(each.design.batch_key, tuple(row.level for row in each.frame)) for _, each in known]):
         own = [known[place] for place in places]
         for (k, _), x in zip(own, _newton([each for _, each in own]), strict=True):
             found[k] = x
@@ -187,12 +187,12 @@ def _newton(begun: Sequence[_Begun]) -> list[dict[str, float] | None]:
     weights = np.zeros((len(begun), len(begun[0].frame)))
     settled, lost = np.zeros(len(begun), dtype=bool), np.zeros(len(begun), dtype=bool)
     for step in range(STEPS):
-        bent = own.bent(x, u)
+        bent = own.derivatives(x, u)
         lost |= ~np.array([all(np.isfinite(part[lane]).all() for part in bent) for lane in range(len(begun))])
         moving = ~(settled | lost)
         if not moving.any():
             break
-        bent = Bent(*(np.where(lost.reshape(-1, *(1,) * (part.ndim - 1)), 0.0, part) for part in bent))
+        bent = RowDerivatives(*(np.where(lost.reshape(-1, *(1,) * (part.ndim - 1)), 0.0, part) for part in bent))
         move, shift, after = _step(bent, own.inner, pieces, weights if step else None)
         x = np.where(moving[:, None], x + move * own.sizes, x)
         u = np.where(moving[:, None], np.clip(u + shift, 0.0, 1.0), u)
@@ -218,13 +218,13 @@ def _chosen(frame: Frame) -> Floats:
     return np.array([float(row.level and row.place == last) for row in frame])
 
 
-def _step(bent: Bent, inner: Floats, pieces: Floats, weights: Floats | None) -> tuple[Floats, Floats, Floats]:
+def _step(bent: RowDerivatives, inner: Floats, pieces: Floats, weights: Floats | None) -> tuple[Floats, Floats, Floats]:
     """Return Newton's step (designs, n) in natural sizes, the shifts of extremes (designs, rows), and new multipliers.
 
     Of: least T with each piece T and each other row 0; weights: the multipliers of the step before, without them those
     that leave the least slope.
     """
-    slope, _ = bent.own
+    slope, _ = bent.along_u
     share, bends = shares(bent, inner), without_extremes(bent, inner)
     # Each row's extreme is to first order where its slope along u vanishes.
     slopes = bent.slopes[:, :, :-1] - (share * slope)[:, :, None] * bent.bends[:, :, :-1, -1]
@@ -271,7 +271,7 @@ def _certified(
     """
     found: list[Search | None] = [None] * len(tried)
     known = [place for place, x in enumerate(ended) if x is not None]
-    for group in grouped([tuple(row.kind for row in tried[place][1]) for place in known]):
+    for group in group_equal([tuple(row.kind for row in tried[place][1]) for place in known]):
         places = [known[k] for k in group]
         own = [(asked[tried[place][0]], x) for place in places if (x := ended[place]) is not None]
         for place, search in zip(places, _judged(own), strict=True):
@@ -290,7 +290,7 @@ def _judged(ended: Sequence[tuple[Between, dict[str, float]]]) -> Iterator[Searc
     places = [k for k, (asked, _) in enumerate(ended) if _holds(asked.search.program, there[k], asked.told)]
     wanted = [(searches[k].program, there[k]) for k in places]
     accuracies = {search.settings.accuracy for search in searches}
-    certificates = dict(zip(places, certify_together(wanted, min(accuracies, default=1.0)), strict=True))
+    certificates = dict(zip(places, certify_batch(wanted, min(accuracies, default=1.0)), strict=True))
     for k, ((_, x), search) in enumerate(zip(ended, searches, strict=True)):
         program, accuracy, certificate = search.program, search.settings.accuracy, certificates.get(k)
         precise = max(min(PRECISE, accuracy), ROUNDING)
@@ -301,7 +301,7 @@ def _judged(ended: Sequence[tuple[Between, dict[str, float]]]) -> Iterator[Searc
             continue
         best, rules = broken[k]
         point = Point(x, "Solve_Succeeded", True, structure=program.structure)
-        candidate = Candidate(point, objectives(program, there[k]), 0.0, best, replace(certificate, settled=rules))
+        candidate = Candidate(point, objectives(program, there[k]), 0.0, best, replace(certificate, tie_breaks=rules))
         after = replace(search, candidates=(candidate,), best=candidate, stayed=True)
         open_still = certificate.level and len(least_change.unsettled(after, candidate)[1])
         # What is not as simple as it may be, or has a remark, is told by a search of its own.

@@ -20,7 +20,7 @@ from loomopt.physics.tolerances import (
     SAME_OBJECTIVE,
     STATIONARY,
 )
-from loomopt.solving.certificate.certificate import Draft, begun
+from loomopt.solving.certificate.certificate import Draft, draft_certificate
 from loomopt.solving.certificate.records import Certificate
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import SUCCESS, Known, Point, Settings, sampler_at
@@ -289,7 +289,7 @@ def _too_weak(settings: Settings, certificate: Certificate) -> bool:
     """Say whether an earlier objective gave way to a later one: its weight must exceed its multiplier, with room."""
     if settings.penalty * STRONGER > STRONGEST_PENALTY:
         return False
-    held = max((level.held for level in certificate.levels[1:]), default=0.0)
+    held = max((level.higher_levels for level in certificate.levels[1:]), default=0.0)
     earlier = any(level.stationarity > STATIONARY for level in certificate.levels[:-1])
     return earlier or settings.penalty <= HELD_MARGIN * held
 
@@ -299,7 +299,7 @@ def _certified(search: Search, candidate: Candidate) -> Search:
     accuracy = search.settings.accuracy
     search, x, draft = _judged_at(search, candidate.point.x)
     for _ in range(CORRECTIONS):
-        here, precise = draft.judged, max(min(PRECISE, accuracy), ROUNDING)
+        here, precise = draft.partial, max(min(PRECISE, accuracy), ROUNDING)
         # What lies between the refined points only counts where all else is close.
         close = here.residual <= precise and here.error <= accuracy and draft.whole.error <= accuracy
         if not here.correction or close:
@@ -308,14 +308,14 @@ def _certified(search: Search, candidate: Candidate) -> Search:
         if sampler_at(search.program, stepped) is None:
             break
         search, moved, better = _judged_at(search, stepped)
-        if better.judged.residual >= here.residual or better.judged.feasibility > FEASIBLE:
+        if better.partial.residual >= here.residual or better.partial.feasibility > FEASIBLE:
             # A long step leaves the rows that bind by its square: it is led back onto them.
             near = replace(candidate.point, x=stepped)
             back = exchange.refine_active_set(search.program, near, replace(search.settings, farthest=POLISH_FARTHER))
             if back is None:
                 break
             search, moved, better = _judged_at(search, back.x)
-        if better.judged.residual >= here.residual or better.judged.feasibility > FEASIBLE:
+        if better.partial.residual >= here.residual or better.partial.feasibility > FEASIBLE:
             break
         x, draft = moved, better
     began = time.perf_counter()
@@ -335,7 +335,7 @@ def _judged_at(
     moved, rules = tie_break.moved(program, job.tidy(program, x))
     at, there = time.perf_counter(), as_read(search, moved)
     shown = len(program.objectives) - 1 if there == known else 0
-    draft = begun(program, there, search.settings.accuracy, shown).settled(rules)
+    draft = draft_certificate(program, there, search.settings.accuracy, shown).with_rules(rules)
     certified = search.certified + time.perf_counter() - at
     return replace(search, tie_broken=search.tie_broken + at - began, certified=certified), moved, draft
 

@@ -22,7 +22,7 @@ from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import TURN, Floats
 from loomopt.physics.tolerances import FLAT, POSITIVE, RANK
 from loomopt.solving.certificate import kkt
-from loomopt.solving.certificate.certificate import judged_levels, level_multipliers
+from loomopt.solving.certificate.certificate import certify_levels, level_multipliers
 from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow, active_set
 from loomopt.solving.certificate.multiplier_set import MultiplierSet
@@ -77,12 +77,14 @@ class Optimum:
         found = JetDerivatives(program, x, sampler, self.rows)
         self.names, self.sizes = found.names, np.array(found.sizes)
         self.local = Local(program, x, sampler, self.active, found, found.gradients())
-        self.levels = judged_levels(self.local)
+        self.levels = certify_levels(self.local)
 
     @lazy
     def level(self) -> int:
         """The last level that still had something to choose."""
-        weighed = [k for k, each in enumerate(self.levels) if np.any(each.multipliers.of) and not self.active.zero[k]]
+        weighed = [
+            k for k, each in enumerate(self.levels) if np.any(each.multipliers.values) and not self.active.zero[k]
+        ]
         return weighed[-1] if weighed else len(self.levels) - 1
 
     @property
@@ -274,7 +276,7 @@ def _anchored(row: ActiveRow, sampler: Sampler) -> ActiveRow:
     """Return a row where its extreme stands at another design. Raises LostError where it is gone."""
     if row.node is None:
         return row
-    moved = kkt.moved([row], sampler)
+    moved = kkt.move_rows([row], sampler)
     node = moved[0].node if moved else None
     where = row.limit.where if isinstance(row.limit, CycleLimit) else None
     angle = sampler.angle(node or row.node)

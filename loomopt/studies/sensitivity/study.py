@@ -476,7 +476,7 @@ def _price_end(study: Study, held: Held | None, key: str, price: Price, side: Si
     sign = -1.0 if price.side == "min" and limit and not limit.sign else 1.0
     cost = np.where(np.isin(np.arange(len(optimum.rows)), places), sign, 0.0)
     every = optimum.multiplier_sets[level]
-    here = {way: every.at_least(way * cost) for way in (1.0, -1.0)}
+    here = {way: every.minimiser(way * cost) for way in (1.0, -1.0)}
     multipliers = here[1.0 if loosened else -1.0]
     if multipliers is None:
         return 0.0, "no design is admissible beyond"
@@ -533,7 +533,7 @@ def _worth(
     for k in places:
         limit = rows[k].limit
         assert limit is not None
-        unit = kkt.priced(sampler, limit, optimum.program.objectives[level], 1.0).worth
+        unit = kkt.price_limit(sampler, limit, optimum.program.objectives[level], 1.0).worth
         total += float(multipliers[k]) * unit
     return total
 

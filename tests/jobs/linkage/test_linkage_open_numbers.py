@@ -16,7 +16,7 @@ def solved(scene, target=None):
 def test_crank_and_frame_of_a_shaper_are_known_by_their_ratio_alone_and_change_least():
     """The lever is turned by r/d; how large both are, no level and no limit tells."""
     answer = solved("shaper")
-    assert answer.certificate.settled == ("r, d: least change from today",)
+    assert answer.certificate.tie_breaks == ("r, d: least change from today",)
     assert answer.design["r"] / answer.design["d"] == pytest.approx(0.3, rel=1e-6)
     assert not answer.certificate.open
 
@@ -32,7 +32,7 @@ def test_a_point_that_nothing_rewards_stays_and_is_named():
     )
     answer = solved(scene)
     assert answer.design["far"] == pytest.approx(0.05, abs=1e-12)
-    assert "far: serves no level, least change from today" in answer.certificate.settled
+    assert "far: serves no level, least change from today" in answer.certificate.tie_breaks
     assert answer.figures["peak_torque"] == pytest.approx(1336.06756, rel=1e-8)
 
 
@@ -41,7 +41,7 @@ def test_the_end_of_a_rest_that_no_level_seeks_is_not_crept_along():
     """Freed in the target of balance it leaves the least torque of no rest, and goes as far as the rest holds."""
     answer = solved(lo.load("sixbar-sley").free(["end"]), "balance")
     assert answer.figures["peak_torque"] == pytest.approx(156.9927548, rel=1e-8)
-    assert "end: serves no level, least change from today" in answer.certificate.settled
+    assert "end: serves no level, least change from today" in answer.certificate.tie_breaks
     assert not answer.certificate.open
     limit = next(each for each in answer.limits if each.name == "travel.rest")
     assert limit.value == pytest.approx(limit.max, rel=1e-6)
@@ -63,4 +63,4 @@ def test_without_its_timing_a_path_is_met_closer_and_where_the_crank_starts_says
     missed = np.abs(P[:, None] - places).min(axis=0)
     assert np.sqrt(np.mean(missed**2)) == pytest.approx(answer.figures["path_rms"], rel=1e-4)
     assert answer.figures["path_rms"] < 0.0223965, "than with the timing"
-    assert any("start" in said for said in answer.certificate.settled + tuple(answer.certificate.open))
+    assert any("start" in said for said in answer.certificate.tie_breaks + tuple(answer.certificate.open))

@@ -53,7 +53,7 @@ def test_figures_that_are_no_number_are_none():
 
 def test_a_certificate_as_data():
     level = Level("f", 1e-9, 2e-9, 3.0)
-    certificate = Certificate(True, (), (level,), 1e-10, 1e-11, True, False, settled=("s",))
+    certificate = Certificate(True, (), (level,), 1e-10, 1e-11, True, False, tie_breaks=("s",))
     certificate = replace(certificate, by="jets", whole_cycle="bounded")
     assert certificate_dict(certificate) == {
         "passed": True,

@@ -10,7 +10,7 @@ from loomopt.jobs import registry
 from loomopt.scenes import designs
 from loomopt.solving import engine
 from loomopt.solving.certificate import batch_certificate
-from loomopt.solving.certificate.certificate import certify, prepared
+from loomopt.solving.certificate.certificate import certify, prepare
 from loomopt.solving.certificate.derivatives import JetDerivatives
 
 ACCURACY, ROUNDED = 1e-8, 1e-12
@@ -49,7 +49,7 @@ def beside(program, x, share, count):
 @pytest.mark.parametrize(("job", "target"), TASKS)
 def test_derivatives_are_those_of_each_design_alone(job, target):
     program, x = optimum(job, target)
-    places = [(each, prepared(program, each, ACCURACY)) for each in beside(program, x, 1e-9, 4)]
+    places = [(each, prepare(program, each, ACCURACY)) for each in beside(program, x, 1e-9, 4)]
     asked = [batch_certificate.DesignAt(program, each, sampler, active.rows) for each, (sampler, active) in places]
     for of, found in zip(asked, batch_certificate.derivatives(asked), strict=True):
         alone = JetDerivatives(program, of.x, of.sampler, of.rows)
@@ -62,7 +62,7 @@ def test_derivatives_are_those_of_each_design_alone(job, target):
 @pytest.mark.parametrize(("job", "target"), TASKS)
 def test_derivatives_are_the_same_bits_in_batches_of_any_size(job, target):
     program, x = optimum(job, target)
-    places = [(each, prepared(program, each, ACCURACY)) for each in beside(program, x, 1e-9, 10)]
+    places = [(each, prepare(program, each, ACCURACY)) for each in beside(program, x, 1e-9, 10)]
     asked = [batch_certificate.DesignAt(program, each, sampler, active.rows) for each, (sampler, active) in places]
     whole = batch_certificate.derivatives(list(itertools.islice(itertools.cycle(asked), 200)))
     for size in (1, 8):
@@ -84,11 +84,11 @@ def test_adversaries_are_refused_in_batches_as_they_are_alone(job, target, count
     program, x = optimum(job, target)
     asked = [(program, each) for share in (1e-6, 1e-4) for each in beside(program, x, share, 2)]
     several = list(itertools.islice(itertools.cycle(asked), count))
-    whole = batch_certificate.certify_together(several, ACCURACY)
+    whole = batch_certificate.certify_batch(several, ACCURACY)
     for k, (_, each) in enumerate(asked):
         assert verdict(whole[k]) == verdict(certify(program, each, ACCURACY))
         assert whole[k].passed == (each == x)
-        assert whole[k] == batch_certificate.certify_together([asked[k]], ACCURACY)[0]
+        assert whole[k] == batch_certificate.certify_batch([asked[k]], ACCURACY)[0]
     assert all(whole[k] == whole[k % len(asked)] for k in range(count))
 
 

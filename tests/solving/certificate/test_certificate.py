@@ -12,7 +12,7 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.solving.certificate import certificate as certificates
 from loomopt.solving.certificate.certificate import certify
-from loomopt.solving.certificate.taylor_bounds import between_points
+from loomopt.solving.certificate.taylor_bounds import scan_excess
 from reference.beatup import DESIGN, Machine, least, random_designs
 
 JOB = registry.find("beatup")
@@ -269,7 +269,7 @@ def test_a_later_level_may_not_pay_with_an_earlier_one(x, y, reason):
     if reason:
         refused(certificate, reason)
     else:
-        assert certificate.levels[1].held == pytest.approx(4.0, rel=1e-6), "slope of b along x: 2 (3 - 1)"
+        assert certificate.levels[1].higher_levels == pytest.approx(4.0, rel=1e-6), "slope of b along x: 2 (3 - 1)"
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
@@ -331,19 +331,19 @@ def test_a_limit_with_next_to_no_price_does_not_bind(price, binds):
 
 def test_a_draft_is_the_certificate_but_for_what_lies_between_the_points(best, monkeypatch):
     """The dense scan is made when the whole certificate is asked for, once."""
-    program, scans, scan = JOB.program(scene_of(745), "balance"), [], between_points
+    program, scans, scan = JOB.program(scene_of(745), "balance"), [], scan_excess
     x = JOB.values(program, best[745])
 
     def counted(*arguments):
         scans.append(1)
         return scan(*arguments)
 
-    monkeypatch.setattr(certificates, between_points.__name__, counted)
-    draft = certificates.begun(program, x, ACCURACY)
-    assert (scans, draft.judged.passed, draft.judged.violation) == ([], True, 0.0)
-    assert draft.settled(()) is draft
-    said = draft.settled(("a rule",))
-    assert (said.judged.settled, said.whole.settled) == (("a rule",), ("a rule",))
+    monkeypatch.setattr(certificates, scan_excess.__name__, counted)
+    draft = certificates.draft_certificate(program, x, ACCURACY)
+    assert (scans, draft.partial.passed, draft.partial.violation) == ([], True, 0.0)
+    assert draft.with_rules(()) is draft
+    said = draft.with_rules(("a rule",))
+    assert (said.partial.tie_breaks, said.whole.tie_breaks) == (("a rule",), ("a rule",))
     assert draft.whole is draft.whole
     assert len(scans) == 2
-    assert replace(said.whole, settled=()) == draft.whole == certify(program, x, ACCURACY)
+    assert replace(said.whole, tie_breaks=()) == draft.whole == certify(program, x, ACCURACY)

@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import linprog
 from support import toy
 
-from loomopt.solving.certificate.batch_certificate import certify_together
-from loomopt.solving.certificate.certificate import certified, certify
+from loomopt.solving.certificate.batch_certificate import certify_batch
+from loomopt.solving.certificate.certificate import certify, certify_by
 from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 
@@ -22,13 +22,13 @@ FALLS, CURVES, EXCEEDED, PRICED = "can still fall", "second order fails", " is e
 def judged(program, x):
     """Return the certificate; what jets are clear about, 40 digits say too."""
     x = {name: float(value) for name, value in x.items()}
-    quick, slow = (certified(kind, program, x, ACCURACY) for kind in (JetDerivatives, MpmathDerivatives))
+    quick, slow = (certify_by(kind, program, x, ACCURACY) for kind in (JetDerivatives, MpmathDerivatives))
     assert (slow.by, slow.clear) == ("40 digits", True)
     if quick.clear:
         assert verdict(quick) == verdict(slow)
     found = certify(program, x, ACCURACY)
     assert found == (quick if quick.clear else slow)
-    alone, *several = [each for count in (1, 9) for each in certify_together([(program, x)] * count, ACCURACY)]
+    alone, *several = [each for count in (1, 9) for each in certify_batch([(program, x)] * count, ACCURACY)]
     assert verdict(alone) == verdict(found)
     assert all(each == alone for each in several)
     return found

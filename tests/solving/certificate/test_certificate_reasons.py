@@ -13,10 +13,10 @@ from loomopt.solving.certificate import certificate, kkt, second_order
 from loomopt.solving.certificate.certificate import (
     COMPLEMENTARY,
     LARGEST_PRICE,
-    JudgedLevel,
+    CertifiedLevel,
     WholeCycle,
-    certified,
     certify,
+    certify_by,
 )
 from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
@@ -28,12 +28,12 @@ NONE = LevelMultipliers(np.zeros(0), 0.0)
 
 
 def judged(curvature=None, **residuals):
-    level = {"objective": "f", "stationarity": 0.0, "complementarity": 0.0, "held": 0.0, **residuals}
-    return JudgedLevel(Level(**level), NONE, curvature)
+    level = {"objective": "f", "stationarity": 0.0, "complementarity": 0.0, "higher_levels": 0.0, **residuals}
+    return CertifiedLevel(Level(**level), NONE, curvature)
 
 
 def not_least(*levels):
-    return [reason.split(":")[0] for reason in certificate._not_least(levels)]
+    return [reason.split(":")[0] for reason in certificate._optimality_reasons(levels)]
 
 
 # The whole cycle ----------------------------------------------------------------------------------------------------
@@ -51,7 +51,7 @@ def not_least(*levels):
     ],
 )
 def test_the_whole_cycle_is_covered_to_the_accuracy(violation, bound, reasons):
-    assert len(list(certificate._open(WholeCycle(violation, bound), 1e-8))) == reasons
+    assert len(list(certificate._cycle_reasons(WholeCycle(violation, bound), 1e-8))) == reasons
 
 
 # Levels -------------------------------------------------------------------------------------------------------------
@@ -72,7 +72,7 @@ def test_residuals_may_be_as_large_as_is_allowed():
 def test_the_last_level_that_falls_is_named():
     falls, fails = Curvature(higher="falls"), Curvature(minimum=False)
     assert not_least(judged(falls)) == ["second order does not decide"]
-    said = list(certificate._not_least([judged(falls), judged(falls, objective="g"), judged(Curvature())]))
+    said = list(certificate._optimality_reasons([judged(falls), judged(falls, objective="g"), judged(Curvature())]))
     assert said == ["second order does not decide: g falls along a direction without curvature"]
     assert not_least(judged(fails), judged()) == ["second order fails"]
 
@@ -108,15 +108,15 @@ def tried(monkeypatch, of, found):
         return LevelMultipliers(np.full(4, float(row)), found[row][0])
 
     def curved(place, level, system, multipliers):
-        return worst if multipliers is first else found[int(multipliers.of[0])][1]
+        return worst if multipliers is first else found[int(multipliers.values[0])][1]
 
     first = LevelMultipliers(np.array(of), 0.0)
-    monkeypatch.setattr(kkt, "solved", solved)
-    monkeypatch.setattr(second_order, "judged", curved)
+    monkeypatch.setattr(kkt, "solve_system", solved)
+    monkeypatch.setattr(second_order, "second_order_of", curved)
     here = local()
     system = kkt.System((3,), (0, 1, 2), (), np.zeros((0, 4)))
-    kept, _ = certificate._best(here, 0, system, first)
-    return ("first" if kept is first else int(kept.of[0])), left_out
+    kept, _ = certificate._best_multipliers(here, 0, system, first)
+    return ("first" if kept is first else int(kept.values[0])), left_out
 
 
 def test_rows_that_bind_are_left_out_in_turn_until_the_curvature_is_better(monkeypatch):
@@ -134,7 +134,7 @@ def test_residuals_name_the_dearest_limit():
     found = certificate._residuals(here, 0, system, LevelMultipliers(np.array([0.5, -2.0, 0.25, 1.0]), 9.0), 0.125)
     assert (found.objective, found.stationarity, found.price, found.dearest) == ("f", 0.125, 2.0, "y")
     assert found.complementarity == pytest.approx(4e-8)
-    assert found.held == 0.0
+    assert found.higher_levels == 0.0
     bare = kkt.System((3,), (), (), np.zeros((0, 4)))
     none = certificate._residuals(here, 0, bare, LevelMultipliers(np.zeros(4), 0.0), 0.0)
     assert (none.complementarity, none.price, none.dearest) == (0.0, 0.0, "")
@@ -144,16 +144,18 @@ def test_a_later_level_tells_what_the_earlier_ones_are_held_by():
     here = local(("f", "g"))
     system = kkt.system(here.active, 1, [LevelMultipliers(np.zeros(5), 0.0)])
     found = certificate._residuals(here, 1, system, LevelMultipliers(np.array([0, 0, 0, -3.0, 1.0]), 0.0), 0.0)
-    assert (found.objective, found.held) == ("g", 3.0)
+    assert (found.objective, found.higher_levels) == ("g", 3.0)
 
 
 def test_a_limit_is_worth_what_the_first_objective_it_moves_would_fall():
     here = local(("f", "slope"), TOUCHING[:2])
     levels = [
-        JudgedLevel(judged().level, LevelMultipliers(np.array([0.0, POSITIVE, 1.0, 0.0]), 0.0)),
-        JudgedLevel(judged().level, LevelMultipliers(np.array([3.0, 2.0, 0.0, 1.0]), 0.0)),
+        CertifiedLevel(judged().level, LevelMultipliers(np.array([0.0, POSITIVE, 1.0, 0.0]), 0.0)),
+        CertifiedLevel(judged().level, LevelMultipliers(np.array([3.0, 2.0, 0.0, 1.0]), 0.0)),
     ]
-    found = [(each.limit.row, each.objective.figure, each.worth) for each in certificate._priced(here, levels).binding]
+    found = [
+        (each.limit.row, each.objective.figure, each.worth) for each in certificate._price_limits(here, levels).binding
+    ]
     assert found == [("x", "slope", 3.0), ("y", "slope", 2.0)]
 
 
@@ -166,14 +168,14 @@ def test_variables_count_in_their_own_size(x, size, said):
     here: Any = SimpleNamespace(
         program=made, x={"x": x, "y": 0.0, "other": 1e30}, active=SimpleNamespace(excess=(0.0,))
     )
-    assert len(list(certificate._amiss(here, 0.0))) == said
+    assert len(list(certificate._design_reasons(here, 0.0))) == said
 
 
 def test_the_limit_that_is_exceeded_most_is_named():
     made = toy.program("xy", limits=(("x", 1, 0.0), ("y", 1, 0.0)))
     here: Any = SimpleNamespace(program=made, x={"x": 1.0}, active=SimpleNamespace(excess=(1e-9, 2e-9, -1.0)))
-    assert list(certificate._amiss(here, 1e-9)) == []
-    assert list(certificate._amiss(here, 2e-9)) == ["limit y is exceeded by 2e-09 of its size"]
+    assert list(certificate._design_reasons(here, 1e-9)) == []
+    assert list(certificate._design_reasons(here, 2e-9)) == ["limit y is exceeded by 2e-09 of its size"]
 
 
 # What is told -------------------------------------------------------------------------------------------------------
@@ -209,21 +211,21 @@ def test_without_second_derivatives_only_a_slope_that_is_left_decides(residual, 
         raise ZeroDivisionError
 
     first = LevelMultipliers(np.zeros(4), residual)
-    monkeypatch.setattr(kkt, "solved", lambda *_: first)
-    monkeypatch.setattr(certificate, "_best", fails)
+    monkeypatch.setattr(kkt, "solve_system", lambda *_: first)
+    monkeypatch.setattr(certificate, "_best_multipliers", fails)
     if raises:
         with pytest.raises(ZeroDivisionError):
-            certificate._judged_level(local(), 0, [])
+            certificate._certify_level(local(), 0, [])
     else:
-        found = certificate._judged_level(local(), 0, [])
+        found = certificate._certify_level(local(), 0, [])
         assert (found.multipliers, found.curvature, found.level.stationarity) == (first, None, residual)
 
 
 @pytest.mark.parametrize(("bound", "by"), [("proven", "bounded"), ("undecided", "refined"), ("violated", "refined")])
 def test_by_what_the_whole_cycle_is_covered_is_told(bound, by):
     here = local()
-    levels = certificate.judged_levels(here)
-    prices = certificate._priced(here, levels)
+    levels = certificate.certify_levels(here)
+    prices = certificate._price_limits(here, levels)
     assert certificate._certificate(here, WholeCycle(0.0, bound), levels, prices, 1e-8).whole_cycle == by
 
 
@@ -239,7 +241,7 @@ def test_what_floats_decide_is_judged_by_jets_and_the_rest_in_40_digits():
 def test_where_floats_have_no_slope_40_digits_have_one():
     """√x at 0: jets have no number there; a difference of 40 digits says that it can still rise, not fall."""
     root = toy.program("x", formulas={"f": lambda m, v: m.sqrt(v["x"])})
-    quick, found = certified(JetDerivatives, root, {"x": 0.0}, 1e-8), certify(root, {"x": 0.0}, 1e-8)
+    quick, found = certify_by(JetDerivatives, root, {"x": 0.0}, 1e-8), certify(root, {"x": 0.0}, 1e-8)
     assert (quick.passed, quick.clear, quick.by) == (False, False, "jets")
     assert "no number" in quick.reasons[0]
     assert (found.passed, found.clear, found.by) == (False, True, "40 digits")

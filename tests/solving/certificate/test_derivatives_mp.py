@@ -88,7 +88,7 @@ def test_an_extreme_is_settled_by_newtons_step_from_where_it_was_sampled():
     row = exact.rows[place["w"]]
     for off, settles in ((1e-6, True), (2e-2, False)):
         node = Extreme(0, 0.5 / math.pi + off, 1.0)
-        moved = float(exact._settled(row, node, exact._reading(exact.base)))
+        moved = float(exact._newton_step(row, node, exact._reading(exact.base)))
         wanted = 0.5 / math.pi if settles else node.u
         assert moved == pytest.approx(wanted, abs=1e-15), "a step of more than 1e-3 is of no extreme"
 

@@ -82,7 +82,7 @@ def test_directions_that_are_curved_move_to_where_the_least_is(fourth, verdict):
     rows = {"f": lambda z: z["v"] ** 2 - 2 * z["v"] * z["w"] ** 2 + fourth * z["w"] ** 4}
     program, found = curve(rows, (), [], [[1.0, 0.0]], v=0.0, w=0.0)
     lagrangian = Lagrangian(program, {"v": 0.0, "w": 0.0}, 0, {}, {})
-    assert found.judged(lagrangian, np.array([0.0, 1.0]), 0.0) == verdict
+    assert found.verdict(lagrangian, np.array([0.0, 1.0]), 0.0) == verdict
 
 
 def wave(m, v, phi):

@@ -8,7 +8,7 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import POSITIVE, STATIONARY
 from loomopt.solving.certificate import kkt
 from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
-from loomopt.solving.certificate.kkt import LevelMultipliers, System, active_set, replaceable, solved
+from loomopt.solving.certificate.kkt import LevelMultipliers, System, active_set, replaceable_rows, solve_system
 
 
 def at(program, x):
@@ -21,7 +21,7 @@ def at(program, x):
 def level(program, x, place=0, earlier=()):
     active, gradients = at(program, x)
     system = kkt.system(active, place, earlier)
-    return active, system, kkt.solved(gradients, system)
+    return active, system, kkt.solve_system(gradients, system)
 
 
 XY = {"x": 0.0, "y": 0.0}
@@ -33,22 +33,22 @@ def test_limits_share_a_slope_by_their_own():
     _, system, found = level(program, XY)
     assert system.inequalities == (0, 1, 2)
     assert system.equalities == ()
-    assert found.of == pytest.approx([3.0, 2.0, 0.0, 1.0])
+    assert found.values == pytest.approx([3.0, 2.0, 0.0, 1.0])
     assert found.residual < 1e-14
     assert found.positive == {0, 1, 3}
     without = system.without(1)
     assert (without.inequalities, without.pieces) == ((0, 2), system.pieces)
-    assert kkt.solved(at(program, XY)[1], without).residual > 0.5
+    assert kkt.solve_system(at(program, XY)[1], without).residual > 0.5
 
 
 def test_an_equality_may_pull_either_way_and_a_limit_may_not():
     for value in (3.0, -3.0):
         rows = {"f": lambda v, value=value: value * v["x"] + v["y"] ** 2}
         _, _, found = level(toy.program("xy", rows, limits=(("x", 0, 0.0),)), XY)
-        assert found.of == pytest.approx([-value, 1.0])
+        assert found.values == pytest.approx([-value, 1.0])
     _, _, found = level(toy.program("xy", LEAN, limits=(("x", 1, 0.0), ("y", -1, 0.0))), XY)
     assert found.residual > 0.5
-    assert found.of[0] == 0.0
+    assert found.values[0] == 0.0
 
 
 def test_pieces_of_an_objective_share_a_multiplier_of_one():
@@ -56,7 +56,7 @@ def test_pieces_of_an_objective_share_a_multiplier_of_one():
     rows = {"p": lambda v: v["x"], "q": lambda v: -2 * v["x"] + v["y"], "r": lambda v: -v["y"]}
     _, system, found = level(toy.program("xy", rows, objectives=("p, q, r",)), XY)
     assert system.pieces == (0, 1, 2)
-    assert found.of == pytest.approx([0.5, 0.25, 0.25])
+    assert found.values == pytest.approx([0.5, 0.25, 0.25])
     assert found.residual < 1e-14
 
 
@@ -72,7 +72,7 @@ def test_what_binds_at_one_level_is_an_equality_at_the_next():
     active, _ = at(program, XY)
     system = kkt.system(active, 1, [multipliers(2.0, 0.0, 1.0, 0.0)])
     assert (system.equalities, system.inequalities) == ((0,), (1,))
-    assert system.held.tolist() == [[0, 0, 1, 0]]
+    assert system.higher_levels.tolist() == [[0, 0, 1, 0]]
     assert system.limits == (1, 0)
     faint = kkt.system(active, 1, [multipliers(0.9e-8, 0.0, 1.0, 0.0)])
     assert faint.equalities == ()
@@ -81,14 +81,14 @@ def test_what_binds_at_one_level_is_an_equality_at_the_next():
 def test_a_peak_of_several_pieces_is_held_piece_by_piece():
     program = toy.program("xy", TWO, objectives=("a, b", "c"))
     active, _ = at(program, XY)
-    held = kkt.system(active, 1, [multipliers(0.5, 0.5, 0.0)]).held
+    held = kkt.system(active, 1, [multipliers(0.5, 0.5, 0.0)]).higher_levels
     assert held.tolist() == [[1, 0, 0], [0, 1, 0]]
-    assert kkt.system(active, 1, [multipliers(1.0, 0.0, 0.0)]).held.tolist() == [[1, 0, 0]]
+    assert kkt.system(active, 1, [multipliers(1.0, 0.0, 0.0)]).higher_levels.tolist() == [[1, 0, 0]]
 
 
 def test_both_pieces_of_a_magnitude_that_vanishes_are_held():
     active, _ = at(toy.program("xy", TWO, objectives=("|a|", "c")), XY)
-    held = kkt.system(active, 1, [multipliers(1.0, 0.0, 0.0)]).held
+    held = kkt.system(active, 1, [multipliers(1.0, 0.0, 0.0)]).higher_levels
     assert held.tolist() == [[1, 0, 0], [0, 1, 0]]
 
 
@@ -114,10 +114,12 @@ def test_a_row_is_replaceable_where_others_can_do_without_it(seed):
     prices = 10.0 ** rng.integers(-4, 2, rows)
     gradients = np.vstack([slopes, -prices @ slopes])
     one = System((rows,), tuple(range(rows)), (), np.zeros((0, rows + 1)))
-    found = solved(gradients, one)
-    named = replaceable(gradients, one, found, STATIONARY)
+    found = solve_system(gradients, one)
+    named = replaceable_rows(gradients, one, found, STATIONARY)
     without = [
-        k for k in range(rows) if found.of[k] > POSITIVE and solved(gradients, one.without(k)).residual <= STATIONARY
+        k
+        for k in range(rows)
+        if found.values[k] > POSITIVE and solve_system(gradients, one.without(k)).residual <= STATIONARY
     ]
     assert set(without) <= set(named)
     if rows <= size and np.linalg.svd(gradients[:rows], compute_uv=False)[-1] * prices.min() > 1e-4:
@@ -129,7 +131,7 @@ def test_a_row_apart_from_those_that_depend_on_each_other_is_not_replaceable():
     gradients = np.array([[1.0, 0.0], [2.0, 0.0], [0.0, 1.0], [-2.0, -1.0]])
     one = System((3,), (0, 1, 2), (), np.zeros((0, 4)))
     found = LevelMultipliers(np.array([1.0, 0.5, 1.0, 1.0]), 0.0)
-    assert replaceable(gradients, one, found, STATIONARY) == [0, 1]
+    assert replaceable_rows(gradients, one, found, STATIONARY) == [0, 1]
 
 
 def test_a_piece_of_an_earlier_level_that_nothing_holds_may_not_rise():
@@ -137,17 +139,17 @@ def test_a_piece_of_an_earlier_level_that_nothing_holds_may_not_rise():
     rows = {"p": lambda v: v["x"], "q": lambda v: v["y"], "f": lambda v: -v["y"]}
     program = toy.program("xy", rows, objectives=("p, q", "f"), limits=(("x", -1, 0.0),))
     _, _, first = level(program, XY)
-    assert first.of[:3] == pytest.approx([1.0, 1.0, 0.0])
+    assert first.values[:3] == pytest.approx([1.0, 1.0, 0.0])
     active, system, found = level(program, XY, 1, [first])
-    (beside,) = (k for k in active.levels[0] if not first.of[k])
+    (beside,) = (k for k in active.levels[0] if not first.values[k])
     assert beside in system.inequalities
     assert found.residual < 1e-14
-    assert found.of[beside] == pytest.approx(1.0)
+    assert found.values[beside] == pytest.approx(1.0)
 
 
 def test_a_magnitude_that_vanishes_is_balanced_by_its_own_pieces():
     slope, beside = np.array([0.3, -2.0, 0.5]), np.array([0.3, -2.0, 0.4])
     pieces = kkt.System((1, 2), (0,), (), np.zeros((0, 3)))
-    found, least = kkt.vanishing(pieces, 3), kkt.solved(np.array([beside, slope, -slope]), pieces)
-    assert found.of == pytest.approx(least.of, abs=1e-15)
+    found, least = kkt.vanishing_multipliers(pieces, 3), kkt.solve_system(np.array([beside, slope, -slope]), pieces)
+    assert found.values == pytest.approx(least.values, abs=1e-15)
     assert least.residual == pytest.approx(found.residual, abs=1e-15)

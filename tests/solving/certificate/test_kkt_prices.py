@@ -8,7 +8,7 @@ from support import toy
 from loomopt.model.limits import DesignLimit, RatioLimit
 from loomopt.model.objectives import Magnitude, Peak, Value, Worst
 from loomopt.model.sampling import Sampler
-from loomopt.solving.certificate.kkt import priced
+from loomopt.solving.certificate.kkt import price_limit
 
 WAVES = {"w": lambda m, v, phi: v["x"] * m.cos(phi)}
 ROWS = {"square": lambda v: v["x"] ** 2, "size": lambda v: v["x"], "inverse": lambda v: 1 / v["x"]}
@@ -17,7 +17,7 @@ LIMIT = DesignLimit("size", 1, "size", -4.0, 2.0)
 
 
 def worth(objective, multiplier=0.5, limit=LIMIT):
-    return priced(SAMPLER, limit, objective, multiplier)
+    return price_limit(SAMPLER, limit, objective, multiplier)
 
 
 def test_a_multiplier_is_in_natural_sizes():

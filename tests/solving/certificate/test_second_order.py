@@ -24,7 +24,7 @@ def curvature(program, **x):
     """Return what second order says of the first level."""
     local = local_at(program, **x)
     system = kkt.system(local.active, 0, [])
-    return second_order.judged(local, 0, system, kkt.solved(local.gradients, system))
+    return second_order.second_order_of(local, 0, system, kkt.solve_system(local.gradients, system))
 
 
 def of(formula, **limits):
@@ -50,7 +50,7 @@ def valley(bend):
 )
 def test_curvature_counts_above_1e_7(bend, minimum, unique, settled):
     found = curvature(valley(bend), x=0.0, y=0.0)
-    assert (found.minimum, found.unique, found.settled) == (minimum, unique, settled)
+    assert (found.minimum, found.unique, found.determined) == (minimum, unique, settled)
 
 
 def test_a_touching_limit_closes_a_way_that_falls():
@@ -101,7 +101,7 @@ def test_pieces_that_share_a_peak_forbid_what_parts_them():
     program = toy.program("xy", rows, objectives=("p, q",))
     local = local_at(program, x=0.0, y=0.0)
     system = kkt.system(local.active, 0, [])
-    cone = second_order.critical(local, system, kkt.solved(local.gradients, system))
+    cone = second_order.critical_cone(local, system, kkt.solve_system(local.gradients, system))
     assert np.abs(cone.basis) == pytest.approx(np.array([[0.0], [1.0]]))
     assert curvature(program, x=0.0, y=0.0).unique
 
@@ -133,7 +133,7 @@ IDLE = {"f": lambda v: (v["x"] - 1) ** 2, "g": lambda v: v["x"] ** 3}
 
 def test_a_level_settles_all_but_what_changes_nothing():
     """Level 2 then has nothing to choose, though it has no multipliers of its own: f holds x to second order only."""
-    assert curvature(moved(IDLE), x=1.0, y=1.0).settled
+    assert curvature(moved(IDLE), x=1.0, y=1.0).determined
     certificate = certify(moved(IDLE), {"x": 1.0, "y": 1.0}, 1e-8)
     assert certificate.passed, certificate.reasons
     assert certificate.levels[1].stationarity == 0.0
@@ -152,19 +152,19 @@ def test_a_level_settles_all_but_what_changes_nothing():
     ids=["a later objective", "one between the ends", "no move", "a limit that is touched", "no moves at all"],
 )
 def test_what_does_change_something_is_still_to_be_chosen(program):
-    assert not curvature(program, x=1.0, y=1.0).settled
+    assert not curvature(program, x=1.0, y=1.0).determined
 
 
 def test_the_bound_of_what_moves_does_not_count():
-    assert curvature(moved(IDLE, limits=(("x", 1, 5.0),)), x=1.0, y=9.0).settled
-    assert not curvature(moved(IDLE, objectives=("f",)), x=1.0, y=1.0).settled, "no later level asks"
+    assert curvature(moved(IDLE, limits=(("x", 1, 5.0),)), x=1.0, y=9.0).determined
+    assert not curvature(moved(IDLE, objectives=("f",)), x=1.0, y=1.0).determined, "no later level asks"
 
 
 def test_a_common_scale_that_changes_nothing_is_settled_too():
     ratio = {"f": lambda v: (v["x"] / v["y"] - 2) ** 2, "g": lambda v: v["x"] / v["y"]}
-    assert curvature(moved(ratio, ("x", "y"), ScaleMove, least=0.5), x=2.0, y=1.0).settled
+    assert curvature(moved(ratio, ("x", "y"), ScaleMove, least=0.5), x=2.0, y=1.0).determined
     tilted = ratio | {"g": lambda v: v["x"]}
-    assert not curvature(moved(tilted, ("x", "y"), ScaleMove, least=0.5), x=2.0, y=1.0).settled
+    assert not curvature(moved(tilted, ("x", "y"), ScaleMove, least=0.5), x=2.0, y=1.0).determined
 
 
 @pytest.mark.parametrize(
@@ -183,7 +183,7 @@ def test_a_move_that_changes_nothing_is_looked_along_only_beside_what_curves(mon
         looked.append(way)
         return "holds"
 
-    monkeypatch.setattr(second_order.FeasibleCurve, "judged", counted)
+    monkeypatch.setattr(second_order.FeasibleCurve, "verdict", counted)
     program = moved({"f": formula}, limits=(("x", -1, 0.0),) if shut else (), objectives=("f",))
     assert curvature(program, x=0.0, y=1.0).higher == "holds"
     assert bool(looked) == looks

@@ -5,7 +5,7 @@ import pytest
 from support import toy
 
 import loomopt as lo
-from loomopt.solving.certificate.certificate import certify, judged_levels
+from loomopt.solving.certificate.certificate import certify, certify_levels
 from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import active_set
@@ -30,7 +30,7 @@ def test_a_later_level_moves_only_what_an_earlier_one_leaves_level():
     """f is least at a = 0 alone, with no slope there to price a step toward a = 1, which g would take."""
     found = passed(BOWL, a=0.0, b=2.0)
     assert (found.minimum, found.unique) == (True, True)
-    assert found.levels[1].held == pytest.approx(0.0, abs=1e-6)
+    assert found.levels[1].higher_levels == pytest.approx(0.0, abs=1e-6)
     assert not certify(BOWL, {"a": 0.0, "b": 1.9}, 1e-8).passed, "b is free for g"
     assert not certify(BOWL, {"a": 0.1, "b": 2.0}, 1e-8).passed, "f comes first"
 
@@ -39,7 +39,7 @@ def test_rounding_in_a_slope_gives_no_price_without_measure():
     """Where f's slope along a is 1e-10 only, g's of 2 would cost 2e10 of it."""
     found = passed(BOWL, a=5e-11, b=2.0)
     assert max(level.price for level in found.levels) < 10.0
-    assert max(level.held for level in found.levels) < 10.0
+    assert max(level.higher_levels for level in found.levels) < 10.0
 
 
 @pytest.mark.parametrize("turn", [0.3, 1.1])
@@ -98,7 +98,7 @@ def test_closed_directions_are_perpendicular_to_what_binds_and_to_each_other():
     sampler = toy.Sampler(program.model, x)
     active = active_set(program, sampler)
     exact = MpmathDerivatives(program, x, sampler, active.rows)
-    first, second = judged_levels(Local(program, x, sampler, active, exact, exact.gradients()))
+    first, second = certify_levels(Local(program, x, sampler, active, exact, exact.gradients()))
     closed = first.curvature.closed
     assert closed.directions @ closed.directions.T == pytest.approx(np.eye(2), abs=1e-12)
     assert closed.directions[:, 3] == pytest.approx(0.0, abs=1e-12)

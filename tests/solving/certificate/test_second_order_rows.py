@@ -12,7 +12,7 @@ from loomopt.physics.tolerances import FLAT
 from loomopt.solving.certificate import kkt, second_order
 from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import LevelMultipliers, active_set
-from loomopt.solving.certificate.second_order import Critical, Local
+from loomopt.solving.certificate.second_order import CriticalCone, Local
 
 
 def local_at(program, **x):
@@ -26,13 +26,13 @@ def curvature(program, **x):
     """Return what second order says of the first level."""
     local = local_at(program, **x)
     system = kkt.system(local.active, 0, [])
-    return second_order.judged(local, 0, system, kkt.solved(local.gradients, system))
+    return second_order.second_order_of(local, 0, system, kkt.solve_system(local.gradients, system))
 
 
 def critical(program, **x):
     local = local_at(program, **x)
     system = kkt.system(local.active, 0, [])
-    return second_order.critical(local, system, kkt.solved(local.gradients, system))
+    return second_order.critical_cone(local, system, kkt.solve_system(local.gradients, system))
 
 
 # Rank -------------------------------------------------------------------------------------------------------------
@@ -79,7 +79,7 @@ def test_where_nothing_is_open_the_step_leads_back_onto_the_vertex():
         x=1 + 3e-8,
         y=2 - 4e-8,
     )
-    assert found.settled
+    assert found.determined
     assert found.step == pytest.approx([-3e-8, 4e-8], rel=1e-6)
 
 
@@ -92,12 +92,12 @@ def test_the_step_onto_a_slanted_row_is_the_shortest():
 
 @pytest.mark.parametrize(("off", "steps"), [(0.9e-13, 0), (1.1e-13, 1)])
 def test_a_distance_of_rounding_is_not_corrected(off, steps):
-    cone = Critical(np.zeros((1, 0)), np.array([off]), np.zeros((0, 0)))
+    cone = CriticalCone(np.zeros((1, 0)), np.array([off]), np.zeros((0, 0)))
     assert len(second_order._newton(cone, np.zeros((0, 0)), np.zeros(0), np.zeros(1))) == steps
 
 
 def test_newtons_step_goes_down_the_slope_and_back():
-    cone = Critical(np.eye(3)[:, :2], np.array([0.0, 0.0, 0.25]), np.zeros((0, 2)))
+    cone = CriticalCone(np.eye(3)[:, :2], np.array([0.0, 0.0, 0.25]), np.zeros((0, 2)))
     step = second_order._newton(cone, np.eye(2), np.array([2.0, 4.0]), np.array([1.0, -1.0, 9.0]))
     assert step == pytest.approx([-0.5, 0.25, 0.25])
 
@@ -119,8 +119,8 @@ def test_of_a_line_the_ways_are_open_that_no_touching_row_shuts():
     one, both = np.array([[1.0, 0.0]]), np.array([[1.0, 0.0], [-1.0, 0.0]])
     line = np.array([1.0, 0.0])
     for slopes, count in ((np.zeros((0, 2)), 2), (one, 1), (both, 0), (1e-7 * both, 2), (1.1e-7 * both, 0)):
-        assert len(Critical(np.eye(2), np.zeros(2), slopes).ways(line)) == count
-    assert Critical(np.eye(2), np.zeros(2), one).ways(line)[0].tolist() == [-1.0, 0.0]
+        assert len(CriticalCone(np.eye(2), np.zeros(2), slopes).directions(line)) == count
+    assert CriticalCone(np.eye(2), np.zeros(2), one).directions(line)[0].tolist() == [-1.0, 0.0]
 
 
 # Prices -------------------------------------------------------------------------------------------------------------
@@ -145,7 +145,9 @@ def read(monkeypatch):
 
 def higher(local, level, found, ways):
     """Return what higher orders do where nothing falls along a straight line: no design beside is asked for."""
-    cone = second_order.Critical(np.eye(2), np.zeros(2), np.zeros((0, 2)), sums=np.zeros((0, len(local.active.rows))))
+    cone = second_order.CriticalCone(
+        np.eye(2), np.zeros(2), np.zeros((0, 2)), sums=np.zeros((0, len(local.active.rows)))
+    )
     curve = second_order._curve(local, cone, np.zeros((2, 0)), np.zeros(0))
     return second_order._higher(second_order._lagrangian(local, level, found), curve, ways, found.residual, every=False)
 
@@ -166,7 +168,7 @@ def test_earlier_levels_are_held_by_what_their_pieces_carry(read):
     rows = {"p": lambda v: v["x"], "q": lambda v: v["y"], "g": lambda v: v["x"] - v["y"]}
     local = local_at(toy.program("xy", rows, objectives=("p, q", "g")), x=1.0, y=1.0)
     found = LevelMultipliers(np.array([3.0, 5.0, 1.0]), 0.0)
-    assert second_order.held_multiplier(local.active, 0, found) == 8.0
+    assert second_order.level_multiplier(local.active, 0, found) == 8.0
     higher(local, 1, found, [np.array([1.0, 0.0])])
     higher(local, 0, found, [np.array([1.0, 0.0])])
     assert [(level, held) for level, _, held, _, _ in read] == [(1, {0: 8.0}), (0, {})]
@@ -184,14 +186,14 @@ def sliding(bend):
 
 @pytest.mark.parametrize(("bend", "settled"), [(1.0, True), (1e-7, True), (4e-8, False), (0.0, False)])
 def test_what_is_left_beside_a_move_must_curve(bend, settled):
-    assert curvature(sliding(bend), x=0.0, y=0.0, z=1.0).settled == settled
+    assert curvature(sliding(bend), x=0.0, y=0.0, z=1.0).determined == settled
 
 
 @pytest.mark.parametrize(("bend", "settled"), [(FLAT, False), (1.001 * FLAT, True)])
 def test_what_is_left_beside_a_move_curves_by_more_than_none(bend, settled):
     local = local_at(sliding(1.0), x=0.0, y=0.0, z=1.0)
     basis = np.eye(3)[:, 1:]
-    assert second_order._settled_but_for_moves(local, 0, basis, np.diag([bend, 0.0])) == settled
+    assert second_order._determined_except_moves(local, 0, basis, np.diag([bend, 0.0])) == settled
 
 
 @pytest.mark.parametrize(("off", "is_open"), [(0.0, True), (0.9e-7, True), (1.1e-7, False)])

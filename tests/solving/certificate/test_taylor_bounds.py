@@ -19,7 +19,7 @@ from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
 from loomopt.solving.certificate import taylor_bounds
 from loomopt.solving.certificate.certificate import certify
-from loomopt.solving.certificate.taylor_bounds import Boxes, judged
+from loomopt.solving.certificate.taylor_bounds import Boxes, peaks_verdict
 
 FULL = lo.load("shedding").with_effect("damping").with_effect("dry_friction")
 ACCURACY = 1e-8
@@ -163,7 +163,7 @@ def said(wave, **kinds):
     made = program(wave, **kinds)
     sampled = Sampler(made.model, {"x": 0.0})
     assert sampled.peak("wave") < 1.0 + 1e-6, "the spike is not missed: it stands 0.54 higher than the samples see"
-    return judged(sampled, [("wave", 1.0, None)], ACCURACY), certify(made, {"x": 0.0}, ACCURACY)
+    return peaks_verdict(sampled, [("wave", 1.0, None)], ACCURACY), certify(made, {"x": 0.0}, ACCURACY)
 
 
 @pytest.mark.parametrize("wave", [spiked, sunk])

@@ -18,11 +18,11 @@ from loomopt.solving.certificate import taylor_bounds
 from loomopt.solving.certificate.taylor_bounds import (
     AngleBox,
     Boxes,
-    _keeps,
-    between_points,
+    _is_below,
+    box_verdict,
     cycle_rows,
-    judged,
-    judged_box,
+    peaks_verdict,
+    scan_excess,
 )
 
 TURN = 2 * math.pi
@@ -57,7 +57,7 @@ def box_of(name, low, high, at, limit, sign=1.0, bend=None):
     made = boxes()
     if bend is not None:
         bend = made.maths.number(bend)
-    return judged_box(functools.partial(made._signed, name, sign, 0), limit, AngleBox(low, high, bend), at)[0]
+    return box_verdict(functools.partial(made._signed, name, sign, 0), limit, AngleBox(low, high, bend), at)[0]
 
 
 @pytest.mark.parametrize(
@@ -119,8 +119,8 @@ def test_a_parabola_is_kept_below_its_highest_value_and_no_lower(slope, bend, pl
     for margin, kept in ((1e-6, True), (-1e-6, False)):
         limit = 0.25 + highest + margin
         if blur == 0.0 or not kept:
-            assert _keeps(here, ball(bend, blur), AngleBox(low, high), at, limit) is kept
-    assert _keeps(here, ball(bend, blur), AngleBox(low, high), at, 0.25 + highest + 3 * blur + 1e-6)
+            assert _is_below(here, ball(bend, blur), AngleBox(low, high), at, limit) is kept
+    assert _is_below(here, ball(bend, blur), AngleBox(low, high), at, 0.25 + highest + 3 * blur + 1e-6)
 
 
 @pytest.mark.parametrize("broken", range(3))
@@ -129,16 +129,16 @@ def test_what_is_no_number_keeps_nothing(broken):
         series = [flint.arb(0.5), flint.arb(0.1), flint.arb(-1.0)]
         series[broken] = nothing
         for at in (0.0, 0.5, 1.0):
-            assert judged_box(lambda centre, half: series, 1e9, AngleBox(0.0, 1.0), at)[0] is (broken > 0 or None)  # noqa: B023
-            assert not _keeps(series[:2], series[2], AngleBox(0.0, 1.0), at, 1e9)
+            assert box_verdict(lambda centre, half: series, 1e9, AngleBox(0.0, 1.0), at)[0] is (broken > 0 or None)  # noqa: B023
+            assert not _is_below(series[:2], series[2], AngleBox(0.0, 1.0), at, 1e9)
 
 
 def test_where_no_series_is_the_box_stays_open_with_what_is_known_of_its_bend():
     def nowhere(centre, half):
         raise ValueError("a ball around zero in a denominator")
 
-    assert judged_box(nowhere, 1.0, AngleBox(0.0, 1.0), 0.5) == (None, None)
-    assert judged_box(nowhere, 1.0, AngleBox(0.0, 1.0, 4.0), 0.5) == (None, 4.0)
+    assert box_verdict(nowhere, 1.0, AngleBox(0.0, 1.0), 0.5) == (None, None)
+    assert box_verdict(nowhere, 1.0, AngleBox(0.0, 1.0, 4.0), 0.5) == (None, 4.0)
 
 
 def test_a_box_is_expanded_at_the_top_in_it_or_toward_the_one_beside_it_and_in_the_middle_far_from_any():
@@ -244,15 +244,15 @@ def test_a_mean_is_enclosed_and_closer_by_the_cube_of_the_width(monkeypatch):
     [(1.0, 1e-9, "proven"), (1.0, -1e-9, "violated"), (10.0, -1e-16, "violated"), (1e-3, -1e-14, "proven")],
 )
 def test_a_peak_is_bounded_up_to_the_accuracy_of_its_size(scale, accuracy, status):
-    assert judged(sampler_of(), [("level", scale, None)], accuracy) == status
+    assert peaks_verdict(sampler_of(), [("level", scale, None)], accuracy) == status
 
 
 def test_both_signs_count_unless_a_quantity_has_one():
     rows = [("sunk", 1.0, None)]
-    assert judged(sampler_of(), rows, 1e-9) == "proven"
+    assert peaks_verdict(sampler_of(), rows, 1e-9) == "proven"
     with mock.patch.object(Sampler, "peak", return_value=1.0):
-        assert judged(sampler_of(), rows, 1e-9) == "violated", "−2 is lower than −1"
-        assert judged(sampler_of(signed=True), rows, 1e-9) == "proven", "and no higher than 1"
+        assert peaks_verdict(sampler_of(), rows, 1e-9) == "violated", "−2 is lower than −1"
+        assert peaks_verdict(sampler_of(signed=True), rows, 1e-9) == "proven", "and no higher than 1"
 
 
 @pytest.mark.parametrize(
@@ -267,17 +267,17 @@ def test_both_signs_count_unless_a_quantity_has_one():
 def test_the_worst_of_all_rows_is_said(statuses, said):
     found = [taylor_bounds.CycleBound(status, 1) for status in statuses]
     with mock.patch.object(Boxes, "bound", side_effect=found):
-        assert judged(sampler_of(signed=True), [("level", 1.0, None), ("hill", 1.0, None)], 1e-9) == said
+        assert peaks_verdict(sampler_of(signed=True), [("level", 1.0, None), ("hill", 1.0, None)], 1e-9) == said
 
 
 def test_a_scan_tells_the_excess_over_the_refined_peak_in_the_rows_size():
     sampled = sampler_of()
     with mock.patch.object(Sampler, "peak", return_value=0.5):
-        assert between_points(sampled, [("level", 2.0, None)], 16) == pytest.approx(0.25)
-        assert between_points(sampled, [("sunk", 0.5, None), ("level", 2.0, None)], 16) == pytest.approx(3.0)
+        assert scan_excess(sampled, [("level", 2.0, None)], 16) == pytest.approx(0.25)
+        assert scan_excess(sampled, [("sunk", 0.5, None), ("level", 2.0, None)], 16) == pytest.approx(3.0)
     with mock.patch.object(Sampler, "peak", return_value=4.0):
-        assert between_points(sampled, [("level", 2.0, None)], 16) == 0.0
-    assert between_points(sampled, [], 16) == 0.0
+        assert scan_excess(sampled, [("level", 2.0, None)], 16) == 0.0
+    assert scan_excess(sampled, [], 16) == 0.0
 
 
 def test_a_quantity_counts_once_with_its_size():

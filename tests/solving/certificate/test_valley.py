@@ -6,7 +6,7 @@ from support import inch, toy
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.solving.certificate.certificate import SECOND_ORDER_OPEN, certified, certify, judged_levels
+from loomopt.solving.certificate.certificate import SECOND_ORDER_OPEN, certify, certify_by, certify_levels
 from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import active_set
@@ -85,7 +85,7 @@ def valley(pull, own, fourth=0.0, bend=1.0, higher=0.0):
 
 def second(program, derivatives=JetDerivatives, **x):
     """Return what second order says of the second level."""
-    return judged_levels(local_by(derivatives, program, x))[1].curvature
+    return certify_levels(local_by(derivatives, program, x))[1].curvature
 
 
 @both
@@ -175,11 +175,11 @@ def test_a_fall_within_a_valleys_error_is_doubted_only_if_it_grows_as_a_fall_doe
     fall = dict(zip(PROBES, falls, strict=True))
     curve = object.__new__(FeasibleCurve)
     monkeypatch.setattr(FeasibleCurve, "_lowest", lambda self, lagrangian, step, way: [{"x": step}])
-    monkeypatch.setattr(FeasibleCurve, "_unsure", 1e-9)
-    monkeypatch.setattr(FeasibleCurve, "_is_kept", lambda self, x: True)
+    monkeypatch.setattr(FeasibleCurve, "_value_error", 1e-9)
+    monkeypatch.setattr(FeasibleCurve, "_keeps_limits", lambda self, x: True)
     lagrangian = Lagrangian(valley(1.0, 0.0), {"x": 0.0}, 0, {}, {})
     monkeypatch.setattr(Lagrangian, "value", lambda self, there: -fall.get(there["x"], 0.0))
-    assert curve.judged(lagrangian, np.zeros(1), 0.0) == verdict
+    assert curve.verdict(lagrangian, np.zeros(1), 0.0) == verdict
 
 
 def test_an_error_that_reaches_the_threshold_is_no_saddle():
@@ -189,7 +189,7 @@ def test_an_error_that_reaches_the_threshold_is_no_saddle():
     assert found.error > 1e-5
     assert found.minimum
     assert second(program, MpmathDerivatives, a=0.0, b=0.0).minimum is False
-    assert not certified(JetDerivatives, program, {"a": 1e-4, "b": 0.0}, 1e-8).clear
+    assert not certify_by(JetDerivatives, program, {"a": 1e-4, "b": 0.0}, 1e-8).clear
 
 
 # Machines -----------------------------------------------------------------------------------------------------------

@@ -65,7 +65,7 @@ def test_the_sum_of_squares_in_bound_widths_is_least():
     program = toy.program("xyz", rows, limits=(("sum", -1, 3.0),), bounds=bounds)
     best = solved(program, {"x": 4.0, "y": 4.0, "z": 2.0}, {"x": 5.0, "y": 0.0, "z": 0.0}).best
     assert best.certificate.passed
-    assert best.certificate.settled == (f"y, z: {LEAST}",)
+    assert best.certificate.tie_breaks == (f"y, z: {LEAST}",)
     assert best.certificate.open == ()
     assert not best.certificate.unique
     assert best.certificate.change.stationarity <= 1e-6
@@ -75,7 +75,7 @@ def test_the_sum_of_squares_in_bound_widths_is_least():
 def test_a_level_that_only_curves_is_held_and_not_traded():
     rows = {"f": lambda v: 1.0 + (v["x"] + v["y"] - 1.0) ** 2}
     best = solved(toy.program("xy", rows), {"x": 4.0, "y": 1.0}, {"x": 9.0, "y": 0.0}).best
-    assert best.certificate.settled == (f"x, y: {LEAST}",)
+    assert best.certificate.tie_breaks == (f"x, y: {LEAST}",)
     assert (best.x["x"], best.x["y"]) == pytest.approx((5.0, -4.0), abs=1e-6)
 
 
@@ -83,17 +83,17 @@ def test_two_levels_are_held():
     rows = {"f": lambda v: v["x"], "g": lambda v: (v["y"] + v["z"] - 1.0) ** 2}
     program = toy.program("xyz", rows, bounds={"x": (2.0, 9.0)}, objectives=("f", "g"))
     best = solved(program, {"x": 4.0, "y": 3.0, "z": 1.0}, {"x": 5.0, "y": 1.0, "z": 2.0}).best
-    assert best.certificate.settled == (f"y, z: {LEAST}",)
+    assert best.certificate.tie_breaks == (f"y, z: {LEAST}",)
     assert [best.x[name] for name in "xyz"] == pytest.approx([2.0, 0.0, 1.0], abs=1e-8)
 
 
 def test_what_has_no_value_of_today_is_named_as_open():
     program = toy.program("xyz", {"f": lambda v: v["x"] ** 2})
     bare = solved(program, {"x": 4.0, "y": 3.0, "z": 1.0}, {}).best.certificate
-    assert (bare.settled, bare.open) == ((), ("y", "z"))
+    assert (bare.tie_breaks, bare.open) == ((), ("y", "z"))
     half = solved(program, {"x": 4.0, "y": 3.0, "z": 1.0}, {"y": 2.0}).best
     assert half.x["y"] == pytest.approx(2.0, abs=1e-6)
-    assert (half.certificate.settled, half.certificate.open) == ((f"y, z: {LEAST}",), ("z",))
+    assert (half.certificate.tie_breaks, half.certificate.open) == ((f"y, z: {LEAST}",), ("z",))
     assert half.certificate.choices[-1] == "open: z"
 
 
@@ -103,7 +103,7 @@ def test_a_design_that_gets_no_certificate_stays_and_says_what_is_open(monkeypat
     search = judged(tried(Search(toy.ToyJob(program), program, Settings(), {"y": 2.0}), {"x": 4.0, "y": 3.0}))
     best = with_least_change(search).best
     assert best.x == search.best.x
-    assert (best.certificate.settled, best.certificate.open) == ((), ("y",))
+    assert (best.certificate.tie_breaks, best.certificate.open) == ((), ("y",))
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_a_design_that_has_changed_least_already_stays_to_the_last_bit_and_is_no
     assert len(certified) == 1
     assert again.x["y"] == first.x["y"]
     assert again.certificate.passed
-    assert again.certificate.settled == (f"y: {LEAST}",)
+    assert again.certificate.tie_breaks == (f"y: {LEAST}",)
     assert again.certificate.change.stationarity <= 1e-6
 
 
@@ -200,7 +200,7 @@ def test_angles_that_need_not_change_do_not():
     answer = lo.solve(freed(operation__speed="60 rpm"), starts=1)
     assert answer.status == "optimal"
     assert degrees(answer) == pytest.approx([120.0, 60.0, 120.0, 60.0], abs=1e-9)
-    assert answer.certificate.settled == (f"rise, far_dwell, return: {LEAST}",)
+    assert answer.certificate.tie_breaks == (f"rise, far_dwell, return: {LEAST}",)
     assert answer.as_dict()["certificate"]["levels"][-1]["objective"] == "change from today"
 
 
@@ -238,7 +238,7 @@ def test_a_law_that_need_not_change_is_todays_sampled_but_for_its_end():
     answer = lo.solve(scene, "law", starts=1)
     own = np.array(answer.design["law"])
     todays = 2 * math.pi * np.sin(2 * math.pi * np.arange(17) / 16)
-    assert answer.certificate.settled == (f"law: {LEAST}",)
+    assert answer.certificate.tie_breaks == (f"law: {LEAST}",)
     assert answer.figures["K1"] == pytest.approx(6176.1875, rel=1e-12)
     assert own == pytest.approx(todays, abs=0.1)
     # The spline through today's values ends at rest but not at 1: of all that end there this one is nearest, and
@@ -255,7 +255,7 @@ def test_a_law_that_need_not_change_is_todays_sampled_but_for_its_end():
 def test_a_rapier_turns_back_toward_today_as_far_as_its_bounds_allow(unsettled):
     scene = lo.load("rapier").update(ROOM)
     answer, before = lo.solve(scene, starts=1), unsettled(scene)
-    assert answer.certificate.settled == (f"alpha, C0x, C0y, phi40: {LEAST}",)
+    assert answer.certificate.tie_breaks == (f"alpha, C0x, C0y, phi40: {LEAST}",)
     assert answer.figures["peak_acceleration"] == pytest.approx(before.figures["peak_acceleration"], rel=1e-9)
     names = ("alpha", "C0x", "C0y", "phi40")
 
@@ -296,7 +296,7 @@ def test_no_earlier_objective_changes(scene, target, monkeypatch):
     monkeypatch.setattr(least_change, "with_least_change", kept)
     answer = lo.solve(scene, target, starts=1)
     assert answer.status == "optimal"
-    assert answer.certificate.settled
+    assert answer.certificate.tie_breaks
     before, after = seen[0]
     assert after == pytest.approx(before, abs=1e-9)
 
