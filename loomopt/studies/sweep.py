@@ -379,7 +379,9 @@ def _gaps(line: Sequence[Row]) -> Iterator[tuple[float, float]]:
 
 def reason(answer: Solution) -> str:
     """Return why an answer is not optimal: what clashes, else what came in the way."""
-    clash = f"limits that clash: {', '.join(answer.clash)}" if answer.clash else answer.message
+    if not answer.clash:
+        return answer.message
+    clash = f"limits that clash: {', '.join(answer.clash)}"
     return f"{clash}; {answer.explanation}" if answer.explanation else clash
 
 

@@ -19,7 +19,7 @@ from loomopt.physics.tolerances import FEASIBLE, STATIONARY
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import JointPrice, Price, Proof, Proofs, Relaxation, Words
+from loomopt.solving.answer.solution import JointPrice, Price, Proof, Proofs, Relaxation, Sentences, Words
 from loomopt.solving.certificate.records import Certificate, GlobalBound, GlobalLevel, Level
 
 AGREES = 1e-6
@@ -70,7 +70,7 @@ def _answer(told: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> An
         scene=scene,
         target="" if target is None else evaluation.target,
         status=str(told["status"]),
-        message=str(told.get("message", "")),
+        sentences=Sentences(str(told.get("message", ""))),
         binding=tuple(_price(each, Words(scene)) for each in told.get("binding", ())),
         bind_together=tuple(map(_joint_price, told.get("bind_together", ()))),
         certificate=certificate,

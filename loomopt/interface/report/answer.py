@@ -84,7 +84,7 @@ def status(subject: Subject) -> Status:
         verdict = "NOT ADMISSIBLE" if broken else "All limits held"
         return Status("bad" if broken else "open", f"{verdict}; evaluated, nothing was optimised", kept)
     if found.status != "optimal":
-        told = (found.message, found.explanation, Words(subject.scene).worse(found.worse), *kept)
+        told = (found.message, Words(subject.scene).worse(found.worse), *kept)
         verdict = VERDICTS.get(found.status, found.status.upper())
         return Status("bad", verdict, tuple(each for each in told if each), EXIT.get(found.status, NOT_CERTIFIED))
     if found.certificate is None or not found.certificate.passed or broken:

@@ -27,6 +27,7 @@ def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
     """Return the parts of a solved target: sentence, table, what binds, certificate, time."""
     heading = HEADINGS.get(answer.status, "design")
     parts: list[str | TextTable] = [f"{answer.problem}, {answer.sought}: {answer.outcome}"]
+    explanation = answer.explanation
     if answer.relaxation:
         clash = ", ".join(joined(limit) for limit in answer.clash)
         parts += [f"No admissible design exists near any start. Limits that clash: {clash}.", relaxation(answer)]
@@ -34,8 +35,8 @@ def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
         parts += [] if answer.members else [registry.of(scene).say(scene, answer.target, answer.figures)]
     else:
         parts.append(answer.message)
-    worse = Words(scene).worse(answer.worse)
-    parts += [text for text in (answer.explanation, worse) if text]
+        explanation = ""  # the message ends with it
+    parts += [text for text in (explanation, Words(scene).worse(answer.worse)) if text]
     parts += [comparison(answer, scene, answer.before, heading)] if answer.design else []
     parts += lists(answer, scene)
     parts += [members(answer, scene)] if answer.members else []

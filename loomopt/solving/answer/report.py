@@ -26,8 +26,10 @@ from loomopt.solving.answer.solution import (
     JointPrice,
     Price,
     Relaxation,
+    Sentences,
     Solution,
     Words,
+    joined,
     remedies,
 )
 from loomopt.solving.certificate.records import Certificate, GlobalBound
@@ -229,7 +231,12 @@ def _with(scene: Scene, target: str, search: Search, best: Candidate) -> Solutio
     other = evaluation(scene, job, program, job.design(program, search.spared.other))
     beside = Beside(search.spared.added.least.figure, search.spared.share, search.spared.chosen, other)
     said = _little(Words(scene), beside, made)
-    return replace(made, beside=beside, message=f"{made.message} {said}", explanation=said)
+    return replace(made, beside=beside, sentences=explained(made, said))
+
+
+def explained(answer: Solution, *more: str) -> Sentences:
+    """Sentences of an answer with more explanations."""
+    return answer.sentences._replace(explanations=(*answer.sentences.explanations, *more))
 
 
 def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
@@ -341,19 +348,17 @@ def with_optimum(
     passed = certificate.passed and here.admissible
     headline = _headline(job, scene, target, here, {price.limit for price in binding})
     if passed:
-        message = " ".join(
-            part for part in (headline, stops(binding, together), _left_open(certificate), searched) if part
-        )
+        sentences = Sentences(headline, stops(binding, together), _left_open(certificate), searched)
     else:
         reasons = "; ".join(certificate.reasons) or "a limit does not hold on independent evaluation"
-        message = f"A design was reached but not certified: {reasons}. Try more starts, such as 20."
-        message = f"{searched} {message}" if substitute else message
+        problem = f"A design was reached but not certified: {reasons}. Try more starts, such as 20."
+        result = joined(searched, problem) if substitute else problem
+        sentences = Sentences(result, explanations=(headline,) if job.members else ())
     return Solution(
         **vars(here),
         target=target,
         status="optimal" if passed else "uncertified",
-        message=message,
-        explanation=headline if job.members else "",
+        sentences=sentences,
         binding=binding,
         bind_together=together,
         certificate=certificate,
@@ -437,21 +442,20 @@ def without_optimum(
 ) -> Solution:
     """Return the answer where no design was reached: infeasible with the least relaxations, else failed."""
     if found.relaxations:
-        message = (
+        result = (
             f"No admissible design exists near any start. Limits that clash: {', '.join(found.limits)}. "
-            f"The least relaxation that helps: {_helps(found.relaxations)} {explanation}"
-        ).strip()
+            f"The least relaxation that helps: {_helps(found.relaxations)}"
+        )
     else:
-        status = str(solver["status"])
-        message = f"The solver failed ({status}): {ADVICE.get(status, 'try more starts, such as 20.')}"
+        status, explanation = str(solver["status"]), ""
+        result = f"The solver failed ({status}): {ADVICE.get(status, 'try more starts, such as 20.')}"
     return Solution(
         **vars(here),
         target=target,
         status="infeasible" if found.relaxations else "failed",
-        message=message,
+        sentences=Sentences(result, explanations=(explanation,) if explanation else ()),
         relaxation=tuple(each for remedy in remedies(found.relaxations) for each in remedy),
         clash=tuple(found.limits),
-        explanation=explanation if found.relaxations else "",
         solver=solver,
         today=today,
     )

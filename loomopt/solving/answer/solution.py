@@ -467,13 +467,36 @@ DESIGN_IS = {
 """Status of an answer → what its design is."""
 
 
+class Sentences(NamedTuple):
+    """Sentences of an answer, "" where it has nothing to say.
+
+    result: what was reached, or why nothing was; limits: those that stop it; open: variables that may be others as
+    well; search: how far the best was looked for; explanations: what else there is to know, one after the other.
+    """
+
+    result: str = ""
+    limits: str = ""
+    open: str = ""
+    search: str = ""
+    explanations: tuple[str, ...] = ()
+
+
+NO_SENTENCES = Sentences()
+
+
+def joined(*sentences: str) -> str:
+    """Sentences as one text, without those that say nothing."""
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
 @dataclass(frozen=True)
 class Solution(Evaluated):
     """A solved target. `status` is ours, `solver["status"]` is IPOPT's own word."""
 
     target: str = ""
     status: str = "failed"
-    message: str = ""
+    sentences: Sentences = NO_SENTENCES
+    """What it says, part by part: `message` joins them."""
     binding: tuple[Price, ...] = ()
     bind_together: tuple[JointPrice, ...] = ()
     """Limits that are worth more together than each alone."""
@@ -481,8 +504,6 @@ class Solution(Evaluated):
     relaxation: tuple[Relaxation, ...] = ()
     clash: tuple[str, ...] = ()
     """Limits that cannot all be kept, as phrases."""
-    explanation: str = ""
-    """What physics says of why no design is admissible."""
     solver: Mapping[str, Any] = field(default_factory=dict)
     time: Mapping[str, float] = field(default_factory=dict)
     optima: tuple[tuple[Mapping[str, float | None], int], ...] = ()
@@ -507,6 +528,18 @@ class Solution(Evaluated):
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
         freeze(self, "design", "figures", "units", "reached", "undefined", "solver", "time")
+
+    @property
+    def message(self) -> str:
+        """What it says, in sentences."""
+        said = self.sentences
+        return joined(said.result, said.limits, said.open, said.search, *said.explanations)
+
+    @property
+    def explanation(self) -> str:
+        """What else than figures and limits explains it; of a family also who decides."""
+        own = self.sentences.result if self.members and self.status == "optimal" else ""
+        return joined(own, *self.sentences.explanations)
 
     @property
     def design_is(self) -> str:

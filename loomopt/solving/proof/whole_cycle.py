@@ -25,7 +25,7 @@ from loomopt.physics.cycle import Where
 from loomopt.physics.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Proof, Proofs, Solution, Words
+from loomopt.solving.answer.solution import Proof, Proofs, Sentences, Solution, Words
 from loomopt.solving.certificate import taylor_bounds
 from loomopt.solving.certificate.taylor_bounds import Boxes
 from loomopt.solving.options import check_sought, target_name
@@ -207,5 +207,5 @@ def proven(scene: Scene, target: str, answer: Solution) -> Solution:
         return replace(answer, certificate=replace(answer.certificate, whole_cycle="proven"))
     reasons = tuple(f"{each.text} is {each.status}" for each in found.proofs if each.status != "proven")
     certificate = replace(answer.certificate, passed=False, reasons=(*answer.certificate.reasons, *reasons))
-    message = f"A design was reached but not proven: {'; '.join(reasons)}."
-    return replace(answer, certificate=certificate, status="uncertified", message=message)
+    sentences = Sentences(f"A design was reached but not proven: {'; '.join(reasons)}.")
+    return replace(answer, certificate=certificate, status="uncertified", sentences=sentences)

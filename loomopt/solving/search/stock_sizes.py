@@ -4,7 +4,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Solution, Words
+from loomopt.solving.answer import report
+from loomopt.solving.answer.solution import Sentences, Solution, Words
 
 FARTHEST_SIZE, SAME_SIZE = 4, 1e-9
 """Sizes sold that are tried on either side, and the share by which two answers to them are equally good."""
@@ -29,10 +30,9 @@ def fitted(scene: Scene, ideal: Solution, name: str, sizes: Sequence[float], sol
             found += [answer] if answer.status == "optimal" else []
     said = f"Any size would have {name} {scene.show(value, 'length')}"
     if not found:
-        message = f"No {name} that is sold gives an admissible design (tried {', '.join(tried) or 'none in bounds'}). "
-        return replace(
-            ideal, status="infeasible", message=f"{message}{said}.", certificate=None, binding=(), bind_together=()
-        )
+        problem = f"No {name} that is sold gives an admissible design (tried {', '.join(tried) or 'none in bounds'})."
+        sentences = Sentences(problem, explanations=(f"{said}.",))
+        return replace(ideal, status="infeasible", sentences=sentences, certificate=None, binding=(), bind_together=())
     best = found[0]
     for answer in found[1:]:
         best = answer if _better(answer, best) else best
@@ -40,7 +40,7 @@ def fitted(scene: Scene, ideal: Solution, name: str, sizes: Sequence[float], sol
     reached = ideal.figures.get(first)
     figure = f" and {first} {scene.show(reached, Words(scene).kind(first), 9)}" if reached is not None else ""
     explanation = f"{said}{figure}; of those sold, tried {', '.join(tried)}."
-    return replace(best, message=f"{best.message} {explanation}", explanation=explanation)
+    return replace(best, sentences=report.explained(best, explanation))
 
 
 def _until_admissible(scene: Scene, name: str, sizes: Iterator[float], solve: Solve) -> Iterator[Tried]:

@@ -22,7 +22,7 @@ from loomopt.physics.tolerances import ACTIVE, FEASIBLE, SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
 from loomopt.solving import neighbour_answer
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import Clash, Evaluated, Finding, Solution, Words
+from loomopt.solving.answer.solution import Clash, Evaluated, Finding, Sentences, Solution, Words
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.kkt import ActiveRow, active_set
 from loomopt.solving.certificate.records import Binding, Certificate
@@ -492,7 +492,8 @@ def _without(solver: Solver, terms: FrontTerms, found: Reached) -> Solution:
     told = {"status": found.reason, "accuracy": solver.accuracy}
     explained = solver.job.explain(solver.scene, clash.limits.values())
     made = report.without_optimum(terms.target or "", here, clash, told, today, explained)
-    return made if clash.limits else replace(made, status=found.status, message=f"No design was found: {found.reason}.")
+    sentences = Sentences(f"No design was found: {found.reason}.")
+    return made if clash.limits else replace(made, status=found.status, sentences=sentences)
 
 
 def clashing(solver: Solver, program: Program) -> Clash:
@@ -510,12 +511,15 @@ def _certified(
     words = Words(solver.scene)
     explicit = _explicit(terms, certificate)
     prices, together = report.prices(words, explicit), report.joint_prices(words, explicit)
-    reason = f"A design was reached but not certified: {found.reason}."
+    if found.reason:
+        sentences = Sentences(f"A design was reached but not certified: {found.reason}.")
+    else:
+        sentences = Sentences(_sought(words, terms, asking), report.stops(prices, together))
     return Solution(
         **vars(here),
         target=terms.target or "",
         status=found.status,
-        message=reason if found.reason else f"{_sought(words, terms, asking)} {report.stops(prices, together)}",
+        sentences=sentences,
         binding=prices,
         bind_together=together,
         certificate=certificate,

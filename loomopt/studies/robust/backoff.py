@@ -24,7 +24,7 @@ from loomopt.model.session import working
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import SIDES, SIGNS, Finding, Price, Robust, Solution, Words, Yield
+from loomopt.solving.answer.solution import SIDES, SIGNS, Finding, Price, Robust, Sentences, Solution, Words, Yield
 from loomopt.solving.options import check_sought, target_name
 from loomopt.studies.robust.margins import Margin, check_crossings, margins, narrow_band, share
 from loomopt.studies.tolerance.plan import SCRAMBLES, Plan, planned
@@ -416,12 +416,8 @@ def _told(
     limits = tuple(each._replace(backed_off=by_name.get(each.name, 0.0)) for each in here.limits)
     binding = tuple(_priced(words, price, off) for price in answer.binding)
     found = replace(answer, limits=limits, reached=here.reached, scene=scene, binding=binding, robust=robust)
-    said = " ".join(_said(scene, ended, found, robust))
-    message = answer.message.replace(
-        report.stops(answer.binding, answer.bind_together), report.stops(binding, answer.bind_together)
-    )
-    explanation = " ".join(text for text in (answer.explanation, said) if text)
-    return replace(found, message=f"{message} {said}", explanation=explanation)
+    sentences = report.explained(found, *_said(scene, ended, found, robust))
+    return replace(found, sentences=sentences._replace(limits=report.stops(binding, answer.bind_together)))
 
 
 def _priced(words: Words, price: Price, off: Mapping[tuple[str, int], float]) -> Price:
@@ -482,20 +478,22 @@ def _percent(share_of: Yield) -> str:
 
 def _infeasible(asked: Asked, answer: Solution, why: str) -> Solution:
     """Return that no design keeps its limits with the back-off."""
-    message = f"No admissible design keeps clear of its limits as asked: {why}."
-    return replace(_as_stands(asked, answer, "infeasible"), message=message)
+    return _as_stands(asked, answer, "infeasible", f"No admissible design keeps clear of its limits as asked: {why}.")
 
 
 def _in_the_way(asked: Asked, answer: Solution, sigmas: float) -> Solution:
     """Return an answer that is no optimum with what it was asked for."""
-    message = f"With limits backed off by {sigmas:.6g} sigma: {answer.message}"
-    return replace(answer, scene=asked.scene, limits=_limits(asked, answer), message=message)
+    result = f"With limits backed off by {sigmas:.6g} sigma: {answer.sentences.result}"
+    sentences = answer.sentences._replace(result=result)
+    return replace(answer, scene=asked.scene, limits=_limits(asked, answer), sentences=sentences)
 
 
-def _as_stands(asked: Asked, answer: Solution, status: str) -> Solution:
+def _as_stands(asked: Asked, answer: Solution, status: str, problem: str) -> Solution:
+    """Answer without a certificate, judged by the limits of the scene; problem: why it is none to build."""
     return replace(
         answer,
         status=status,
+        sentences=Sentences(problem),
         limits=_limits(asked, answer),
         scene=asked.scene,
         certificate=None,
@@ -526,15 +524,15 @@ def _fixed(here: Pass) -> str:
 
 def _most(asked: Asked, found: Yield, here: Pass, obstacle: str) -> Solution:
     """Return the answer of the most machines, which are fewer than asked for, and what stands in the way of more."""
-    message = (
+    problem = (
         f"{100 * (asked.share or 0.0):.6g} % of the machines cannot hold all limits: the most that was found is "
         f"{_percent(found)}, the yield of the design shown, with {_backed(here)}. In the way of more: "
         f"{obstacle or f'{TRIALS} back-offs were tried'}. Tighten the tolerances, widen the limits or ask for less."
     )
-    return replace(_as_stands(asked, here.answer, "infeasible"), message=message)
+    return _as_stands(asked, here.answer, "infeasible", problem)
 
 
 def _unsettled(asked: Asked, here: Pass) -> Solution:
     """Return that no fixed point was found."""
-    message = f"The standard deviations of the limits still change after {PASSES} solves. Ask for a smaller back-off."
-    return replace(_as_stands(asked, here.answer, "failed"), message=message)
+    problem = f"The standard deviations of the limits still change after {PASSES} solves. Ask for a smaller back-off."
+    return _as_stands(asked, here.answer, "failed", problem)

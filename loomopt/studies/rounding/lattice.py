@@ -32,7 +32,7 @@ from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
 from loomopt.scenes import designs, numbers, sizes
 from loomopt.scenes.scene import Scene, cursor
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import Rounded, Solution, Words, risen
+from loomopt.solving.answer.solution import Rounded, Sentences, Solution, Words, joined, risen
 from loomopt.solving.options import check_sought, target_name
 from loomopt.solving.search.search import objectives
 
@@ -151,11 +151,12 @@ def solved(
     fixed = asked.within({name: (value, value) for name, value in best.point.items()})
     answer = _under("solving with the best sizes", fixed, last or solve, say)
     if answer.status != "optimal":
-        return replace(answer, scene=asked.scene, message=f"With the best sizes found: {answer.message}")
+        sentences = answer.sentences._replace(result=f"With the best sizes found: {answer.sentences.result}")
+        return replace(answer, scene=asked.scene, sentences=sentences)
     _check_goals(asked, nominal, answer)
     if best.levels and not _agree(asked, answer, best):
-        message = "What was read on the lattice and what was solved there differ; please report it."
-        return replace(answer, status="uncertified", message=message, scene=asked.scene)
+        sentences = Sentences("What was read on the lattice and what was solved there differ; please report it.")
+        return replace(answer, status="uncertified", sentences=sentences, scene=asked.scene)
     return _told(asked, answer, nominal, best)
 
 
@@ -448,9 +449,6 @@ def _told(asked: Asked, answer: Solution, nominal: Solution, best: Best) -> Solu
         kept = "" if best.admissible is None else f", {best.admissible} of which keep all limits"
         kept += f" and {best.reaching} reach the goal" if best.reaching != best.admissible else ""
         said.append(f"None of the {asked.points} points of the lattice is better{kept}: {best.rests}.")
-    text = " ".join(said)
-    explanation = " ".join(part for part in (answer.explanation, text) if part)
-    message = f"{answer.message} {text}"
     own = {scene.full(name): value for name, value in designs.flat(answer.design).items()}
     here = report.evaluated(scene, asked.job, asked.target, own)
     # A size is what was chosen and no limit; and how far today's machine is goes by the widths of the scene's bounds.
@@ -458,16 +456,19 @@ def _told(asked: Asked, answer: Solution, nominal: Solution, best: Best) -> Solu
     together = tuple(price for price in answer.bind_together if not {*price.limits} & {*asked.sizes})
     figures = {**answer.figures, **{name: here.figures[name] for name in ("change",) if name in answer.figures}}
     stops = report.stops(binding, together) if binding else "No limit binds beside the sizes."
-    message = message.replace(report.stops(answer.binding, answer.bind_together), stops)
+    sentences = report.explained(answer, *said)._replace(limits=stops)
     found = replace(answer, scene=scene, limits=here.limits, binding=binding, bind_together=together, figures=figures)
-    return replace(found, message=message, explanation=explanation, rounded=rounded)
+    return replace(found, sentences=sentences, rounded=rounded)
 
 
 def _without(asked: Asked, nominal: Solution, best: Best) -> Solution:
     """Return that no point was found."""
     helps = "Take smaller steps or wider bounds; the design told is the optimum without sizes."
     if best.gap:
-        message = f"No admissible sizes were found in {best.boxes} boxes of a lattice of {asked.points} points. {helps}"
-        return replace(nominal, status="failed", message=message, certificate=None, binding=(), bind_together=())
-    message = f"None of the {asked.points} points of the lattice keeps all limits: {best.rests}. {helps}"
-    return replace(nominal, status="infeasible", message=message, certificate=None, binding=(), bind_together=())
+        status = "failed"
+        problem = f"No admissible sizes were found in {best.boxes} boxes of a lattice of {asked.points} points."
+    else:
+        status = "infeasible"
+        problem = f"None of the {asked.points} points of the lattice keeps all limits: {best.rests}."
+    sentences = Sentences(joined(problem, helps))
+    return replace(nominal, status=status, sentences=sentences, certificate=None, binding=(), bind_together=())

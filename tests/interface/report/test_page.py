@@ -20,6 +20,7 @@ from loomopt.interface.report import answer, document, mathml, report_path
 from loomopt.interface.report.answer import Subject
 from loomopt.picture import chart
 from loomopt.picture.motion import POSES
+from loomopt.solving.answer.solution import Sentences
 
 PROBLEMS = ("beatup-light", "shedding")
 VOID = {"meta", "link", "input", "br", "wbr", "i"}
@@ -128,7 +129,7 @@ def test_the_true_status_stands_first(answers):
     broken = (good.limits[0]._replace(ok=False), *good.limits[1:])
     said = {
         "Optimal and certified": good,
-        "NOT CERTIFIED": replace(good, status="uncertified", message="it is not"),
+        "NOT CERTIFIED": replace(good, status="uncertified", sentences=Sentences("it is not")),
         "NO ADMISSIBLE DESIGN EXISTS near any start": replace(good, status="infeasible"),
         "FAILED: no design was found": replace(good, status="failed"),
         "INTERRUPTED: not solved to its end": replace(good, status="interrupted"),

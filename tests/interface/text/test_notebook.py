@@ -8,6 +8,7 @@ import pytest
 import loomopt as lo
 from loomopt.interface.text import notebook
 from loomopt.picture.table import TextTable
+from loomopt.solving.answer.solution import Sentences
 
 EVIL = 'A "loom" <script>alert(1)</script> & more'
 
@@ -38,7 +39,9 @@ def test_an_answer_shows_sentence_table_prices_certificate_and_drawing(answer):
 
 def test_text_from_outside_is_escaped(answer):
     certificate = dataclasses.replace(answer.certificate, passed=False, reasons=(EVIL,))
-    evil = dataclasses.replace(answer, status="failed", message=EVIL, problem=EVIL, certificate=certificate)
+    evil = dataclasses.replace(
+        answer, status="failed", sentences=Sentences(EVIL), problem=EVIL, certificate=certificate
+    )
     html = evil._repr_html_()
     assert "<script" not in html
     assert EVIL in "".join(tree(html).itertext())

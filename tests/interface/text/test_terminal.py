@@ -16,7 +16,7 @@ from loomopt.interface.text import answers, layout, scenes
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import kinds
 from loomopt.picture.table import TextTable, call, joined, spaced
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import Sentences, Words
 
 SCENE = load("beatup-light")
 EFFECTS = kinds.of("loomopt.physics.effects.beatup")
@@ -160,7 +160,9 @@ def test_an_infeasible_target_shows_what_clashes_and_what_helps(infeasible):
 
 def test_an_uncertified_answer_says_so_first_and_last(answer):
     certificate = dataclasses.replace(answer.certificate, passed=False, reasons=("no minimum",))
-    doubtful = dataclasses.replace(answer, status="uncertified", message="Not sure.", certificate=certificate)
+    doubtful = dataclasses.replace(
+        answer, status="uncertified", sentences=Sentences("Not sure."), certificate=certificate
+    )
     shown = text(*answers.solution(doubtful, SCENE))
     assert shown.startswith("beatup-light, balance: uncertified\nNot sure.")
     assert "Certificate NOT passed: no minimum" in shown

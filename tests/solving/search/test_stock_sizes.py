@@ -6,7 +6,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.units import DISPLAY_UNIT, show
-from loomopt.solving.answer.solution import Solution
+from loomopt.solving.answer.solution import Sentences, Solution
 from loomopt.solving.certificate.records import Certificate, Level
 from loomopt.solving.search.stock_sizes import FARTHEST_SIZE, fitted
 
@@ -56,7 +56,7 @@ def solution(wire, status="optimal", **figures):
         units={},
         limits=(),
         status=status,
-        message=f"Solved at {wire}.",
+        sentences=Sentences(f"Solved at {wire}."),
         certificate=certificate,
     )
 
