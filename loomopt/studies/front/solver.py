@@ -309,6 +309,8 @@ class Solver:
             "held": list(objectives(program, best.x)[: self.held]),
         }
         optimum = None
+        if asking[::2] == (0, 1):
+            optimum = neighbour_newton.optimum(self.job, program, best.x, best.certificate)
         told |= {"optimum": optimum.as_dict()} if optimum else {}
         return Reached(
             status,
