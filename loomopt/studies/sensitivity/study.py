@@ -1,4 +1,4 @@
-"""Derivatives of an optimum's figures and design in every number of its scene, and how far its prices hold."""
+"""Derivatives of an optimum's figures and design by every number of its scene, and the ranges of its prices."""
 
 import contextlib
 import math
@@ -25,41 +25,48 @@ from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import SIDES, Price, Solution, Words, demand_single
 from loomopt.solving.certificate import kkt
 from loomopt.solving.certificate.kkt import ActiveRow
-from loomopt.studies.sensitivity.active import STILL_MET, At, Held, LostError, Optimum, flat, identity
+from loomopt.studies.sensitivity.active import (
+    SLOPE_RESIDUAL,
+    ContinuationError,
+    Evaluation,
+    Optimum,
+    WorkingSet,
+    curved_basis,
+    limit_key,
+)
 from loomopt.studies.tolerance.plan import toleranced
 
 Side = Literal["up", "down"]
 SIDES_OF_A_NUMBER: tuple[Side, Side] = ("up", "down")
 STEP = 2e-4
-"""Of a number's own size, or of its natural one where it is 0: the fourth power is 2e-15, and rounding of 1e-13 shows
-at 5e-10."""
-FROM_NOTHING = 3e-3
-"""SI; the step of a number that is 0 and of no known size, such as a damping."""
-BOTH_SIDES = ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12))
-ONE_SIDED = ((0, -25 / 12), (1, 4.0), (2, -3.0), (3, 4 / 3), (4, -1 / 4))
-"""Steps of a difference of the fourth order, and their weights."""
-ALIKE = 1e-6
-"""Share by which two one-sided derivatives may differ and are one: differences' own error, many times."""
+"""Step of a difference as a share of the number, or of its scale where it is 0: the fourth power is 2e-15, and a
+rounding of 1e-13 gives an error of 5e-10."""
+STEP_FROM_ZERO = 3e-3
+"""SI; step of a number that is 0 and has no scale, such as a damping."""
+CENTRAL = ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12))
+FORWARD = ((0, -25 / 12), (1, 4.0), (2, -3.0), (3, 4 / 3), (4, -1 / 4))
+"""Steps and weights of differences of the fourth order."""
+SAME_DERIVATIVE = 1e-6
+"""Share within which two one-sided derivatives are the same: many times the error of differences."""
 PERCENT = 0.01
-"""Share of itself by which a number moves where it has no tolerance."""
-PRICE_MOVED = 0.1
-"""Share of itself by which a price has moved where its range ends."""
+"""Share by which a number without a tolerance is changed."""
+PRICE_CHANGE = 0.1
+"""Share by which a price changes at the end of its range."""
 FIRST_STEP, GROWTH, MOST_STEPS, CLOSE = 1e-7, 4.0, 80, 1e-9
-"""Of a limit's natural size: the first step along its range; each is so many times the one before; secants and halvings
-of the last; and the share of a range to which its end is told."""
-NO_SHIFT, MOST_STRETCHES = 1e-11, 20
-"""Share of a limit's natural size that is no move of it; and how often a path may begin anew where a step was too
-long."""
-NEWTON, SETTLED = 24, 1e-11
-"""Newton's steps to the optimum of an active set, and what is left of its equations, in natural sizes."""
+"""First step along a range, in scales of its limit; ratio of two successive steps; most secants and halvings of the
+last step; relative accuracy of the end of a range."""
+NO_SHIFT, MOST_RESTARTS = 1e-11, 20
+"""Shift of a limit, in scales, that counts as none; most restarts of a path after a step that was too long."""
+NEWTON_STEPS, CONVERGED = 24, 1e-11
+"""Most Newton steps to the optimum of a working set, and the length of the last one, in scales."""
 SLOW = 0.1
-"""Share of a step that the next may be before slopes are bent anew: those of an earlier place cost nothing."""
+"""Ratio of two successive Newton steps above which the Hessian is computed again."""
 FARTHEST = 10.0
-"""Natural sizes of a limit beyond which its range is not followed."""
+"""Scales of a limit beyond which its range is not followed."""
 
 
 class Row(NamedTuple):
-    """One derivative, SI: of a figure or a part of the design in a number; side: None where both are the same."""
+    """Derivative, SI, of a figure or a design variable (`of`) by a number; side: None where both sides agree."""
 
     number: str
     of: str
@@ -69,9 +76,9 @@ class Row(NamedTuple):
 
 
 class PriceRange(NamedTuple):
-    """A limit's price, SI, and how far its value may move with the price that it has; ends: why not farther.
+    """Price of a limit, SI, and the range in which it stays within 10 %; ends: why the range ends.
 
-    range: shift of the limit's value to each side, SI; infinite where nothing ends it.
+    range: shift of the limit's value to each side, SI; infinite where the range has no end.
     """
 
     limit: str
@@ -83,10 +90,10 @@ class PriceRange(NamedTuple):
     unit: str
 
 
-class Holding(NamedTuple):
-    """How far a number of the operation may move, SI, until other rows hold the optimum; ends: which.
+class ActiveSetRange(NamedTuple):
+    """Range of a number of the operation, SI, in which the same limits bind; ends: why the range ends.
 
-    range: the number itself, infinite where nothing ends it.
+    range: values of the number, infinite where the range has no end.
     """
 
     number: str
@@ -96,7 +103,7 @@ class Holding(NamedTuple):
 
 @dataclass(frozen=True)
 class SensitivityResult:
-    """What a study of sensitivity shows; refused: why there is nothing, and which limits are in the way."""
+    """Result of a sensitivity study; refused: why it has no rows, with the limits concerned; None otherwise."""
 
     scene: Scene
     target: str
@@ -105,14 +112,14 @@ class SensitivityResult:
     prices: tuple[PriceRange, ...]
     refused: str | None
     sizes: Mapping[str, float]
-    """By how much each number moves, SI: one sigma of its tolerance, 1 % of itself without one."""
+    """Change of every number, SI: one sigma of its tolerance, or 1 % of the number."""
     kinds: Mapping[str, str]
-    """Kind of quantity of each number."""
-    holds: tuple[Holding, ...] = ()
-    """Of numbers of the operation that move what is sought and have no price."""
+    """Kind of quantity of every number."""
+    holds: tuple[ActiveSetRange, ...] = ()
+    """Ranges of numbers of the operation that change the objective and have no price."""
 
     def as_dict(self) -> dict[str, object]:
-        """Return the object that `sensitivity --json` prints."""
+        """The object that `sensitivity --json` prints."""
         return {
             "problem": self.scene.name,
             "target": self.target,
@@ -122,15 +129,15 @@ class SensitivityResult:
                 for price in self.prices
             ],
             "holds": [
-                {**each._asdict(), "range": [x if math.isfinite(x) else None for x in each.range]}
-                for each in self.holds
+                {**interval._asdict(), "range": [x if math.isfinite(x) else None for x in interval.range]}
+                for interval in self.holds
             ],
             "refused": self.refused,
         }
 
 
 class Number(NamedTuple):
-    """A number of a scene: what it may be, what a designer calls it, and its value, SI."""
+    """A number of a scene: its kind of quantity, its name, and its value, SI."""
 
     quantity: Quantity
     name: str
@@ -139,7 +146,7 @@ class Number(NamedTuple):
 
 @dataclass(frozen=True)
 class Study:
-    """An answer and what of its scene is varied."""
+    """An optimum, and the scene numbers by which it is differentiated."""
 
     scene: Scene
     target: str
@@ -147,43 +154,43 @@ class Study:
 
     @lazy
     def job(self) -> Job:
-        """The job."""
+        """Job of the scene."""
         return registry.of(self.scene)
 
     @lazy
     def program(self) -> Program:
-        """The task."""
+        """Design task of the scene and its target."""
         return self.job.program(self.scene, self.target)
 
     @lazy
     def optimum(self) -> Optimum:
-        """The optimum with its active rows."""
+        """The optimum with its active rows, refined to full accuracy."""
         assert self.answer.point is not None
-        own = {self.scene.full(name): value for name, value in designs.flat(self.answer.design).items()}
-        found = Optimum(self.program, {**self.answer.point.x, **self.job.values(self.program, own)})
-        for held in found.sets():
-            # An answer is right to the accuracy that it was asked for; its derivatives are to be right to more.
-            with contextlib.suppress(LostError, np.linalg.LinAlgError):
-                return Optimum(self.program, _settled(found, held, self.program, Place(found.x)).x)
-        return found
+        design = {self.scene.full(name): value for name, value in designs.flat(self.answer.design).items()}
+        optimum = Optimum(self.program, {**self.answer.point.x, **self.job.values(self.program, design)})
+        for working_set in optimum.working_sets():
+            # The answer has only the accuracy of its solve; its derivatives need more.
+            with contextlib.suppress(ContinuationError, np.linalg.LinAlgError):
+                return Optimum(self.program, _newton(optimum, working_set, self.program, PathPlace(optimum.x)).x)
+        return optimum
 
     @lazy
-    def keys(self) -> dict[str, Number]:
+    def numbers(self) -> dict[str, Number]:
         """Every number that may move the optimum, by dotted key.
 
-        Numbers that are chosen move nothing today; ends of bounds and limits that keep clear of the optimum neither.
+        Variables and inactive bounds and limits are left out: they do not move it.
         """
-        scene, found = self.scene, dict[str, Number]()
+        scene, known = self.scene, dict[str, Number]()
         chosen = {v.called for v in self.program.variables if v.name not in self.program.fixed}
         chosen |= {name for name, bound in scene.bounds.items() if bound.min == bound.max}
         chosen |= {*scene.schema.variables} - {v.called for v in self.program.variables if v.name in self.program.held}
         touched = {(row.limit.name, row.limit.sign) for row in self.optimum.rows if row.limit}
-        known = list(scene.tables.items()) + [(f"effects.{name}", own) for name, own in scene.effects.items()]
-        for table, own in known:
-            for name, value in own:
+        tables = [*scene.tables.items(), *((f"effects.{name}", effect) for name, effect in scene.effects.items())]
+        for table, values in tables:
+            for name, value in values:
                 if isinstance(value, float) and name not in chosen:
                     key = f"{table}.{name}"
-                    found[key] = Number(numbers.quantity(scene, key), name, value)
+                    known[key] = Number(numbers.quantity(scene, key), name, value)
         for table, names in (("bounds", scene.bounds), ("limits", scene.limits)):
             for name in names:
                 ends = ((f"{table}.{name}.min", -1), (f"{table}.{name}.max", 1), (f"{table}.{name}", 0))
@@ -191,77 +198,79 @@ class Study:
                     given = scene.given(key)
                     if given is not None and (name, sign) in touched:
                         quantity = numbers.quantity(scene, key)
-                        found[key] = Number(quantity, name, quantity.validate(given))
-        return found
+                        known[key] = Number(quantity, name, quantity.validate(given))
+        return known
 
     def value(self, key: str) -> float:
-        """Return the number under a key, SI."""
-        return self.keys[key].value
+        """Value of a number, SI, by its key."""
+        return self.numbers[key].value
 
-    def at(self, key: str, value: float) -> tuple[Scene, Program]:
-        """Return the scene with one number, SI, and its task. Raises BadInput."""
-        unit = SI_UNIT[self.keys[key].quantity.kind]
+    def change(self, key: str, value: float) -> tuple[Scene, Program]:
+        """Scene with one number changed, to a value in SI, and its design task. Raises BadInput."""
+        unit = SI_UNIT[self.numbers[key].quantity.kind]
         scene = self.scene.update({key: value if unit == "1" else f"{value!r} {unit}"})
         return scene, self.job.program(scene, self.target)
 
     def step(self, key: str) -> float:
-        """Return the step of differences in a number, SI."""
-        name = self.keys[key].name
+        """Step of differences by a number, SI."""
+        name = self.numbers[key].name
         sizes = (row.scale for row in self.optimum.rows if row.limit and row.limit.name == name)
-        return STEP * abs(self.value(key)) or STEP * next(sizes, 0.0) or FROM_NOTHING
+        return STEP * abs(self.value(key)) or STEP * next(sizes, 0.0) or STEP_FROM_ZERO
 
-    def size(self, key: str) -> float:
-        """Return by how much a number moves, SI: one sigma of its tolerance, 1 % of itself without one."""
-        _, name, value = self.keys[key]
-        own = next((each for each in toleranced(self.scene).values() if each.number == name), None)
-        return own.sigma(value) if own else PERCENT * abs(value)
+    def usual_change(self, key: str) -> float:
+        """Change of a number, SI: one sigma of its tolerance, or 1 % of the number without one."""
+        _, name, value = self.numbers[key]
+        tolerances = toleranced(self.scene).values()
+        tolerance = next((tolerance for tolerance in tolerances if tolerance.number == name), None)
+        return tolerance.sigma(value) if tolerance else PERCENT * abs(value)
 
-    def ahead(self, key: str) -> bool:
-        """Say whether a number may only grow: it stands at the least that it may be."""
+    def is_at_minimum(self, key: str) -> bool:
+        """Whether a number is at its least allowed value, so that it can only increase."""
         return not self.value(key) - 2 * self.step(key) > max(
-            self.keys[key].quantity.least, self.keys[key].quantity.above
+            self.numbers[key].quantity.least, self.numbers[key].quantity.above
         )
 
 
 def planned(scene: Scene, answer: Solution) -> Study:
-    """Return the study of an answer. Raises BadInput where it is not certified."""
+    """The study of an answer. Raises BadInput where the answer is not certified."""
     demand_single(answer, "derivatives")
     if answer.status != "optimal" or answer.point is None or not answer.certificate:
         problem = f"only a certified optimum has derivatives, and this answer is {answer.status}"
         raise refusal(
-            problem, scene.origin, "sensitivity", remedy="Solve it first: the message says what is in the way"
+            problem, scene.origin, "sensitivity", remedy="Correct what the message of the answer names, and solve again"
         )
     return Study(scene, answer.target, answer)
 
 
 @working()
 def run(study: Study, on_step: Callable[[str], None] | None = None) -> SensitivityResult:
-    """Return derivatives and ranges of prices of an answer; on_step(what): called before each number and each price."""
-    say = on_step or (lambda text: None)
+    """Derivatives of an answer, and ranges of its prices; on_step(text): called before every number and every price."""
+    report = on_step or (lambda text: None)
     optimum, rows, prices = study.optimum, list[Row](), list[PriceRange]()
-    held = list(optimum.sets())
-    chosen = dict[str, dict[Side, Held]]()
-    for key in study.keys:
-        say(f"moving {key}")
-        if held:
-            sides = _sides(study, held, key)
-            chosen[key] = {side: own for side, (own, _) in sides.items()}
-            rows += _told(study, key, {side: way for side, (_, way) in sides.items()})
+    working_sets = list(optimum.working_sets())
+    chosen = dict[str, dict[Side, WorkingSet]]()
+    for key in study.numbers:
+        report(f"derivatives by {key}")
+        if working_sets:
+            sides = _choose_working_sets(study, working_sets, key)
+            chosen[key] = {side: working_set for side, (working_set, _) in sides.items()}
+            rows += _derivatives(study, key, {side: direction for side, (_, direction) in sides.items()})
         else:
-            rows += _of_vertex(study, key)
+            rows += _vertex_derivatives(study, key)
     if not rows:
         touched = ", ".join(dict.fromkeys(row.name for row in optimum.rows if row.limit))
-        why = f"no active set of independent rows was found that holds the optimum: {touched}"
+        why = f"the active limits are dependent, so derivatives are not unique: {touched}"
         return SensitivityResult(study.scene, study.target, study.answer, (), (), why, {}, {})
-    for price in study.answer.binding if held else ():
-        say(f"following the price of {price.limit}")
-        found = _priced(study, held, chosen.get(_key_of(study, price) or "", {}), price)
-        prices += [found] if found else []
-    kinds = {key: each.quantity.kind for key, each in study.keys.items()}
-    sizes = {key: study.size(key) for key in study.keys}
+    for price in study.answer.binding if working_sets else ():
+        report(f"range of the price of {price.limit}")
+        price_range = _price_range(study, working_sets, chosen.get(number_key(study, price) or "", {}), price)
+        prices += [price_range] if price_range else []
+    kinds = {key: number.quantity.kind for key, number in study.numbers.items()}
+    sizes = {key: study.usual_change(key) for key in study.numbers}
     worth = {name: abs(value) for name, value in study.answer.figures.items() if value}
     rows.sort(key=lambda row: -abs(row.value * sizes[row.number]) / worth.get(row.of, 1.0))
-    holds = tuple(each for key in _unpriced(study, rows) if held and (each := _holding(study, chosen[key], key)))
+    unpriced = _unpriced_numbers(study, rows) if working_sets else []
+    holds = tuple(interval for key in unpriced if (interval := _active_set_range(study, chosen[key], key)))
     return SensitivityResult(
         study.scene, study.target, study.answer, tuple(rows), tuple(prices), None, sizes, kinds, holds
     )
@@ -271,9 +280,9 @@ def run(study: Study, on_step: Callable[[str], None] | None = None) -> Sensitivi
 
 
 class Direction(NamedTuple):
-    """How an optimum moves with a number: step of the variables, natural sizes per SI; rise of its objective's row.
+    """Derivative of an optimum by a number: step of the variables, in scales per SI, and rise of the objective's row.
 
-    rises: of what is not met, per SI: the largest, and the largest fall.
+    rises: largest rise and largest fall, per SI, of the rows outside the working set.
     """
 
     step: Floats
@@ -281,195 +290,200 @@ class Direction(NamedTuple):
     rises: tuple[float, float]
 
 
-def direction(study: Study, held: Held, key: str) -> Direction:
-    """Return how an active set's optimum moves with a number. Raises LostError."""
+def find_direction(study: Study, working_set: WorkingSet, key: str) -> Direction:
+    """Derivative of a working set's optimum by a number. Raises ContinuationError."""
     optimum = study.optimum
     limits, pieces = tuple(range(optimum.active.limits)), optimum.active.levels[optimum.level]
-    rises, slopes_by = _risen(study, key)
-    at = optimum.at(study.program, optimum.x, held)
-    own = [*held.met, *held.pieces]
-    _, slopes = optimum.equations(at, held)
-    rate, _ = optimum.equations(at._replace(values=rises[own]), held)
+    rises, slopes_by = _row_derivatives(study, key)
+    evaluation = optimum.evaluate(study.program, optimum.x, working_set)
+    rows = [*working_set.rows]
+    _, slopes = optimum.equations(evaluation, working_set)
+    rate, _ = optimum.equations(evaluation._replace(values=rises[rows]), working_set)
     step = -np.linalg.pinv(slopes, rcond=1e-10) @ rate
-    basis = optimum.open(slopes)
-    weights = held.weights[own]
+    basis = optimum.null_space(slopes)
+    weights = working_set.multipliers[rows]
     if basis.shape[1]:
-        bends = optimum.bends(study.program, optimum.x, held, weights, basis)
-        vectors, sizes = flat(basis, bends)
-        if len(sizes):
-            # H is symmetric: Z'H x' = (H Z)'x'.
-            pull = bends.T @ step + basis.T @ (weights @ slopes_by[own])
-            step = step - basis @ (vectors @ ((vectors.T @ pull) / sizes))
-    moving = rises + optimum.local.gradients @ step
-    objective = float(held.weights @ rises)
-    left = [float(moving[k]) for k in limits if k not in held.met]
-    left += [float(moving[k] - objective) for k in pieces if k not in held.pieces]
-    return Direction(step, objective, (max(left, default=-math.inf), max((-x for x in left), default=-math.inf)))
+        product = optimum.hessian_product(study.program, optimum.x, working_set, weights, basis)
+        # H is symmetric: Z'H x' = (H Z)'x'.
+        step = _tangent_step(step, basis, product, product.T @ step + basis.T @ (weights @ slopes_by[rows]))
+    total = rises + optimum.local.gradients @ step
+    objective = float(working_set.multipliers @ rises)
+    outside = [float(total[k]) for k in limits if k not in working_set.constraints]
+    outside += [float(total[k] - objective) for k in pieces if k not in working_set.pieces]
+    largest_rise, largest_fall = max(outside, default=-math.inf), max((-x for x in outside), default=-math.inf)
+    return Direction(step, objective, (largest_rise, largest_fall))
 
 
-def _risen(study: Study, key: str) -> tuple[Floats, Floats]:
-    """Return how values of all rows, and their slopes, change with a number, per SI. Raises LostError."""
+def _tangent_step(step: Floats, basis: Floats, product: Floats, pull: Floats) -> Floats:
+    """Newton step with its part in the null space, along which the Lagrangian's slope `pull`, (k,), vanishes."""
+    vectors, curvatures = curved_basis(basis, product)
+    return step - basis @ (vectors @ ((vectors.T @ pull) / curvatures)) if len(curvatures) else step
+
+
+def _row_derivatives(study: Study, key: str) -> tuple[Floats, Floats]:
+    """Derivatives of all rows, (rows,), and of their slopes, by a number, per SI. Raises ContinuationError."""
     optimum, h, here = study.optimum, study.step(key), study.value(key)
     limits, pieces = tuple(range(optimum.active.limits)), optimum.active.levels[optimum.level]
-    every = Held((*limits, *optimum.zeros), pieces, np.zeros(0), ())
+    all_rows = WorkingSet((*limits, *optimum.zeros), pieces, np.zeros(0), ())
     slopes_by = 0.0 * optimum.local.gradients
     rises = np.zeros(len(optimum.rows))
-    places = [*every.met, *every.pieces]
-    for k, weight in ONE_SIDED if study.ahead(key) else BOTH_SIDES:
-        _, program = study.at(key, here + k * h)
-        there = optimum.at(program, optimum.x, every)
+    places = [*all_rows.rows]
+    for k, weight in FORWARD if study.is_at_minimum(key) else CENTRAL:
+        _, program = study.change(key, here + k * h)
+        there = optimum.evaluate(program, optimum.x, all_rows)
         rises[places] += weight * there.values / h
         slopes_by[places] += weight * there.slopes / h
     return rises, slopes_by
 
 
-def _of_vertex(study: Study, key: str) -> Iterator[Row]:
-    """Yield the derivatives in one number of an optimum that more rows hold than there are variables.
+def _vertex_derivatives(study: Study, key: str) -> Iterator[Row]:
+    """Yield the derivatives by one number of an optimum with more active rows than variables.
 
-    None on a side where no design keeps them all, or several do alike.
+    A side on which no design satisfies all rows, or several are optimal, has none.
     """
     try:
-        rises, _ = _risen(study, key)
-    except (LostError, BadInput, np.linalg.LinAlgError):
+        rises, _ = _row_derivatives(study, key)
+    except (ContinuationError, BadInput, np.linalg.LinAlgError):
         return
     chosen = dict[Side, Direction]()
-    for side in SIDES_OF_A_NUMBER[: 1 if study.ahead(key) else 2]:
+    for side in SIDES_OF_A_NUMBER[: 1 if study.is_at_minimum(key) else 2]:
         sign = 1.0 if side == "up" else -1.0
-        found = study.optimum.vertex(sign * rises)
-        if found is None:
-            continue
-        step, objective = found
-        if step is not None:
+        solution = study.optimum.vertex_direction(sign * rises)
+        if solution is not None:
+            step, objective = solution
             chosen[side] = Direction(sign * step, sign * objective, (0.0, 0.0))
-    yield from _told(study, key, chosen)
+    yield from _derivatives(study, key, chosen)
 
 
-def _sides(study: Study, sets: Sequence[Held], key: str) -> dict[Side, tuple[Held, Direction]]:
-    """Return the active set that holds the optimum where a number grows, and where it falls, and how it moves there."""
-    ways = []
-    for own in sets:
-        with contextlib.suppress(LostError, BadInput, np.linalg.LinAlgError):
-            ways.append((own, direction(study, own, key)))
-    size = max((float(np.abs(way.step).max(initial=0.0)) for _, way in ways), default=0.0)
-    chosen: dict[Side, tuple[Held, Direction]] = {}
-    for side in SIDES_OF_A_NUMBER[: 1 if study.ahead(key) else 2]:
+def _choose_working_sets(
+    study: Study, working_sets: Sequence[WorkingSet], key: str
+) -> dict[Side, tuple[WorkingSet, Direction]]:
+    """Working set that stays optimal on each side of a number, with its direction there."""
+    candidates = []
+    for working_set in working_sets:
+        with contextlib.suppress(ContinuationError, BadInput, np.linalg.LinAlgError):
+            candidates.append((working_set, find_direction(study, working_set, key)))
+    size = max((float(np.abs(direction.step).max(initial=0.0)) for _, direction in candidates), default=0.0)
+    chosen: dict[Side, tuple[WorkingSet, Direction]] = {}
+    for side in SIDES_OF_A_NUMBER[: 1 if study.is_at_minimum(key) else 2]:
         sign, place = (1.0, 0) if side == "up" else (-1.0, 1)
-        # What is not met must not rise on this side.
-        fitting = [(own, way) for own, way in ways if way.rises[place] <= ALIKE * size]
-        if fitting:
-            best = max(sign * way.objective for _, way in fitting)
-            # Of sets alike the one with the most rows: it knows what the others leave open.
-            chosen[side] = next(
-                each for each in fitting if sign * each[1].objective >= best - ALIKE * (size + abs(best))
-            )
+        # Rows outside the working set must not rise on this side.
+        valid = [candidate for candidate in candidates if candidate[1].rises[place] <= SAME_DERIVATIVE * size]
+        if valid:
+            best = max(sign * direction.objective for _, direction in valid)
+            enough = best - SAME_DERIVATIVE * (size + abs(best))
+            # Among equal sets the first has the most rows, and so the fewest free directions.
+            chosen[side] = next(candidate for candidate in valid if sign * candidate[1].objective >= enough)
     return chosen
 
 
-def _told(study: Study, key: str, chosen: Mapping[Side, Direction]) -> Iterator[Row]:
-    """Yield the derivatives along the direction of each side, once where both are one."""
-    if not chosen:
+def _derivatives(study: Study, key: str, chosen: Mapping[Side, Direction]) -> Iterator[Row]:
+    """Yield the derivatives of each side, or once where both sides agree."""
+    if _sides_agree(chosen):
+        yield from _side_derivatives(study, key, None, chosen["up"])
         return
-    one = _same(chosen)
-    sides: list[tuple[Side | None, Direction]] = [(None, next(iter(chosen.values())))] if one else list(chosen.items())
-    for told, way in sides:
-        yield from _figures(study, key, told, way)
+    for side, direction in chosen.items():
+        yield from _side_derivatives(study, key, side, direction)
 
 
-def _same(chosen: Mapping[Side, Direction]) -> bool:
+def _sides_agree(chosen: Mapping[Side, Direction]) -> bool:
     if len(chosen) < 2:
         return False
     up, down = chosen["up"], chosen["down"]
-    size = max(float(np.abs(each.step).max(initial=0.0)) + abs(each.objective) for each in (up, down))
+    size = max(float(np.abs(side.step).max(initial=0.0)) + abs(side.objective) for side in (up, down))
     apart = max(float(np.abs(up.step - down.step).max(initial=0.0)), abs(up.objective - down.objective))
-    return apart <= ALIKE * size
+    return apart <= SAME_DERIVATIVE * size
 
 
-def _figures(study: Study, key: str, side: Side | None, way: Direction) -> Iterator[Row]:
-    """Yield derivatives along a direction, by differences of figures of the moved optimum."""
+def _side_derivatives(study: Study, key: str, side: Side | None, direction: Direction) -> Iterator[Row]:
+    """Yield the derivatives along a direction, by differences of the figures of the moved optimum."""
     optimum, here, h = study.optimum, study.value(key), study.step(key)
     names = (*study.answer.design, *(n for n, v in study.answer.figures.items() if v is not None))
     lists = study.scene.schema.lists
-    stencil = BOTH_SIDES if side is None else ONE_SIDED
+    stencil = CENTRAL if side is None else FORWARD
     turn = -1 if side == "down" else 1
     total = dict.fromkeys((n for n in names if n not in lists), 0.0)
     for k, weight in stencil:
         t = turn * k * h
-        scene, program = study.at(key, here + t)
-        design = study.job.design(program, optimum.moved(optimum.x, way.step * t))
+        scene, program = study.change(key, here + t)
+        design = study.job.design(program, optimum.move(optimum.x, direction.step * t))
         called = {study.job.task(scene).labels.get(name, name): value for name, value in design.items()}
         figures = study.job.figures(scene, design)
         for name in total:
             value = called.get(name, figures.get(name))
             total[name] += turn * weight * (value if value is not None else math.nan) / h
     words, level = Words(study.scene), optimum.program.objectives[optimum.level]
-    scales = {each.figure: each.scale for each in optimum.program.objectives if each.power == 1}
-    merit = level.merit(optimum.sampler(optimum.program, optimum.x))
-    # Some figures are another number than the row of which the least is sought, such as an angle from its complement.
-    own = study.answer.figures.get(level.figure)
-    is_row = own is not None and abs(own - merit) <= ALIKE * max(abs(merit), level.scale)
-    alike: dict[str, float] = {}
-    for name, figure in study.answer.figures.items():
-        alike[words.si(name)] = max(alike.get(words.si(name), 0.0), abs(figure or 0.0))
-    for name, value in total.items():
-        told = value
+    scales = {objective.figure: objective.scale for objective in optimum.program.objectives if objective.power == 1}
+    merit = level.merit(optimum.build_sampler(optimum.program, optimum.x))
+    # Some figures differ from the row that is minimised, such as an angle from its complement.
+    figure = study.answer.figures.get(level.figure)
+    is_row = figure is not None and abs(figure - merit) <= SAME_DERIVATIVE * max(abs(merit), level.scale)
+    largest: dict[str, float] = {}
+    for name, number in study.answer.figures.items():
+        largest[words.si(name)] = max(largest.get(words.si(name), 0.0), abs(number or 0.0))
+    for name, difference in total.items():
+        slope = difference
         if name == level.figure and is_row and level.power == 1 and not level.is_magnitude:
-            told = way.objective * level.scale
-        if math.isfinite(told):
-            kind = SI_UNIT[study.keys[key].quantity.kind]
-            size = max(alike.get(words.si(name), 0.0), scales.get(name, 0.0)) / (abs(here) or 1.0)
-            told = 0.0 if abs(told) <= NOTHING * size else told
-            yield Row(key, name, side, told, f"{words.si(name)}/({kind})" if kind != "1" else words.si(name))
+            slope = direction.objective * level.scale
+        if math.isfinite(slope):
+            kind = SI_UNIT[study.numbers[key].quantity.kind]
+            size = max(largest.get(words.si(name), 0.0), scales.get(name, 0.0)) / (abs(here) or 1.0)
+            slope = 0.0 if abs(slope) <= ZERO_DERIVATIVE * size else slope
+            yield Row(key, name, side, slope, f"{words.si(name)}/({kind})" if kind != "1" else words.si(name))
 
 
-NOTHING = 1e-8
-"""Share of the largest figure of a unit, over its number, below which a derivative is an error of differences."""
+ZERO_DERIVATIVE = 1e-8
+"""A derivative below this share of the unit's largest figure, divided by the number, is an error of differences."""
 
 
 # Prices.
 
 
-def _priced(study: Study, sets: Sequence[Held], chosen: Mapping[Side, Held], price: Price) -> PriceRange | None:
-    """Return a price with its range; None for a limit whose value is no number of the scene.
+def _price_range(
+    study: Study, working_sets: Sequence[WorkingSet], chosen: Mapping[Side, WorkingSet], price: Price
+) -> PriceRange | None:
+    """A price with its range; None for a limit whose value is not a number of the scene.
 
-    chosen: what holds the optimum where the number grows, and where it falls; sets: all active sets that do, the first
-    of which that meets the limit is followed on a side that has none of its own.
+    chosen: working set of each side of the number; a side without one follows the first of `working_sets` with the
+    limit.
     """
-    key = _key_of(study, price)
-    places = _places(study, price)
+    key = number_key(study, price)
+    places = _limit_rows(study, price)
     if key is None or not places:
         return None
     figure, worth = next(iter(price.worth.items()))
-    usual = next((each for each in sets if {*places} & {*each.met}), None)
+    usual = next((working_set for working_set in working_sets if {*places} & {*working_set.constraints}), None)
     ends = {side: _price_end(study, chosen.get(side, usual), key, price, side) for side in SIDES_OF_A_NUMBER}
     reach = (0.0 - ends["down"][0], ends["up"][0])
     why = (ends["down"][1], ends["up"][1])
     return PriceRange(price.limit, price.side, worth, price.value, reach, why, price.unit[figure])
 
 
-def _keys_of(study: Study, limit: str, side: str) -> tuple[str, ...]:
+def _possible_keys(price: Price) -> tuple[str, ...]:
+    limit, side = price.limit, price.side
     return (f"bounds.{limit}.{side}", f"limits.{limit}.{side}", f"operation.{limit}", f"mechanism.{limit}")
 
 
-def _key_of(study: Study, price: Price) -> str | None:
-    """Return the dotted key of a limit's value; None where it is no number of the scene."""
-    return next((key for key in _keys_of(study, price.limit, price.side) if key in study.keys), None)
+def number_key(study: Study, price: Price) -> str | None:
+    """Dotted key of a limit's value; None where it is not a number of the scene."""
+    return next((key for key in _possible_keys(price) if key in study.numbers), None)
 
 
-def _places(study: Study, price: Price) -> list[int]:
-    """Return the places of a limit's rows."""
+def _limit_rows(study: Study, price: Price) -> list[int]:
+    """Indices of a limit's active rows."""
     signs = {0, *(sign for sign, side in SIDES.items() if side == price.side)}
     rows = enumerate(study.optimum.rows)
     return [k for k, row in rows if row.limit and row.limit.name == price.limit and row.limit.sign in signs]
 
 
-def _price_end(study: Study, held: Held | None, key: str, price: Price, side: Side) -> tuple[float, str]:
-    """Return how far a price holds where its limit's number moves to one side, SI, and why not farther."""
-    optimum, places = study.optimum, _places(study, price)
+def _price_end(study: Study, working_set: WorkingSet | None, key: str, price: Price, side: Side) -> tuple[float, str]:
+    """Shift of a limit's number to one side, SI, at which its price range ends, and why it ends."""
+    optimum, places = study.optimum, _limit_rows(study, price)
     figure, worth = next(iter(price.worth.items()))
-    level = next(k for k, each in enumerate(optimum.program.objectives) if each.figure == figure)
+    level = [objective.figure for objective in optimum.program.objectives].index(figure)
     if level > optimum.level:
         return 0.0, "the optimum cannot be followed"
-    # On this side the multipliers count by which the limit is worth least, where it is loosened, or most.
+    # The least price counts where the limit is loosened, the largest where it is tightened.
     loosened = (side == "up") == (price.side == "max")
     limit = optimum.rows[places[0]].limit
     # The multiplier of an equality has the sign of the side on which it gains.
@@ -480,42 +494,40 @@ def _price_end(study: Study, held: Held | None, key: str, price: Price, side: Si
     multipliers = here[1.0 if loosened else -1.0]
     if multipliers is None:
         return 0.0, "no design is admissible beyond"
-    own = optimum.support(level, multipliers)
+    support = optimum.find_support(level, multipliers)
     largest = max(
-        sign * _worth(optimum, optimum.x, level, w, optimum.rows, places) for w in here.values() if w is not None
+        sign * _price(optimum, optimum.x, level, w, optimum.rows, places) for w in here.values() if w is not None
     )
     size = worth or largest
-    now = sign * _worth(optimum, optimum.x, level, multipliers, optimum.rows, places)
-    if abs(now - worth) > PRICE_MOVED * size:
+    now = sign * _price(optimum, optimum.x, level, multipliers, optimum.rows, places)
+    if abs(now - worth) > PRICE_CHANGE * size:
         return 0.0, f"the price is {Words(study.scene).price_reading(figure, price.limit, now)} there"
-    if held is None:
+    if working_set is None:
         return 0.0, "the optimum cannot be followed"
 
-    def beyond(there: Walked) -> tuple[float, str]:
-        """Return by how much a price has moved beyond what counts, negative where it has not."""
-        rows, weights = there.at.rows, there.weights
-        own_places = [*held.met, *held.pieces]
+    def price_excess(there: PathPoint) -> tuple[float, str]:
+        """Change of the price beyond `PRICE_CHANGE`, negative within it, and what it means."""
+        evaluation, weights, row_places = there.evaluation, there.multipliers, working_set.rows
         if level != optimum.level:
-            own_places = [*own.met, *own.pieces]
-            at = optimum.at(there.program, there.x, own)
-            weights, left = optimum.weights(at, own)
-            rows = at.rows
-            if left > STILL_MET:
-                raise LostError("an earlier objective does not stay at its best")
+            row_places = support.rows
+            evaluation = optimum.evaluate(there.program, there.x, support)
+            weights, residual = optimum.estimate_multipliers(evaluation, support)
+            if residual > SLOPE_RESIDUAL:
+                raise ContinuationError("an earlier objective does not stay at its best")
         full = np.zeros(len(optimum.rows))
-        full[own_places] = weights
-        known = list(optimum.rows)
-        for k, row in zip(own_places, rows, strict=True):
-            known[k] = row
-        value = sign * _worth(optimum, there.x, level, full, known, places, there.at.sampler)
-        turned = f"the price moves by {'+' if value > worth else '-'}10 %" if worth else "it has a price of its own"
-        return abs(value - worth) / size - PRICE_MOVED, turned
+        full[[*row_places]] = weights
+        rows = list(optimum.rows)
+        for k, row in zip(row_places, evaluation.rows, strict=True):
+            rows[k] = row
+        value = sign * _price(optimum, there.x, level, full, rows, places, there.evaluation.sampler)
+        reason = f"the price moves by {'+' if value > worth else '-'}10 %" if worth else "its price is no longer 0"
+        return abs(value - worth) / size - PRICE_CHANGE, reason
 
     row = optimum.rows[places[0]]
-    return _end(study, held, key, row.scale, 1.0 if side == "up" else -1.0, beyond)
+    return _follow(study, working_set, key, row.scale, 1.0 if side == "up" else -1.0, price_excess)
 
 
-def _worth(
+def _price(
     optimum: Optimum,
     x: Mapping[str, float],
     level: int,
@@ -524,209 +536,212 @@ def _worth(
     places: Sequence[int],
     sampler: Sampler | None = None,
 ) -> float:
-    """Return what a limit is worth, SI, by multipliers of its rows: the fall of the figure, whatever its objective is.
+    """Price of a limit, SI, from the multipliers, (rows,), of its rows at indices `places`: the fall of the figure.
 
-    A worth below 0 is that of the other side.
+    A negative price belongs to the other side of the limit.
     """
-    sampler = sampler or optimum.sampler(optimum.program, x)
+    sampler = sampler or optimum.build_sampler(optimum.program, x)
     total = 0.0
     for k in places:
         limit = rows[k].limit
         assert limit is not None
-        unit = kkt.price_limit(sampler, limit, optimum.program.objectives[level], 1.0).worth
-        total += float(multipliers[k]) * unit
+        total += float(multipliers[k]) * kkt.price_limit(sampler, limit, optimum.program.objectives[level], 1.0).worth
     return total
 
 
-def _unpriced(study: Study, rows: Sequence[Row]) -> list[str]:
-    """Return the numbers of the operation that move what is sought, alike to both sides, and are no limit."""
-    limits = {key for price in study.answer.binding for key in _keys_of(study, price.limit, price.side)}
+def _unpriced_numbers(study: Study, rows: Sequence[Row]) -> list[str]:
+    """Keys of numbers of the operation that change the objective, with one derivative, and are no limit."""
+    limits = {key for price in study.answer.binding for key in _possible_keys(price)}
     moving = {row.number for row in rows if row.of == study.optimum.figure and row.side is None and row.value}
-    return [key for key in study.keys if key.startswith("operation.") and key in moving - limits]
+    return [key for key in study.numbers if key.startswith("operation.") and key in moving - limits]
 
 
-def _holding(study: Study, chosen: Mapping[Side, Held], key: str) -> Holding | None:
-    """Return how far a number may move until other rows hold the optimum; None where none were found that do."""
-    here, found = study.value(key), list[tuple[float, str]]()
-    for side in SIDES_OF_A_NUMBER:
-        if side not in chosen:
-            return None
-        found.append(_end(study, chosen[side], key, abs(here), 1.0 if side == "up" else -1.0))
-    up, down = found
-    low, high = (0.0 if abs(end) <= AS_NOTHING * abs(here) else end for end in (here - down[0], here + up[0]))
-    return Holding(key, (low, high), (down[1], up[1]))
+def _active_set_range(study: Study, chosen: Mapping[Side, WorkingSet], key: str) -> ActiveSetRange | None:
+    """Range of a number in which the same limits bind; None where a side has no working set."""
+    if len(chosen) < len(SIDES_OF_A_NUMBER):
+        return None
+    here = study.value(key)
+    up = _follow(study, chosen["up"], key, abs(here), 1.0)
+    down = _follow(study, chosen["down"], key, abs(here), -1.0)
+    low, high = (0.0 if abs(end) <= ZERO_END * abs(here) else end for end in (here - down[0], here + up[0]))
+    return ActiveSetRange(key, (low, high), (down[1], up[1]))
 
 
-AS_NOTHING = 1e-6
-"""Share of a number below which the end of its range is 0: near it prices vanish into rounding."""
+ZERO_END = 1e-6
+"""An end of a range below this share of its number is 0: prices near it are rounding errors."""
 
 
-class Walked(NamedTuple):
-    """An active set's optimum at a value of a number: variables, its rows, their multipliers.
+class PathPoint(NamedTuple):
+    """Optimum of a working set at one value of a number: variables, rows and multipliers.
 
-    amiss: by how much a price is below 0 or a limit exceeded, in natural sizes, negative where none is; wrong: which.
+    excess: largest violation of a limit or a price's sign, in scales, negative without one; reason: which one it is.
     """
 
     program: Program
     x: dict[str, float]
-    at: At
-    weights: Floats
-    wrong: str
-    amiss: float
+    evaluation: Evaluation
+    multipliers: Floats
+    reason: str
+    excess: float
 
 
-class Place(NamedTuple):
-    """Where a path along a number has led: variables, SI, and the rows as they stand there, None at its beginning."""
+class PathPlace(NamedTuple):
+    """Start of a Newton iteration on a path: variables, SI, and the rows there, None at the optimum."""
 
     x: Mapping[str, float]
     rows: tuple[ActiveRow, ...] | None = None
 
 
-def _end(
+def _follow(
     study: Study,
-    held: Held,
+    working_set: WorkingSet,
     key: str,
     scale: float,
     sign: float,
-    beyond: Callable[[Walked], tuple[float, str]] | None = None,
+    criterion: Callable[[PathPoint], tuple[float, str]] | None = None,
 ) -> tuple[float, str]:
-    """Return how far a number may move on one side, SI, and why not farther.
+    """Shift of a number to one side, SI, at which a range ends, and why it ends.
 
-    scale: natural size of the number; beyond(there): by how much what counts has changed too much, and how.
+    scale: of the number. sign: of the side. criterion(point): excess of a quantity that must not change too much, and
+    what it means.
     """
     optimum, here = study.optimum, study.value(key)
 
-    def look(t: float, place: Place) -> tuple[Place, float, str]:
-        """Return where a shift leads, and by how much it is beyond the range, negative inside, with the reason."""
+    def evaluate(shift: float, start: PathPlace) -> tuple[PathPlace, float, str]:
+        """PathPlace at a shift of the number, its excess, which is negative inside the range, and the reason."""
         try:
-            there = _settled(optimum, held, study.at(key, here + sign * t)[1], place)
-            moved = beyond(there) if beyond else (-math.inf, "")
+            there = _newton(optimum, working_set, study.change(key, here + sign * shift)[1], start)
+            change = criterion(there) if criterion else (-math.inf, "")
         except BadInput as error:
-            return place, math.inf, error.problem
-        except (LostError, np.linalg.LinAlgError):
-            return place, math.inf, "the optimum cannot be followed farther"
-        return Place(there.x, there.at.rows), *max((there.amiss, there.wrong), moved)
+            return start, math.inf, error.problem
+        except (ContinuationError, np.linalg.LinAlgError):
+            return start, math.inf, "the optimum cannot be followed farther"
+        return PathPlace(there.x, there.evaluation.rows), *max((there.excess, there.reason), change)
 
-    low, step, at, below = 0.0, FIRST_STEP * scale, Place(optimum.x), -PRICE_MOVED
-    for _ in range(MOST_STRETCHES):
+    low, step, at, below = 0.0, FIRST_STEP * scale, PathPlace(optimum.x), -PRICE_CHANGE
+    for _ in range(MOST_RESTARTS):
         while True:
             high = low + step
-            there, above, why = look(high, at)
+            there, above, why = evaluate(high, at)
             if above > 0.0:
                 break
             low, at, below, step = high, there, above, step * GROWTH
             if low > FARTHEST * scale:
-                return math.inf, "nothing within reach ends it"
+                return math.inf, f"no end within {FARTHEST:g} times its scale"
         for turn in range(MOST_STEPS):
             if high - low <= CLOSE * high or high <= NO_SHIFT * scale:
                 break
             secant = low - below * (high - low) / (above - below) if math.isfinite(above - below) else math.nan
-            # Every third time half of what is left, where secants stay on one side.
+            # Every third step halves the interval: secants alone may stay on one side.
             middle = secant if turn % 3 < 2 and low < secant < high else (low + high) / 2
-            there, value, found = look(middle, at)
-            # The value at an end that stays counts half [the Illinois method: Dowell and Jarratt, BIT 11 (1971)].
+            there, value, reason = evaluate(middle, at)
+            # The value at the end that stays is halved [the Illinois method: Dowell and Jarratt, BIT 11 (1971)].
             if value > 0.0:
-                high, above, why, below = middle, value, found, below / 2
+                high, above, why, below = middle, value, reason, below / 2
             else:
                 low, at, below, above = middle, there, value, above / 2
         if high <= NO_SHIFT * scale:
             return 0.0, why
-        # What too long a step has lost is found again from nearby.
+        # A step that was too long may have failed where a short one succeeds.
         step = max(2 * CLOSE * high, FIRST_STEP * scale)
-        there, value, _ = look(high + step, at)
+        there, value, _ = evaluate(high + step, at)
         if value > 0.0:
             break
         low, at, below = high + step, there, value
     return (low + high) / 2, why
 
 
-def _settled(optimum: Optimum, held: Held, program: Program, place: Place) -> Walked:
-    """Return the optimum of an active set of a task, by Newton's method from nearby. Raises LostError."""
-    own = [*held.met, *held.pieces]
-    here, rows, bends, before, length = dict(place.x), place.rows, None, math.inf, 0.0
-    for _ in range(NEWTON):
-        at = optimum.at(program, here, held, rows)
-        rows = at.rows
-        values, slopes = optimum.equations(at, held)
+def _newton(optimum: Optimum, working_set: WorkingSet, program: Program, start: PathPlace) -> PathPoint:
+    """Optimum of a working set in a task, by Newton's method from a start nearby. Raises ContinuationError."""
+    here, rows, product, before, length = dict(start.x), start.rows, None, math.inf, 0.0
+    for _ in range(NEWTON_STEPS):
+        evaluation = optimum.evaluate(program, here, working_set, rows)
+        rows = evaluation.rows
+        values, slopes = optimum.equations(evaluation, working_set)
         step = -np.linalg.pinv(slopes, rcond=1e-10) @ values
-        basis = optimum.open(slopes)
-        weights, _ = optimum.weights(at, held)
+        basis = optimum.null_space(slopes)
+        weights, _ = optimum.estimate_multipliers(evaluation, working_set)
         if basis.shape[1]:
-            if bends is None or bends.shape[1] != basis.shape[1] or length > SLOW * before:
-                bends = optimum.bends(program, here, held, weights, basis, rows)
-            vectors, sizes = flat(basis, bends)
-            if len(sizes):
-                pull = bends.T @ step + basis.T @ (weights @ at.slopes)
-                step = step - basis @ (vectors @ ((vectors.T @ pull) / sizes))
-        here = optimum.moved(here, step)
+            if product is None or product.shape[1] != basis.shape[1] or length > SLOW * before:
+                product = optimum.hessian_product(program, here, working_set, weights, basis, rows)
+            step = _tangent_step(step, basis, product, product.T @ step + basis.T @ (weights @ evaluation.slopes))
+        here = optimum.move(here, step)
         before, length = length, float(np.abs(step).max(initial=0.0))
-        if length <= SETTLED:
+        if length <= CONVERGED:
             break
     else:
-        raise LostError("Newton's method does not settle")
-    at = optimum.at(program, here, held, rows)
-    weights, _ = optimum.weights(at, held)
-    amiss = [
-        (-float(w) / max(1.0, abs(float(held.weights[k]))), f"{optimum.rows[k].name}'s price is 0")
-        for k, w in zip(own, weights, strict=True)
-        if k not in held.free and (abs(held.weights[k]) > POSITIVE or w < -STILL_MET)
+        raise ContinuationError("Newton's method does not converge")
+    evaluation = optimum.evaluate(program, here, working_set, rows)
+    weights, _ = optimum.estimate_multipliers(evaluation, working_set)
+    multipliers = working_set.multipliers
+    excesses = [
+        (-float(w) / max(1.0, abs(float(multipliers[k]))), f"{optimum.rows[k].name}'s price is 0")
+        for k, w in zip(working_set.rows, weights, strict=True)
+        if k not in working_set.free and (abs(multipliers[k]) > POSITIVE or w < -SLOPE_RESIDUAL)
     ]
-    amiss += [*_entering(optimum, held, program, at), *_overtaking(optimum, held, at)]
-    worst = max(amiss, default=(-math.inf, ""))
-    return Walked(program, here, at, weights, worst[1], worst[0])
+    excesses += _limit_excesses(optimum, working_set, program, evaluation)
+    excesses += _piece_excesses(optimum, working_set, evaluation)
+    excess, reason = max(excesses, default=(-math.inf, ""))
+    return PathPoint(program, here, evaluation, weights, reason, excess)
 
 
-def _entering(optimum: Optimum, held: Held, program: Program, at: At) -> Iterator[tuple[float, str]]:
-    """Yield by how much each limit is exceeded, natural sizes, where the active set does not meet it, and what it is.
+def _limit_excesses(
+    optimum: Optimum, working_set: WorkingSet, program: Program, evaluation: Evaluation
+) -> Iterator[tuple[float, str]]:
+    """Yield the excess, in scales, of every limit outside the working set, and the reason that it gives.
 
-    Of a limit over the whole cycle all other extremes count.
+    A limit over the whole cycle is tested at all extremes that are not in the working set.
     """
-    touched = {identity(row.limit) for row in optimum.rows if row.limit}
+    touched = {limit_key(row.limit) for row in optimum.rows if row.limit}
     names = {row.limit.name for row in optimum.rows if row.limit}
-    rows = at.rows[: len(held.met)]
+    rows, sampler = evaluation.rows[: len(working_set.constraints)], evaluation.sampler
     for limit in program.limits:
-        own = identity(limit)
-        met = [row for row in rows if row.limit and identity(row.limit) == own]
-        said = f"{limit.name} is reached"
+        key = limit_key(limit)
+        limit_rows = [row for row in rows if row.limit and limit_key(row.limit) == key]
+        reason = f"{limit.name} is reached"
         if not limit.sign:
             continue
-        if own not in touched:
-            yield limit.excess(at.sampler), f"{said} on its other side" if limit.name in names else said
+        if key not in touched:
+            yield limit.excess(sampler), f"{reason} on its other side" if limit.name in names else reason
         elif isinstance(limit, CycleLimit):
-            other = _other(at.sampler.extremes(limit.row, limit.where), met)
-            if other:
-                excess = (other.height - limit.bound) / limit.scale
-                yield _beside(excess), f"{said} at {_degrees(at.sampler, other)} too"
-        elif not met:
-            yield _beside(limit.excess(at.sampler)), said
+            extreme = _highest_new_extreme(sampler.extremes(limit.row, limit.where), limit_rows)
+            if extreme:
+                excess = (extreme.height - limit.bound) / limit.scale
+                yield _ignore_equal(excess), f"{reason} at {_crank_angle(sampler, extreme)} too"
+        elif not limit_rows:
+            yield _ignore_equal(limit.excess(sampler)), reason
 
 
-def _overtaking(optimum: Optimum, held: Held, at: At) -> Iterator[tuple[float, str]]:
-    """Yield by how much other pieces of the objective are above those of the active set, natural sizes, and which."""
-    objective, pieces = optimum.program.objectives[optimum.level], at.rows[len(held.met) :]
-    top = max(at.values[len(held.met) :])
+def _piece_excesses(optimum: Optimum, working_set: WorkingSet, evaluation: Evaluation) -> Iterator[tuple[float, str]]:
+    """Yield the excess, in scales, of pieces of the objective outside the working set, and the reason."""
+    objective, sampler, first = (
+        optimum.program.objectives[optimum.level],
+        evaluation.sampler,
+        len(working_set.constraints),
+    )
+    pieces, top = evaluation.rows[first:], max(evaluation.values[first:])
     for name in objective.quantities:
-        other = _other(at.sampler.extremes(name), [row for row in pieces if row.reads == name])
-        if other:
-            said = f"{objective.figure} is as large at {_degrees(at.sampler, other)}"
-            yield _beside(other.height / objective.scale - top), said
+        extreme = _highest_new_extreme(sampler.extremes(name), [row for row in pieces if row.reads == name])
+        if extreme:
+            reason = f"{objective.figure} is as large at {_crank_angle(sampler, extreme)}"
+            yield _ignore_equal(extreme.height / objective.scale - top), reason
     for name, sign in () if objective.is_magnitude else objective.sides:
         if not any((row.reads, row.sign) == (name, sign) for row in pieces):
-            yield _beside(sign * at.sampler.single(name) / objective.scale - top), f"{name} is as large"
+            yield _ignore_equal(sign * sampler.single(name) / objective.scale - top), f"{name} is as large"
 
 
-def _other(extremes: Sequence[Extreme], rows: Sequence[ActiveRow]) -> Extreme | None:
-    """Return the highest extreme at which none of some rows stands; None without one."""
+def _highest_new_extreme(extremes: Sequence[Extreme], rows: Sequence[ActiveRow]) -> Extreme | None:
+    """Highest extreme at which none of the rows stands; None without one."""
     nodes = [row.node for row in rows if row.node]
-    others = (e for e in extremes if not any(e.piece == n.piece and abs(e.u - n.u) <= SAME_NODE for n in nodes))
-    return next(others, None)
+    new = (e for e in extremes if not any(e.piece == n.piece and abs(e.u - n.u) <= SAME_NODE for n in nodes))
+    return next(new, None)
 
 
-def _beside(excess: float) -> float:
-    """Return what is exceeded, minus infinity where a row only stays level with those that hold the optimum."""
+def _ignore_equal(excess: float) -> float:
+    """The excess, or minus infinity where it is 0: such a row is degenerate, and not violated."""
     return -math.inf if -ACTIVE <= excess <= FEASIBLE else excess
 
 
-def _degrees(sampler: Sampler, extreme: Extreme) -> str:
-    """Return the crank angle of an extreme in words."""
+def _crank_angle(sampler: Sampler, extreme: Extreme) -> str:
+    """Text of the crank angle of an extreme."""
     return f"{math.degrees(sampler.angle(extreme)) % 360:.6g} deg"

@@ -9,29 +9,29 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.interface.study import sensitivity as text
+from loomopt.interface.study.sensitivity import SensitivityStudy
 from loomopt.jobs import registry
 from loomopt.picture.table import TextTable
 from loomopt.solving import engine
 from loomopt.studies.sensitivity import study
-from loomopt.studies.sensitivity.active import least
+from loomopt.studies.sensitivity.active import solve_linear_program
 
 RAMS = Path(__file__).parents[2] / "solving" / "answer" / "cases" / "mirrored_rams.toml"
 DIGITS = 2e-9
-"""Of a derivative with ten digits: differences of the fourth order."""
+"""Relative error of a derivative by differences of the fourth order; references have ten digits."""
 RANGE = 2e-5
-"""Of a range with five digits."""
+"""Relative error of a range; references have five digits."""
 
 
 @functools.cache
-def found(problem, **changes):
+def sensitivity(problem, **changes):
     scene = registry.load(problem)
     scene = scene.update(dict(changes)) if changes else scene
     return study.run(study.planned(scene, engine.solve(scene)))
 
 
 def derivative(problem, number, of):
-    (row,) = [row for row in found(problem).rows if (row.number, row.of) == (number, of)]
+    (row,) = [row for row in sensitivity(problem).rows if (row.number, row.of) == (number, of)]
     return row
 
 
@@ -78,8 +78,8 @@ def test_the_balanced_beatup(number, of, value):
         ),
     ],
 )
-def test_how_far_prices_of_the_beatup_hold_and_why_not_farther(limit, low, high, ends):
-    (price,) = [price for price in found("beatup").prices if price.limit == limit]
+def test_price_ranges_of_the_beatup_and_their_ends(limit, low, high, ends):
+    (price,) = [price for price in sensitivity("beatup").prices if price.limit == limit]
     assert price.range == pytest.approx((low, high), rel=5e-5 if limit == "swing" else RANGE)
     assert price.ends == ends
 
@@ -97,22 +97,22 @@ def test_how_far_prices_of_the_beatup_hold_and_why_not_farther(limit, low, high,
         ("operation.N_min", 7.209189763),
     ],
 )
-def test_rise_and_return_bind_together_and_nothing_is_refused(number, value):
+def test_rise_and_return_that_bind_together_have_derivatives(number, value):
     row = derivative("shedding", number, "K1")
     assert row.value == pytest.approx(value, rel=DIGITS, abs=1e-9)
     assert row.side == ("up" if number == "operation.N_min" else None)
 
 
-def test_how_far_the_cloth_may_change_until_other_limits_bind():
-    (held,) = found("beatup").holds
-    assert held.number == "operation.M0"
-    assert held.range == pytest.approx((699.603990, 789.153301), abs=6e-7)
-    assert held.ends == ("m4e is reached", "m4e is reached")
-    assert found("shedding").holds == ()
+def test_range_of_the_cloth_resistance_in_which_the_same_limits_bind():
+    (interval,) = sensitivity("beatup").holds
+    assert interval.number == "operation.M0"
+    assert interval.range == pytest.approx((699.603990, 789.153301), abs=6e-7)
+    assert interval.ends == ("m4e is reached", "m4e is reached")
+    assert sensitivity("shedding").holds == ()
 
 
 def test_a_weight_that_has_its_mass_and_a_spring_that_has_one():
-    """The weight with its mass M = G/g; a spring's mass moves with a third of itself."""
+    """The weight has the mass M = G/g; a third of the spring's mass moves with the lever."""
     assert derivative("shedding", "effects.weight.G", "K1").value + derivative(
         "shedding", "effects.inertia.M", "K1"
     ).value / 9.80665 == pytest.approx(278.921618, abs=6e-7)
@@ -124,18 +124,18 @@ def test_a_weight_that_has_its_mass_and_a_spring_that_has_one():
 
 
 @pytest.mark.slow
-def test_effects_that_begin_have_derivatives_on_one_side():
-    """Damping and friction part rise from return: each side has its own active set; less than none there is not."""
-    here = found("shedding", **{"effects.damping.C": "0 N*s/m", "effects.dry_friction.F": "0 N"})
+def test_effects_at_zero_have_derivatives_on_one_side():
+    """Damping and friction separate rise from return: each side has a different active set, and 0 is the least."""
+    here = sensitivity("shedding", **{"effects.damping.C": "0 N*s/m", "effects.dry_friction.F": "0 N"})
     rows = {row.number: row for row in here.rows if row.of == "K1"}
     for number, value in (("effects.damping.C", 15.396653420), ("effects.dry_friction.F", 7.209189763)):
         assert rows[number].side == "up"
         assert rows[number].value == pytest.approx(value, rel=1e-8)
 
 
-def test_how_far_prices_of_the_shedding_hold():
-    ranges = {price.limit: price.range for price in found("shedding").prices}
-    ends = {price.limit: price.ends for price in found("shedding").prices}
+def test_price_ranges_of_the_shedding():
+    ranges = {price.limit: price.range for price in sensitivity("shedding").prices}
+    ends = {price.limit: price.ends for price in sensitivity("shedding").prices}
     more, less = "the price moves by +10 %", "the price moves by -10 %"
     assert {name: ends[name] for name in ("X0", "travel", "speed")} == {
         "X0": (more, less),
@@ -149,20 +149,20 @@ def test_how_far_prices_of_the_shedding_hold():
 
 
 def test_another_angle_of_the_same_limit_ends_a_price():
-    """Beyond 18 361.28 N the roller lifts off at the beginning of the cycle first, where a newton costs 12.5 N/m."""
-    (price,) = [price for price in found("shedding").prices if price.limit == "N_min"]
+    """Beyond 18 361.28 N the roller lifts off at the start of the cycle first, where the price is 12.5 (N/m)/N."""
+    (price,) = [price for price in sensitivity("shedding").prices if price.limit == "N_min"]
     assert price.range == (0.0, pytest.approx(18361.28, abs=6e-3))
     assert price.ends == ("it is out of range", "N_min is reached at 0 deg too")
 
 
 @pytest.mark.slow
 def test_another_angle_ends_it_at_the_printed_travel_too():
-    (price,) = [price for price in found("shedding-printed-travel").prices if price.limit == "N_min"]
+    (price,) = [price for price in sensitivity("shedding-printed-travel").prices if price.limit == "N_min"]
     assert price.range == (0.0, pytest.approx(17442.74, abs=6e-3))
 
 
-def test_a_price_range_that_is_0_is_told_as_0():
-    grids = [part for part in text.SensitivityStudy(found("shedding")).tables() if isinstance(part, TextTable)]
+def test_an_end_of_0_is_printed_as_0():
+    grids = [part for part in SensitivityStudy(sensitivity("shedding")).tables() if isinstance(part, TextTable)]
     (line,) = [line for grid in grids for line in grid.lines if line[0] == "N_min min"]
     assert line[1] == "0"
 
@@ -173,8 +173,8 @@ def rams(target):
     return study.run(study.planned(lo.load(RAMS), answer))
 
 
-def test_bounds_that_bind_only_together_have_derivatives_of_their_own_on_each_side():
-    """Loosened alone a bound gains nothing; tightened it costs what both are worth."""
+def test_bounds_that_bind_only_together_have_different_derivatives_on_both_sides():
+    """One bound loosened alone changes nothing; tightened it costs the price of both together."""
     rows = {(row.number, row.side): row.value for row in rams("torque").rows if row.of == "peak_torque"}
     for name in ("left", "right"):
         assert rows[f"bounds.{name}.max", "up"] == 0.0
@@ -185,8 +185,8 @@ def test_bounds_that_bind_only_together_have_derivatives_of_their_own_on_each_si
         assert price.ends[0] == "the price is 0.000198 N*m per mm there"
 
 
-def test_prices_of_two_objectives_each_follow_their_own():
-    """Of two angles the most of one and then of the other is sought: cos mu = r / rod."""
+def test_a_price_follows_the_objective_that_it_belongs_to():
+    """Two angles are maximised, one after the other: cos mu = r / rod."""
     rows = {(row.number, row.of): row.value for row in rams("angles").rows}
     slope = 0.05 / 0.3**2 / math.sqrt(1 - (0.05 / 0.3) ** 2)
     for name, of in (("right", "mu.ram1"), ("left", "mu.ram2")):
@@ -201,18 +201,18 @@ def test_prices_of_two_objectives_each_follow_their_own():
 @pytest.mark.slow
 def test_resolving_confirms_a_derivative():
     scene = registry.load("beatup-light")
-    row = {row.number: row for row in found("beatup-light").rows if row.of == "M3_fdc"}["bounds.l1.min"]
+    row = {row.number: row for row in sensitivity("beatup-light").rows if row.of == "M3_fdc"}["bounds.l1.min"]
     ends = [engine.solve(scene.set("bounds.l1.min", f"{30 + d} mm")).figures["M3_fdc"] for d in (1e-3, -1e-3)]
     assert row.value == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-4)
 
 
-def test_a_free_cam_law_which_more_rows_hold_than_it_has_knots():
-    """Confirmed by solving again on both sides; N_min may only grow, and counts as the weight does."""
+def test_a_free_cam_law_with_more_active_rows_than_knots():
+    """Repeated solves on both sides confirm it; N_min can only increase, and acts like the weight."""
     scene = registry.load("shedding")
     answer = engine.solve(scene, "law")
-    found = study.run(study.planned(scene, answer))
-    assert found.refused is None
-    rows = {row.number: row for row in found.rows if row.of == "K1"}
+    result = study.run(study.planned(scene, answer))
+    assert result.refused is None
+    rows = {row.number: row for row in result.rows if row.of == "K1"}
     for key, unit, here, step, si in (
         ("bounds.X0.max", "mm", 80.0, 0.01, 1e-3),
         ("operation.speed", "rpm", 600.0, 0.1, math.pi / 30),
@@ -226,21 +226,23 @@ def test_a_free_cam_law_which_more_rows_hold_than_it_has_knots():
     assert rows["operation.N_min"].value == pytest.approx(rows["effects.weight.G"].value, rel=1e-8)
 
 
-def test_the_least_of_a_linear_program_is_its_vertex_or_nothing():
+def test_a_linear_program_has_one_vertex_or_no_solution():
     square = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 1.0]])
     sides, none, nothing = np.array([1.0, 1.0, 0.0, 0.0, 2.0]), np.zeros((0, 2)), np.zeros(0)
-    assert least(np.array([-1.0, -2.0]), square, sides, none, nothing) == pytest.approx([1.0, 1.0])
-    assert least(np.array([1.0, -2.0]), square, sides, none, nothing) == pytest.approx([0.0, 1.0])
-    held = np.array([[1.0, -1.0]])
-    assert least(np.array([1.0, 1.0]), square, sides, held, np.array([0.25])) == pytest.approx([0.25, 0.0])
-    assert least(np.array([1.0, 0.0]), square[:1], sides[:1], none, nothing) is None
+    assert solve_linear_program(np.array([-1.0, -2.0]), square, sides, none, nothing) == pytest.approx([1.0, 1.0])
+    assert solve_linear_program(np.array([1.0, -2.0]), square, sides, none, nothing) == pytest.approx([0.0, 1.0])
+    equal = np.array([[1.0, -1.0]])
+    assert solve_linear_program(np.array([1.0, 1.0]), square, sides, equal, np.array([0.25])) == pytest.approx(
+        [0.25, 0.0]
+    )
+    assert solve_linear_program(np.array([1.0, 0.0]), square[:1], sides[:1], none, nothing) is None
 
 
 def test_an_answer_that_is_not_certified_is_refused():
     scene = registry.load("beatup").update({"limits.swing.max": "23 deg", "limits.swing.min": "22.99 deg"})
     answer = engine.solve(scene.update({"bounds.l1.min": "34.9 mm"}))
     if answer.status == "optimal":
-        pytest.skip("the scene has an answer after all")
+        pytest.skip("the scene has an answer")
     with pytest.raises(BadInput, match="only a certified optimum has derivatives"):
         study.planned(scene, answer)
 
@@ -275,8 +277,8 @@ def test_the_rapier_with_its_free_direction(number, value):
 
 
 @pytest.mark.slow
-def test_how_far_prices_of_the_rapier_hold():
-    prices = {price.limit: price for price in found("rapier").prices}
+def test_price_ranges_of_the_rapier():
+    prices = {price.limit: price for price in sensitivity("rapier").prices}
     assert prices["stroke"].range[0] == pytest.approx(-6.730e-3, abs=6e-7)
     reached, more, less = "C0x is reached", "the price moves by +10 %", "the price moves by -10 %"
     assert {name: prices[name].ends for name in ("stroke", "s_dwell", "dwell_after", "dwell_before")} == {
