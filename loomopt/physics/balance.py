@@ -168,6 +168,11 @@ class Loaded:
         """What the loads move, each with its motion."""
         return masses(self.maths, self.loads, self.given, (self.pose, self.carried))
 
+    @property
+    def inertia(self) -> Number:
+        """Inertia of all that the loads move, kg·m² or kg."""
+        return total([mass.second for mass, _ in self.masses])
+
     @lazy
     def pushes(self) -> "Sequence[Vector]":
         """Forces on the output's link itself, N."""

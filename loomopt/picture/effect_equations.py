@@ -207,6 +207,11 @@ class WrittenLoading(NamedTuple):
     pushes: "Sequence[Vector]"
     applied: Sequence[Applied] = ()
 
+    @property
+    def inertia(self) -> Expression:
+        """Inertia of all that the loads move, kg·m² or kg."""
+        return balance.total([mass.second for mass, _ in self.masses])
+
 
 def joint_equations(model: JobModel, pose: Motion, known: Given, total: Expression, letter: str) -> list[Equation]:
     """Write the components of each force in a joint, and the moments, that checks read, once for all of them."""

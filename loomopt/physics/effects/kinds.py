@@ -108,6 +108,10 @@ class Loading(Protocol):
         """What the loads move, each with its motion."""
 
     @property
+    def inertia(self) -> Number:
+        """Inertia of all that the loads move, about the output's axis, kg·m², or its mass, kg."""
+
+    @property
     def pushes(self) -> "Sequence[Vector]":
         """Forces on the output's link itself, N."""
 

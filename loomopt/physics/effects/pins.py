@@ -4,12 +4,14 @@ On slender pins that is close to what pins that brake each other take: at μ = 0
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 from pydantic import Field, create_model
 
 from loomopt.base.quantities import PositiveLength, PureNumber
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics.schema import Figure, Table, Values
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Inputs
+from loomopt.physics.schema import Figure, Table
 
 LOSS = "friction_loss"
 FIGURE = Figure(LOSS, "power", "mean power that friction in the pins takes, by their loads", sides=())
@@ -37,9 +39,12 @@ def read(effect: str, pins: Mapping[str, str]) -> tuple[str, ...]:
     return tuple(f"effects.{effect}.pins.{name}.{key}" for name in pins for key in Pin.model_fields)
 
 
-def works(maths: Maths, own: Values, turned: Mapping[str, tuple[str, Number]]) -> dict[str, Number]:
-    """Return what a newton of each force takes, m per rad of the crank; turned: pin → its force, and how it turns."""
-    size = {name: maths.sqrt(turn**2) for name, (_, turn) in turned.items()}
-    return {
-        force: own[f"pins.{name}.mu"] * own[f"pins.{name}.radius"] * size[name] for name, (force, _) in turned.items()
-    }
+def works(at: Inputs[Any], turned: Mapping[str, tuple[str, Number]]) -> dict[str, Number]:
+    """Work of a newton of each force against friction, m per rad of the crank: μ r |δ'|.
+
+    turned: pin → the name of its force, and δ', how the pin turns per rad of the crank.
+    """
+    found = {}
+    for pin, (force, turn) in turned.items():
+        found[force] = at.table[f"pins.{pin}.mu"] * at.table[f"pins.{pin}.radius"] * at.maths.sqrt(turn**2)
+    return found

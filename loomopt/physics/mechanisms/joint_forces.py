@@ -52,6 +52,11 @@ def minus(vector: Vector) -> Vector:
     return Vector(-vector.x, -vector.y)
 
 
+def unit(vector: Vector, length: Number) -> Vector:
+    """Direction of a vector of a known length."""
+    return Vector(vector.x / length, vector.y / length)
+
+
 def turned(direction: Vector, along: Number, across: Number) -> Vector:
     """Return what lies `along` a unit direction and `across` it, to its left."""
     return Vector(along * direction.x - across * direction.y, along * direction.y + across * direction.x)

@@ -58,7 +58,7 @@ def upon(at: Inputs[ReedPose], loading: Loading) -> Number:
     from loomopt.physics.effects.beatup.joint_forces import CrankRockerForces
     from loomopt.physics.mechanisms.dyad import Vector, dot
 
-    found = CrankRockerForces(at.maths, at.pose, at.values, loading)
+    found = CrankRockerForces(at, loading)
     share, dyad = at.table["mu"] * at.table["radius"], found.linkage.dyad
     across, H = Vector(-2 * dyad.link1.x / dyad.area4, -2 * dyad.link1.y / dyad.area4), found.force_D
     drag = at.table["viscous"] * at.pose.velocity if "viscous" in at.table else None

@@ -7,7 +7,7 @@ shaking_force = |Σ m a_S| of all that moves: with the reed alone (m4 + m4e) |r|
 
 from loomopt.maths.systems import Number
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.beatup.joint_forces import PLACED, SHAKING_FORCE, forces
+from loomopt.physics.effects.beatup.joint_forces import PLACED, SHAKING_FORCE, CrankRockerForces
 from loomopt.physics.effects.kinds import Check, Inputs
 from loomopt.physics.schema import Figure, Table
 
@@ -27,7 +27,7 @@ EFFECT = Check(
     table=Parameters,
     rank=80,
     quantities={"reed_centrifugal": reed_centrifugal},
-    joints=forces,
+    joints=CrankRockerForces,
     between=("rod", "swung"),
     vectors=(SHAKING_FORCE.name,),
     reads=("m4e", "r4e"),

@@ -6,21 +6,22 @@ their force. Weights are those of effect gravity. Shaking force −Σ m a_S, mom
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from loomopt.base.records import lazy
 from loomopt.base.units import ShowValue
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Number
 from loomopt.physics.effects import pins
 from loomopt.physics.effects.beatup import ReedPose, gravity
 from loomopt.physics.effects.kinds import Check, Inputs, LinkMass, Loading
-from loomopt.physics.schema import Figure, Values
+from loomopt.physics.mechanisms import joint_forces
+from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.joint_forces import PairForces, Wrench
+from loomopt.physics.schema import Figure
 
 if TYPE_CHECKING:
     from loomopt.physics.mechanisms.crank_rocker import CrankRockerPose
-    from loomopt.physics.mechanisms.dyad import Vector
-    from loomopt.physics.mechanisms.joint_forces import PairForces, Wrench
 
 PLACED = ("mechanism.m4", "mechanism.r4")
 """Without which it is not known where the reed's mass is."""
@@ -63,28 +64,22 @@ class Swinging(Protocol):
 class CrankRockerForces:
     """Forces in the joints A to D, N, and on the frame, at one instant; each when it is first read."""
 
-    maths: Maths
-    pose: ReedPose
-    given: Values
+    at: Inputs[ReedPose]
     loading: Loading
-    own: Values = field(default_factory=dict)
 
     @property
     def linkage(self) -> "CrankRockerPose":
         """The linkage itself."""
-        found: CrankRockerPose = self.pose.joints  # type: ignore[assignment]  # it is one, whole or in symbols
+        found: CrankRockerPose = self.at.pose.joints  # type: ignore[assignment]  # it is one, whole or in symbols
         return found
 
     @lazy
-    def rod(self) -> "Wrench | None":
+    def rod(self) -> Wrench | None:
         """What acts on the rod by its own mass, about B; None for a rod without mass."""
-        from loomopt.physics.mechanisms import joint_forces
-
         linkage, rods = self.linkage, [each for each, _ in self.loading.masses if each.link == "rod"]
         if not rods:
             return None
-        along, length = linkage.dyad.link1, linkage.lengths.l2
-        direction = type(along)(along.x / length, along.y / length)
+        direction = joint_forces.unit(linkage.dyad.link1, linkage.lengths.l2)
         return joint_forces.together(
             joint_forces.inertia(
                 own.mass,
@@ -98,144 +93,120 @@ class CrankRockerForces:
 
     def _turning(self, rate: Number, second: Number) -> tuple[Number, Number]:
         """Return a link's angular speed, rad/s, and acceleration, rad/s², from its derivatives."""
-        omega, change = self.pose.omega, self.pose.omega_dot
+        omega, change = self.at.pose.omega, self.at.pose.omega_dot
         steady = second * omega**2
         return rate * omega, steady if change is None else steady + rate * change
 
-    def _carried(self, arm: "Vector") -> "Vector":
+    def _carried(self, arm: Vector) -> Vector:
         """Return the acceleration, m/s², of what turns with the crank."""
-        square, change = self.pose.omega**2, self.pose.omega_dot
+        square, change = self.at.pose.omega**2, self.at.pose.omega_dot
         x, y = -square * arm.x, -square * arm.y
-        return type(arm)(x, y) if change is None else type(arm)(x - change * arm.y, y + change * arm.x)
+        return Vector(x, y) if change is None else Vector(x - change * arm.y, y + change * arm.x)
 
     @lazy
-    def swung(self) -> "Wrench":
+    def swung(self) -> Wrench:
         """What acts on the rocker by the masses on the rocking shaft, about D."""
-        from loomopt.physics.mechanisms import joint_forces
-        from loomopt.physics.mechanisms.dyad import Vector
+        return joint_forces.together(self._swinging()) or Wrench(Vector(0, 0), 0)
 
-        return joint_forces.together(self._swinging()) or joint_forces.Wrench(Vector(0, 0), 0)
-
-    def _swinging(self) -> "Iterator[Wrench]":
-        from loomopt.physics.mechanisms import joint_forces
-        from loomopt.physics.mechanisms.dyad import Vector
-
+    def _swinging(self) -> Iterator[Wrench]:
         for own, motion in self._on_shaft():
             turning = -motion.velocity, -motion.acceleration
-            first = Vector(0, 0)
-            if motion is self.pose:
-                rocker, length = self.linkage.dyad.link2, self.linkage.lengths.l3
-                first = joint_forces.turned(Vector(rocker.x / length, rocker.y / length), own.along, own.across)
+            if motion is self.at.pose:
+                line = joint_forces.unit(self.linkage.dyad.link2, self.linkage.lengths.l3)
             else:
-                reed = Vector(self.maths.cos(motion.q), -self.maths.sin(motion.q))
-                first = joint_forces.turned(reed, own.along, own.across)
+                line = Vector(self.at.maths.cos(motion.q), -self.at.maths.sin(motion.q))
+            first = joint_forces.turned(line, own.along, own.across)
             yield joint_forces.inertia(own.mass, first, own.second, turning)
 
     def _on_shaft(self) -> Iterator[tuple[LinkMass, Swinging]]:
         """Yield what swings about D, each with its motion: reed and counterweight first, in line with the rocker."""
-        given, found = self.given, [each for each in self.loading.masses if each[0].link != "rod"]
+        given, found = self.at.values, [each for each in self.loading.masses if each[0].link != "rod"]
         if "m4" in given and "r4" in given and not any(own.link == "reed" for own, _ in found):
             first = given["m4"] * given["r4"] - given["m4e"] * given["r4e"]
             yield LinkMass("reed", given["m4"] + given["m4e"], first, 0, 0), self.loading.carried
         yield from found
 
     @lazy
-    def group(self) -> "PairForces":
+    def group(self) -> PairForces:
         """The group of rod and rocker, loaded by M3, all masses and weights."""
-        from loomopt.physics.mechanisms import joint_forces
-
         force = joint_forces.plus(self.swung.force, *self.loading.pushes)
         rod = joint_forces.together(each for each in (self.rod, self.rod_weight) if each is not None)
-        return joint_forces.two_links(self.linkage.dyad, rod, joint_forces.Wrench(force, self.loading.force))
+        return joint_forces.two_links(self.linkage.dyad, rod, Wrench(force, self.loading.force))
 
     @lazy
-    def rod_weight(self) -> "Wrench | None":
+    def rod_weight(self) -> Wrench | None:
         """The rod's weight about B; None where it has none."""
-        from loomopt.physics.mechanisms import joint_forces
-
-        given = self.given
+        given = self.at.values
         if "gravity.tilt" not in given or "rod_inertia.m2" not in given:
             return None
-        force = gravity.weight(self.maths, given["rod_inertia.m2"], given["gravity.tilt"])
+        force = gravity.weight(self.at.maths, given["rod_inertia.m2"], given["gravity.tilt"])
         share, rod = given["rod_inertia.s2"] / given["today.l2"], self.linkage.dyad.link1
-        return joint_forces.Wrench(force, share * joint_forces.cross(rod, force))
+        return Wrench(force, share * joint_forces.cross(rod, force))
 
     @property
-    def _crank_weight(self) -> "Vector | None":
+    def _crank_weight(self) -> Vector | None:
         """The crank's weight, N; None where it has none."""
-        if "gravity.tilt" not in self.given or "crank.mass" not in self.given:
+        if "gravity.tilt" not in self.at.values or "crank.mass" not in self.at.values:
             return None
-        return gravity.weight(self.maths, self.given["crank.mass"], self.given["gravity.tilt"])
+        return gravity.weight(self.at.maths, self.at.values["crank.mass"], self.at.values["gravity.tilt"])
 
     @lazy
-    def crank(self) -> "Vector | None":
+    def crank(self) -> Vector | None:
         """The force of the crank's own mass, N, at A alone; None for a balanced crank."""
-        given, crank = self.given, self.linkage.crank
+        given, crank = self.at.values, self.linkage.crank
         if "crank.mass" not in given or "crank.centre" not in given:
             return None
         share = given["crank.mass"] * given["crank.centre"] / self.linkage.lengths.l1
         carried = self._carried(crank)
-        return type(crank)(-share * carried.x, -share * carried.y)
+        return Vector(-share * carried.x, -share * carried.y)
 
     @lazy
-    def force_A(self) -> "Vector":
+    def force_A(self) -> Vector:
         """Of the frame on the crank."""
-        from loomopt.physics.mechanisms import joint_forces
-
         own = (each for each in (self.crank, self._crank_weight) if each is not None)
         return joint_forces.plus(self.group.outer1, *map(joint_forces.minus, own))
 
     @property
-    def force_B(self) -> "Vector":
+    def force_B(self) -> Vector:
         """Of the crank on the rod."""
         return self.group.outer1
 
     @property
-    def force_C(self) -> "Vector":
+    def force_C(self) -> Vector:
         """Of the rod on the rocker."""
         return self.group.inner
 
     @property
-    def force_D(self) -> "Vector":
+    def force_D(self) -> Vector:
         """Of the frame on the rocker."""
         return self.group.outer2
 
     @lazy
-    def shaking_force(self) -> "Vector":
+    def shaking_force(self) -> Vector:
         """Of all moving masses on the frame."""
-        from loomopt.physics.mechanisms import joint_forces
-
         others = [self.rod.force] if self.rod else []
         return joint_forces.plus(self.swung.force, *others, *([self.crank] if self.crank else []))
 
     @lazy
     def shaking_moment(self) -> Number:
         """Of all moving masses on the frame, about A, N·m."""
-        from loomopt.physics.mechanisms import joint_forces
-
         about = self.swung.moment + self.linkage.lengths.l4 * self.swung.force.y
         if self.rod is None:
             return about
         return about + self.rod.moment + joint_forces.cross(self.linkage.crank, self.rod.force)
 
-    def heading(self, part: str) -> "Vector":
+    def heading(self, part: str) -> Vector:
         """Return the unit direction of crank, rod or rocker."""
         linkage = self.linkage
         vectors = {"crank": (linkage.crank, linkage.lengths.l1), "rod": (linkage.dyad.link1, linkage.lengths.l2)}
-        vector, length = {**vectors, "rocker": (linkage.dyad.link2, linkage.lengths.l3)}[part]
-        return type(vector)(vector.x / length, vector.y / length)
+        return joint_forces.unit(*{**vectors, "rocker": (linkage.dyad.link2, linkage.lengths.l3)}[part])
 
     @lazy
     def friction_work(self) -> Mapping[str, Number]:
         """What a newton in each joint takes by friction, m per rad of the crank: μ r |δ'|, δ' how the pin turns."""
-        rod, rocker = self.linkage.rod_1, -self.pose.q1
+        rod, rocker = self.linkage.rod_1, -self.at.pose.q1
         turned = {"A": 1, "B": rod - 1, "C": rocker - rod, "D": rocker}
-        return pins.works(self.maths, self.own, {joint: (f"force_{joint}", turn) for joint, turn in turned.items()})
-
-
-def forces(at: Inputs[ReedPose], loading: Loading) -> CrankRockerForces:
-    """Return the forces at an instant."""
-    return CrankRockerForces(at.maths, at.pose, at.values, loading, at.table)
+        return pins.works(self.at, {joint: (f"force_{joint}", turn) for joint, turn in turned.items()})
 
 
 def remark(at: Inputs[object], shown: ShowValue) -> str:
@@ -253,7 +224,7 @@ EFFECT = Check(
     summary="forces in the joints, and of all moving masses on the frame",
     table=pins.own(PINS),
     rank=85,
-    joints=forces,
+    joints=CrankRockerForces,
     between=("rod", "rod_weight", "swung"),
     vectors=("force_A", "force_B", "force_C", "force_D", SHAKING_FORCE.name),
     scalars=("shaking_moment",),

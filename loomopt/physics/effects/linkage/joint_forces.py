@@ -8,14 +8,14 @@ slides; what only turns with the output, or slides with it, shakes the frame wit
 import functools
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from loomopt.base.records import lazy
 from loomopt.maths.systems import Number
 from loomopt.physics.effects import pins
 from loomopt.physics.effects.kinds import Applied, Check, Inputs, Loading
 from loomopt.physics.effects.linkage import LinkagePose
-from loomopt.physics.schema import Figure, Table, Values
+from loomopt.physics.schema import Figure, Table
 
 if TYPE_CHECKING:
     from loomopt.physics.mechanisms.chain import Chain
@@ -37,8 +37,9 @@ class Parameters(Table):
 class LinkageForces:
     """Forces at one instant, by the names of their figures; each when it is first read."""
 
-    def __init__(self, linked: "Chain", pose: Number, loading: Loading, own: Values) -> None:
-        self.linked, self.pose, self.loading, self.own = linked, pose, loading, own
+    def __init__(self, linked: "Chain | None", at: Inputs[Any], loading: Loading) -> None:
+        assert linked is not None
+        self.linked, self.at, self.pose, self.loading = linked, at, at.pose, loading
 
     def output(self, size: Number, inertial: bool = False) -> list[Applied]:
         """Return the loads that a force or torque at the output is; size: as the output counts it."""
@@ -67,13 +68,9 @@ class LinkageForces:
     @lazy
     def inertial(self) -> list[Applied]:
         """What moves with the output resists with this, as loads."""
-        moving = [own.second for own, _ in self.loading.masses]
-        if not moving:
+        if not self.loading.masses:
             return []
-        total = moving[0]
-        for own in moving[1:]:
-            total = total + own
-        return self.output(-total * self.pose.acceleration, True)
+        return self.output(-self.loading.inertia * self.pose.acceleration, True)
 
     @lazy
     def walk(self) -> "Walk":
@@ -113,7 +110,7 @@ class LinkageForces:
             name: (f"force_{name}", chain_forces.turned(self.linked, self.pose.joints, place))
             for place, name in chain_forces.pinned(self.linked).items()
         }
-        return pins.works(self.pose.joints.maths, self.own, turned)
+        return pins.works(self.at, turned)
 
     @lazy
     def _shaken(self) -> "Wrench":
@@ -132,12 +129,6 @@ class LinkageForces:
     def shaking_moment(self) -> Number:
         """Of all moving masses on the frame, about the crank shaft, N·m."""
         return self._shaken.moment
-
-
-def forces(linked: "Chain | None", at: Inputs[LinkagePose], loading: Loading) -> LinkageForces:
-    """Return the forces at an instant."""
-    assert linked is not None
-    return LinkageForces(linked, at.pose, loading, at.table)
 
 
 @functools.lru_cache(maxsize=64)
@@ -164,7 +155,7 @@ def fitted(linked: "Chain") -> Check[LinkagePose]:
         sides={f"force_{name}": chain_forces.joined(linked, place) for place, name in places.items()},
         worked={pins.LOSS: "friction_work"},
         wanted={pins.LOSS: ("operation.speed", *pins.read("joint_forces", rubbed))},
-        joints=functools.partial(forces, linked),
+        joints=functools.partial(LinkageForces, linked),
         vectors=(*vectors, *shaking),
         scalars=(*teeth, "shaking_moment"),
         figures=(*told, Figure("shaking_moment", "torque", moment, sides=("max",)), pins.FIGURE),
@@ -177,7 +168,7 @@ EFFECT: Check[LinkagePose] = Check(
     summary="forces in the joints, and of all moving masses on the frame",
     table=Parameters,
     rank=90,
-    joints=functools.partial(forces, None),
+    joints=functools.partial(LinkageForces, None),
     fitted=fitted,
     said=SAID,
     examples=({},),

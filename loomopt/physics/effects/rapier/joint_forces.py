@@ -8,19 +8,29 @@ tooth force at B2, and what beats up, whose forces add.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from loomopt.base.records import lazy
 from loomopt.base.units import ShowValue
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Number
 from loomopt.physics.effects import pins
 from loomopt.physics.effects.kinds import Check, Inputs, Loading, Motion
-from loomopt.physics.schema import Figure, Values
+from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.joint_forces import (
+    PairForces,
+    Wrench,
+    crank_torque,
+    cross,
+    minus,
+    plus,
+    tooth_force,
+    two_links,
+    unit,
+)
+from loomopt.physics.schema import Figure
 
 if TYPE_CHECKING:
-    from loomopt.physics.mechanisms.dyad import Vector
-    from loomopt.physics.mechanisms.joint_forces import PairForces, Wrench
     from loomopt.physics.mechanisms.rapier_drive import RapierPose
 
 JOINTS = {
@@ -52,15 +62,12 @@ PINS = {joint: text.removeprefix("peak force in the ") for joint, text in JOINTS
 class RapierForces:
     """Forces in the joints, N, at one instant; each when it is first read."""
 
-    maths: Maths
-    pose: Number
-    given: Values
+    at: Inputs[Any]
     loading: Loading
-    own: Values = field(default_factory=dict)
 
     @property
     def _drive(self) -> "RapierPose":
-        found: RapierPose = self.pose.joints
+        found: RapierPose = self.at.pose.joints
         return found
 
     @lazy
@@ -69,97 +76,85 @@ class RapierForces:
         return self.loading.force * self._drive.dimensions.travel
 
     @lazy
-    def five_bar(self) -> "PairForces":
+    def five_bar(self) -> PairForces:
         """Link 5 (C→D) and driving link (B2→D)."""
-        from loomopt.physics.mechanisms.dyad import Vector
-        from loomopt.physics.mechanisms.joint_forces import Wrench, two_links
-
         return two_links(self._drive.dyad, None, Wrench(Vector(0, 0), -self.couple))
 
     @lazy
-    def sley(self) -> "Wrench":
+    def sley(self) -> Wrench:
         """What acts on the sley, about B0."""
-        from loomopt.physics.mechanisms.joint_forces import Wrench, cross, minus
-
         push = minus(self.force_B2)
         return Wrench(push, self.couple + cross(self._drive.carrier, push))
 
     @lazy
-    def four_bar(self) -> "PairForces":
+    def four_bar(self) -> PairForces:
         """Rod (A→B1) and sley (B0→B1)."""
-        from loomopt.physics.mechanisms.joint_forces import two_links
-
         return two_links(self._drive.sley_dyad, None, self.sley)
 
     @lazy
-    def _centres(self) -> "tuple[Vector, Number]":
+    def _centres(self) -> tuple[Vector, Number]:
         """Unit vector C0→A0, and the pitch radius of the second crank's gear, m."""
         drive, shaft = self._drive, self._drive.main_shaft
-        x, y = shaft.x - drive.dimensions.C0x, shaft.y - drive.dimensions.C0y
-        length = self.maths.sqrt(x**2 + y**2)
-        return type(shaft)(x / length, y / length), self.given.get("gears.pitch_radius", length / 3)
+        centres = Vector(shaft.x - drive.dimensions.C0x, shaft.y - drive.dimensions.C0y)
+        length = self.at.maths.sqrt(centres.x**2 + centres.y**2)
+        return unit(centres, length), self.at.values.get("gears.pitch_radius", length / 3)
 
     @lazy
     def gear_force(self) -> Number:
         """At the pitch circles, on the second crank's gear, to the left of C0→A0."""
-        from loomopt.physics.mechanisms.joint_forces import crank_torque
-
         return crank_torque(self._drive.second_crank, self.force_C) / self._centres[1]
 
     @lazy
-    def _mesh(self) -> "Vector":
-        from loomopt.physics.mechanisms.joint_forces import tooth_force
-
+    def _mesh(self) -> Vector:
         return tooth_force(self.gear_force, 1, self._centres[0])
 
     @lazy
-    def force_A0(self) -> "Vector":
+    def force_A0(self) -> Vector:
         """Of the frame on the main crank with its gear."""
-        return type(self.force_A)(self.force_A.x + self._mesh.x, self.force_A.y + self._mesh.y)
+        return plus(self.force_A, self._mesh)
 
     @property
-    def force_A(self) -> "Vector":
+    def force_A(self) -> Vector:
         """Of the main crank on the rod."""
         return self.four_bar.outer1
 
     @property
-    def force_B0(self) -> "Vector":
+    def force_B0(self) -> Vector:
         """Of the frame on the sley."""
         return self.four_bar.outer2
 
     @property
-    def force_B1(self) -> "Vector":
+    def force_B1(self) -> Vector:
         """Of the rod on the sley."""
         return self.four_bar.inner
 
     @property
-    def force_B2(self) -> "Vector":
+    def force_B2(self) -> Vector:
         """Of the sley on the driving link."""
         return self.five_bar.outer2
 
     @lazy
-    def force_C0(self) -> "Vector":
+    def force_C0(self) -> Vector:
         """Of the frame on the second crank with its gear."""
-        return type(self.force_C)(self.force_C.x - self._mesh.x, self.force_C.y - self._mesh.y)
+        return plus(self.force_C, minus(self._mesh))
 
     @property
-    def force_C(self) -> "Vector":
+    def force_C(self) -> Vector:
         """Of the second crank on link 5."""
         return self.five_bar.outer1
 
     @property
-    def force_D(self) -> "Vector":
+    def force_D(self) -> Vector:
         """Of link 5 on the driving link."""
         return self.five_bar.inner
 
-    def heading(self, part: str) -> "Vector":
+    def heading(self, part: str) -> Vector:
         """Return the unit direction of a part."""
         drive = self._drive
         d, rod, link = drive.dimensions, drive.sley_dyad, drive.dyad
         vectors = {"crank": (drive.main_crank, d.l1), "rod": (rod.link1, d.l2), "sley": (rod.link2, d.l3)}
         vectors |= {"second crank": (drive.second_crank, d.l4), "link 5": (link.link1, d.l5)}
-        vector, length = {**vectors, "driving link": (link.link2, d.l6)}[part]
-        return type(vector)(vector.x / length, vector.y / length)
+        return unit(*{**vectors, "driving link": (link.link2, d.l6)}[part])
 
     @lazy
     def friction_work(self) -> Mapping[str, Number]:
@@ -169,12 +164,7 @@ class RapierForces:
         rod, second = sense * drive.four_bar.rod_1, -2 * sense
         turned = {"A0": sense, "A": rod - sense, "B0": sley, "B1": sley - rod, "B2": driving - sley}
         turned |= {"C0": second, "C": link - second, "D": driving - link}
-        return pins.works(self.maths, self.own, {joint: (f"force_{joint}", turn) for joint, turn in turned.items()})
-
-
-def forces(at: Inputs[Motion], loading: Loading) -> RapierForces:
-    """Return the forces at an instant."""
-    return RapierForces(at.maths, at.pose, at.values, loading, at.table)
+        return pins.works(self.at, {joint: (f"force_{joint}", turn) for joint, turn in turned.items()})
 
 
 def remark(at: Inputs[object], shown: ShowValue) -> str:
@@ -189,7 +179,7 @@ EFFECT: Check[Motion] = Check(
     summary="forces in the joints and in the gear mesh",
     table=pins.own(PINS),
     rank=40,
-    joints=forces,
+    joints=RapierForces,
     between=("sley",),
     vectors=tuple(f"force_{joint}" for joint in JOINTS),
     scalars=("gear_force",),

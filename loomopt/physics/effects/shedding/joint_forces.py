@@ -7,19 +7,18 @@ pull: where N is negative there is no contact and no force.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from loomopt.base.records import lazy
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Number
 from loomopt.physics.effects import pins
 from loomopt.physics.effects.kinds import Check, Inputs, Loading
-from loomopt.physics.effects.shedding import FramePose
-from loomopt.physics.schema import Figure, Values
+from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.schema import Figure
 
 if TYPE_CHECKING:
     from loomopt.physics.mechanisms.cam_follower import Contact
-    from loomopt.physics.mechanisms.dyad import Vector
 
 SWUNG = ("mechanism.arm_swing",)
 FOLLOWED = ("mechanism.arm", "mechanism.centre_distance", "mechanism.base_radius", "mechanism.roller_radius", *SWUNG)
@@ -36,29 +35,26 @@ PINS = {"shaft": "cam shaft's bearings", "roller": "pin of the roller, which rol
 class CamForces:
     """Forces at one instant, N; each when it is first read."""
 
-    maths: Maths
-    pose: Number
-    given: Values
+    at: Inputs[Any]
     loading: Loading
-    own: Values = field(default_factory=dict)
 
     @lazy
     def _contact(self) -> "Contact":
         from loomopt.physics.mechanisms.cam_follower import Follower
 
         names = [key.removeprefix("mechanism.") for key in FOLLOWED]
-        found: Contact = self.pose.contact(Follower(**{name: self.given[name] for name in names}))
+        found: Contact = self.at.pose.contact(Follower(**{name: self.at.values[name] for name in names}))
         return found
 
     @lazy
     def lever_couple(self) -> Number:
         """N λ, N·m."""
-        return self.loading.force * self.given["travel"] / self.given["arm_swing"]
+        return self.loading.force * self.at.values["travel"] / self.at.values["arm_swing"]
 
     @lazy
     def _across(self) -> Number:
         """What of the roller's force turns the lever."""
-        return self.lever_couple / self.given["arm"]
+        return self.lever_couple / self.at.values["arm"]
 
     @lazy
     def roller_force(self) -> Number:
@@ -67,10 +63,10 @@ class CamForces:
         return self._across * self._contact.speed / along
 
     @lazy
-    def push(self) -> "Vector":
+    def push(self) -> Vector:
         """The force of the cam on the roller, and of the frame on the cam's shaft."""
         normal = self._contact.normal(0)
-        return type(normal)(-self.roller_force * normal.x, -self.roller_force * normal.y)
+        return Vector(-self.roller_force * normal.x, -self.roller_force * normal.y)
 
     @property
     def cam_shaft_force(self) -> Number:
@@ -84,34 +80,26 @@ class CamForces:
         return -self._across * across / along
 
     @lazy
-    def lever_pivot_force(self) -> "Vector":
+    def lever_pivot_force(self) -> Vector:
         """Of the frame on the lever: what roller and rod leave."""
-        normal, angle = self._contact.normal(0), self.given["lever.direction"]
-        rod = self.lever_couple / self.given["lever.arm"]
-        return type(normal)(
-            self.roller_force * normal.x - rod * self.maths.cos(angle),
-            self.roller_force * normal.y - rod * self.maths.sin(angle),
+        normal, angle = self._contact.normal(0), self.at.values["lever.direction"]
+        rod = self.lever_couple / self.at.values["lever.arm"]
+        return Vector(
+            self.roller_force * normal.x - rod * self.at.maths.cos(angle),
+            self.roller_force * normal.y - rod * self.at.maths.sin(angle),
         )
 
     @lazy
-    def shaking_force(self) -> "Vector":
+    def shaking_force(self) -> Vector:
         """Of frame and spring on the loom, N; y upward, against X."""
-        from loomopt.physics.mechanisms.dyad import Vector
-
-        moving = [own.second for own, _ in self.loading.masses]
-        total = moving[0]
-        for own in moving[1:]:
-            total = total + own
-        force = total * self.pose.acceleration
+        force = self.loading.inertia * self.at.pose.acceleration
         return Vector(0 * force, force)
 
-    def heading(self, part: str) -> "Vector":
+    def heading(self, part: str) -> Vector:
         """Return the unit direction of the cam, x where it begins to rise, or of the lever, to its roller."""
-        from loomopt.physics.mechanisms.dyad import Vector
-
-        cos, sin = self.maths.cos, self.maths.sin
+        cos, sin = self.at.maths.cos, self.at.maths.sin
         if part == "cam":
-            return Vector(cos(self.pose.phi), sin(self.pose.phi))
+            return Vector(cos(self.at.pose.phi), sin(self.at.pose.phi))
         return Vector(-sin(self._contact.angle), -cos(self._contact.angle))
 
     @lazy
@@ -122,12 +110,7 @@ class CamForces:
             "roller": ("roller_force", self._contact.rolling),
             "lever": ("lever_pivot_force", self._contact.phi_1),
         }
-        return pins.works(self.maths, self.own, turned)
-
-
-def forces(at: Inputs[FramePose], loading: Loading) -> CamForces:
-    """Return the forces at an instant."""
-    return CamForces(at.maths, at.pose, at.values, loading, at.table)
+        return pins.works(self.at, turned)
 
 
 EFFECT = Check(
@@ -135,7 +118,7 @@ EFFECT = Check(
     summary="forces of the roller, in its lever and the cam shaft, and of the moving masses",
     table=pins.own(PINS),
     rank=95,
-    joints=forces,
+    joints=CamForces,
     vectors=("lever_pivot_force", "shaking_force"),
     scalars=PUSHES[:-1],
     sides={
