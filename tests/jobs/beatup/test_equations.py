@@ -147,7 +147,7 @@ def test_printed_checks_are_the_effects():
     shown = dict(equation.text.split(" = ") for equation in beatup_equations.equations(found))
     for check in found.checks:
         for name, quantity in check.quantities.items():
-            number = quantity(FLOAT, pose, given.values, given.own[check.name])
+            number = quantity(given.inputs(FLOAT, check, pose))
             assert value(read(shown[name]), named) == pytest.approx(number, rel=1e-12)
 
 
