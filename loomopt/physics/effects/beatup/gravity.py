@@ -13,7 +13,6 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.beatup import ReedPose
 from loomopt.physics.effects.kinds import Inputs, LinkMass, Load
 from loomopt.physics.mechanisms.dyad import Vector
-from loomopt.physics.mechanisms.moving import total
 from loomopt.physics.schema import Table, Values
 
 STANDARD_GRAVITY = 9.80665
@@ -44,18 +43,15 @@ def rocker_moment(given: Values) -> Number | None:
 
 def inside(at: Inputs[ReedPose]) -> Number | None:
     """Crank torque that lifts rod and crank, N·m: the rod as its shares at B and C; None where neither tells a mass."""
-    at_crank, at_rocker = None, None
-    if "rod_inertia.m2" in at.values:
-        at_rocker = at.values["rod_inertia.m2"] * at.values["rod_inertia.s2"] / at.values["today.l2"]
-        at_crank = (at.values["rod_inertia.m2"] - at_rocker) * at.values["l1"]
-    if "crank.mass" in at.values:
-        at_crank = total(at_crank, at.values["crank.mass"] * at.values["crank.centre"])
-    if at_crank is None:
-        return None
-    found = at_crank * at.maths.cos(at.pose.phi + at.table["tilt"])
-    if at_rocker is not None:
-        found = found - at_rocker * at.values["l3"] * at.pose.q1 * at.maths.cos(at.table["tilt"] - at.pose.q)
-    return STANDARD_GRAVITY * found
+    turned = at.maths.cos(at.pose.phi + at.table["tilt"])
+    crank = at.values["crank.mass"] * at.values["crank.centre"] if "crank.mass" in at.values else None
+    if "rod_inertia.m2" not in at.values:
+        return None if crank is None else STANDARD_GRAVITY * (crank * turned)
+    at_rocker = at.values["rod_inertia.m2"] * at.values["rod_inertia.s2"] / at.values["today.l2"]
+    at_crank = (at.values["rod_inertia.m2"] - at_rocker) * at.values["l1"]
+    at_crank = at_crank if crank is None else at_crank + crank
+    swung = at_rocker * at.values["l3"] * at.pose.q1 * at.maths.cos(at.table["tilt"] - at.pose.q)
+    return STANDARD_GRAVITY * (at_crank * turned - swung)
 
 
 def push(at: Inputs[ReedPose], term: Number) -> Vector:
