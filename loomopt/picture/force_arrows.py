@@ -1,7 +1,7 @@
 """Forces in the joints as arrows on a drawing: at events of the motion, and where each one peaks."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -10,8 +10,8 @@ from loomopt.base.records import Frozen
 from loomopt.maths.systems import FLOAT
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import TURN
-from loomopt.picture.drawing import JOINT, Label, arrow
-from loomopt.picture.shapes import Circle, Line, Point, Primitive
+from loomopt.picture.drawing import JOINT, Label, arrow, place
+from loomopt.picture.shapes import Circle, Drawing, Floats, Line, Measure, Point, Primitive, Units
 
 if TYPE_CHECKING:
     from loomopt.picture.motion import MechanismMotion
@@ -77,10 +77,37 @@ def _read(sampler: Sampler, name: str, piece: int, u: float, event: str, places:
     return ForceArrow(joint, angle, x, y, event, places.get(joint, ""))
 
 
-def legend(event: str) -> tuple[tuple[str, str], ...]:
-    """Return what the legend says of the arrows."""
-    when = f"just before {event} and " if event else ""
-    return ((LAYER, f"F  forces in the joints, {when}at their peaks"),)
+class Sheet(NamedTuple):
+    """A mechanism's drawing before its texts are placed: strokes, labels and lines of its legend, each with its layer.
+
+    height: of texts, m; event: that before which forces are drawn, "" for none; measures: lengths that stand in it.
+    """
+
+    title: str
+    height: float
+    strokes: Sequence[Primitive]
+    labels: Sequence[Label]
+    legend: Sequence[tuple[str, str]]
+    units: Units
+    event: str = ""
+    measures: tuple[Measure, ...] = ()
+
+    def drawing(
+        self, forces: Mapping[ForceArrow, str] | None, motion: "Callable[[Floats], MechanismMotion]"
+    ) -> Drawing:
+        """Drawing with its texts placed, and with forces in its joints.
+
+        forces: each with its size in words, None or empty without any; motion(angles): the joints at crank angles, rad.
+        """
+        strokes, labels, legend = [*self.strokes], [*self.labels], [*self.legend]
+        if forces:
+            joints = motion(np.array([force.angle for force in forces]))
+            arrows, sizes = drawn(tuple(forces), joints, forces, self.height)
+            strokes, labels = strokes + arrows, labels + sizes
+            when = f"just before {self.event} and " if self.event else ""
+            legend.append((LAYER, f"F  forces in the joints, {when}at their peaks"))
+        texts = place(labels, strokes, self.height)
+        return Drawing(self.title, self.height, (*strokes, *texts), tuple(legend), self.units.length, self.measures)
 
 
 def drawn(

@@ -13,9 +13,8 @@ from loomopt.jobs.beatup.model import FRONT, LENGTHS, REAR
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.mechanisms import crank_rocker
-from loomopt.picture import force_arrows
-from loomopt.picture.drawing import POINTER, Label, Mass, Skeleton, along, angle_between, around, place, pointer
-from loomopt.picture.force_arrows import ForceArrow
+from loomopt.picture.drawing import POINTER, Label, Mass, Skeleton, along, angle_between, around, pointer
+from loomopt.picture.force_arrows import ForceArrow, Sheet
 from loomopt.picture.motion import MechanismMotion
 from loomopt.picture.shapes import METRIC, Arc, Drawing, Floats, Measure, Point, Primitive, Units
 
@@ -95,15 +94,10 @@ def linkage(
     forces: in its joints at some crank angles, each with its size as it is told.
     """
     found = of(design)
-    strokes, labels = [*found.skeleton.strokes(found.height), *_angles(found)], _labels(found, units)
-    legend = _legend(found, units)
-    if forces:
-        moved = motion(design, np.array([force.angle for force in forces]))
-        arrows, sizes = force_arrows.drawn(tuple(forces), moved, forces, found.height)
-        strokes, labels = [*strokes, *arrows], [*labels, *sizes]
-        legend = (*legend, *force_arrows.legend(FRONT))
-    texts = place(labels, strokes, found.height)
-    return Drawing(title, found.height, (*strokes, *texts), legend, units.length, _measures(found))
+    strokes = [*found.skeleton.strokes(found.height), *_angles(found)]
+    labels, legend, measures = _labels(found, units), _legend(found, units), _measures(found)
+    sheet = Sheet(title, found.height, strokes, labels, legend, units, FRONT, measures)
+    return sheet.drawing(forces, functools.partial(motion, design))
 
 
 def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:

@@ -1,10 +1,10 @@
 """A linkage drawn at full scale at its events: ternary links as plates, points and sliders with their paths."""
 
+import functools
 import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,8 +17,8 @@ from loomopt.physics.cycle import TURN, Floats
 from loomopt.physics.mechanisms import chain_forces
 from loomopt.physics.mechanisms.moving import Joint
 from loomopt.picture import force_arrows
-from loomopt.picture.drawing import Label, Skeleton, along, place
-from loomopt.picture.force_arrows import ForceArrow
+from loomopt.picture.drawing import Label, Skeleton, along
+from loomopt.picture.force_arrows import ForceArrow, Sheet
 from loomopt.picture.motion import MechanismMotion
 from loomopt.picture.shapes import METRIC, Drawing, Line, Point, Units
 
@@ -134,15 +134,9 @@ def linkage(
     """Return a design at its events, at full scale; forces: in its joints, each with its size as it is told."""
     found = LinkageDrawing(sampler)
     skeleton, height = found.skeleton, found.height
-    strokes: list[Any] = skeleton.strokes(height)
-    labels, legend = _labels(found, skeleton, units), _legend(found, skeleton, units)
-    if forces:
-        moved = motion(sampler, np.array([force.angle for force in forces]))
-        arrows, sizes = force_arrows.drawn(tuple(forces), moved, forces, height)
-        strokes, labels = [*strokes, *arrows], [*labels, *sizes]
-        legend = (*legend, *force_arrows.legend(next(iter(event_of(sampler)), "")))
-    texts = place(labels, strokes, height)
-    return Drawing(title, height, (*strokes, *texts), legend, units.length)
+    labels, legend, event = _labels(found, skeleton, units), _legend(found, skeleton, units), "".join(event_of(sampler))
+    sheet = Sheet(title, height, skeleton.strokes(height), labels, legend, units, event)
+    return sheet.drawing(forces, functools.partial(motion, sampler))
 
 
 def joints_csv(sampler: Sampler, units: Units = METRIC) -> str:

@@ -15,9 +15,8 @@ from loomopt.physics.cycle import TURN, Floats
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, RapierPose, Sley
-from loomopt.picture import force_arrows
-from loomopt.picture.drawing import POINTER, Label, Skeleton, along, angle_between, around, arrow, place, pointer
-from loomopt.picture.force_arrows import ForceArrow
+from loomopt.picture.drawing import POINTER, Label, Skeleton, along, angle_between, around, arrow, pointer
+from loomopt.picture.force_arrows import ForceArrow, Sheet
 from loomopt.picture.motion import MechanismMotion
 from loomopt.picture.shapes import METRIC, Drawing, Line, Measure, Point, Primitive, Units
 
@@ -127,18 +126,10 @@ def linkage(
     forces: in its joints at some crank angles, each with its size as it is told.
     """
     found = of(design)
-    strokes, labels = (
-        [*found.skeleton.strokes(found.height), *_angles(found)],
-        [*_joints(found), *_labels(found, units)],
-    )
-    legend = _legend(found, units)
-    if forces:
-        moved = motion(design, np.array([force.angle for force in forces]))
-        arrows, sizes = force_arrows.drawn(tuple(forces), moved, forces, found.height)
-        strokes, labels = [*strokes, *arrows], [*labels, *sizes]
-        legend = (*legend, *force_arrows.legend(FRONT))
-    texts = place(labels, strokes, found.height)
-    return Drawing(title, found.height, (*strokes, *texts), legend, units.length, _measures(found))
+    strokes = [*found.skeleton.strokes(found.height), *_angles(found)]
+    labels, legend, measures = [*_joints(found), *_labels(found, units)], _legend(found, units), _measures(found)
+    sheet = Sheet(title, found.height, strokes, labels, legend, units, FRONT, measures)
+    return sheet.drawing(forces, functools.partial(motion, design))
 
 
 def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:

@@ -5,7 +5,7 @@ The cam stands still as it is at the beginning of the rise, and the arm goes rou
 
 import functools
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,6 @@ from loomopt.physics.cycle import TURN, Floats, Pieces
 from loomopt.physics.mechanisms.cam_follower import Follower, Stations
 from loomopt.physics.mechanisms.cam_motion import Spline
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
-from loomopt.picture import force_arrows
 from loomopt.picture.drawing import (
     JOINT,
     Label,
@@ -33,10 +32,9 @@ from loomopt.picture.drawing import (
     dimension,
     fixed_pivot,
     ground,
-    place,
     spring,
 )
-from loomopt.picture.force_arrows import ForceArrow
+from loomopt.picture.force_arrows import ForceArrow, Sheet
 from loomopt.picture.job_views import sized, tells_forces
 from loomopt.picture.motion import MechanismMotion, Turning
 from loomopt.picture.shapes import Arc, Circle, Drawing, Line, Measure, Point, Primitive, Units, drawn_units
@@ -353,18 +351,14 @@ def linkage(scene: Scene, found: CamDrawing, figures: Figures) -> Drawing:
     strokes = [*drawn.skeleton.strokes(drawn.height), *_frame(drawn), *drawn.spring.strokes()]
     labels, legend = _labels(drawn, units), _legend(scene, drawn, figures, units)
     forces = sized(scene, _forces(drawn)) if tells_forces(scene) else {}
-    if forces:
-        arrows, sizes = force_arrows.drawn(tuple(forces), _stood(drawn, forces), forces, drawn.height)
-        strokes, labels = [*strokes, *arrows], [*labels, *sizes]
-        legend = (*legend, *force_arrows.legend(LEAST))
-    texts = place(labels, strokes, drawn.height)
     near = drawn.skeleton.joints[NEAR]
     measures = (
         Measure("arm", near["B"], near["C"]),
         Measure("centre_distance", ORIGIN, near["B"]),
         Measure("roller_radius", near["C"], near["T"]),
     )
-    return Drawing(scene.name, drawn.height, (*strokes, *texts), legend, units.length, measures)
+    sheet = Sheet(scene.name, drawn.height, strokes, labels, legend, units, LEAST, measures)
+    return sheet.drawing(forces, functools.partial(_stood, drawn))
 
 
 PINS = {"cam_shaft_force": "A", "lever_pivot_force": "B", "roller_force": "C"}
@@ -387,9 +381,8 @@ def _forces(drawn: Picture) -> list[ForceArrow]:
     return found
 
 
-def _stood(drawn: Picture, forces: Collection[ForceArrow]) -> MechanismMotion:
-    """Return where the arm stands about the cam at the forces' cam angles."""
-    theta = np.array([force.angle for force in forces])
+def _stood(drawn: Picture, theta: Floats) -> MechanismMotion:
+    """Arm about the cam at cam angles, rad."""
     round_it = float(drawn.cam.follower.centre_distance) * np.column_stack((np.sin(theta), np.cos(theta)))
     return MechanismMotion(theta, {"A": ORIGIN}, {"B": round_it, "C": drawn.cam.at(theta).pitch}, (("B", "C"),))
 
