@@ -52,6 +52,11 @@ def no_worse(search: Search) -> Search:
     return replace(search, best=found, nearest=None, substitute=True)
 
 
+def is_no_worse_than_today(search: Search) -> bool:
+    """Whether the best is no worse than today's machine, where that is admissible."""
+    return _stands(search, _known(search, search.today))
+
+
 def _stands(search: Search, known: Candidate | None) -> bool:
     """Say whether the best is certified or admissible, and no worse than a known design."""
     best = search.best

@@ -28,7 +28,7 @@ from loomopt.solving.certificate.kkt import ActiveRow, active_set
 from loomopt.solving.certificate.records import Binding, Certificate
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
-from loomopt.solving.search import elastic, least_change, multistart, neighbour_newton
+from loomopt.solving.search import elastic, fallback, least_change, multistart, neighbour_newton
 from loomopt.solving.search.multistart import rewarded, searched, spread, tied
 from loomopt.solving.search.search import Candidate, Search, judged, objectives, tried
 from loomopt.studies.front.plan import ALIKE, Touched, sloped
@@ -175,7 +175,12 @@ class Solver:
             first, second = map(neighbour_newton.read_optimum, optima)
             begun.append(neighbour_newton.Between(self._begun(asking), first, second, share, self._peaks))
         searches = zip(asked, neighbour_newton.solved(begun), strict=True)
-        return [self._told(search, of) if search and self._priced(search, of) else None for of, search in searches]
+        return [
+            self._told(search, of)
+            if search and self._priced(search, of) and fallback.is_no_worse_than_today(search)
+            else None
+            for of, search in searches
+        ]
 
     def moved(self, asked: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Moved | None]:
         """Return where a neighbour's optimum moves to each program with the rows that stop it.
@@ -260,7 +265,7 @@ class Solver:
             search = self._spread(search)
         if not (search.passed or wide is None):
             search = rewarded(search, None, 0, (), None) or searched(search, None, 0, (), None)
-        return search
+        return fallback.no_worse(search)
 
     def _beside(self, search: Search, near: Sequence[Mapping[str, Any]]) -> Search:
         """Return the search after solves from neighbours' rows, its best judged."""

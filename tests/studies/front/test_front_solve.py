@@ -5,10 +5,12 @@ import math
 from dataclasses import replace
 
 import pytest
+from support.linkage_scenes import four_bar
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface import results
+from loomopt.solving.search import fallback
 from loomopt.studies.front import front, plan
 from loomopt.studies.front import solver as solving
 from loomopt.studies.front.solver import Asking
@@ -129,3 +131,28 @@ def test_an_answer_that_keeps_contact_up_to_a_speed_is_judged_and_proven_by_it()
 def test_a_contact_speed_that_nothing_limits_is_not_traded():
     with pytest.raises(BadInput, match=r"nothing limits the speed.*trade another axis"):
         front.trade(lo.load("shedding-static"), ("K1", "contact_speed"))
+
+
+def test_where_no_row_leads_on_a_point_is_solved_from_an_admissible_machine_of_today():
+    scene = four_bar()
+    today = lo.evaluate(scene)
+    assert all(limit.ok for limit in today.limits)
+    solver = front.trade(scene, ("peak_torque", "mass")).solver
+    found = solver.solve(Asking(0, (None, None)), [], None)
+    assert found.status == "optimal", found.reason
+    assert found.figures["peak_torque"] < today.figures["peak_torque"]
+    below = 0.9 * found.figures["peak_torque"]
+    none = solver.solve(Asking(1, (below, None)), [], None)
+    assert (none.status, dict(none.design)) == ("failed", {}), "today's machine is not admissible there"
+
+
+def test_rows_between_two_optima_that_are_worse_than_today_are_solved_anew(monkeypatch):
+    trade = front.trade(lo.load("beatup"), ("peak_torque", "m4e"), "balance")
+    low, high = (trade.solver.solve(Asking(0, (None, cap)), [], False) for cap in (3.0, 5.0))
+    ends = [row.warm["optimum"] for row in (low, high)]
+    between = Asking(0, (None, 4.0))
+    (row,) = trade.solver.solve_neighbours([between], [[*ends, 0.5]])
+    assert row is not None
+    assert row.certified
+    monkeypatch.setattr(fallback, "is_no_worse_than_today", lambda search: False)
+    assert trade.solver.solve_neighbours([between], [[*ends, 0.5]]) == [None]
