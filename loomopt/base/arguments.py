@@ -43,7 +43,7 @@ def renamed(**names: str) -> Callable[[Callable[Arguments, Returned]], Callable[
 
 
 def number(given: object, key: str, allowed: str, remedy: str) -> float:
-    """Return a number, of Python or of NumPy. Raises BadInput for anything else, a truth value too."""
+    """Number, of Python or of NumPy. Raises BadInput for anything else, a truth value too."""
     if isinstance(given, bool) or not isinstance(given, Real):
         raise refusal("it is not a number", "", key, given, allowed, remedy)
     try:
@@ -53,14 +53,14 @@ def number(given: object, key: str, allowed: str, remedy: str) -> float:
 
 
 def flag(given: object, key: str, remedy: str = "Write True or False") -> bool:
-    """Return a truth value, of Python or of NumPy. Raises BadInput for anything else, however true it looks."""
+    """Truth value, of Python or of NumPy. Raises BadInput for anything else, however true it looks."""
     if isinstance(given, bool) or (type(given).__module__ == "numpy" and type(given).__name__ in ("bool", "bool_")):
         return bool(given)
     raise refusal("it is neither true nor false", "", key, given, "true, false", remedy)
 
 
 def whole(given: object, key: str, allowed: str, remedy: str) -> int:
-    """Return a whole number, of Python or of NumPy. Raises BadInput for anything else, a truth value too."""
+    """Whole number, of Python or of NumPy. Raises BadInput for anything else, a truth value too."""
     if isinstance(given, bool) or not isinstance(given, Integral):
         raise refusal("it is not a whole number", "", key, given, allowed, remedy)
     return int(given)
@@ -74,7 +74,7 @@ def text(given: object, key: str, allowed: str, remedy: str) -> str:
 
 
 def texts(given: object, key: str, allowed: str, remedy: str) -> tuple[str, ...]:
-    """Return the names of a sequence, in its order. Raises BadInput for anything else: a set has no order."""
+    """Names of a sequence, in its order. Raises BadInput for anything else: a set has no order."""
     if isinstance(given, str) or not _ordered(given):
         raise refusal("it is no list of names", "", key, given, allowed, remedy)
     return tuple(text(each, key, allowed, remedy) for each in given)
@@ -92,7 +92,7 @@ def names(given: object, key: str, allowed: str, remedy: str) -> tuple[str, ...]
 
 
 def listed(given: object, key: str, allowed: str, remedy: str) -> list[Any]:
-    """Return the members of a sequence. Raises BadInput for anything else: a set has no order."""
+    """Members of a sequence. Raises BadInput for anything else: a set has no order."""
     if isinstance(given, str | bytes | Mapping) or not _ordered(given):
         raise refusal("it is no list", "", key, given, allowed, remedy)
     return list(given)
@@ -106,7 +106,7 @@ def table(given: object, key: str, allowed: str, remedy: str) -> dict[str, Any]:
 
 
 def path(given: object, key: str, allowed: str, remedy: str) -> str:
-    """Return the path or the name that is given. Raises BadInput for anything else."""
+    """Path or the name that is given. Raises BadInput for anything else."""
     if not isinstance(given, str | os.PathLike):
         raise refusal("it is no path", "", key, given, allowed, remedy)
     return text(os.fspath(given), key, allowed, remedy)

@@ -75,7 +75,7 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
         return (self._in(self.file) if self.others else self, *self.others)
 
     def placed(self, file: str, tables: Collection[str]) -> "BadInput":
-        """Return the same mistakes, those in one of these tables as mistakes of a file, where they name none."""
+        """Same mistakes, those in one of these tables as mistakes of a file, where they name none."""
         first, *others = (
             each._in(file) if not each.file and each.key.split(".")[0] in tables else each for each in self.faults
         )
@@ -123,7 +123,7 @@ class Faults:
         return any(each.key.split(".")[0] in tables for each in self.found)
 
     def told(self) -> BadInput:
-        """Return the error of all mistakes, the worst first; there must be one."""
+        """Error of all mistakes, the worst first; there must be one."""
         first, *others = sorted(self.found, key=lambda each: each.grade)
         return first.together(others) if others else first
 
@@ -142,7 +142,7 @@ BROUGHT: dict[str, str] = {}
 
 
 def blamed(error: BaseException) -> BaseException:
-    """Return an error that ran through the code of another distribution as one message that names it.
+    """Error that ran through the code of another distribution as one message that names it.
 
     Any other is returned as it is, with a note of what other distributions bring.
     """
@@ -190,7 +190,7 @@ NOTHING = object()
 
 
 def shown(value: object) -> str:
-    """Return a scene's raw value as it would be written, shortened."""
+    """Scene's raw value as it would be written, shortened."""
     if isinstance(value, str):
         return f'"{clean(value, _LONGEST_VALUE)}"'
     if isinstance(value, bool) or value is None:
@@ -211,7 +211,7 @@ def refusal(
     remedy: str = "",
     grade: int = VALUE,
 ) -> BadInput:
-    """Return the error for one problem; value: as given, where one is given; grade: how bad it is."""
+    """Error for one problem; value: as given, where one is given; grade: how bad it is."""
     return BadInput(
         clean(problem, _LONGEST_PART),
         file=clean(origin, _LONGEST_PART),
@@ -232,7 +232,7 @@ def unknown(
     remedy: str = "Correct the name or take it out",
     given: Collection[str] = (),
 ) -> BadInput:
-    """Return the error for a name nobody knows, with the nearest known one; what: "key", "effect", …
+    """Error for a name nobody knows, with the nearest known one; what: "key", "effect", …
 
     remedy: where none is near; given: names that are there too, and so are meant less likely.
     """
@@ -245,7 +245,7 @@ def unknown(
 
 
 def nearest(name: str, known: Iterable[str], given: Collection[str] = (), least: float = NEAR) -> str:
-    """Return the known name that is meant, whatever its case and its hyphens; "" where none is near.
+    """Known name that is meant, whatever its case and its hyphens; "" where none is near.
 
     given: names that come last among equally near ones; least: how alike names must be, 1 for the same letters.
     """
@@ -262,7 +262,7 @@ def _plain(name: str) -> str:
 
 
 def near_file(path: Path) -> str:
-    """Return the path of the file beside one that is not there which is meant; "" where none is near."""
+    """Path of the file beside one that is not there which is meant; "" where none is near."""
     with contextlib.suppress(OSError, ValueError):
         beside = itertools.islice(path.parent.iterdir(), _MOST_FILES)
         names = [each.name for each in beside if each.suffix == path.suffix and each.is_file()]
@@ -272,5 +272,5 @@ def near_file(path: Path) -> str:
 
 
 def misread(error: QuantityError, origin: str, key: str, value: object) -> BadInput:
-    """Return the error for a value that is not the quantity asked for."""
+    """Error for a value that is not the quantity asked for."""
     return refusal(error.problem, origin, key, value, error.allowed, error.remedy)

@@ -60,7 +60,7 @@ def check_room(folder: Path) -> None:
 
 
 def suffix(path: Path, allowed: Sequence[str]) -> str:
-    """Return the suffix of `path` in small letters: ".dxf". Raises BadInput when it is not allowed."""
+    """Suffix of `path` in small letters: ".dxf". Raises BadInput when it is not allowed."""
     found = path.suffix.lower()
     if found not in allowed:
         raise BadInput(

@@ -34,7 +34,7 @@ def leave_at_once() -> None:
 
 
 def stoppable(run: Callable[[], int]) -> int:
-    """Return the exit status of `run`; after Ctrl-C 130, whatever an import or a library has made of it."""
+    """Exit status of `run`; after Ctrl-C 130, whatever an import or a library has made of it."""
 
     def stop(number: int, frame: "FrameType | None") -> None:
         _came.append(number)

@@ -46,7 +46,7 @@ _RATIO_PATTERN = rf"^[ \t]*{NUMBER_PATTERN}(?: */ *{NUMBER_PATTERN})?[ \t]*$"
 
 
 def pattern_schema(kind: str, least: float, above: float, below: float, allowed: str) -> dict[str, Any]:
-    """Return the JSON Schema of a quantity's raw value; least, above, below: its range, SI; allowed: it in words.
+    """JSON Schema of a quantity's raw value; least, above, below: its range, SI; allowed: it in words.
 
     Under the key `QUANTITY` stands a name that equal ones share. What fails is told by a sentence: see `told`.
     """
@@ -67,7 +67,7 @@ def pattern_schema(kind: str, least: float, above: float, below: float, allowed:
 
 
 def told(check: dict[str, Any], allowed: str) -> dict[str, Any]:
-    """Return a JSON Schema that takes what `check` takes, and of anything else says what is allowed.
+    """JSON Schema that takes what `check` takes, and of anything else says what is allowed.
 
     Editors repeat the part that fails: a pattern says nothing to a person, the one value that would be taken does.
     """
@@ -75,21 +75,21 @@ def told(check: dict[str, Any], allowed: str) -> dict[str, Any]:
 
 
 def _name(kind: str, least: float, above: float, below: float) -> str:
-    """Return a name for quantities of a kind and a range."""
+    """Name for quantities of a kind and a range."""
     unit, ends = DISPLAY_UNIT[kind], (("from", least), ("above", above), ("below", below))
     return " ".join([kind, *(f"{word} {show(end, unit)}" for word, end in ends if math.isfinite(end))])
 
 
 @functools.cache
 def foreign(kind: str) -> str:
-    """Return a pattern of units that are usual for other kinds of quantity and wrong for this one."""
+    """Pattern of units that are usual for other kinds of quantity and wrong for this one."""
     single = [re.escape(name) for name in (*UNITS, *SPEEDS, *PRIMES) if not fits(name, kind)]
     composed = {_usual(unit) for unit in SI_UNIT.values() if unit not in UNITS and unit != "1" and not fits(unit, kind)}
     return "|".join([*single, *sorted(composed), *_NEVER])
 
 
 def _usual(unit: str) -> str:
-    """Return a pattern of an SI unit with each of its names exchanged for any other of the same dimension."""
+    """Pattern of an SI unit with each of its names exchanged for any other of the same dimension."""
 
     def names(match: re.Match[str]) -> str:
         alike = [name for name in UNITS if UNITS[name].powers == UNITS[match[0]].powers]
@@ -114,7 +114,7 @@ _ARITHMETIC = re.compile(r"[0-9.] *(?:\*\*|[-+*/^]) *\(?[0-9.]|(?<![eE])\+ *[0-9
 
 @functools.lru_cache(maxsize=_MOST_REMEMBERED)
 def read(text: str, kind: str) -> float:
-    """Return the quantity that text gives, in SI units, correctly rounded; kind: a key of `SI_UNIT`.
+    """Quantity that text gives, in SI units, correctly rounded; kind: a key of `SI_UNIT`.
 
     Raises QuantityError for anything but one number and one unit of that kind (a pure number may be a ratio).
     """
@@ -144,7 +144,7 @@ def read(text: str, kind: str) -> float:
 
 
 def shortest_text(value: float, unit_text: str, kind: str) -> str:
-    """Return the shortest text in `unit_text` that `read` turns into the same SI float64; without a unit for "1"."""
+    """Shortest text in `unit_text` that `read` turns into the same SI float64; without a unit for "1"."""
     shared = Fraction(value) / parse_unit(unit_text).factor
     for digits in range(1, _MOST_DIGITS):
         number = Context(prec=digits).divide(Decimal(shared.numerator), Decimal(shared.denominator)).normalize()
@@ -163,7 +163,7 @@ def _reads_as(text: str, kind: str, value: float) -> bool:
 
 
 def plain_number(text: str) -> float | None:
-    """Return the number that text is by the same pattern, without a unit; None for anything else."""
+    """Number that text is by the same pattern, without a unit; None for anything else."""
     if len(text) > _LONGEST_TEXT or not _PLAIN.fullmatch(text):
         return None
     value, nothing = float(text), not re.search("[1-9]", re.split("[eE]", text)[0])
@@ -176,7 +176,7 @@ def is_beyond(text: str) -> bool:
 
 
 def unit_of(text: str) -> str:
-    """Return the unit of a quantity as written, "1" for a pure number. Raises QuantityError without one."""
+    """Unit of a quantity as written, "1" for a pure number. Raises QuantityError without one."""
     text = text.strip(" \t")
     if _RATIO.fullmatch(text):
         return "1"
@@ -205,7 +205,7 @@ def _pure_number(text: str) -> float:
 
 
 def _as_written(number: str, kind: str) -> Fraction:
-    """Return the number as written, its size checked before any digits are expanded."""
+    """Number as written, its size checked before any digits are expanded."""
     mantissa = re.split("[eE]", number)[0]
     if not re.search("[1-9]", mantissa):
         return Fraction(0)
@@ -215,7 +215,7 @@ def _as_written(number: str, kind: str) -> Fraction:
 
 
 def _rounded(value: Fraction, kind: str) -> float:
-    """Return an SI value as float64, within a range whose fourth powers float64 can still hold."""
+    """SI value as float64, within a range whose fourth powers float64 can still hold."""
     if value and not _SMALLEST < abs(value) < _LARGEST:
         raise _refusal(kind, "the number is too large or too small to compute with")
     return float(value)
@@ -336,7 +336,7 @@ class Quantity(NamedTuple):
         return self.schema()
 
     def schema(self) -> dict[str, Any]:
-        """Return the JSON Schema of its raw value."""
+        """JSON Schema of its raw value."""
         kind, least, above, below = self
         said = f"{described(kind)}, {self.range}" if self.range else described(kind)
         return pattern_schema(kind, least, above, below, said)
@@ -402,7 +402,7 @@ def quantities_of(model: type[BaseModel]) -> Mapping[str, Quantity]:
 
 
 def table_inside(model: type[BaseModel], field: str) -> type[BaseModel] | None:
-    """Return the model of a table that a model's field is, also for `X | None`; None for a field that is none."""
+    """Model of a table that a model's field is, also for `X | None`; None for a field that is none."""
     annotation = model.model_fields[field].annotation
     parts = (annotation, *(part for part in typing.get_args(annotation) if typing.get_origin(annotation) is not tuple))
     return next((part for part in parts if isinstance(part, type) and issubclass(part, BaseModel)), None)

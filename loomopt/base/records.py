@@ -86,7 +86,7 @@ class lazy(functools.cached_property[Computed]):  # noqa: N801 (it is written li
     def __get__(self, instance: object, owner: type[Any] | None = None) -> Computed: ...
 
     def __get__(self, instance: object | None, owner: type[Any] | None = None) -> "lazy[Computed] | Computed":
-        """Return the value, computed once and kept in the instance."""
+        """Value, computed once and kept in the instance."""
         if instance is None:
             return self
         value = instance.__dict__[self.attrname or ""] = self.func(instance)

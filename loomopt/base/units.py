@@ -88,7 +88,7 @@ class ShowValue(Protocol):
     """shown(value, kind, digits): an SI value as text in the unit in which a person sees its kind of quantity."""
 
     def __call__(self, value: float, kind: str, digits: int = 6, /) -> str:
-        """Return the text; digits: significant ones."""
+        """Text; digits: significant ones."""
 
 
 _USUAL: dict[str, str] = {
@@ -115,7 +115,7 @@ _USUAL: dict[str, str] = {
 
 
 def usual_units(kind: str) -> str:
-    """Return the units of a kind of quantity that people write, in words: "rpm, rad/s or deg/s"."""
+    """Units of a kind of quantity that people write, in words: "rpm, rad/s or deg/s"."""
     *others, last = dict.fromkeys([DISPLAY_UNIT[kind], *_USUAL.get(kind, "").split(), SI_UNIT[kind]])
     return f"{', '.join(others)} or {last}" if others else last
 
@@ -135,13 +135,13 @@ def factor(unit_text: str) -> float:
 
 
 def show(value: float, unit_text: str, digits: int = 6) -> str:
-    """Return an SI value as text in `unit_text`, such as "30 mm"; digits: significant digits."""
+    """SI value as text in `unit_text`, such as "30 mm"; digits: significant digits."""
     number = f"{value / factor(unit_text) + 0.0:.{digits}g}"
     return number if unit_text == "1" else f"{number} {unit_text}"
 
 
 def usual(value: float, kind: str, digits: int = 6) -> str:
-    """Return an SI value as text in the unit of its kind where no scene says another."""
+    """SI value as text in the unit of its kind where no scene says another."""
     return show(value, DISPLAY_UNIT[kind], digits)
 
 
@@ -154,7 +154,7 @@ def fits(unit_text: str, kind: str) -> bool:
 
 @functools.lru_cache(maxsize=512)
 def parse_unit(text: str) -> Unit:
-    """Return the unit that an expression gives: names joined by * or /, powers ^ or ** up to 4, parentheses.
+    """Unit that an expression gives: names joined by * or /, powers ^ or ** up to 4, parentheses.
 
     Raises QuantityError for an unknown unit and for anything else, a space or arithmetic included.
     """
@@ -173,7 +173,7 @@ def parse_unit(text: str) -> Unit:
 
 
 def ascii_unit(text: str) -> str:
-    """Return a unit's text in ASCII: N·m² as N*m^2, ° as deg, " as in."""
+    """Unit's text in ASCII: N·m² as N*m^2, ° as deg, " as in."""
     text = PRIMES.get(text.translate(_QUOTES), text)
     return re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda power: "^" + power[0].translate(_SUPERSCRIPT), text).translate(_LOOKALIKE)
 
@@ -241,7 +241,7 @@ def _from_pint(name: str) -> Unit:
 
 
 def meant_unit(text: str, kind: str, shortest: int = 2) -> str:
-    """Return the unit of a kind of quantity that stands a slip away from text that is none of it; "" where none does.
+    """Unit of a kind of quantity that stands a slip away from text that is none of it; "" where none does.
 
     Case, and what joins units, count for nothing; a slip is a letter more, less, another one, or two exchanged.
     shortest: letters of text in which there may be one.
@@ -256,7 +256,7 @@ def meant_unit(text: str, kind: str, shortest: int = 2) -> str:
 
 
 def _letters(unit: str) -> str:
-    """Return a unit's letters and digits, all small."""
+    """Unit's letters and digits, all small."""
     return re.sub(r"[^a-z0-9]", "", ascii_unit(unit[:_LONGEST_UNIT]).lower())
 
 

@@ -76,7 +76,7 @@ class Task(abc.ABC):
 
     @abc.abstractmethod
     def objectives(self) -> tuple[Objective, ...]:
-        """Return the target's levels in order."""
+        """Target's levels in order."""
 
     # What is known.
 
@@ -103,7 +103,7 @@ class Task(abc.ABC):
     # The program, step by step.
 
     def program(self) -> Program:
-        """Return the task as data. Raises BadInput."""
+        """Task as data. Raises BadInput."""
         self.demand_figures()
         return Program(
             self.model,
@@ -142,11 +142,11 @@ class Task(abc.ABC):
         return tuple(self.variable(name, ends) for name, ends in self.limited.items())
 
     def variable(self, name: str, ends: Ends) -> Variable:
-        """Return a variable of natural size."""
+        """Variable of natural size."""
         return Variable(name, *ends, self.scale(name, ends), self.room(name, ends), self.labels.get(name, ""))
 
     def scale(self, name: str, ends: Ends) -> float:
-        """Return the natural size of a variable: the largest it is or may be."""
+        """Natural size of a variable: the largest it is or may be."""
         return max(abs(self.known[name]), *map(abs, ends)) or 1.0
 
     def room(self, name: str, ends: Ends) -> Ends:
@@ -176,7 +176,7 @@ class Task(abc.ABC):
         return tuple(found.values())
 
     def _asked_of(self, name: str) -> Variable:
-        """Return a variable that limits ask something of; one that is not there yet stands at the most of it."""
+        """Variable that limits ask something of; one that is not there yet stands at the most of it."""
         least = max(value for _, value in self.demanded[name])
         return next((v for v in self.bounded if v.name == name), Variable(name, least, least, least, (least, least)))
 
@@ -190,7 +190,7 @@ class Task(abc.ABC):
         return [*self.bounds(), *self.figures(), *self.demands(), *self.margins(), *self.wanted()]
 
     def bounds(self) -> list[Limit]:
-        """Return the scene's bounds of variables as limits."""
+        """Scene's bounds of variables as limits."""
         return [each for v in self.bounded if v.called in self.scene.bounds for each in bound_limits(v)]
 
     def floors(self) -> Iterator[Limit]:
@@ -205,16 +205,16 @@ class Task(abc.ABC):
                 told |= {by, value}
 
     def figures(self) -> list[Limit]:
-        """Return the scene's limits on figures, row by row."""
+        """Scene's limits on figures, row by row."""
         return [each for name, limit in self.scene.limits.items() for each in self.figure(name, limit.min, limit.max)]
 
     def figure(self, name: str, low: float | None, high: float | None) -> list[Limit]:
-        """Return the limits on one figure; the least of several rows is limited in each of them."""
+        """Limits on one figure; the least of several rows is limited in each of them."""
         size, rows = self.figure_size(name), self.read_from.get(name, (name,))
         return [self.row_limit(name, sign, row, value, size) for sign, value in ends(low, high) for row in rows]
 
     def row_limit(self, name: str, sign: int, row: str, value: float, scale: float, relaxable: bool = True) -> Limit:
-        """Return a limit on a row of the model: on one of the design alone, or over the whole cycle."""
+        """Limit on a row of the model: on one of the design alone, or over the whole cycle."""
         kind = CycleLimit if self.model.has_quantity(row) else DesignLimit
         return kind(name, sign, row, value, scale, relaxable=relaxable)
 
@@ -237,7 +237,7 @@ class Task(abc.ABC):
         return 0.0
 
     def margins(self) -> list[Limit]:
-        """Return the margins by which the links close, which nobody can give up."""
+        """Margins by which the links close, which nobody can give up."""
         rows = [row for group in self.model.kinematics.groups.values() for row in group.margins]
         return [DesignLimit(row, -1, row, 0.0, self.length, relaxable=False) for row in rows]
 
@@ -251,7 +251,7 @@ class Task(abc.ABC):
         return []
 
     def goals(self) -> tuple[Goal, ...]:
-        """Return the same as goals of the figures."""
+        """Same as goals of the figures."""
         return goals(self.wanted())
 
     def held(self) -> tuple[Objective, ...]:
@@ -261,7 +261,7 @@ class Task(abc.ABC):
         return tuple(level for level in own[:-1] if level.figure not in self.traded)
 
     def least(self) -> tuple[Objective, ...]:
-        """Return the levels after a target's own: what effects want least, rows of checks and free numbers of any."""
+        """Levels after a target's own: what effects want least, rows of checks and free numbers of any."""
         found = []
         for effect in self.sampler.model.effects:
             if isinstance(effect, Check) and effect.least in effect.rows:
@@ -273,11 +273,11 @@ class Task(abc.ABC):
         return tuple(found)
 
     def starts(self) -> tuple[dict[str, float], ...]:
-        """Return the job's own starts: today's machine."""
+        """Job's own starts: today's machine."""
         return (self.inside(self.known),)
 
     def inside(self, values: Numbers) -> dict[str, float]:
-        """Return a start: values, or lower bounds, moved just inside the bounds of the variables."""
+        """Start: values, or lower bounds, moved just inside the bounds of the variables."""
         start = {}
         for v in self.variables:
             room = START_ROOM * (v.upper - v.lower) if math.isfinite(v.upper - v.lower) else 0.0
@@ -285,11 +285,11 @@ class Task(abc.ABC):
         return start
 
     def moves(self) -> list[Move]:
-        """Return the directions that may leave everything unchanged, in order: numbers of effects."""
+        """Directions that may leave everything unchanged, in order: numbers of effects."""
         return self.axis_moves()
 
     def axis_moves(self) -> list[Move]:
-        """Return the moves along numbers of effects that may change nothing."""
+        """Moves along numbers of effects that may change nothing."""
         named = [(axis.name, owned(effect, axis.key)) for effect in self.scene.active for axis in effect.axes]
         return [
             self.move(axis, name)
@@ -298,11 +298,11 @@ class Task(abc.ABC):
         ]
 
     def move(self, name: str, along: str, wishes: Sequence[Preference] = (Preference("today", LEAST_CHANGE),)) -> Move:
-        """Return the move along one number; it would stay nearest to today's where no other wish is told."""
+        """Move along one number; it would stay nearest to today's where no other wish is told."""
         return AxisMove(name, (along,), tuple(wishes), {along: self.known[along]}, {along: self.limited[along]})
 
     def scale_move(self, name: str, along: tuple[str, ...]) -> Move:
-        """Return the move that scales lengths in common, and would stay nearest to today's."""
+        """Move that scales lengths in common, and would stay nearest to today's."""
         today = {n: self.known[n] for n in along if n in self.known}
         bounds = {n: self.limited[n] for n in along if n in self.limited}
         return ScaleMove(name, along, (Preference("today", LEAST_CHANGE),), today, bounds)
@@ -326,14 +326,14 @@ class Task(abc.ABC):
     # Natural sizes.
 
     def figure_size(self, name: str) -> float:
-        """Return the natural size of a figure: today's value of it, or of the first row that it is read from."""
+        """Natural size of a figure: today's value of it, or of the first row that it is read from."""
         row, axis = self.read_from.get(name, (name,))[0], self.scene.schema.own_axes.get(name)
         told = self.model.has_row(row) or self.model.has_quantity(row)
         read = axis.rows[0] if axis and axis.rows and not told else row
         return size_read(self.sampler, read, self.scene.schema.figures)
 
     def size(self, axis: str) -> float:
-        """Return the natural size of what of an axis is sought the least of."""
+        """Natural size of what of an axis is sought the least of."""
         return next((v.scale for v in self.variables if axis in (v.name, v.called)), 0.0) or self.figure_size(axis)
 
 
@@ -343,7 +343,7 @@ Below the second it is: no force, torque or length of a loom is that small."""
 
 
 def size_read(today: Sampler, name: str, figures: Mapping[str, Figure]) -> float:
-    """Return the size of a figure as today's machine has it; 1 for one that only its own speed tells.
+    """Size of a figure as today's machine has it; 1 for one that only its own speed tells.
 
     Where today's is only rounding, as of a machine that is balanced already: the largest peak of its kind.
     """
@@ -360,7 +360,7 @@ def size_read(today: Sampler, name: str, figures: Mapping[str, Figure]) -> float
 
 
 def bound_limits(variable: Variable, relaxable_from: bool = True) -> list[Limit]:
-    """Return the bounds of a variable as limits; a least value of 0 may not give way unless `relaxable_from`."""
+    """Bounds of a variable as limits; a least value of 0 may not give way unless `relaxable_from`."""
     name, v = variable.called, variable
     if v.lower == v.upper:
         return [BoundLimit(name, 0, v.name, v.lower, v.scale)]
@@ -372,7 +372,7 @@ def bound_limits(variable: Variable, relaxable_from: bool = True) -> list[Limit]
 
 
 def ends(low: float | None, high: float | None) -> list[tuple[int, float]]:
-    """Return the sides of a limit that are given: (0, value) where both are one."""
+    """Sides of a limit that are given: (0, value) where both are one."""
     if low is not None and low == high:
         return [(0, low)]
     return [(sign, value) for sign, value in ((-1, low), (1, high)) if value is not None]
@@ -488,7 +488,7 @@ class Job(abc.ABC):
 
     @abc.abstractmethod
     def model(self, scene: Scene, design: Mapping[str, float] | None = None) -> JobModel:
-        """Return the mechanism with the effects the scene calls for; design: whose own parts take the scene's place."""
+        """Mechanism with the effects the scene calls for; design: whose own parts take the scene's place."""
 
     @abc.abstractmethod
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
@@ -508,7 +508,7 @@ class Job(abc.ABC):
     # What few jobs say otherwise.
 
     def program(self, scene: Scene, target: str) -> Program:
-        """Return a target as a task: structure and numbers. Raises BadInput."""
+        """Target as a task: structure and numbers. Raises BadInput."""
         return kept(scene, (self.name, target), lambda: self.task(scene, target).program())
 
     def schema(self, document: Mapping[str, Any]) -> SceneSchema:
@@ -556,7 +556,7 @@ class Job(abc.ABC):
         return {**self.numbers(scene), **{scene.full(name): value for name, value in design.items()}}
 
     def sampler(self, scene: Scene, design: Numbers) -> Sampler:
-        """Return a design ready to be sampled, at the speed that the scene gives its crank. Raises BadInput."""
+        """Design ready to be sampled, at the speed that the scene gives its crank. Raises BadInput."""
         found = sampled(self.model(scene, design), self.numbers_of(scene, design))
         if drive.motor(found.model.effects) is None:
             return found
@@ -567,7 +567,7 @@ class Job(abc.ABC):
     def curves(
         self, scene: Scene, design: Numbers, steps: int = STEPS, also: Sequence[float] = ()
     ) -> dict[str, Floats]:
-        """Return the curves of a design over one turn, units in the column names; peaks that are figures are rows."""
+        """Curves of a design over one turn, units in the column names; peaks that are figures are rows."""
         sampler = self.sampler(scene, design)
         peaks = tops(sampler, self.peaks(sampler.model).values())
         kinds = {name: figure.kind for name, figure in scene.schema.figures.items()} | drive.KINDS
@@ -577,7 +577,7 @@ class Job(abc.ABC):
         return (parted.curves if parted else functools.partial(curves, sampler))(columns, steps, [*peaks, *also])
 
     def parted(self, scene: Scene, sampler: Sampler) -> "Parted | None":
-        """Return a sampled design, followed, where an effect of the scene may part its output from the mechanism."""
+        """Sampled design, followed, where an effect of the scene may part its output from the mechanism."""
         if not any(isinstance(effect, Event) for effect in scene.active):
             return None
         from loomopt.model.separation import followed
@@ -585,7 +585,7 @@ class Job(abc.ABC):
         return followed(scene, sampler)
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return the design a person reads, by full names, from the NLP's variables: these themselves."""
+        """Design a person reads, by full names, from the NLP's variables: these themselves."""
         return dict(x)
 
     def figures(self, scene: Scene, design: Numbers) -> Figures:
@@ -620,12 +620,12 @@ class Job(abc.ABC):
         return found | {name: sampled.peak(quantity) for name, quantity in peaks.items()}
 
     def over_cycle(self, model: JobModel) -> Mapping[str, str]:
-        """Return the figures that are read over the cycle: the quantity of an extreme, "" for what is none."""
+        """Figures that are read over the cycle: the quantity of an extreme, "" for what is none."""
         means = [name for mean in model.integrals for name in (mean.name, mean.root)]
         return {**dict.fromkeys((*means, *model.worked), ""), **self.peaks(model)}
 
     def traded(self, scene: Scene, target: str | None, asked: "Requested") -> "tuple[Program, tuple[Traded, ...]]":
-        """Return the task whose levels are axes, after what a target holds (None: nothing), and the axes.
+        """Task whose levels are axes, after what a target holds (None: nothing), and the axes.
 
         Raises BadInput.
         """
@@ -639,7 +639,7 @@ class Job(abc.ABC):
         return axes.with_axes(task.program(), known, asked, scene.full, task.size)
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
-        """Return the NLP's variables of a design."""
+        """NLP's variables of a design."""
         return program.completed({**program.parameters, **design})
 
     def start(self, program: Program, scene: Scene) -> dict[str, float]:
@@ -648,11 +648,11 @@ class Job(abc.ABC):
         return {**self.values(program, {**self.today(scene), **program.today}), **program.today}
 
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return the NLP's variables without what is only rounding."""
+        """NLP's variables without what is only rounding."""
         return dict(x)
 
     def peaks(self, model: JobModel) -> Mapping[str, str]:
-        """Return the figures that are extremes over the cycle, with their quantities."""
+        """Figures that are extremes over the cycle, with their quantities."""
         return {name: name for name in model.quantities}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
@@ -670,11 +670,11 @@ class Job(abc.ABC):
         return {}
 
     def adopted(self, scene: Scene, design: Mapping[str, Any], target: str) -> tuple[Scene, str]:
-        """Return the scene whose own are a design's lists, and the target whose limits it keeps."""
+        """Scene whose own are a design's lists, and the target whose limits it keeps."""
         return scene, target
 
     def sizes(self, scene: Scene) -> Mapping[str, Sequence[float]]:
-        """Return the freed numbers, as a designer calls them, that come in sizes only, with those sold, ascending.
+        """Freed numbers, as a designer calls them, that come in sizes only, with those sold, ascending.
 
         Sizes of the scene's own [stock] take the place of those that a check knows.
         """
@@ -708,7 +708,7 @@ def alone(scene: Scene, sampled: "Sampler | Machines", asked: Container[str]) ->
 
 
 def power(sampled: "Sampler | Machines", work: str) -> Number:
-    """Return the mean over a turn, W, of work done, J/rad, that may bend where a motion turns back."""
+    """Mean over a turn, W, of work done, J/rad, that may bend where a motion turns back."""
     done, time = (sampled.mean(Integral(name, "", name, parts=BENT)) for name in (work, SLOWNESS))
     return done / time
 
@@ -722,7 +722,7 @@ def _own(value: Number) -> float | None:
 
 
 def _checks(scene: Scene) -> list[tuple[Check[Any], Any]]:
-    """Return the checks that are on, each with the values of its table."""
+    """Checks that are on, each with the values of its table."""
     on = zip(scene.active, scene.effects.values(), strict=True)
     return [(effect, own) for effect, own in on if isinstance(effect, Check)]
 

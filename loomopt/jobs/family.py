@@ -56,11 +56,11 @@ class FamilyJob(Job):
             self.job.demand(member, self.target)
 
     def model(self, scene: Scene, design: Mapping[str, float] | None = None) -> JobModel:
-        """Return the model of all members."""
+        """Model of all members."""
         return self.family.program.model
 
     def program(self, scene: Scene, target: str) -> Program:
-        """Return the task of all members. Raises BadInput."""
+        """Task of all members. Raises BadInput."""
         return self.family.program
 
     def _family(self) -> Family:
@@ -96,15 +96,15 @@ class FamilyJob(Job):
         return self._whole([self.job.today(member) for member in self.members])
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return the design, SI, of the variables."""
+        """Design, SI, of the variables."""
         return self._whole(self.designs(x))
 
     def designs(self, x: Numbers) -> list[dict[str, float]]:
-        """Return the design, SI, of each member."""
+        """Design, SI, of each member."""
         return [self.job.design(part.program, part.own(x)) for part in self.parts]
 
     def own_designs(self, design: Numbers) -> list[dict[str, float]]:
-        """Return the design, SI, of each member, of the whole's."""
+        """Design, SI, of each member, of the whole's."""
         plain = self.job.today(self.members[0])
         named = {name: [of_member(name, k) for k in range(len(self.members))] for name in plain}
         return [
@@ -123,12 +123,12 @@ class FamilyJob(Job):
         return found
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
-        """Return the variables of a design."""
+        """Variables of a design."""
         own = zip(self.parts, self.own_designs(design), strict=True)
         return program.completed(self._joined([self.job.values(part.program, each) for part, each in own], design))
 
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return the variables without what is only rounding."""
+        """Variables without what is only rounding."""
         tidied = self._joined([self.job.tidy(part.program, part.own(x)) for part in self.parts], x)
         return {**x, **tidied}
 

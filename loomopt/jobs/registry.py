@@ -35,7 +35,7 @@ HERE = Path(__file__).parent
 
 @functools.cache
 def own_names() -> tuple[str, ...]:
-    """Return the names of this package's jobs."""
+    """Names of this package's jobs."""
     return tuple(sorted(path.parent.name for path in HERE.glob("*/job.py")))
 
 
@@ -44,7 +44,7 @@ def _distribution(point: "EntryPoint") -> str:
 
 
 def _single(group: str, name: str, what: str) -> "EntryPoint | None":
-    """Return the one entry point of a name. Raises BadInput, naming the distributions, where several claim it."""
+    """One entry point of a name. Raises BadInput, naming the distributions, where several claim it."""
     points = [point for point in entry_points(group) if point.name == name]
     if len(points) > 1:
         problem = f"{what} {name} is brought by {' and by '.join(map(_distribution, points))}"
@@ -75,13 +75,13 @@ def _useless(point: "EntryPoint", what: str, why: str) -> BadInput:
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all jobs, other distributions' too."""
+    """Names of all jobs, other distributions' too."""
     return tuple(sorted({*own_names(), *(point.name for point in entry_points(JOBS))}))
 
 
 @functools.cache
 def find(name: str) -> Job:
-    """Return a job by name. Raises BadInput for one that nobody brings, that several bring, or that does not import."""
+    """Job by name. Raises BadInput for one that nobody brings, that several bring, or that does not import."""
     if name in own_names():
         job: Job = importlib.import_module(f"loomopt.jobs.{name}.job").JOB
         return job
@@ -93,12 +93,12 @@ def find(name: str) -> Job:
 
 
 def of(scene: Scene) -> Job:
-    """Return a scene's job."""
+    """Scene's job."""
     return find(scene.job)
 
 
 def of_target(scene: Scene, target: str) -> Job:
-    """Return the job that answers a target: of a family that of all its members. Raises BadInput."""
+    """Job that answers a target: of a family that of all its members. Raises BadInput."""
     if target != FAMILY:
         return of(scene)
     from loomopt.jobs.family import FamilyJob
@@ -116,7 +116,7 @@ class _Registered:
         return name in own_names() or name in names()
 
     def names(self) -> Collection[str]:
-        """Return the names of all jobs."""
+        """Names of all jobs."""
         return names()
 
     def schema(self, job: str, document: Mapping[str, Any], effects: Collection[str]) -> SceneSchema:
@@ -139,7 +139,7 @@ class _Registered:
             of(scene).check(scene)
 
     def equations(self, scene: Scene) -> tuple[Equation, ...]:
-        """Return the equations that a scene really uses; SymPy is imported for them."""
+        """Equations that a scene really uses; SymPy is imported for them."""
         return of(scene).views.equations(scene)
 
 
@@ -167,7 +167,7 @@ REGISTERED = _Registered()
 
 
 def brought() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
-    """Return the files of other distributions' scenes by name, and what is wrong with their jobs."""
+    """Files of other distributions' scenes by name, and what is wrong with their jobs."""
     found: dict[str, Path] = {}
     faults: list[BadInput] = []
     for point in {point.name: point for point in entry_points(JOBS)}.values():
@@ -198,7 +198,7 @@ def heads(names: Iterable[str]) -> tuple[list[packaged.Head], list[BadInput]]:
 
 
 def problems() -> dict[str, Path]:
-    """Return the files of all packaged scenes by name, those of other distributions too; loomopt's own win."""
+    """Files of all packaged scenes by name, those of other distributions too; loomopt's own win."""
     return dict(sorted((brought()[0] | packaged.problems()).items()))
 
 
@@ -209,12 +209,12 @@ def is_packaged(scene: Scene) -> bool:
 
 
 def results(scene: Scene) -> Path:
-    """Return the folder of the reference results of a scene's job."""
+    """Folder of the reference results of a scene's job."""
     return packaged.results_path() if scene.job in own_names() else _folder(scene.job, "results")
 
 
 def _folder(job: str, name: str) -> Path:
-    """Return a folder of what a job brings. Raises BadInput where the job cannot be imported."""
+    """Folder of what a job brings. Raises BadInput where the job cannot be imported."""
     return Path(str(find(job).resources / name))
 
 
@@ -227,7 +227,7 @@ def declared(name: str) -> SceneSchema:
 
 
 def template(name: str) -> str:
-    """Return the commented scene to start from. Raises BadInput for an unknown job, and one without a template."""
+    """Commented scene to start from. Raises BadInput for an unknown job, and one without a template."""
     place = find(name).resources / "template.toml"
     if not place.is_file():
         raise BadInput(f"job {name} brings no template", file=str(place), remedy="Start from one of its scenes")
@@ -235,7 +235,7 @@ def template(name: str) -> str:
 
 
 def load(name_or_path: str | os.PathLike[str]) -> Scene:
-    """Return the scene of a packaged name, of a TOML file or of an answer's JSON file. Raises BadInput."""
+    """Scene of a packaged name, of a TOML file or of an answer's JSON file. Raises BadInput."""
     given = arguments.path(name_or_path, "scene", "a name that `loomopt list` shows, or a path", "Name a scene")
     if packaged.is_path(name_or_path):
         path = Path(given)
@@ -252,12 +252,12 @@ def load(name_or_path: str | os.PathLike[str]) -> Scene:
 
 
 def answer_path(given: object) -> Path | None:
-    """Return the path of an answer's JSON file; None for anything else."""
+    """Path of an answer's JSON file; None for anything else."""
     return Path(given) if isinstance(given, str | os.PathLike) and str(given).endswith(".json") else None
 
 
 def answered(path: Path) -> "tuple[Scene, DesignGiven]":
-    """Return the scene that an answer in a JSON file was found in, and what it brings. Raises BadInput."""
+    """Scene that an answer in a JSON file was found in, and what it brings. Raises BadInput."""
     from loomopt.scenes import designs
 
     return designs.read_answer(path, REGISTERED)
@@ -268,5 +268,5 @@ def _read(path: Path, origin: str) -> Scene:
 
 
 def scene(document: Mapping[str, object]) -> Scene:
-    """Return the scene that nested tables describe, as a TOML file would. Raises BadInput."""
+    """Scene that nested tables describe, as a TOML file would. Raises BadInput."""
     return build(document, REGISTERED, "<dict>")

@@ -34,7 +34,7 @@ class IntervalSeries(Enclosure):
         self.terms = terms
 
     def __add__(self, other: Number) -> "IntervalSeries":
-        """Return the sum."""
+        """Sum."""
         if isinstance(other, IntervalSeries):
             return IntervalSeries(SeriesTerms(*(a + b for a, b in zip(self.terms, other.terms, strict=True))))
         return IntervalSeries(self.terms._replace(value=self.terms.value + other))
@@ -42,25 +42,25 @@ class IntervalSeries(Enclosure):
     __radd__ = __add__
 
     def __neg__(self) -> "IntervalSeries":
-        """Return the opposite."""
+        """Opposite."""
         return IntervalSeries(SeriesTerms(*(-a for a in self.terms)))
 
     def __pos__(self) -> "IntervalSeries":
-        """Return the number itself."""
+        """Number itself."""
         return self
 
     def __sub__(self, other: Number) -> "IntervalSeries":
-        """Return the difference."""
+        """Difference."""
         if isinstance(other, IntervalSeries):
             return IntervalSeries(SeriesTerms(*(a - b for a, b in zip(self.terms, other.terms, strict=True))))
         return IntervalSeries(self.terms._replace(value=self.terms.value - other))
 
     def __rsub__(self, other: Number) -> "IntervalSeries":
-        """Return the difference, the other number first."""
+        """Difference, the other number first."""
         return (-self).__add__(other)
 
     def __mul__(self, other: Number) -> "IntervalSeries":
-        """Return the product."""
+        """Product."""
         if not isinstance(other, IntervalSeries):
             return IntervalSeries(SeriesTerms(*(a * other for a in self.terms)))
         a, b = self.terms, other.terms
@@ -72,7 +72,7 @@ class IntervalSeries(Enclosure):
     __rmul__ = __mul__
 
     def __truediv__(self, other: Number) -> "IntervalSeries":
-        """Return the quotient."""
+        """Quotient."""
         if not isinstance(other, IntervalSeries):
             return IntervalSeries(SeriesTerms(*(a / other for a in self.terms)))
         a, b = self.terms, other.terms
@@ -81,11 +81,11 @@ class IntervalSeries(Enclosure):
         return IntervalSeries(SeriesTerms(value, slope, (a.bend - value * b.bend - slope * b.slope) / b.value))
 
     def __rtruediv__(self, other: Number) -> "IntervalSeries":
-        """Return the quotient, the other number on top."""
+        """Quotient, the other number on top."""
         return IntervalSeries(SeriesTerms(other, interval(0.0), interval(0.0))) / self
 
     def __pow__(self, power: int) -> "IntervalSeries":
-        """Return a power of a whole number above 0."""
+        """Power of a whole number above 0."""
         found = self
         for _ in range(power - 1):
             found = found * self
@@ -107,17 +107,17 @@ def _waves(x: IntervalSeries) -> tuple[IntervalSeries, IntervalSeries]:
 
 
 def sin(x: Number) -> Number:
-    """Return the sine."""
+    """Sine."""
     return _waves(x)[0] if isinstance(x, IntervalSeries) else intervals.sin(x)
 
 
 def cos(x: Number) -> Number:
-    """Return the cosine."""
+    """Cosine."""
     return _waves(x)[1] if isinstance(x, IntervalSeries) else intervals.cos(x)
 
 
 def sqrt(x: Number) -> Number:
-    """Return the square root."""
+    """Square root."""
     if not isinstance(x, IntervalSeries):
         return intervals.sqrt(x)
     root = intervals.sqrt(x.terms.value)
@@ -126,7 +126,7 @@ def sqrt(x: Number) -> Number:
 
 
 def atan2(y: Number, x: Number) -> Number:
-    """Return the angle of (x, y) in (−π, π]."""
+    """Angle of (x, y) in (−π, π]."""
     if not isinstance(y, IntervalSeries) and not isinstance(x, IntervalSeries):
         return intervals.atan2(y, x)
     up, right = _whole(y), _whole(x)
@@ -138,7 +138,7 @@ def atan2(y: Number, x: Number) -> Number:
 
 
 def floor(x: Number) -> Number:
-    """Return the largest whole numbers up to what x may be; where these are several, slopes are without bound."""
+    """Largest whole numbers up to what x may be; where these are several, slopes are without bound."""
     if not isinstance(x, IntervalSeries):
         return intervals.floor(x)
     found = intervals.floor(x.terms.value)
@@ -150,7 +150,7 @@ def floor(x: Number) -> Number:
 
 
 def chosen(place: Number, values: Sequence[Number]) -> Number:
-    """Return the value at a place that is data: one for all, or one for each node and box."""
+    """Value at a place that is data: one for all, or one for each node and box."""
     if not any(isinstance(value, IntervalSeries) for value in values):
         return intervals.chosen(place, values)
     return IntervalSeries(
@@ -159,5 +159,5 @@ def chosen(place: Number, values: Sequence[Number]) -> Number:
 
 
 def along(low: Floats, high: Floats) -> IntervalSeries:
-    """Return u itself between two ends, (nodes, 1)."""
+    """u itself between two ends, (nodes, 1)."""
     return IntervalSeries(SeriesTerms(Interval(low, high), interval(np.ones_like(low)), interval(0.0)))

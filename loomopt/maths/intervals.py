@@ -29,7 +29,7 @@ class Interval:
         self.high: Floats = np.asarray(high, dtype=np.float64)
 
     def __add__(self, other: Number) -> Number:
-        """Return the sum."""
+        """Sum."""
         if isinstance(other, Enclosure):
             return NotImplemented
         other = interval(other)
@@ -38,26 +38,26 @@ class Interval:
     __radd__ = __add__
 
     def __neg__(self) -> "Interval":
-        """Return the opposite."""
+        """Opposite."""
         return Interval(-self.high, -self.low)
 
     def __pos__(self) -> "Interval":
-        """Return the number itself."""
+        """Number itself."""
         return self
 
     def __sub__(self, other: Number) -> Number:
-        """Return the difference."""
+        """Difference."""
         if isinstance(other, Enclosure):
             return NotImplemented
         other = interval(other)
         return Interval(_down(self.low - other.high), _up(self.high - other.low))
 
     def __rsub__(self, other: Number) -> Number:
-        """Return the difference, the other number first."""
+        """Difference, the other number first."""
         return interval(other) - self
 
     def __mul__(self, other: Number) -> Number:
-        """Return the product."""
+        """Product."""
         if isinstance(other, Enclosure):
             return NotImplemented
         if other is self:
@@ -76,17 +76,17 @@ class Interval:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Number) -> Number:
-        """Return the quotient."""
+        """Quotient."""
         if isinstance(other, Enclosure):
             return NotImplemented
         return self * interval(other).inverse()
 
     def __rtruediv__(self, other: Number) -> Number:
-        """Return the quotient, the other number on top."""
+        """Quotient, the other number on top."""
         return interval(other) * self.inverse()
 
     def __pow__(self, power: int) -> "Interval":
-        """Return an integer power."""
+        """Integer power."""
         if power < 0:
             return (self**-power).inverse()
         if power % 2:
@@ -108,19 +108,19 @@ class Interval:
         return np.asarray((self.low <= 0) & (self.high >= 0))
 
     def square(self) -> "Interval":
-        """Return the square."""
+        """Square."""
         ends = self.low * self.low, self.high * self.high
         low = np.where(self.holds_zero, 0.0, np.maximum(_down(np.minimum(*ends)), 0.0))
         return Interval(low, _up(np.maximum(*ends)))
 
     def inverse(self) -> "Interval":
-        """Return 1 over it: anything where it holds 0."""
+        """1 over it: anything where it holds 0."""
         with np.errstate(divide="ignore", over="ignore"):
             ends = _down(1 / self.high), _up(1 / self.low)
         return Interval(np.where(self.holds_zero, -np.inf, ends[0]), np.where(self.holds_zero, np.inf, ends[1]))
 
     def root(self) -> "Interval":
-        """Return the square root of what of it is not negative: anything from 0 where nothing is."""
+        """Square root of what of it is not negative: anything from 0 where nothing is."""
         low, high = (np.sqrt(np.maximum(end, 0.0)) for end in (self.low, self.high))
         return Interval(np.maximum(_down(low), 0.0), np.where(self.high < 0, np.inf, _up(high)))
 
@@ -145,7 +145,7 @@ def _up(x: Floats) -> Floats:
 
 
 def _outward(x: Floats, sign: float) -> Floats:
-    """Return the next floats of many, toward sign times infinity."""
+    """Next floats of many, toward sign times infinity."""
     with np.errstate(over="ignore", invalid="ignore"):
         step = np.abs(x)
         step *= STEP
@@ -158,7 +158,7 @@ def _outward(x: Floats, sign: float) -> Floats:
 
 
 def interval(x: Number) -> Interval:
-    """Return a number as an interval; a float, or an array of them, is one that holds nothing else."""
+    """Number as an interval; a float, or an array of them, is one that holds nothing else."""
     return x if isinstance(x, Interval) else Interval(x, x)
 
 
@@ -198,7 +198,7 @@ def _sine_cosine(x: Floats) -> tuple[Floats, Floats]:
 
 
 def _wave(x: Interval, phase: int) -> Interval:
-    """Return the sine (phase 0) or the cosine (phase 1): its tops lie at (1 − phase) quarter turns."""
+    """Sine (phase 0) or the cosine (phase 1): its tops lie at (1 − phase) quarter turns."""
     ends = [_sine_cosine(np.where(np.abs(end) <= LARGEST_ANGLE, end, 0.0))[phase] for end in (x.low, x.high)]
     low, high = np.minimum(*ends) - TRIG_ERROR, np.maximum(*ends) + TRIG_ERROR
     begin, end = ((each * (2 / math.pi) - (1 - phase)) / 4 for each in (x.low, x.high))
@@ -209,7 +209,7 @@ def _wave(x: Interval, phase: int) -> Interval:
 
 
 def _angle(y: Interval, x: Interval) -> Interval:
-    """Return the angle of (x, y) in (−π, π]: away from the branch cut it is least and largest at corners."""
+    """Angle of (x, y) in (−π, π]: away from the branch cut it is least and largest at corners."""
     cut = _across_the_cut(y, x)
     pairs = [np.broadcast_arrays(up, right) for up in (y.low, y.high) for right in (x.low, x.high)]
     ups, rights = (np.stack([pair[k] for pair in pairs]) for k in range(2))
@@ -241,7 +241,7 @@ class Enclosure:
         self.v, self.g = v, g
 
     def __add__(self, other: Number) -> "Enclosure":
-        """Return the sum."""
+        """Sum."""
         if isinstance(other, Enclosure):
             return Enclosure(self.v + other.v, self.g + other.g)
         return Enclosure(self.v + other, self.g)
@@ -249,25 +249,25 @@ class Enclosure:
     __radd__ = __add__
 
     def __neg__(self) -> "Enclosure":
-        """Return the opposite."""
+        """Opposite."""
         return Enclosure(-self.v, -self.g)
 
     def __pos__(self) -> "Enclosure":
-        """Return the number itself."""
+        """Number itself."""
         return self
 
     def __sub__(self, other: Number) -> "Enclosure":
-        """Return the difference."""
+        """Difference."""
         if isinstance(other, Enclosure):
             return Enclosure(self.v - other.v, self.g - other.g)
         return Enclosure(self.v - other, self.g)
 
     def __rsub__(self, other: Number) -> "Enclosure":
-        """Return the difference, the other number first."""
+        """Difference, the other number first."""
         return Enclosure(other - self.v, -self.g)
 
     def __mul__(self, other: Number) -> "Enclosure":
-        """Return the product."""
+        """Product."""
         if other is self:
             return Enclosure(self.v.square(), self.g * (self.v * 2.0))
         if isinstance(other, Enclosure):
@@ -277,7 +277,7 @@ class Enclosure:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Number) -> "Enclosure":
-        """Return the quotient."""
+        """Quotient."""
         if not isinstance(other, Enclosure):
             return self * interval(other).inverse()
         inverse = other.v.inverse()
@@ -285,22 +285,22 @@ class Enclosure:
         return Enclosure(share, (self.g - other.g * share) * inverse)
 
     def __rtruediv__(self, other: Number) -> "Enclosure":
-        """Return the quotient, the other number on top."""
+        """Quotient, the other number on top."""
         inverse = self.v.inverse()
         found: Enclosure = self.mapped(inverse, -inverse.square()) * other
         return found
 
     def __pow__(self, power: int) -> "Enclosure":
-        """Return an integer power."""
+        """Integer power."""
         return self.mapped(self.v**power, self.v ** (power - 1) * float(power)) if power else self * 0.0 + 1.0
 
     def mapped(self, v: Interval, slope: Interval) -> "Enclosure":
-        """Return a function of the number from its value and its slope."""
+        """Function of the number from its value and its slope."""
         return Enclosure(v, self.g * slope)
 
 
 def variable(place: int, count: int, low: Floats, high: Floats) -> Enclosure:
-    """Return a variable of boxes (boxes,) as a number; place: which of `count`."""
+    """Variable of boxes (boxes,) as a number; place: which of `count`."""
     slopes = np.zeros((count, 1, 1))
     slopes[place] = 1.0
     return Enclosure(Interval(low[None], high[None]), interval(slopes))
@@ -309,7 +309,7 @@ def variable(place: int, count: int, low: Floats, high: Floats) -> Enclosure:
 def _lifted(
     function: Callable[[Interval], Interval], slope: Callable[[Interval, Interval], Interval]
 ) -> Callable[[Number], Number]:
-    """Return a function of intervals for enclosures too; slope(x, f(x))."""
+    """Function of intervals for enclosures too; slope(x, f(x))."""
 
     def of(x: Number) -> Number:
         if not isinstance(x, Enclosure):
@@ -326,7 +326,7 @@ sqrt = _lifted(Interval.root, lambda x, value: (value * 2.0).inverse())
 
 
 def atan2(y: Number, x: Number) -> Number:
-    """Return the angle of (x, y) in (−π, π]; where it may jump, its slopes are without bound."""
+    """Angle of (x, y) in (−π, π]; where it may jump, its slopes are without bound."""
     if not isinstance(y, Enclosure) and not isinstance(x, Enclosure):
         return _angle(interval(y), interval(x))
     up, right = (each.v if isinstance(each, Enclosure) else interval(each) for each in (y, x))
@@ -340,7 +340,7 @@ def atan2(y: Number, x: Number) -> Number:
 
 
 def floor(x: Number) -> Number:
-    """Return the largest whole numbers up to what x may be; where these are several, slopes are without bound."""
+    """Largest whole numbers up to what x may be; where these are several, slopes are without bound."""
     value = x.v if isinstance(x, Enclosure) else interval(x)
     found = Interval(np.floor(value.low), np.floor(value.high))
     several = found.low != found.high
@@ -351,7 +351,7 @@ def floor(x: Number) -> Number:
 
 
 def chosen(place: Number, values: Sequence[Number]) -> Number:
-    """Return the value at a place that is data: one for all, or one for each node and box."""
+    """Value at a place that is data: one for all, or one for each node and box."""
     places = np.asarray(place.low if isinstance(place, Interval) else place, dtype=np.intp)
     if places.ndim == 0:
         return values[int(places)]

@@ -38,7 +38,7 @@ class Jet:
         return self.h
 
     def __add__(self, other: Number) -> "Jet":
-        """Return the sum."""
+        """Sum."""
         if not isinstance(other, Jet):
             return _shaped(self.v + other, self)
         h = None if self.h is None or other.h is None else self.h + other.h
@@ -47,26 +47,26 @@ class Jet:
     __radd__ = __add__
 
     def __neg__(self) -> "Jet":
-        """Return the opposite."""
+        """Opposite."""
         return Jet(-self.v, -self.g, None if self.h is None else -self.h)
 
     def __pos__(self) -> "Jet":
-        """Return the number itself."""
+        """Number itself."""
         return self
 
     def __sub__(self, other: Number) -> "Jet":
-        """Return the difference."""
+        """Difference."""
         if not isinstance(other, Jet):
             return _shaped(self.v - other, self)
         h = None if self.h is None or other.h is None else self.h - other.h
         return Jet(self.v - other.v, self.g - other.g, h)
 
     def __rsub__(self, other: Number) -> "Jet":
-        """Return the difference, the other number first."""
+        """Difference, the other number first."""
         return _shaped(other - self.v, -self)
 
     def __mul__(self, other: Number) -> "Jet":
-        """Return the product."""
+        """Product."""
         if not isinstance(other, Jet):
             return self._scaled(self.v * other, other)
         a, b = _wide(self.v), _wide(other.v)
@@ -78,7 +78,7 @@ class Jet:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Number) -> "Jet":
-        """Return the quotient."""
+        """Quotient."""
         if not isinstance(other, Jet):
             return self._scaled(self.v / other, 1 / other)
         v = self.v / other.v
@@ -90,20 +90,20 @@ class Jet:
         return Jet(v, g, h)
 
     def __rtruediv__(self, other: Number) -> "Jet":
-        """Return the quotient, the other number on top."""
+        """Quotient, the other number on top."""
         v = other / self.v
         first = -v / self.v
         return self.mapped(v, first, -2 * first / self.v)
 
     def __pow__(self, power: int) -> "Jet":
-        """Return an integer power."""
+        """Integer power."""
         if power == 2:
             return self.mapped(self.v * self.v, 2 * self.v, 2.0)
         first = power * self.v ** (power - 1)
         return self.mapped(self.v**power, first, power * (power - 1) * self.v ** (power - 2))
 
     def __rpow__(self, base: float) -> "Jet":
-        """Return a positive constant to the power of the number."""
+        """Positive constant to the power of the number."""
         v, rate = base**self.v, math.log(base)
         return self.mapped(v, rate * v, rate * rate * v)
 
@@ -113,7 +113,7 @@ class Jet:
         return Jet(whole.v[places], whole.g[places], None if whole.h is None else whole.h[places])
 
     def mapped(self, v: Number, first: Number, second: Number) -> "Jet":
-        """Return a function of the number from its value and its first two derivatives there."""
+        """Function of the number from its value and its first two derivatives there."""
         slope = _wide(first)
         h = None
         if self.h is not None:
@@ -121,13 +121,13 @@ class Jet:
         return Jet(v, slope * self.g, h)
 
     def sum(self) -> "Jet":
-        """Return the sum over the values' last axis."""
+        """Sum over the values' last axis."""
         whole = self.whole()
         h = None if whole.h is None else whole.h.sum(axis=-3)
         return Jet(whole.v.sum(axis=-1), whole.g.sum(axis=-2), h)
 
     def whole(self) -> "Jet":
-        """Return the number with derivatives of its value's own shape, where they were left to broadcast."""
+        """Number with derivatives of its value's own shape, where they were left to broadcast."""
         shape, width = np.shape(self.v), self.g.shape[-1]
         h = None if self.h is None else np.broadcast_to(self.h, (*shape, width, width))
         return Jet(self.v, np.broadcast_to(self.g, (*shape, width)), h)
@@ -149,7 +149,7 @@ def _mixed(one: Floats, other: Floats) -> Floats:
 
 
 def _shaped(v: Number, like: Jet) -> Jet:
-    """Return a jet of another value with the derivatives of one; they broadcast with what an array has added."""
+    """Jet of another value with the derivatives of one; they broadcast with what an array has added."""
     return Jet(v, like.g, like.h)
 
 
@@ -170,7 +170,7 @@ def variables(values: Sequence[Number], directions: Floats, curved: bool) -> lis
 def lifted(
     function: Callable[[Number], Number], derivatives: Callable[[Number, Number], tuple[Number, Number]]
 ) -> Callable[[Number], Number]:
-    """Return a function of one number for jets too; derivatives(x, f(x)): its first two."""
+    """Function of one number for jets too; derivatives(x, f(x)): its first two."""
 
     def of(x: Number) -> Number:
         if not isinstance(x, Jet):
@@ -188,7 +188,7 @@ sqrt = lifted(np.sqrt, lambda x, root: (0.5 / root, -0.25 / (root * x)))
 
 
 def atan2(y: Number, x: Number) -> Number:
-    """Return the angle of (x, y) in (−π, π]; its slopes are those of x dy − y dx over x² + y²."""
+    """Angle of (x, y) in (−π, π]; its slopes are those of x dy − y dx over x² + y²."""
     if not isinstance(y, Jet) and not isinstance(x, Jet):
         return np.arctan2(y, x)
     values = [each.v if isinstance(each, Jet) else each for each in (y, x)]
@@ -209,7 +209,7 @@ def atan2(y: Number, x: Number) -> Number:
 
 
 def floor(x: Number) -> Number:
-    """Return the largest whole number up to x, which has no slope."""
+    """Largest whole number up to x, which has no slope."""
     return np.floor(x.v if isinstance(x, Jet) else x)
 
 
@@ -232,7 +232,7 @@ def spread(numbers: Sequence[float], beside: Iterable[Number]) -> Floats:
 
 
 def weighted(weights: Sequence[Sequence[float]], values: Number) -> list[Number]:
-    """Return the sums Σ weights[k][i] values[i] over the values' first axis."""
+    """Sums Σ weights[k][i] values[i] over the values' first axis."""
     table = np.asarray(weights, dtype=np.float64)
     if not isinstance(values, Jet):
         return list(np.tensordot(table, values, axes=1))
@@ -243,7 +243,7 @@ def weighted(weights: Sequence[Sequence[float]], values: Number) -> list[Number]
 
 
 def chosen(place: Number, values: Sequence[Number]) -> Number:
-    """Return the value at a place, a number or an array of them (nodes,)."""
+    """Value at a place, a number or an array of them (nodes,)."""
     if not isinstance(place, np.ndarray):
         return values[int(place)]
     places = place.astype(np.intp)
@@ -253,7 +253,7 @@ def chosen(place: Number, values: Sequence[Number]) -> Number:
 
 
 def _picked(places: NDArray[np.intp], values: Sequence[Number]) -> Number:
-    """Return at each node the value of its place, of numbers of which some are arrays of nodes."""
+    """Value at each node of its place, of numbers of which some are arrays of nodes."""
     found = None
     for k in np.unique(places).tolist():
         share = np.asarray(places == k, dtype=np.float64)
@@ -263,7 +263,7 @@ def _picked(places: NDArray[np.intp], values: Sequence[Number]) -> Number:
 
 
 def _masked(value: Number, share: Floats) -> Number:
-    """Return a value where share is 1, exactly 0 elsewhere whatever it is there."""
+    """Value where share is 1, exactly 0 elsewhere whatever it is there."""
     on = share > 0
 
     def kept(numbers: Number, axes: int) -> Number:

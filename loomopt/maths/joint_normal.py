@@ -21,7 +21,7 @@ POINTS = 2**14
 
 
 def within(ways: Floats, low: Floats, high: Floats) -> float:
-    """Return the probability that every value lies between its bounds.
+    """Probability that every value lies between its bounds.
 
     ways: (values, numbers), what independent standard normal numbers do to each value; low, high: (values,), in the
     unit of the values, infinite where there is none. One value after the other is conditioned on those before [Genz,
@@ -67,7 +67,7 @@ def _merged(units: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, F
 
 
 def _factored(correlation: Floats) -> Floats:
-    """Return Cholesky's factor of a correlation, with zeros where values depend on those before."""
+    """Cholesky's factor of a correlation, with zeros where values depend on those before."""
     count = len(correlation)
     found = np.zeros((count, count))
     for k in range(count):
@@ -88,7 +88,7 @@ def _ends(factor: Floats, k: int, before: Floats, low: Floats, high: Floats) -> 
 
 @functools.lru_cache(maxsize=4)
 def _gauss(count: int) -> tuple[Floats, Floats]:
-    """Return Gauss's nodes and weights between -1 and 1."""
+    """Gauss's nodes and weights between -1 and 1."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     return nodes, weights
 

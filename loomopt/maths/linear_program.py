@@ -18,7 +18,7 @@ EXCHANGES = 50
 
 
 def least(cost: Floats, start: Floats, ways: Floats, signed: NDArray[np.bool_]) -> Floats | None:
-    """Return the x of least cost · x; None where it falls without end.
+    """X of least cost · x; None where it falls without end.
 
     cost, start: (n,), start with no negative signed part; ways: (n, k), directions in which x may move; signed: (n,),
     the parts that may not be negative. Of several least ones it is the one reached first.

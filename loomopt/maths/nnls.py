@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 
 def nnls(matrix: Floats, target: Floats) -> Floats:
-    """Return y ≥ 0 that minimises ‖matrix y − target‖; SciPy's would cost half a second of imports.
+    """y ≥ 0 that minimises ‖matrix y − target‖; SciPy's would cost half a second of imports.
 
     matrix: (m, n); target: (m,). Stops after 10 n exchanges at the best point found. Raises ArithmeticError where an
     entry is no number.
@@ -92,7 +92,7 @@ class _Used:
             self.add(column)
 
     def solution(self) -> Floats:
-        """Return the unconstrained solution over the columns in use, 0 elsewhere."""
+        """Unconstrained solution over the columns in use, 0 elsewhere."""
         count = len(self.columns)
         across, inverse = self._across[:, :count], self._inverse[:count, :count]
         found = np.zeros(self.matrix.shape[1])
@@ -109,7 +109,7 @@ TINY = 1e-300
 
 
 def least_on_cone(hessian: Floats, slopes: Floats) -> float:
-    """Return the least d'Hd over unit directions d with slopes d ≤ 0 that was found; infinite without any.
+    """Least d'Hd over unit directions d with slopes d ≤ 0 that was found; infinite without any.
 
     hessian: (n, n), symmetric; slopes: (m, n). Projected gradients from the eigenvectors: a heuristic, for the
     problem is NP-hard [Murty and Kabadi, Mathematical Programming 39 (1987), 117-129]. What it returns is reached by
@@ -132,7 +132,7 @@ def least_on_cone(hessian: Floats, slopes: Floats) -> float:
 
 
 def onto_cone(direction: Floats, slopes: Floats) -> Floats | None:
-    """Return the unit direction of the nearest point of the cone slopes d ≤ 0; None where that is its tip."""
+    """Unit direction of the nearest point of the cone slopes d ≤ 0; None where that is its tip."""
     kept = direction - slopes.T @ nnls(slopes.T, direction)
     length = float(np.linalg.norm(kept))
     if length <= CONE_TIP * max(1.0, float(np.linalg.norm(direction))) or np.any(slopes @ kept > CONE_OPEN * length):

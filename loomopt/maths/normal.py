@@ -45,7 +45,7 @@ TAIL = (
 
 
 def quantile(p: Floats) -> Floats:
-    """Return the value below which a share p of the standard normal distribution lies; p: in (0, 1)."""
+    """Value below which a share p of the standard normal distribution lies; p: in (0, 1)."""
     centred = p - 0.5
     apart = np.sqrt(-np.log(np.minimum(p, 1.0 - p)))
     inner = _fraction(CENTRAL, SHIFTS[0] - centred**2)
@@ -59,10 +59,10 @@ def _fraction(powers: tuple[tuple[float, ...], tuple[float, ...]], x: Floats) ->
 
 
 def below(value: float) -> float:
-    """Return the share of the standard normal distribution that lies below a value."""
+    """Share of the standard normal distribution that lies below a value."""
     return 0.5 * math.erfc(-value / math.sqrt(2))
 
 
 def below_each(values: Floats) -> Floats:
-    """Return the shares of the standard normal distribution that lie below values."""
+    """Shares of the standard normal distribution that lie below values."""
     return np.array([below(float(value)) for value in values.ravel()]).reshape(values.shape)

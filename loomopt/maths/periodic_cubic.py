@@ -72,7 +72,7 @@ class PeriodicCubic(NamedTuple):
         return c0 + t * (c1 + t * (c2 + t * c3))
 
     def at(self, maths: Maths, angle: Number, interval: Number) -> Number:
-        """Return the value at an angle, rad, on any turn; interval: 0.0, 1.0 …, data of a node, never of the design."""
+        """Value at an angle, rad, on any turn; interval: 0.0, 1.0 …, data of a node, never of the design."""
         t = self.from_middle(maths, angle, interval)
         columns = ([maths.number(value) for value in column] for column in zip(*self.cubics, strict=True))
         c0, c1, c2, c3 = (maths.choose(interval, column) for column in columns)
@@ -121,7 +121,7 @@ class PeriodicCubics(NamedTuple):
 
 
 def misfit(angles: Sequence[float], values: Sequence[float]) -> float | None:
-    """Return the rms by which samples, left out one at a time, lie off the curve of the others; None without a curve.
+    """Rms by which samples, left out one at a time, lie off the curve of the others; None without a curve.
 
     angles: rad, of one turn or less; where they leave a gap, the samples beside it are corners.
     """
@@ -133,13 +133,13 @@ def misfit(angles: Sequence[float], values: Sequence[float]) -> float | None:
 
 
 def interval_at(angle: float, begins: Sequence[float]) -> float:
-    """Return the interval that an angle lies in on any turn, rad; begins: where intervals begin, in order."""
+    """Interval that an angle lies in on any turn, rad; begins: where intervals begin, in order."""
     return float(sum((angle - begins[0]) % TURN >= begin - begins[0] for begin in begins) - 1)
 
 
 @functools.lru_cache(maxsize=16)
 def through(angles: tuple[float, ...], values: tuple[float, ...], marked: tuple[bool, ...]) -> PeriodicCubic:
-    """Return the curve through samples, in any order; angles: rad, of one turn; marked: whether each is a corner.
+    """Curve through samples, in any order; angles: rad, of one turn; marked: whether each is a corner.
 
     A last sample one turn after the first is the same one. Raises ValueError, with what is wrong, in words.
     """
@@ -202,7 +202,7 @@ def _refuse_gaps(rows: Sequence[_Row]) -> None:
 
 
 def _cubics(rows: Sequence[_Row], closed: bool = False) -> list[Cubic]:
-    """Return c0 … c3 between samples, about each interval's middle; closed: the last is the first one turn later."""
+    """c0 … c3 between samples, about each interval's middle; closed: the last is the first one turn later."""
     import numpy as np
 
     # Inside, both sides are one; of the ends the curve has the one that is its own.
@@ -223,7 +223,7 @@ def _cubics(rows: Sequence[_Row], closed: bool = False) -> list[Cubic]:
 
 
 def _slopes(widths: "Floats", chords: "Floats", closed: bool) -> "Floats":
-    """Return the slopes at all samples for which the curvature does not jump inside; widths, chords: of intervals."""
+    """Slopes at all samples for which the curvature does not jump inside; widths, chords: of intervals."""
     import numpy as np
 
     count = len(widths) + 1
@@ -249,7 +249,7 @@ def _slopes(widths: "Floats", chords: "Floats", closed: bool) -> "Floats":
 
 
 def _left_out(rows: Sequence[_Row], places: Sequence[int]) -> list[float]:
-    """Return the squares of how far samples lie off the curve through those beside them."""
+    """Squares of how far samples lie off the curve through those beside them."""
     squares = []
     for k in places:
         near = [row for j, row in enumerate(rows[: k + BESIDE + 1]) if j >= k - BESIDE and j != k]
@@ -261,7 +261,7 @@ def _left_out(rows: Sequence[_Row], places: Sequence[int]) -> list[float]:
 
 
 def _spread(rows: Sequence[_Row], closed: bool) -> float | None:
-    """Return the rms of `_left_out` of all samples of a closed curve."""
+    """Rms of `_left_out` of all samples of a closed curve."""
     before = [row._replace(angle=row.angle - TURN) for row in rows[-BESIDE:]]
     after = [row._replace(angle=row.angle + TURN) for row in rows[:BESIDE]]
     whole = [*before, *rows, *after]

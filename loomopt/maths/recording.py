@@ -48,51 +48,51 @@ class Recorded:
         self.tape, self.place = tape, place
 
     def __add__(self, other: Number) -> "Recorded":
-        """Return the sum."""
+        """Sum."""
         return self.tape.record("{0} + {1}", self, other)
 
     def __radd__(self, other: Number) -> "Recorded":
-        """Return the sum, the other number first."""
+        """Sum, the other number first."""
         return self.tape.record("{0} + {1}", other, self)
 
     def __sub__(self, other: Number) -> "Recorded":
-        """Return the difference."""
+        """Difference."""
         return self.tape.record("{0} - {1}", self, other)
 
     def __rsub__(self, other: Number) -> "Recorded":
-        """Return the difference, the other number first."""
+        """Difference, the other number first."""
         return self.tape.record("{0} - {1}", other, self)
 
     def __mul__(self, other: Number) -> "Recorded":
-        """Return the product."""
+        """Product."""
         return self.tape.record("{0} * {1}", self, other)
 
     def __rmul__(self, other: Number) -> "Recorded":
-        """Return the product, the other number first."""
+        """Product, the other number first."""
         return self.tape.record("{0} * {1}", other, self)
 
     def __truediv__(self, other: Number) -> "Recorded":
-        """Return the quotient."""
+        """Quotient."""
         return self.tape.record("{0} / {1}", self, other)
 
     def __rtruediv__(self, other: Number) -> "Recorded":
-        """Return the quotient, the other number on top."""
+        """Quotient, the other number on top."""
         return self.tape.record("{0} / {1}", other, self)
 
     def __pow__(self, power: Number) -> "Recorded":
-        """Return a power."""
+        """Power."""
         return self.tape.record("{0} ** {1}", self, power)
 
     def __rpow__(self, base: Number) -> "Recorded":
-        """Return a power of another number."""
+        """Power of another number."""
         return self.tape.record("{0} ** {1}", base, self)
 
     def __neg__(self) -> "Recorded":
-        """Return the opposite."""
+        """Opposite."""
         return self.tape.record("-{0}", self)
 
     def __pos__(self) -> "Recorded":
-        """Return the number itself."""
+        """Number itself."""
         return self.tape.record("+{0}", self)
 
     def __bool__(self) -> bool:
@@ -113,11 +113,11 @@ class Tape:
         self._places: dict[object, int] = {}
 
     def input(self) -> Recorded:
-        """Return a number that is given when the function is bound, or called."""
+        """Number that is given when the function is bound, or called."""
         return self._at(len(self.operations), RecordedOperation(INPUT))
 
     def known(self, number: Recorded) -> Recorded:
-        """Return an input that stands for a number known when the function is bound; an input stands for itself."""
+        """Input that stands for a number known when the function is bound; an input stands for itself."""
         return number if self.operations[number.place].template == INPUT else self.input()
 
     def call(self, system: int, function: str, *operands: Number) -> Recorded:
@@ -126,7 +126,7 @@ class Tape:
         return self.record(f"{function}_{system}({listed})", *operands)
 
     def choose(self, system: int, place: Number, values: Sequence[Number]) -> Recorded:
-        """Return the value at a place, by a number system's `choose`."""
+        """Value at a place, by a number system's `choose`."""
         return self.call(system, "choose", place, self.listed(values))
 
     def listed(self, values: Iterable[Number]) -> Recorded:
@@ -136,12 +136,12 @@ class Tape:
         return self.record(f"({listed})", *operands)
 
     def record(self, template: str, *operands: Number) -> Recorded:
-        """Return the result of an operation on recorded numbers and literals."""
+        """Result of an operation on recorded numbers and literals."""
         operation = RecordedOperation(template, tuple(map(self.place, operands)))
         return self._at(operation, operation)
 
     def place(self, number: Number) -> int:
-        """Return the place of a number. Raises ValueError for one of another tape."""
+        """Place of a number. Raises ValueError for one of another tape."""
         if isinstance(number, Recorded):
             if number.tape is not self:
                 raise ValueError("a number of another tape")
@@ -157,7 +157,7 @@ class Tape:
         return Recorded(self, place)
 
     def needed(self, outputs: Iterable[Number], since: int = 0) -> set[int]:
-        """Return the places that outputs need, and what may fail from the place `since` on."""
+        """Places that outputs need, and what may fail from the place `since` on."""
         found = {self.place(output) for output in outputs}
         found |= {k for k in range(since, len(self.operations)) if not HARMLESS.fullmatch(self.operations[k].template)}
         for place in range(len(self.operations) - 1, -1, -1):
@@ -232,7 +232,7 @@ class _Written:
         return found
 
     def _last_read(self) -> dict[int, int]:
-        """Return of each result what named one reads it last."""
+        """For each result the one that reads it last."""
         last: dict[int, int] = {}
         for place in reversed(self.needed):
             reached = [reader if reader in self.named else last.get(reader, self.end) for reader in self.readers[place]]
@@ -240,7 +240,7 @@ class _Written:
         return last
 
     def text(self, inputs: Mapping[int, str]) -> str:
-        """Return the source of `program`; inputs: their names."""
+        """Source of `program`; inputs: their names."""
         names, wide = dict(inputs), dict[int, str]()
         lines: tuple[list[str], ...] = ([], [], [])
         free, freed = list[str](), dict[int, list[str]]()
@@ -271,7 +271,7 @@ class _Written:
         return self._nested(lines, inputs, "".join(f"{names[place]}, " for place in self.outputs))
 
     def _nested(self, lines: Sequence[Sequence[str]], inputs: Mapping[int, str], result: str) -> str:
-        """Return the source of `program` from the lines of each level."""
+        """Source of `program` from the lines of each level."""
         templates = {self.operations[place].template for place in self.needed}
         used = sorted({found[0] for template in templates if (found := re.match(r"[a-z0-9]+_\d+", template))})
         taken = [f"{name} = systems[{name.split('_')[1]}].{name.split('_')[0]}" for name in used]

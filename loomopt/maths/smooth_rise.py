@@ -69,7 +69,7 @@ class SmoothRise(NamedTuple):
 
 @functools.lru_cache(maxsize=32)
 def through(u: tuple[float, ...], s: tuple[float, ...], half: tuple[float, ...]) -> SmoothRise:
-    """Return the curve through points of a rise.
+    """Curve through points of a rise.
 
     u: ascending; s: values; half: how far rounding may have moved each value, 0 for none. At least 4 points.
     """
@@ -122,7 +122,7 @@ def through(u: tuple[float, ...], s: tuple[float, ...], half: tuple[float, ...])
 
 
 def values(found: SmoothRise, u: Sequence[float]) -> list[float]:
-    """Return a curve's values at arguments within its own."""
+    """Curve's values at arguments within its own."""
     import numpy as np
 
     curve = tuple(np.array(each) for each in found[:5])
@@ -130,7 +130,7 @@ def values(found: SmoothRise, u: Sequence[float]) -> list[float]:
 
 
 def _at(curve: "tuple[Floats, Floats, Floats, Floats, Floats]", u: "Floats") -> "Floats":
-    """Return the curve at arguments; curve: u, s, v, after and before."""
+    """Curve at arguments; curve: u, s, v, after and before."""
     import numpy as np
 
     places, s, v, after, before = curve
@@ -145,7 +145,7 @@ _Columns = tuple["Floats", "Floats", "Floats", "Floats"]
 
 
 def _still(values: "Floats") -> _Columns:
-    """Return the curve of a dwell."""
+    """Curve of a dwell."""
     import numpy as np
 
     nothing = np.zeros(len(values))
@@ -153,7 +153,7 @@ def _still(values: "Floats") -> _Columns:
 
 
 def _dwells(values: "Floats", unit: float) -> tuple[tuple[int, int], ...]:
-    """Return the points between which the curve stands still; unit: of the last digit.
+    """Points between which the curve stands still; unit: of the last digit.
 
     Rounding too makes equal values, where a law sets out slowly: as u^`STEEPEST` it reaches `SHARP` units at twice the
     length of the equal values. A dwell ends where such a law, seen from behind, would set out.
@@ -199,7 +199,7 @@ class _Spline(NamedTuple):
 
 
 def _spline(u: "Floats") -> _Spline:
-    """Return the cubic of given points."""
+    """Cubic of given points."""
     import numpy as np
 
     h, count = np.diff(u), len(u)
@@ -229,7 +229,7 @@ class _Fit(NamedTuple):
 
 
 def _smooth(u: "Floats", s: "Floats", half: "Floats") -> _Part:
-    """Return the smoothest curve of one rise; half: what rounding may have done to each value, 0 for none."""
+    """Smoothest curve of one rise; half: what rounding may have done to each value, 0 for none."""
     import numpy as np
 
     spline = _spline(u)
@@ -259,7 +259,7 @@ def _smooth(u: "Floats", s: "Floats", half: "Floats") -> _Part:
 
 
 def _fitted(spline: _Spline, s: "Floats", half: "Floats", jumps: Sequence[int]) -> tuple[_Fit, float, "Floats"]:
-    """Return the fit of least expected error, its λ, and s'' with λ `LESS` times smaller; λ infinite without rounding.
+    """Fit of least expected error, its λ, and s'' with λ `LESS` times smaller; λ infinite without rounding.
 
     jumps: inner points, counted from 0, where s'' may jump.
     """
@@ -306,7 +306,7 @@ def _fitted(spline: _Spline, s: "Floats", half: "Floats", jumps: Sequence[int]) 
 
 
 def _noise(spline: _Spline, half: "Floats", jumps: Sequence[int]) -> "Floats":
-    """Return the standard deviation of s'' at the points of a curve that goes through them."""
+    """Standard deviation of s'' at the points of a curve that goes through them."""
     import numpy as np
 
     steps = spline.step[:, jumps]
@@ -316,7 +316,7 @@ def _noise(spline: _Spline, half: "Floats", jumps: Sequence[int]) -> "Floats":
 
 
 def _jump(spline: _Spline, s: "Floats", half: "Floats", weight: float, jumps: Sequence[int]) -> int | None:
-    """Return the inner point, counted from 0, at which a further jump of s'' explains most; None where none does.
+    """Inner point, counted from 0, at which a further jump of s'' explains most; None where none does.
 
     What is penalised is seen as noise of variance 1/λ beside that of rounding; a jump is a known pattern in it.
     """
@@ -364,7 +364,7 @@ def _coarseness(before: "Floats", after: "Floats", jumps: Sequence[int]) -> "Flo
 
 
 def _left_out(u: "Floats", s: "Floats") -> list[float]:
-    """Return by how much inner points lie off the cubic at rest at both ends through the others."""
+    """Amount by which inner points lie off the cubic at rest at both ends through the others."""
     import numpy as np
 
     if len(u) < FEWEST_SMOOTHED:

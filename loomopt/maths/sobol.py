@@ -31,7 +31,7 @@ POLYNOMIALS = (
 
 
 def points(count: int, dimensions: int, seed: int = 0, first: int = 0) -> Floats:
-    """Return (count, dimensions) points, the first of them number `first` of the seed's sequence.
+    """(count, dimensions) points, the first of them number `first` of the seed's sequence.
 
     Coordinates beyond the sixteenth are random ones of the seed, and of where the points begin.
     """
@@ -52,7 +52,7 @@ def points(count: int, dimensions: int, seed: int = 0, first: int = 0) -> Floats
 
 
 def _directions(coordinate: int) -> list[int]:
-    """Return the direction numbers of a coordinate, one for each bit, as integers of so many bits."""
+    """Direction numbers of a coordinate, one for each bit, as integers of so many bits."""
     if coordinate == 0:
         return [1 << (BITS - 1 - bit) for bit in range(BITS)]
     degree, inner, first = POLYNOMIALS[coordinate - 1]

@@ -101,7 +101,7 @@ FLOAT = Maths(
 
 
 def within_half_turn(maths: Maths, angle: Number) -> Number:
-    """Return an angle, rad, between −π and π: what is no sine of it is periodic so; its branch is half a turn away.
+    """Angle, rad, between −π and π: what is no sine of it is periodic so; its branch is half a turn away.
 
     One that lies there is returned to the last bit.
     """
@@ -109,12 +109,12 @@ def within_half_turn(maths: Maths, angle: Number) -> Number:
 
 
 def within_turn(maths: Maths, angle: Number, behind: Number) -> Number:
-    """Return an angle, rad, on the turn that begins so much of a turn before 0; behind: data of a node."""
+    """Angle, rad, on the turn that begins so much of a turn before 0; behind: data of a node."""
     return angle - 2 * maths.pi * maths.floor(angle / (2 * maths.pi) + behind)
 
 
 def arrays(system: Maths) -> Maths:
-    """Return the system in which a formula runs over an array of another's numbers, as its `spread` makes one."""
+    """System in which a formula runs over an array of another's numbers, as its `spread` makes one."""
     if system is FLOAT:
         return numpy()
     return system if system.spread is not _spread_objects else _elementwise(system)
@@ -122,7 +122,7 @@ def arrays(system: Maths) -> Maths:
 
 @functools.cache
 def _elementwise(system: Maths) -> Maths:
-    """Return a system of scalars whose functions take arrays of objects, element by element."""
+    """System of scalars whose functions take arrays of objects, element by element."""
     import numpy as np
 
     single = (system.sin, system.cos, system.sqrt, system.exp, system.floor)
@@ -253,7 +253,7 @@ def balls() -> Maths:
 
 
 def ball_series(centre: float, half: float) -> Number:
-    """Return the series of a variable itself around the ball centre ± half."""
+    """Series of a variable itself around the ball centre ± half."""
     flint = importlib.import_module("flint")
     return flint.arb_series([flint.arb(centre, half), 1], ORDER)
 

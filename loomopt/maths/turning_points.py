@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 def followed(rates: Callable[[Number], tuple[Number, Number, Number]], hint: Number) -> Number:
-    """Return the root near a hint that is right in float64, so that it moves with the design to second order.
+    """Root near a hint that is right in float64, so that it moves with the design to second order.
 
     rates(x): a function's value f, slope f' and bend f''. Halley's step, x − 2 f f'/(2 f'² − f f''): its error is of
     the third order, so value, gradient and curvature with respect to the design are those of the root. One step of
@@ -31,7 +31,7 @@ def followed(rates: Callable[[Number], tuple[Number, Number, Number]], hint: Num
 
 
 def turns(slope: Callable[[Floats], Any]) -> list[float]:
-    """Return the crank angles, rad, where slope(angles) changes its sign, the first of them from − to +.
+    """Crank angles, rad, where slope(angles) changes its sign, the first of them from − to +.
 
     None where it never does, or where the motion has no real position somewhere. A sample where the slope is 0 has no
     sign: those beside it tell, across the turn's end too.
@@ -137,7 +137,7 @@ def graded_nodes(centre: float) -> Floats:
 
 
 def spike_peaks(heights: Callable[[Floats], Floats], centre: float) -> list[float]:
-    """Return the angles, rad, of the local maxima of heights(angles) near `centre` that graded nodes show, refined."""
+    """Angles, rad, of the local maxima of heights(angles) near `centre` that graded nodes show, refined."""
     angles = graded_nodes(centre)
     values = heights(angles)
     if not np.all(np.isfinite(values)):

@@ -37,16 +37,16 @@ class Traded(NamedTuple):
         return f"|{self.axis.name}|" if self.objective.is_magnitude else self.axis.name
 
     def figure(self, value: float) -> float:
-        """Return the figure, SI, of a value."""
+        """Figure, SI, of a value."""
         root = max(value, 0.0) ** (1 / self.axis.power) if self.axis.power != 1 else value
         return self.axis.offset + self.sign * root
 
     def value(self, figure: float) -> float:
-        """Return the value that is sought the least of, of a figure, SI."""
+        """Value that is sought the least of, of a figure, SI."""
         return float((self.sign * (figure - self.axis.offset)) ** self.axis.power)
 
     def slope(self, figure: float) -> float:
-        """Return d value / d figure at a figure, SI."""
+        """d value / d figure at a figure, SI."""
         root = self.sign * (figure - self.axis.offset)
         return float(self.sign * self.axis.power * root ** (self.axis.power - 1))
 
@@ -56,7 +56,7 @@ class Traded(NamedTuple):
 
 
 def requested_of(axes: Mapping[str, Axis], numbers: Iterable[str], asked: Requested, origin: str) -> dict[str, Axis]:
-    """Return the axes of the names that are asked for; numbers: those of the scene that are bounded, axes too.
+    """Axes of the names that are asked for; numbers: those of the scene that are bounded, axes too.
 
     Raises BadInput for a name that is no axis, and for an end that is not offered.
     """
@@ -79,7 +79,7 @@ def with_axes(
     full: Callable[[str], str],
     size: Callable[[str], float],
 ) -> tuple[Program, tuple[Traded, ...]]:
-    """Return a program whose last levels are the axes in the order asked for, and what they are.
+    """Program whose last levels are the axes in the order asked for, and what they are.
 
     program: its objectives are what is held before them; full: name among the model's values; size: natural one of a
     value, SI. Raises BadInput for an axis that nothing in the scene gives.
@@ -105,7 +105,7 @@ def with_axes(
 
 
 def _objective(name: str, rows: Sequence[str], kind: type[Objective], scale: float, power: int) -> Objective:
-    """Return the objective of an axis; of several rows the worst counts."""
+    """Objective of an axis; of several rows the worst counts."""
     first, *others = rows
     return Worst(name, first, scale, tuple(others), power=power) if others else kind(name, first, scale, power=power)
 
@@ -120,7 +120,7 @@ def _demand(program: Program, name: str, rows: Sequence[str]) -> None:
 
 @functools.lru_cache(maxsize=64)
 def opposing(model: JobModel, rows: tuple[str, ...]) -> JobModel:
-    """Return a model with the opposites of rows or numbers beside its own rows."""
+    """Model with the opposites of rows or numbers beside its own rows."""
     return replace(model, own_rows={**model.own_rows, **{opposite(row): _opposed(model, row) for row in rows}})
 
 
@@ -130,7 +130,7 @@ def _opposed(model: JobModel, name: str) -> DesignRow:
 
 
 def _read(name: str, at: Instant) -> Number:
-    """Return a row that stands at no event, or a number."""
+    """Row that stands at no event, or a number."""
     known = at.model.static(at.maths, at.given, {}, (name,))
     return known[name] if name in known else at.values[name]
 

@@ -82,7 +82,7 @@ class TorqueBudget:
 
 
 def budget(sampler: Sampler, fluctuation: float | None = None) -> TorqueBudget:
-    """Return the budget of a sampled design, on whose crank something acts all over the turn."""
+    """Budget of a sampled design, on whose crank something acts all over the turn."""
     loads = shared(sampler.model.loads)
     names = tuple(f"share of {load.name}" for load in loads)
     shares = dict(zip(names, loads, strict=True))
@@ -113,7 +113,7 @@ def budget(sampler: Sampler, fluctuation: float | None = None) -> TorqueBudget:
 
 
 def _with_shares(model: JobModel, shares: Mapping[str, Acting]) -> JobModel:
-    """Return a model with the shares of its loads among its quantities, and with the motor's torque."""
+    """Model with the shares of its loads among its quantities, and with the motor's torque."""
     own = {name: CycleQuantity(functools.partial(_share, load), figure=False) for name, load in shares.items()}
     own[MOTOR] = CycleQuantity(lambda at: drive.motor_torque(at, at.crank_torque), figure=False)
     own[drive.SPEED] = CycleQuantity(lambda at: at.pose.omega, figure=False)
@@ -121,14 +121,14 @@ def _with_shares(model: JobModel, shares: Mapping[str, Acting]) -> JobModel:
 
 
 def shared(loads: Sequence[Acting]) -> tuple[Acting, ...]:
-    """Return the loads that have a share of their own: all but those that a state carries without telling how."""
+    """Loads that have a share of their own: all but those that a state carries without telling how."""
     silent = [load for load in loads if isinstance(load, State) and not load.moved]
     gone = balance.carried(silent)
     return tuple(load for load in loads if load.name not in gone)
 
 
 def _share(load: Acting, at: Instant) -> Number:
-    """Return a load's share of the crank torque at an instant, N·m.
+    """Load's share of the crank torque at an instant, N·m.
 
     What a state carries moves on its own: its share is its power over the crank's speed, and the state's is what its
     member takes in between, F (q' − q'_carried).
@@ -163,7 +163,7 @@ class _Quadrature(NamedTuple):
     weights: Floats
 
     def by_stretch(self, values: Floats) -> Floats:
-        """Return the integral over each stretch."""
+        """Integral over each stretch."""
         found: Floats = (self.weights * values).reshape(-1, len(gauss()[0])).sum(axis=1)
         return found
 
@@ -232,7 +232,7 @@ def _motor(sampler: Sampler, edges: Edges, fluctuation: float | None) -> MotorSi
 
 
 def _swing(sampler: Sampler, edges: Edges, mean: float) -> float:
-    """Return the largest less the least energy, J, that the crank has taken beyond its mean torque up to some angle."""
+    """Largest less the least energy, J, that the crank has taken beyond its mean torque up to some angle."""
     parted = _rule(sampler.cycle, _with_crossings(sampler, drive.TORQUE, edges, mean))
     beyond = parted.by_stretch(sampler.at(drive.TORQUE, parted.pieces, parted.u) - mean)
     taken = np.concatenate([[0.0], np.cumsum(beyond)])
@@ -240,7 +240,7 @@ def _swing(sampler: Sampler, edges: Edges, mean: float) -> float:
 
 
 def _with_crossings(sampler: Sampler, name: str, edges: Edges, level: float) -> Edges:
-    """Return the stretches parted also where a quantity passes a level, so that on each it lies on one side."""
+    """Stretches parted also where a quantity passes a level, so that on each it lies on one side."""
     pieces, u = sampler.grid()
     above = sampler.at(name, pieces, u) > level
     begins = np.flatnonzero((above[:-1] != above[1:]) & (pieces[:-1] == pieces[1:]))

@@ -28,7 +28,7 @@ PIECE, NO_LOAD = "piece of the turn", "no_load_speed"
 
 
 def turned(steady: Sampler, scene: Scene) -> Sampler:
-    """Return a design at the speed that the scene's motor gives its crank; steady: at constant speed. Raises BadInput.
+    """Design at the speed that the scene's motor gives its crank; steady: at constant speed. Raises BadInput.
 
     Kept as the steady sampler is: the same object for the same one.
     """
@@ -69,7 +69,7 @@ def _turned(steady: Sampler, motor: Speed) -> Sampler:
 def _posed(
     kinematics: Kinematics, maths: Maths, given: Given, node: Node, speeds: tuple[Number, Number], event: str = ""
 ) -> Motion:
-    """Return a pose, or the exact one at an event, at a speed of its own; speeds: ω, rad/s, and ω̇, rad/s²."""
+    """Pose, or the exact one at an event, at a speed of its own; speeds: ω, rad/s, and ω̇, rad/s²."""
     known = given._replace(values={**given.values, "speed": speeds[0], "omega_dot": speeds[1]})
     return kinematics.still(maths, known, event, node.switch) if event else kinematics.pose(maths, known, node)
 
@@ -121,20 +121,20 @@ class TurnedCrank(Kinematics):
         return self.steady.hints(given, called)
 
     def pose(self, maths: Maths, given: Given, node: Node) -> Motion:
-        """Return the pose at a node with the crank's speed there. Raises TypeError outside float64."""
+        """Pose at a node with the crank's speed there. Raises TypeError outside float64."""
         return _posed(self.steady, maths, given, node, self._speeds(maths, node))
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> Motion:
-        """Return the exact pose at an event with the crank's speed there. Raises TypeError outside float64."""
+        """Exact pose at an event with the crank's speed there. Raises TypeError outside float64."""
         node = Node(self.events(maths, given)[event], switch)
         return _posed(self.steady, maths, given, node, self._speeds(maths, node), event)
 
     def events(self, maths: Maths, given: Given) -> Mapping[str, Number]:
-        """Return the crank angles of events by name."""
+        """Crank angles of events by name."""
         return self.steady.events(maths, given)
 
     def _speeds(self, maths: Maths, node: Node) -> tuple[Number, Number]:
-        """Return ω, rad/s, and ω̇, rad/s², of the side of a corner that the node's switch tells."""
+        """ω, rad/s, and ω̇, rad/s², of the side of a corner that the node's switch tells."""
         if maths.name not in FLOATS:
             raise TypeError(f"the crank's own speed is known in float64 only, not in {maths.name}")
         phi = np.asarray(node.phi, dtype=np.float64)

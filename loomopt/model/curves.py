@@ -68,7 +68,7 @@ class Columns(NamedTuple):
 
 
 def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequence[float] = ()) -> dict[str, Floats]:
-    """Return the curves of a design over one turn, SI; columns of what the scene does not call for are absent.
+    """Curves of a design over one turn, SI; columns of what the scene does not call for are absent.
 
     Rows are `steps` equal ones, the angles `also`, rad, and both sides of every corner where a formula changes (the
     same angle twice). Where a load's term is not known, neither it nor the force is: NaN.
@@ -77,7 +77,7 @@ def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequenc
 
 
 def columns_at(sampler: Sampler, columns: Columns, rows: Rows) -> dict[str, Floats]:
-    """Return the curves at rows, SI."""
+    """Curves at rows, SI."""
     pieces, u, phi = rows
     node = sampler.node(pieces, u)
     at = sampler.model.instant(systems.numpy(), sampler.given, node)
@@ -114,7 +114,7 @@ def columns_at(sampler: Sampler, columns: Columns, rows: Rows) -> dict[str, Floa
 
 
 def tops(sampler: Sampler, quantities: Iterable[str]) -> list[float]:
-    """Return the crank angles, rad, at which quantities are largest, wherever they are alike."""
+    """Crank angles, rad, at which quantities are largest, wherever they are alike."""
     found = []
     for extremes in map(sampler.extremes, quantities):
         alike = ALIKE * max((abs(extreme.value) for extreme in extremes), default=0.0)
@@ -123,7 +123,7 @@ def tops(sampler: Sampler, quantities: Iterable[str]) -> list[float]:
 
 
 def _in_time(columns: Mapping[str, Floats], at: Instant) -> dict[str, Floats]:
-    """Return the derivatives with respect to time of what has columns of those with respect to φ, SI.
+    """Derivatives with respect to time of what has columns of those with respect to φ, SI.
 
     x˙ = x' ω, x¨ = x'' ω² + x' ω̇; the third, x''' ω³, at constant speed only. None where the speed is not known.
     """
@@ -151,7 +151,7 @@ def load_name(load: Acting) -> str:
 
 
 def split(column: str) -> tuple[str, str]:
-    """Return a column's name and unit."""
+    """Column's name and unit."""
     match = COLUMN.fullmatch(column)
     return (match["name"], match["unit"]) if match else (column, "1")
 
@@ -189,7 +189,7 @@ CurveRows = Callable[[int, Sequence[float]], dict[str, Floats]]
 
 
 def sparse_curves(sampler: Sampler, rows: CurveRows, accuracy: float) -> tuple[dict[str, Floats], float]:
-    """Return the curves (SI), and an estimate of the relative error of each column's largest magnitude.
+    """Curves (SI), and an estimate of the relative error of each column's largest magnitude.
 
     Around every top rows are added between it and its neighbours, in thirds and at the vertex of their parabola, until
     what the top may still rise (no more than it stands above them) is small enough.
@@ -207,7 +207,7 @@ def sparse_curves(sampler: Sampler, rows: CurveRows, accuracy: float) -> tuple[d
 
 
 def _around_tops(columns: Mapping[str, Floats], least: float) -> tuple[list[float], float]:
-    """Return the angles, rad, where rows are missing, and the largest share by which a column's top may still rise."""
+    """Angles, rad, where rows are missing, and the largest share by which a column's top may still rise."""
     angles, found, worst = columns[ANGLE], set(), 0.0
     # The turn closes: a top may stand between the last row and the first.
     phi = np.concatenate([angles[-1:] - TURN, angles, angles[:1] + TURN])
@@ -245,7 +245,7 @@ def _on_levels(phi: Floats, sizes: Floats, tops: Pieces) -> NDArray[np.bool_]:
 
 
 def _rise(phi: Floats, sizes: Floats, k: int) -> float:
-    """Return by how much a top at row k, on no level, may still rise between it and its neighbours on its own side.
+    """Amount by which a top at row k, on no level, may still rise between it and its neighbours on its own side.
 
     At a corner that the curve rises to, only what its bend leaves; else no more than the top stands above its
     neighbours.

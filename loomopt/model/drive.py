@@ -35,7 +35,7 @@ def quantities(effects: Iterable[Effect], known: Collection[str]) -> dict[str, C
 
 
 def motion() -> dict[str, CycleQuantity]:
-    """Return the speed of a crank, rad/s, and the motor's torque, N·m, which differ from its mean and the crank's."""
+    """Speed of a crank, rad/s, and the motor's torque, N·m, which differ from its mean and the crank's."""
     return {
         SPEED: CycleQuantity(lambda at: at.pose.omega, figure=False),
         MOTOR: CycleQuantity(lambda at: motor_torque(at, at.crank_torque), figure=False),
@@ -43,7 +43,7 @@ def motion() -> dict[str, CycleQuantity]:
 
 
 def motor(effects: Iterable[Effect]) -> Speed | None:
-    """Return the effect by which the crank has a speed of its own; None at constant speed."""
+    """Effect by which the crank has a speed of its own; None at constant speed."""
     return next((effect for effect in effects if isinstance(effect, Speed)), None)
 
 
@@ -56,5 +56,5 @@ def motor_torque(at: Instant, crank_torque: Number) -> Number:
 
 
 def motor_power(at: Instant, crank_torque: Number) -> Number:
-    """Return the motor's power, W: its torque times the crank's speed; negative where the mechanism drives."""
+    """Motor's power, W: its torque times the crank's speed; negative where the mechanism drives."""
     return motor_torque(at, crank_torque) * at.pose.omega

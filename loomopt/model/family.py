@@ -6,7 +6,7 @@ name; all else once for each member. The worst over members, or their sum, is wh
 
 import functools
 import math
-from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -17,7 +17,7 @@ from loomopt.model.kinematics import Arcs, Group
 from loomopt.model.limits import CycleLimit, DesignLimit, Limit, RatioLimit
 from loomopt.model.model import CycleQuantity, DesignRow, Formula, Instant, Integral, JobModel, cornered
 from loomopt.model.objectives import Objective, Piece, Sought, Value, Worst
-from loomopt.model.program import Alias, Move, Numbers, Preference, Program, Variable
+from loomopt.model.program import Alias, Move, Numbers, Program, Variable
 from loomopt.model.reading import DATUM
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.balance import Given, total
@@ -50,13 +50,13 @@ class Scenario(NamedTuple):
         return self.model.given(maths, {own: values[name] for own, name in self.values.items() if name in values})
 
     def node(self, node: Node) -> Node:
-        """Return a node of the whole as its own."""
+        """Node of the whole as its own."""
         switch = {own: node.switch[name] for own, name in self.switches.items() if name in node.switch}
         return Node(node.phi, switch | {name: node.switch[name] for name in (DATUM,) if name in node.switch})
 
 
 def members_of(given: Given) -> tuple[Given, ...]:
-    """Return the numbers of each member."""
+    """Numbers of each member."""
     found = given.linkage
     assert isinstance(found, tuple)
     return found
@@ -74,7 +74,7 @@ class FamilyKinematics:
     breaks: frozenset[str] = frozenset()
 
     def linkage(self, maths: Maths, values: Values) -> tuple[Given, ...]:
-        """Return the numbers of each member."""
+        """Numbers of each member."""
         return tuple(scenario.given(maths, values) for scenario in self.scenarios)
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
@@ -96,7 +96,7 @@ class FamilyKinematics:
         return self.pose(maths, given, Node(self.events(maths, given)[event], switch))
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
-        """Return the crank angles, rad, of members' events."""
+        """Crank angles, rad, of members' events."""
         own = members_of(given)
         return {
             name: self.scenarios[k].model.event(maths, own[k], event) for name, (k, event) in self.occurring.items()
@@ -160,7 +160,7 @@ class Roots:
         return {name: self.tape.input() for name in (*self.model.switches, DATUM)}
 
     def of(self, name: str) -> frozenset[str]:
-        """Return the numbers that a row, a whole-cycle quantity or a mean follows from."""
+        """Numbers that a row, a whole-cycle quantity or a mean follows from."""
         if name in self.inputs:
             return frozenset({name})
         if name not in self._found:
@@ -168,7 +168,7 @@ class Roots:
         return self._found[name]
 
     def of_switch(self, place: int) -> frozenset[str]:
-        """Return the numbers that the corners of a switch follow from, by its place in the model's."""
+        """Numbers that the corners of a switch follow from, by its place in the model's."""
         return self._of(lambda: cornered(self.model, self.maths, self.given)[place].angles)
 
     def _read(self, name: str) -> tuple[Number, ...]:
@@ -223,11 +223,11 @@ class WorstOf(Objective):
         return self.of[0].sought
 
     def worsening(self, now: float, then: float, most: bool) -> float:
-        """Return by how much the figure becomes worse from now to then, SI."""
+        """Amount by which the figure becomes worse from now to then, SI."""
         return self.of[0].worsening(now, then, most)
 
     def pieces(self, sampler: Sampler) -> list[Piece]:
-        """Return the smooth functions of all of them."""
+        """Smooth functions of all of them."""
         return [piece for each in self.of for piece in each.pieces(sampler)]
 
     def limits(self, name: str, most: float) -> list[Limit]:
@@ -271,14 +271,14 @@ class Family(NamedTuple):
 
 
 def standing_for(program: Program, name: str) -> frozenset[str]:
-    """Return the variables by which a program tells a number of the design: itself, or what its limits are read as."""
+    """Variables by which a program tells a number of the design: itself, or what its limits are read as."""
     if any(variable.name == name for variable in program.variables):
         return frozenset({name})
     return frozenset(limit.row for limit in program.limits if limit.name == name and limit.is_of_variable)
 
 
 def together(programs: Sequence[Program], own: Collection[str], combine: Combine) -> Family:
-    """Return the program of a family; own: variables of which each member has its own.
+    """Program of a family; own: variables of which each member has its own.
 
     The members' programs are of one structure: they differ in numbers only.
     """
@@ -311,7 +311,7 @@ class _Combining:
         self.measured: dict[str, tuple[int, Objective]] = {}
 
     def _hinted(self, own: Collection[str]) -> dict[str, bool]:
-        """Return the events that no formula gives, by name of value, and whether any number of a member's own moves it.
+        """Events that no formula gives, by name of value, and whether any number of a member's own moves it.
 
         They are found by iteration: that is seen at the first start, at which each member's own variables differ.
         """
@@ -328,7 +328,7 @@ class _Combining:
         return {name: any(each.get(name) != value for each in found) for name, value in found[0].items()}
 
     def _apart(self, own: Collection[str]) -> frozenset[str]:
-        """Return the numbers that are not the same for all members, and variables that hang on them by an equality."""
+        """Numbers that are not the same for all members, and variables that hang on them by an equality."""
         numbers = [program.parameters for program in self.programs]
         found = {*own} | {name for name in numbers[0] if any(each[name] != numbers[0][name] for each in numbers)}
         found |= {name for name, moves in self.hinted.items() if moves}
@@ -424,7 +424,7 @@ class _Combining:
         )
 
     def arcs(self) -> list[tuple[bool, Arcs]]:
-        """Return the switches of the whole, and whether each changes a formula."""
+        """Switches of the whole, and whether each changes a formula."""
         model, found = self.model, dict[str, tuple[bool, Arcs]]()
         loads = [load for load in model.loads if isinstance(load, Load) and load.corners]
         reads = [arc.switch for arc in (*model.kinematics.arcs, *model.arcs)] + [load.switch for load in loads]
@@ -452,7 +452,7 @@ class _Combining:
         return {"": Group({}, closes, closest=closest)}, beside
 
     def whole(self) -> JobModel:
-        """Return the model of all members, with what was read of it."""
+        """Model of all members, with what was read of it."""
         groups, beside = self.closing()
         arcs = self.arcs()
         scenarios = tuple(
@@ -477,7 +477,7 @@ class _Combining:
     # Variables, limits, objectives.
 
     def variable(self, member: int, place: int) -> Variable:
-        """Return a variable of a member as one of the whole."""
+        """Variable of a member as one of the whole."""
         each = [program.variables[place] for program in self.programs]
         own = each[member]
         if own.name in self.apart:
@@ -486,7 +486,7 @@ class _Combining:
         return own._replace(lower=lower, upper=max(lower, upper))
 
     def limit(self, member: int, limit: Limit) -> Limit:
-        """Return a limit of a member as one of the whole."""
+        """Limit of a member as one of the whole."""
         found: Limit = replace(limit, row=self.read(member, limit.row))
         if isinstance(found, RatioLimit):
             found = replace(found, weight=self.read(member, found.weight))
@@ -496,7 +496,7 @@ class _Combining:
         return found if same else replace(found, name=of_member(limit.name, member))
 
     def limits(self) -> list[Limit]:
-        """Return the limits of all members, those that are the same once."""
+        """Limits of all members, those that are the same once."""
         found: dict[Hashable, Limit] = {}
         for k, program in enumerate(self.programs):
             for limit in program.limits:
@@ -512,7 +512,7 @@ class _Combining:
         return found
 
     def objectives(self) -> tuple[Objective, ...]:
-        """Return the levels: of each of the members' the worst or the sum.
+        """Levels: of each of the members' the worst or the sum.
 
         Of a magnitude the sum too, after the worst: who does not decide the worst comes as near as can be.
         """
@@ -533,7 +533,7 @@ class _Combining:
         return tuple(found)
 
     def summed(self, each: Sequence[Objective]) -> Objective:
-        """Return the sum of what members seek: of what is not smooth, of variables that are no less."""
+        """Sum of what members seek: of what is not smooth, of variables that are no less."""
         first = each[0]
         figure = Alias(sum_name(first.figure, first.is_magnitude, first.power), first.figure)
         direct = first.is_smooth and not any(own.row in self.integrals or self.stands(own.row) for own in each)
@@ -547,7 +547,7 @@ class _Combining:
         return row in self.rows and bool(self.rows[row].event)
 
     def least(self, member: int, own: Objective) -> str:
-        """Return the variable that is no less than what a member seeks, with the limits that say so."""
+        """Variable that is no less than what a member seeks, with the limits that say so."""
         name = of_member(f"most {own.figure}", member)
         self.extra.append(Variable(name, -math.inf, math.inf, own.scale, (0.0, 2 * own.scale)))
         self.measured[name] = member, self.programs[member].objectives[self.place(own)]
@@ -570,7 +570,7 @@ class _Combining:
         return name
 
     def place(self, own: Objective) -> int:
-        """Return the place of a level among the members' own."""
+        """Place of a level among the members' own."""
         return next(k for k, level in enumerate(self.first.objectives) if level.figure == own.figure)
 
     @property
@@ -581,7 +581,7 @@ class _Combining:
     # The program.
 
     def family(self) -> Family:
-        """Return the whole, and each member's share of it."""
+        """Whole, and each member's share of it."""
         limits, objectives = self.limits(), self.objectives()
         places = range(len(self.variables))
         variables = {
@@ -614,7 +614,7 @@ class _Combining:
         return Family(replace(whole, starts=self.starts(whole)), parts)
 
     def part(self, member: int) -> MemberShare:
-        """Return a member's share."""
+        """Member's share."""
         own = {limit.name: self.limit(member, limit).name for limit in self.programs[member].limits}
         return MemberShare(
             self.programs[member],
@@ -623,7 +623,7 @@ class _Combining:
         )
 
     def starts(self, whole: Program) -> tuple[dict[str, float], ...]:
-        """Return the members' own starts: those of one place together, what is shared from each member in turn."""
+        """Members' own starts: those of one place together, what is shared from each member in turn."""
         found: list[dict[str, float]] = []
         for place in range(max(len(program.starts) for program in self.programs)):
             each = [program.starts[min(place, len(program.starts) - 1)] for program in self.programs]
@@ -638,7 +638,7 @@ class _Combining:
         return tuple(found)
 
     def moves(self) -> list[Move]:
-        """Return the members' moves, those along shared variables once, with what all members wish."""
+        """Members' moves, those along shared variables once, with what all members wish."""
         found: dict[Hashable, Move] = {}
         for k, program in enumerate(self.programs):
             for move in program.moves:
@@ -648,21 +648,17 @@ class _Combining:
                 bounds = {self.name(k, name): ends for name, ends in move.bounds.items()}
                 own = along != move.along
                 key = move.name, along
-                wishes = _wished((*found[key].wishes, *wishes)) if key in found else wishes
+                if key in found:  # wishes that always hold are the last
+                    wishes = tuple(sorted(dict.fromkeys((*found[key].wishes, *wishes)), key=lambda wish: not wish.when))
                 named = of_member(move.name, k) if own else move.name
                 found[key] = replace(move, name=named, along=along, wishes=wishes, today=today, bounds=bounds)
         return list(found.values())
 
 
-def _wished(wishes: Iterable[Preference]) -> tuple[Preference, ...]:
-    """Return wishes without repeats, those that always hold last."""
-    return tuple(sorted(dict.fromkeys(wishes), key=lambda wish: not wish.when))
-
-
 def _followed(
     parts: Sequence[MemberShare], measured: Mapping[str, tuple[int, Objective]], model: JobModel, values: Numbers
 ) -> dict[str, float]:
-    """Return the variables that follow from the others: the members' own, and what is no less than what they seek."""
+    """Variables that follow from the others: the members' own, and what is no less than what they seek."""
     found: dict[str, float] = {}
     for part in parts:
         own = part.program.follow(part.program.model, {**part.program.parameters, **part.own(values)})

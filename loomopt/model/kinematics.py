@@ -46,7 +46,7 @@ class Group(NamedTuple):
     closest: tuple[float, ...] = ()
 
     def singular(self, prefix: str, squares: Squares) -> tuple[float, ...]:
-        """Return the crank angles, rad, where the links nearly fold or stretch; prefix: what their quantities have."""
+        """Crank angles, rad, where the links nearly fold or stretch; prefix: what their quantities have."""
         own = functools.partial(squares, tuple(prefix + name for name in self.closes.values()))
         if self.closest:
             tops = [pair for values in own(np.array(self.closest)) for pair in zip(self.closest, values, strict=True)]
@@ -131,7 +131,7 @@ class Follows(Protocol):
     """A mechanism that says of its events what boxes of designs need to enclose them."""
 
     def following(self, given: Given) -> Following | None:
-        """Return the events of a design in floats that hints lead to; None where they are not followed so."""
+        """Events of a design in floats that hints lead to; None where they are not followed so."""
 
 
 class Kinematics(Protocol):
@@ -169,14 +169,14 @@ class Kinematics(Protocol):
         return {}
 
     def pose(self, maths: Maths, given: Given, node: Node) -> Motion:
-        """Return the pose at a node."""
+        """Pose at a node."""
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> Motion:
-        """Return the exact pose at an event."""
+        """Exact pose at an event."""
         return self.pose(maths, given, Node(self.events(maths, given)[event], switch))
 
     def events(self, maths: Maths, given: Given) -> Mapping[str, Number]:
-        """Return the crank angles of events by name."""
+        """Crank angles of events by name."""
         return {}
 
 
@@ -187,7 +187,7 @@ def four_bar(
     phrases: tuple[str, str],
     obliquity: OfPhi | None = None,
 ) -> Group:
-    """Return the group of a crank-rocker.
+    """Group of a crank-rocker.
 
     names: what the scene calls its links; side: on which its rocker lies; phase(values): the linkage's own crank angle
     at φ = 0, rad; phrases: that rod and rocker are not stretched, and not folded.

@@ -90,7 +90,7 @@ class Limit(abc.ABC):
         return 1.0
 
     def touches(self, sampler: Sampler) -> list[Touch]:
-        """Return the smooth rows of it that a design touches, none where it keeps clear of it."""
+        """Smooth rows of it that a design touches, none where it keeps clear of it."""
         excess = self.excess(sampler)
         return [] if self.sign != 0 and excess < -ACTIVE else self._touches(sampler, excess)
 
@@ -112,7 +112,7 @@ class SingleLimit(Limit):
 
     @abc.abstractmethod
     def _read(self, rows: Rows) -> Number:
-        """Return the row, SI."""
+        """Row, SI."""
 
     def _compared(self, rows: Rows, bound: Number) -> Number:
         """Return what the row is compared with, SI."""
@@ -157,7 +157,7 @@ class RatioLimit(DesignLimit):
         return abs(self.value) or 1.0
 
     def factor(self, rows: Rows) -> Number:
-        """Return the weight."""
+        """Weight."""
         return rows.single(self.weight)
 
     def _compared(self, rows: Rows, bound: Number) -> Number:
@@ -206,7 +206,7 @@ class CycleLimit(Limit):
         return self.sign * (peak - self.complement)
 
     def near(self, sampler: Sampler) -> list[Extreme]:
-        """Return the extremes of the quantity that come near the bound, or exceed it."""
+        """Extremes of the quantity that come near the bound, or exceed it."""
         found = sampler.extremes(self.row, self.where)
         return [e for e in found if e.height >= self.bound - ACTIVE * self.scale]
 

@@ -72,11 +72,11 @@ class Machines:
         self._tops: dict[str, Tops] = {}
 
     def at_numbers(self, **numbers: Number) -> "Machines":
-        """Return the machines with other numbers, which must not change the order of their corners."""
+        """Machines with other numbers, which must not change the order of their corners."""
         return Machines(self.model, {**self.values, **numbers}, self.like)
 
     def single(self, name: str) -> Floats:
-        """Return a figure, row or number of each machine, (machines,), SI."""
+        """Figure, row or number of each machine, (machines,), SI."""
         found: Floats = wide(self.rows.single(name), self.count)
         return found
 
@@ -87,12 +87,12 @@ class Machines:
         return {name: wide(row, self.count) for name, row in rows.items()}
 
     def mean(self, integral: Integral) -> Floats:
-        """Return a mean over the cycle of each machine, (machines,), SI."""
+        """Mean over the cycle of each machine, (machines,), SI."""
         found: Floats = self.rows.mean(integral)
         return found
 
     def peak(self, name: str, where: Where | None = None) -> Floats:
-        """Return the largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, (machines,)."""
+        """Largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, (machines,)."""
         values = self.tops(name, where).value
         return values if name in self.model.signed else np.abs(values)
 
@@ -113,12 +113,12 @@ class Machines:
         self.like.session.positions += len(new) * len(self.u) * self.count
 
     def sampled(self, name: str) -> Floats:
-        """Return a quantity on the grid, (nodes, machines), SI."""
+        """Quantity on the grid, (nodes, machines), SI."""
         self.search((name,))
         return self._sampled[name]
 
     def at(self, name: str, pieces: Pieces, u: Floats, machines: Places) -> Floats:
-        """Return a quantity, SI, at nodes (pieces, u) of machines; u: (…, chosen), the others (chosen,)."""
+        """Quantity, SI, at nodes (pieces, u) of machines; u: (…, chosen), the others (chosen,)."""
         return self._each((name,), machines, lambda rows, part: rows.own_node(pieces[part], u[..., part]), u.shape)[0]
 
     def at_angles(self, names: Sequence[str], angles: Floats, machines: Places | None = None) -> list[Floats]:
@@ -146,7 +146,7 @@ class Machines:
         return found
 
     def angles(self, tops: Tops) -> Floats:
-        """Return the crank angles of tops, rad, (machines,)."""
+        """Crank angles of tops, rad, (machines,)."""
         found: Floats = self.rows.own_node(tops.piece, tops.u).phi
         return found
 
@@ -221,7 +221,7 @@ class Machines:
         return turned, np.abs(np.take_along_axis(self.sampled(name), order, axis=0))
 
     def _turning(self, name: str, angles: Floats, machines: Places) -> Floats:
-        """Return the crank angles, rad, where |quantity| is highest near angles (chosen,) of machines (chosen,)."""
+        """Crank angles, rad, where |quantity| is highest near angles (chosen,) of machines (chosen,)."""
         step, found = TURN / GRID, angles
         for closer in (1.0, CLOSER, CLOSER**2):
             around = found + closer * step * np.arange(-2, 3)[:, None]
@@ -269,7 +269,7 @@ class _Refined:
         return found
 
     def highest(self, at: At) -> Tops:
-        """Return the highest top of each machine."""
+        """Highest top of each machine."""
         u, height = self.refined(at)
         best = np.full(self.of.count, -np.inf)
         np.maximum.at(best, self.machines, height)
@@ -280,7 +280,7 @@ class _Refined:
         return tops
 
     def refined(self, at: At) -> tuple[Floats, Floats]:
-        """Return u and height of each top: a parabola through samples, then a quartic; an end may stay the top."""
+        """u and height of each top: a parabola through samples, then a quartic; an end may stay the top."""
         step = CLOSER * self.step
         centre = inside_samples(self.centre + self.step * vertex(self.beside), 2 * step)
         top, bent = np.empty_like(centre), np.empty(len(centre), dtype=bool)
@@ -309,7 +309,7 @@ class _Refined:
 
 
 def _fourth(around: Floats) -> Floats:
-    """Return the fourth difference of five values."""
+    """Fourth difference of five values."""
     outer: Floats = around[0] - 4 * around[1] + 6 * around[2] - 4 * around[3] + around[4]
     return outer
 
@@ -356,7 +356,7 @@ def read_all(model: JobModel, values: Values, like: Sampler, read: Read, alone: 
 
 
 def _picked(values: Values, places: Number) -> dict[str, Number]:
-    """Return the numbers of some machines."""
+    """Numbers of some machines."""
     return {name: value[places] if np.ndim(value) else value for name, value in values.items()}
 
 

@@ -96,12 +96,12 @@ class Instant:
         return self._joints[check.joints]
 
     def switched(self, **switch: Number) -> "Instant":
-        """Return the same node with other switches."""
+        """Same node with other switches."""
         node = Node(self.node.phi, {**self.node.switch, **switch})
         return Instant(self.model, self.maths, self.given, node, self.event)
 
     def at_speed(self, speed: Number) -> "Instant":
-        """Return the same node with the crank at another speed, rad/s; its pose must be a dataclass with `omega`."""
+        """Same node with the crank at another speed, rad/s; its pose must be a dataclass with `omega`."""
         found = Instant(self.model, self.maths, self.given, self.node, self.event)
         found._pose = replace(self.pose, omega=speed)
         return found
@@ -153,17 +153,17 @@ class Integral(NamedTuple):
 
 
 def group_value(formula: Callable[..., Number], at: Instant) -> Number:
-    """Return a quantity of links that must close."""
+    """Quantity of links that must close."""
     return formula(at.maths, at.given, at.node.phi, lambda: at.pose)
 
 
 def check_value(check: Check[Any], name: str, at: Instant) -> Number:
-    """Return a quantity of a check, SI."""
+    """Quantity of a check, SI."""
     return check.quantities[name](at.inputs(check))
 
 
 def squared(name: str) -> str:
-    """Return the name of the square of a quantity that is the size of a vector."""
+    """Name of the square of a quantity that is the size of a vector."""
     return f"{name}^2"
 
 
@@ -172,28 +172,28 @@ COMPONENTS = ("x", "y")
 
 
 def component(check: Check[Any], name: str, axis: str, at: Instant) -> Number:
-    """Return a component of a vector that a check reads, SI."""
+    """Component of a vector that a check reads, SI."""
     return getattr(getattr(at.joints(check), name), axis)
 
 
 def square_of(check: Check[Any], name: str, at: Instant) -> Number:
-    """Return the square of a vector's size, SI."""
+    """Square of a vector's size, SI."""
     vector = getattr(at.joints(check), name)
     return vector.x**2 + vector.y**2
 
 
 def size_of(check: Check[Any], name: str, at: Instant) -> Number:
-    """Return the size of a vector that a check reads, SI."""
+    """Size of a vector that a check reads, SI."""
     return at.maths.sqrt(square_of(check, name, at))
 
 
 def scalar_of(check: Check[Any], name: str, at: Instant) -> Number:
-    """Return a scalar that a check reads of the forces in the joints, SI."""
+    """Scalar that a check reads of the forces in the joints, SI."""
     return getattr(at.joints(check), name)
 
 
 def work_of(check: Check[Any], name: str, at: Instant) -> Number:
-    """Return the work that a check reads of the forces in the joints, J per rad of the crank."""
+    """Work that a check reads of the forces in the joints, J per rad of the crank."""
     shares = getattr(at.joints(check), name)
     return sum((share * _magnitude(check, force, at) for force, share in shares.items()), 0 * at.node.phi)
 
@@ -207,7 +207,7 @@ SLOWNESS = "slowness"
 
 
 def slowness(at: Instant) -> Number:
-    """Return the time that the crank takes per angle, s/rad."""
+    """Time that the crank takes per angle, s/rad."""
     return 1 / at.pose.omega + 0 * at.node.phi
 
 
@@ -217,7 +217,7 @@ def heading_name(part: str, axis: str) -> str:
 
 
 def heading_of(check: Check[Any], part: str, axis: str, at: Instant) -> Number:
-    """Return a component of a part's unit direction, as a check reads it."""
+    """Component of a part's unit direction, as a check reads it."""
     return getattr(at.joints(check).heading(part), axis) + 0 * at.node.phi
 
 
@@ -253,12 +253,12 @@ def jointed(check: Check[Any], known: Collection[str]) -> dict[str, CycleQuantit
 
 
 def design_value(formula: Callable[[Maths, Values], Number], at: Instant) -> Number:
-    """Return a row of the design alone, SI."""
+    """Row of the design alone, SI."""
     return formula(at.maths, at.values)
 
 
 def check_row(check: Check[Any], name: str, at: Instant) -> Number:
-    """Return a row of a check, SI."""
+    """Row of a check, SI."""
     return check.rows[name](at.given.inputs(at.maths, check))
 
 
@@ -287,7 +287,7 @@ def cornered(model: "JobModel", maths: Maths, given: Given) -> list[Cornered]:
 
 
 def with_states_eliminated(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], found: Given) -> Given:
-    """Return the scene's numbers with what follows from them for each state."""
+    """Scene's numbers with what follows from them for each state."""
     for state in (load for load in loads if isinstance(load, State)):
         moving = carried_by(maths, kinematics, loads, found, state)
         derived = state.derived(found.inputs(maths, state), moving)
@@ -340,7 +340,7 @@ def state_quantities(states: Sequence[State]) -> dict[str, CycleQuantity]:
 
 
 def state_columns(states: Sequence[State]) -> Mapping[str, Callable[[Instant], Number]]:
-    """Return the columns that states add to the curves, with their units."""
+    """Columns that states add to the curves, with their units."""
     return {
         name: functools.partial(state_value, state, formula, 1)
         for state in states
@@ -418,7 +418,7 @@ class JobModel:
         return {each.name: {key: owned(each, key) for key in keys(each.table)} for each in self.effects}
 
     def words_of(self, effect: str) -> dict[str, str]:
-        """Return the words of an effect's table by key."""
+        """Words of an effect's table by key."""
         return {key: word for name, key, word in self.words if name == effect}
 
     @lazy
@@ -428,7 +428,7 @@ class JobModel:
         return next((found for load in loads if (found := load.known_in(self.words_of(load.name)))), ())
 
     def known_of(self, name: str) -> tuple[Where, ...]:
-        """Return the pieces where a whole-cycle quantity is known; empty for all of the cycle."""
+        """Pieces where a whole-cycle quantity is known; empty for all of the cycle."""
         return self.known_in if self._quantities[name].loaded else ()
 
     def counted(self, cycle: Cycle, name: str, where: Where | None = None) -> NDArray[np.bool_]:
@@ -495,7 +495,7 @@ class JobModel:
         return frozenset(name for name, quantity in self._quantities.items() if quantity.bounded)
 
     def square(self, name: str) -> str:
-        """Return the quantity that is the square of one which has a corner at 0; "" where there is no need of it."""
+        """Quantity that is the square of one which has a corner at 0; "" where there is no need of it."""
         return self._quantities[name].square
 
     def has_quantity(self, name: str) -> bool:
@@ -509,7 +509,7 @@ class JobModel:
         return name in {*self._rows, *means, *turned}
 
     def event_of(self, name: str) -> str:
-        """Return the event that a row stands at; "" for one of the design alone."""
+        """Event that a row stands at; "" for one of the design alone."""
         return self._rows[name].event
 
     @lazy
@@ -570,7 +570,7 @@ class JobModel:
     # Numbers and corners.
 
     def given(self, maths: Maths, values: Values) -> Given:
-        """Return the scene's numbers and what follows from them at once, SI."""
+        """Scene's numbers and what follows from them at once, SI."""
         return with_states_eliminated(maths, self.kinematics, self.loads, self.plain(maths, values))
 
     def samples(self, given: Given) -> int:
@@ -578,7 +578,7 @@ class JobModel:
         return max((math.ceil(each.samples(given.inputs(FLOAT, each))) for each in self.states), default=0)
 
     def plain(self, maths: Maths, values: Values) -> Given:
-        """Return the scene's numbers with what follows from the mechanism alone, SI."""
+        """Scene's numbers with what follows from the mechanism alone, SI."""
         own: dict[str, dict[str, Any]] = {}
         for effect, full in self._full.items():
             own[effect] = {key: values[name] for key, name in full.items() if name in values}
@@ -603,11 +603,11 @@ class JobModel:
         return frozenset(name for name in self.switches if name not in arcs)
 
     def corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
-        """Return the corner angles of the cycle, rad, as declared one after the other."""
+        """Corner angles of the cycle, rad, as declared one after the other."""
         return tuple(angle for each in cornered(self, maths, given) for angle in each.placed)
 
     def split(self, maths: Maths, given: Given) -> Cycle:
-        """Return the pieces of the cycle; maths: of floats."""
+        """Pieces of the cycle; maths: of floats."""
         found = cornered(self, maths, given)
         corners = [angle for each in found for angle in each.placed]
         return cycle.split(corners, self.switches, lambda angle: [each.switch(angle, each.angles) for each in found])
@@ -617,22 +617,22 @@ class JobModel:
         return dict(self.kinematics.hints(given, self.called))
 
     def singular(self, squares: Squares) -> tuple[float, ...]:
-        """Return the crank angles, rad, where the mechanism nearly reaches a singular position."""
+        """Crank angles, rad, where the mechanism nearly reaches a singular position."""
         groups = self.kinematics.groups.items()
         return tuple(angle for prefix, group in groups for angle in group.singular(prefix, squares))
 
     # Values.
 
     def instant(self, maths: Maths, given: Given, node: Node) -> Instant:
-        """Return the mechanism with its effects at a node."""
+        """Mechanism with its effects at a node."""
         return Instant(self, maths, given, node)
 
     def formula(self, name: str) -> Formula:
-        """Return the formula of a whole-cycle quantity."""
+        """Formula of a whole-cycle quantity."""
         return self._quantities[name].formula
 
     def quantity(self, maths: Maths, given: Given, name: str, node: Node) -> Number:
-        """Return a whole-cycle quantity, SI, at a node."""
+        """Whole-cycle quantity, SI, at a node."""
         return self.together(maths, given, node)(name)
 
     def together(self, maths: Maths, given: Given, node: Node) -> Callable[[str], Number]:
@@ -658,7 +658,7 @@ class JobModel:
         return found
 
     def event(self, maths: Maths, given: Given, name: str) -> Number:
-        """Return the crank angle of an event, rad."""
+        """Crank angle of an event, rad."""
         return self.kinematics.events(maths, given)[name]
 
 
@@ -668,7 +668,7 @@ Word = tuple[str, str, str]
 
 
 def with_words_fixed(model: JobModel, values: Mapping[str, float]) -> JobModel:
-    """Return the model as its states need it at a design (SI); itself where it serves that already.
+    """Model as its states need it at a design (SI); itself where it serves that already.
 
     Raises UnsteadyError where there is no steady state to trust.
     """
@@ -712,6 +712,6 @@ def _made(model: JobModel, words: tuple[Word, ...], integrals: tuple[Integral, .
 
 
 def _with(model: JobModel, words: tuple[Word, ...], parts: tuple[int, ...]) -> JobModel:
-    """Return the model with these words, and means in these parts; itself where it has them."""
+    """Model with these words, and means in these parts; itself where it has them."""
     cut = tuple(mean._replace(parts=n) for mean, n in zip(model.integrals, parts, strict=False)) or model.integrals
     return model if (words, cut) == (model.words, model.integrals) else _made(model, words, cut)

@@ -27,7 +27,7 @@ def numbers(scene: Scene) -> dict[str, float]:
 
 
 def words(scene: Scene) -> tuple[tuple[str, str, Any], ...]:
-    """Return (effect, key, word) for every value that chooses an effect's formula; a curve for the name of its file.
+    """(effect, key, word) for every value that chooses an effect's formula; a curve for the name of its file.
 
     Raises BadInput.
     """
@@ -46,12 +46,12 @@ Curve = PeriodicCubic | PeriodicCubics
 
 
 def curves(scene: Scene) -> dict[tuple[str, str], Curve]:
-    """Return the curves that the scene's loads are, read from its files, by effect and key. Raises BadInput."""
+    """Curves that the scene's loads are, read from its files, by effect and key. Raises BadInput."""
     return {place: curve for place, (curve, _) in _curves(scene).items()}
 
 
 def _curves(scene: Scene) -> dict[tuple[str, str], tuple[Curve, csv_tables.Table]]:
-    """Return the curves that the scene's loads are, each with its table. Raises BadInput."""
+    """Curves that the scene's loads are, each with its table. Raises BadInput."""
     on = zip(scene.active, scene.effects.values(), strict=True)
     loads = [(effect, own) for effect, own in on if isinstance(effect, Load) and effect.tabulated]
     found = {(load.name, load.tabulated.key): _curve(scene, load, own) for load, own in loads if load.tabulated}
@@ -59,7 +59,7 @@ def _curves(scene: Scene) -> dict[tuple[str, str], tuple[Curve, csv_tables.Table
 
 
 def _curve(scene: Scene, load: Load[Any], own: Table) -> tuple[Curve, csv_tables.Table] | None:
-    """Return the curve that a load's table names, with the table; None where it names none. Raises BadInput."""
+    """Curve that a load's table names, with the table; None where it names none. Raises BadInput."""
     table = load.tabulated
     given = getattr(own, table.key) if table else None
     if table is None or given is None:

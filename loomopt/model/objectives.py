@@ -89,12 +89,12 @@ class Objective(abc.ABC):
         return float(self.worth(sampler.rows))
 
     def figure_of(self, sampler: Sampler) -> float:
-        """Return the figure of a design, SI: with its sign where it is a number of its own."""
+        """Figure of a design, SI: with its sign where it is a number of its own."""
         own = sampler.figure(self.figure)
         return float(self.merit(sampler) ** (1 / self.power)) if own is None else own
 
     def worsening(self, now: float, then: float, most: bool) -> float:
-        """Return by how much the figure becomes worse from now to then, SI; most: whether the most of it is sought."""
+        """Amount by which the figure becomes worse from now to then, SI; most: whether the most of it is sought."""
         return now - then if most else then - now
 
     def least_of(self, signed: Collection[str]) -> float:
@@ -116,7 +116,7 @@ class Objective(abc.ABC):
         return np.asarray(wide(self.worth(designs), designs.count))[None]
 
     def pieces(self, sampler: Sampler) -> list[Piece]:
-        """Return the smooth functions the largest of which it is at a design."""
+        """Smooth functions the largest of which it is at a design."""
         found = [Piece(row, sign * sampler.single(row), sign) for row, sign in self.sides]
         return found + [Piece(row, e.height, e.sign, e) for row in self.quantities for e in sampler.extremes(row)]
 
@@ -136,11 +136,11 @@ class Value(Objective):
         return ((self.row, 1.0),)
 
     def least_within(self, lower: Mapping[str, float]) -> float:
-        """Return the variable's lower bound, SI, where the row is a variable."""
+        """Variable's lower bound, SI, where the row is a variable."""
         return lower.get(self.row, -math.inf)
 
     def limits(self, name: str, most: float) -> list[Limit]:
-        """Return the limit of the row at `most`, SI."""
+        """Limit of the row at `most`, SI."""
         return [DesignLimit(name, 1, self.row, most, self.scale)]
 
 
@@ -161,7 +161,7 @@ class Worst(Objective):
         return tuple((row, 1.0) for row in self.rows)
 
     def limits(self, name: str, most: float) -> list[Limit]:
-        """Return the limit of each row at `most`, SI."""
+        """Limit of each row at `most`, SI."""
         return [DesignLimit(name, 1, row, most, self.scale) for row in self.rows]
 
 
@@ -181,25 +181,25 @@ class Magnitude(Objective):
         return "least magnitude"
 
     def worth(self, rows: Rows) -> Number:
-        """Return |row|, SI."""
+        """|row|, SI."""
         return abs(rows.single(self.row))
 
     def worsening(self, now: float, then: float, most: bool) -> float:
-        """Return by how much the magnitude grows from now to then, SI."""
+        """Amount by which the magnitude grows from now to then, SI."""
         return abs(then) - abs(now)
 
     def least_within(self, lower: Mapping[str, float]) -> float:
-        """Return 0."""
+        """0."""
         return 0.0
 
     def pieces(self, sampler: Sampler) -> list[Piece]:
-        """Return the row with its own sign; with both where it vanishes."""
+        """Row with its own sign; with both where it vanishes."""
         value = sampler.single(self.row)
         signs = (1.0, -1.0) if abs(value) <= FEASIBLE * self.scale else (float(np.sign(value)),)
         return [Piece(self.row, abs(value), sign) for sign in signs]
 
     def limits(self, name: str, most: float) -> list[Limit]:
-        """Return the limits of the row at `most` and at its opposite, SI."""
+        """Limits of the row at `most` and at its opposite, SI."""
         return [DesignLimit(name, sign, self.row, sign * most, self.scale) for sign in (1, -1)]
 
 
@@ -214,18 +214,18 @@ class Peak(Objective):
         return (self.row,)
 
     def figure_of(self, sampler: Sampler) -> float:
-        """Return the figure of a design, SI: of the peak itself."""
+        """Figure of a design, SI: of the peak itself."""
         return float(self.merit(sampler) ** (1 / self.power))
 
     def watched(self, designs: BatchReading) -> Floats:
-        """Return the quantity at the nodes looked at, SI, (nodes, designs)."""
+        """Quantity at the nodes looked at, SI, (nodes, designs)."""
         return np.asarray(designs.looked(self.row))
 
     def limits(self, name: str, most: float) -> list[Limit]:
-        """Return the limit of the quantity at `most`, SI."""
+        """Limit of the quantity at `most`, SI."""
         return [CycleLimit(name, 1, self.row, most, self.scale)]
 
 
 def opposite(row: str) -> str:
-    """Return the name of a row's opposite, the least of which is the row's most."""
+    """Name of a row's opposite, the least of which is the row's most."""
     return f"-{row}"

@@ -27,7 +27,7 @@ class Alias(str):
     of: str
 
     def __new__(cls, text: str, of: str) -> "Alias":
-        """Return the name."""
+        """Name."""
         found = super().__new__(cls, text)
         found.of = of
         return found
@@ -71,7 +71,7 @@ class Move(abc.ABC):
     """Whether each variable changes by itself."""
 
     def wished(self, values: Numbers) -> Preference | None:
-        """Return the first wish that holds at these values (SI)."""
+        """First wish that holds at these values (SI)."""
         return next((wish for wish in self.wishes if not wish.when or values[wish.when] > wish.above), None)
 
     @abc.abstractmethod
@@ -87,7 +87,7 @@ class Move(abc.ABC):
         """Yield where a direction from x (SI) ends at the bounds."""
 
     def _room(self) -> list[str]:
-        """Return the variables that have room, but not without end."""
+        """Variables that have room, but not without end."""
         widths = {name: self.bounds[name][1] - self.bounds[name][0] for name in self.along}
         return [name for name, width in widths.items() if 0.0 < width < math.inf]
 
@@ -108,7 +108,7 @@ class AxisMove(Move):
         return goal
 
     def directions(self, x: Numbers) -> list[dict[str, float]]:
-        """Return the axis of each variable that has room, but not without end."""
+        """Axis of each variable that has room, but not without end."""
         return [{name: 1.0} for name in self._room()]
 
     def ends(self, way: Numbers, x: Numbers) -> Iterator[dict[str, float]]:
@@ -122,7 +122,7 @@ class ScaleMove(Move):
     is_apart = False
 
     def goal(self, wish: Preference, x: Numbers) -> dict[str, float]:
-        """Return x scaled in common: nearest to today's, in bound widths, or as small or as large as bounds allow."""
+        """x scaled in common: nearest to today's, in bound widths, or as small or as large as bounds allow."""
         widths = {name: self.bounds[name][1] - self.bounds[name][0] for name in self.along}
         if min(widths.values()) <= 0.0 or not any(x[name] for name in self.along):
             return {}
@@ -134,7 +134,7 @@ class ScaleMove(Move):
         return {n: min(max(x[n] * factor, self.bounds[n][0]), self.bounds[n][1]) for n in self.along}
 
     def directions(self, x: Numbers) -> list[dict[str, float]]:
-        """Return x itself, where every variable has room, but not without end."""
+        """x itself, where every variable has room, but not without end."""
         room = self._room()
         return [{name: x[name] for name in room}] if len(room) == len(self.along) and any(x[n] for n in room) else []
 
@@ -143,7 +143,7 @@ class ScaleMove(Move):
         yield from ({name: factor * x[name] for name in way} for factor in self._factors(x))
 
     def _factors(self, x: Numbers) -> tuple[float, float]:
-        """Return the least and the largest common factor that bounds allow; above the largest where they leave none."""
+        """Least and the largest common factor that bounds allow; above the largest where they leave none."""
         scales = [sorted((self.bounds[n][0] / x[n], self.bounds[n][1] / x[n])) for n in self.along if x[n]]
         return max(low for low, _ in scales), min(high for _, high in scales)
 
@@ -197,7 +197,7 @@ class Goal(NamedTuple):
 
 
 def shortfall(reached: Mapping[str, bool]) -> str:
-    """Return the goals that are missed, in words: "M3_fdc not reached"; "" for none. reached: goal → whether it is."""
+    """Goals that are missed, in words: "M3_fdc not reached"; "" for none. reached: goal → whether it is."""
     missed = [name for name, met in reached.items() if not met]
     return f"{' and '.join(missed)} not reached" if missed else ""
 
@@ -260,7 +260,7 @@ class Program:
         )
 
     def backed_off(self, off: Mapping[tuple[str, int], float]) -> "Program":
-        """Return the task with limits tightened; off: name and sign of limits → by how much, SI.
+        """Task with limits tightened; off: name and sign of limits → by how much, SI.
 
         Bounds of variables that stand for figures, such as a dwell that is kept, move with their limits.
         """
@@ -344,7 +344,7 @@ class Program:
         return frozenset(v.name for v in self.variables if v.lower == v.upper)
 
     def completed(self, x: Mapping[str, float]) -> dict[str, float]:
-        """Return x (SI) with the variables that follow from the others; raises ValueError where it cannot move."""
+        """x (SI) with the variables that follow from the others; raises ValueError where it cannot move."""
         given = {v.name: x.get(v.name, v.lower) for v in self.variables}
         implied = self.follow(self.model, {**self.parameters, **given})
         return {name: implied.get(name, value) for name, value in given.items()}

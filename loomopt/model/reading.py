@@ -46,7 +46,7 @@ class Recording:
     _bind: dict[tuple[Maths, Maths], Bind] = field(default_factory=dict)
 
     def bind(self, systems: tuple[Maths, Maths], given: Given) -> AtNode:
-        """Return the quantities of one design as a function of the node."""
+        """Quantities of one design as a function of the node."""
         if systems not in self._bind:
             self._bind[systems] = self.program(systems)
         values, names = given.values, self.switches
@@ -91,7 +91,7 @@ class Quantities:
         return run(node)
 
     def _run(self, names: tuple[str, ...], switches: tuple[str, ...], history: _History) -> AtNode | None:
-        """Return the recorded quantities of this design, None where there is no recording, or not yet."""
+        """Recorded quantities of this design, None where there is no recording, or not yet."""
         history.evaluations += 1
         if history.recording is None and history.evaluations > WORTH_IT and not history.refused:
             try:
@@ -141,12 +141,12 @@ def gauss(count: int = GAUSS_NODES) -> tuple[Floats, Floats]:
 
 
 def _enough(width: float) -> int:
-    """Return the nodes that a piece so wide, rad, needs."""
+    """Nodes that a piece so wide, rad, needs."""
     return math.ceil(math.log(ROUNDING) / (2 * math.log(width / 2))) if 0.0 < width < NARROW else GAUSS_NODES
 
 
 def fixed_nodes(cycle: Cycle, integral: Integral) -> Node:
-    """Return the nodes of a mean at its own angles, each with its number as the switch "datum".
+    """Nodes of a mean at its own angles, each with its number as the switch "datum".
 
     A cycle of another design, whose corners lie elsewhere, names the formulas that hold in its own pieces.
     """
@@ -181,14 +181,14 @@ class Rows(abc.ABC):
 
     @abc.abstractmethod
     def mean(self, integral: Integral) -> Number:
-        """Return a mean over the cycle, SI."""
+        """Mean over the cycle, SI."""
 
     def quantity(self, name: str, phi: Number, switch: Values) -> Number:
-        """Return a whole-cycle quantity at a crank angle, rad, SI."""
+        """Whole-cycle quantity at a crank angle, rad, SI."""
         return self._quantities((name,), Node(phi, switch))[0]
 
     def single(self, name: str) -> Number:
-        """Return a figure or row of the design, a mean over the cycle or its root, or a number of the scene, SI."""
+        """Figure or row of the design, a mean over the cycle or its root, or a number of the scene, SI."""
         if name not in self._single:
             self._single[name] = self._value(name)
         return self._single[name]
@@ -203,7 +203,7 @@ class Rows(abc.ABC):
         return known[name] if name in known else self.given.values[name]
 
     def highest(self, name: str, where: Where | None = None) -> Number:
-        """Return the largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI.
+        """Largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI.
 
         Only where the cycle has been looked at as a whole: in samples.
         """
@@ -223,12 +223,12 @@ class Reading(Rows):
         return self.cycle.begins(self.model.corners(self.maths, self.given), self.maths.pi)
 
     def at(self, name: str, piece: int, u: Number) -> Number:
-        """Return a whole-cycle quantity at a node, SI."""
+        """Whole-cycle quantity at a node, SI."""
         begin, end = self.starts[piece], self.starts[piece + 1]
         return self.quantity(name, begin + u * (end - begin), self.cycle.switch(piece))
 
     def mean(self, integral: Integral) -> Number:
-        """Return a mean by its rule, node by node, SI."""
+        """Mean by its rule, node by node, SI."""
         if integral.angles:
             number = self.maths.number
             pieces = self.cycle.located(np.asarray(integral.angles))[0].tolist()
@@ -264,7 +264,7 @@ class BatchReading(Reading):
         return Node(begin + u[:, None] * (end - begin), switch)
 
     def own_node(self, pieces: Pieces, u: Floats) -> Node:
-        """Return a node (pieces, u) of each design, its own; pieces: (designs,), u: (…, designs)."""
+        """Node (pieces, u) of each design, its own; pieces: (designs,), u: (…, designs)."""
         every = np.arange(self.count)
         starts = np.broadcast_to(self._starts, (len(self._starts), self.count))
         begin, end = starts[pieces, every], starts[pieces + 1, every]
@@ -296,11 +296,11 @@ class BatchReading(Reading):
         self._looked = pieces, self.quantities(names, self.node(pieces, u))
 
     def looked(self, name: str) -> Number:
-        """Return a quantity at the nodes looked at, (nodes, designs)."""
+        """Quantity at the nodes looked at, (nodes, designs)."""
         return self._looked[1][name]
 
     def highest(self, name: str, where: Where | None = None) -> Number:
-        """Return the largest |quantity| (of a signed one, value) of each design at the nodes looked at, (designs,)."""
+        """Largest |quantity| (of a signed one, value) of each design at the nodes looked at, (designs,)."""
         pieces, values, signed = self._looked[0], self.looked(name), name in self.model.signed
         on = np.flatnonzero(self.model.counted(self.cycle, name, where)[pieces])
         known = plain(values)[on]
@@ -310,7 +310,7 @@ class BatchReading(Reading):
         return highest if signed else np.where(plain(highest) < 0.0, -1.0, 1.0) * highest
 
     def mean(self, integral: Integral) -> Number:
-        """Return a mean by its rule, all nodes of all designs at once, (designs,), SI."""
+        """Mean by its rule, all nodes of all designs at once, (designs,), SI."""
         name = integral.quantity
         if integral.angles:
             fixed = fixed_nodes(self.cycle, integral)
@@ -322,17 +322,17 @@ class BatchReading(Reading):
 
 
 def plain(value: Number) -> Number:
-    """Return a number's value without its derivatives."""
+    """Value of the number without its derivatives."""
     return value.v if isinstance(value, Jet) else value
 
 
 def wide(value: Number, count: int) -> Number:
-    """Return a number of all of so many designs, (designs,)."""
+    """Number of all of so many designs, (designs,)."""
     return _shaped(value, (count,))
 
 
 def _shaped(value: Number, shape: tuple[int, ...]) -> Number:
-    """Return a number, or a jet, in full shape."""
+    """Number, or a jet, in full shape."""
     if not isinstance(value, Jet):
         return np.broadcast_to(np.asarray(value, dtype=np.float64), shape)
     width = value.g.shape[-1]
@@ -349,5 +349,5 @@ def _stacked(numbers: Sequence[Number]) -> Number:
 
 
 def _total(values: Number) -> Number:
-    """Return the sum over the nodes, (designs,)."""
+    """Sum over the nodes, (designs,)."""
     return Jet(values.v.sum(axis=0), values.g.sum(axis=0)) if isinstance(values, Jet) else values.sum(axis=0)

@@ -64,7 +64,7 @@ def _grid(counts: tuple[int, ...]) -> tuple[Pieces, Floats]:
 
 @functools.cache
 def _ends(counts: tuple[int, ...]) -> tuple[Pieces, Pieces]:
-    """Return the first and the last of the nodes of each piece."""
+    """First and the last of the nodes of each piece."""
     last = np.cumsum(counts) - 1
     return last - np.array(counts) + 1, last
 
@@ -117,7 +117,7 @@ class Sampler:
         return tuple(name for integral in self.model.integrals for name in (integral.name, integral.root))
 
     def read(self, system: systems.Maths) -> Reading:
-        """Return the design in another number system."""
+        """Design in another number system."""
         values = {name: system.number(value) for name, value in {**self.values, **self.hints}.items()}
         return Reading(self.model, system, self.model.given(system, values), self.cycle, self.stills)
 
@@ -127,7 +127,7 @@ class Sampler:
         return _SampledRows(self)
 
     def single(self, name: str) -> float:
-        """Return a figure, row or number of the design, SI."""
+        """Figure, row or number of the design, SI."""
         return float(self.rows.single(name))
 
     @lazy
@@ -136,7 +136,7 @@ class Sampler:
         return Quantities(self.model, (systems.FLOAT, systems.numpy()), self.given)
 
     def at(self, name: str, pieces: Pieces, u: Floats) -> Floats:
-        """Return a quantity at nodes (pieces, u), SI."""
+        """Quantity at nodes (pieces, u), SI."""
         return self.together((name,), pieces, u)[name]
 
     def together(self, names: Sequence[str], pieces: Pieces, u: Floats) -> dict[str, Floats]:
@@ -187,7 +187,7 @@ class Sampler:
         return tuple((np.maximum(np.ceil(samples * widths / TURN).astype(int), least) + 1).tolist())
 
     def extremes(self, name: str, where: Where | None = None) -> list[Extreme]:
-        """Return the local extremes of |quantity| (of a signed one, its maxima), largest first, right to rounding.
+        """Local extremes of |quantity| (of a signed one, its maxima), largest first, right to rounding.
 
         where: the pieces they are asked for; every piece without it.
         """
@@ -255,7 +255,7 @@ class Sampler:
         return np.flatnonzero((size > left) & (size >= right))
 
     def _sampled(self, name: str) -> Floats:
-        """Return a quantity on the sampler's own grid; one that fits in the cache keeps its poses for the next."""
+        """Quantity on the sampler's own grid; one that fits in the cache keeps its poses for the next."""
         pieces, u = self.grid()
         if len(u) > CHUNK:
             return self.at(name, pieces, u)
@@ -277,7 +277,7 @@ class Sampler:
         return self.model.singular(squares)
 
     def _spikes(self, name: str) -> list[Extreme]:
-        """Return the extremes beside singular positions that even samples may miss."""
+        """Extremes beside singular positions that even samples may miss."""
 
         def heights(angles: Floats) -> Floats:
             return self.heights(name, self.at_angles(name, angles))
@@ -289,7 +289,7 @@ class Sampler:
         return found
 
     def at_angles(self, name: str, angles: Floats) -> Floats:
-        """Return a quantity at crank angles, rad, as they are: a spike may be narrower than u resolves."""
+        """Quantity at crank angles, rad, as they are: a spike may be narrower than u resolves."""
         self.session.positions += len(angles)
         with np.errstate(invalid="ignore", divide="ignore"):
             (values,) = self.quantities((name,), self.node_at(angles))
@@ -347,15 +347,15 @@ class Sampler:
         return found
 
     def angle(self, extreme: Extreme) -> float:
-        """Return the crank angle of an extreme, rad."""
+        """Crank angle of an extreme, rad."""
         return float(self.cycle.angles(np.array([extreme.piece]), np.array([extreme.u]))[0])
 
     def peak(self, name: str, where: Where | None = None) -> float:
-        """Return the largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI; else 0."""
+        """Largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI; else 0."""
         return max((extreme.height for extreme in self.extremes(name, where)), default=0.0)
 
     def pushed(self, name: str) -> float:
-        """Return the largest |quantity| where Q is not negative, SI; of what only pushes that is its peak."""
+        """Largest |quantity| where Q is not negative, SI; of what only pushes that is its peak."""
         found = [each for each in self.extremes(name) if each.height > 0.0]
         if not found:
             return 0.0
@@ -364,7 +364,7 @@ class Sampler:
         return max((each.height for each, own in zip(found, force, strict=True) if own >= 0.0), default=0.0)
 
     def mean(self, integral: Integral) -> float:
-        """Return the mean of an integral's quantity over its pieces, or at its own angles, SI."""
+        """Mean of an integral's quantity over its pieces, or at its own angles, SI."""
         if integral.angles:
             return float(np.mean(self.quantities((integral.quantity,), fixed_nodes(self.cycle, integral))[0]))
         pieces, u, weights = quadrature(self.cycle, integral)
@@ -392,7 +392,7 @@ certificate look at, and those of all designs that are certified together."""
 
 
 def sampled(model: JobModel, values: Mapping[str, float], samples: int = SAMPLES) -> Sampler:
-    """Return the sampler of a design: the one there is already where the same design was asked for just now.
+    """Sampler of a design: the one there is already where the same design was asked for just now.
 
     The same to the last bit, and to the sign of a zero. Raises what a design without a real cycle raises.
     """
@@ -417,11 +417,11 @@ class _SampledRows(Rows):
         return static[name] if name in static else super()._value(name)
 
     def highest(self, name: str, where: Where | None = None) -> float:
-        """Return the largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI."""
+        """Largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI."""
         return self.sampler.peak(name, where)
 
     def mean(self, integral: Integral) -> float:
-        """Return a mean over the cycle, SI."""
+        """Mean over the cycle, SI."""
         return self.sampler.mean(integral)
 
 
@@ -430,7 +430,7 @@ STRETCH_SAMPLES = 3600
 
 
 def near_zero(sampler: Sampler, name: str, most: float, least: float) -> list[tuple[float, float]]:
-    """Return the stretches (begin, end), rad, over which |quantity| is at most `most`, SI, where it is known.
+    """Stretches (begin, end), rad, over which |quantity| is at most `most`, SI, where it is known.
 
     least: the narrowest that counts, rad; one across the turn's end ends beyond it.
     """

@@ -55,7 +55,7 @@ class Linear(NamedTuple):
     friction: float
 
     def at(self, x: Number, v: Number, a: Number, direction: Number) -> Number:
-        """Return the term, SI."""
+        """Term, SI."""
         return self.mass * a + self.damping * v + self.stiffness * x + self.steady + self.friction * direction
 
 
@@ -72,7 +72,7 @@ class ProbeSizes(NamedTuple):
 
 
 def sizes(sampler: Sampler) -> ProbeSizes:
-    """Return the sizes of the output's motion."""
+    """Sizes of the output's motion."""
     pieces, u = sampler.grid(SAMPLES)
     pose = sampler.model.instant(systems.numpy(), sampler.given, sampler.node(pieces, u)).pose
     rates = (float(np.abs(values).max()) for values in (pose.velocity, pose.acceleration))
@@ -80,7 +80,7 @@ def sizes(sampler: Sampler) -> ProbeSizes:
 
 
 def forms(sampler: Sampler, event: Event) -> Forms:
-    """Return the linear forms of the output's loads. Raises UnfollowedError."""
+    """Linear forms of the output's loads. Raises UnfollowedError."""
     ends = [-math.inf, *_corners(sampler, event), math.inf]
     found = {}
     for load in (load for load in sampler.model.loads if load.acts == "output"):
@@ -90,7 +90,7 @@ def forms(sampler: Sampler, event: Event) -> Forms:
 
 
 def body(sampler: Sampler, event: Event, known: Forms) -> Body:
-    """Return the output on its own; known: the linear forms of its loads. Raises UnfollowedError."""
+    """Output on its own; known: the linear forms of its loads. Raises UnfollowedError."""
     zones = [tuple(each) for each in zip(*known.values(), strict=True)]
     mass, damping, _, _, friction = (math.fsum(values) for values in zip(*zones[0], strict=True))
     held = tuple(Zone(math.fsum(f.stiffness for f in each), math.fsum(f.steady for f in each)) for each in zones)
@@ -104,14 +104,14 @@ def body(sampler: Sampler, event: Event, known: Forms) -> Body:
 
 
 def _corners(sampler: Sampler, event: Event) -> list[float]:
-    """Return the positions of the output where loads change their formula, ascending."""
+    """Positions of the output where loads change their formula, ascending."""
     loads = [load for load in sampler.model.loads if isinstance(load, Load) and _cornered(sampler, load)]
     called = {name for load in loads for name in load.reads}
     return sorted({place for name, place in event.places(sampler.given.values).items() if name in called})
 
 
 def _cornered(sampler: Sampler, load: Load[Any]) -> tuple[float, ...]:
-    """Return the crank angles, rad, where a load changes its formula; none for most."""
+    """Crank angles, rad, where a load changes its formula; none for most."""
     given = sampler.given
     return tuple(load.corners(given.inputs(FLOAT, load))) if load.corners else ()
 
@@ -149,7 +149,7 @@ def _switches(sampler: Sampler, load: Acting) -> Iterator[tuple[float, float]]:
 
 
 def _form(sampler: Sampler, event: Event, load: Acting, switch: float) -> Linear:
-    """Return a load's linear form, tried at a few states. Raises UnfollowedError for one that has none."""
+    """Load's linear form, tried at a few states. Raises UnfollowedError for one that has none."""
     assert isinstance(load, Load)
     extent, speed, push = sizes(sampler)
 
@@ -194,7 +194,7 @@ class Parted:
         return dict(self.event.read(self.course))
 
     def curves(self, columns: Columns, steps: int, also: Sequence[float]) -> dict[str, Floats]:
-        """Return the curves of one period, SI; of the last turn that was simulated where there is none.
+        """Curves of one period, SI; of the last turn that was simulated where there is none.
 
         Of the output in flight they are its own; what it rests on, and the gap between them, are columns too.
         """
@@ -206,7 +206,7 @@ class Parted:
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def _stretch(self, columns: Columns, whole: Rows, stretch: Stretch) -> dict[str, Floats]:
-        """Return the curves from one end of a stretch to the other; whole: the rows of a turn."""
+        """Curves from one end of a stretch to the other; whole: the rows of a turn."""
         output = next(iter(columns.motion))
         name, unit = split(output)
         found = columns_at(self.sampler, columns, self._rows(whole, stretch))
@@ -218,7 +218,7 @@ class Parted:
         return first | {column: values for column, values in flown.items() if column not in first}
 
     def _rows(self, whole: Rows, stretch: Stretch) -> Rows:
-        """Return the rows of a turn that lie in a stretch, its ends from the inside among them."""
+        """Rows of a turn that lie in a stretch, its ends from the inside among them."""
         cycle = self.sampler.cycle
         inside = (whole[2] > stretch.begin + SAME_ANGLE) & (whole[2] < stretch.end - SAME_ANGLE)
         first, u = cycle.place(stretch.begin)
@@ -232,7 +232,7 @@ class Parted:
         )
 
     def _flown(self, found: dict[str, Floats], columns: Columns, stretch: Stretch) -> dict[str, Floats]:
-        """Return the columns that are the output's own in flight; nothing acts between it and the mechanism."""
+        """Columns that are the output's own in flight; nothing acts between it and the mechanism."""
         piece, omega, body = stretch.piece, self.course.cam.omega, self.course.body
         assert piece
         motions = [self.course.free(stretch, float(angle)) for angle in found[ANGLE]]
@@ -259,7 +259,7 @@ class Parted:
 
 
 def followed(scene: Scene, sampler: Sampler) -> Parted | None:
-    """Return a design, followed, where an effect of its scene may part its output from the mechanism.
+    """Design, followed, where an effect of its scene may part its output from the mechanism.
 
     Raises BadInput where it cannot be followed.
     """
@@ -291,7 +291,7 @@ def _followed(sampler: Sampler) -> Parted | None:
 
 
 def _cam(sampler: Sampler, event: Event) -> Cam:
-    """Return the mechanism that pushes the output. Raises UnfollowedError where they do not touch at crank angle 0."""
+    """Mechanism that pushes the output. Raises UnfollowedError where they do not touch at crank angle 0."""
     cycle, kinematics, given = sampler.cycle, sampler.model.kinematics, sampler.given
     starts = [float(start) for start in cycle.starts]
     switches = [cycle.switch(piece) for piece in range(cycle.pieces)]
@@ -306,7 +306,7 @@ def _cam(sampler: Sampler, event: Event) -> Cam:
 
 
 def _pulls(sampler: Sampler, event: Event) -> tuple[tuple[float, float], ...]:
-    """Return the stretches of the turn, rad, where the force of contact would be below 0, by more than a solve leaves.
+    """Stretches of the turn, rad, where the force of contact would be below 0, by more than a solve leaves.
 
     Raises UnfollowedError where that is so at crank angle 0.
     """
@@ -323,7 +323,7 @@ def _pulls(sampler: Sampler, event: Event) -> tuple[tuple[float, float], ...]:
         raise UnfollowedError(event.name, problem, remedy, start)
 
     def crossed(k: int) -> float:
-        """Return the crank angle, rad, where the force crosses 0 between a node and the next."""
+        """Crank angle, rad, where the force crosses 0 between a node and the next."""
         piece, sign = pieces[k : k + 1], -1.0 if force[k] >= 0.0 else 1.0
         if pieces[k] != pieces[k + 1]:
             return float(angles[k + 1])

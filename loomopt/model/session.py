@@ -70,7 +70,7 @@ _CURRENT = ContextVar[Session | None]("session", default=None)
 
 
 def current() -> Session:
-    """Return the session in which this thread computes."""
+    """Session in which this thread computes."""
     return _CURRENT.get() or OF_PROCESS
 
 

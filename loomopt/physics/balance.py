@@ -81,7 +81,7 @@ def terms(
 def replied(
     maths: Maths, state: State, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values
 ) -> tuple[Number, Number]:
-    """Return z and z˙ in answer to the loads with corners that a state carries."""
+    """z and z˙ in answer to the loads with corners that a state carries."""
     found = []
     for load in loads:
         if isinstance(load, Load) and load.name in state.carries and load.response:
@@ -91,7 +91,7 @@ def replied(
 
 
 def total(numbers: Sequence[Number]) -> Number:
-    """Return the sum without a leading zero term; 0 for none."""
+    """Sum without a leading zero term; 0 for none."""
     if not numbers:
         return 0
     result = numbers[0]
@@ -101,18 +101,18 @@ def total(numbers: Sequence[Number]) -> Number:
 
 
 def carried(loads: Sequence[Acting]) -> frozenset[str]:
-    """Return the names of the loads that move with a coordinate of their own: its force stands for them."""
+    """Names of the loads that move with a coordinate of their own: its force stands for them."""
     return frozenset(name for load in loads if isinstance(load, State) for name in load.carries)
 
 
 def output_force(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values) -> Number:
-    """Return Q, N or N·m: what the mechanism must supply at its output."""
+    """Q, N or N·m: what the mechanism must supply at its output."""
     gone = carried(loads) | {load.name for load in loads if load.acts != "output"}
     return total([term for _, term in terms(maths, loads, pose, given, switch, gone)])
 
 
 def crank_torque(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values) -> Number:
-    """Return the torque on the crank, N·m: Q q' and the drive's own terms."""
+    """Torque on the crank, N·m: Q q' and the drive's own terms."""
     found = list(terms(maths, loads, pose, given, switch, carried(loads)))
     output = [term for load, term in found if load.acts == "output"]
     drive = [term for load, term in found if load.acts == "drive"]
@@ -206,7 +206,7 @@ def masses(
 def pushes(
     maths: Maths, terms: Sequence[tuple[Acting, Number]], given: Given, motions: tuple[Motion, Motion]
 ) -> "list[Vector]":
-    """Return the forces that loads tell of their terms, N; motions: the output's, and of what is carried."""
+    """Forces that loads tell of their terms, N; motions: the output's, and of what is carried."""
     found = []
     gone = carried([load for load, _ in terms])
     for load, term in terms:

@@ -51,7 +51,7 @@ class Cycle:
         return len(self.starts) - 1
 
     def switch(self, pieces: Pieces | int) -> dict[str, Number]:
-        """Return the switches on a piece, or on each of several, by name."""
+        """Switches on a piece, or on each of several, by name."""
         return {name: column[pieces] for name, column in zip(self.names, self._columns, strict=True)}
 
     @lazy
@@ -66,7 +66,7 @@ class Cycle:
         return np.isin(self.switches[:, self.names.index(where[0])], where[1])
 
     def stretch(self, where: Where | None) -> tuple[float, float]:
-        """Return the crank angles, rad, where a stretch of the cycle that is meant begins and ends."""
+        """Crank angles, rad, where a stretch of the cycle that is meant begins and ends."""
         on = self.on(where)
         begins, ends = on & ~np.roll(on, 1), on & ~np.roll(on, -1)
         if not begins.any():
@@ -83,7 +83,7 @@ class Cycle:
         return TURN * turns, weights
 
     def shares(self, piece: int, u: float, corners: int) -> tuple[float, Floats]:
-        """Return the turns and the share of each declared corner of which a node's angle is made."""
+        """Turns and the share of each declared corner of which a node's angle is made."""
         weights = np.zeros(corners)
         if not self.order:
             return u, weights
@@ -99,24 +99,24 @@ class Cycle:
         return [*found, found[0] + 2 * pi]
 
     def located(self, angles: Floats) -> tuple[Pieces, Floats]:
-        """Return the nodes (pieces, u) at crank angles in rad."""
+        """Nodes (pieces, u) at crank angles in rad."""
         turned = self.starts[0] + np.mod(angles - self.starts[0], TURN)
         pieces = np.clip(np.searchsorted(self.starts, turned, side="right") - 1, 0, self.pieces - 1)
         return pieces, (turned - self.starts[pieces]) / (self.starts[pieces + 1] - self.starts[pieces])
 
     def place(self, angle: float) -> tuple[int, float]:
-        """Return the node (piece, u) at one crank angle in rad."""
+        """Node (piece, u) at one crank angle in rad."""
         pieces, u = self.located(np.array([angle]))
         return int(pieces[0]), float(u[0])
 
     def piece_before(self, angle: float) -> int:
-        """Return the piece that ends at, or holds, a crank angle in rad."""
+        """Piece that ends at, or holds, a crank angle in rad."""
         ahead = (self.starts[1:] - angle + SAME_ANGLE) % TURN
         return int(np.argmin(ahead))
 
 
 def split(corners: Sequence[float], names: Sequence[str], read: Callable[[float], Sequence[float]]) -> Cycle:
-    """Return the cycle's pieces from the corners declared, rad; read(angle): the switches at an angle inside one."""
+    """Cycle's pieces from the corners declared, rad; read(angle): the switches at an angle inside one."""
     if not corners:
         starts = np.array([0.0, TURN])
         return Cycle(starts, tuple(names), _switches(starts, read), ())
@@ -137,7 +137,7 @@ def _switches(starts: Floats, read: Callable[[float], Sequence[float]]) -> Float
 
 
 def node_angle(offset: Number, coefficients: Sequence[Number], corners: Sequence[Number]) -> Number:
-    """Return a node's crank angle, rad, in any number system."""
+    """Node's crank angle, rad, in any number system."""
     angle = offset
     for coefficient, corner in zip(coefficients, corners, strict=True):
         angle = angle + coefficient * corner

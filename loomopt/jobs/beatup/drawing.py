@@ -69,7 +69,7 @@ class CrankRockerDrawing:
 
 
 def of(design: Mapping[str, float]) -> CrankRockerDrawing:
-    """Return the crank-rocker l1, l2, l3, l4 (m) with its masses where it has any (kg, m; offset in rad).
+    """Crank-rocker l1, l2, l3, l4 (m) with its masses where it has any (kg, m; offset in rad).
 
     Raises BadInput when it is none.
     """
@@ -89,7 +89,7 @@ def linkage(
     units: Units = METRIC,
     forces: Mapping[ForceArrow, str] | None = None,
 ) -> Drawing:
-    """Return the crank-rocker of a design in both dead centres, at full scale. Raises BadInput.
+    """Crank-rocker of a design in both dead centres, at full scale. Raises BadInput.
 
     forces: in its joints at some crank angles, each with its size as it is told.
     """
@@ -101,12 +101,12 @@ def linkage(
 
 
 def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:
-    """Return the joints that `linkage` draws as CSV; digits round-trip. Raises BadInput."""
+    """Joints that `linkage` draws as CSV; digits round-trip. Raises BadInput."""
     return of(design).skeleton.csv(units)
 
 
 def motion(design: Mapping[str, float], angles: Floats) -> MechanismMotion:
-    """Return the crank-rocker at crank angles, rad, its centres of mass with it. Raises BadInput."""
+    """Crank-rocker at crank angles, rad, its centres of mass with it. Raises BadInput."""
     found = of(design)
     pose, skeleton = crank_rocker.CrankRockerPose(systems.numpy(), found.lengths, angles), found.skeleton
     rod, at = pose.dyad.link1, {"B": np.column_stack(pose.crank)}
@@ -119,7 +119,7 @@ def motion(design: Mapping[str, float], angles: Floats) -> MechanismMotion:
 
 
 def _measures(found: CrankRockerDrawing) -> tuple[Measure, ...]:
-    """Return the lengths of crank, rod, rocker and frame, at front dead centre."""
+    """Lengths of crank, rod, rocker and frame, at front dead centre."""
     at = found.skeleton.at(FRONT)
     ends = (("A", "B"), ("B", "C"), ("D", "C"), ("A", "D"))
     return tuple(Measure(name, at[one], at[other]) for name, (one, other) in zip(LENGTHS, ends, strict=True))
@@ -171,7 +171,7 @@ def _mass_text(name: str, own: Mass, units: Units) -> str:
 
 
 def _legend(found: CrankRockerDrawing, units: Units) -> tuple[tuple[str, str], ...]:
-    """Return the lines below a drawing, each with its layer."""
+    """Lines below a drawing, each with its layer."""
     centres = found.centres
     theta, rear = math.degrees(centres.theta), 180 + math.degrees(centres.beta_r)
     said = {REED: "G  centre of mass of the reed system", COUNTERWEIGHT: "E  counterweight, opposite the reed"}

@@ -48,7 +48,7 @@ class Beatup(Job):
             )
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
-        """Return the crank-rocker with the effects the scene calls for."""
+        """Crank-rocker with the effects the scene calls for."""
         return model(scene, self.numbers(scene), design)
 
     def demand(self, scene: Scene, target: str) -> None:
@@ -88,7 +88,7 @@ class Beatup(Job):
         return {name: known[name] for name in (*variables, *others)}
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return the design, SI, of NLP variables: m4e is s/r4e² where the NLP was solved in s."""
+        """Design, SI, of NLP variables: m4e is s/r4e² where the NLP was solved in s."""
         values = {**program.parameters, **x}
         if "s" in x:
             masses = _masses(program)
@@ -101,7 +101,7 @@ class Beatup(Job):
         return {name: values[name] for name in (*VARIABLES, *extra)}
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
-        """Return the NLP's variables, SI, of a design; a counterweight without mass stands at its largest radius.
+        """NLP's variables, SI, of a design; a counterweight without mass stands at its largest radius.
 
         Where m4e = 0 the radius says nothing, unless it is asked for, and r4e = 0 would hide how s = m4e r4e² can grow.
         """
@@ -113,7 +113,7 @@ class Beatup(Job):
         return {v.name: found[v.name] for v in program.variables}
 
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return NLP variables with a negligible counterweight taken for none, so that mass or radius can settle."""
+        """NLP variables with a negligible counterweight taken for none, so that mass or radius can settle."""
         known = {v.name: v for v in program.variables}
         radius, masses = known.get("r4e"), _masses(program)
         if "s" not in known or radius is None or x["s"] > NO_MASS * known["s"].range[1]:
@@ -143,7 +143,7 @@ class Beatup(Job):
         return found
 
     def peaks(self, model: JobModel) -> dict[str, str]:
-        """Return the figures that are extremes over the cycle."""
+        """Figures that are extremes over the cycle."""
         return {name: name for name in (*model.quantities, *model.least)} | {"mu_min": "obliquity"}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
@@ -186,7 +186,7 @@ class Beatup(Job):
         return served(bands, members[0][0])
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
-        """Return ψ, ψ', ψ'', the transmission angle, folded to at most 90°, the terms, M3 and Md."""
+        """ψ, ψ', ψ'', the transmission angle, folded to at most 90°, the terms, M3 and Md."""
         values = sampler.given.values
         return Columns(
             {
@@ -208,7 +208,7 @@ class Beatup(Job):
 
 
 def _masses(program: Program) -> list[float]:
-    """Return the limits of the counterweight's mass, kg; without any there is none."""
+    """Limits of the counterweight's mass, kg; without any there is none."""
     return [limit.value for limit in program.limits if limit.name == "m4e"] or [0.0]
 
 

@@ -126,7 +126,7 @@ class CrankRocker:
         return FourBar(lengths, crank_rocker.dead_centres(maths, lengths))
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
-        """Return s = m4e r4e², kg·m², and both dead centres, rad."""
+        """s = m4e r4e², kg·m², and both dead centres, rad."""
         values, centres = given.values, linked(given).centres
         found = {"beta": centres.beta, "beta_r": centres.beta_r}
         return found if "s" in values else found | {"s": values["m4e"] * values["r4e"] ** 2}
@@ -136,12 +136,12 @@ class CrankRocker:
         return {}
 
     def pose(self, maths: Maths, given: Given, node: Node) -> ReedMotion:
-        """Return the pose at crank angles φ, rad."""
+        """Pose at crank angles φ, rad."""
         pose = crank_rocker.CrankRockerPose(maths, linked(given).lengths, node.phi)
         return ReedMotion(node.phi, given.values.get("speed"), pose, given.values.get("omega_dot"))
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FrontPose:
-        """Return the pose at front dead centre."""
+        """Pose at front dead centre."""
         return FrontPose(
             maths, linked(given), given.values["beta"], given.values.get("speed"), given.values.get("omega_dot")
         )
@@ -152,14 +152,14 @@ class CrankRocker:
 
 
 def eccentricity(at: Instant) -> Number:
-    """Return r4 of reed and counterweight together, m [Yuan24, section on eq 10]."""
+    """r4 of reed and counterweight together, m [Yuan24, section on eq 10]."""
     values = at.values
     moment = values["m4"] * values["r4"] - values["m4e"] * values["r4e"]
     return moment / (values["m4"] + values["m4e"])
 
 
 def inertia(at: Instant) -> Number:
-    """Return J4 of reed and counterweight, kg·m² [Yuan24, eq 10]: all that moves with the reed."""
+    """J4 of reed and counterweight, kg·m² [Yuan24, eq 10]: all that moves with the reed."""
     return balance.total(
         [
             load.moved(at.given.inputs(at.maths, load))
@@ -170,7 +170,7 @@ def inertia(at: Instant) -> Number:
 
 
 def change(names: Collection[str], at: Instant) -> Number:
-    """Return Σ weight ((x − x_today)/bound width)², the retrofit's norm."""
+    """Σ weight ((x − x_today)/bound width)², the retrofit's norm."""
     v = at.values
     return balance.total([v[f"weight.{x}"] * ((v[x] - v[today(x)]) / v[f"width.{x}"]) ** 2 for x in names])
 
@@ -199,7 +199,7 @@ def model(
     pulse: Where,
     changing: tuple[str, ...] = (),
 ) -> JobModel:
-    """Return the crank-rocker with effects; changing: the design variables of the retrofit's norm, if that is asked.
+    """Crank-rocker with effects; changing: the design variables of the retrofit's norm, if that is asked.
 
     pulse: the pieces of the cycle in which the cloth resists, which the figure pulse_rms is of.
     """

@@ -33,7 +33,7 @@ AMPLE, LONG = 10.0, 3.0
 
 
 def counterweight_holding(reed: float, front: float, resistance: float) -> float:
-    """Return the inertia, kg·m², that holds the resistance at front dead centre, turning as the reed does today.
+    """Inertia, kg·m², that holds the resistance at front dead centre, turning as the reed does today.
 
     reed: today's inertia, kg·m²; front: today's reed torque there with the resistance, N·m; resistance: N·m. From
     M3 = M0 − J ψ'' ω² [Yuan24, eq 2], in proportion.
@@ -42,7 +42,7 @@ def counterweight_holding(reed: float, front: float, resistance: float) -> float
 
 
 def counterweight_room(known: Mapping[str, float], bounds: Mapping[str, Ends], inertia: float) -> dict[str, Ends]:
-    """Return the bounds of mass, kg, and radius, m, as far as they are of use: generous ones say nothing of a machine.
+    """Bounds of mass, kg, and radius, m, as far as they are of use: generous ones say nothing of a machine.
 
     known: today's m4e, r4e and l4; inertia: of the reed or of what holds the resistance, kg·m²; 0 where there is none
     to compare with, and the bounds stay as they are.
@@ -66,13 +66,13 @@ MASKED = 1e-3
 
 
 def resisted(scene: Scene) -> Where:
-    """Return the pieces of the cycle in which the cloth resists; of a curve those where it is not 0 all over."""
+    """Pieces of the cycle in which the cloth resists; of a curve those where it is not 0 all over."""
     curve = next((found for (name, _), found in curves(scene).items() if name == RESISTED[0]), None)
     return RESISTED if curve is None else (RESISTED[0], curve.acting)
 
 
 def model(scene: Scene, known: Numbers, design: Numbers | None = None, changes: bool = False) -> JobModel:
-    """Return the mechanism with the effects the scene calls for, as its states need it. Raises BadInput.
+    """Mechanism with the effects the scene calls for, as its states need it. Raises BadInput.
 
     known: the scene's numbers; design: what is not today's; changes: whether the change from today is read.
     """
@@ -135,7 +135,7 @@ class BeatupTask(Task):
         return own if self.direct else (*own, Variable("s", -math.inf, math.inf, self.inertia, (0.0, self.most)))
 
     def scale(self, name: str, ends: Ends) -> float:
-        """Return the size of a variable: its kind's, or its own largest value that is of use."""
+        """Size of a variable: its kind's, or its own largest value that is of use."""
         if name in LENGTHS:
             return self.length
         return max(abs(self.known[name]), *map(abs, self.room(name, ends))) or self.length
@@ -161,7 +161,7 @@ class BeatupTask(Task):
     # Limits.
 
     def bounds(self) -> list[Limit]:
-        """Return the bounds of variables; the mass's as limits on s against r4e² where that is a variable."""
+        """Bounds of variables; the mass's as limits on s against r4e² where that is a variable."""
         found = [each for v in self.variables if v.called in self.scene.bounds for each in bound_limits(v, False)]
         if self.direct:
             return found
@@ -188,7 +188,7 @@ class BeatupTask(Task):
     # Levels, starts and moves.
 
     def objectives(self) -> tuple[Objective, ...]:
-        """Return the target's levels in order."""
+        """Target's levels in order."""
         peak = Peak(TORQUE, TORQUE, self.peak)
         own = {
             "balance": (Magnitude("M3_fdc", "M3_fdc", self.torque), peak),
@@ -214,7 +214,7 @@ class BeatupTask(Task):
         return distinct([using(USED), *([first] if retrofit else [using(MUCH)] if self.direct else [])])
 
     def moves(self) -> list[Move]:
-        """Return the directions that may leave every figure unchanged: the counterweight's, then a common scale."""
+        """Directions that may leave every figure unchanged: the counterweight's, then a common scale."""
         names = {variable.name for variable in self.variables}
         used, above = ("s", NO_MASS * self.most) if "s" in names else ("m4e", 0.0)
         wishes = {
@@ -229,7 +229,7 @@ class BeatupTask(Task):
         return [*own, self.scale_move("scale", LENGTHS), *self.axis_moves()]
 
     def added(self) -> Added | None:
-        """Return the counterweight: by its mass, or by s, which is least where that is at the largest radius."""
+        """Counterweight: by its mass, or by s, which is least where that is at the largest radius."""
         table = self.scene.targets[self.target] if self.target else None
         if not isinstance(table, BeatupTarget) or self.limited["m4e"][1] == 0.0:
             return None
@@ -304,7 +304,7 @@ class BeatupTask(Task):
         return self.torque * max(self.torque, self.resistance)
 
     def figure_size(self, name: str) -> float:
-        """Return the size of a figure."""
+        """Size of a figure."""
         if name == TORQUE:
             return self.peak
         if self.sampler.model.has_quantity(name):
@@ -314,7 +314,7 @@ class BeatupTask(Task):
         return fixed.get(kind) or size_read(self.sampler, name, self.scene.schema.figures)
 
     def size(self, axis: str) -> float:
-        """Return the size of what of an axis is sought the least of."""
+        """Size of what of an axis is sought the least of."""
         if axis not in self.scene.schema.figures:
             return next(v.scale for v in self.variables if axis in (v.name, v.called))
         return {"change": 1.0, "pulse_rms": self.mean_square}.get(axis) or self.figure_size(axis)

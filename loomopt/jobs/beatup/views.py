@@ -24,7 +24,7 @@ from loomopt.scenes.scene import Scene
 
 
 def equations(model: JobModel) -> tuple[Equation, ...]:
-    """Return the equations of a beat-up scene: geometry, dead centres, each term, balance, crank torque.
+    """Equations of a beat-up scene: geometry, dead centres, each term, balance, crank torque.
 
     An effect that is not in the scene leaves no symbol and no term.
     """
@@ -80,7 +80,7 @@ class _Symbols(Symbols):
 
 
 def _pose() -> balance.Pose:
-    """Return a pose of symbols; gamma is the angle of the rod B→C."""
+    """Pose of symbols; gamma is the angle of the rod B→C."""
     phi, gamma, psi, sp = symbol("phi"), symbol("gamma"), symbol("psi"), sympy()
     lengths = crank_rocker.Lengths(*(symbol(name) for name in ("l1", "l2", "l3", "l4")))
     rod = Vector(lengths.l2 * sp.cos(gamma), lengths.l2 * sp.sin(gamma))
@@ -108,7 +108,7 @@ class BeatupViews(JobViews):
     """The crank-rocker in both dead centres, its equations, and where the cloth resists."""
 
     def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
-        """Return the crank-rocker in both dead centres at full scale. Raises BadInput."""
+        """Crank-rocker in both dead centres at full scale. Raises BadInput."""
         from loomopt.jobs.beatup import drawing
         from loomopt.picture.shapes import drawn_units
 
@@ -128,13 +128,13 @@ class BeatupViews(JobViews):
         return drawing.joints_csv(_numbers(scene, design), drawn_units(scene))
 
     def motion(self, scene: Scene, design: Mapping[str, float], angles: "Floats") -> "MechanismMotion":
-        """Return the crank-rocker at crank angles, rad. Raises BadInput."""
+        """Crank-rocker at crank angles, rad. Raises BadInput."""
         from loomopt.jobs.beatup import drawing
 
         return drawing.motion(_numbers(scene, design), angles)
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
-        """Return the equations the scene really uses."""
+        """Equations the scene really uses."""
 
         return equations(registry.of(scene).model(scene))
 

@@ -103,7 +103,7 @@ def _path(joint: Joint, phi: Floats) -> Line:
 
 
 def motion(sampler: Sampler, angles: Floats) -> MechanismMotion:
-    """Return the linkage at crank angles, (n,) rad: the lines and circles of its drawing."""
+    """Linkage at crank angles, (n,) rad: the lines and circles of its drawing."""
     found = LinkageDrawing(sampler)
     fixed, at = found.linkage.chain.pivots, found.linkage.at(systems.numpy(), sampler.given, angles).joints
     moving = {
@@ -116,7 +116,7 @@ def motion(sampler: Sampler, angles: Floats) -> MechanismMotion:
 
 
 def forces(sampler: Sampler) -> list[ForceArrow]:
-    """Return the forces that a design tells in its joints: just before its first event, and at their peaks."""
+    """Forces that a design tells in its joints: just before its first event, and at their peaks."""
     linked = linkage_of(sampler.model).chain
     pins = {part.name: part.word("pin") for part in linked.parts}
     places = {name: joint if joint != own else pins[own] for (joint, own), name in chain_forces.names(linked).items()}
@@ -124,14 +124,14 @@ def forces(sampler: Sampler) -> list[ForceArrow]:
 
 
 def event_of(sampler: Sampler) -> tuple[str, ...]:
-    """Return the event of a linkage at which forces are drawn: its first one, if any."""
+    """Event of a linkage at which forces are drawn: its first one, if any."""
     return tuple(itertools.islice(linkage_of(sampler.model).events(FLOAT, sampler.given), 1))
 
 
 def linkage(
     sampler: Sampler, title: str, units: Units = METRIC, forces: Mapping[ForceArrow, str] | None = None
 ) -> Drawing:
-    """Return a design at its events, at full scale; forces: in its joints, each with its size as it is told."""
+    """Design at its events, at full scale; forces: in its joints, each with its size as it is told."""
     found = LinkageDrawing(sampler)
     skeleton, height = found.skeleton, found.height
     labels, legend, event = _labels(found, skeleton, units), _legend(found, skeleton, units), "".join(event_of(sampler))
@@ -140,7 +140,7 @@ def linkage(
 
 
 def joints_csv(sampler: Sampler, units: Units = METRIC) -> str:
-    """Return the joints that `linkage` draws as CSV; digits round-trip."""
+    """Joints that `linkage` draws as CSV; digits round-trip."""
     return LinkageDrawing(sampler).skeleton.csv(units)
 
 
@@ -154,14 +154,9 @@ def _labels(found: LinkageDrawing, skeleton: Skeleton, units: Units) -> list[Lab
 
 
 def _legend(found: LinkageDrawing, skeleton: Skeleton, units: Units) -> tuple[tuple[str, str], ...]:
-    """Return the lines below the drawing, each with its layer."""
-    moving = " ".join(next(iter(skeleton.joints.values())))
-    rows = [
-        (event, f"{_primed(moving, skeleton.primes[event])}  {event}, crank at {math.degrees(angle) % 360:.2f}°")
-        for event, angle in found.events.items()
-    ]
+    """Lines below the drawing, each with its layer."""
+    rows = []
+    for event, angle in found.events.items():
+        names = " ".join(name + skeleton.primes[event] for name in next(iter(skeleton.joints.values())))
+        rows.append((event, f"{names}  {event}, crank at {math.degrees(angle) % 360:.2f}°"))
     return (*rows, ("notes", units.said))
-
-
-def _primed(names: str, prime: str) -> str:
-    return " ".join(f"{name}{prime}" for name in names.split())

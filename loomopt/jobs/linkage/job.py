@@ -44,7 +44,7 @@ class LinkageJob(Job):
         scenes.check(scene)
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
-        """Return the linkage with the effects the scene calls for."""
+        """Linkage with the effects the scene calls for."""
         return model(scene)
 
     def figures_of(
@@ -57,13 +57,13 @@ class LinkageJob(Job):
         return found | {name: self.read(name, sampled.peak(quantity)) for name, quantity in peaks.items()}
 
     def read(self, name: str, peak: Number) -> Number:
-        """Return a figure of a quantity's largest value, SI."""
+        """Figure of a quantity's largest value, SI."""
         if name.startswith("mu."):
             return math.pi / 2 - peak
         return -peak if name.startswith(LEAST) else peak
 
     def peaks(self, model: JobModel) -> dict[str, str]:
-        """Return the figures that are extremes over the cycle."""
+        """Figures that are extremes over the cycle."""
         found = {name: name for name in model.quantities}
         found |= {name: name for name in model.signed}
         return found | {f"mu.{part}": f"{part}.{OBLIQUITY}" for part in linkage_of(model).oblique}
@@ -92,7 +92,7 @@ class LinkageJob(Job):
         return f"{said[:1].upper()}{said[1:]}."
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
-        """Return the output with three derivatives, the transmission angles, the terms, force and torque."""
+        """Output with three derivatives, the transmission angles, the terms, force and torque."""
         linkage = linkage_of(sampler.model)
         slides = linkage.output.slides
         unit, force = ("m", "N") if slides else ("rad", "N*m")

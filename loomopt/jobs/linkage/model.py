@@ -5,6 +5,7 @@ q = the output that the scene names (an angle, a slide, a coordinate of a joint)
 
 import functools
 import math
+import operator
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -104,12 +105,12 @@ class Place(NamedTuple):
 
 
 def hint_of(name: str) -> str:
-    """Return the name of the value from which a crank angle is followed, rad."""
+    """Name of the value from which a crank angle is followed, rad."""
     return f"hint {name}"
 
 
 def event_value(event: str) -> str:
-    """Return the name of the value that is an event's crank angle, rad."""
+    """Name of the value that is an event's crank angle, rad."""
     return f"event {event}"
 
 
@@ -118,7 +119,7 @@ OUTPUT_PLACES = "output at events"
 
 
 def output_value(event: str, axis: str) -> str:
-    """Return the name of the value that tells where the output is at an event: q, or its direction's x or y."""
+    """Name of the value that tells where the output is at an event: q, or its direction's x or y."""
     return f"output {axis} at {event}"
 
 
@@ -142,12 +143,12 @@ class Window(NamedTuple):
         return tuple(start + number(maths, given.values, end) for end in (self.begins, self.ends))
 
     def arcs(self) -> Arcs:
-        """Return it as a stretch of the cycle that limits speak of."""
+        """Window as a stretch of the cycle that limits speak of."""
         return Arcs(self.switch, self.corners, inside, self)
 
 
 def inside(angle: float, corners: tuple[float, ...]) -> float:
-    """Return 1 between two crank angles, rad, and 0 outside; a stretch that passes 0 is one too."""
+    """1 between two crank angles, rad, and 0 outside; a stretch that passes 0 is one too."""
     begin, end = corners
     return 1.0 if (angle - begin) % TURN < end - begin else 0.0
 
@@ -174,7 +175,7 @@ def nearest_rates(joint: Joint, place: tuple[Number, Number]) -> tuple[Number, N
 
 
 def number(maths: Maths, values: Values, ref: Ref) -> Number:
-    """Return a number of the scene by its name, or a literal."""
+    """Number of the scene by its name, or a literal."""
     if not ref.name:
         return maths.number(ref.value)
     return values[ref.name] if ref.sign > 0 else -values[ref.name]
@@ -209,13 +210,13 @@ class LinkageMotion(Motion):
         return Vector(dot(seen, found), cross(seen, found))
 
     def travelled(self, given: Values, event: str) -> Number:
-        """Return q − q at an event, rad or m; given: with the output's places there."""
+        """q − q at an event, rad or m; given: with the output's places there."""
         if self.output.measure != "angle":
             return self.q - given[output_value(event, "q")]
         return self._turned(Vector(given[output_value(event, "x")], given[output_value(event, "y")]))
 
     def order(self, order: int) -> Number:
-        """Return the output or a derivative of it with respect to φ."""
+        """Output or a derivative of it with respect to φ."""
         out, at = self.output, self.joints
         if out.measure == "angle":
             found = self._angle() if order == 0 else self._rate(order)
@@ -356,11 +357,11 @@ class Linkage(Kinematics):
         return self.chain.corners(cam, maths, given.values)
 
     def at(self, maths: Maths, given: Given, phi: Number) -> LinkageMotion:
-        """Return the pose at crank angles, rad, of a design in floats; maths: of the angles."""
+        """Pose at crank angles, rad, of a design in floats; maths: of the angles."""
         return self.pose(maths, given, self._at(given, phi))
 
     def _at(self, given: Given, phi: Number) -> Node:
-        """Return the node at crank angles, rad, of a design in floats, with the cams' stretches there."""
+        """Node at crank angles, rad, of a design in floats, with the cams' stretches there."""
         if not self.chain.cams:
             return Node(phi, {})
         found = self.chain.switch(given.values, np.atleast_1d(np.asarray(phi, dtype=np.float64)))
@@ -372,7 +373,7 @@ class Linkage(Kinematics):
         return tuple(part.name for part in self.chain.parts if chain.has_transmission_angle(part))
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
-        """Return the crank angle of each event, rad."""
+        """Crank angle of each event, rad."""
         found: dict[str, Number] = {}
         for place in self.places:
             if place.angle is not None:
@@ -388,7 +389,7 @@ class Linkage(Kinematics):
         return found
 
     def _nearest(self, maths: Maths, given: Given) -> dict[str, Number]:
-        """Return the crank angles, rad, at which a point without timing is nearest to the places of its path."""
+        """Crank angles, rad, at which a point without timing is nearest to the places of its path."""
         path, found = self.path, dict[str, Number]()
         for k, name in enumerate(path.times if path else ()):
             if path and hint_of(name) in given.values:
@@ -412,7 +413,7 @@ class Linkage(Kinematics):
         return {output_value(place.name, "x"): seen.x, output_value(place.name, "y"): seen.y}
 
     def _followed(self, maths: Maths, given: Given, place: Place) -> Number:
-        """Return the crank angle of an event from near which it is: a root, or a corner of a cam."""
+        """Crank angle of an event from near which it is: a root, or a corner of a cam."""
         values, rates = given.values, functools.partial(self._rates, maths, given, place)
         if place.corner not in values:
             return turning_points.followed(rates, values[place.hint])
@@ -428,7 +429,7 @@ class Linkage(Kinematics):
         return maths.choose(which, [root, *corners]) + 2 * maths.pi * values[place.turned]
 
     def _corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
-        """Return the crank angles, rad, of the corners of all cams, one cam after the other."""
+        """Crank angles, rad, of the corners of all cams, one cam after the other."""
         return tuple(angle for cam in self.chain.cams for angle in self.chain.corners(cam, maths, given.values))
 
     def _rates(self, maths: Maths, given: Given, place: Place, phi: Number) -> tuple[Number, Number, Number]:
@@ -521,7 +522,7 @@ class Linkage(Kinematics):
         return tuple(found)
 
     def turn(self, given: Given, place: Place) -> Turn:
-        """Return the turn of the output that an extreme means. Raises UnfoundError."""
+        """Turn of the output that an extreme means. Raises UnfoundError."""
         return chosen(self.turns(given), place)
 
     def corner_words(self, corner: Corner) -> str:
@@ -596,7 +597,7 @@ class Linkage(Kinematics):
         return beside + place.side * turning_points.crossing(excess, float(steps[k - 1]), float(steps[k]))
 
     def following(self, given: Given) -> Following | None:
-        """Return the events of a design in floats that are extremes and travels; None with cams, or a free timing."""
+        """Events of a design in floats that are extremes and travels; None with cams, or a free timing."""
         if self.chain.cams or (self.path and self.path.times):
             return None
         turns = self.turns(given)
@@ -627,7 +628,8 @@ class Linkage(Kinematics):
         """Return what is positive where a scan finds the same events as of the design with those turns."""
         found: list[tuple[str, Number]] = []
         for place in (place for place in self.places if place.extreme):
-            mine = turns.index(next(turn for turn in turns if _is(turn, chosen(tuple(turns), place))))
+            extreme = chosen(tuple(turns), place)
+            mine = next(k for k, turn in enumerate(turns) if (turn.extreme, turn.q) == (extreme.extreme, extreme.q))
             others = [k for k, turn in enumerate(turns) if turn.extreme == place.extreme and k != mine]
             said = f"another extreme of the output is {place.name}"
             if place.near is None:
@@ -650,7 +652,7 @@ class Linkage(Kinematics):
         return found
 
     def pose(self, maths: Maths, given: Given, node: Node) -> LinkageMotion:
-        """Return the pose at crank angles φ, rad."""
+        """Pose at crank angles φ, rad."""
         values, out = given.values, self.output
         joints = self.chain.pose(maths, values, node.phi, node.switch)
         factor = None if out.scale is None else number(maths, values, out.scale)
@@ -658,20 +660,20 @@ class Linkage(Kinematics):
         return LinkageMotion(joints, out, values.get("speed"), values.get("omega_dot"), factor, zero)
 
     def at_event(self, maths: Maths, given: Given, event: str) -> LinkageMotion:
-        """Return the pose at an event."""
+        """Pose at an event."""
         return self.pose(maths, given, self._there(given, event, given.values[event_value(event)]))
 
     def at_place(self, maths: Maths, given: Given, name: str) -> LinkageMotion:
-        """Return the pose at a place of the path that has no timing; name: of its crank angle."""
+        """Pose at a place of the path that has no timing; name: of its crank angle."""
         return self.pose(maths, given, self._there(given, name, given.values[name]))
 
     def _there(self, given: Given, event: str, phi: Number) -> Node:
-        """Return the node at or beside an event, or a place of a path, with the cams' stretches there."""
+        """Node at or beside an event, or a place of a path, with the cams' stretches there."""
         cams = (cam_switch(cam) for cam in self.chain.cams)
         return Node(phi, {cam: given.values[f"{cam} at {event}"] for cam in cams})
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
-        """Return the crank angles of the events, rad."""
+        """Crank angles of the events, rad."""
         return {place.name: given.values[place.value] for place in self.places if place.value in given.values}
 
 
@@ -680,7 +682,7 @@ SWEPT = "turn of sweep"
 
 
 def chosen(turns: tuple[Turn, ...], place: Place) -> Turn:
-    """Return the turn of the output that an extreme means, its angle within half a turn of `near`. Raises."""
+    """Turn of the output that an extreme means, its angle within half a turn of `near`. Raises."""
     own = [turn for turn in turns if turn.extreme == place.extreme]
     if not own:
         raise UnfoundError(place.name, "the output never turns back")
@@ -700,7 +702,7 @@ def chosen(turns: tuple[Turn, ...], place: Place) -> Turn:
 
 
 def end_of_rest(turn: Turn, place: Place) -> Corner | None:
-    """Return the corner of a cam at which an extreme stands, by the end of the rest that is meant; None at none."""
+    """Corner of a cam at which an extreme stands, by the end of the rest that is meant; None at none."""
     if not turn.rest:
         return None
     begin, end = turn.rest
@@ -718,10 +720,6 @@ def _rates_of(linkage: Linkage, place: Place, maths: Maths, given: Given, phi: N
     return pose.since(linkage.at_event(maths, given, place.beside)) + number(maths, given.values, place.travel), pose.q1
 
 
-def _is(turn: Turn, other: Turn) -> bool:
-    return (turn.extreme, turn.q) == (other.extreme, other.q)
-
-
 def _away(at: Number, angle: float, near: float) -> Number:
     """Return how far a turn near an angle, rad, is from another one."""
     nearest = apart(angle, near)
@@ -730,12 +728,12 @@ def _away(at: Number, angle: float, near: float) -> Number:
 
 
 def apart(angle: float, other: float) -> float:
-    """Return an angle from another, rad, within half a turn."""
+    """Angle from another, rad, within half a turn."""
     return (angle - other + math.pi) % TURN - math.pi
 
 
 def extremes(places: tuple[Place, ...]) -> tuple[str, str]:
-    """Return the first event that is a maximum of q, and the first that is a minimum; "" without."""
+    """First event that is a maximum of q, and the first that is a minimum; "" without."""
     return tuple(next((p.name for p in places if p.extreme == kind), "") for kind in ("max", "min"))  # type: ignore[return-value]
 
 
@@ -751,7 +749,7 @@ def _obliquity(group: str, m: Maths, given: Given, phi: Number, pose: Callable[[
 
 
 def _at(at: Instant, event: str) -> LinkageMotion:
-    """Return the pose at an event."""
+    """Pose at an event."""
     return _linkage(at).at_event(at.maths, at.given, event)
 
 
@@ -772,10 +770,6 @@ def _angle(event: str, at: Instant) -> Number:
     return at.values[event_value(event)]
 
 
-def _force(at: Instant) -> Number:
-    return at.force
-
-
 class Reach(NamedTuple):
     """How far a joint reaches along x or y; sign: +1 for the largest, −1 for the least coordinate."""
 
@@ -789,7 +783,7 @@ class Reach(NamedTuple):
         return f"{self.axis}_{'max' if self.sign > 0 else 'min'}.{self.joint}"
 
     def value(self, at: Instant) -> Number:
-        """Return the coordinate, m, or its opposite where the least counts."""
+        """Coordinate, m, or its opposite where the least counts."""
         found = getattr(at.pose.joints.joints[self.joint].place, self.axis)
         return found if self.sign > 0 else -found
 
@@ -806,14 +800,14 @@ def _square(a: Vector, x: Number, y: Number) -> Number:
 
 
 def _missed(path: Path, at: Instant) -> Number:
-    """Return the square of the distance of the point from where it should be at a place of the table, m²."""
+    """Square of the distance of the point from where it should be at a place of the table, m²."""
     place = at.node.switch["datum"]
     x, y = (at.maths.choose(place, [at.maths.number(v) for v in values]) for values in (path.x, path.y))
     return _square(at.pose.joints.joints[path.point].place, x, y)
 
 
 def _nearest(path: Path, at: Instant) -> Number:
-    """Return the mean square of the distances at crank angles of the design's own, m²."""
+    """Mean square of the distances at crank angles of the design's own, m²."""
     found = 0
     for name, x, y in zip(path.times, path.x, path.y, strict=True):
         pose = _linkage(at).at_place(at.maths, at.given, name)
@@ -844,7 +838,7 @@ def model(
     reaches: tuple[Reach, ...] = (),
     windows: tuple[Window, ...] = (),
 ) -> JobModel:
-    """Return the linkage with effects; known: names of scene numbers that are given."""
+    """Linkage with effects; known: names of scene numbers that are given."""
     quantities, rows, means = dict(MOTION), dict[str, DesignRow](), list[Integral]()
     driven = drive.quantities(effects, known)
     if driven:
@@ -857,7 +851,7 @@ def model(
         quantities[f"travel.{window.name}"] = CycleQuantity(functools.partial(_travelled, window))
     for name, event in linkage.loads.items():
         rows[f"angle.{event}"] = DesignRow(functools.partial(_angle, event))
-        rows[name] = DesignRow(_force, event=event)
+        rows[name] = DesignRow(operator.attrgetter("force"), event=event)
     high, low = extremes(linkage.places)
     if high and low:
         rows["swing"] = DesignRow(functools.partial(_swing, high, low))

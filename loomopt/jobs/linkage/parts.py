@@ -263,7 +263,7 @@ def _whole_ratio(cursor: Cursor) -> int:
 
 
 def number_schema(number: Number) -> Json:
-    """Return the JSON Schema of a number of the linkage: a quantity, or the name of a number of [mechanism]."""
+    """JSON Schema of a number of the linkage: a quantity, or the name of a number of [mechanism]."""
     quantity = number.kind.__metadata__[0].schema()
     name: Json = {"type": "string", "pattern": r"^[ \t]*-?[ \t]*[^\s\d+.-]"}
     said = re.sub(r" (?:of|from|between|and) (?:\{\w*\})+| \{\w*\}", "", number.text)
@@ -302,7 +302,7 @@ _SORTS: Mapping[str, Sort] = {
 
 
 def keys_schema(known: Keys, kind: str = "") -> Json:
-    """Return the JSON Schema of a table that holds these keys and no others; kind: of a part."""
+    """JSON Schema of a table that holds these keys and no others; kind: of a part."""
     found = {
         key: number_schema(each) if isinstance(each, Number) else _SORTS[each.sort].schema()
         for key, each in known.items()
@@ -313,7 +313,7 @@ def keys_schema(known: Keys, kind: str = "") -> Json:
 
 
 def schema() -> Json:
-    """Return the JSON Schema of [parts]."""
+    """JSON Schema of [parts]."""
     rules: list[Json] = [
         {"if": {"properties": {"kind": {"const": kind}}}, "then": keys_schema(known, kind)}
         for kind, known in KEYS.items()
@@ -557,5 +557,5 @@ def _said(raw: object) -> Iterator[str]:
 
 
 def kinds_of(linked: Chain) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """Return the names of joints, of links, and of parts in which something slides."""
+    """Names of joints, of links, and of parts in which something slides."""
     return linked.joints, linked.links, linked.slides

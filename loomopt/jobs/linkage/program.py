@@ -34,7 +34,7 @@ from loomopt.scenes.scene import Scene
 
 
 def model(scene: Scene, target: str = "") -> JobModel:
-    """Return the linkage with the effects the scene calls for; target: whose path its point should follow."""
+    """Linkage with the effects the scene calls for; target: whose path its point should follow."""
     known = reading(scene.document)
     pathed = path(scene, target)
     linkage = replace(known.linkage, path=pathed) if pathed else known.linkage
@@ -45,7 +45,7 @@ def model(scene: Scene, target: str = "") -> JobModel:
 
 
 def linkage_of(model: JobModel) -> Linkage:
-    """Return a model's linkage."""
+    """Model's linkage."""
     assert isinstance(model.kinematics, Linkage)
     return model.kinematics
 
@@ -108,14 +108,14 @@ class LinkageTask(Task):
         return max(map(abs, ends), default=1.0) or 1.0
 
     def scale(self, name: str, ends: Ends) -> float:
-        """Return the size of a variable: lengths the longest, angles 1 rad, others their own."""
+        """Size of a variable: lengths the longest, angles 1 rad, others their own."""
         kind = self.scene.schema.variables.get(name, "")
         return {"length": self.length, "angle": 1.0}.get(kind) or super().scale(name, ends)
 
     # Limits.
 
     def figure(self, name: str, low: float | None, high: float | None) -> list[Limit]:
-        """Return the limits on one figure."""
+        """Limits on one figure."""
         size = self.figure_size(name)
         return [self._limit(name, sign, value, size) for sign, value in ends(low, high)]
 
@@ -150,11 +150,11 @@ class LinkageTask(Task):
     # Levels, starts and moves.
 
     def objectives(self) -> tuple[Objective, ...]:
-        """Return the target's levels in order."""
+        """Target's levels in order."""
         return *(self.level(name, sense) for name, sense in self.levels), *self.least()
 
     def held(self) -> tuple[Objective, ...]:
-        """Return the levels before the first that is traded: what the target demands before it weighs anything."""
+        """Levels before the first that is traded: what the target demands before it weighs anything."""
         before = itertools.takewhile(lambda level: level[0] not in self.traded, self.levels[:-1])
         return tuple(self.level(name, sense) for name, sense in before)
 
@@ -187,14 +187,14 @@ class LinkageTask(Task):
         return distinct([today | half, today] if half else [today])
 
     def moves(self) -> list[Move]:
-        """Return the common scale of the lengths, and numbers of checks."""
+        """Common scale of the lengths, and numbers of checks."""
         lengths = tuple(name for name, kind in self.scene.schema.variables.items() if kind == "length")
         return [*([self.scale_move("scale", lengths)] if lengths else []), *self.axis_moves()]
 
     # Natural sizes.
 
     def figure_size(self, name: str) -> float:
-        """Return the natural size of a figure: today's; of a force at an event the largest term that it is made of.
+        """Natural size of a figure: today's; of a force at an event the largest term that it is made of.
 
         Where today's is only rounding, as of a machine that is balanced already, the largest figure of its kind.
         """
@@ -212,7 +212,7 @@ class LinkageTask(Task):
         return linkage_of(self.plain_model).loads
 
     def _force(self, event: str) -> float:
-        """Return the largest term of the output at an event, N or N·m."""
+        """Largest term of the output at an event, N or N·m."""
         phi = float(self.sampler.given.values[linkages.event_value(event)])
         at = self.sampler.model.instant(FLOAT, self.sampler.given, Node(phi, self.sampler.stills.get(event, {})))
         acts = {load.name: load.acts for load in self.sampler.model.loads}
@@ -220,7 +220,7 @@ class LinkageTask(Task):
         return max(terms, default=0.0) or 1.0
 
     def _extent(self) -> float:
-        """Return the size of the path, m."""
+        """Size of the path, m."""
         found = linkage_of(self.plain_model).path
         assert isinstance(found, Path)
         return float(max(np.ptp(found.x), np.ptp(found.y))) or self.length

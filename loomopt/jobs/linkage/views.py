@@ -81,7 +81,7 @@ class _SymbolicParts:
 
 
 def symbolic(linked: Chain, taken: Collection[str] = ()) -> _SymbolicParts:
-    """Return the parts as symbols, and what they close by; taken: names of numbers, which no angle has."""
+    """Parts as symbols, and what they close by; taken: names of numbers, which no angle has."""
     exact = replace(systems.sympy(), number=_exact)
     written = _SymbolicParts(chain.ChainPose(exact, Symbols(), symbol("phi")), taken)
     for part in linked.parts:
@@ -90,7 +90,7 @@ def symbolic(linked: Chain, taken: Collection[str] = ()) -> _SymbolicParts:
 
 
 def _exact(value: float) -> Expression:
-    """Return a literal as a person would write it: a fraction, or one of pi."""
+    """Literal as a person would write it: a fraction, or one of pi."""
     sp = sympy()
     turned = sp.nsimplify(value / math.pi, rational=True, tolerance=LITERAL)
     return turned * sp.pi if turned.q <= FINEST else sp.nsimplify(value, rational=True, tolerance=LITERAL)
@@ -145,7 +145,7 @@ def _dyad(written: _SymbolicParts, part: Part) -> None:
 
 
 def _guide(written: _SymbolicParts, part: Part) -> Vector:
-    """Return the direction of a slider's guide."""
+    """Direction of a slider's guide."""
     sp, guide, tilt = sympy(), part.word("guide"), written.pose.number(part, "direction")
     angle = sp.Integer(0) if tilt is None else tilt
     if guide and guide != FRAME_NAME:
@@ -186,11 +186,11 @@ class SymbolicPose(LinkageMotion):
     """The linkage as symbols, its output q with primes."""
 
     def order(self, order: int) -> Number:
-        """Return q, or a derivative of it."""
+        """q, or a derivative of it."""
         return symbol("q" + "'" * order)
 
     def travelled(self, given: Values, event: str) -> Number:
-        """Return q less its value at an event."""
+        """q less its value at an event."""
         return symbol("q") - symbol(f"q_{event}")
 
 
@@ -206,7 +206,7 @@ def _output(out: Output, written: _SymbolicParts) -> Expression:
 
 
 def equations(model: JobModel) -> tuple[Equation, ...]:
-    """Return the equations of a linkage scene: how its parts close, the output, each term, balance, crank torque.
+    """Equations of a linkage scene: how its parts close, the output, each term, balance, crank torque.
 
     An effect that is not in the scene leaves no symbol and no term; numbers of a named effect have its name as index.
     """
@@ -223,13 +223,13 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
 
 
 def _own(effect: Effect, key: str) -> Expression:
-    """Return the symbol of a number of an effect's table; of a named one with its name as index."""
+    """Symbol of a number of an effect's table; of a named one with its name as index."""
     letter = effect.letters.get(key, key)
     return symbol(f"{letter}_{effect.instance}" if effect.instance else letter)
 
 
 def _own_values(model: JobModel, effect: Effect) -> Values:
-    """Return the symbols and words of an effect's table, of those keys that are given."""
+    """Symbols and words of an effect's table, of those keys that are given."""
     given = {key: _own(effect, key) for key in effect.table.model_fields if f"{effect.name}.{key}" in model.known}
     words = model.words_of(effect.name)
     return {**given, **words, **({"instance": effect.instance} if effect.instance else {})}
@@ -239,7 +239,7 @@ class LinkageViews(JobViews):
     """The linkage at its events, its equations, and where its windows lie."""
 
     def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
-        """Return the linkage at its events, full scale. Raises BadInput."""
+        """Linkage at its events, full scale. Raises BadInput."""
         from loomopt.jobs.linkage import drawing
         from loomopt.picture.shapes import drawn_units
 
@@ -255,17 +255,17 @@ class LinkageViews(JobViews):
         return drawing.joints_csv(registry.of(scene).sampler(scene, design), drawn_units(scene))
 
     def motion(self, scene: Scene, design: Mapping[str, float], angles: "Floats") -> "MechanismMotion":
-        """Return the linkage at crank angles, rad. Raises BadInput."""
+        """Linkage at crank angles, rad. Raises BadInput."""
         from loomopt.jobs.linkage import drawing
 
         return drawing.motion(registry.of(scene).sampler(scene, design), angles)
 
     def equations(self, scene: Scene) -> tuple[Equation, ...]:
-        """Return the equations the scene really uses."""
+        """Equations the scene really uses."""
         return equations(registry.of(scene).model(scene))
 
     def marks(self, scene: Scene, design: Mapping[str, float]) -> Marks:
-        """Return the crank angles of the events, rad, and where the windows lie."""
+        """Crank angles of the events, rad, and where the windows lie."""
         sampler = registry.of(scene).sampler(scene, design)
         model, given = sampler.model, sampler.given
         found: dict[str, float | Span] = {

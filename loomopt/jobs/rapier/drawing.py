@@ -40,7 +40,7 @@ class Drive:
         return Sley(FLOAT, self.dimensions)
 
     def turn(self, phi1: Floats) -> RapierPose:
-        """Return the drive at crank angles, rad."""
+        """Drive at crank angles, rad."""
         return RapierPose(systems.numpy(), self.dimensions, self.sley.stand, phi1)
 
     @functools.cached_property
@@ -85,7 +85,7 @@ class Drive:
     @functools.cached_property
     def skeleton(self) -> Skeleton:
         """Its joints and links, both cranks' circles and the path of D."""
-        joints = {event: {name: _point(at) for name, at in pose.joints.items()} for event, pose in self.poses.items()}
+        joints = {event: {name: Point(*at) for name, at in pose.joints.items()} for event, pose in self.poses.items()}
         path = self.turn(np.asarray(TURN / SAMPLES * np.arange(SAMPLES), dtype=np.float64)).joints["D"]
         d = tuple(Point(float(x), float(y)) for x, y in zip(path.x, path.y, strict=True))
         return Skeleton(
@@ -98,12 +98,8 @@ class Drive:
         )
 
 
-def _point(vector: Vector) -> Point:
-    return Point(vector.x, vector.y)
-
-
 def of(design: Mapping[str, float]) -> Drive:
-    """Return the drive of a design's dimensions (m, rad; other keys are ignored).
+    """Drive of a design's dimensions (m, rad; other keys are ignored).
 
     Raises BadInput when it does not assemble at every crank angle.
     """
@@ -121,7 +117,7 @@ def linkage(
     units: Units = METRIC,
     forces: Mapping[ForceArrow, str] | None = None,
 ) -> Drawing:
-    """Return the drive in both dead centres of the sley and at the hand-over, at full scale. Raises BadInput.
+    """Drive in both dead centres of the sley and at the hand-over, at full scale. Raises BadInput.
 
     forces: in its joints at some crank angles, each with its size as it is told.
     """
@@ -133,12 +129,12 @@ def linkage(
 
 
 def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:
-    """Return the joints that `linkage` draws as CSV; digits round-trip. Raises BadInput."""
+    """Joints that `linkage` draws as CSV; digits round-trip. Raises BadInput."""
     return of(design).skeleton.csv(units)
 
 
 def motion(design: Mapping[str, float], angles: Floats) -> MechanismMotion:
-    """Return the drive at crank angles, rad. Raises BadInput."""
+    """Drive at crank angles, rad. Raises BadInput."""
     found = of(design)
     at, skeleton = found.turn(angles).joints, found.skeleton
     moving = {name: np.column_stack(np.broadcast_arrays(*at[name])) for name in MOVING}
@@ -146,7 +142,7 @@ def motion(design: Mapping[str, float], angles: Floats) -> MechanismMotion:
 
 
 def _measures(found: Drive) -> tuple[Measure, ...]:
-    """Return the lengths of the links and of the frame, at front dead centre."""
+    """Lengths of the links and of the frame, at front dead centre."""
     at = found.skeleton.at(FRONT)
     ends = [("l71", ("A0", "B0")), *zip(("l1", "l2", "l3", "l3p", "l4", "l5", "l6"), LINKS, strict=True)]
     return tuple(Measure(name, at[one], at[other]) for name, (one, other) in ends)
@@ -207,7 +203,7 @@ def _joints(found: Drive) -> list[Label]:
 
 
 def _legend(found: Drive, units: Units) -> tuple[tuple[str, str], ...]:
-    """Return the lines below the drawing, each with its layer."""
+    """Lines below the drawing, each with its layer."""
     d, c0 = found.dimensions, found.skeleton.pivots["C0"]
     rows = [
         (at, f"A{prime} B1{prime} C{prime} D{prime}  {at}, crank at {math.degrees(found.phi1[at]):.2f}°")

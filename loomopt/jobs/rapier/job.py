@@ -58,7 +58,7 @@ class Rapier(Job):
                 raise refusal("it is no dwell", scene.origin, key, scene.given(key), allowed, "Correct the value")
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
-        """Return the drive with the effects the scene calls for."""
+        """Drive with the effects the scene calls for."""
         return model(scene)
 
     def demand(self, scene: Scene, target: str) -> None:
@@ -76,7 +76,7 @@ class Rapier(Job):
         return (*super().tables(scene, target), read.record("targets.match.table", misfit, "the head travel to match"))
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return the design, SI, of NLP variables: the drive's own, and every other number that is freed."""
+        """Design, SI, of NLP variables: the drive's own, and every other number that is freed."""
         fixed = {limit.row for limit in program.bound_limits.values() if limit.sign == 0} - set(STROKE)
         own = {v.name for v in program.variables if v.lower < v.upper or v.name in fixed} - {"phi_stroke", "dwell"}
         values = {**program.parameters, **x}
@@ -107,11 +107,11 @@ class Rapier(Job):
         return found
 
     def over_cycle(self, model: JobModel) -> dict[str, str]:
-        """Return the figures that are read over the cycle, with their quantities."""
+        """Figures that are read over the cycle, with their quantities."""
         return {**super().over_cycle(model), "rms_jerk": ""}
 
     def peaks(self, model: JobModel) -> dict[str, str]:
-        """Return the figures that are extremes over the cycle."""
+        """Figures that are extremes over the cycle."""
         return {name: name for name in model.quantities} | {"stroke": "S", "mu_min": "obliquity"}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
@@ -138,7 +138,7 @@ class Rapier(Job):
         return f"With stroke {told('stroke')}, the largest dwell on both sides is {told('dwell')}."
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
-        """Return S with three derivatives, φ3, φ6, φ63, the folded transmission angle, terms, tape force and torque."""
+        """S with three derivatives, φ3, φ6, φ63, the folded transmission angle, terms, tape force and torque."""
         front = sampler.model.kinematics.still(FLOAT, sampler.given, "front dead centre", {}).joints  # type: ignore[attr-defined]
         gap = math.atan2(front.dyad.link2.y, front.dyad.link2.x) - front.phi3
         centres = linked(sampler.given).centres

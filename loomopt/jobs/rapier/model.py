@@ -82,7 +82,7 @@ class HeadPose(Motion):
 
 
 def _five_bar() -> Group:
-    """Return the dyad C D B2: what links l5 and l6 have to span, 1 at the margin, and the transmission angle at D."""
+    """Dyad C D B2: what links l5 and l6 have to span, 1 at the margin, and the transmission angle at D."""
 
     def base(given: Given, pose: Callable[[], Any]) -> Number:
         vector = pose().joints.base
@@ -140,7 +140,7 @@ class RapierDrive:
         return DriveLinkage(dimensions, rapier_drive.Sley(maths, dimensions).centres)
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
-        """Return the sley's stand, the driving link's direction at front dead centre, and the turns if called in."""
+        """Sley's stand, the driving link's direction at front dead centre, and the turns if called in."""
         values, centres = given.values, linked(given).centres
         found = {"beta": centres.beta, "frame_angle": values["phi30"] - centres.psi_front}
         stand = rapier_drive.Stand(found["beta"], found["frame_angle"])
@@ -162,7 +162,7 @@ class RapierDrive:
         return pose.q1, pose.q2, pose.q3
 
     def pose(self, maths: Maths, given: Given, node: Node) -> HeadPose:
-        """Return the pose at crank angles φ1, rad."""
+        """Pose at crank angles φ1, rad."""
         values = given.values
         stand = rapier_drive.Stand(values["beta"], values["frame_angle"])
         joints = rapier_drive.RapierPose(maths, linked(given).dimensions, stand, node.phi)
@@ -186,7 +186,7 @@ class RapierDrive:
         return found
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> HeadPose:
-        """Return the pose at front dead centre, where φ1 counts from."""
+        """Pose at front dead centre, where φ1 counts from."""
         return self.pose(maths, given, Node(0 * maths.pi, switch))
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
@@ -200,7 +200,7 @@ def _turn(k: int) -> str:
 
 
 def _arc(sides: tuple[float, ...], angle: float, corners: tuple[float, ...]) -> float:
-    """Return on which side's dwell arc a crank angle lies, 0 for neither; corners: the arcs' outer ends."""
+    """Side on whose dwell arc a crank angle lies, 0 for neither; corners: the arcs' outer ends."""
     for side, end in zip(sides, corners, strict=False):
         inside = angle % (2 * math.pi) if side == AFTER else -angle % (2 * math.pi)
         if inside < abs(end):
@@ -209,7 +209,7 @@ def _arc(sides: tuple[float, ...], angle: float, corners: tuple[float, ...]) -> 
 
 
 def dwells(arcs: tuple[tuple[float, str], ...]) -> Arcs:
-    """Return the dwells' stretches; arcs: side, and the name of the value that is the dwell there."""
+    """Dwells' stretches; arcs: side, and the name of the value that is the dwell there."""
 
     def ends(maths: Maths, given: Given) -> tuple[Number, ...]:
         found = tuple(given.values[name] if side == AFTER else -given.values[name] for side, name in arcs)
@@ -219,7 +219,7 @@ def dwells(arcs: tuple[tuple[float, str], ...]) -> Arcs:
 
 
 def _at_stroke(at: Instant) -> HeadPose:
-    """Return the pose at the hand-over."""
+    """Pose at the hand-over."""
     return at.model.kinematics.pose(at.maths, at.given, Node(at.values["phi_stroke"], {}))  # type: ignore[return-value]
 
 
@@ -252,13 +252,13 @@ ROWS: dict[str, DesignRow] = {
 
 
 def jerk_mean() -> Integral:
-    """Return the mean square of the head's jerk over the turn."""
+    """Mean square of the head's jerk over the turn."""
     angles = tuple(2 * math.pi * k / JERK_NODES for k in range(JERK_NODES))
     return Integral("jerk_mean_square", "rms_jerk", "jerk_square", angles=angles, data=(0.0,) * JERK_NODES)
 
 
 def match_mean(angles: tuple[float, ...], travels: tuple[float, ...]) -> Integral:
-    """Return the mean square of the head's distance from a table of crank angles, rad, and travels, m."""
+    """Mean square of the head's distance from a table of crank angles, rad, and travels, m."""
     return Integral("match_mean_square", "match_rms", "miss_square", angles=angles, data=travels)
 
 
@@ -270,7 +270,7 @@ def model(
     arcs: tuple[tuple[float, str], ...] = (),
     means: tuple[Integral, ...] = (),
 ) -> JobModel:
-    """Return the drive with effects; arcs: the dwells that limits speak of; means: those that a target reads."""
+    """Drive with effects; arcs: the dwells that limits speak of; means: those that a target reads."""
     driven = drive.quantities(effects, known)
     quantities = QUANTITIES | (TAPE_FORCE if driven else {}) | driven
     stretches = (dwells(arcs),) if arcs else ()
@@ -289,7 +289,7 @@ them."""
 
 
 def settled_turn(sampler: Sampler, derivatives: tuple[str, str], angle: float) -> float:
-    """Return the crank angle, rad, of a turning point after Newton's method from nearby.
+    """Crank angle, rad, of a turning point after Newton's method from nearby.
 
     derivatives: quantities that are the first and the second derivative in the crank angle.
     """

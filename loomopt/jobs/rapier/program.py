@@ -48,7 +48,7 @@ TURN = (0.0, 2 * math.pi)
 def model(
     scene: Scene, sought: Collection[str] = (), read: bool = True, dwelt: Collection[str] | None = None
 ) -> JobModel:
-    """Return the drive with the effects the scene calls for and what is sought; read: whether effects are.
+    """Drive with the effects the scene calls for and what is sought; read: whether effects are.
 
     sought: the target, or what is traded; dwelt: dwells that are asked for, those of the operation without.
     """
@@ -62,14 +62,14 @@ def model(
 
 
 def dwell_arcs(sought: Collection[str], dwelt: Collection[str]) -> tuple[tuple[float, str], ...]:
-    """Return the sides on which there is a dwell, each with the value that it is."""
+    """Sides on which there is a dwell, each with the value that it is."""
     if DWELL in sought:
         return tuple((side, DWELL) for side in SIDES.values())
     return tuple((side, name) for name, side in SIDES.items() if name in dwelt)
 
 
 def hand_over(model: JobModel, values: Numbers) -> Numbers:
-    """Return the angle of the stroke and the least dwell; raises ValueError where the drive does not turn."""
+    """Angle of the stroke and the least dwell; raises ValueError where the drive does not turn."""
     reading = read(sampled(model, values))
     found = {"phi_stroke": reading.phi_stroke}
     return found | ({"dwell": min(reading.dwell_after, reading.dwell_before, math.pi)} if "s_dwell" in values else {})
@@ -169,21 +169,21 @@ class RapierTask(Task):
         return *found, *(self.loose(name) for name in self.sought if name in LOOSE and name not in self.free)
 
     def scale(self, name: str, ends: Ends) -> float:
-        """Return the size of a variable: angles 1 rad, lengths the largest they may be."""
+        """Size of a variable: angles 1 rad, lengths the largest they may be."""
         return 1.0 if name in ANGLES else max(abs(self.known[name]), *map(abs, ends)) or 1.0
 
     def loose(self, name: str) -> Variable:
-        """Return a number of the operation that is free."""
+        """Number of the operation that is free."""
         if name == "stroke":
             return self.operated(name, (0.0, math.inf), (0.5 * self.known[name], 1.5 * self.known[name]))
         return self.operated(name, (1e-3, math.pi))
 
     def operated(self, name: str, ends: Ends, around: Ends | None = None) -> Variable:
-        """Return a number of the operation as a variable; around: where random starts lie."""
+        """Number of the operation as a variable; around: where random starts lie."""
         return Variable(name, *ends, self.operated_size(name), around or ends)
 
     def operated_size(self, name: str) -> float:
-        """Return the natural size of a number of the operation."""
+        """Natural size of a number of the operation."""
         stroke = float(self.known.get("stroke", 0.0))
         if name == "stroke":
             return stroke
@@ -198,7 +198,7 @@ class RapierTask(Task):
         return [*self.bounds(), *required, *self.floors(), *self.meant(), *self.margins(), *figures, *self.demands()]
 
     def bounds(self) -> list[Limit]:
-        """Return the bounds of what the scene frees."""
+        """Bounds of what the scene frees."""
         return [each for v in self.bounded if v.name in self.free for each in bound_limits(v)]
 
     def required(self) -> list[Limit]:
@@ -242,13 +242,13 @@ class RapierTask(Task):
         return found
 
     def margins(self) -> list[Limit]:
-        """Return the margins by which every dyad closes over the whole turn; the sley's where it may change."""
+        """Margins by which every dyad closes over the whole turn; the sley's where it may change."""
         found = [self.row_limit(name, 1, row, 1.0, 1.0, relaxable=False) for name, row in CLOSES.items()]
         rows = SLEY_MARGINS if set(SLEY) & set(self.free) else ()
         return found + [self.row_limit(row, -1, row, 0.0, self.known["l71"], relaxable=False) for row in rows]
 
     def figure(self, name: str, low: float | None, high: float | None) -> list[Limit]:
-        """Return the limits on one figure, row by row; a dwell is a variable's."""
+        """Limits on one figure, row by row; a dwell is a variable's."""
         if name == "mu_min" and low is not None:
             return [CycleLimit(name, -1, "obliquity", low, 1.0, complement=math.pi / 2)]
         if name in (DWELL, *SIDES):
@@ -270,7 +270,7 @@ class RapierTask(Task):
     # Levels, starts and moves.
 
     def objectives(self) -> tuple[Objective, ...]:
-        """Return the target's levels in order."""
+        """Target's levels in order."""
         peak, stroke = self.sampler.peak("peak_acceleration") or 1.0, self.reading.stroke or 1.0
         own = {
             "stroke-dwell": Peak("peak_acceleration", "peak_acceleration", peak),
@@ -286,7 +286,7 @@ class RapierTask(Task):
         return distinct([self.inside(self.known), *([self.inside({**self.known, **built})] if built else [])])
 
     def moves(self) -> list[Move]:
-        """Return the scales of five-bar and sley, where all of their lengths are free, and numbers of checks."""
+        """Scales of five-bar and sley, where all of their lengths are free, and numbers of checks."""
         taken = {variable.name for variable in self.variables}
         scales = (("five-bar scale", FIVE_BAR), ("sley scale", SLEY))
         return [*(self.scale_move(name, along) for name, along in scales if taken >= set(along)), *self.axis_moves()]
@@ -296,14 +296,14 @@ class RapierTask(Task):
         return hand_over
 
     def figure_size(self, name: str) -> float:
-        """Return the size of a figure, of a mean its square's."""
+        """Size of a figure, of a mean its square's."""
         peak, stroke = self.sampler.peak("peak_acceleration") or 1.0, self.reading.stroke or 1.0
         own = {"rms_jerk": peak**2, "match_rms": stroke**2, "mu_min": 1.0, "sley_mu_min": 1.0}
         return own.get(name) or size_read(self.sampler, name, self.scene.schema.figures)
 
 
 def constructed(known: Numbers) -> dict[str, float] | None:
-    """Return C0, l5 and φ40 by the paper's construction [Hong17] for a scene's stroke; None where it does not close."""
+    """C0, l5 and φ40 by the paper's construction [Hong17] for a scene's stroke; None where it does not close."""
     if "stroke" not in known:
         return None
     dimensions = rapier_drive.Dimensions(**{name: known[name] for name in rapier_drive.Dimensions.__dataclass_fields__})

@@ -20,7 +20,7 @@ from loomopt.scenes.scene import Scene
 
 
 def equations(model: JobModel) -> tuple[Equation, ...]:
-    """Return the equations of a rapier scene: dead centres, both loops, travel, each term, balance, crank torque.
+    """Equations of a rapier scene: dead centres, both loops, travel, each term, balance, crank torque.
 
     An effect that is not in the scene leaves no symbol and no term.
     """
@@ -79,14 +79,14 @@ def _travel(d: Dimensions) -> list[Equation]:
 
 
 def _pose() -> balance.Pose:
-    """Return a pose of symbols: the output is the rapier's travel."""
+    """Pose of symbols: the output is the rapier's travel."""
     phi1, omega, S, S1, S2 = (symbol(name) for name in ("phi1", "omega", "S", "S'", "S''"))
     links = _linkage(Dimensions(*(symbol(name) for name in Dimensions.__dataclass_fields__)))
     return balance.Pose(phi1, omega, S, S1, S2, links)
 
 
 def _linkage(d: Dimensions) -> SimpleNamespace:
-    """Return the links of both loops by their directions, as forces in joints read them."""
+    """Links of both loops by their directions, as forces in joints read them."""
     sp, system = sympy(), systems.sympy()
     phi2, phi3, phi4, phi5, phi6, phi7 = (symbol(f"phi{k}") for k in range(2, 8))
     rod, sley, link, driving = (
@@ -126,7 +126,7 @@ class RapierViews(JobViews):
     """The drive in both dead centres of the sley and at the hand-over, its equations, and where the head dwells."""
 
     def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
-        """Return the drive in both dead centres and at the hand-over, at full scale. Raises BadInput."""
+        """Drive in both dead centres and at the hand-over, at full scale. Raises BadInput."""
         from loomopt.jobs.rapier import drawing
         from loomopt.picture.shapes import drawn_units
 
@@ -146,18 +146,18 @@ class RapierViews(JobViews):
         return drawing.joints_csv(registry.of(scene).numbers_of(scene, design), drawn_units(scene))
 
     def motion(self, scene: Scene, design: Mapping[str, float], angles: "Floats") -> "MechanismMotion":
-        """Return the drive at crank angles, rad. Raises BadInput."""
+        """Drive at crank angles, rad. Raises BadInput."""
         from loomopt.jobs.rapier import drawing
 
         return drawing.motion(registry.of(scene).numbers_of(scene, design), angles)
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
-        """Return the equations the scene really uses."""
+        """Equations the scene really uses."""
 
         return equations(registry.of(scene).model(scene))
 
     def marks(self, scene: Scene, design: Mapping[str, float]) -> Marks:
-        """Return the sley's dead centres, rad, the hand-over and the dwell."""
+        """Sley's dead centres, rad, the hand-over and the dwell."""
         sampler = registry.of(scene).sampler(scene, design)
         events, reading = sampler.model.kinematics.events(FLOAT, sampler.given), read(sampler)
         found = {name: float(angle) % TURN for name, angle in events.items()} | {"hand-over": reading.phi_stroke}

@@ -98,7 +98,7 @@ def _deviation(
 
 
 def _off_chord(points: Floats) -> Floats:
-    """Return the greatest distance of points (n, k, 2) from the straight line between first and last."""
+    """Greatest distance of points (n, k, 2) from the straight line between first and last."""
     from_start, chord = points - points[:, :1], points[:, -1:] - points[:, :1]
     length = np.sum(chord**2, axis=2)
     share = np.sum(from_start * chord, axis=2) / np.where(length > 0.0, length, 1.0)
@@ -137,7 +137,7 @@ class ReturnSpring:
         return self.levels[0].towards(math.pi / 2, LENGTH * self.h)
 
     def strokes(self) -> list[Primitive]:
-        """Return the spring, its load in both positions, preload and travel."""
+        """Spring, its load in both positions, preload and travel."""
         h, (slack, top, bottom) = self.h, self.levels
         loads = [Line(LAYER, (at.towards(0.0, -COIL * h), at.towards(0.0, BAR * h))) for at in (top, bottom)]
         return [
@@ -226,7 +226,7 @@ class CamDrawing:
         return frame(self.sampler.model).spans(self.sampler.given.values)
 
     def spring(self, top: Point = ORIGIN, h: float = 1.0) -> ReturnSpring:
-        """Return the return spring with the heald frame's upper position at a point; h: text height, m."""
+        """Return spring with the heald frame's upper position at a point; h: text height, m."""
         K1, X0, travel = (float(self.sampler.given.values[name]) for name in ("K1", "X0", "travel"))
         return ReturnSpring(K1, X0, travel, top, h, f"frame, {OPEN[NEAR]}", f"frame, {OPEN[FAR]}")
 
@@ -238,12 +238,12 @@ class CamDrawing:
 
 
 def missing(scene: Scene) -> tuple[str, ...]:
-    """Return the keys of the follower that a scene does not give: without them there is no cam to draw."""
+    """Keys of the follower that a scene does not give: without them there is no cam to draw."""
     return tuple(name for name in FOLLOWER if scene.mechanism.get(name) is None)
 
 
 def cam(scene: Scene, design: Mapping[str, float]) -> CamDrawing:
-    """Return the cam of a design, SI (today's number for what it does not name). Raises BadInput where there is none.
+    """Cam of a design, SI (today's number for what it does not name). Raises BadInput where there is none.
 
     A cam that is undercut is one.
     """
@@ -311,7 +311,7 @@ class Picture:
 
 
 def picture(found: CamDrawing, least: float) -> Picture:
-    """Return the arm in both dwells and at the cam angle of least cam force, rad."""
+    """Arm in both dwells and at the cam angle of least cam force, rad."""
     near, far = frame(found.sampler.model).ends(found.sampler.given.values)
     return Picture(found, {NEAR: near, FAR: far, LEAST: least})
 
@@ -321,7 +321,7 @@ OUTLINE = 180
 
 
 def motion(found: CamDrawing, angles: Floats) -> MechanismMotion:
-    """Return the cam turning at cam angles, rad, under its arm, and the frame with its spring beside it.
+    """Cam turning at cam angles, rad, under its arm, and the frame with its spring beside it.
 
     An output that leaves the cam is shown on it.
     """
@@ -346,7 +346,7 @@ def _turned(points: Floats, angles: Floats) -> Floats:
 
 
 def linkage(scene: Scene, found: CamDrawing, figures: Figures) -> Drawing:
-    """Return a design's cam with its follower in both dwells and at the least cam force, at full scale."""
+    """Design's cam with its follower in both dwells and at the least cam force, at full scale."""
     drawn, units = picture(found, figures["contact_angle"] or 0.0), drawn_units(scene)
     strokes = [*drawn.skeleton.strokes(drawn.height), *_frame(drawn), *drawn.spring.strokes()]
     labels, legend = _labels(drawn, units), _legend(scene, drawn, figures, units)
@@ -365,7 +365,7 @@ PINS = {"cam_shaft_force": "A", "lever_pivot_force": "B", "roller_force": "C"}
 
 
 def _forces(drawn: Picture) -> list[ForceArrow]:
-    """Return the forces on the lever and in the cam's bearings in the drawing's axes, which turn with the cam."""
+    """Forces on the lever and in the cam's bearings in the drawing's axes, which turn with the cam."""
     sampler, found = drawn.cam.sampler, []
     for name in (name for name in PINS if name in sampler.model.told):
         pushed = sampler.pushed(name)
@@ -431,12 +431,12 @@ SIZES = ("arm", "centre_distance", "base_radius", "roller_radius")
 
 
 def settled(least: float, most: float) -> float:
-    """Return the least cam force, N, as it is told: what is only rounding is 0."""
+    """Least cam force, N, as it is told: what is only rounding is 0."""
     return 0.0 if abs(least) <= SHOWN_AS_ZERO * abs(most) else least
 
 
 def _legend(scene: Scene, drawn: Picture, figures: Figures, units: Units) -> tuple[tuple[str, str], ...]:
-    """Return the lines below the drawing, each with its layer."""
+    """Lines below the drawing, each with its layer."""
     size, found = {name: value or 0.0 for name, value in figures.items()}, drawn.cam
     force, within = settled(size["contact_min"], size["contact_max"]), units.within(CURVE_PROMISED * allowed(found))
     said = OPEN | {LEAST: show(force, units.force)}
@@ -459,7 +459,7 @@ def _legend(scene: Scene, drawn: Picture, figures: Figures, units: Units) -> tup
 
 
 def _law(scene: Scene, found: CamDrawing) -> str:
-    """Return the name of the law the cam really has."""
+    """Name of the law the cam really has."""
     cam = frame(found.sampler.model)
     if isinstance(cam, CamProgram):
         own = [each.law or scene.table(HealdFrame).law for each in scene.table(HealdFrame).segments or ()]
@@ -470,7 +470,7 @@ def _law(scene: Scene, found: CamDrawing) -> str:
 
 
 def joints_csv(scene: Scene, found: CamDrawing) -> str:
-    """Return the profile as CSV: cam angle, X, both curves in the cam's frame, pressure angle, curvature.
+    """Profile as CSV: cam angle, X, both curves in the cam's frame, pressure angle, curvature.
 
     Digits round-trip. Rows stand every half degree and at every corner of the law, from 0 to 360 deg; where the
     curvature jumps, the angle stands twice, with both one-sided values.
@@ -496,7 +496,7 @@ def joints_csv(scene: Scene, found: CamDrawing) -> str:
 
 
 def _rows(found: CamDrawing) -> tuple[Pieces, Floats]:
-    """Return the table's nodes: every half degree and both sides of every corner, one where they are alike."""
+    """Table's nodes: every half degree and both sides of every corner, one where they are alike."""
     cycle = found.sampler.cycle
     there = np.flatnonzero(np.diff(cycle.starts) > 0.0)
     pieces, u = [], []

@@ -115,7 +115,7 @@ class Shedding(Job):
             raise _refused(scene, "mechanism", f"the cam's follower cannot work: {reason}", "")
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
-        """Return the frame with the effects the scene calls for, and a design's own law where it has one."""
+        """Frame with the effects the scene calls for, and a design's own law where it has one."""
         own = knots(design or {})
         return model(scene, Spline(len(own) - 1) if own else None)
 
@@ -158,7 +158,7 @@ class Shedding(Job):
         return (read_law(scene).record(scene), *super().tables(scene, target))
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return the design, SI, of NLP variables: the spring, what else is freed, and a free law's knots."""
+        """Design, SI, of NLP variables: the spring, what else is freed, and a free law's knots."""
         values, law = {**program.parameters, **x}, frame(program.model).law
         knots = set(law.names) if isinstance(law, Spline) else set()
         fixed = {limit.row for limit in program.bound_limits.values() if limit.sign == 0}
@@ -172,7 +172,7 @@ class Shedding(Job):
         return found
 
     def adopted(self, scene: Scene, design: Mapping[str, Any], target: str) -> tuple[Scene, str]:
-        """Return the scene with a design's own cam law, and the target whose limits it keeps.
+        """Scene with a design's own cam law, and the target whose limits it keeps.
 
         Of target law the law is then given: what remains is contact, and the bound on its acceleration.
         """
@@ -208,11 +208,11 @@ class Shedding(Job):
         return found | ({CONTACT_SPEED: contact_speeds(sampled)} if CONTACT_SPEED in asked else {})
 
     def over_cycle(self, model: JobModel) -> dict[str, str]:
-        """Return the figures that are read over the cycle, with their quantities."""
+        """Figures that are read over the cycle, with their quantities."""
         return {**super().over_cycle(model), CONTACT_SPEED: ""}
 
     def peaks(self, model: JobModel) -> dict[str, str]:
-        """Return the figures that are extremes over the cycle, with their quantities."""
+        """Figures that are extremes over the cycle, with their quantities."""
         found = {name: quantity for name, quantity in CYCLE.items() if model.has_quantity(quantity)}
         told = [name for check in model.checks for name in check.over_cycle if model.has_quantity(name)]
         return found | {name: name for name in told}
@@ -239,7 +239,7 @@ class Shedding(Job):
         return f"{said} {_today(scene, self.sampler(scene, self.today(scene)))}".strip()
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
-        """Return X with three derivatives, s'', the terms, N, the cam torque, pressure angle and curvatures."""
+        """X with three derivatives, s'', the terms, N, the cam torque, pressure angle and curvatures."""
         after: dict[str, Formula] = {}
         if sampler.model.has_quantity("curvature"):
             after = {
@@ -269,7 +269,7 @@ class Shedding(Job):
         return Studied(("stiffness", "law"), peaks, motion="X_2", family=family)
 
     def law_limit(self, scene: Scene, x: Mapping[str, Number]) -> Number | None:
-        """Return the limit of K1, N/m, for target law, in 40 digits; None where the closed form does not hold.
+        """Limit of K1, N/m, for target law, in 40 digits; None where the closed form does not hold.
 
         x: with a stiffness, N/m, for which some law keeps contact, such as a spline law's least one. The frame must
         rise and fall alike, and nothing but N_min and the law's acceleration be limited.
@@ -299,7 +299,7 @@ def _chosen(variable: Variable, value: float) -> bool:
 
 
 def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
-    """Return the least cam force, N, and the first cam angle where it is reached, rad."""
+    """Least cam force, N, and the first cam angle where it is reached, rad."""
     highest = max(extreme.height for extreme in found)
     size = max(abs(extreme.value) for extreme in found)
     alike = [extreme for extreme in found if extreme.height >= highest - SAME * size]
@@ -307,7 +307,7 @@ def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
 
 
 def judged(model: JobModel) -> str:
-    """Return the dwells, in words, that the cam force is judged in; "" where it is known all round."""
+    """Dwells, in words, that the cam force is judged in; "" where it is known all round."""
     names = [SEGMENTS[k] for k in frame(model).segments if (SEGMENT, float(k)) in model.known_in]
     known = [name.replace("_", " ") for name in names]
     return "both dwells" if len(known) > 1 else f"the {known[0]}" if known else ""
@@ -329,7 +329,7 @@ def _today(scene: Scene, sampler: Sampler) -> str:
 
 
 def _frame(scene: Scene, model: JobModel, numbers: Numbers) -> cam_limit.SymmetricFrame | None:
-    """Return the frame that the loads make of it; None where their sum is another."""
+    """Frame that the loads make of it; None where their sum is another."""
     number, known = systems.mpmath(cam_limit.DIGITS).number, scene.mechanism
     force = _force(model, numbers)
     middle, inertia = force(RISE, 0.5, 0.5, 0.0, 0.0), force(RISE, 0.5, 0.5, 0.0, 1.0)
@@ -352,7 +352,7 @@ def _frame(scene: Scene, model: JobModel, numbers: Numbers) -> cam_limit.Symmetr
 
 
 def _force(model: JobModel, numbers: Numbers) -> Force:
-    """Return the sum of all loads but the return spring at a segment, s, u, s' and s''."""
+    """Sum of all loads but the return spring at a segment, s, u, s' and s''."""
     system = systems.mpmath(cam_limit.DIGITS)
     given = model.given(system, {name: system.number(value) for name, value in numbers.items()})
     loads = [load for load in model.loads if load is not RETURN_SPRING]

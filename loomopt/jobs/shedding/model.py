@@ -44,7 +44,7 @@ class NoTable(Table):
 
 
 def spring_force(at: Inputs[Frame]) -> Number:
-    """Return K1 (X + X0), N [Qiu21, eq 4]; K1 is of both springs together."""
+    """K1 (X + X0), N [Qiu21, eq 4]; K1 is of both springs together."""
     return at.values["K1"] * (at.pose.q + at.values["X0"])
 
 
@@ -174,20 +174,20 @@ class CamFrame:
         return frozenset((HALF_OPEN,) if self.law.symmetric and Fraction(1, 2) in self.law.breaks else ())
 
     def spans(self, values: Values) -> dict[str, tuple[float, float]]:
-        """Return the cam angles, rad, between which each segment that is there lasts, by name; values: floats."""
+        """Cam angles, rad, between which each segment that is there lasts, by name; values: floats."""
         ends = (0.0, *(float(values[f"begin.{name}"]) for name in ("far", "return", "near")), 2 * math.pi)
         names = ("rise", "far dwell", "return", "near dwell")
         return {name: (ends[k], ends[k + 1]) for k, name in enumerate(names) if ends[k + 1] > ends[k]}
 
     def ends(self, values: Values) -> tuple[float, float]:
-        """Return a cam angle, rad, with the frame at its lowest X, and one at its highest; values: floats."""
+        """Cam angle, rad, with the frame at its lowest X, and one at its highest; values: floats."""
         return 0.0, float(values["begin.far"] + values["begin.return"]) / 2
 
     def linkage(self, maths: Maths, values: Values) -> None:
         """Return nothing: poses read the numbers."""
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
-        """Return the angles where segments begin, the law's knots, and where the shed is half open if called in."""
+        """Angles where segments begin, the law's knots, and where the shed is half open if called in."""
         values = given.values
         far = values["rise"]
         turning = far + values["far_dwell"]
@@ -200,7 +200,7 @@ class CamFrame:
         return {**found, **knots}
 
     def _middle(self, maths: Maths, values: Values) -> Number:
-        """Return the u where s = 1/2; of a law that is not symmetric it moves with the law, from a hint."""
+        """U where s = 1/2; of a law that is not symmetric it moves with the law, from a hint."""
         if self.law.symmetric or MIDDLE not in values:
             return Fraction(1, 2)
 
@@ -217,7 +217,7 @@ class CamFrame:
         return dict(zip((MIDDLE, MIDDLE_PIECE), middle(self.law, given.values), strict=True))
 
     def pose(self, maths: Maths, given: Given, node: Node) -> FrameMotion:
-        """Return the pose at cam angles θ, rad; switches: segment, the law's piece, worst."""
+        """Pose at cam angles θ, rad; switches: segment, the law's piece, worst."""
         values, theta = given.values, node.phi
         segment, piece = node.switch[SEGMENT], node.switch[LAW]
         u = maths.choose(segment, (theta / values["rise"], 1, (values["begin.near"] - theta) / values["return"], 0))
@@ -228,7 +228,7 @@ class CamFrame:
         return FrameMotion(maths, theta, values["travel"], segment, u, rate, law, worst, *speeds)
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FrameMotion:
-        """Return the pose at the beginning of the rise, from ahead of it."""
+        """Pose at the beginning of the rise, from ahead of it."""
         return self.pose(maths, given, Node(0, {**switch, SEGMENT: 0.0, LAW: 0.0}))
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
@@ -254,12 +254,12 @@ class Segment(NamedTuple):
 
 
 def height(k: int) -> str:
-    """Return the name of X, m, at the end of segment k; that of the last stands at the beginning too."""
+    """Name of X, m, at the end of segment k; that of the last stands at the beginning too."""
     return f"segments.{k + 1}.to"
 
 
 def width(k: int) -> str:
-    """Return the name of the cam angle, rad, that segment k takes."""
+    """Name of the cam angle, rad, that segment k takes."""
     return f"segments.{k + 1}.angle"
 
 
@@ -318,13 +318,13 @@ class CamProgram(CamFrame):
         return tuple(sorted({move.kind for move in self.moves}))
 
     def spans(self, values: Values) -> dict[str, tuple[float, float]]:
-        """Return the cam angles, rad, between which each segment lasts, by place and kind; values: floats."""
+        """Cam angles, rad, between which each segment lasts, by place and kind; values: floats."""
         begins = [float(values[f"begin.{k + 1}"]) for k in range(len(self.moves))]
         names = [f"{k} {MOVES[move.kind]}" for k, move in enumerate(self.moves, 1)]
         return dict(zip(names, zip(begins, [*begins[1:], 2 * math.pi], strict=True), strict=True))
 
     def ends(self, values: Values) -> tuple[float, float]:
-        """Return the cam angles, rad, where X is first at its lowest and at its highest; values: floats."""
+        """Cam angles, rad, where X is first at its lowest and at its highest; values: floats."""
         tops = [float(values[height(k)]) for k in range(len(self.moves))]
         begins = [begin for begin, _ in self.spans(values).values()]
         at = dict(zip([*tops[-1:], *tops[:-1]][::-1], begins[::-1], strict=True))
@@ -361,7 +361,7 @@ class CamProgram(CamFrame):
         return tuple(found)
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
-        """Return the angles where segments begin, rad, and what their laws are made of."""
+        """Angles where segments begin, rad, and what their laws are made of."""
         values, angle = given.values, 0
         found: dict[str, Number] = {}
         for k, move in enumerate(self.moves):
@@ -379,13 +379,13 @@ class CamProgram(CamFrame):
         return {}
 
     def pose(self, maths: Maths, given: Given, node: Node) -> FrameMotion:
-        """Return the pose at cam angles θ, rad; switches: the stretch, by `stretches`; worst."""
+        """Pose at cam angles θ, rad; switches: the stretch, by `stretches`; worst."""
         values, theta = given.values, node.phi
         place = node.switch[SEGMENT]
         segments = [k for k, _ in self.stretches]
 
         def chosen(numbers: Sequence[Number]) -> Number:
-            """Return a number of the segment."""
+            """Number of the segment."""
             return maths.choose(place, [numbers[k] for k in segments])
 
         count = len(self.moves)
@@ -409,7 +409,7 @@ class CamProgram(CamFrame):
         return ProgramMotion(*found, low=chosen(lows), span=chosen(spans))
 
     def _law(self, maths: Maths, given: Given, place: Number, u: Number) -> LawDerivatives:
-        """Return the law that holds, of all that there are."""
+        """Law that holds, of all that there are."""
         laws = list(dict.fromkeys(move.law for move in self.moves if move.law))
         which = [laws.index(move.law) if move.law else 0 for move in self.moves]
         found = []
@@ -423,7 +423,7 @@ class CamProgram(CamFrame):
         )
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FrameMotion:
-        """Return the pose at the beginning of the first segment."""
+        """Pose at the beginning of the first segment."""
         return self.pose(maths, given, Node(0, {**switch, SEGMENT: 0.0}))
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
@@ -432,7 +432,7 @@ class CamProgram(CamFrame):
 
 
 def follower(values: Values) -> Follower:
-    """Return the roller follower."""
+    """Roller follower."""
     return Follower(**{name: values[name] for name in FOLLOWER})
 
 
@@ -443,7 +443,7 @@ def contact(at: Instant) -> Contact:
 
 
 def moving(at: Instant, value: Number) -> Number:
-    """Return a value in the moves, 0 in the dwells."""
+    """Value in the moves, 0 in the dwells."""
     return at.maths.choose(at.pose.segment, (value, 0, value, 0))
 
 
@@ -491,7 +491,7 @@ CYCLE = {
 
 
 def law_rows(law: CamLaw) -> dict[str, DesignRow]:
-    """Return the rows a spline law must keep: its end, its slope there and at the inner knots, ±s'' at these."""
+    """Rows a spline law must keep: its end, its slope there and at the inner knots, ±s'' at these."""
     if not isinstance(law, Spline):
         return {}
     n, found = law.intervals, {}
@@ -515,7 +515,7 @@ def model(
     raced: tuple[str, ...] = (),
     moves: tuple[Segment, ...] = (),
 ) -> JobModel:
-    """Return the frame with its return spring and effects; raced: what of RACED is limited; moves: several segments."""
+    """Frame with its return spring and effects; raced: what of RACED is limited; moves: several segments."""
     motion = CamProgram(law, moves=moves) if moves else CamFrame(law, dwells)
     followed = known.issuperset(FOLLOWER)
     partly = JobModel(motion, effects, words).known_in
@@ -533,6 +533,6 @@ def model(
 
 
 def frame(found: JobModel) -> CamFrame:
-    """Return the motion of a shedding model."""
+    """Motion of a shedding model."""
     assert isinstance(found.kinematics, CamFrame)
     return found.kinematics

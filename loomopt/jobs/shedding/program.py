@@ -49,7 +49,7 @@ steps at most, and the share of the speed after which there is none left to take
 
 
 def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most: float, slack: float = 0.0) -> float:
-    """Return the speed, rad/s, up to which a signed quantity stays at most `most`, SI; infinite where it always does.
+    """Speed, rad/s, up to which a signed quantity stays at most `most`, SI; infinite where it always does.
 
     It is quadratic in the speed at every crank angle: the first root is sampled, then followed by Newton's method
     with the refined largest value. 0 where the bound is broken at rest. slack, SI: an excess that counts as none, at
@@ -72,7 +72,7 @@ def followed(
 
 
 def _reached(at_rest: Sampler, unit: float, name: str, most: float, slack: float) -> float:
-    """Return the speed, rad/s, up to which a quantity stays at most `most`; unit: a speed to read it at, rad/s."""
+    """Speed, rad/s, up to which a quantity stays at most `most`; unit: a speed to read it at, rad/s."""
     nodes = at_rest.node(*at_rest.grid())
     rest, ahead, back = -_at_speeds(at_rest, name, nodes, (0.0, unit, -unit))
     rounding = SPEED_AT_REST * float(np.abs([rest, ahead]).max())
@@ -86,7 +86,7 @@ def _reached(at_rest: Sampler, unit: float, name: str, most: float, slack: float
 
 
 def _at_speeds(at_rest: Sampler, name: str, nodes: Node, speeds: Sequence[float]) -> Floats:
-    """Return (speeds, nodes): a quantity at each of several speeds, rad/s."""
+    """(speeds, nodes): a quantity at each of several speeds, rad/s."""
     values = {**at_rest.values, **at_rest.hints, "speed": np.array(speeds)[:, None]}
     given = at_rest.model.given(numpy(), values)
     (found,) = Quantities(at_rest.model, (numpy(), numpy()), given)((name,), nodes)
@@ -95,7 +95,7 @@ def _at_speeds(at_rest: Sampler, name: str, nodes: Node, speeds: Sequence[float]
 
 
 def _first_roots(square: Floats, linear: Floats, spare: Floats, rounding: float) -> Floats:
-    """Return the least positive x with square x² + linear x + spare = 0 at each angle, infinite without one."""
+    """Least positive x with square x² + linear x + spare = 0 at each angle, infinite without one."""
     with np.errstate(divide="ignore", invalid="ignore"):
         inside = linear**2 - 4 * square * spare
         root = 2 * spare / (-linear + np.sqrt(np.maximum(inside, 0.0)))
@@ -104,7 +104,7 @@ def _first_roots(square: Floats, linear: Floats, spare: Floats, rounding: float)
 
 
 def _settled(at_rest: Sampler, name: str, most: float, speed: float) -> float:
-    """Return the speed, rad/s, where the refined largest value is `most`, from one nearby."""
+    """Speed, rad/s, where the refined largest value is `most`, from one nearby."""
     for _ in range(SPEED_STEPS):
         top = sampled(at_rest.model, {**at_rest.values, "speed": speed}).extremes(name)[0]
         node = at_rest.node(np.array([top.piece]), np.array([top.u]))
@@ -147,7 +147,7 @@ def scene_numbers(scene: Scene) -> dict[str, float]:
 
 
 def model(scene: Scene, law: CamLaw | None = None, raced: tuple[str, ...] = ()) -> JobModel:
-    """Return the frame with the effects the scene calls for; law: another than the scene's; raced: of model.RACED."""
+    """Frame with the effects the scene calls for; law: another than the scene's; raced: of model.RACED."""
     free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
     several = moves(scene)
     dwells = (True, True) if free or several else dwelt(scene.mechanism)
@@ -157,7 +157,7 @@ def model(scene: Scene, law: CamLaw | None = None, raced: tuple[str, ...] = ()) 
 
 
 def survived(sampler: Sampler, least: float) -> float:
-    """Return the speed, rad/s, up to which the cam force stays at least `least`, N, as closely as a solve keeps it."""
+    """Speed, rad/s, up to which the cam force stays at least `least`, N, as closely as a solve keeps it."""
     slack = ACCURACY * abs(sampler.static["spring_force_max"])
     return speed_reached(sampler.model, sampler.values, "lift", -least, slack)
 
@@ -169,7 +169,7 @@ def races(physics: JobModel) -> bool:
 
 
 def contact_speed(scene: Scene, sampler: Sampler) -> float | None:
-    """Return the speed, rad/s, up to which the roller stays on the cam; None where none ends that, or it is unknown."""
+    """Speed, rad/s, up to which the roller stays on the cam; None where none ends that, or it is unknown."""
     if not races(sampler.model):
         return None
     speed = survived(sampler, scene.operation["N_min"])
@@ -177,7 +177,7 @@ def contact_speed(scene: Scene, sampler: Sampler) -> float | None:
 
 
 def contact_speeds(machines: "Machines") -> Floats | None:
-    """Return the speed, rad/s, up to which each roller stays on its cam, (machines,); infinite where none ends that.
+    """Speed, rad/s, up to which each roller stays on its cam, (machines,); infinite where none ends that.
 
     As `speed_reached`, but that at each cam angle the inverse of the first root is a curve, and refined as one.
     """
@@ -251,7 +251,7 @@ class SpringScale:
         self.stiffness = min(self.needed, most) or self.needed
 
     def stiffness_for(self, least: float, preload: float) -> float:
-        """Return the stiffness, N/m, that keeps the cam force above `least`, N, at a preload, m, as sampled."""
+        """Stiffness, N/m, that keeps the cam force above `least`, N, at a preload, m, as sampled."""
         elongated = np.maximum(self.travelled + preload, min(LEAST_STRETCH * self.stretch, preload) or LEAST_STRETCH)
         return float(max(0.0, np.max((least - self.others) / elongated)))
 
@@ -364,7 +364,7 @@ class SheddingTask(Task):
         )
 
     def scale(self, name: str, ends: Ends) -> float:
-        """Return a variable's natural size, SI."""
+        """Variable's natural size, SI."""
         if name == "K1":
             return self.sizes.stiffness
         if name in SEGMENTS:
@@ -389,7 +389,7 @@ class SheddingTask(Task):
         return [*own, *self.figures(), *self.demands(), *self.law_limits()]
 
     def bounds(self) -> list[Limit]:
-        """Return the bounds of variables as limits; a requirement gives way on one side only."""
+        """Bounds of variables as limits; a requirement gives way on one side only."""
         found: list[Limit] = []
         knots = set(self.law.names) if self.law else set()
         for v in (v for v in self.bounded if v.name not in knots):
@@ -403,7 +403,7 @@ class SheddingTask(Task):
         return found
 
     def contact(self) -> list[Limit]:
-        """Return the limit that is the job: contact where the warp's pull is known, up to a speed that is traded."""
+        """Limit that is the job: contact where the warp's pull is known, up to a speed that is traded."""
         least, size = self.known["N_min"], self.sizes.force
         row = FASTEST if self.lasting and not self.sped else LIFT
         found = self.row_limit("N_min", -1, row, least, size, relaxable=least > 0.0)
@@ -425,7 +425,7 @@ class SheddingTask(Task):
         ]
 
     def figure(self, name: str, low: float | None, high: float | None) -> list[Limit]:
-        """Return the scene's limits on a figure; the least of a quantity is the largest of its opposite."""
+        """Scene's limits on a figure; the least of a quantity is the largest of its opposite."""
         if name == CONTACT_SPEED or (name == "law_acceleration" and self.law):
             return []
         row, sides = (
@@ -478,7 +478,7 @@ class SheddingTask(Task):
     # Levels, starts and moves.
 
     def objectives(self) -> tuple[Objective, ...]:
-        """Return the target's levels in order; what checks would have least comes after the spring."""
+        """Target's levels in order; what checks would have least comes after the spring."""
         if self.target == "force":
             return (Peak("contact_max", "cam_force", self.sizes.force),)
         if self.target == "speed":
@@ -513,7 +513,7 @@ class SheddingTask(Task):
         return functools.partial(followed, CONTACT_SPEED, reached) if self.lasting else nothing_follows
 
     def today(self) -> Numbers:
-        """Return the knots of a free law nearest to the scene's own."""
+        """Knots of a free law nearest to the scene's own."""
         if self.law is None:
             return {}
         return named_knots(accelerations(chosen(self.scene), scene_numbers(self.scene), self.law.intervals))
@@ -540,5 +540,5 @@ class SheddingTask(Task):
         return SpringScale(self.sampler, self.limited["X0"][1] + self.known["travel"], most)
 
     def figure_size(self, name: str) -> float:
-        """Return the natural size of a figure."""
+        """Natural size of a figure."""
         return self.limit_size(name, 0.0) if name in CYCLE else size_read(self.sampler, name, self.scene.schema.figures)

@@ -105,7 +105,7 @@ def law(found: CamLaw) -> list[Equation]:
 
 @functools.lru_cache(64)
 def expanded(formula: Expression, u: Expression) -> Expression:
-    """Return a law's formula as a sum of powers of u and plain sine waves."""
+    """Law's formula as a sum of powers of u and plain sine waves."""
     from sympy.simplify.fu import TR8
 
     sp = sympy()
@@ -197,7 +197,7 @@ class FrameSymbols(Motion):
 
 
 def equations(model: JobModel) -> tuple[Equation, ...]:
-    """Return the equations of a shedding scene: law, segments, motion, terms, balance, contact, follower, coils.
+    """Equations of a shedding scene: law, segments, motion, terms, balance, contact, follower, coils.
 
     An effect that is not in the scene leaves no symbol and no term. phi0: the arm's angle at the beginning of the
     rise; omega: speed of the cam shaft; w: |d(x, y)/d theta|.
@@ -217,13 +217,16 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
 
 
 def _given(model: JobModel) -> Given:
-    """Return the scene's numbers as symbols, with the words that choose formulas."""
+    """Scene's numbers as symbols, with the words that choose formulas."""
     knots = set(filter(of_knots, model.known))
     values = {name: symbol(name) for name in model.known - knots - set(model.labels)}
     values |= {"speed": symbol(SPEED)} if "speed" in values else {}
     cam = frame(model)
     if isinstance(cam, CamProgram):
-        named = {each: symbol(f"{letter}_{k + 1}") for k in range(len(cam.moves)) for letter, each in _letters(k)}
+        letters = {"a": width, "X": height}
+        named = {
+            name(k): symbol(f"{letter}_{k + 1}") for k in range(len(cam.moves)) for letter, name in letters.items()
+        }
         values |= named
         return effect_equations.given(model, {**values, **cam.derived(systems.sympy(), Given(values, {}), ())})
     far = values["rise"]
@@ -266,7 +269,7 @@ def _term(model: JobModel, segments: Sequence[int], load: Acting, known: Given) 
 
 
 def _in_segment(model: JobModel, load: Acting, segment: int, force: Callable[..., Expression]) -> Case:
-    """Return a term in one segment, with the segment; what a dwell leaves open, and what nobody knows, in words."""
+    """Term in one segment, with the segment; what a dwell leaves open, and what nobody knows, in words."""
     known_in = load.known_in(model.words_of(load.name)) if isinstance(load, Load) else ()
     if known_in and (SEGMENT, float(segment)) not in known_in:
         return "not known", WHERE[segment]
@@ -277,7 +280,7 @@ def _in_segment(model: JobModel, load: Acting, segment: int, force: Callable[...
 
 
 def motion(cam: CamFrame, given: Given) -> list[Equation]:
-    """Return the segments, and u, X, X' and X'' in each, by the frame's own pose; given: the scene's numbers."""
+    """Segments, and u, X, X' and X'' in each, by the frame's own pose; given: the scene's numbers."""
     theta, values, pi = symbol("theta"), given.values, systems.sympy().pi
     ends = (sympy().Integer(0), *(values[f"begin.{name}"] for name in ("far", "return", "near")), 2 * pi)
     spans = [(SEGMENTS[k], (ends[k], theta, ends[k + 1])) for k in cam.segments]
@@ -298,13 +301,8 @@ def motion(cam: CamFrame, given: Given) -> list[Equation]:
     ]
 
 
-def _letters(k: int) -> tuple[tuple[str, str], tuple[str, str]]:
-    """Return the letters of a segment's cam angle and of X at its end, with the names of their numbers."""
-    return ("a", width(k)), ("X", height(k))
-
-
 def program(cam: CamProgram, given: Given) -> list[Equation]:
-    """Return the segments of a motion in several, and u, X, X' and X'' in each; a_k: angle, X_k: X at its end."""
+    """Segments of a motion in several, and u, X, X' and X'' in each; a_k: angle, X_k: X at its end."""
     theta, values, pi = symbol("theta"), given.values, systems.sympy().pi
     count = len(cam.moves)
     ends = [*(sympy().sympify(values[f"begin.{k + 1}"]) for k in range(count)), 2 * pi]
@@ -331,7 +329,7 @@ def program(cam: CamProgram, given: Given) -> list[Equation]:
 
 
 def pose(cam: CamFrame, given: Given, segment: int) -> FrameMotion:
-    """Return the frame's pose on symbols in a segment; the law's s, s', s'' are symbols."""
+    """Frame's pose on symbols in a segment; the law's s, s', s'' are symbols."""
     unwritten = dataclasses.replace(cam, law=Unwritten(cam.law))
     return unwritten.pose(systems.sympy(), given, Node(symbol("theta"), {SEGMENT: segment, LAW: 0}))
 
@@ -340,12 +338,12 @@ class _Started(Follower):
     """A follower whose angle φ0 is a symbol."""
 
     def start_angle(self, maths: Maths) -> Number:
-        """Return φ0."""
+        """φ0."""
         return symbol("phi0")
 
 
 def follower() -> list[Equation]:
-    """Return the follower's equations: swing, roller centre, pressure angle, curvature, profile."""
+    """Follower's equations: swing, roller centre, pressure angle, curvature, profile."""
     system, theta = systems.sympy(), symbol("theta")
     numbers = [symbol(name) for name in FOLLOWER]
     at = Contact(system, _Started(*numbers), symbol("phi"), symbol("phi'"), symbol("phi''"))
@@ -398,37 +396,37 @@ class SheddingViews(JobViews):
     lists = {"law": "s'' at {count} knots"}  # noqa: RUF012 (never changed)
 
     def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
-        """Return the cam with its follower in both dwells and at the least cam force, full scale. Raises BadInput."""
+        """Cam with its follower in both dwells and at the least cam force, full scale. Raises BadInput."""
         from loomopt.jobs.shedding import drawing
 
         found = drawing.cam(scene, design)
         return drawing.linkage(scene, found, registry.of(scene).figures(scene, design))
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Return the profile as CSV. Raises BadInput."""
+        """Profile as CSV. Raises BadInput."""
         from loomopt.jobs.shedding import drawing
 
         return drawing.joints_csv(scene, drawing.cam(scene, design))
 
     def motion(self, scene: Scene, design: Mapping[str, float], angles: "Floats") -> "MechanismMotion | None":
-        """Return the cam turning under its arm at cam angles, rad; none without a follower. Raises BadInput."""
+        """Cam turning under its arm at cam angles, rad; none without a follower. Raises BadInput."""
         from loomopt.jobs.shedding import drawing
 
         return None if self.missing(scene) else drawing.motion(drawing.cam(scene, design), angles)
 
     def missing(self, scene: Scene) -> tuple[str, ...]:
-        """Return the keys of the follower that the scene does not give."""
+        """Keys of the follower that the scene does not give."""
         from loomopt.jobs.shedding import drawing
 
         return drawing.missing(scene)
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
-        """Return the equations the scene really uses."""
+        """Equations the scene really uses."""
 
         return equations(registry.of(scene).model(scene))
 
     def marks(self, scene: Scene, design: Mapping[str, float]) -> Marks:
-        """Return the dwells, cam angles in rad, and where the cam force is least if the frame stays on its cam."""
+        """Dwells, cam angles in rad, and where the cam force is least if the frame stays on its cam."""
         job = registry.of(scene)
         values = job.sampler(scene, design).given.values
         spans = frame(job.model(scene)).spans(values)
@@ -551,7 +549,7 @@ def _partly(sampler: Sampler) -> Iterator[str]:
 
 
 def _others(load: Load[Any], words: Mapping[str, str]) -> str:
-    """Return the words of a load's table with which it is known all over the cycle."""
+    """Words of a load's table with which it is known all over the cycle."""
     found = []
     for key, word in words.items():
         said = [each for each in get_args(load.table.model_fields[key].annotation) if each != word]
@@ -560,7 +558,7 @@ def _others(load: Load[Any], words: Mapping[str, str]) -> str:
 
 
 def _acting(sampler: Sampler) -> list[str]:
-    """Return the loads that act while the frame moves: they need the speed, or differ between rise and return."""
+    """Loads that act while the frame moves: they need the speed, or differ between rise and return."""
     rise, back = (_terms(sampler, segment) for segment in (RISE, RETURN))
     moved = {load.name for load in sampler.model.loads if "operation.speed" in load.needs}
     moved |= {name for name, term in rise.items() if not math.isclose(term, back[name], rel_tol=ALIKE, abs_tol=ALIKE)}

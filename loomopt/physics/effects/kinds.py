@@ -121,12 +121,12 @@ class Loading(Protocol):
 
 
 def constant_switch(angle: float, corners: tuple[float, ...]) -> float:
-    """Return the switch of what has no corners: it is never read."""
+    """Switch of what has no corners: it is never read."""
     return 0.0
 
 
 def nothing_unknown(words: Mapping[str, str]) -> tuple[Place, ...]:
-    """Return no places: what the effect adds is known all over the cycle."""
+    """No places: what the effect adds is known all over the cycle."""
     return ()
 
 
@@ -241,7 +241,7 @@ class LoadTable(NamedTuple):
 
 
 def needed(effect: "Effect", own: Table) -> tuple[str, ...]:
-    """Return the scene keys that an effect needs with the values of its table."""
+    """Scene keys that an effect needs with the values of its table."""
     table = effect.tabulated if isinstance(effect, Load) else None
     given = table is not None and getattr(own, table.key) is not None
     own_needs = (*effect.needs, *model_of(effect, own).needs)
@@ -249,7 +249,7 @@ def needed(effect: "Effect", own: Table) -> tuple[str, ...]:
 
 
 def required(effect: "Effect") -> tuple[str, ...]:
-    """Return the keys of an effect's table without which it is none, those that a curve may stand for included."""
+    """Keys of an effect's table without which it is none, those that a curve may stand for included."""
     table = effect.tabulated if isinstance(effect, Load) else None
     for_curve = table.instead if table else ()
     fields = effect.table.model_fields
@@ -550,16 +550,16 @@ class SteadyOscillator(Protocol):
         """Time of one turn, s."""
 
     def steady(self, frequency: Number, /) -> tuple[Number, Number]:
-        """Return A and B of its answer A cos Ωt + B sin Ωt to the force cos Ωt; frequency: Ω, rad/s."""
+        """A and B of its answer A cos Ωt + B sin Ωt to the force cos Ωt; frequency: Ω, rad/s."""
 
     def steady_cubic(self, force: Sequence[Number], /) -> tuple[Number, Number, Number, Number]:
-        """Return the powers of the cubic in time that answers a force that is one; force: its powers, N or N·m."""
+        """Powers of the cubic in time that answers a force that is one; force: its powers, N or N·m."""
 
     def repeated(self, position: Number, rate: Number, /) -> tuple[Number, Number]:
-        """Return z and z˙ just after a kick of both, once a turn for ever."""
+        """z and z˙ just after a kick of both, once a turn for ever."""
 
     def ringing(self, after: tuple[Number, Number], elapsed: Number, /) -> tuple[Number, Number]:
-        """Return z and z˙ of the free vibration that begins with `after`; elapsed: time since then, s."""
+        """z and z˙ of the free vibration that begins with `after`; elapsed: time since then, s."""
 
 
 class Carried(NamedTuple):
@@ -600,7 +600,7 @@ class Written(NamedTuple):
 
 @functools.lru_cache(maxsize=256)
 def keys(table: type[Table]) -> tuple[str, ...]:
-    """Return the keys of a table's values, those of the tables inside it dotted."""
+    """Keys of a table's values, those of the tables inside it dotted."""
     found: list[str] = []
     for key, info in table.model_fields.items():
         kinds = (info.annotation, *get_args(info.annotation))
@@ -610,7 +610,7 @@ def keys(table: type[Table]) -> tuple[str, ...]:
 
 
 def value_at(table: Table, key: str) -> object:
-    """Return a table's value by a dotted key; None where it, or the table that it would stand in, is not given."""
+    """Table's value by a dotted key; None where it, or the table that it would stand in, is not given."""
     found: object = table
     for part in key.split("."):
         found = None if found is None else getattr(found, part)
@@ -618,12 +618,12 @@ def value_at(table: Table, key: str) -> object:
 
 
 def owned(effect: Effect, key: str) -> str:
-    """Return the full name of a number of an effect's table, unique in a scene."""
+    """Full name of a number of an effect's table, unique in a scene."""
     return f"{effect.name}.{key}"
 
 
 def lacking(check: Check[Any], known: Collection[str]) -> dict[str, tuple[str, ...]]:
-    """Return the figures of a check that have no value, each with the scene keys that it needs and that are missing.
+    """Figures of a check that have no value, each with the scene keys that it needs and that are missing.
 
     known: names of scene numbers that are given; empty for all of them.
     """
@@ -649,7 +649,7 @@ def label(effect: Effect, key: str) -> str:
 
 @functools.cache
 def of(package: str, variant: str = "EFFECT") -> Mapping[str, Effect]:
-    """Return the effects that the modules of a package declare as EFFECT, by name, the lowest rank first.
+    """Effects that the modules of a package declare as EFFECT, by name, the lowest rank first.
 
     variant: another name under which a module may declare it, or None where it then has no effect.
     """

@@ -25,7 +25,7 @@ class Pin(Table):
 
 
 def own(pins: Mapping[str, str]) -> type[Table]:
-    """Return the table of an effect that tells what pins lose; pins: name → what it is."""
+    """Table of an effect that tells what pins lose; pins: name → what it is."""
     fields = {name: (Pin | None, Field(None, description=text)) for name, text in pins.items()}
     inner = create_model("Pins", __base__=Table, __module__=__name__, __doc__="Friction of each pin.", **fields)  # type: ignore[call-overload]
     whole = (inner | None, Field(None, description="friction of the pins, for what they lose: a figure only"))
@@ -35,7 +35,7 @@ def own(pins: Mapping[str, str]) -> type[Table]:
 
 
 def read(effect: str, pins: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the scene keys that the loss by friction reads."""
+    """Scene keys that the loss by friction reads."""
     return tuple(f"effects.{effect}.pins.{name}.{key}" for name in pins for key in Pin.model_fields)
 
 

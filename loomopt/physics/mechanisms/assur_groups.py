@@ -37,10 +37,10 @@ class Closure(Protocol):
         """Heron's factors by name: each below 1 where the group closes, and 1 where it is singular."""
 
     def across(self) -> Number:
-        """Return the sine of its transmission angle, times a positive number."""
+        """Sine of its transmission angle, times a positive number."""
 
     def inward(self) -> Number:
-        """Return the cosine of its transmission angle, times the same number; 0 where that is a right angle."""
+        """Cosine of its transmission angle, times the same number; 0 where that is a right angle."""
 
 
 class Slide(NamedTuple):
@@ -50,7 +50,7 @@ class Slide(NamedTuple):
 
 
 def passing(base: Vector, base_1: Vector | None) -> Number:
-    """Return |base'|²/(|base'|² + |base|²), 1 where two joints meet, whatever the unit of length.
+    """|base'|²/(|base'|² + |base|²), 1 where two joints meet, whatever the unit of length.
 
     base: from one to the other, m; base_1: its derivative with respect to φ. Kept below 1/ASSEMBLY_MARGIN², a link
     between them turns at most 22 times as fast as the crank, as in a dyad that keeps that margin.
@@ -114,13 +114,13 @@ class TwoLinks:
         )
 
     def rates_1(self, order: int) -> Number | None:
-        """Return a derivative of the first link's angle."""
+        """Derivative of the first link's angle."""
         if self._bases[1] is None:
             return None
         return self._rates[0] if order == 1 else self._second_1 if order == 2 else self._third_1
 
     def rates_2(self, order: int) -> Number | None:
-        """Return a derivative of the second link's angle."""
+        """Derivative of the second link's angle."""
         if self._bases[1] is None:
             return None
         return self._rates[1] if order == 1 else self._second_2 if order == 2 else self._third_2
@@ -146,11 +146,11 @@ class TwoLinks:
         }
 
     def across(self) -> Number:
-        """Return the sine of the angle between both links, scaled."""
+        """Sine of the angle between both links, scaled."""
         return self.side * self.closed.area4 / 2
 
     def inward(self) -> Number:
-        """Return the cosine of the angle between both links, scaled."""
+        """Cosine of the angle between both links, scaled."""
         return dot(self.closed.link1, self.closed.link2)
 
 
@@ -172,7 +172,7 @@ class OnGuide:
     side: int
 
     def base(self, order: int) -> Vector | None:
-        """Return the way from the link's joint to the guide's, or its derivative."""
+        """Way from the link's joint to the guide's, or its derivative."""
         return minus(self.through.at(order), self.start.at(order))
 
     @lazy
@@ -253,18 +253,18 @@ class OnGuide:
         return self.base(1) is None and self.guide.rates(1) is None
 
     def rates(self, order: int) -> Number | None:
-        """Return a derivative of the link's angle."""
+        """Derivative of the link's angle."""
         return None if self._still else self._motion(order)[0]
 
     def _motion(self, order: int) -> tuple[Number, Number]:
         return self._first if order == 1 else self._second if order == 2 else self._third
 
     def slide(self) -> Slide:
-        """Return the place of the pin on the guide."""
+        """Place of the pin on the guide."""
         return Slide(lambda order: self.s if order == 0 else 0 if self._still else self._motion(order)[1])
 
     def link(self) -> Link:
-        """Return the link, from its joint."""
+        """Link, from its joint."""
         return Link(self.start, lambda: self.vector, self.rates, self.r)
 
     @property
@@ -273,11 +273,11 @@ class OnGuide:
         return {"span": lambda: dyad.square(self.height / self.r)}
 
     def across(self) -> Number:
-        """Return the sine of the angle between the link and the guide's normal, scaled."""
+        """Sine of the angle between the link and the guide's normal, scaled."""
         return self.side * self.reach
 
     def inward(self) -> Number:
-        """Return the cosine of that angle, scaled."""
+        """Cosine of that angle, scaled."""
         return self.height
 
 
@@ -291,7 +291,7 @@ class Slotted:
     offset: Number | None
 
     def base(self, order: int) -> Vector | None:
-        """Return the way from the link's joint to the one that slides in it, or its derivative."""
+        """Way from the link's joint to the one that slides in it, or its derivative."""
         return minus(self.through.at(order), self.pivot.at(order))
 
     @lazy
@@ -353,15 +353,15 @@ class Slotted:
         return self._first if order == 1 else self._second if order == 2 else self._third
 
     def rates(self, order: int) -> Number | None:
-        """Return a derivative of the link's angle."""
+        """Derivative of the link's angle."""
         return None if self._base_1 is None else self._motion(order)[0]
 
     def slide(self) -> Slide:
-        """Return the place of the other joint along the line."""
+        """Place of the other joint along the line."""
         return Slide(lambda order: self.s if order == 0 else 0 if self._base_1 is None else self._motion(order)[1])
 
     def link(self) -> Link:
-        """Return the link, from its joint."""
+        """Link, from its joint."""
         return Link(self.pivot, lambda: self.d, self.rates)
 
     @property
@@ -373,9 +373,9 @@ class Slotted:
         return {"span": lambda: offset * offset / self._square}
 
     def across(self) -> Number:
-        """Return the sine of the angle between the line's normal and the way to the pivot, scaled."""
+        """Sine of the angle between the line's normal and the way to the pivot, scaled."""
         return self.s
 
     def inward(self) -> Number:
-        """Return the cosine of that angle, scaled."""
+        """Cosine of that angle, scaled."""
         return 0 if self.offset is None else self.offset

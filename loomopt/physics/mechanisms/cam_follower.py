@@ -37,7 +37,7 @@ class Follower:
     arm_swing: Number
 
     def start_angle(self, maths: Maths) -> Number:
-        """Return φ0, rad: the angle at the pivot of the triangle a, l, r0, from factors that do not cancel."""
+        """φ0, rad: the angle at the pivot of the triangle a, l, r0, from factors that do not cancel."""
         a, arm, r0 = self.centre_distance, self.arm, self.base_radius
         opening = maths.sqrt((r0 + a - arm) * (r0 - a + arm))
         return 2 * maths.atan2(opening, maths.sqrt((a + arm - r0) * (a + arm + r0)))
@@ -85,23 +85,23 @@ class Contact:
         return self.maths.sqrt(along**2 + across**2)
 
     def _turned(self, theta: Number, along: Number, across: Number) -> Vector:
-        """Return a vector given along and across the arm in the cam's frame at cam angle θ."""
+        """Vector given along and across the arm in the cam's frame at cam angle θ."""
         sine, cosine = self.maths.sin(theta + self._angle), self.maths.cos(theta + self._angle)
         return Vector(along * sine + across * cosine, along * cosine - across * sine)
 
     def centre(self, theta: Number) -> Vector:
-        """Return the roller centre in the cam's frame, m."""
+        """Roller centre in the cam's frame, m."""
         a, arm = self.follower.centre_distance, self.follower.arm
         sin, cos, direction = self.maths.sin, self.maths.cos, theta + self._angle
         return Vector(a * sin(theta) - arm * sin(direction), a * cos(theta) - arm * cos(direction))
 
     def normal(self, theta: Number) -> Vector:
-        """Return the unit normal of the curve in the cam's frame, towards the cam."""
+        """Unit normal of the curve in the cam's frame, towards the cam."""
         along, across = self._local
         return self._turned(theta, -across / self.speed, along / self.speed)
 
     def profile(self, theta: Number) -> Vector:
-        """Return the point of the cam's surface under the roller, m: one roller radius along the normal."""
+        """Point of the cam's surface under the roller, m: one roller radius along the normal."""
         centre, normal = self.centre(theta), self.normal(theta)
         radius = self.follower.roller_radius
         return Vector(centre.x + radius * normal.x, centre.y + radius * normal.y)

@@ -56,7 +56,7 @@ def _harmonic(maths: Maths, u: Number, _piece: Number) -> LawDerivatives:
 
 
 def _harmonics(first: int, third: int) -> Callable[[Maths, Number, Number], LawDerivatives]:
-    """Return the law s' = 1 − (first·cos x + third·cos 3x)/(first + third), x = 2πu, in powers of sin x and sin x/2."""
+    """Law s' = 1 − (first·cos x + third·cos 3x)/(first + third), x = 2πu, in powers of sin x and sin x/2."""
     total = first + third
 
     def formula(maths: Maths, u: Number, _piece: Number) -> LawDerivatives:

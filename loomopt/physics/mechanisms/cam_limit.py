@@ -31,7 +31,7 @@ class SymmetricFrame:
     inertia: Number
 
     def slopes(self, stiffness: Number) -> tuple[tuple[Number, Number], tuple[Number, Number]]:
-        """Return (α, β) of −s'' = α + β s on the arc: above the middle of the shed, s > 1/2, and before it."""
+        """(α, β) of −s'' = α + β s on the arc: above the middle of the shed, s > 1/2, and before it."""
         steady, stretch = stiffness * self.preload - self.steady, stiffness * self.travel
         above = (steady - self.after) / self.inertia, (stretch + 2 * self.after) / self.inertia
         below = (steady - self.before) / self.inertia, (stretch + 2 * self.before) / self.inertia
@@ -39,7 +39,7 @@ class SymmetricFrame:
 
 
 def least_stiffness(frame: SymmetricFrame, high: Number) -> Number | None:
-    """Return the stiffness between 0 and `high`, N/m, where bang and arc take the whole rise; frame: in mpmath.
+    """Stiffness between 0 and `high`, N/m, where bang and arc take the whole rise; frame: in mpmath.
 
     By halving: exact, and never astray. None where `high` is too low, or the arc leaves the bound.
     """
@@ -56,7 +56,7 @@ def least_stiffness(frame: SymmetricFrame, high: Number) -> Number | None:
 
 
 def _duration(frame: SymmetricFrame, stiffness: Number) -> Number:
-    """Return the share of the rise that bang and arc take, infinite where the spring cannot hold the frame up."""
+    """Share of the rise that bang and arc take, infinite where the spring cannot hold the frame up."""
     context = systems.mpmath(DIGITS)
     (a, b), (c, d) = frame.slopes(stiffness)
     if not (c > 0 and a + b / 2 > 0):
@@ -73,12 +73,12 @@ def _duration(frame: SymmetricFrame, stiffness: Number) -> Number:
 
 
 def _meeting(context: Maths, p: Number, q: Number, r: Number) -> Number:
-    """Return s where the arc's energy is the bang's: the positive root of q s² + 2 p s = r."""
+    """s where the arc's energy is the bang's: the positive root of q s² + 2 p s = r."""
     return r / (p + context.sqrt(p * p + q * r))
 
 
 def _swing(context: Maths, level: Number, beta: Number, amplitude: Number, begin: Number, end: Number) -> Number:
-    """Return the time from s = end up to s = begin on s + level = amplitude · cos(√β t)."""
+    """Time from s = end up to s = begin on s + level = amplitude · cos(√β t)."""
 
     def phase(s: Number) -> Number:
         share = (s + level) / amplitude

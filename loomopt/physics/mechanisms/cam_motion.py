@@ -37,7 +37,7 @@ class CamLaw(Hashable, Protocol):
         """Return what every position shares."""
 
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
-        """Return s and its derivatives at u."""
+        """s and its derivatives at u."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class NamedLaw:
         return {}
 
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
-        """Return s and its derivatives at u."""
+        """s and its derivatives at u."""
         return LAWS[self.name].formula(maths, u, piece)
 
 
@@ -115,7 +115,7 @@ class Spline:
         return tuple(values[f"{PREFIX}{k}"] for k in range(self.intervals + 1))
 
     def prepared(self, maths: Maths, values: Values) -> dict[str, Number]:
-        """Return s, s' and s'' at the knots; s and s' as they are where `values` have them."""
+        """s, s' and s'' at the knots; s and s' as they are where `values` have them."""
         bends = dict(zip(self.knots["a"], self.accelerations(values), strict=True))
         if self.recurrent[0] in values:
             first = dict.fromkeys((self.knots["s"][0], self.knots["v"][0]), maths.number(0.0))
@@ -125,18 +125,18 @@ class Spline:
         return bends | dict(columns)
 
     def followed(self, maths: Maths, values: Values) -> dict[str, Number]:
-        """Return s and s' at every knot from those at the knot before; values: with all of them."""
+        """s and s' at every knot from those at the knot before; values: with all of them."""
         known = self.prepared(maths, values)
         s, v, a = ([known[name] for name in self.knots[of]] for of in "sva")
         steps = (cam_spline.after(self.intervals, *at) for at in zip(s, v, a, a[1:], strict=False))
         return dict(zip(self.recurrent, itertools.chain.from_iterable(steps), strict=True))
 
     def knot(self, of: str, k: int) -> str:
-        """Return the name of s, v or a (= s, s', s'') at a knot."""
+        """Name of s, v or a (= s, s', s'') at a knot."""
         return f"{PREFIX}{of}_{k}"
 
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
-        """Return s and its derivatives at u."""
+        """s and its derivatives at u."""
         columns = (LawColumn(values, names) for names in self._ends)
         return cam_spline.cubic(
             self.intervals * u - piece, self.intervals, *(maths.choose(piece, column) for column in columns)
@@ -164,7 +164,7 @@ class LawColumn(Sequence[Number]):
         return map(self.values.__getitem__, self.names)
 
     def __getitem__(self, place: Number) -> Number:
-        """Return the value at a place."""
+        """Value at a place."""
         return self.values[self.names[place]]
 
 
@@ -194,7 +194,7 @@ class Tabulated:
         return {}
 
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
-        """Return s and its derivatives at u."""
+        """s and its derivatives at u."""
         return self.table.at(maths, u, piece)
 
 
@@ -222,25 +222,25 @@ def accelerations(law: CamLaw, values: Values, intervals: int) -> tuple[float, .
 
 
 def segment_at(present: tuple[int, ...], angle: float, corners: tuple[float, ...]) -> float:
-    """Return the segment that a cam angle lies in; corners: where those that are present begin."""
+    """Segment that a cam angle lies in; corners: where those that are present begin."""
     return float(present[sum(angle >= corner for corner in corners) - 1])
 
 
 def piece_at(angle: float, corners: tuple[float, ...]) -> float:
-    """Return the law's piece at a cam angle; corners: its breaks on the rise, then, mirrored, those on the return."""
+    """Law's piece at a cam angle; corners: its breaks on the rise, then, mirrored, those on the return."""
     half = len(corners) // 2
     return float(bisect.bisect_right(corners[:half], angle) - bisect.bisect_right(corners[: half - 1 : -1], angle))
 
 
 def mirrored(values: Values, shares: Sequence[Number]) -> tuple[Number, ...]:
-    """Return the cam angles of arguments u on the rise, then on the return, where u falls from 1 to 0."""
+    """Cam angles of arguments u on the rise, then on the return, where u falls from 1 to 0."""
     rise = [_part(values["rise"], share) for share in shares]
     back = [values["begin.near"] - _part(values["return"], share) for share in shares]
     return (*rise, *back)
 
 
 def middle(law: CamLaw, values: Values) -> tuple[float, float]:
-    """Return the u where a law of floats passes s = 1/2 for good, and the number of its piece.
+    """U where a law of floats passes s = 1/2 for good, and the number of its piece.
 
     Raises ValueError for numbers that make no law: it never lies below 1/2.
     """
@@ -257,5 +257,5 @@ def middle(law: CamLaw, values: Values) -> tuple[float, float]:
 
 
 def _part(angle: Number, share: Number) -> Number:
-    """Return a share of an angle; a fraction without rounding it first."""
+    """Share of an angle; a fraction without rounding it first."""
     return angle * share.numerator / share.denominator if isinstance(share, Fraction) else angle * share

@@ -65,7 +65,7 @@ class SplineData:
 
 
 def cubic(share: Number, n: int, s: Number, v: Number, a: Number, after: Number) -> LawDerivatives:
-    """Return s and its derivatives at a share of one of n equal intervals, from s, s', s'' at its beginning and s''
+    """s and its derivatives at a share of one of n equal intervals, from s, s', s'' at its beginning and s''
     at its end.
     """
     t, rise = share / n, after - a
@@ -78,7 +78,7 @@ def cubic(share: Number, n: int, s: Number, v: Number, a: Number, after: Number)
 
 
 def spline(maths: Maths, accelerations: Sequence[Number]) -> SplineData:
-    """Return the spline that starts at rest with second derivatives a_0 … a_n at its evenly spaced knots.
+    """Spline that starts at rest with second derivatives a_0 … a_n at its evenly spaced knots.
 
     s and v are running sums, linear in the accelerations: with symbols for these, s(1) = 1 and s'(1) = 0 are linear.
     """
@@ -92,18 +92,18 @@ def spline(maths: Maths, accelerations: Sequence[Number]) -> SplineData:
 
 
 def after(n: int, s: Number, v: Number, before: Number, end: Number) -> tuple[Number, Number]:
-    """Return s and s' at the end of one of n equal intervals, from s, s', s'' at its beginning and s'' at its end."""
+    """s and s' at the end of one of n equal intervals, from s, s', s'' at its beginning and s'' at its end."""
     return s + v / n + (2 * before + end) / (6 * n**2), v + (before + end) / (2 * n)
 
 
 def mirrored(half: Sequence[Number]) -> tuple[Number, ...]:
-    """Return a_0 … a_n of the symmetric law, a_(n−k) = −a_k, from its first half a_0 … a_(n/2 − 1); n even."""
+    """a_0 … a_n of the symmetric law, a_(n−k) = −a_k, from its first half a_0 … a_(n/2 − 1); n even."""
     first = tuple(half)
     return (*first, 0 * first[0], *(-value for value in reversed(first)))
 
 
 def cycloid_like(n: int) -> tuple[float, ...]:
-    """Return a_0 … a_n of a start: samples of a sine, antisymmetric, scaled until s(1) = 1; then s'(1) = 0.
+    """a_0 … a_n of a start: samples of a sine, antisymmetric, scaled until s(1) = 1; then s'(1) = 0.
 
     Its peak is a little above the cycloid's own 2π, by a factor that tends to 1 as 1 + O(1/n²). Raises ValueError for
     n < 3: two intervals hold no sine.
@@ -147,7 +147,7 @@ class LawTable:
 
 
 def tabulated(u: Sequence[float], s: Sequence[float], half: Sequence[float] = ()) -> LawTable:
-    """Return the cubic through the points (u, s) with zero slope at both ends, smoothed as far as rounding allows.
+    """Cubic through the points (u, s) with zero slope at both ends, smoothed as far as rounding allows.
 
     half: how far rounding may have moved each s; nothing for exact ones. Raises ValueError unless at least 4 points
     rise from (0, 0) to (1, 1) with u increasing and the curve between them never falls by more than rounding may do.
@@ -220,7 +220,7 @@ def fault(accelerations: tuple[float, ...]) -> str:
 
 
 def _least_slope(made: SplineData, k: int) -> float:
-    """Return the least s' on an interval, where s'' is linear."""
+    """Least s' on an interval, where s'' is linear."""
     before, after = made.a[k : k + 2]
     turn = before / (before - after) if before < 0 < after else 1.0
     return float(min(made.v[k + 1], made.at(FLOAT, (k + turn) / made.intervals, k).s1))

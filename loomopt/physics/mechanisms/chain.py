@@ -84,12 +84,12 @@ class Part:
         return dict(self.refs)
 
     def word(self, key: str) -> str:
-        """Return a word by its key; "" without it."""
+        """Word by its key; "" without it."""
         found = self._words.get(key, "")
         return found if isinstance(found, str) else ""
 
     def names(self, key: str) -> tuple[str, ...]:
-        """Return a list of words by its key."""
+        """List of words by its key."""
         found = self._words.get(key, ())
         return found if isinstance(found, tuple) else ()
 
@@ -114,7 +114,7 @@ class ChainPose:
     margins: dict[str, Closure] = field(default_factory=dict)
 
     def number(self, part: Part, key: str) -> Number | None:
-        """Return a part's number; None for one that is not given, and for a literal 0."""
+        """Part's number; None for one that is not given, and for a literal 0."""
         ref = part.numbers.get(key)
         if ref is None:
             return None
@@ -123,11 +123,11 @@ class ChainPose:
         return self.values[ref.name] if ref.sign > 0 else -self.values[ref.name]
 
     def vector(self, link: str) -> Vector:
-        """Return a link's direction, of any length."""
+        """Link's direction, of any length."""
         return self.links[link].heading()
 
     def obliquity(self, part: str) -> Number:
-        """Return by how much a group's transmission angle falls short of a right angle, rad; negative beyond it."""
+        """Amount by which a group's transmission angle falls short of a right angle, rad; negative beyond it."""
         margin = self.margins[part]
         return self.maths.atan2(margin.inward(), margin.across())
 
@@ -198,13 +198,13 @@ def _gear(pose: ChainPose, part: Part) -> None:
 
 
 def _counted(maths: Maths, mate: Link, carrier: Link, zero: Number | None) -> Vector:
-    """Return the direction of a gear's mate as seen from its carrier, counted from zero."""
+    """Direction of a gear's mate as seen from its carrier, counted from zero."""
     seen = seen_from(carrier.unit(), mate.unit())
     return seen if zero is None else seen_from(polar(maths, zero), seen)
 
 
 def _power(unit: Vector, exponent: int) -> Vector:
-    """Return the unit vector whose angle is a whole multiple of another's."""
+    """Unit vector whose angle is a whole multiple of another's."""
     if exponent < 0:
         unit, exponent = Vector(unit.x, -unit.y), -exponent
     found = X
@@ -223,7 +223,7 @@ def _cam(pose: ChainPose, part: Part) -> None:
 
 
 def cam_switch(part: Part) -> str:
-    """Return the name under which a node says in which stretch of its turn a cam is."""
+    """Name under which a node says in which stretch of its turn a cam is."""
     return f"cam {part.name}"
 
 
@@ -298,42 +298,42 @@ DRIVERS = frozenset({"crank", "gear", "cam"})
 
 
 def joints_of(part: Part) -> tuple[str, ...]:
-    """Return the joints that a part places."""
+    """Joints that a part places."""
     own = (part.name,) if part.kind in ("pivot", "point") else ()
     return (*own, part.word("pin")) if part.word("pin") else own
 
 
 def links_of(part: Part) -> tuple[str, ...]:
-    """Return the links that a part places."""
+    """Links that a part places."""
     if part.kind in DRIVERS:
         return (part.name,)
     return (part.word("link"),) if part.word("link") else part.names("links")
 
 
 def provides(part: Part) -> tuple[str, ...]:
-    """Return the joints and links that a part places."""
+    """Joints and links that a part places."""
     return joints_of(part) + links_of(part)
 
 
 def wanted_joints(part: Part) -> tuple[str, ...]:
-    """Return the joints that a part hangs on."""
+    """Joints that a part hangs on."""
     found = (*part.names("joins"), *(part.word(key) for key in ("at", "from", "through")))
     return tuple(name for name in found if name)
 
 
 def wanted_links(part: Part) -> tuple[str, ...]:
-    """Return the links that a part hangs on; the frame is always there."""
+    """Links that a part hangs on; the frame is always there."""
     found = (part.word(key) for key in ("on", "guide", "with", "carrier"))
     return tuple(name for name in found if name not in ("", FRAME_NAME))
 
 
 def wants(part: Part) -> tuple[str, ...]:
-    """Return the joints and links that a part hangs on."""
+    """Joints and links that a part hangs on."""
     return wanted_joints(part) + wanted_links(part)
 
 
 def closes(part: Part) -> Mapping[str, str]:
-    """Return the spans of a part's margin by what they say: "drive: B to D < rod + rocker"."""
+    """Spans of a part's margin by what they say: "drive: B to D < rod + rocker"."""
     if part.kind == "dyad":
         (a, b), (one, other) = part.names("joins"), part.names("links")
         far, near = f"{part.name}: {a} to {b} < {one} + {other}", f"{part.name}: {a} to {b} > |{one} - {other}|"
@@ -365,7 +365,7 @@ class Chain:
     parts: tuple[Part, ...]
 
     def pose(self, maths: Maths, values: Values, phi: Number, switch: Values = NO_SWITCH) -> ChainPose:
-        """Return the linkage at crank angles φ, rad, of any shape; values: numbers by name, SI."""
+        """Linkage at crank angles φ, rad, of any shape; values: numbers by name, SI."""
         pose = ChainPose(maths, values, phi, switch)
         for part in self.parts:
             KINDS[part.kind](pose, part)
@@ -377,11 +377,11 @@ class Chain:
         return tuple(part for part in self.parts if part.kind == "cam")
 
     def corners(self, cam: Part, maths: Maths, values: Values) -> tuple[Number, ...]:
-        """Return the crank angles, rad, between the stretches of a cam, for `dwell_cam.stretch`."""
+        """Crank angles, rad, between the stretches of a cam, for `dwell_cam.stretch`."""
         return _lasts(ChainPose(maths, values, None), cam).corners(maths)
 
     def switch(self, values: Values, phi: "Floats") -> dict[str, Number]:
-        """Return the stretches in which all cams are at crank angles φ, rad, as a node has them."""
+        """Stretches in which all cams are at crank angles φ, rad, as a node has them."""
         return {cam_switch(cam): stretches(phi, self.corners(cam, FLOAT, values)) for cam in self.cams}
 
     @lazy
@@ -470,7 +470,7 @@ def _heights(chain: Chain, part: Part, span: str, values: Values, phi: "Floats")
 
 
 def _top(heights: "Callable[[Floats], Floats]") -> tuple[float, float]:
-    """Return the highest of heights(angles) over one turn, between samples too where it nears 1, and its angle, rad."""
+    """Highest of heights(angles) over one turn, between samples too where it nears 1, and its angle, rad."""
     import numpy as np
 
     from loomopt.maths.turning_points import sectioned

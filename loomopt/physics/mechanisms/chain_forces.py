@@ -21,12 +21,12 @@ from loomopt.physics.mechanisms.moving import known, less, polar, total, turned_
 
 
 def slider_of(part: str) -> str:
-    """Return the name of the body that slides in a part."""
+    """Name of the body that slides in a part."""
     return f"slider {part}"
 
 
 def owners(linked: Chain) -> dict[str, str]:
-    """Return the body that each joint belongs to."""
+    """Body that each joint belongs to."""
     found = {}
     for part in linked.parts:
         pin = part.word("pin")
@@ -41,7 +41,7 @@ def owners(linked: Chain) -> dict[str, str]:
 
 
 def origins(linked: Chain) -> dict[str, str]:
-    """Return the joint about which each link's moment is reckoned."""
+    """Joint about which each link's moment is reckoned."""
     found: dict[str, str] = {}
     for part in linked.parts:
         if part.kind == "dyad":
@@ -81,7 +81,7 @@ def pinned(linked: Chain) -> dict[tuple[str, str], str]:
 
 
 def joined(linked: Chain, place: tuple[str, str]) -> tuple[str, str]:
-    """Return the bodies that a force is between: of the first on the second one."""
+    """Bodies that a force is between: of the first on the second one."""
     joint, own = place
     part = next(each for each in linked.parts if each.name == own)
     if part.kind == "dyad":
@@ -111,7 +111,7 @@ def turned(linked: Chain, pose: ChainPose, place: tuple[str, str]) -> Number:
 
 
 def geared(linked: Chain) -> tuple[str, ...]:
-    """Return the gears that touch their mates at their pitch circles."""
+    """Gears that touch their mates at their pitch circles."""
     own = origins(linked)
     gears = (part for part in linked.parts if part.kind == "gear" and part.ratio != 1)
     return tuple(part.name for part in gears if own[part.word("with")] != part.word("at"))
@@ -192,7 +192,7 @@ class Walk:
         self.given(start, part, found.outer1)
 
     def sliding(self, part: Part) -> Vector:
-        """Return the unit direction in which a slider moves."""
+        """Unit direction in which a slider moves."""
         guide = self.pose.links[part.word("guide") or FRAME_NAME].unit()
         return turned_by(guide, polar(self.pose.maths, self.pose.number(part, "direction")))
 
@@ -234,7 +234,7 @@ class Walk:
 
 
 def walked(linked: Chain, pose: ChainPose, applied: Sequence[Applied]) -> Walk:
-    """Return a chain with the forces in all its joints, N, and what the main shaft must give."""
+    """Chain with the forces in all its joints, N, and what the main shaft must give."""
     walk = Walk(linked, pose)
     for load in applied:
         if load.on in pose.joints:

@@ -105,22 +105,22 @@ class CrankRockerPose:
 
 
 def _base_square(maths: Maths, lengths: Lengths, phi: Number) -> Number:
-    """Return the square of B to D, m², written so that nothing cancels near change points."""
+    """Square of B to D, m², written so that nothing cancels near change points."""
     return (lengths.l4 - lengths.l1) ** 2 + 4 * lengths.l1 * lengths.l4 * dyad.square(maths.sin(phi / 2))
 
 
 def span_far(maths: Maths, lengths: Lengths, phi: Number) -> Number:
-    """Return the square of B to D over that of l2 + l3: 1 where rod and rocker are stretched; phi: crank angle, rad."""
+    """Square of B to D over that of l2 + l3: 1 where rod and rocker are stretched; phi: crank angle, rad."""
     return _base_square(maths, lengths, phi) / (lengths.l2 + lengths.l3) ** 2
 
 
 def span_near(maths: Maths, lengths: Lengths, phi: Number) -> Number:
-    """Return the square of l2 − l3 over that of B to D: 1 where rod and rocker are folded; phi: crank angle, rad."""
+    """Square of l2 − l3 over that of B to D: 1 where rod and rocker are folded; phi: crank angle, rad."""
     return dyad.square(lengths.l2 - lengths.l3) / _base_square(maths, lengths, phi)
 
 
 def curves(lengths: Lengths, phi: "Floats", chunk: int = 8192) -> tuple["Floats", "Floats", "Floats"]:
-    """Return ψ, ψ', ψ'' at an array of crank angles φ, rad; lengths in m.
+    """ψ, ψ', ψ'' at an array of crank angles φ, rad; lengths in m.
 
     Evaluated `chunk` positions at a time, so that what a formula needs stays in the processor's cache.
     """
@@ -241,7 +241,7 @@ class Still(CrankRockerPose):
 
 
 def front_pose(maths: Maths, lengths: Lengths, centres: "DeadCentres") -> Still:
-    """Return the linkage at front dead centre: crank and rod stretched."""
+    """Linkage at front dead centre: crank and rod stretched."""
     return Still(maths, lengths, centres.beta, centres)
 
 
@@ -251,14 +251,14 @@ def dead_centres(maths: Maths, lengths: Lengths) -> DeadCentres:
 
 
 def transmission_angle_near(maths: Maths, lengths: Lengths) -> Number:
-    """Return μ at φ = 0, rad: there μ is least [Yuan24, eq 17 with the square it lacks]."""
+    """μ at φ = 0, rad: there μ is least [Yuan24, eq 17 with the square it lacks]."""
     l2, l3, near = lengths.l2, lengths.l3, lengths.l4 - lengths.l1
     opening = maths.sqrt((near + l2 - l3) * (near - l2 + l3))
     return 2 * maths.atan2(opening, maths.sqrt((l2 + l3 - near) * (l2 + l3 + near)))
 
 
 def transmission_angle_far(maths: Maths, lengths: Lengths) -> Number:
-    """Return π − μ at φ = π, rad: there μ is largest; μ_min over the cycle is the lesser of this and the near one."""
+    """π − μ at φ = π, rad: there μ is largest; μ_min over the cycle is the lesser of this and the near one."""
     l2, l3, far = lengths.l2, lengths.l3, lengths.l4 + lengths.l1
     closing = maths.sqrt((l2 + l3 - far) * (l2 + l3 + far))
     return 2 * maths.atan2(closing, maths.sqrt((far + l2 - l3) * (far - l2 + l3)))
@@ -275,7 +275,7 @@ class Inequality(NamedTuple):
 
 
 def assembly_margins(lengths: Lengths) -> dict[Inequality, Number]:
-    """Return by how much each inequality of a crank-rocker holds, in units of length; all positive ⇔ crank-rocker.
+    """Amount by which each inequality of a crank-rocker holds, in units of length; all positive ⇔ crank-rocker.
 
     The first keeps the dyad closed at φ = π, the next two at φ = 0, the last makes AB the shortest link.
     """
@@ -324,6 +324,6 @@ def _where_it_stops(l1: float, l2: float, l3: float, l4: float, shown: ShowValue
 
 
 def _angle_at(l1: float, l4: float, distance: float) -> float:
-    """Return the crank angle, rad, at which BD (m) has a given length."""
+    """Crank angle, rad, at which BD (m) has a given length."""
     far, near = (l4 + l1 - distance) * (l4 + l1 + distance), (distance - l4 + l1) * (distance + l4 - l1)
     return 2 * math.atan2(math.sqrt(max(near, 0.0)), math.sqrt(max(far, 0.0)))

@@ -35,7 +35,7 @@ class Stretches:
         return self.begins + self.rise + self.dwell
 
     def corners(self, maths: Maths) -> tuple[Number, ...]:
-        """Return the crank angles between stretches, in order from where the rise begins."""
+        """Crank angles between stretches, in order from where the rise begins."""
         breaks = [maths.number(each.numerator) / each.denominator for each in LAWS[self.law].breaks]
         up = [self.begins, *(self.begins + self.rise * at for at in breaks), self.begins + self.rise]
         down = [self.falls, *(self.falls + self.fall * (1 - at) for at in reversed(breaks)), self.falls + self.fall]
@@ -43,13 +43,13 @@ class Stretches:
 
 
 def stretch(angle: float, corners: Sequence[float]) -> float:
-    """Return the number of the stretch in which a crank angle lies; corners: as from `Stretches.corners`, rad."""
+    """Number of the stretch in which a crank angle lies; corners: as from `Stretches.corners`, rad."""
     turned = (angle - corners[0]) % (2 * math.pi)
     return float(sum(turned >= corner - corners[0] for corner in corners[1:]))
 
 
 def stretches(angles: "Floats", corners: Sequence[float]) -> "Floats":
-    """Return the numbers of the stretches in which crank angles lie."""
+    """Numbers of the stretches in which crank angles lie."""
     import numpy as np
 
     turned = np.mod(np.asarray(angles, dtype=np.float64) - corners[0], 2 * math.pi)
@@ -90,7 +90,7 @@ class DwellCam:
         return law.formula(self.maths, share, piece), grows, moves
 
     def angle(self, order: int) -> Number:
-        """Return the follower's angle from its lower dwell, or a derivative of it."""
+        """Follower's angle from its lower dwell, or a derivative of it."""
         law, grows, moves = self._law
         if order == 0:
             low = [0.0] * (len(LAWS[self.lasts.law].breaks) + 1)

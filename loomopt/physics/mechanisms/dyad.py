@@ -28,7 +28,7 @@ class Dyad(NamedTuple):
 
 
 def dot(a: Vector, b: Vector) -> Number:
-    """Return the inner product a·b."""
+    """Inner product a·b."""
     return a.x * b.x + a.y * b.y
 
 
@@ -41,7 +41,7 @@ def heron(maths: Maths, a: Number, b: Number, c: Number) -> Number:
 
 
 def close(maths: Maths, base: Vector, r1: Number, r2: Number, side: Number) -> Dyad:
-    """Return the dyad of links r1 (from P1) and r2 (from P2) over the base vector P1→P2.
+    """Dyad of links r1 (from P1) and r2 (from P2) over the base vector P1→P2.
 
     Assumes |r1 − r2| < |base| < r1 + r2. Intersection of two circles by Heron's factors: the error is that of the
     data, also near folded and stretched positions.
@@ -65,19 +65,19 @@ def rates(dyad: Dyad, base_1: Vector) -> tuple[Number, Number]:
 
 
 def second_rate_1(dyad: Dyad, base_2: Vector, rate1: Number, rate2: Number, r2: Number) -> Number:
-    """Return d²φ₁/dφ² of link 1; base_2: d²(base)/dφ², rates as from `rates`."""
+    """d²φ₁/dφ² of link 1; base_2: d²(base)/dφ², rates as from `rates`."""
     mutual = dot(dyad.link1, dyad.link2)
     return 2 / dyad.area4 * (dot(dyad.link2, base_2) + rate1 * rate1 * mutual - rate2 * rate2 * (r2 * r2))
 
 
 def second_rate_2(dyad: Dyad, base_2: Vector, rate1: Number, rate2: Number, r1: Number) -> Number:
-    """Return d²φ₂/dφ² of link 2; base_2: d²(base)/dφ², rates as from `rates`."""
+    """d²φ₂/dφ² of link 2; base_2: d²(base)/dφ², rates as from `rates`."""
     mutual = dot(dyad.link1, dyad.link2)
     return 2 / dyad.area4 * (dot(dyad.link1, base_2) + rate1 * rate1 * (r1 * r1) - rate2 * rate2 * mutual)
 
 
 def square(x: Number) -> Number:
-    """Return x², as a product: the power of a ball around 0 is no number."""
+    """x², as a product: the power of a ball around 0 is no number."""
     return x * x
 
 

@@ -34,12 +34,12 @@ class PairForces(NamedTuple):
 
 
 def cross(a: Vector, b: Vector) -> Number:
-    """Return a × b."""
+    """a × b."""
     return a.x * b.y - a.y * b.x
 
 
 def plus(*vectors: Vector) -> Vector:
-    """Return the sum of one vector or more."""
+    """Sum of one vector or more."""
     first, *others = vectors
     x, y = first
     for other in others:
@@ -48,7 +48,7 @@ def plus(*vectors: Vector) -> Vector:
 
 
 def minus(vector: Vector) -> Vector:
-    """Return the opposite."""
+    """Opposite."""
     return Vector(-vector.x, -vector.y)
 
 
@@ -63,7 +63,7 @@ def turned(direction: Vector, along: Number, across: Number) -> Vector:
 
 
 def together(wrenches: Iterable[Wrench]) -> Wrench | None:
-    """Return the sum of what acts on one link about one joint; None for nothing."""
+    """Sum of what acts on one link about one joint; None for nothing."""
     found = list(wrenches)
     if not found:
         return None
@@ -91,7 +91,7 @@ def inertia(
 
 
 def _over(number: Number, determinant: Number) -> Number:
-    """Return a number over a group's determinant. Raises ZeroDivisionError at a singular position."""
+    """Number over a group's determinant. Raises ZeroDivisionError at a singular position."""
     try:
         return number / determinant
     except ZeroDivisionError:
@@ -99,7 +99,7 @@ def _over(number: Number, determinant: Number) -> Number:
 
 
 def two_links(dyad: Dyad, link1: Wrench | None, link2: Wrench | None) -> PairForces:
-    """Return the forces of an RRR group: links P1→C and P2→C.
+    """Forces of an RRR group: links P1→C and P2→C.
 
     R = (N2 r1 + N1 r2)/(r1 × r2), H1 = R − F1, H2 = −R − F2. A link without a load is a two-force member by itself.
     """
@@ -121,7 +121,7 @@ def two_links(dyad: Dyad, link1: Wrench | None, link2: Wrench | None) -> PairFor
 
 
 def link_and_slider(r1: Vector, along: Vector, link1: Wrench, slider: Vector) -> PairForces:
-    """Return the forces of an RRP group: link P1→C and a slider at C, guided along a unit direction.
+    """Forces of an RRP group: link P1→C and a slider at C, guided along a unit direction.
 
     slider: the force on it, N. R = −F_u u + (N1 + F_u (r1 × u))/(r1·u) n, with n = u turned a quarter to its left; the
     guide's force on the slider stands across u.
@@ -135,7 +135,7 @@ def link_and_slider(r1: Vector, along: Vector, link1: Wrench, slider: Vector) ->
 
 
 def slotted_lever(arm: Vector, along: Vector, lever: Wrench, block: Wrench) -> PairForces:
-    """Return the forces of an RPR group: a slotted lever on P1 and the block in its slot, pinned at P2.
+    """Forces of an RPR group: a slotted lever on P1 and the block in its slot, pinned at P2.
 
     arm: P1→P2; along: unit direction of the slot, which turns lever and block together; block: moment about P2.
     On the block at P2 H2 = −(F2·u) u − ((N1 + N2)/(r·u) + F2·n) n; on the lever at P1 H1 = −F1 − F2 − H2; `inner`, of
@@ -149,7 +149,7 @@ def slotted_lever(arm: Vector, along: Vector, lever: Wrench, block: Wrench) -> P
 
 
 def tooth_force(torque: Number, radius: Number, centres: Vector) -> Vector:
-    """Return the force on a gear in the mesh that holds a torque on it, N, without the part that parts the wheels.
+    """Force on a gear in the mesh that holds a torque on it, N, without the part that parts the wheels.
 
     torque: N·m, of the gear on what it drives; radius: of its pitch circle, m; centres: unit direction from its centre
     to the other one's.
@@ -158,7 +158,7 @@ def tooth_force(torque: Number, radius: Number, centres: Vector) -> Vector:
 
 
 def crank_torque(arm: Vector, pin: Vector) -> Number:
-    """Return the torque, N·m, that a balanced crank needs for the force of its pin; crank and rod in line is regular.
+    """Torque, N·m, that a balanced crank needs for the force of its pin; crank and rod in line is regular.
 
     arm: from the shaft to the pin, m; pin: force of the crank on the next link, N.
     """

@@ -23,7 +23,7 @@ X = Vector(1, 0)
 
 
 def by_order(formula: Callable[[int], Found]) -> Callable[[int], Found]:
-    """Return a formula of an order of derivative that is computed when it is first read."""
+    """Formula of an order of derivative that is computed when it is first read."""
     known: dict[int, Found] = {}
 
     def read(order: int) -> Found:
@@ -35,7 +35,7 @@ def by_order(formula: Callable[[int], Found]) -> Callable[[int], Found]:
 
 
 def once(formula: Callable[[], Found]) -> Callable[[], Found]:
-    """Return a formula that is computed when it is first read."""
+    """Formula that is computed when it is first read."""
     found: list[Found] = []
 
     def read() -> Found:
@@ -47,51 +47,51 @@ def once(formula: Callable[[], Found]) -> Callable[[], Found]:
 
 
 def cross(a: Vector, b: Vector) -> Number:
-    """Return the outer product a × b."""
+    """Outer product a × b."""
     return a.x * b.y - a.y * b.x
 
 
 def left_of(a: Vector) -> Vector:
-    """Return a turned by a right angle to the left."""
+    """Vector a, turned by a right angle to the left."""
     return Vector(-a.y, a.x)
 
 
 def scaled(length: Number, a: Vector) -> Vector:
-    """Return a times a number."""
+    """Vector a times a number."""
     return Vector(length * a.x, length * a.y)
 
 
 def turned_by(direction: Vector, a: Vector) -> Vector:
-    """Return a turned by the angle of a direction (a unit vector) from x."""
+    """Vector a, turned by the angle of a direction (a unit vector) from x."""
     return Vector(direction.x * a.x - direction.y * a.y, direction.y * a.x + direction.x * a.y)
 
 
 def seen_from(direction: Vector, a: Vector) -> Vector:
-    """Return a as seen from a direction: (dot, cross)."""
+    """Vector a as seen from a direction: (dot, cross)."""
     return Vector(dot(direction, a), cross(direction, a))
 
 
 def polar(maths: Maths, angle: Number | None) -> Vector:
-    """Return the unit vector at an angle, rad."""
+    """Unit vector at an angle, rad."""
     return X if angle is None else Vector(maths.cos(angle), maths.sin(angle))
 
 
 def plus(a: Vector | None, b: Vector | None) -> Vector | None:
-    """Return a + b."""
+    """a + b."""
     if a is None or b is None:
         return b if a is None else a
     return Vector(a.x + b.x, a.y + b.y)
 
 
 def minus(a: Vector | None, b: Vector | None) -> Vector | None:
-    """Return a − b."""
+    """a − b."""
     if a is None or b is None:
         return a if b is None else Vector(-b.x, -b.y)
     return Vector(a.x - b.x, a.y - b.y)
 
 
 def total(*terms: Number | None) -> Number | None:
-    """Return the sum of the terms that are not zero by construction."""
+    """Sum of the terms that are not zero by construction."""
     found = None
     for term in terms:
         found = term if found is None else found if term is None else found + term
@@ -99,29 +99,29 @@ def total(*terms: Number | None) -> Number | None:
 
 
 def times(first: Number | None, *factors: Number | None) -> Number | None:
-    """Return a product, zero by construction where a factor is."""
+    """Product, zero by construction where a factor is."""
     for factor in factors:
         first = None if first is None or factor is None else first * factor
     return first
 
 
 def known(a: Number | None) -> Number:
-    """Return a number as it is, and 0 for what is zero by construction."""
+    """Number as it is, and 0 for what is zero by construction."""
     return 0 if a is None else a
 
 
 def less(a: Number | None) -> Number | None:
-    """Return −a."""
+    """−a."""
     return None if a is None else -a
 
 
 def along(a: Vector | None, b: Vector) -> Number | None:
-    """Return a·b."""
+    """a·b."""
     return None if a is None else dot(a, b)
 
 
 def turned(rates: Rates, r: Vector, order: int) -> Vector | None:
-    """Return the derivative of an order, 0 to 3, of a vector r of constant length whose angle has these rates."""
+    """Derivative of an order, 0 to 3, of a vector r of constant length whose angle has these rates."""
     if order == 0:
         return r
     w = rates(1)
@@ -176,7 +176,7 @@ class Link:
         return self._unit
 
     def point(self, along: Number | None, across: Number | None = None) -> Joint:
-        """Return a point of it: along its line from the origin, and to the left of that, m."""
+        """Point of it: along its line from the origin, and to the left of that, m."""
 
         def arm() -> Vector:
             if across is None:
@@ -186,7 +186,7 @@ class Link:
         return Joint(self.carried(once(arm)))
 
     def carried(self, arm: Callable[[], Vector]) -> Callable[[int], Vector | None]:
-        """Return the motion of what an arm of the link, m, reaches from the origin."""
+        """Motion of what an arm of the link, m, reaches from the origin."""
         return by_order(lambda order: plus(self.origin.at(order), turned(self.rates, arm(), order)))
 
 

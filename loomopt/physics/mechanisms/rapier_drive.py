@@ -51,12 +51,12 @@ class Dimensions:
 
 
 def polar(maths: Maths, radius: Number, angle: Number) -> Vector:
-    """Return the vector of a length at an angle, rad."""
+    """Vector of a length at an angle, rad."""
     return Vector(radius * maths.cos(angle), radius * maths.sin(angle))
 
 
 def between(first: Vector, second: Vector) -> Vector:
-    """Return (dot, cross): the second vector as seen from the first, scaled by both lengths."""
+    """(dot, cross): the second vector as seen from the first, scaled by both lengths."""
     return Vector(dot(first, second), first.x * second.y - first.y * second.x)
 
 
@@ -102,7 +102,7 @@ class Sley:
 
 
 def sley_lengths(dimensions: Dimensions, mirror: int = 1) -> Lengths:
-    """Return the sley four-bar as a crank-rocker; the sley lies counter-clockwise of A0 seen from B0 [Hong17]."""
+    """Sley four-bar as a crank-rocker; the sley lies counter-clockwise of A0 seen from B0 [Hong17]."""
     d = dimensions
     return Lengths(d.l1, d.l2, d.l3, d.l71, -mirror)
 
@@ -231,7 +231,7 @@ class RapierPose:
         return third - self.phi3_3
 
     def phi63(self, front: Vector) -> Number:
-        """Return φ6 − φ3 less its value at front dead centre, as one angle; front: `relative` there."""
+        """φ6 − φ3 less its value at front dead centre, as one angle; front: `relative` there."""
         change = between(front, self.relative)
         return self.maths.atan2(change.y, change.x)
 
@@ -247,7 +247,7 @@ class RapierPose:
         return polar(self.maths, 1, self.stand.frame_angle)
 
     def _placed(self, vector: Vector) -> Vector:
-        """Return a vector of the sley four-bar in the drive's axes."""
+        """Vector of the sley four-bar in the drive's axes."""
         along = self._along
         return Vector(vector.x * along.x - vector.y * along.y, vector.x * along.y + vector.y * along.x)
 
@@ -294,7 +294,7 @@ class DriveLayout:
 
 
 def construct(maths: Maths, dimensions: Dimensions, phi3M: Number, phi63: Number) -> DriveLayout:
-    """Return the paper's own layout in closed form [Hong17]: C0 on A0's vertical, crank and link stretched twice.
+    """Paper's own layout in closed form [Hong17]: C0 on A0's vertical, crank and link stretched twice.
 
     C0 is equally far from D at front dead centre (driving link in line with φ30) and at the hand-over, where the sley
     stands at φ3M and the driving link at φ3M + φ63; rad. C0, l4, l5 and φ40 of `dimensions` are not read.
@@ -343,7 +343,7 @@ def fault(dimensions: Dimensions, shown: ShowValue = usual) -> str:
 
 
 def _span(d: Dimensions, phi1: NDArray[np.floating[Any]]) -> Floats:
-    """Return the distance of C and B2, m, at crank angles φ1, rad."""
+    """Distance of C and B2, m, at crank angles φ1, rad."""
     base = RapierPose(systems.numpy(), d, Sley(systems.FLOAT, d).stand, phi1).base
     return np.asarray(np.sqrt(dot(base, base)), dtype=np.float64)
 
@@ -365,7 +365,7 @@ def _angles(d: Dimensions) -> Floats:
 
 
 def _stretches(angles: Floats, open_at: NDArray[np.bool_], shown: ShowValue) -> str:
-    """Return the stretches of crank angle, rad, where something holds, as words; one across FDC ends past a turn."""
+    """Stretches of crank angle, rad, where something holds, as words; one across FDC ends past a turn."""
     inside = [int(k) for k in np.flatnonzero(open_at)]
     runs: list[list[int]] = []
     for k in inside:

@@ -120,7 +120,7 @@ class Course:
         return found
 
     def _highest(self, stretch: Stretch) -> float:
-        """Return the largest gap within a stretch of flight, m: where the gap's speed changes its sign."""
+        """Largest gap within a stretch of flight, m: where the gap's speed changes its sign."""
 
         def parting(angle: float) -> float:
             return self.free(stretch, angle).v - self.cam.motion(angle).v
@@ -134,7 +134,7 @@ class Course:
         return max(self.free(stretch, angle).x - self.cam.motion(angle).x for angle in tops)
 
     def free(self, stretch: Stretch, angle: float) -> Moving:
-        """Return the body's motion at an angle of a stretch in flight."""
+        """Body's motion at an angle of a stretch in flight."""
         assert stretch.piece
         return stretch.piece.at((angle - stretch.piece.begin) / self.cam.omega)
 
@@ -174,7 +174,7 @@ class _Rule:
     restitution: float
 
     def turn(self, state: FlightState | None) -> FlightTurn:
-        """Return the turn from a state, None for contact."""
+        """Turn from a state, None for contact."""
         angle, stretches, lifts, landings = 0.0, list[Stretch](), list[float](), list[Landing]()
         blind = 0.0
         for _ in range(MOST_PIECES):
@@ -207,7 +207,7 @@ class _Rule:
         raise ArithmeticError(f"more than {MOST_PIECES} pieces of flight in one turn")
 
     def _pull(self, angle: float) -> tuple[float, float]:
-        """Return the next stretch in which nothing holds the body on the cam; it may have begun."""
+        """Next stretch in which nothing holds the body on the cam; it may have begun."""
         return next((pull for pull in self.cam.pulls if pull[1] > angle), (TURN, TURN))
 
     def _blind(self, angle: float, end: float) -> float:
@@ -219,7 +219,7 @@ class _Rule:
         return min((end - angle) / self.cam.omega, self.body.quarter)
 
     def _landed(self, angle: float, state: FlightState) -> tuple[FlightState | None, float, Landing]:
-        """Return the state after a landing, how long no landing can follow, and the landing."""
+        """State after a landing, how long no landing can follow, and the landing."""
         cam = self.cam.motion(angle)
         speed = min(state.v - cam.v, 0.0)
         rebound = -self.restitution * speed
@@ -231,7 +231,7 @@ class _Rule:
         return None, 0.0, Landing(angle, speed, False)
 
     def _piece(self, angle: float, state: FlightState) -> FreePiece:
-        """Return the free motion from a state."""
+        """Free motion from a state."""
         body = self.body
         zone = sum(state.x > corner or (state.x == corner and state.v > 0.0) for corner in body.corners)
         back = body.rest(zone, state.x)

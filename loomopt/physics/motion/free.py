@@ -57,7 +57,7 @@ class Response(NamedTuple):
 
 
 def response(sigma: float, kappa: float, time: float) -> Response:
-    """Return w, s², and s = ẇ, s, of ẅ + 2 sigma ẇ + kappa w = 1 from rest; sigma, 1/s, and kappa, 1/s², >= 0.
+    """w, s², and s = ẇ, s, of ẅ + 2 sigma ẇ + kappa w = 1 from rest; sigma, 1/s, and kappa, 1/s², >= 0.
 
     Under-, over- and critically damped and without a spring, without loss of digits between them.
     """
@@ -81,7 +81,7 @@ def response(sigma: float, kappa: float, time: float) -> Response:
 
 
 def _series(sigma: float, kappa: float, time: float) -> Response:
-    """Return the response soon after, by its power series: where closed forms lose digits."""
+    """Response soon after, by its power series: where closed forms lose digits."""
     before, last = 0.0, time * time / 2
     step, speed = last, time
     for n in range(3, SERIES_TERMS):
@@ -108,7 +108,7 @@ class FreePiece:
     stuck: bool = False
 
     def at(self, time: float) -> Moving:
-        """Return the motion some time, s, after the beginning."""
+        """Motion some time, s, after the beginning."""
         if self.stuck:
             return Moving(self.x, 0.0, 0.0)
         step, speed = response(self.sigma, self.kappa, time)
@@ -118,7 +118,7 @@ class FreePiece:
         return Moving(self.x + moved, v, self.push - 2 * self.sigma * v - self.kappa * moved)
 
     def jerk(self, at: Moving) -> float:
-        """Return the third derivative, m/s³, at a motion that is this piece's."""
+        """Third derivative, m/s³, at a motion that is this piece's."""
         return -2 * self.sigma * at.a - self.kappa * at.v
 
 

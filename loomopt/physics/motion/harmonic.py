@@ -57,13 +57,13 @@ class Oscillator:
         return REGIMES[self.regime](self.maths, self.of, elapsed)
 
     def steady(self, frequency: Number) -> Pair:
-        """Return A and B of its answer A cos Ωt + B sin Ωt to the force cos Ωt; frequency: Ω, rad/s."""
+        """A and B of its answer A cos Ωt + B sin Ωt to the force cos Ωt; frequency: Ω, rad/s."""
         stiff, drag = self.of.stiffness - self.of.inertia * frequency**2, self.of.damping * frequency
         size = stiff * stiff + drag * drag
         return stiff / size, drag / size
 
     def steady_cubic(self, force: Sequence[Number]) -> tuple[Number, Number, Number, Number]:
-        """Return the powers of the cubic in time that answers f0 + f1 t + f2 t² + f3 t³, in rad or m."""
+        """Powers of the cubic in time that answers f0 + f1 t + f2 t² + f3 t³, in rad or m."""
         f0, f1, f2, f3 = force
         J, c, k = self.of.inertia, self.of.damping, self.of.stiffness
         p3 = f3 / k
@@ -72,7 +72,7 @@ class Oscillator:
         return (f0 - c * p1 - 2 * J * p2) / k, p1, p2, p3
 
     def repeated(self, position: Number, rate: Number) -> Pair:
-        """Return z and z˙ just after a kick that adds position and rate once a turn, those of all turns before kept."""
+        """z and z˙ just after a kick that adds position and rate once a turn, those of all turns before kept."""
         of = self.of
         moved = rate + of.decay * position, -(of.decay * rate + (of.square + of.decay**2) * position)
         left = 1 - of.cosine
@@ -80,7 +80,7 @@ class Oscillator:
         return (left * position + of.sine * moved[0]) / size, (left * rate + of.sine * moved[1]) / size
 
     def ringing(self, after: Pair, elapsed: Number) -> Pair:
-        """Return z and z˙ of a free vibration; after: both as it begins; elapsed: time since then, s."""
+        """z and z˙ of a free vibration; after: both as it begins; elapsed: time since then, s."""
         (position, rate), of = after, self.of
         cosine, sine = self.free(elapsed)
         swung = of.decay * rate + (of.square + of.decay**2) * position
@@ -121,7 +121,7 @@ def regime(inertia: float, damping: float, stiffness: float) -> str:
 def constants(
     maths: Maths, regime: str, inertia: Number, damping: Number, stiffness: Number, omega: Number
 ) -> Constants:
-    """Return the constants of an oscillator; omega: speed of the shaft whose turn is the period, rad/s."""
+    """Constants of an oscillator; omega: speed of the shaft whose turn is the period, rad/s."""
     decay = damping / (2 * inertia)
     square = stiffness / inertia - decay**2
     rate = 0 if regime == "critical" else maths.sqrt(SIGNS[regime] * square)
@@ -138,7 +138,7 @@ class FourierSeries(NamedTuple):
     sines: Sequence[Number]
 
     def at(self, maths: Maths, phi: Number) -> Number:
-        """Return the sum at a crank angle, rad; sines of multiples, for a recurrence would let balls grow."""
+        """Sum at a crank angle, rad; sines of multiples, for a recurrence would let balls grow."""
         found = self.cosines[0]
         for n in range(1, len(self.cosines)):
             angle = n * phi
@@ -146,13 +146,13 @@ class FourierSeries(NamedTuple):
         return found
 
     def tail(self) -> float:
-        """Return the largest of the last harmonics over the largest of all."""
+        """Largest of the last harmonics over the largest of all."""
         sizes = [math.hypot(a, b) for a, b in zip(self.cosines, self.sines, strict=True)]
         return max(sizes[-LAST:]) / (max(sizes) or 1.0)
 
 
 def harmonics(maths: Maths, count: int, weigh: Weigh) -> FourierSeries:
-    """Return the first `count` harmonics of a smooth force, by the trapezoidal rule on twice as many angles."""
+    """First `count` harmonics of a smooth force, by the trapezoidal rule on twice as many angles."""
     # What is recorded on a tape must not outlive it.
     angles, weights = _made(maths, count) if maths.name == "recorded" else _kept(maths, count)
     sums = weigh(angles, weights)
@@ -160,7 +160,7 @@ def harmonics(maths: Maths, count: int, weigh: Weigh) -> FourierSeries:
 
 
 def _made(maths: Maths, count: int) -> tuple[Sequence[Number], Sequence[Sequence[Number]]]:
-    """Return the angles, rad, and the weights of the cosines from 0 on and of the sines from 1 on."""
+    """Angles, rad, and the weights of the cosines from 0 on and of the sines from 1 on."""
     points = 2 * count
     angles = [2 * maths.pi * k / points for k in range(points)]
     waves = [maths.cos(angle) for angle in angles]
@@ -189,7 +189,7 @@ def enough(weigh: Weigh, maths: Maths, begun: int = FEWEST) -> int:
 
 
 def answered(oscillator: Oscillator, force: FourierSeries) -> tuple[FourierSeries, FourierSeries]:
-    """Return the harmonics of z and of k z + c z˙ in answer to those of a force."""
+    """Harmonics of z and of k z + c z˙ in answer to those of a force."""
     of = oscillator.of
     positions: list[Pair] = []
     torques: list[Pair] = []
@@ -212,11 +212,11 @@ def named(prefix: str, values: Constants | FourierSeries) -> dict[str, Number]:
 
 
 def read_constants(prefix: str, values: Mapping[str, Number]) -> Constants:
-    """Return the constants of a name."""
+    """Constants of a name."""
     return Constants(*(values[f"{prefix}.{name}"] for name in Constants._fields))
 
 
 def read_series(prefix: str, values: Mapping[str, Number], count: int) -> FourierSeries:
-    """Return the first `count` harmonics of a name."""
+    """First `count` harmonics of a name."""
     sines = [0, *(values[f"{prefix}.sin {n}"] for n in range(1, count))]
     return FourierSeries([values[f"{prefix}.cos {n}"] for n in range(count)], sines)

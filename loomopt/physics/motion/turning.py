@@ -49,7 +49,7 @@ class CrankTurn:
     halves: tuple[Floats, ...]
 
     def at(self, pieces: Pieces, u: Floats) -> tuple[Floats, Floats]:
-        """Return ω, rad/s, and ω̇, rad/s², at nodes (pieces, u)."""
+        """ω, rad/s, and ω̇, rad/s², at nodes (pieces, u)."""
         pieces, u = np.broadcast_arrays(pieces, u)
         half, change = np.empty(u.shape), np.empty(u.shape)
         for piece in np.unique(pieces):
@@ -59,7 +59,7 @@ class CrankTurn:
         return np.sqrt(2 * half), change
 
     def speed(self, angle: float) -> float:
-        """Return ω, rad/s, at a crank angle, rad."""
+        """ω, rad/s, at a crank angle, rad."""
         turned = self.starts[0] + (angle - self.starts[0]) % (2 * math.pi)
         piece = int(np.clip(np.searchsorted(self.starts, turned, side="right"), 1, len(self.halves))) - 1
         u = (turned - self.starts[piece]) / (self.starts[piece + 1] - self.starts[piece])
@@ -73,7 +73,7 @@ class CrankTurn:
 
 
 def _extremes(change: Floats, half: Floats) -> Floats:
-    """Return the values of ω²/2 at the ends of a piece and wherever its ω̇ changes sign."""
+    """Values of ω²/2 at the ends of a piece and wherever its ω̇ changes sign."""
     x = np.linspace(-1.0, 1.0, 8 * len(change))
     sign = np.sign(chebyshev.chebval(x, change))
     (turns,) = np.nonzero(sign[:-1] * sign[1:] < 0)
@@ -86,7 +86,7 @@ def _extremes(change: Floats, half: Floats) -> Floats:
 
 
 def solved(starts: Floats, mean: float, surplus: Surplus) -> CrankTurn:
-    """Return the periodic motion with no surplus at any angle and ∮dφ/ω = 2π/mean.
+    """Periodic motion with no surplus at any angle and ∮dφ/ω = 2π/mean.
 
     starts: (pieces + 1,) crank angles, rad, between which the surplus is smooth; mean: speed, rad/s. Raises NoTurn.
     """
@@ -97,7 +97,7 @@ def solved(starts: Floats, mean: float, surplus: Surplus) -> CrankTurn:
 
 
 def _resolved(starts: Floats, mean: float, surplus: Surplus, points_first: int) -> CrankTurn:
-    """Return the motion, with so many points on each piece at first, and twice as many where that is too few."""
+    """Motion, with so many points on each piece at first, and twice as many where that is too few."""
     degrees = [points_first] * (len(starts) - 1)
     guess = _Motion(np.zeros(sum(degrees)), mean**2 / 2, mean)
     while True:
@@ -127,7 +127,7 @@ class _Motion(NamedTuple):
     no_load: float
 
     def moved(self, step: Floats, share: float) -> "_Motion":
-        """Return the motion after a share of a step in all of it."""
+        """Motion after a share of a step in all of it."""
         return _Motion(
             self.change + share * step[:-2], self.half + share * float(step[-2]), self.no_load + share * float(step[-1])
         )
@@ -152,12 +152,12 @@ class _Points:
             self.integral[own, own] = self.half_widths[piece] * _rule(n)[0]
 
     def series(self, values: Floats) -> list[Floats]:
-        """Return the Chebyshev series on each piece of values at the points."""
+        """Chebyshev series on each piece of values at the points."""
         parts = np.split(values, np.cumsum(self.degrees)[:-1])
         return [_transform(n) @ part for n, part in zip(self.degrees, parts, strict=True)]
 
     def integrated(self, series: Sequence[Floats], first: float) -> list[Floats]:
-        """Return the series of the integral, which is continuous and begins with `first`."""
+        """Series of the integral, which is continuous and begins with `first`."""
         found = []
         for half_width, each in zip(self.half_widths, series, strict=True):
             found.append(chebyshev.chebint(half_width * each, k=[first], lbnd=-1))
@@ -167,7 +167,7 @@ class _Points:
 
 @functools.cache
 def _transform(n: int) -> Floats:
-    """Return the matrix from values at n Chebyshev points to the coefficients of their series."""
+    """Matrix from values at n Chebyshev points to the coefficients of their series."""
     matrix = 2 / n * chebyshev.chebvander(chebyshev.chebpts1(n), n - 1).T
     matrix[0] /= 2
     return np.asarray(matrix)
@@ -175,13 +175,13 @@ def _transform(n: int) -> Floats:
 
 @functools.cache
 def _rule(n: int) -> tuple[Floats, Floats]:
-    """Return the matrix from values at n Chebyshev points of [−1, 1] to integrals up to each, and Fejér's weights."""
+    """Matrix from values at n Chebyshev points of [−1, 1] to integrals up to each, and Fejér's weights."""
     integrals = chebyshev.chebint(_transform(n), lbnd=-1, axis=0)
     return chebyshev.chebvander(chebyshev.chebpts1(n), n) @ integrals, integrals.sum(axis=0)
 
 
 def _newton(points: _Points, motion: _Motion, mean: float, surplus: Surplus) -> _Motion:
-    """Return the motion without surplus at the points, from one nearby. Raises NoTurn."""
+    """Motion without surplus at the points, from one nearby. Raises NoTurn."""
     for _ in range(STEPS):
         halves = motion.half + points.integral @ motion.change
         if not np.all(halves > 0.0):
@@ -198,7 +198,7 @@ def _newton(points: _Points, motion: _Motion, mean: float, surplus: Surplus) -> 
 
 
 def _step(points: _Points, motion: _Motion, omega: Floats, mean: float, surplus: Surplus) -> Floats:
-    """Return Newton's step in (ω̇ at the points, ω²/2 where the turn begins, no-load speed)."""
+    """Newton's step in (ω̇ at the points, ω²/2 where the turn begins, no-load speed)."""
     n, small = len(omega), SMALL * mean
 
     def read(no_load: float = 0.0, faster: float = 0.0, change: float = 0.0) -> Floats:

@@ -41,7 +41,7 @@ def switch(angle: float, corners: tuple[float, ...]) -> float:
 
 
 def force(at: Inputs[ReedPose]) -> Number:
-    """Return T_c sgn q˙ + c q˙, N·m; with the load T = μ r |F_D| where the force is known by its name."""
+    """T_c sgn q˙ + c q˙, N·m; with the load T = μ r |F_D| where the force is known by its name."""
     if at.table.get("model") != "load":
         return at.table["coulomb"] * at.switch + at.table["viscous"] * at.pose.velocity
     friction = at.table["mu"] * at.table["radius"] * at.values["force_D"] * at.switch
@@ -49,7 +49,7 @@ def force(at: Inputs[ReedPose]) -> Number:
 
 
 def upon(at: Inputs[ReedPose], loading: Loading) -> Number:
-    """Return the term, N·m; with the load in closed form, for the force in D that friction itself adds to.
+    """Term, N·m; with the load in closed form, for the force in D that friction itself adds to.
 
     F_D = H + T e, T = a |F_D|, a = μ r, e = −sgn q˙ r1/(r1 × r2), H what all else gives: one root, while a |e| < 1.
     """

@@ -17,7 +17,7 @@ class Parameters(Table):
 
 
 def reed_centrifugal(at: Inputs[ReedPose]) -> Number:
-    """Return F4, N; negative where the counterweight outweighs the reed."""
+    """F4, N; negative where the counterweight outweighs the reed."""
     return (at.values["m4"] * at.values["r4"] - at.values["m4e"] * at.values["r4e"]) * at.pose.velocity**2
 
 

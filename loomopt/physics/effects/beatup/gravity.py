@@ -27,7 +27,7 @@ class Parameters(Table):
 
 
 def force(at: Inputs[ReedPose]) -> Number:
-    """Return −∂U/∂ψ, N·m (q = −ψ)."""
+    """−∂U/∂ψ, N·m (q = −ψ)."""
     moment = at.values["m4"] * at.values["r4"] - at.values["m4e"] * at.values["r4e"]
     reed = -STANDARD_GRAVITY * moment * at.maths.cos(at.table["offset"] + at.table["tilt"] - at.pose.q)
     rocker = rocker_moment(at.values)
@@ -55,7 +55,7 @@ def inside(at: Inputs[ReedPose]) -> Number | None:
 
 
 def push(at: Inputs[ReedPose], term: Number) -> Vector:
-    """Return the weight of reed, counterweight and rocker, N; x along the line from A to D."""
+    """Weight of reed, counterweight and rocker, N; x along the line from A to D."""
     mass = at.values["m4"] + at.values["m4e"]
     return weight(
         at.maths, mass if rocker_moment(at.values) is None else mass + at.values["rocker_inertia.m3"], at.table["tilt"]

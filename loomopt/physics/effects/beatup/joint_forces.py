@@ -92,13 +92,13 @@ class CrankRockerForces:
         )
 
     def _turning(self, rate: Number, second: Number) -> tuple[Number, Number]:
-        """Return a link's angular speed, rad/s, and acceleration, rad/s², from its derivatives."""
+        """Link's angular speed, rad/s, and acceleration, rad/s², from its derivatives."""
         omega, change = self.at.pose.omega, self.at.pose.omega_dot
         steady = second * omega**2
         return rate * omega, steady if change is None else steady + rate * change
 
     def _carried(self, arm: Vector) -> Vector:
-        """Return the acceleration, m/s², of what turns with the crank."""
+        """Acceleration, m/s², of what turns with the crank."""
         square, change = self.at.pose.omega**2, self.at.pose.omega_dot
         x, y = -square * arm.x, -square * arm.y
         return Vector(x, y) if change is None else Vector(x - change * arm.y, y + change * arm.x)
@@ -196,7 +196,7 @@ class CrankRockerForces:
         return about + self.rod.moment + joint_forces.cross(self.linkage.crank, self.rod.force)
 
     def heading(self, part: str) -> Vector:
-        """Return the unit direction of crank, rod or rocker."""
+        """Unit direction of crank, rod or rocker."""
         linkage = self.linkage
         vectors = {"crank": (linkage.crank, linkage.lengths.l1), "rod": (linkage.dyad.link1, linkage.lengths.l2)}
         return joint_forces.unit(*{**vectors, "rocker": (linkage.dyad.link2, linkage.lengths.l3)}[part])

@@ -45,7 +45,7 @@ def corners(at: Inputs[object]) -> tuple[Number, ...]:
 
 
 def switch(angle: float, corners: tuple[float, ...]) -> float:
-    """Return 1 inside the pulse and 0 outside, of a table the interval; angle in rad, anywhere on the turn."""
+    """1 inside the pulse and 0 outside, of a table the interval; angle in rad, anywhere on the turn."""
     if len(corners) != 2:
         return interval_at(angle, corners)
     begin, end = corners
@@ -53,19 +53,19 @@ def switch(angle: float, corners: tuple[float, ...]) -> float:
 
 
 def force(at: Inputs[ReedPose]) -> Number:
-    """Return M_R, N·m."""
+    """M_R, N·m."""
     if "table" in at.table:
         return at.table["table"].at(at.maths, at.pose.phi - at.values["beta"], at.switch)
     return at.switch * at.values["M0"] * at.maths.cos(at.maths.pi * _from_front(at) / at.table["pulse"])
 
 
 def _from_front(at: Inputs[ReedPose]) -> Number:
-    """Return φ−β on any turn, rad: inside the pulse from −π to π, outside from 0 to 2π, so that it jumps in neither."""
+    """φ−β on any turn, rad: inside the pulse from −π to π, outside from 0 to 2π, so that it jumps in neither."""
     return within_turn(at.maths, at.pose.phi - at.values["beta"], at.switch / 2)
 
 
 def push(at: Inputs[ReedPose], term: Number) -> Vector | None:
-    """Return the force of the cloth on the reed, N, across the line from D to where it pushes; None: a couple."""
+    """Force of the cloth on the reed, N, across the line from D to where it pushes; None: a couple."""
     if "reach" not in at.table:
         return None
     size, angle = term / at.table["reach"], at.table.get("reach_angle", 0) - at.pose.q
@@ -73,7 +73,7 @@ def push(at: Inputs[ReedPose], term: Number) -> Vector | None:
 
 
 def response(at: Inputs[ReedPose], oscillator: "SteadyOscillator") -> tuple[Number, Number]:
-    """Return z, rad, and z˙ in answer to the pulse M0 cos Ωt, |t| ≤ τ, once a turn.
+    """z, rad, and z˙ in answer to the pulse M0 cos Ωt, |t| ≤ τ, once a turn.
 
     A cos Ωt + B sin Ωt inside, and the free vibrations that begin at both corners, each with z = B and z˙ = −A Ω: there
     the answer to the cosine sets in, or falls away. The branch of t = (φ−β)/ω jumps where the other formula holds.
@@ -97,7 +97,7 @@ def response(at: Inputs[ReedPose], oscillator: "SteadyOscillator") -> tuple[Numb
 def _tabulated(
     maths: Maths, oscillator: "SteadyOscillator", curve: PeriodicCubic, angle: Number, omega: Number, interval: Number
 ) -> tuple[Number, Number]:
-    """Return z, rad, and z˙ in answer to a curve: a cubic in each interval, and free vibrations from where each begins.
+    """z, rad, and z˙ in answer to a curve: a cubic in each interval, and free vibrations from where each begins.
 
     Where one interval becomes the next, what both cubics are apart by begins to ring. angle: φ−β, rad.
     """
@@ -120,7 +120,7 @@ def _tabulated(
 
 
 def _cubic(powers: Sequence[Number], time: Number) -> tuple[Number, Number]:
-    """Return a cubic of time and its rate."""
+    """Cubic of time and its rate."""
     p0, p1, p2, p3 = powers
     return p0 + time * (p1 + time * (p2 + time * p3)), p1 + time * (2 * p2 + time * (3 * p3))
 

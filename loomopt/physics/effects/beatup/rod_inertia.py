@@ -35,7 +35,7 @@ class Parameters(Table):
 
 
 def lumped(at: Inputs[ReedPose]) -> Number:
-    """Return the torque of the two point masses, N·m."""
+    """Torque of the two point masses, N·m."""
     at_rocker = at.table["m2"] * at.table["s2"] / at.values["today.l2"]
     torque = at_rocker * at.values["l3"] ** 2 * at.pose.q1 * at.pose.acceleration
     if at.pose.omega_dot is None:
@@ -44,7 +44,7 @@ def lumped(at: Inputs[ReedPose]) -> Number:
 
 
 def rigid_body_torque(at: Inputs[ReedPose]) -> Number:
-    """Return the torque of the rod as a rigid body, N·m."""
+    """Torque of the rod as a rigid body, N·m."""
     rod = at.pose.joints
     s2 = at.table["s2"] * at.values["l2"] / at.values["today.l2"]
     crank_arm = at.table["m2"] * at.values["l1"] * s2
@@ -65,12 +65,12 @@ MODELS: dict[str, Callable[[Inputs[ReedPose]], Number]] = {"lumped": lumped, "ex
 
 
 def force(at: Inputs[ReedPose]) -> Number:
-    """Return the crank torque that moves the rod, N·m, by the model the scene names."""
+    """Crank torque that moves the rod, N·m, by the model the scene names."""
     return MODELS[at.table["model"]](at)
 
 
 def mass(at: Inputs[object]) -> LinkMass:
-    """Return the rod by its joint B; two point masses have the inertia m2 s2 (l2 − s2) about their centre."""
+    """Rod by its joint B; two point masses have the inertia m2 s2 (l2 − s2) about their centre."""
     m2, s2 = at.table["m2"], at.table["s2"] * at.values["l2"] / at.values["today.l2"]
     second = m2 * s2 * at.values["l2"] if at.table["model"] == "lumped" else m2 * s2**2 + at.table["JS2"]
     return LinkMass("rod", m2, m2 * s2, 0, second)

@@ -67,7 +67,7 @@ def fixed(at: Inputs[object], carried: "Carried") -> Mapping[str, str]:
 
 
 def derived(at: Inputs[object], carried: "Carried") -> dict[str, Number]:
-    """Return the oscillator's constants, and the harmonics of z, rad, and of k z + c z˙, N·m."""
+    """Oscillator's constants, and the harmonics of z, rad, and of k z + c z˙, N·m."""
     from loomopt.physics.motion import harmonic
 
     regime, count = at.table["regime"], int(at.table["harmonics"])
@@ -80,7 +80,7 @@ def derived(at: Inputs[object], carried: "Carried") -> dict[str, Number]:
 
 
 def oscillator(at: Inputs[object]) -> "SteadyOscillator":
-    """Return the shaft with what moves on it."""
+    """Shaft with what moves on it."""
     from loomopt.physics.motion import harmonic
 
     return harmonic.Oscillator(at.maths, at.table["regime"], harmonic.read_constants(NAME, at.values))
@@ -93,7 +93,7 @@ def _series(name: str, at: "Inputs[Motion]") -> "harmonic.FourierSeries":
 
 
 def force(at: "Inputs[Motion]", reply: tuple[Number, Number]) -> Number:
-    """Return k z + c z˙, N·m."""
+    """k z + c z˙, N·m."""
     return (
         _series(TORQUE, at).at(at.maths, at.pose.phi)
         + at.table["stiffness"] * reply[0]
@@ -102,7 +102,7 @@ def force(at: "Inputs[Motion]", reply: tuple[Number, Number]) -> Number:
 
 
 def coordinate(at: "Inputs[Motion]", reply: tuple[Number, Number]) -> Number:
-    """Return z, rad."""
+    """z, rad."""
     return _series(TWIST, at).at(at.maths, at.pose.phi) + reply[0]
 
 
@@ -116,7 +116,7 @@ class Reed(NamedTuple):
 
 
 def moved(at: "Inputs[Motion]", coordinate: Number, force: Number, acceleration: Number) -> Reed:
-    """Return the reed's motion: z˙ follows from k z + c z˙."""
+    """Reed's motion: z˙ follows from k z + c z˙."""
     rate = (force - at.table["stiffness"] * coordinate) / at.table["damping"]
     return Reed(at.pose.phi, at.pose.q - coordinate, at.pose.velocity - rate, acceleration)
 
@@ -137,7 +137,7 @@ def motion(written: "Written", own: Values) -> tuple[Number, Number]:
 
 
 def term(written: "Written", own: Values) -> Number:
-    """Return k z + c z˙."""
+    """k z + c z˙."""
     return own["stiffness"] * written.coordinate[0] + own["damping"] * written.omega * written.coordinate[1]
 
 

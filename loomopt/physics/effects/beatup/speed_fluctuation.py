@@ -28,33 +28,33 @@ class Parameters(Table):
 
 
 def motor(at: Inputs[object], omega: Number) -> Number:
-    """Return D (ω_n − ω), N·m; negative where the motor brakes."""
+    """D (ω_n − ω), N·m; negative where the motor brakes."""
     return at.table["motor_torque"] / (at.table["slip"] * at.values["speed"]) * (at.values["no_load_speed"] - omega)
 
 
 def flywheel(at: Inputs[object]) -> Number:
-    """Return J_f, kg·m²."""
+    """J_f, kg·m²."""
     return at.table["flywheel"]
 
 
 def fluctuation(at: Inputs[object], turning: "CrankTurn") -> float:
-    """Return (greatest − least speed)/mean speed."""
+    """(greatest − least speed)/mean speed."""
     least, greatest = turning.range
     return (greatest - least) / float(at.values["speed"])
 
 
 def speed_fdc(at: Inputs[object], turning: "CrankTurn") -> float:
-    """Return ω(β), rad/s."""
+    """ω(β), rad/s."""
     return turning.speed(float(at.values["beta"]))
 
 
 def no_load_speed(at: Inputs[object], turning: "CrankTurn") -> float:
-    """Return ω_n, rad/s."""
+    """ω_n, rad/s."""
     return turning.no_load
 
 
 def motor_torque_max(at: Inputs[object], turning: "CrankTurn") -> float:
-    """Return the motor's torque where the crank is slowest, N·m."""
+    """Motor's torque where the crank is slowest, N·m."""
     return float(motor(at, turning.range[0]))
 
 

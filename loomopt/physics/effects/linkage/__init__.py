@@ -74,22 +74,22 @@ class LinkagePose(Protocol):
         """The part that is the output."""
 
     def travelled(self, given: Values, event: str) -> Number:
-        """Return q − q at an event, rad or m."""
+        """q − q at an event, rad or m."""
 
 
 def event_angle(given: Values, event: str) -> Number:
-    """Return the crank angle of an event, rad."""
+    """Crank angle of an event, rad."""
     return given[f"event {event}"]
 
 
 def between(angle: float, corners: tuple[float, ...]) -> float:
-    """Return 1 between two crank angles, rad, and 0 outside: a load that acts from the first to the second."""
+    """1 between two crank angles, rad, and 0 outside: a load that acts from the first to the second."""
     begin, end = corners
     return 1.0 if (angle - begin) % TURN < (end - begin) % TURN else 0.0
 
 
 def centre(parts: Parts, name: str, along: Number, across: Number) -> Joint:
-    """Return the centre of mass of a link, m from its first joint, or of a joint, which carries a mass of its own."""
+    """Centre of mass of a link, m from its first joint, or of a joint, which carries a mass of its own."""
     if name in parts.links:
         return parts.links[name].point(along, across)
     return parts.joints[name]

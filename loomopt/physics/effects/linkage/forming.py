@@ -35,7 +35,7 @@ def corners(at: Inputs[object]) -> tuple[Number, ...]:
 
 
 def force(at: Inputs[LinkagePose]) -> Number:
-    """Return the resistance, N·m or N, against q."""
+    """Resistance, N·m or N, against q."""
     return at.switch * at.table["torque" if "torque" in at.table else "force"]
 
 

@@ -32,7 +32,7 @@ def weighed(at: Inputs[LinkagePose]) -> Iterator[OutputMass]:
 
 
 def force(at: Inputs[LinkagePose]) -> Number:
-    """Return the crank torque that lifts what has a mass, N·m."""
+    """Crank torque that lifts what has a mass, N·m."""
     x, y, found = at.maths.cos(at.table["down"]), at.maths.sin(at.table["down"]), 0
     for weight in weighed(at):
         rate = weight.at.at(1)
@@ -43,7 +43,7 @@ def force(at: Inputs[LinkagePose]) -> Number:
 
 
 def applied(at: Inputs[LinkagePose]) -> list[Applied]:
-    """Return the weights, each in its centre of mass."""
+    """Weights, each in its centre of mass."""
     x, y, found = at.maths.cos(at.table["down"]), at.maths.sin(at.table["down"]), []
     for weight in weighed(at):
         size = at.maths.number(STANDARD_GRAVITY) * weight.mass

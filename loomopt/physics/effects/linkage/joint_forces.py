@@ -42,7 +42,7 @@ class LinkageForces:
         self.linked, self.at, self.pose, self.loading = linked, at, at.pose, loading
 
     def output(self, size: Number, inertial: bool = False) -> list[Applied]:
-        """Return the loads that a force or torque at the output is; size: as the output counts it."""
+        """Loads that a force or torque at the output is; size: as the output counts it."""
         from loomopt.physics.mechanisms.chain_forces import Walk, slider_of
         from loomopt.physics.mechanisms.dyad import Vector
         from loomopt.physics.mechanisms.moving import scaled
@@ -94,7 +94,7 @@ class LinkageForces:
         return self.walk.forces[self._called[name]]
 
     def heading(self, part: str) -> "Vector":
-        """Return the unit direction of a body; of a slider that of its guide."""
+        """Unit direction of a body; of a slider that of its guide."""
         from loomopt.physics.mechanisms import chain_forces
 
         body = chain_forces.guides(self.linked).get(part, part)
@@ -133,7 +133,7 @@ class LinkageForces:
 
 @functools.lru_cache(maxsize=64)
 def fitted(linked: "Chain") -> Check[LinkagePose]:
-    """Return the check of a linkage, with a figure for every force that it has."""
+    """Check of a linkage, with a figure for every force that it has."""
     from loomopt.physics.mechanisms import chain_forces
 
     vectors, teeth = {}, {f"teeth_{gear}": gear for gear in chain_forces.geared(linked)}

@@ -41,14 +41,14 @@ def corners(at: Inputs[object]) -> tuple[Number, ...]:
 
 
 def switch(angle: float, corners: tuple[float, ...]) -> float:
-    """Return 1 where it acts and 0 elsewhere, of a table the interval."""
+    """1 where it acts and 0 elsewhere, of a table the interval."""
     if len(corners) == 2:
         return between(angle, corners)
     return interval_at(angle, corners) if corners else 1.0
 
 
 def force(at: Inputs[LinkagePose]) -> Number:
-    """Return the crank torque against it, N·m."""
+    """Crank torque against it, N·m."""
     rate = at.pose.joints.joints[at.table["instance"]].at(1)
     if rate is None:
         return 0
@@ -63,7 +63,7 @@ def force(at: Inputs[LinkagePose]) -> Number:
 
 
 def applied(at: Inputs[LinkagePose]) -> list[Applied]:
-    """Return the force on its joint."""
+    """Force on its joint."""
     if "table" in at.table:
         angle = at.pose.phi - event_angle(at.values, at.table["at"]) if "at" in at.table else at.pose.phi
         x, y = (curve.at(at.maths, angle, at.switch) for curve in at.table["table"].curves)

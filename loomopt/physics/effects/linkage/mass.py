@@ -25,7 +25,7 @@ class Parameters(Table):
 
 
 def force(at: Inputs[LinkagePose]) -> Number:
-    """Return the crank torque that moves it, N·m."""
+    """Crank torque that moves it, N·m."""
     link = at.pose.joints.links.get(at.table["instance"])
     body = centre(at.pose.joints, at.table["instance"], at.table.get("along"), at.table.get("across"))
     p1, p2, inertia = body.at(1), body.at(2), at.table.get("J")

@@ -49,7 +49,7 @@ def corners(at: Inputs[object]) -> tuple[Number, ...]:
 
 
 def switch(angle: float, corners: tuple[float, ...]) -> float:
-    """Return 1 inside the pulse and 0 outside, of a table the interval; angle in rad, anywhere on the turn."""
+    """1 inside the pulse and 0 outside, of a table the interval; angle in rad, anywhere on the turn."""
     if len(corners) != 2:
         return interval_at(angle, corners)
     begin, end = corners
@@ -57,7 +57,7 @@ def switch(angle: float, corners: tuple[float, ...]) -> float:
 
 
 def force(at: Inputs[LinkagePose]) -> Number:
-    """Return the resistance, N·m or N, against q.
+    """Resistance, N·m or N, against q.
 
     The branch of the angle since the event jumps where the other formula holds: half a turn away inside the pulse, at
     the event itself outside.

@@ -45,7 +45,7 @@ class Sliding(Table):
 
 
 def stretched(at: Inputs[LinkagePose]) -> Number:
-    """Return the crank torque that stretches a spring between two joints, N·m."""
+    """Crank torque that stretches a spring between two joints, N·m."""
     a, b = (at.pose.joints.joints[at.table[key]] for key in ("begins", "ends"))
     base, rate = minus(b.at(0), a.at(0)), minus(b.at(1), a.at(1))
     if base is None or rate is None:

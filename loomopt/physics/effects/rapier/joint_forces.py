@@ -149,7 +149,7 @@ class RapierForces:
         return self.five_bar.inner
 
     def heading(self, part: str) -> Vector:
-        """Return the unit direction of a part."""
+        """Unit direction of a part."""
         drive = self._drive
         d, rod, link = drive.dimensions, drive.sley_dyad, drive.dyad
         vectors = {"crank": (drive.main_crank, d.l1), "rod": (rod.link1, d.l2), "sley": (rod.link2, d.l3)}

@@ -20,7 +20,7 @@ class Parameters(Table):
 
 
 def corners(at: Inputs[object]) -> tuple[Number, ...]:
-    """Return the crank angles where the head turns, rad, the first of them onto its way out."""
+    """Crank angles where the head turns, rad, the first of them onto its way out."""
     return tuple(at.values["turns"])
 
 
@@ -34,7 +34,7 @@ def direction(angle: float, corners: tuple[float, ...]) -> float:
 
 
 def force(at: Inputs[Motion]) -> Number:
-    """Return F sgn S˙, N."""
+    """F sgn S˙, N."""
     return at.table["force"] * at.switch
 
 

@@ -110,50 +110,50 @@ class Coil:
         return (4 * bend**2 - bend - 1) / (4 * bend * (bend - 1))
 
     def mass(self, maths: Maths) -> Number:
-        """Return the mass of the active turns m_s = π² d² D n ρ/4, kg [Shigley, eq 10-27]."""
+        """Mass of the active turns m_s = π² d² D n ρ/4, kg [Shigley, eq 10-27]."""
         return maths.pi**2 * self.wire**2 * self.diameter * self.turns * self.density / 4
 
     def surge_frequency(self, maths: Maths) -> Number:
-        """Return the first natural frequency of the spring between its ends, ½ √(k/m_s), Hz [Shigley, eq 10-25]."""
+        """First natural frequency of the spring between its ends, ½ √(k/m_s), Hz [Shigley, eq 10-25]."""
         return maths.sqrt(self.rate / self.mass(maths)) / 2
 
     def torsion(self, maths: Maths, force: Number) -> Number:
-        """Return the stress 8 F D/(π d³) of the wire taken as straight, Pa; force F, N."""
+        """Stress 8 F D/(π d³) of the wire taken as straight, Pa; force F, N."""
         return 8 * force * self.diameter / (maths.pi * self.wire**3)
 
     def shear_stress(self, maths: Maths, force: Number) -> Number:
-        """Return the greatest shear stress of the body K 8 F D/(π d³), Pa; force F, N; K by the coil's correction."""
+        """Greatest shear stress of the body K 8 F D/(π d³), Pa; force F, N; K by the coil's correction."""
         factor = self.en_factor if self.correction == "EN 13906" else self.wahl
         return factor * self.torsion(maths, force)
 
     def initial_stress(self, maths: Maths) -> Number:
-        """Return the uncorrected stress of the initial tension 8 F_i D/(π d³), Pa."""
+        """Uncorrected stress of the initial tension 8 F_i D/(π d³), Pa."""
         return self.torsion(maths, self.initial_tension)
 
     def initial_stress_least(self, maths: Maths) -> Number:
-        """Return the least initial stress that winding holds to, Pa: below, it is hard to control."""
+        """Least initial stress that winding holds to, Pa: below, it is hard to control."""
         return self._initial_stress_usual(maths) - self._initial_stress_spread()
 
     def initial_stress_most(self, maths: Maths) -> Number:
-        """Return the greatest initial stress that is readily wound in, Pa: above, it is hard to attain."""
+        """Greatest initial stress that is readily wound in, Pa: above, it is hard to attain."""
         return self._initial_stress_usual(maths) + self._initial_stress_spread()
 
     def _initial_stress_usual(self, maths: Maths) -> Number:
-        """Return 231 exp(−0.105 C) MPa in Pa, a power, since no number system here is asked for exp [eq 10-41]."""
+        """231 exp(−0.105 C) MPa in Pa, a power, since no number system here is asked for exp [eq 10-41]."""
         return 231_000_000 * maths.number(DECAY) ** self.index
 
     def _initial_stress_spread(self) -> Number:
-        """Return 6.9 (4 − (C − 3)/6.5) MPa in Pa, half the width of the window [eq 10-41]."""
+        """6.9 (4 − (C − 3)/6.5) MPa in Pa, half the width of the window [eq 10-41]."""
         return 6_900_000 * (4 - 2 * (self.index - 3) / 13)
 
     def hook_bending(self, maths: Maths, force: Number) -> Number:
-        """Return the tensile stress inside the hook's bend F (16 D K_A/(π d³) + 4/(π d²)), Pa [Shigley, eq 10-34]."""
+        """Tensile stress inside the hook's bend F (16 D K_A/(π d³) + 4/(π d²)), Pa [Shigley, eq 10-34]."""
         bending = 16 * self.diameter * self.hook_curvature / (maths.pi * self.wire**3)
         return force * (bending + 4 / (maths.pi * self.wire**2))
 
 
 def strength(maths: Maths, d: Number, A: Number, m: Number) -> Number:
-    """Return the tensile strength A/(d / 1 mm)^m of drawn wire, Pa [Shigley, eq 10-14].
+    """Tensile strength A/(d / 1 mm)^m of drawn wire, Pa [Shigley, eq 10-14].
 
     d: wire diameter, m; A: strength of 1 mm wire, Pa; m: exponent, a number. Needs no function of `maths`.
     """
@@ -261,23 +261,23 @@ def coil(own: Values) -> Coil:
 
 
 def load(at: Inputs[object]) -> Number:
-    """Return the largest force on one coil, with the shed open downward, N."""
+    """Largest force on one coil, with the shed open downward, N."""
     return at.values["K1"] * (at.values["X0"] + at.values["travel"]) / at.table["springs"]
 
 
 def tensile(maths: Maths, own: Values) -> Number:
-    """Return the tensile strength of the wire, Pa."""
+    """Tensile strength of the wire, Pa."""
     return strength(maths, own["wire"], own["strength"], own["strength_exponent"])
 
 
 def _length(at: Inputs[object]) -> Number:
-    """Return the length inside the hooks with the shed open downward, m."""
+    """Length inside the hooks with the shed open downward, m."""
     own_coil = coil(at.table)
     return own_coil.free_length + at.values["X0"] + at.values["travel"] - own_coil.initial_tension / own_coil.rate
 
 
 def _bending_share(at: Inputs[object]) -> Number:
-    """Return the bending stress of the hooks over the strength; 0 of free hooks, whose bend nothing tells."""
+    """Bending stress of the hooks over the strength; 0 of free hooks, whose bend nothing tells."""
     share = coil(at.table).hook_bending(at.maths, load(at)) / tensile(at.maths, at.table)
     return 0 * share if at.table.get("hooks") == "free" else share
 
@@ -311,7 +311,7 @@ FIGURES = (
 
 
 def sold(own: Parameters) -> Mapping[str, Sequence[float]]:
-    """Return the wire diameters that are sold, m, where the wire must be one of them."""
+    """Wire diameters that are sold, m, where the wire must be one of them."""
     return {"wire": WIRES} if own.sizes == "preferred" else {}
 
 

@@ -16,7 +16,7 @@ class Parameters(Table):
 
 
 def force(at: Inputs[FramePose]) -> Number:
-    """Return C X˙, N."""
+    """C X˙, N."""
     return at.table["C"] * at.pose.velocity
 
 

@@ -20,7 +20,7 @@ class Parameters(Table):
 
 
 def force(at: Inputs[FramePose]) -> Number:
-    """Return F sgn X˙, N; in a dwell its worst value."""
+    """F sgn X˙, N; in a dwell its worst value."""
     return at.table["F"] * at.pose.direction
 
 

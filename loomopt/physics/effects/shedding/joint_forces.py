@@ -96,7 +96,7 @@ class CamForces:
         return Vector(0 * force, force)
 
     def heading(self, part: str) -> Vector:
-        """Return the unit direction of the cam, x where it begins to rise, or of the lever, to its roller."""
+        """Unit direction of the cam, x where it begins to rise, or of the lever, to its roller."""
         cos, sin = self.at.maths.cos, self.at.maths.sin
         if part == "cam":
             return Vector(cos(self.at.pose.phi), sin(self.at.pose.phi))

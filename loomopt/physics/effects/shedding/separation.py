@@ -63,24 +63,24 @@ class FreeFrame(Motion):
 
 
 def free(given: Values, q: float, velocity: float, acceleration: float, direction: float) -> FreeFrame:
-    """Return the frame off its cam."""
+    """Frame off its cam."""
     return FreeFrame(q, velocity, acceleration, direction, given["travel"], given["speed"])
 
 
 def places(given: Values) -> Mapping[str, float]:
-    """Return the travel, m, of a half open shed."""
+    """Travel, m, of a half open shed."""
     return {"half_open": given["travel"] / 2}
 
 
 def follow(body: "Body", cam: "Cam", own: Values) -> "Course":
-    """Return the frame's course until its state at cam angle 0 repeats."""
+    """Frame's course until its state at cam angle 0 repeats."""
     from loomopt.physics.motion import flight
 
     return flight.follow(body, cam, own["restitution"], int(own["turns"]))
 
 
 def read(course: "Course") -> dict[str, float | None]:
-    """Return the figures of the first flight, and of the period where there is one; SI, rad."""
+    """Figures of the first flight, and of the period where there is one; SI, rad."""
     (lift_off, landing), first, period = course.first, course.first_landing, course.period
     speed = first.speed if first else None
     return {

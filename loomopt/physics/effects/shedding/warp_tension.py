@@ -38,7 +38,7 @@ class Parameters(Table):
 
 
 def corners(at: Inputs[object]) -> tuple[Number, ...]:
-    """Return the cam angles where the shed is half open, rad, on the rise and on the return; none where none counts.
+    """Cam angles where the shed is half open, rad, on the rise and on the return; none where none counts.
 
     Of a table those where its intervals begin.
     """
@@ -48,29 +48,29 @@ def corners(at: Inputs[object]) -> tuple[Number, ...]:
 
 
 def past_middle(angle: float, corners: tuple[float, ...]) -> float:
-    """Return 1 between the angles where the shed is half open, 0 outside and without any; of a table the interval."""
+    """1 between the angles where the shed is half open, 0 outside and without any; of a table the interval."""
     if len(corners) > 2:
         return interval_at(angle, corners)
     return float((angle - corners[0]) % TURN < (corners[1] - corners[0]) % TURN) if corners else 0.0
 
 
 def known_in(words: Mapping[str, str]) -> tuple[Place, ...]:
-    """Return the dwells where nothing is said of the moves."""
+    """Dwells where nothing is said of the moves."""
     return (("segment", 1.0), ("segment", 3.0)) if words["shape"] == "levels" and "table" not in words else ()
 
 
 def linear(at: Inputs[FramePose]) -> Number:
-    """Return −T, N, in proportion to the shed; switch: 1 past the middle."""
+    """−T, N, in proportion to the shed; switch: 1 past the middle."""
     return (2 * at.pose.lowered - 1) * at.maths.choose(at.switch, (at.table["T1"], at.table["T2"]))
 
 
 def step(at: Inputs[FramePose]) -> Number:
-    """Return −T, N, by the cubic STEP of the law's argument u."""
+    """−T, N, by the cubic STEP of the law's argument u."""
     return (at.table["T1"] + at.table["T2"]) * at.pose.u**2 * (3 - 2 * at.pose.u) - at.table["T1"]
 
 
 def levels(at: Inputs[FramePose]) -> Number:
-    """Return −T, N, in the dwells; 0 stands for what is not known between them."""
+    """−T, N, in the dwells; 0 stands for what is not known between them."""
     return at.maths.choose(at.pose.segment, (0, at.table["T2"], 0, -at.table["T1"]))
 
 
@@ -82,7 +82,7 @@ SHAPES: dict[str, Callable[[Inputs[FramePose]], Number]] = {
 
 
 def force(at: Inputs[FramePose]) -> Number:
-    """Return −T, N, by the shape the scene names, or by its table."""
+    """−T, N, by the shape the scene names, or by its table."""
     if "table" in at.table:
         return -at.table["table"].at(at.maths, at.pose.phi, at.switch)
     return SHAPES[at.table["shape"]](at)

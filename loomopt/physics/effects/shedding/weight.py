@@ -19,7 +19,7 @@ class Parameters(Table):
 
 
 def force(at: Inputs[FramePose]) -> Number:
-    """Return −G, N."""
+    """−G, N."""
     return -at.table["G"]
 
 
