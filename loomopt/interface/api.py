@@ -159,7 +159,7 @@ def solve(
         )
         once = functools.partial(anywhere, own)
         if round_to:
-            from loomopt.studies.rounding import lattice
+            from loomopt.studies.rounding import size_rounding
 
             if robust is not None or min_yield is not None:
                 remedy = "Round first, then back off with the sizes set as bounds"
@@ -167,9 +167,9 @@ def solve(
             if proof:
                 remedy = "Leave out the proof: an answer in sizes says what of the lattice was read"
                 raise refusal("sizes and the global proof cannot be combined", "", "round_to", remedy=remedy)
-            rounding = lattice.asked(own, target, None if round_to is True else round_to)
+            rounding = size_rounding.asked(own, target, None if round_to is True else round_to)
             told_last = functools.partial(anywhere, prove=prove)
-            found = lattice.solved(rounding, anywhere, told_last, told)
+            found = size_rounding.solved(rounding, anywhere, told_last, told)
         elif robust is None and min_yield is None:
             found = once(prove=prove, global_proof=proof)
         else:

@@ -1,6 +1,6 @@
 """From a continuous optimum to sizes that are sold: solve again with each neighbour, keep the best."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from loomopt.scenes.scene import Scene
@@ -11,21 +11,35 @@ FARTHEST_SIZE, SAME_SIZE = 4, 1e-9
 """Sizes sold that are tried on either side, and the share by which two answers to them are equally good."""
 
 Solve = Callable[[Scene], Solution]
+Stock = Mapping[str, Sequence[float]]
 Tried = tuple[float, Solution]
 
 
-def fitted(scene: Scene, ideal: Solution, name: str, sizes: Sequence[float], solve: Solve) -> Solution:
-    """Return the best optimum with `name` at one of `sizes` (SI, ascending), `ideal` itself where it is one already.
+def fitted(scene: Scene, ideal: Solution, stock: Stock, solve: Solve) -> Solution:
+    """Best optimum whose numbers are at sizes that are sold; `ideal` itself where it is one already, or no optimum.
 
-    solve(scene): the answer of a changed scene. On either side the nearest size with an admissible design is enough;
-    where there is none, ideal is returned with a message that says so, as no answer to build.
+    stock: sizes (SI, ascending) by number; solve(scene): optimum of a changed scene, its numbers continuous.
     """
-    value = ideal.design[name]
-    if any(abs(value - size) <= SAME_SIZE * size for size in sizes):
-        return ideal
+    for name, sizes in stock.items() if ideal.status == "optimal" else ():
+        if all(abs(ideal.design[name] - size) > SAME_SIZE * size for size in sizes):
+            return _at_a_size(scene, ideal, name, stock, solve)
+    return ideal
+
+
+def _at_a_size(scene: Scene, ideal: Solution, name: str, stock: Stock, solve: Solve) -> Solution:
+    """Best optimum with one number at a size; on either side the nearest size with an admissible design is enough.
+
+    Where there is none, `ideal` with sentences that say so, as no answer to build.
+    """
+    value, sizes = ideal.design[name], stock[name]
+    rest = {other: own for other, own in stock.items() if other != name}
+
+    def at_size(own: Scene) -> Solution:
+        return fitted(own, solve(own), rest, solve)
+
     found, tried = [], []
     for side in (reversed([size for size in sizes if size < value]), (size for size in sizes if size > value)):
-        for size, answer in _until_admissible(scene, name, side, solve):
+        for size, answer in _until_admissible(scene, name, side, at_size):
             tried.append(scene.show(size, "length"))
             found += [answer] if answer.status == "optimal" else []
     said = f"Any size would have {name} {scene.show(value, 'length')}"

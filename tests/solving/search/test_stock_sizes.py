@@ -83,7 +83,7 @@ def fit(wire, answers, bound=ALL, sizes=SIZES):
     """Return the answer that is kept, and the sizes tried, mm."""
     solve = Solve(answers)
     ideal = solution(wire / 1000, K1=100.0, spring_mass=1.0)
-    found = fitted(scene_of(bound), ideal, "wire", sizes, solve)
+    found = fitted(scene_of(bound), ideal, {"wire": sizes}, solve)
     return found, solve.tried
 
 
@@ -176,7 +176,7 @@ def test_beyond_the_ends_of_the_list_there_is_one_neighbour(wire, expected):
 @pytest.mark.parametrize("off", [0.0, 5e-10, -5e-10])
 def test_an_optimum_at_a_size_is_taken_as_it_is(off):
     solve, ideal = Solve({}), solution(0.005 * (1 + off), K1=100.0)
-    assert fitted(scene_of(ALL), ideal, "wire", SIZES, solve) is ideal
+    assert fitted(scene_of(ALL), ideal, {"wire": SIZES}, solve) is ideal
     assert solve.tried == []
 
 
