@@ -143,7 +143,7 @@ def symbols(name: str) -> str:
     scene = registry.load(name)
     said = {symbol.name: symbol.text for symbol in glossary.symbols(scene)}
     words = Words(scene)
-    shown = [row["name"] for row in rows(api.evaluate(scene), scene)]
+    shown = [row["name"] for row in rows(api.evaluate(scene).result, scene)]
     lines = tuple((f"`{each}`", words.unit(each).removeprefix("1"), said[each]) for each in shown)
     return table(TextTable("", ("symbol", "unit", "what it is"), lines))
 

@@ -15,7 +15,6 @@ from loomopt.jobs.registry import scene
 from loomopt.physics.tolerances import ACCURACY, SLACK
 from loomopt.scenes.designs import Given as Design
 from loomopt.scenes.scene import Call, Scene
-from loomopt.solving.answer import solution
 from loomopt.solving.options import GAP, OMITTED, SECONDS, GlobalProof, check_global_proof, check_numbers, target_name
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ if TYPE_CHECKING:
     from loomopt.studies.run.rows import Row
     from loomopt.studies.sweep import Over
 
-Given = Scene | solution.Evaluated | str | os.PathLike[str]
+Given = Scene | Evaluation | str | os.PathLike[str]
 """A scene, an answer in its own scene, or what `load` takes: a packaged name or a path."""
 if TYPE_CHECKING:  # a file's name does not tell type checkers what `load` returns, and most name scenes
     Loaded = Scene | Any
@@ -88,7 +87,7 @@ def solve(
     accuracy: float = ACCURACY,
     starts: int | None = None,
     seed: int = 0,
-    warm_start: solution.Solution | None = None,
+    warm_start: Answer | None = None,
     prove: bool = False,
     global_proof: bool = False,
     gap: float = GAP,
@@ -139,7 +138,7 @@ def solve(
         if hook is not None:
             arguments.called(hook, key, "a function", "Give a function, or leave it out")
     arguments.flag(prove, "prove")
-    if warm_start is not None and not isinstance(warm_start, solution.Solution):
+    if warm_start is not None and not isinstance(warm_start, Answer):
         raise refusal("it is no answer", "", "warm_start", warm_start, "what `solve` returned", "Give one or none")
     arguments.flag(global_proof, "global_proof")
     if not isinstance(round_to, bool):
@@ -182,7 +181,7 @@ def solve(
     return results.solved(found, own, own.call.target if target is None else target)
 
 
-def evaluate(scene: Given, design: Design | solution.Evaluated | None = None, target: str | None = None) -> Evaluation:
+def evaluate(scene: Given, design: Design | Evaluation | None = None, target: str | None = None) -> Evaluation:
     """Return figures and limits of a design (SI and rad; today's where it names nothing). Raises BadInput.
 
     scene: as `load` takes it; without a design, an answer is judged as it is. design: a mapping, or an answer, of which
@@ -193,7 +192,7 @@ def evaluate(scene: Given, design: Design | solution.Evaluated | None = None, ta
 
 
 def prove(
-    scene: Given, design: Design | solution.Evaluated | None = None, target: str | None = None, *, slack: float = SLACK
+    scene: Given, design: Design | Evaluation | None = None, target: str | None = None, *, slack: float = SLACK
 ) -> "Proofs":
     """Return proofs that a design's limits (SI; today's without one) hold at every crank angle, or where they fail.
 
@@ -214,7 +213,7 @@ def prove(
 @renamed(beside="measured")
 def simulate(
     scene: Given,
-    design: Design | solution.Evaluated | None = None,
+    design: Design | Evaluation | None = None,
     target: str | None = None,
     *,
     accuracy: float | None = None,
@@ -236,9 +235,7 @@ def simulate(
     return tables.curves(own, given, accuracy, name, measured)
 
 
-def budget(
-    scene: Given, design: Design | solution.Evaluated | None = None, *, fluctuation: float | None = None
-) -> "Budget":
+def budget(scene: Given, design: Design | Evaluation | None = None, *, fluctuation: float | None = None) -> "Budget":
     """Return where the crank torque of a design (SI; today's without one) comes from, effect by effect.
 
     Each effect's share where the torque peaks, its rms, its energy a turn; what their sum asks of a motor. design: a
@@ -315,15 +312,13 @@ def sensitivity(
 
     if on_step is not None:
         arguments.called(on_step, "on_step", "a function", "Give a function, or leave it out")
-    solved = answer if isinstance(answer, solution.Solution) and answer.point else solve(_scene(answer), target)
-    if solved.scene is None:
-        raise refusal("the answer knows no scene", "", "scene", remedy="Solve it again")
-    return run_sensitivity(planned(solved.scene, solved), on_step)
+    solved = answer if isinstance(answer, Answer) and answer.point else solve(_scene(answer), target)
+    return run_sensitivity(planned(solved.scene, solved.result), on_step)
 
 
 def tolerance(
     scene: Given,
-    design: Design | solution.Evaluated | None = None,
+    design: Design | Evaluation | None = None,
     target: str | None = None,
     executor: "Executor | Callable[[], Executor] | None" = None,
     *,
@@ -445,18 +440,15 @@ def _opened(given: Given) -> tuple[Scene, dict[str, float] | None]:
 
     if isinstance(given, Scene):
         return given, None
-    if isinstance(given, solution.Evaluated):
-        if given.scene is None:
-            raise refusal("the answer knows no scene", "", "scene", remedy="Give the scene it was found for")
-        target = getattr(given, "target", None) or None
-        return given.scene.called(Call(target=target)), designs.checked(given.design, given.scene)
+    if isinstance(given, Evaluation):
+        return given.scene.called(Call(target=given.target or None)), designs.checked(given.design, given.scene)
     if path := registry.answer_path(given):
         own, handed = registry.answered(path)
         return own, designs.checked(handed.design, own, own.origin)
     return registry.load(given), None
 
 
-def _request(scene: Given, design: Design | solution.Evaluated | None) -> tuple[Scene, dict[str, float]]:
+def _request(scene: Given, design: Design | Evaluation | None) -> tuple[Scene, dict[str, float]]:
     """Return a scene and a design in it, checked: of an answer its own, where none is given; else today's, as nothing.
 
     Of an answer given as the design, its design alone. Raises BadInput.
@@ -464,9 +456,8 @@ def _request(scene: Given, design: Design | solution.Evaluated | None) -> tuple[
     from loomopt.scenes import designs
 
     own, known = _opened(scene)
-    if isinstance(design, solution.Evaluated):
-        if design.scene:
-            designs.check_job(design.scene.job, own, "<answer>")
+    if isinstance(design, Evaluation):
+        designs.check_job(design.scene.job, own, "<answer>")
         design = design.design
     if design is None or (isinstance(design, Mapping) and not design):
         return own, known or {}

@@ -4,15 +4,16 @@ import dataclasses
 import inspect
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from loomopt.base import arguments, records
 from loomopt.base.arguments import renamed
 from loomopt.base.records import lazy
+from loomopt.interface.record_holder import RecordHolder
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
-from loomopt.scenes import designs
+from loomopt.scenes import designs, family
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report, solution
 from loomopt.solving.options import check_numbers, target_name
@@ -30,20 +31,34 @@ PICTURE = arguments.PICTURE
 
 
 @dataclass(frozen=True, repr=False)
-class Evaluation(solution.Evaluated, records.Shown):
+class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
     """A given design in its scene: its figures and limits, SI and rad; nothing was optimised.
 
     target: whose limits it was judged by.
     """
 
-    scene: Scene = field(kw_only=True, compare=False)
-    target: str = field(kw_only=True, default="")
+    target: str = ""
+
+    @property
+    def scene(self) -> Scene:
+        """What it holds in: the scene as it was asked for, with all that was set, put on and taken off."""
+        assert self.result.scene is not None
+        return self.result.scene
+
+    @lazy
+    def members(self) -> "tuple[Evaluation, ...]":
+        """Of a family each machine by itself."""
+        return tuple(_judged(each, self.scene, family.of_target(self.scene)) for each in self.result.members)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Object that `--json` prints."""
+        return self.result.as_dict(self.target)
 
     def table(self) -> "pd.DataFrame":
         """Return design and figures, a row each, beside today's machine and the limits, in the scene's own units."""
         from loomopt.interface import tables
 
-        return tables.answer(self, self.scene)
+        return tables.answer(self.result, self.scene)
 
     def to_frame(self, *, si: bool = False) -> "pd.DataFrame":
         """Return design and figures as one row, units in the column names, to be set beside others by `pd.concat`.
@@ -52,7 +67,7 @@ class Evaluation(solution.Evaluated, records.Shown):
         """
         from loomopt.interface import tables
 
-        return tables.row(self, self.scene, self.sought, self._outcome, si=arguments.flag(si, "si"))
+        return tables.row(self.result, self.scene, self.sought, self._outcome, si=arguments.flag(si, "si"))
 
     def curves(self) -> "pd.DataFrame":
         """Return the curves of the design over the cycle, SI, units in the column names."""
@@ -66,11 +81,11 @@ class Evaluation(solution.Evaluated, records.Shown):
 
         path: a file to write it to as well: .png, .svg or .pdf. measured: as in `loomopt.simulate`. Raises BadInput.
         """
-        solution.demand_single(self, "curves")
+        solution.demand_single(self.result, "curves")
         from loomopt.interface.files import outputs
 
         place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
-        return outputs.plot(self, self.scene, self.target, place, measured)
+        return outputs.plot(self.result, self.scene, self.target, place, measured)
 
     def plot_forces(self, path: str | os.PathLike[str] | None = None) -> "Figure":
         """Return the forces that an effect tells by components: size over the turn, and each one's polar diagram.
@@ -86,22 +101,22 @@ class Evaluation(solution.Evaluated, records.Shown):
 
     def draw(self) -> "Sketch":
         """Return the mechanism drawn at full scale, which shows itself in Jupyter. Raises BadInput."""
-        solution.demand_single(self, "drawing")
+        solution.demand_single(self.result, "drawing")
         from loomopt.interface.files import outputs
         from loomopt.interface.text import notebook
 
-        return notebook.sketch(self.scene, self.design, outputs.what(self))
+        return notebook.sketch(self.scene, self.design, outputs.what(self.result))
 
     def export(self, path: str | os.PathLike[str]) -> Path:
         """Write linkage or cam for the workshop, as `loomopt export` does; return the file. Raises BadInput.
 
         path: .dxf or .svg at true scale; .csv or .xlsx for the joints or the profile.
         """
-        solution.demand_single(self, "drawing")
+        solution.demand_single(self.result, "drawing")
         from loomopt.interface.files import outputs
 
         place = Path(arguments.path(path, "path", "a path that ends in .dxf, .svg, .csv or .xlsx", "Name a file"))
-        outputs.linkage(place, self.scene, self.design, outputs.what(self))
+        outputs.linkage(place, self.scene, self.design, outputs.what(self.result))
         return place
 
     def report(self, path: str | os.PathLike[str], *beside: object) -> Path:
@@ -121,16 +136,16 @@ class Evaluation(solution.Evaluated, records.Shown):
 
         path: a file to write it to as well: .html, .gif, or .mp4 where ffmpeg is found.
         """
-        solution.demand_single(self, "drawing")
+        solution.demand_single(self.result, "drawing")
         from loomopt.interface.files import outputs
         from loomopt.interface.report import animation
 
         place = None if path is None else Path(arguments.path(path, "path", *animation.FILE))
-        return animation.animated(self.scene, self.design, place, outputs.what(self))
+        return animation.animated(self.scene, self.design, place, outputs.what(self.result))
 
     def evaluate(self) -> "Evaluation":
         """Return figures and limits of the design in its own scene, judged by the limits of its own target."""
-        solution.demand_single(self, "figures to evaluate")
+        solution.demand_single(self.result, "figures to evaluate")
         design = designs.checked(self.design, self.scene)
         if self.terms:
             return _judged(self.terms.evaluation(design), self.scene, self.target)
@@ -141,7 +156,7 @@ class Evaluation(solution.Evaluated, records.Shown):
         self, *, accuracy: float | None = None, measured: str | os.PathLike[str] | None = None
     ) -> "pd.DataFrame":
         """Return the curves of the design in its own scene; accuracy, measured: as in `loomopt.simulate`."""
-        solution.demand_single(self, "curves")
+        solution.demand_single(self.result, "curves")
         from loomopt.interface import tables
 
         if accuracy is not None:
@@ -150,7 +165,7 @@ class Evaluation(solution.Evaluated, records.Shown):
 
     def budget(self, *, fluctuation: float | None = None) -> "Budget":
         """Return where the crank torque of the design comes from; fluctuation: as in `loomopt.budget`."""
-        solution.demand_single(self, "torque budget")
+        solution.demand_single(self.result, "torque budget")
         from loomopt.interface.study.budget import compute
 
         return compute(self.scene, designs.checked(self.design, self.scene), fluctuation)
@@ -159,7 +174,7 @@ class Evaluation(solution.Evaluated, records.Shown):
         """Return proofs of the limits of its own scene and target; slack: as in `loomopt.prove`. Raises BadInput."""
         from loomopt.solving.proof import whole_cycle
 
-        solution.demand_single(self, "proofs")
+        solution.demand_single(self.result, "proofs")
         design = designs.checked(self.design, self.scene)
         return (
             self.terms.proofs(design, slack)
@@ -201,7 +216,9 @@ class Evaluation(solution.Evaluated, records.Shown):
         from loomopt.interface.text import answers, layout
 
         before = None if self._is_today else evaluated(self.scene, None, self.target or None)
-        return layout.render(answers.evaluation(self, self.scene, before), layout.width())
+        return layout.render(
+            answers.evaluation(self.result, self.scene, before.result if before else None), layout.width()
+        )
 
     @property
     def _is_today(self) -> bool:
@@ -214,64 +231,59 @@ class Evaluation(solution.Evaluated, records.Shown):
 
 
 @dataclass(frozen=True, repr=False)
-class Answer(Evaluation, solution.Solution):
+class Answer(Evaluation):
     """A solved target: the design that was found, what binds, what is certified, and today's machine beside it."""
+
+    result: solution.Solution
 
     @lazy
     def before(self) -> Evaluation | None:
         """Today's machine, evaluated when it is first read."""
-        return _judged(self.today(), self.scene, self.target) if self.today else None
+        return _judged(self.result.before, self.scene, self.target) if self.result.before else None
 
     def __str__(self) -> str:
         from loomopt.interface.text import answers, layout
 
-        return layout.render(answers.solution(self, self.scene), layout.width())
+        return layout.render(answers.solution(self.result, self.scene), layout.width())
 
     @property
     def _outcome(self) -> str:
-        return self.outcome
+        return self.result.outcome
 
     @property
     def _summary(self) -> str:
-        return f"limits that clash: {', '.join(self.clash)}" if self.clash else super()._summary
+        clash = self.result.clash
+        return f"limits that clash: {', '.join(clash)}" if clash else super()._summary
 
 
-for _shown in (Answer, Evaluation):  # names alone: whoever reads `help` looks for what is in it, and makes none
-    _signature = inspect.signature(_shown)
-    _named = [each.replace(annotation=each.empty, default=each.empty) for each in _signature.parameters.values()]
-    _shown.__signature__ = _signature.replace(parameters=_named, return_annotation=_signature.empty)  # type: ignore[attr-defined]
+def _fields_signature(record: type) -> inspect.Signature:
+    """Names of what is in a record: whoever reads `help` looks for them."""
+    known = inspect.signature(record).parameters.values()
+    return inspect.Signature([each.replace(annotation=each.empty, default=each.empty) for each in known])
+
+
+Answer.__signature__ = _fields_signature(solution.Solution)  # type: ignore[attr-defined]
+Evaluation.__signature__ = _fields_signature(solution.Evaluated)  # type: ignore[attr-defined]
 
 
 def _html(thing: records.Shown) -> str:
     from loomopt.interface.text import notebook
 
-    return notebook.html(thing)
+    return notebook.html(thing.result if isinstance(thing, Evaluation) else thing)
 
 
 records.show_by(_html)
 
 
 def evaluated(scene: Scene, design: Mapping[str, float] | None, target: str | None) -> Evaluation:
-    """Return figures and limits of a design, checked, SI; today's without one. Raises BadInput."""
+    """Figures and limits of a design, checked, SI; today's without one. Raises BadInput."""
     return _judged(report.evaluate(scene, design, target), scene, target_name(scene, target))
 
 
 def solved(found: solution.Solution, scene: Scene, target: str | None = None) -> Answer:
-    """Return what a solve says as an object to work with; target: as the call named it."""
-    members = tuple(_member(each, scene) for each in found.members)
-    return Answer(**_fields(found) | {"scene": scene, "asked": target, "members": members})
-
-
-def _member(found: solution.Evaluated, scene: Scene) -> Evaluation:
-    """Return a member of a scene's family as an object to work with, in its own scene and for its own target."""
-    from loomopt.scenes import family
-
-    return _judged(found, found.scene or scene, family.of_target(scene))
+    """What a solve says as an object to work with; target: as the call named it."""
+    return Answer(dataclasses.replace(found, scene=scene, asked=target), found.target)
 
 
 def _judged(found: solution.Evaluated, scene: Scene, target: str) -> Evaluation:
-    return Evaluation(**_fields(found) | {"scene": scene, "target": target})
-
-
-def _fields(found: solution.Evaluated) -> dict[str, Any]:
-    return {entry.name: getattr(found, entry.name) for entry in dataclasses.fields(found)}
+    return Evaluation(found if found.scene else dataclasses.replace(found, scene=scene), target)

@@ -7,15 +7,15 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING
 
 from loomopt.base import arguments
 from loomopt.base.errors import refusal
 from loomopt.base.files import atomically, suffix
 from loomopt.interface.files import outputs
 from loomopt.interface.progress import cell_progress
+from loomopt.interface.record_holder import Record, RecordHolder
 from loomopt.picture.chart import Charts
 from loomopt.picture.shapes import Drawing
 from loomopt.picture.table import TextTable
@@ -84,23 +84,8 @@ class Presentation(ABC):
         return notebook.page(self.tables())
 
 
-Result = TypeVar("Result")
-
-
-@dataclass(frozen=True, repr=False)
-class StudyResult(Presentation, Generic[Result]):
-    """What a study found, to work with; the attributes of the record are its own too."""
-
-    result: Result
-
-    def __getattr__(self, name: str) -> Any:
-        """Attribute of the record."""
-        if name == "result" or name.startswith("__"):  # while it is being unpickled there is no record yet
-            raise AttributeError(name)
-        return getattr(self.result, name)
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *(name for name in dir(self.result) if not name.startswith("_"))})
+class StudyResult(RecordHolder[Record], Presentation):
+    """What a study found, to work with; the attributes of its record are its own too."""
 
 
 @contextlib.contextmanager

@@ -122,14 +122,14 @@ def test_show_simulate_and_evaluate_print_every_scene(cli, name):
 
 def test_a_free_law_is_one_short_line(answer):
     scene = lo.load("shedding")
-    shown = layout.render(answers.solution(answer, scene), 100)
+    shown = layout.render(answers.solution(answer.result, scene), 100)
     law = answer.design["law"]
     line = f"law: s'' at 9 knots, {min(law):.6g} ... {max(law):.6g}; all in design"
     assert shown.splitlines().count(line) == 1
-    evaluated = layout.render(answers.evaluation(lo.evaluate(scene, answer.design), scene, None), 100)
+    evaluated = layout.render(answers.evaluation(lo.evaluate(scene, answer.design).result, scene, None), 100)
     assert line in evaluated.splitlines()
     for name in ("shedding", "beatup"):
-        assert answers.lists(lo.evaluate(lo.load(name)), lo.load(name)) == []
+        assert answers.lists(lo.evaluate(lo.load(name)).result, lo.load(name)) == []
 
 
 def test_a_free_law_goes_from_answer_to_workshop_and_figure(cli, answer, tmp_path):

@@ -147,7 +147,7 @@ def test_a_scene_from_tables_is_the_scene_from_the_file():
 
 
 def test_an_answer_travels_between_processes(answer):
-    plain = dataclasses.replace(answer, point=None)
+    plain = lo.Answer(dataclasses.replace(answer.result, point=None), answer.target)
     assert pickle.loads(pickle.dumps(plain)).as_dict() == answer.as_dict()
 
 
@@ -201,7 +201,18 @@ METHODS = {
             "sought",
         ),
         *("beside", "outcome", "status", "table", "target", "terms", "time", "to_frame", "today", "units"),
-        *("report", "robust", "rounded", "undefined", "members", "change", "worse", "bind_together", "design_is"),
+        *(
+            "report",
+            "result",
+            "robust",
+            "rounded",
+            "undefined",
+            "members",
+            "change",
+            "worse",
+            "bind_together",
+            "design_is",
+        ),
     },
     "Scene": {
         *("active", "bounds", "call", "called", "change", "document", "effects", "equations", "free", "full", "given"),

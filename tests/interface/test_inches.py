@@ -95,9 +95,9 @@ def _inner(value):
 
 
 def test_what_a_person_sees_differs_in_units_only(pair):
-    shown = [masked(answers.solution(answer, answer.scene)) for answer in pair]
+    shown = [masked(answers.solution(answer.result, answer.scene)) for answer in pair]
     assert shown[0] == shown[1]
-    text = layout.render(answers.solution(pair[1], pair[1].scene), None)
+    text = layout.render(answers.solution(pair[1].result, pair[1].scene), None)
     assert not re.search(r" (mm|N\*m|N|N/m|kg)\b", text)
     own, inches = (set(answer.table()["unit"]) for answer in pair)
     assert ("mm" in own, "in" in inches, "mm" in inches) == (True, True, False)
@@ -132,7 +132,7 @@ def test_show_and_evaluate_differ_in_units_only(name):
     scenes = lo.load(name), in_inches(name)
     evaluated = [lo.evaluate(scene) for scene in scenes]
     assert evaluated[0].as_dict() == evaluated[1].as_dict()
-    told = [masked(answers.evaluation(found, s, None)) for found, s in zip(evaluated, scenes, strict=True)]
+    told = [masked(answers.evaluation(found.result, s, None)) for found, s in zip(evaluated, scenes, strict=True)]
     assert told[0] == told[1]
     drawn = [masked(curves(scene, {}, None)[1:]) for scene in scenes]
     assert drawn[0].count("U") == drawn[1].count("U") > 2
@@ -169,7 +169,7 @@ def test_what_physics_says_of_a_clash_is_in_the_scenes_units():
 def seen(scene):
     """Return the tables of a scene that a person sees, each as its units."""
     found = lo.evaluate(scene)
-    yield [row["unit"] for row in tables.rows(found, scene)]
+    yield [row["unit"] for row in tables.rows(found.result, scene)]
     grids = [part for part in scenes.curves(scene, {}, None) if isinstance(part, TextTable)]
     heads = [head for grid in grids for head in grid.columns]
     yield [head.partition("[")[2].rstrip("]") for head in heads]

@@ -223,6 +223,8 @@ def test_a_signature_is_names_that_can_be_read(shown):
 def test_a_goal_that_is_reached_reads_zero():
     """Rounding has no digits that mean something: the least M3_fdc of a balanced machine is 0 in what Python shows."""
     answer = lo.solve("beatup")
-    rounded = replace(answer, figures={**answer.figures, "M3_fdc": -1.13687e-13})
+    rounded = lo.Answer(replace(answer.result, figures={**answer.figures, "M3_fdc": -1.13687e-13}), answer.target)
     assert "M3_fdc 0 N*m, " in repr(rounded)
-    assert "M3_fdc 0.0001 N*m, " in repr(replace(answer, figures={**answer.figures, "M3_fdc": 1e-4}))
+    assert "M3_fdc 0.0001 N*m, " in repr(
+        lo.Answer(replace(answer.result, figures={**answer.figures, "M3_fdc": 1e-4}), answer.target)
+    )

@@ -17,7 +17,6 @@ from loomopt.base.errors import BadInput
 from loomopt.interface import study_table
 from loomopt.interface.files import outputs
 from loomopt.picture.table import TextTable
-from loomopt.solving.answer.solution import Solution
 from loomopt.studies import sweep
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import digest
@@ -111,7 +110,7 @@ def test_threads_of_one_process_solve_one_at_a_time(serial):
 def test_a_row_gives_its_whole_answer_again(serial):
     for point in (0, 3):
         answer, row = serial.answer(point), serial.rows[point]
-        assert isinstance(answer, Solution)
+        assert isinstance(answer, lo.Answer)
         assert dict(answer.design) == dict(row.design)
         assert dict(answer.figures) == dict(row.figures)
         assert answer.scene.operation["M0"] == row.place["operation.M0"]
@@ -152,7 +151,7 @@ def test_a_row_that_misses_its_goal_is_nowhere_called_optimal_alone(serial):
     answer = serial.answer(0)
     assert "optimal but M3_fdc not reached" in repr(answer)
     assert answer.to_frame()["outcome"].tolist() == ["optimal but M3_fdc not reached"]
-    assert outputs.what(answer).shortfall == "M3_fdc not reached"
+    assert outputs.what(answer.result).shortfall == "M3_fdc not reached"
 
 
 def test_changes_along_a_sweep_name_the_limits_that_come_and_go(serial):

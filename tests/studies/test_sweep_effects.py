@@ -69,7 +69,7 @@ def differences(row, plan):
     passed = answer.certificate is not None and answer.certificate.passed
     if row.certified != passed:
         said.append(f"certified: {row.certified}, and not {passed}")
-    if (binds := set(row.multipliers)) != (own := set(sweep.multipliers(answer))):
+    if (binds := set(row.multipliers)) != (own := set(sweep.multipliers(answer.result))):
         said.append(f"what binds: {binds ^ own}")
     if row.figures.keys() != answer.figures.keys():
         return [*said, f"figures: {row.figures.keys() ^ answer.figures.keys()}"]

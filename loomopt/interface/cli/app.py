@@ -130,7 +130,7 @@ def solve(
     unwritten = None
     if out:
         try:
-            remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer, scene, comma)))
+            remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer.result, scene, comma)))
         except BadInput as error:
             unwritten = error
     remarked(scene, answer.design)
@@ -139,7 +139,7 @@ def solve(
     else:
         from loomopt.interface.text import answers, layout
 
-        layout.show(*answers.solution(answer, scene))
+        layout.show(*answers.solution(answer.result, scene))
     if unwritten:
         raise unwritten
     unproven = answer.global_bound is not None and not answer.global_bound.proven

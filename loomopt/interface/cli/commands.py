@@ -20,9 +20,9 @@ from loomopt.interface.cli.shell import DIFFERS, call_progress, read_number, rea
 from loomopt.picture.table import TextTable
 
 if TYPE_CHECKING:
+    from loomopt.interface.results import Evaluation
     from loomopt.scenes.designs import Design as DesignGiven
     from loomopt.scenes.scene import Scene
-    from loomopt.solving.answer.solution import Evaluated
 
 
 def tell(
@@ -55,7 +55,7 @@ def remarked(scene: "Scene", design: "DesignGiven") -> None:
         remark(f"Remark: {text}.")
 
 
-def printed(found: "Evaluated") -> None:
+def printed(found: "Evaluation") -> None:
     """Print one JSON object."""
     from loomopt.interface.files import outputs
 
@@ -135,7 +135,9 @@ def show(
     from loomopt.interface.text import glossary, layout, scenes
 
     scene, given, name, status = read_request(problem, design, None, changes.call)
-    said = outputs.what(api.evaluate(scene, given, name), name, status) if given and (figure or animate) else None
+    said = (
+        outputs.what(api.evaluate(scene, given, name).result, name, status) if given and (figure or animate) else None
+    )
     write(figure, lambda path: outputs.picture(path, scene, given, said))
     if animate:
         from loomopt.interface.report import animation
@@ -168,7 +170,8 @@ def evaluate(
         return
     from loomopt.interface.text import answers, layout
 
-    layout.show(*answers.evaluation(found, scene, api.evaluate(scene, None, name) if given else None))
+    before = api.evaluate(scene, None, name).result if given else None
+    layout.show(*answers.evaluation(found.result, scene, before))
 
 
 def prove(
@@ -222,7 +225,7 @@ def simulate(
         check_numbers(asked, 1)
     told = scenes.forces(scene, api.simulate(scene, given, name), given) if forces else ()
     compared = [scenes.beside(scene, api.simulate(scene, given, name, measured=beside))] if beside else []
-    said = outputs.what(api.evaluate(scene, given, name), name, status) if given and out else None
+    said = outputs.what(api.evaluate(scene, given, name).result, name, status) if given and out else None
     for path in out or ():
         if forces and path.suffix.lower() in outputs.PICTURES:
             api.evaluate(scene, given, name).plot_forces(path)
@@ -285,7 +288,7 @@ def export(
 
     comma = sheets.decimal_comma(decimal)
     scene, given, name, status = read_request(problem, design, target, changes.call)
-    said = outputs.what(api.evaluate(scene, given, name), name, status) if given else None
+    said = outputs.what(api.evaluate(scene, given, name).result, name, status) if given else None
     how = outputs.workshop(dxf, arcs, only)
     outputs.check_workshop(out, how)
     write(out, lambda path: outputs.linkage(path, scene, given, said, comma, how))

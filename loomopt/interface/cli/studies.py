@@ -279,7 +279,7 @@ def sensitivity(
             else:
                 remark(answer.message)
             raise typer.Exit(INFEASIBLE if answer.status == "infeasible" else NOT_CERTIFIED)
-        found = run_sensitivity(planned(scene, answer), progress.say)
+        found = run_sensitivity(planned(scene, answer.result), progress.say)
     tell(as_json, found.as_dict, found.tables)
     write(table.out, lambda path: outputs.write_table(path, found.table(), comma=comma))
     write(figure, found.plot)

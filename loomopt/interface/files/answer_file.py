@@ -19,7 +19,7 @@ from loomopt.physics.tolerances import FEASIBLE, STATIONARY
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import JointPrice, Price, Proof, Proofs, Relaxation, Sentences, Words
+from loomopt.solving.answer.solution import JointPrice, Price, Proof, Proofs, Relaxation, Sentences, Solution, Words
 from loomopt.solving.certificate.records import Certificate, GlobalBound, GlobalLevel, Level
 
 AGREES = 1e-6
@@ -63,7 +63,7 @@ def _answer(told: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> An
     certificate = _certificate(told["certificate"]) if told.get("certificate") else None
     bound = _everywhere(told["global"], told["figures"]) if told.get("global") else None
     fields = {name: getattr(evaluation, name) for name in ("problem", "effects", "design", "figures", "units")}
-    return Answer(
+    record = Solution(
         **fields,
         limits=limits,
         reached=evaluation.reached,
@@ -82,6 +82,7 @@ def _answer(told: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> An
         global_bound=bound,
         today=functools.partial(report.evaluate, scene, None, evaluation.target or None),
     )
+    return Answer(record, record.target)
 
 
 def _of_target(told: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> bool:

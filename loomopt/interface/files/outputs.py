@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from loomopt.base import __version__, quantities
 from loomopt.base.errors import BadInput, misread, refusal
@@ -58,8 +58,15 @@ class DrawnSubject(NamedTuple):
         return f"{self.name}; limits not held: {', '.join(self.broken)}" if self.broken else self.name
 
 
-def document(found: Evaluated) -> str:
-    """Return an evaluation or an answer as one JSON object; what is undefined is null."""
+class Serialisable(Protocol):
+    """What has JSON data."""
+
+    def as_dict(self) -> Mapping[str, object]:
+        """Its JSON data."""
+
+
+def document(found: Serialisable) -> str:
+    """An evaluation or an answer as one JSON object; what is undefined is null."""
     return json_text({"loomopt": __version__, **found.as_dict()})
 
 

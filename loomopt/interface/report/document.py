@@ -27,15 +27,35 @@ class Reported(Protocol):
         """Return its parts of a page."""
 
 
-def of_answer(found: Evaluated, beside: Sequence[object] = (), doubts: Sequence[str] = ()) -> list[Chapter]:
+class Judged(Protocol):
+    """A design in its scene; target: whose limits it was judged by; sought: what it answers."""
+
+    @property
+    def result(self) -> Evaluated:
+        """What is known of it."""
+
+    @property
+    def scene(self) -> Scene:
+        """What it holds in."""
+
+    @property
+    def target(self) -> str:
+        """Whose limits it was judged by."""
+
+    @property
+    def sought(self) -> str:
+        """What it answers."""
+
+
+def of_answer(found: Judged, beside: Sequence[object] = (), doubts: Sequence[str] = ()) -> list[Chapter]:
     """Return the chapter of an answer, of a family one for each of its members too; the rest as of `of_design`."""
     first = of_design(found, beside, doubts)
-    if not found.members:
+    if not found.result.members:
         return [first]
     return [first, *(Chapter(heading, "", told, parts) for heading, told, parts in answer.members(_subject(found)))]
 
 
-def of_design(found: Evaluated, beside: Sequence[object] = (), doubts: Sequence[str] = ()) -> Chapter:
+def of_design(found: Judged, beside: Sequence[object] = (), doubts: Sequence[str] = ()) -> Chapter:
     """Return the chapter of an answer or an evaluation, which knows its scene.
 
     beside: what was computed of the same scene; doubts: why what its file says is not believed. Raises BadInput.
@@ -44,11 +64,8 @@ def of_design(found: Evaluated, beside: Sequence[object] = (), doubts: Sequence[
     return _chapter(subject.heading, subject.scene, answer.status(subject), [*answer.parts(subject), *_more(beside)])
 
 
-def _subject(found: Evaluated, doubts: Sequence[str] = ()) -> Subject:
-    if found.scene is None:
-        raise refusal("the answer knows no scene", "", "scene", remedy="Give the scene it was found for")
-    target, sought = (str(getattr(found, name, "")) for name in ("target", "sought"))
-    return Subject(found, found.scene, target, sought, tuple(doubts))
+def _subject(found: Judged, doubts: Sequence[str] = ()) -> Subject:
+    return Subject(found.result, found.scene, found.target, found.sought, tuple(doubts))
 
 
 def of_study(plan: SceneStudy, solved: Sequence[Row], beside: Sequence[object] = ()) -> Chapter:

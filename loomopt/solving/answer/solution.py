@@ -14,6 +14,7 @@ from loomopt.model.limits import CycleLimit, Limit
 from loomopt.model.program import Alias, shortfall
 from loomopt.physics.effects.kinds import label
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
+from loomopt.scenes import family
 from loomopt.scenes.document import copied
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import FAMILY
@@ -270,8 +271,8 @@ class Evaluated:
         """Whether every limit holds."""
         return all(limit.ok for limit in self.limits)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the object `evaluate --json` prints."""
+    def as_dict(self, target: str = "") -> dict[str, Any]:
+        """Object that `evaluate --json` prints; target: whose tables it tells."""
         found = {
             "problem": self.problem,
             "effects": list(self.effects),
@@ -282,9 +283,11 @@ class Evaluated:
             "reached": dict(self.reached),
         }
         found |= {"undefined": dict(self.undefined)} if self.undefined else {}
-        tables = _tables(self.scene, str(getattr(self, "target", ""))) if self.scene and not self.members else []
+        tables = _tables(self.scene, target) if self.scene and not self.members else []
         found |= {"tables": tables} if tables else {}
-        return found | ({"members": [_member_dict(member) for member in self.members]} if self.members else {})
+        return found | (
+            {"members": [_member_dict(member, self.scene) for member in self.members]} if self.members else {}
+        )
 
 
 def _tables(scene: Scene, target: str) -> list[dict[str, object]]:
@@ -309,9 +312,10 @@ def demand_single(found: Evaluated, what: str) -> None:
         raise refusal(f"a family has no {what}: each of its members has", origin, "target", FAMILY, remedy=remedy)
 
 
-def _member_dict(member: Evaluated) -> dict[str, Any]:
-    """Return a member of a family as JSON data, with what it changes of the scene."""
-    told = {key: value for key, value in member.as_dict().items() if key not in ("problem", "effects", "units")}
+def _member_dict(member: Evaluated, whole: Scene | None) -> dict[str, Any]:
+    """A member of a family as JSON data, with what it changes of the scene; whole: the scene of the family."""
+    target = family.of_target(whole) if whole else ""
+    told = {key: value for key, value in member.as_dict(target).items() if key not in ("problem", "effects", "units")}
     return {"change": dict(member.change), **told}
 
 
@@ -586,9 +590,9 @@ class Solution(Evaluated):
         """What it answers: its target, or what its terms say."""
         return self.terms.said if self.terms else self.target
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self, target: str = "") -> dict[str, Any]:
         """Return the object `solve --json` prints."""
-        base = super().as_dict()
+        base = super().as_dict(self.target or target)
         head: dict[str, Any] = {
             "problem": self.problem,
             "target": self.target or None,

@@ -40,13 +40,13 @@ def test_todays_machine_is_drawn_as_such(tmp_path, capsys):
 
 def test_the_nearest_design_of_an_infeasible_target_is_drawn_as_such(nearest, tmp_path):
     assert nearest.status == "infeasible"
-    outputs.answer(tmp_path / "out", nearest, nearest.scene)
+    outputs.answer(tmp_path / "out", nearest.result, nearest.scene)
     drawn = (tmp_path / "out/linkage.svg").read_text(encoding="utf-8")
     broken = {limit.name for limit in nearest.limits if not limit.ok}
     said, _, named = title(drawn).partition("; limits not held: ")
     assert said == "beatup: nearest design for balance"
     assert set(named.split(", ")) == broken != set()
-    assert "nearest design" in notebook.html(nearest)
+    assert "nearest design" in notebook.html(nearest.result)
 
 
 def test_a_design_that_breaks_limits_is_exported_as_such(nearest, tmp_path, capsys):
@@ -73,8 +73,8 @@ def test_every_file_that_is_asked_for_is_written_or_a_second_one_refused(tmp_pat
 
 
 def test_todays_machine_is_called_so_wherever_it_is_evaluated():
-    assert outputs.what(lo.evaluate("beatup-light")).text == "today's machine"
-    assert outputs.what(lo.evaluate("beatup-light", {"l1": 0.0305})).name.startswith("a given design")
+    assert outputs.what(lo.evaluate("beatup-light").result).text == "today's machine"
+    assert outputs.what(lo.evaluate("beatup-light", {"l1": 0.0305}).result).name.startswith("a given design")
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_todays_machine_is_called_so_wherever_it_is_evaluated():
     ],
 )
 def test_an_answer_says_what_its_design_is(nearest, status, said):
-    held = dataclasses.replace(nearest, status=status, limits=())
+    held = dataclasses.replace(nearest.result, status=status, limits=())
     assert outputs.what(held).text == said
     broken = Finding("swing", 0.5, None, 0.4, ok=False)
     assert outputs.what(dataclasses.replace(held, limits=(broken,))).text == f"{said}; limits not held: swing"

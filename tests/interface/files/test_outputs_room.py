@@ -105,16 +105,16 @@ def test_the_answer_is_printed_though_the_disk_fills_up_meanwhile(here, capsys, 
 @pytest.mark.few(2)
 def test_an_earlier_answer_stays_whole_where_a_new_one_cannot_be_written(here, monkeypatch, after):
     answer = lo.solve(lo.load("beatup"))
-    outputs.answer(here / "answer", answer, answer.scene)
+    outputs.answer(here / "answer", answer.result, answer.scene)
     before = {path.name: path.read_bytes() for path in (here / "answer").iterdir()}
     assert sorted(before) == NAMES
     other = lo.solve(lo.load("beatup-light"))
     with monkeypatch.context() as patch:
         full(patch, after=after)
         with pytest.raises(BadInput, match="No space left on device"):
-            outputs.answer(here / "answer", other, other.scene)
+            outputs.answer(here / "answer", other.result, other.scene)
     assert {path.name: path.read_bytes() for path in (here / "answer").iterdir()} == before
-    outputs.answer(here / "answer", other, other.scene)
+    outputs.answer(here / "answer", other.result, other.scene)
     assert json.loads((here / "answer" / "answer.json").read_text())["problem"] == "beatup-light"
 
 
@@ -122,7 +122,7 @@ def test_an_earlier_answer_stays_whole_where_a_new_one_cannot_be_written(here, m
 def test_a_folder_may_stand_deep(here):
     answer = lo.solve(lo.load("beatup"))
     deep = Path("x/" * 1200)
-    files_made = outputs.answer(deep, answer, answer.scene)
+    files_made = outputs.answer(deep, answer.result, answer.scene)
     assert [path.parent for path in files_made] == [deep] * len(NAMES)
     for path in files_made:
         path.unlink()

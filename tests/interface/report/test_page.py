@@ -64,8 +64,13 @@ def page(found, doubts=()):
     return document.html([document.of_design(found, doubts=doubts)])
 
 
+def altered(found, **changes):
+    """Return an answer with other fields of its record."""
+    return lo.Answer(replace(found.result, **changes), found.target)
+
+
 def status(found):
-    return answer.status(Subject(found, found.scene, found.target, found.sought))
+    return answer.status(Subject(found.result, found.scene, found.target, found.sought))
 
 
 def verdict(html):
@@ -129,10 +134,10 @@ def test_the_true_status_stands_first(answers):
     broken = (good.limits[0]._replace(ok=False), *good.limits[1:])
     said = {
         "Optimal and certified": good,
-        "NOT CERTIFIED": replace(good, status="uncertified", sentences=Sentences("it is not")),
-        "NO ADMISSIBLE DESIGN EXISTS near any start": replace(good, status="infeasible"),
-        "FAILED: no design was found": replace(good, status="failed"),
-        "INTERRUPTED: not solved to its end": replace(good, status="interrupted"),
+        "NOT CERTIFIED": altered(good, status="uncertified", sentences=Sentences("it is not")),
+        "NO ADMISSIBLE DESIGN EXISTS near any start": altered(good, status="infeasible"),
+        "FAILED: no design was found": altered(good, status="failed"),
+        "INTERRUPTED: not solved to its end": altered(good, status="interrupted"),
     }
     for told, found in said.items():
         assert status(found).verdict == told
@@ -143,12 +148,12 @@ def test_the_true_status_stands_first(answers):
     assert 'class="status bad"' in html
     assert "Optimal" not in html
     for found in (
-        replace(good, certificate=bad),
-        replace(good, certificate=None),
-        replace(good, limits=broken),
+        altered(good, certificate=bad),
+        altered(good, certificate=None),
+        altered(good, limits=broken),
     ):  # the word of its status alone makes no optimum
         assert (status(found).verdict, status(found).level) == ("NOT CERTIFIED", "bad")
-    assert "stationarity 0.1" in " ".join(status(replace(good, certificate=bad)).told)
+    assert "stationarity 0.1" in " ".join(status(altered(good, certificate=bad)).told)
 
 
 def test_what_is_not_proven_or_not_reached_is_no_plain_optimum(answers):
@@ -158,7 +163,7 @@ def test_what_is_not_proven_or_not_reached_is_no_plain_optimum(answers):
     proofs = answers["shedding"].prove()
     open_ = replace(proofs, proofs=(proofs.proofs[0]._replace(status="undecided"), *proofs.proofs[1:]))
     assert (
-        status(replace(answers["shedding"], proofs=open_)).verdict
+        status(altered(answers["shedding"], proofs=open_)).verdict
         == "Optimal and certified; NOT PROVEN at every crank angle"
     )
 

@@ -40,9 +40,9 @@ def test_an_answer_shows_sentence_table_prices_certificate_and_drawing(answer):
 def test_text_from_outside_is_escaped(answer):
     certificate = dataclasses.replace(answer.certificate, passed=False, reasons=(EVIL,))
     evil = dataclasses.replace(
-        answer, status="failed", sentences=Sentences(EVIL), problem=EVIL, certificate=certificate
+        answer.result, status="failed", sentences=Sentences(EVIL), problem=EVIL, certificate=certificate
     )
-    html = evil._repr_html_()
+    html = notebook.html(evil)
     assert "<script" not in html
     assert EVIL in "".join(tree(html).itertext())
     assert "<script" not in notebook.table(TextTable(EVIL, (EVIL,), ((EVIL,),)))

@@ -126,7 +126,7 @@ def test_the_width_is_the_terminals_and_none_in_a_pipe(monkeypatch, capsys):
 
 
 def test_an_optimum_shows_today_design_limits_prices_and_certificate(answer):
-    shown = text(*answers.solution(answer, SCENE))
+    shown = text(*answers.solution(answer.result, SCENE))
     assert row(shown, "l1") == ["l1", "31", "30", "mm", "30", "...", "35", "min"]
     assert row(shown, "M3_fdc")[-1] == "no", "balance is out of reach"
     assert row(shown, "mu_min") == ["mu_min", "57.0694", "63.8961", "deg", ">=", "56.5"]
@@ -141,15 +141,15 @@ def test_an_optimum_shows_today_design_limits_prices_and_certificate(answer):
 
 def test_rounding_is_shown_as_zero_but_a_small_number_is_not():
     scene = load("beatup")
-    shown = text(*answers.solution(api.solve(scene), scene))
+    shown = text(*answers.solution(api.solve(scene).result, scene))
     assert row(shown, "M3_fdc")[1:3] == ["10.0152", "0"]
     tiny = scene.set("effects.inertia.J4", "1e-10 kg*m^2")
-    table = text(answers.comparison(api.evaluate(tiny), tiny, None, "today"))
+    table = text(answers.comparison(api.evaluate(tiny).result, tiny, None, "today"))
     assert row(table, "J4")[1] == "1e-10"
 
 
 def test_an_infeasible_target_shows_what_clashes_and_what_helps(infeasible):
-    shown = text(*answers.solution(infeasible, SCENE))
+    shown = text(*answers.solution(infeasible.result, SCENE))
     assert infeasible.status == "infeasible"
     assert "No admissible design exists" in shown
     assert all(limit in shown for limit in infeasible.clash)
@@ -161,7 +161,7 @@ def test_an_infeasible_target_shows_what_clashes_and_what_helps(infeasible):
 def test_an_uncertified_answer_says_so_first_and_last(answer):
     certificate = dataclasses.replace(answer.certificate, passed=False, reasons=("no minimum",))
     doubtful = dataclasses.replace(
-        answer, status="uncertified", sentences=Sentences("Not sure."), certificate=certificate
+        answer.result, status="uncertified", sentences=Sentences("Not sure."), certificate=certificate
     )
     shown = text(*answers.solution(doubtful, SCENE))
     assert shown.startswith("beatup-light, balance: uncertified\nNot sure.")
@@ -171,7 +171,7 @@ def test_an_uncertified_answer_says_so_first_and_last(answer):
 def test_starts_that_ended_elsewhere_are_told(answer):
     better, worse = dict(answer.optima[0][0]), dict(answer.optima[0][0]) | {"peak_torque": 99.0}
     told = dataclasses.replace(
-        answer, optima=((better, 3), (worse, 2)), solver={**answer.solver, "starts": 5, "starts_at_best": 3}
+        answer.result, optima=((better, 3), (worse, 2)), solver={**answer.solver, "starts": 5, "starts_at_best": 3}
     )
     shown = text(*answers.solution(told, SCENE), columns=None)
     assert "Starts: 3 of 5 reached the best. Other optima: " in shown
@@ -180,10 +180,10 @@ def test_starts_that_ended_elsewhere_are_told(answer):
 
 def test_an_evaluated_design_stands_beside_today_and_names_what_it_breaks(answer):
     found = api.evaluate(SCENE, {**answer.design, "l1": 0.02})
-    shown = text(*answers.evaluation(found, SCENE, api.evaluate(SCENE)))
+    shown = text(*answers.evaluation(found.result, SCENE, api.evaluate(SCENE).result))
     assert shown.startswith("beatup-light: NOT admissible: l1")
     assert row(shown, "l1")[:3] == ["l1", "31", "20"]
-    assert "all limits held" in text(*answers.evaluation(api.evaluate(SCENE), SCENE, None))
+    assert "all limits held" in text(*answers.evaluation(api.evaluate(SCENE).result, SCENE, None))
 
 
 def test_a_scene_shows_every_number_with_its_unit():
@@ -222,7 +222,7 @@ def test_curves_fit_the_width_and_show_both_sides_of_a_jump():
 @pytest.mark.parametrize("name", ["beatup-light", "rapier", "shedding", "shedding-static"])
 def test_the_design_to_retype_is_the_design_to_the_last_digit(name):
     found = api.solve(name)
-    shown = text(*answers.solution(found, found.scene))
+    shown = text(*answers.solution(found.result, found.scene))
     (line,) = re.findall(r"^to retype: (\{.*?\})", shown, re.MULTILINE | re.DOTALL)
     words, typed = Words(found.scene), json.loads(line)
     assert list(typed) == list(found.design)
@@ -235,10 +235,10 @@ def test_the_design_to_retype_is_the_design_to_the_last_digit(name):
 
 
 def test_what_was_proven_is_told_in_a_few_lines_and_only_where_it_was_asked_for(answer):
-    assert "Proven" not in text(*answers.solution(answer, SCENE))
+    assert "Proven" not in text(*answers.solution(answer.result, SCENE))
     found = api.solve(SCENE, prove=True)
     assert found.proofs.passed
-    shown = text(*answers.solution(found, SCENE), columns=None)
+    shown = text(*answers.solution(found.result, SCENE), columns=None)
     lines = shown[shown.index("Proven at every crank angle") :].splitlines()
     block = [lines[0], *(line for line in lines if line.startswith("    "))]
     boxes = sum(proof.boxes for proof in found.proofs.proofs)
@@ -281,7 +281,9 @@ def test_points_that_narrow_a_change_down_are_marked_and_counted_apart():
 
 def test_an_evaluation_shows_value_and_limit_of_what_is_no_figure():
     scene = lo.load("shedding-static").set("operation.N_min", "50 N")
-    *_, grid = (part for part in answers.evaluation(lo.evaluate(scene), scene, None) if not isinstance(part, str))
+    *_, grid = (
+        part for part in answers.evaluation(lo.evaluate(scene).result, scene, None) if not isinstance(part, str)
+    )
     line = next(line for line in grid.lines if line[0] == "N_min")
     assert line[1:3] == ("148.236", "N")
     assert spaced(line[3]) == ">= 50"

@@ -147,7 +147,7 @@ def test_the_sum_lets_one_member_go():
     totals = [math.fsum(map(abs, own(each, "M3_fdc"))) for each in (summed, worst)]
     assert totals == pytest.approx([100.0, 120.0], abs=1e-6)  # the median is balanced; or the middle of the ends
     assert summed.status == worst.status == "optimal"
-    grids = [answers.members(each, each.scene) for each in (summed, worst)]
+    grids = [answers.members(each.result, each.scene) for each in (summed, worst)]
     assert grids[0].columns == grids[1].columns
     assert "M3_fdc [N*m]" in grids[0].columns
 

@@ -29,7 +29,7 @@ def solve(scene):
     """Return the scene's answer, once for the same tables."""
     text = json.dumps(scene.document)
     if text not in SOLVED:
-        SOLVED[text] = lo.solve(scene, starts=1)
+        SOLVED[text] = lo.solve(scene, starts=1).result
     return SOLVED[text]
 
 

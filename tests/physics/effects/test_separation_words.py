@@ -176,7 +176,7 @@ def test_an_inch_frame_at_350_rpm_shows_its_own_units():
     inches = {"length": "in", "force": "lbf", "mass": "lb"}
     metric = ON.set("operation.speed", "350 rpm")
     scene = metric.update({f"display.{kind}": unit for kind, unit in inches.items()})
-    rows = {row["name"]: row for row in tables.rows(lo.evaluate(scene), scene)}
+    rows = {row["name"]: row for row in tables.rows(lo.evaluate(scene).result, scene)}
     si = figures(metric)
     assert (rows["gap_max"]["unit"], rows["landing_energy"]["unit"]) == ("in", "lbf*in")
     assert rows["gap_max"]["design"] * factor("in") == pytest.approx(si["gap_max"], rel=1e-12)

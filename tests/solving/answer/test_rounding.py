@@ -111,7 +111,7 @@ def test_a_reader_and_a_script_see_the_difference(answers):
     answer = answers["rapier", "stroke-dwell"]
     scene, found = answer.scene, lo.evaluate(answer.scene, retyped(answer, 6), answer.target)
     rounded = [limit.name for limit in found.limits if limit.rounding]
-    shown = layout.render(evaluation(found, scene, None), 120)
+    shown = layout.render(evaluation(found.result, scene, None), 120)
     held = "all limits held, but for the rounding of the digits given"
     assert shown.startswith(f"rapier: {held}: {', '.join(rounded)}\n")
     assert shown.count("<- exceeded by rounding") == len(rounded)
@@ -120,4 +120,4 @@ def test_a_reader_and_a_script_see_the_difference(answers):
     assert {name for name, limit in told.items() if limit.get("rounding")} == set(rounded)
     assert all(list(limit) == ["name", "value", "min", "max", "ok"] for limit in told.values() if limit["ok"])
     worse = lo.evaluate(scene, {**retyped(answer, 6), "C0x": 0.39}, answer.target)
-    assert layout.render(evaluation(worse, scene, None), 120).startswith("rapier: NOT admissible: C0x")
+    assert layout.render(evaluation(worse.result, scene, None), 120).startswith("rapier: NOT admissible: C0x")

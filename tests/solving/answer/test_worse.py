@@ -41,7 +41,7 @@ def test_what_is_worse_by_more_than_a_percent_is_told_once_and_nothing_else(name
 
 def test_it_is_one_line_in_the_terminal_and_a_list_in_json():
     found = answer("beatup")
-    parts = answers.solution(found, found.scene)
+    parts = answers.solution(found.result, found.scene)
     (line,) = [part for part in parts if isinstance(part, str) and part.startswith("Worse than today's machine: ")]
     assert "pulse_rms 328.8 -> 335.7 N*m (+2.1 %)" in line
     assert "shaking_moment 321.7 -> 448.9 N*m (+40 %)" in line

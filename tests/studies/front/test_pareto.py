@@ -145,7 +145,9 @@ def test_an_answer_of_a_front_is_judged_and_proven_by_its_own_limits(serial, ree
     again = answer.evaluate()
     assert again.limits == answer.limits
     assert again.evaluate().admissible
-    heavier = replace(answer, design=dict(answer.design) | {"m4e": row.place["m4e"] + 1e-3}).evaluate()
+    heavier = lo.Answer(
+        replace(answer.result, design=dict(answer.design) | {"m4e": row.place["m4e"] + 1e-3}), answer.target
+    ).evaluate()
     assert [limit.name for limit in heavier.limits if not limit.ok] == ["m4e"]
     middle = reed.rows[1]
     of_reed = reed.answer(middle.point)

@@ -170,7 +170,7 @@ def test_an_end_of_0_is_printed_as_0():
 @functools.cache
 def rams(target):
     answer = lo.solve(lo.load(RAMS), target=target)
-    return study.run(study.planned(lo.load(RAMS), answer))
+    return study.run(study.planned(lo.load(RAMS), answer.result))
 
 
 def test_bounds_that_bind_only_together_have_different_derivatives_on_both_sides():
