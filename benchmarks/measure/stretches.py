@@ -47,7 +47,7 @@ def front(problem: str, axes: tuple[str, str], most: str = "", target: str | Non
 def resistances(count: int) -> sweep.Sweep:
     """Return a sweep of the beat-up's resistance, 600 to 900 N·m."""
     values = [f"{600 + 300 * k / (count - 1)!r} N*m" for k in range(count)]
-    return sweep.planned(lo.load("beatup"), {"operation.M0": values})
+    return sweep.plan_sweep(lo.load("beatup"), {"operation.M0": values})
 
 
 def cases() -> tuple[Case, ...]:

@@ -268,9 +268,9 @@ def sweep(
     seed: as in `solve`. on_row(row): called as each is there. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
     from loomopt.interface.study.points import run_study
-    from loomopt.studies.sweep import planned
+    from loomopt.studies.sweep import plan_sweep
 
-    study = planned(_scene(scene), over, target, accuracy=accuracy, seed=seed)
+    study = plan_sweep(_scene(scene), over, target, accuracy=accuracy, seed=seed)
     return run_study(study, executor, workers, store, resume, on_row)
 
 
@@ -293,9 +293,9 @@ def effects(
     KeyboardInterrupt on Ctrl-C.
     """
     from loomopt.interface.study.effects import run_effects
-    from loomopt.studies.effects.study import planned
+    from loomopt.studies.effects.study import plan_effects
 
-    study = planned(_scene(scene), target, tolerance, accuracy=accuracy, seed=seed)
+    study = plan_effects(_scene(scene), target, tolerance, accuracy=accuracy, seed=seed)
     return run_effects(study, executor, workers, on_row)
 
 
@@ -308,12 +308,12 @@ def sensitivity(
     progress. Raises BadInput, also for an answer that is not certified, and KeyboardInterrupt on Ctrl-C.
     """
     from loomopt.interface.study.sensitivity import run_sensitivity
-    from loomopt.studies.sensitivity.study import planned
+    from loomopt.studies.sensitivity.study import plan_sensitivity
 
     if on_step is not None:
         arguments.called(on_step, "on_step", "a function", "Give a function, or leave it out")
     solved = answer if isinstance(answer, Answer) and answer.point else solve(_scene(answer), target)
-    return run_sensitivity(planned(solved.scene, solved.result), on_step)
+    return run_sensitivity(plan_sensitivity(solved.scene, solved.result), on_step)
 
 
 def tolerance(
@@ -338,13 +338,13 @@ def tolerance(
     on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
     from loomopt.interface.study.tolerance import run_tolerance
-    from loomopt.studies.tolerance.plan import planned
+    from loomopt.studies.tolerance.plan import plan_tolerance
 
     own, given = _request(scene, design)
     if on_step is not None:
         arguments.called(on_step, "on_step", "a function", "Give a function, or leave it out")
     proving, going_on = arguments.flag(worst, "worst"), arguments.flag(resume, "resume")
-    plan = planned(own, given, target, samples, seed)
+    plan = plan_tolerance(own, given, target, samples, seed)
     return run_tolerance(plan, executor, workers, on_step, proving, store, going_on)
 
 

@@ -389,7 +389,9 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def planned(scene: Scene, over: Over, target: str | None = None, *, accuracy: float = ACCURACY, seed: int = 0) -> Sweep:
+def plan_sweep(
+    scene: Scene, over: Over, target: str | None = None, *, accuracy: float = ACCURACY, seed: int = 0
+) -> Sweep:
     """Return the plan of a sweep, every value of which has been checked by itself. Raises BadInput."""
     name = target_name(scene, target, families=True)
     check_numbers(accuracy, None, seed)

@@ -17,7 +17,7 @@ CLOSE = 1e-12
 
 def resistances(count):
     values = [f"{740 + 60 * k / (count - 1)!r} N*m" for k in range(count)]
-    return sweep.planned(lo.load("beatup"), {"operation.M0": values})
+    return sweep.plan_sweep(lo.load("beatup"), {"operation.M0": values})
 
 
 def front():

@@ -51,7 +51,7 @@ def test_every_point_is_certified_and_as_good_as_a_search_from_scratch(serial, e
     assert sum(row.parent is None for row in serial.rows) == 4
     rows = serial.rows[::every]
     over = {"operation.M0": [f"{row.place['operation.M0']!r} N*m" for row in rows]}
-    cold = run.run(replace(sweep.planned(lo.load("beatup"), over), cold=True))
+    cold = run.run(replace(sweep.plan_sweep(lo.load("beatup"), over), cold=True))
     assert all(row.parent is None for row in cold)
     for row, other in zip(rows, cold, strict=True):
         assert row.place == other.place
@@ -196,15 +196,15 @@ def test_where_every_local_optimum_is_the_best_nothing_starts_warm():
 
 def test_the_key_follows_what_rows_depend_on_and_nothing_else(tmp_path):
     scene = lo.load("beatup")
-    first = sweep.planned(scene, OVER)
-    same = sweep.planned(scene.set("problem.title", "another"), {"operation.M0": "600:900:15 N*m"})
+    first = sweep.plan_sweep(scene, OVER)
+    same = sweep.plan_sweep(scene.set("problem.title", "another"), {"operation.M0": "600:900:15 N*m"})
     assert same.key == first.key
     others = [
-        sweep.planned(scene.set("operation.speed", "601 rpm"), OVER),
-        sweep.planned(scene, {"operation.M0": "600:900:20 N*m"}),
-        sweep.planned(scene, OVER, "torque"),
-        sweep.planned(scene, OVER, accuracy=1e-9),
-        sweep.planned(scene, OVER, seed=1),
+        sweep.plan_sweep(scene.set("operation.speed", "601 rpm"), OVER),
+        sweep.plan_sweep(scene, {"operation.M0": "600:900:20 N*m"}),
+        sweep.plan_sweep(scene, OVER, "torque"),
+        sweep.plan_sweep(scene, OVER, accuracy=1e-9),
+        sweep.plan_sweep(scene, OVER, seed=1),
     ]
     assert len({first.key, *(other.key for other in others)}) == 6
 
@@ -213,9 +213,9 @@ def test_the_key_follows_the_contents_of_a_table_that_the_scene_names(tmp_path):
     path = tmp_path / "my law.csv"
     path.write_text("phi1 [deg],S [mm]\n" + "".join(f"{36 * k},{k * (10 - k)}\n" for k in range(10)))
     scene = lo.load("rapier").set("targets.match.table", str(path))
-    before = sweep.planned(scene, {"operation.stroke": ["800 mm"]}).key
+    before = sweep.plan_sweep(scene, {"operation.stroke": ["800 mm"]}).key
     path.write_text(path.read_text().replace("36,9", "36,8"))
-    assert sweep.planned(scene, {"operation.stroke": ["800 mm"]}).key != before
+    assert sweep.plan_sweep(scene, {"operation.stroke": ["800 mm"]}).key != before
 
 
 @pytest.mark.parametrize(
@@ -234,7 +234,7 @@ def test_the_key_follows_the_contents_of_a_table_that_the_scene_names(tmp_path):
 )
 def test_bad_input_is_refused_before_anything_is_solved(over, words):
     with pytest.raises(BadInput, match=words):
-        sweep.planned(lo.load("beatup"), over)
+        sweep.plan_sweep(lo.load("beatup"), over)
 
 
 def test_a_store_and_a_number_of_workers_are_asked_for_properly(tmp_path):

@@ -135,9 +135,9 @@ def _check_studies(scene: "Scene", target: str | None, studies: Sequence[str]) -
     if "budget" in studies:
         budget.compute(scene, {})
     if "tolerance" in studies:
-        tolerance.planned(scene, None, name)
+        tolerance.plan_tolerance(scene, None, name)
     if "effects" in studies:
-        effects.planned(scene, name)
+        effects.plan_effects(scene, name)
 
 
 def _solved(scene: "Scene", target: str | None, prove: bool, studies: Sequence[str], say: Say) -> "list[Chapter]":

@@ -99,11 +99,11 @@ def sweep(
     how: RunOptions = USUAL,
 ) -> None:
     """Solve for every combination of scene numbers."""
-    from loomopt.studies.sweep import planned
+    from loomopt.studies.sweep import plan_sweep
 
     scene = changes.scene(problem)
     ranges = _parted(over, "--over", "operation.M0=600:900:25 N*m", "KEY=LO:HI:STEP UNIT")
-    raise typer.Exit(run(planned(scene, ranges, target), how))
+    raise typer.Exit(run(plan_sweep(scene, ranges, target), how))
 
 
 def pareto(
@@ -222,12 +222,12 @@ def effects(
     """Show what each effect is worth, and what may be left out."""
     from loomopt.interface.files import outputs
     from loomopt.interface.study.effects import EffectsStudy, run_effects, summarise_effects
-    from loomopt.studies.effects.study import planned
+    from loomopt.studies.effects.study import plan_effects
 
     outputs.check_files(figure or ())
     count = computer.count
     scene = changes.scene(problem)
-    study = planned(scene, target, read_number("--tolerance", tolerance, float))
+    study = plan_effects(scene, target, read_number("--tolerance", tolerance, float))
     rows: dict[int, Row] = {}
 
     def on_row(row: "Row") -> None:
@@ -265,7 +265,7 @@ def sensitivity(
     from loomopt.interface import api
     from loomopt.interface.files import outputs
     from loomopt.interface.study.sensitivity import run_sensitivity
-    from loomopt.studies.sensitivity.study import planned
+    from loomopt.studies.sensitivity.study import plan_sensitivity
 
     outputs.check_files(figure or (), table.out or ())
     comma = table.comma
@@ -279,7 +279,7 @@ def sensitivity(
             else:
                 remark(answer.message)
             raise typer.Exit(INFEASIBLE if answer.status == "infeasible" else NOT_CERTIFIED)
-        found = run_sensitivity(planned(scene, answer.result), progress.say)
+        found = run_sensitivity(plan_sensitivity(scene, answer.result), progress.say)
     tell(as_json, found.as_dict, found.tables)
     write(table.out, lambda path: outputs.write_table(path, found.table(), comma=comma))
     write(figure, found.plot)
@@ -304,13 +304,13 @@ def tolerance(
     from loomopt.interface.cli.shell import read_request
     from loomopt.interface.files import outputs
     from loomopt.interface.study.tolerance import run_tolerance
-    from loomopt.studies.tolerance.plan import planned
+    from loomopt.studies.tolerance.plan import plan_tolerance
 
     outputs.check_files(figure or (), table.out or ())
     comma, count = table.comma, computer.count
     drawn, begin = read_number("--samples", samples, int), read_number("--seed", seed, int)
     scene, given, name, _ = read_request(problem, design, target, changes.call)
-    plan = planned(scene, given, name, drawn, begin)
+    plan = plan_tolerance(scene, given, name, drawn, begin)
     with computer.executor() as executor, call_progress() as progress:
         found = run_tolerance(plan, executor, count, progress.say, worst, rows.store, rows.resume)
     tell(as_json, found.as_dict, found.tables)

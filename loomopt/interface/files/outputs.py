@@ -433,9 +433,9 @@ CORNERED = 12
 def _dxf(path: Path, scene: Scene, design: Design, said: DrawnSubject | None, how: Workshop = USUAL) -> None:
     """Write a linkage as DXF at true scale, its lengths with their tolerances."""
     from loomopt.interface.files import dxf
-    from loomopt.studies.tolerance.plan import toleranced
+    from loomopt.studies.tolerance.plan import read_tolerances
 
-    found, made = drawing(scene, design, said), toleranced(scene)
+    found, made = drawing(scene, design, said), read_tolerances(scene)
     nominal = registry.of(scene).numbers_of(scene, flat(design))
     bands = {each.number: each.band(nominal[name]) for name, each in made.items() if name in nominal}
     measures = tuple(each._replace(band=bands.get(each.name, (0.0, 0.0))) for each in found.measures)

@@ -14,7 +14,7 @@ from loomopt.scenes.scene import Scene, build
 from loomopt.studies.front import front
 from loomopt.studies.run.rows import SceneStudy
 from loomopt.studies.run.store import Store
-from loomopt.studies.sweep import planned
+from loomopt.studies.sweep import plan_sweep
 
 HEAD = b"SQLite format 3\x00"
 
@@ -51,7 +51,7 @@ def _study(told: Mapping[str, Any], path: Path) -> SceneStudy:
         scene = build(told["document"], REGISTERED, str(path), paths)
         if "axes" in told:
             return _front(told, scene)
-        return planned(scene, _over(told, scene), told["target"], accuracy=told["accuracy"], seed=told["seed"])
+        return plan_sweep(scene, _over(told, scene), told["target"], accuracy=told["accuracy"], seed=told["seed"])
     except BadInput:
         raise
     except (KeyError, TypeError, ValueError, AttributeError):

@@ -48,7 +48,7 @@ class ToleranceStudy(StudyResult[ToleranceResult]):
     def tables(self) -> list[str | TextTable]:
         """Spreads, yields, worst cases, and what to tighten first."""
         result, plan = self.result, self.result.plan
-        numbers = ", ".join(each.number for each in plan.made.values())
+        numbers = ", ".join(each.number for each in plan.tolerances.values())
         head = f"{plan.scene.name}, limits of {plan.target}: {result.samples} machines, {numbers} as they are made"
         lost = f"{result.bad} of them do not assemble or lack a figure" if result.bad else "all of them assemble"
         worst: list[str | TextTable] = [_worst(result)] if result.worst else []
@@ -59,7 +59,7 @@ class ToleranceStudy(StudyResult[ToleranceResult]):
         """How each figure spreads that judges machines or is sought."""
         plan = self.result.plan
         names = dict.fromkeys(
-            [*(each.name for each in plan.judged), *(each.figure for each in plan.program.objectives)]
+            [*(each.name for each in plan.criteria), *(each.figure for each in plan.program.objectives)]
         )
         spreads = ((name, self.result.figures.get(name)) for name in names)
         shown = [
@@ -94,7 +94,7 @@ def run_tolerance(
         if store is None:
             check_resume(resume)
         else:
-            drawing = study.Drawing(plan, {})
+            drawing = study.SampleStudy(plan, {})
             known = "{} of the {} scrambles".format
             rows = opened.enter_context(
                 opened_store(store, drawing.key, drawing.settings, resume, lambda count: known(count, SCRAMBLES))
@@ -156,7 +156,7 @@ def _yields(result: ToleranceResult) -> TextTable:
 
 def _histogram(result: ToleranceResult, name: str, spread: Spread) -> Chart:
     """How one figure spreads; what no machine may have is shaded."""
-    units, judged = Words(result.plan.scene), next((each for each in result.plan.judged if each.name == name), None)
+    units, judged = Words(result.plan.scene), next((each for each in result.plan.criteria if each.name == name), None)
     unit = units.unit(name)
     size = factor(unit)
     edges = (spread.nominal + REACH * spread.sigma_linear * np.linspace(-1, 1, BINS + 1)) / size
@@ -183,7 +183,7 @@ def _worst(result: ToleranceResult) -> TextTable:
     for name, each in result.worst.items():
         unit = words.unit(name)
         size = factor(unit)
-        sides = zip((each.min, each.max), each.found, (-1.0, 1.0), ("or less", "or more"), strict=True)
+        sides = zip((each.min, each.max), each.farthest, (-1.0, 1.0), ("or less", "or more"), strict=True)
         shown = [_end(end, beyond, size, sign, more) for end, beyond, sign, more in sides]
         lines.append((name, *shown, "" if unit == "1" else unit, "proven" if each.proven else each.why))
     heads = ("within all tolerances", "at least", "at most", "unit", "")
@@ -211,10 +211,10 @@ def _outward(value: float, sign: float) -> str:
 
 def _advice(result: ToleranceResult) -> list[str]:
     first = [f"{name} ({100 * share:.3g} %)" for name, share in result.tighten[:MOST_TOLD] if share >= LEAST_SHARE]
-    lost = any(result.yields[each.name].value < 1.0 for each in result.plan.judged)
+    lost = any(result.yields[each.name].value < 1.0 for each in result.plan.criteria)
     of = "what is lost" if lost else "what is sought spreads by; no machine that was drawn is lost"
     said = [f"Tighten first: {', '.join(first)} of {of}."] if first else []
-    names = result.plan.unjudged
+    names = result.plan.goals_without_band
     if names:
         said.append(f"No machine is judged by {', '.join(names)}, an equality or a goal: [accept] gives it a band.")
     return said

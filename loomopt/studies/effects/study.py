@@ -234,7 +234,7 @@ class Effects:
         )
 
 
-def planned(
+def plan_effects(
     scene: Scene,
     target: str | None = None,
     tolerance: float = OMITTED,

@@ -27,8 +27,8 @@ from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import SIDES, SIGNS, Finding, Price, Robust, Sentences, Solution, Words, Yield
 from loomopt.solving.options import check_sought, target_name
 from loomopt.studies.robust.margins import Margin, check_crossings, margins, narrow_band, share
-from loomopt.studies.tolerance.plan import SCRAMBLES, Plan, planned
-from loomopt.studies.tolerance.study import ALL, Sums, summed, yielded
+from loomopt.studies.tolerance.plan import SCRAMBLES, Plan, plan_tolerance
+from loomopt.studies.tolerance.study import ALL, Sums, estimate_yield, sum_scramble
 
 SAMPLES = 2**15
 """Machines that are drawn to verify a yield."""
@@ -92,7 +92,7 @@ class Asked:
             for name, (low, high) in frozen.items()
         }
         scene = self.scene.update(made) if made else self.scene
-        return planned(scene, designs.flat(answer.design), self.target, self.samples, self.seed)
+        return plan_tolerance(scene, designs.flat(answer.design), self.target, self.samples, self.seed)
 
 
 def asked(scene: Scene, target: str | None, sigmas: float | None, least: float | None, seed: int = 0) -> Asked:
@@ -110,7 +110,7 @@ def asked(scene: Scene, target: str | None, sigmas: float | None, least: float |
         allowed = "a share of all machines between 0 and 1"
         if not 0.0 < arguments.number(least, "min_yield", allowed, "Write --yield 0.99") < 1.0:
             raise refusal("there is no such yield", "", "min_yield", least, allowed, "Write --yield 0.99")
-    planned(scene, None, name)
+    plan_tolerance(scene, None, name)
     return Asked(scene, name, sigmas, least, seed=seed)
 
 
@@ -221,7 +221,7 @@ def _settled(asked: Asked, solve: Solve, here: Pass, sigmas: Sigmas, say: Callab
         if answer.status != "optimal":
             return _in_the_way(asked, answer, here.sigmas)
         plan, frozen = asked.plan(answer, here.frozen), dict(here.frozen)
-        for name, made in plan.made.items():
+        for name, made in plan.tolerances.items():
             if made.standard:
                 known, band = bands.setdefault(made.number, []), made.band(plan.nominal[name])
                 if band in known[:-1] and band != known[-1]:
@@ -383,8 +383,8 @@ def linear(at: Pass, least: float) -> float:
 
 def _yields(plan: Plan) -> dict[str, Yield]:
     """Return the share of machines that hold, by limit and of all, drawn with the plan's seed."""
-    sums: list[Sums] = list(map(functools.partial(summed, plan, {}), range(SCRAMBLES)))
-    return {name: yielded([each.holding[name] / each.machines for each in sums]) for name in sums[0].holding}
+    sums: list[Sums] = list(map(functools.partial(sum_scramble, plan, {}), range(SCRAMBLES)))
+    return {name: estimate_yield([part.passes[name] / part.machines for part in sums]) for name in sums[0].passes}
 
 
 # What is told.
@@ -405,7 +405,7 @@ def _told(
         dict(yields),
         nominal,
         dict(before),
-        ended.plan.unjudged + tuple(ended.plan.accepted),
+        ended.plan.goals_without_band + tuple(ended.plan.bands),
         tuple(corners),
         ended.passes,
         asked.samples,

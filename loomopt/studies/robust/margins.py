@@ -13,7 +13,7 @@ from loomopt.maths import joint_normal
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Floats
 from loomopt.solving.answer.solution import SIDES, Words
-from loomopt.studies.tolerance.plan import Judged, Plan
+from loomopt.studies.tolerance.plan import Criterion, Plan
 from loomopt.studies.tolerance.study import Slopes, slopes
 
 MET = 1e-5
@@ -58,9 +58,9 @@ class Margin(NamedTuple):
 def margins(plan: Plan) -> tuple[Margin, ...]:
     """Return every side of what a design's machines are judged by. Raises BadInput for what has no value."""
     found, own = list[Margin](), slopes(plan)
-    values = plan.read({name: np.full(1, plan.nominal[name]) for name in plan.made})
+    values = plan.read({name: np.full(1, plan.nominal[name]) for name in plan.tolerances})
     bands = {goal.figure for goal in plan.goals}
-    for each in plan.judged:
+    for each in plan.criteria:
         value = float(values[each.name][0]) if each.name in values else math.nan
         if not math.isfinite(value) or not all(map(math.isfinite, own[each.name].by_number.values())):
             problem = f"the spread of {each.name} is unknown, so that it cannot be backed off"
@@ -70,29 +70,29 @@ def margins(plan: Plan) -> tuple[Margin, ...]:
                 way = _way(plan, each, own[each.name], side)
                 fixed = each.name in bands
                 left = _left(plan, each, own[each.name], side)
-                shift = sign * math.fsum(left[name] * plan.shifts[name] for name in plan.made)
+                shift = sign * math.fsum(left[name] * plan.shifts[name] for name in plan.tolerances)
                 room = sign * (end - value) - shift
                 found.append(Margin(each.name, sign, room, way, fixed, own[each.name].corner, shift))
     return tuple(found)
 
 
-def _way(plan: Plan, judged: Judged, slope: Slopes, side: str) -> Floats:
+def _way(plan: Plan, judged: Criterion, slope: Slopes, side: str) -> Floats:
     """Return what independent numbers do to a side's figure, less its own end where that is one of the numbers."""
     left = _left(plan, judged, slope, side)
-    groups = sorted({each.group for each in plan.made.values() if each.group})
-    way = np.zeros(len(plan.made) + len(groups))
-    for k, (name, made) in enumerate(plan.made.items()):
+    groups = sorted({each.group for each in plan.tolerances.values() if each.group})
+    way = np.zeros(len(plan.tolerances) + len(groups))
+    for k, (name, made) in enumerate(plan.tolerances.items()):
         moved = left[name] * plan.sigmas[name]
         way[k] = math.sqrt(1 - made.correlation) * moved
         if made.group:
-            way[len(plan.made) + groups.index(made.group)] += math.sqrt(made.correlation) * moved
+            way[len(plan.tolerances) + groups.index(made.group)] += math.sqrt(made.correlation) * moved
     return way
 
 
-def _left(plan: Plan, judged: Judged, slope: Slopes, side: str) -> dict[str, float]:
+def _left(plan: Plan, judged: Criterion, slope: Slopes, side: str) -> dict[str, float]:
     """Slopes of a side's figure, less those of its own end where that is one of the numbers."""
     end = plan.scene.full(judged.name) if side in judged.follows else None
-    left = {name: slope.steeper[name] - (name == end) for name in plan.made}
+    left = {name: slope.steeper[name] - (name == end) for name in plan.tolerances}
     # A figure that is its own limit's number moves with it, and what is left of its slope is rounding.
     return {name: 0.0 if name == end and abs(value) <= MET else value for name, value in left.items()}
 
@@ -126,7 +126,7 @@ def _room(margin: Margin, wanted: float, applied: float) -> float:
 
 def check_crossings(plan: Plan, sigmas: float) -> None:
     """Raise BadInput where a travel turns so near the level whose crossing a limit reads that some machines' jumps."""
-    judged, words = {each.name for each in plan.judged}, Words(plan.scene)
+    judged, words = {each.name for each in plan.criteria}, Words(plan.scene)
     for name, crossings in registry.of(plan.scene).crossings(plan.scene).items():
         for crossing in crossings if name in judged else ():
             level = plan.nominal[crossing.level]
@@ -144,7 +144,7 @@ def check_crossings(plan: Plan, sigmas: float) -> None:
 def _tops(plan: Plan, crossing: Crossing) -> Iterator[tuple[float, float, float]]:
     """Yield angle, size and its standard deviation, SI, of the extremes of a travel up to the first past a crossing."""
     quantity, side, dwell = crossing.quantity, crossing.side, plan.figures[crossing.figure]
-    found = _extremes(plan.like, quantity, side)
+    found = _extremes(plan.nominal_sampler, quantity, side)
     inside = [angle for angle in found if 0.0 < angle < dwell]
     beyond = [angle for angle in found if angle >= dwell][:1]
     here = {angle: found[angle] for angle in (*inside, *beyond)}
@@ -152,7 +152,7 @@ def _tops(plan: Plan, crossing: Crossing) -> Iterator[tuple[float, float, float]
         # To first order an extreme is as high as the curve at its angle.
         sides = [
             [abs(_moved(plan, name, turn).at_angle((quantity,), side * angle)[0]) for turn in (1, -1)]
-            for name in plan.made
+            for name in plan.tolerances
         ]
         yield side * angle, height, math.hypot(*((above - below) / 2 for above, below in sides))
 

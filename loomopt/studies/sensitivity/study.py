@@ -34,7 +34,7 @@ from loomopt.studies.sensitivity.active import (
     curved_basis,
     limit_key,
 )
-from loomopt.studies.tolerance.plan import toleranced
+from loomopt.studies.tolerance.plan import read_tolerances
 
 Side = Literal["up", "down"]
 SIDES_OF_A_NUMBER: tuple[Side, Side] = ("up", "down")
@@ -220,7 +220,7 @@ class Study:
     def usual_change(self, key: str) -> float:
         """Change of a number, SI: one sigma of its tolerance, or 1 % of the number without one."""
         _, name, value = self.numbers[key]
-        tolerances = toleranced(self.scene).values()
+        tolerances = read_tolerances(self.scene).values()
         tolerance = next((tolerance for tolerance in tolerances if tolerance.number == name), None)
         return tolerance.sigma(value) if tolerance else PERCENT * abs(value)
 
@@ -231,7 +231,7 @@ class Study:
         )
 
 
-def planned(scene: Scene, answer: Solution) -> Study:
+def plan_sensitivity(scene: Scene, answer: Solution) -> Study:
     """The study of an answer. Raises BadInput where the answer is not certified."""
     demand_single(answer, "derivatives")
     if answer.status != "optimal" or answer.point is None or not answer.certificate:

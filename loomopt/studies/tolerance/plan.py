@@ -1,4 +1,4 @@
-"""What of a design is made how, and by what its machines are judged."""
+"""Plan of a tolerance study: the tolerances of a design's numbers, and the criteria that its machines must satisfy."""
 
 import math
 from collections.abc import Callable, Container, Mapping
@@ -28,26 +28,26 @@ from loomopt.solving.answer.solution import Evaluated
 from loomopt.solving.options import target_name
 
 SAMPLES, SCRAMBLES = 100_000, 16
-"""Machines that are drawn, and scrambles of Sobol's points, from whose differences standard errors are told."""
+"""Number of machines, and of scrambles of Sobol's points; the scatter between scrambles gives standard errors."""
 MOST_SAMPLES = 100_000_000
 ASSEMBLED = 1e-9
-"""Share by which a triangle of links may close tighter than its margin and count as closed: rounding."""
+"""Relative rounding within which a triangle of links still counts as closed."""
 
 
-def toleranced(scene: Scene) -> dict[str, Tolerance]:
-    """Return how the numbers of a scene are made, by full name."""
-    found = tolerances.read(cursor(scene).at("tolerances"), scene.schema, places(scene))
-    return {scene.full(each.number): each for each in found}
+def read_tolerances(scene: Scene) -> dict[str, Tolerance]:
+    """Tolerances of a scene's numbers, by full name."""
+    table = tolerances.read(cursor(scene).at("tolerances"), scene.schema, places(scene))
+    return {scene.full(tolerance.number): tolerance for tolerance in table}
 
 
 Mask = NDArray[np.bool_]
 
 
-class Judged(NamedTuple):
-    """What machines are judged by: a limit, or a band around an equality or a goal; ends SI, None where it is open.
+class Criterion(NamedTuple):
+    """A limit that machines must satisfy, or a band around an equality or a goal; ends SI, None where it is open.
 
-    slack: what counts as no excess, SI; read: its value of machines, where that is no figure; follows: which of its
-    ends are a number of the scene itself.
+    slack: excess that still counts as none, SI. read: function that reads its value of machines, None for a figure.
+    follows: ends ("low", "high") that are a number of the scene with a tolerance.
     """
 
     name: str
@@ -57,16 +57,19 @@ class Judged(NamedTuple):
     read: Callable[[Any], Any] | None = None
     follows: tuple[str, ...] = ()
 
-    def holds(self, values: Floats, own: Mapping[str, Any]) -> Mask:
-        """Say of each machine whether it holds; values: of its figure; own: the machines' numbers that it follows."""
-        low = own.get("low", -math.inf if self.low is None else self.low)
-        high = own.get("high", math.inf if self.high is None else self.high)
+    def test(self, values: Floats, ends: Mapping[str, Any]) -> Mask:
+        """Whether every machine satisfies it, (machines,).
+
+        values: of its figure, (machines,), SI. ends: values of the ends that follow a number of the machine, SI.
+        """
+        low = ends.get("low", -math.inf if self.low is None else self.low)
+        high = ends.get("high", math.inf if self.high is None else self.high)
         return np.asarray((values >= low - self.slack) & (values <= high + self.slack))
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A design with its tolerances; design: full names, SI; what it does not name stays the scene's."""
+    """A design with its tolerances; design: by full names, SI, today's values where it names none."""
 
     scene: Scene
     target: str
@@ -75,194 +78,203 @@ class Plan:
     seed: int = 0
 
     def __reduce__(self) -> tuple[type["Plan"], tuple[Any, ...]]:
-        """Return how to make it again: from what it is given, for formulas do not pickle."""
+        """Constructor and its arguments: formulas do not pickle, so a copy builds them again."""
         return Plan, (self.scene, self.target, dict(self.design), self.samples, self.seed)
 
     @lazy
     def job(self) -> Job:
-        """The job."""
+        """Job of the scene."""
         return registry.of(self.scene)
 
     @lazy
-    def made(self) -> dict[str, Tolerance]:
-        """Full name of each number that is toleranced → how it is made."""
-        return toleranced(self.scene)
+    def tolerances(self) -> dict[str, Tolerance]:
+        """Tolerances by full name of the number."""
+        return read_tolerances(self.scene)
 
     @lazy
-    def accepted(self) -> dict[str, float]:
-        """Half the band by which machines are judged, SI, by figure."""
+    def bands(self) -> dict[str, float]:
+        """Half width of the bands in [accept], SI, by figure."""
         return tolerances.bands(cursor(self.scene).at("accept"), self.scene.schema)
 
     @lazy
     def full(self) -> dict[str, float]:
-        """The whole design by full names, SI."""
+        """The complete design by full names, SI."""
         return {**self.job.today(self.scene), **self.design}
 
     @lazy
     def nominal(self) -> dict[str, float]:
-        """Every number of the design's machine, SI."""
+        """All numbers of the nominal machine, SI."""
         return self.job.numbers_of(self.scene, self.full)
 
     @lazy
     def model(self) -> JobModel:
-        """The machine with its effects."""
+        """Model of the machine with its effects."""
         return self.job.model(self.scene, self.full)
 
     @lazy
-    def like(self) -> Sampler:
-        """The nominal machine."""
+    def nominal_sampler(self) -> Sampler:
+        """Sampler of the nominal machine."""
         return sampled(self.model, self.nominal)
 
     @lazy
     def program(self) -> Program:
-        """The task whose limits judge."""
+        """Design task whose limits the machines must satisfy."""
         return self.job.program(self.scene, self.target)
 
     @lazy
     def evaluated(self) -> Evaluated:
-        """The nominal machine's figures and limits."""
+        """Figures and limits of the nominal machine."""
         return report.evaluated(self.scene, self.job, self.target, self.full)
 
     @lazy
     def figures(self) -> dict[str, float]:
-        """The figures that the nominal machine has, SI."""
-        found = self.evaluated.figures.items()
-        return {name: value for name, value in found if value is not None and math.isfinite(value)}
+        """Figures of the nominal machine that have a value, SI."""
+        return {
+            name: value for name, value in self.evaluated.figures.items() if value is not None and math.isfinite(value)
+        }
 
     @lazy
     def sigmas(self) -> dict[str, float]:
-        """Standard deviation of each toleranced number, SI. Raises BadInput."""
-        return {name: each.sigma(self.nominal[name]) for name, each in self.made.items()}
+        """Standard deviations of numbers with a tolerance, SI. Raises BadInput."""
+        return {name: tolerance.sigma(self.nominal[name]) for name, tolerance in self.tolerances.items()}
 
     @lazy
-    def halves(self) -> dict[str, float]:
-        """Half width of each toleranced number, SI. Raises BadInput."""
-        return {name: each.plus_minus(self.nominal[name]) for name, each in self.made.items()}
+    def half_widths(self) -> dict[str, float]:
+        """Half widths of the tolerance bands, SI. Raises BadInput."""
+        return {name: tolerance.plus_minus(self.nominal[name]) for name, tolerance in self.tolerances.items()}
 
     @lazy
     def shifts(self) -> dict[str, float]:
-        """Distance of each number's mean from its nominal, SI: the middle of its band. Raises BadInput."""
-        return {name: each.shift(self.nominal[name]) for name, each in self.made.items()}
+        """Distance from the nominal to the middle of each tolerance band, the mean, SI. Raises BadInput."""
+        return {name: tolerance.shift(self.nominal[name]) for name, tolerance in self.tolerances.items()}
 
     @lazy
-    def judged(self) -> tuple[Judged, ...]:
-        """What machines are judged by: limits of figures, then bands around equalities and goals."""
+    def criteria(self) -> tuple[Criterion, ...]:
+        """Criteria of the machines: limits of figures, then bands around equalities and goals. Raises BadInput."""
         closes = {*self.model.assembly, *self.scene.schema.own_margins}
         limits = {limit.name: limit for limit in self.program.limits if not limit.hidden}
-        accepted, found = self.accepted, list[Judged]()
-        for each in self.evaluated.limits:
-            limit = limits[each.name]
-            bounds = limit.is_of_variable or each.name not in self.figures
-            if each.name in closes or (bounds and each.name in self.evaluated.design):
+        criteria = list[Criterion]()
+        for result in self.evaluated.limits:
+            name, limit = result.name, limits[result.name]
+            bounds = limit.is_of_variable or name not in self.figures
+            if name in closes or (bounds and name in self.evaluated.design):
                 continue
-            if each.min is not None and each.min == each.max:
+            if result.min is not None and result.min == result.max:
                 continue
             slack = FEASIBLE * limit.named_scale
-            own = limit if isinstance(limit, CycleLimit) and self.model.has_quantity(limit.row) else None
-            read = None if each.name in self.figures else own.figure if own else self._row(each.name)
-            number = self.nominal.get(self.scene.full(each.name), math.nan)
-            follows = tuple(side for side, end in (("low", each.min), ("high", each.max)) if end == number)
-            follows = follows if self.scene.full(each.name) in self.made else ()
-            found.append(Judged(each.name, each.min, each.max, slack, read, follows))
+            cycle_limit = limit if isinstance(limit, CycleLimit) and self.model.has_quantity(limit.row) else None
+            read = None if name in self.figures else cycle_limit.figure if cycle_limit else self._row(name)
+            number = self.nominal.get(self.scene.full(name), math.nan)
+            follows = tuple(side for side, end in (("low", result.min), ("high", result.max)) if end == number)
+            follows = follows if self.scene.full(name) in self.tolerances else ()
+            criteria.append(Criterion(name, result.min, result.max, slack, read, follows))
         for goal in self.goals:
-            if goal.figure in accepted:
-                half = accepted[goal.figure]
-                found.append(Judged(goal.figure, goal.low - half, goal.high + half, 0.0))
-        for name in accepted:
+            if goal.figure in self.bands:
+                half = self.bands[goal.figure]
+                criteria.append(Criterion(goal.figure, goal.low - half, goal.high + half, 0.0))
+        for name in self.bands:
             if name not in [goal.figure for goal in self.goals]:
-                problem = f"{name} is no equality and no goal of target {self.target}"
-                remedy = "Take it out; a limit judges machines as it is"
+                problem = f"{name} is neither an equality nor a goal of target {self.target}"
+                remedy = "Remove it: a limit needs no band"
                 raise refusal(problem, self.scene.origin, f"accept.{name}", remedy=remedy)
-        return tuple(found)
+        return tuple(criteria)
 
     def _row(self, name: str) -> Callable[[Any], Any]:
+        """Function that reads a row of machines."""
         return lambda machines: machines.single(name)
 
     @lazy
     def goals(self) -> tuple[Goal, ...]:
-        """Equalities of figures and goals of the target, by which no machine is judged without a band."""
-        own = [each for each in self.evaluated.limits if each.min is not None and each.min == each.max]
-        design = self.evaluated.design
-        sides = [Goal(each.name, each.min or 0.0, each.max or 0.0, 0.0) for each in own]
-        asked = [goal for goal in (*sides, *self.program.goals) if goal.low == goal.high]
-        found = {goal.figure: goal for goal in asked if goal.figure not in design}
-        limited = {each.name for each in self.evaluated.limits} - {each.name for each in own}
-        return tuple(goal for name, goal in found.items() if name in self.figures and name not in limited)
+        """Equalities of figures, and goals of the target; each needs a band to be a criterion."""
+        limits, design = self.evaluated.limits, self.evaluated.design
+        equalities = [limit for limit in limits if limit.min is not None and limit.min == limit.max]
+        equal_goals = [Goal(limit.name, limit.min or 0.0, limit.max or 0.0, 0.0) for limit in equalities]
+        exact = [goal for goal in (*equal_goals, *self.program.goals) if goal.low == goal.high]
+        goals = {goal.figure: goal for goal in exact if goal.figure not in design}
+        inequalities = {limit.name for limit in limits} - {limit.name for limit in equalities}
+        return tuple(goal for name, goal in goals.items() if name in self.figures and name not in inequalities)
 
     @property
-    def unjudged(self) -> tuple[str, ...]:
-        """Equalities and goals without a band."""
-        return tuple(goal.figure for goal in self.goals if goal.figure not in self.accepted)
+    def goals_without_band(self) -> tuple[str, ...]:
+        """Figures of equalities and goals that have no band, and so are no criterion."""
+        return tuple(goal.figure for goal in self.goals if goal.figure not in self.bands)
 
-    def read(self, values: Mapping[str, Any], asked: Container[str] = EVERY) -> dict[str, Floats]:
-        """Return figures of machines, and what else judges them, (machines,); values: their numbers that differ.
+    def read(self, values: Mapping[str, Any], names: Container[str] = EVERY) -> dict[str, Floats]:
+        """Figures and criteria of machines by name, (machines,), SI.
 
-        asked: the figures that are, all without it.
+        values: numbers of the machines that differ from the nominal, (machines,), SI. names: the figures to read, all
+        by default.
         """
-        others = [each for each in self.judged if each.read]
 
-        def many(machines: Machines | Sampler) -> dict[str, Any]:
-            found = self.job.figures_of(self.scene, machines, asked)
-            return {name: found[name] for name in self.figures if name in asked and name in found} | {
-                each.name: each.read(machines) for each in others if each.read
-            }
+        def select(figures: Mapping[str, Any], machines: Machines | Sampler) -> dict[str, Any]:
+            selected = {name: figures[name] for name in self.figures if name in names and name in figures}
+            return selected | {row.name: row.read(machines) for row in self.criteria if row.read}
 
-        def alone(numbers: Mapping[str, float]) -> dict[str, Any]:
-            own = {**self.full, **{name: numbers[name] for name in self.made}}
+        def read_batch(machines: Machines | Sampler) -> dict[str, Any]:
+            return select(self.job.figures_of(self.scene, machines, names), machines)
+
+        def read_single(numbers: Mapping[str, float]) -> dict[str, Any]:
+            design = {**self.full, **{name: numbers[name] for name in self.tolerances}}
             try:
-                machine = self.job.sampler(self.scene, own)
+                machine = self.job.sampler(self.scene, design)
                 closes = all(
                     machine.peak(quantity) <= most + ASSEMBLED for quantity, most in self.model.assembly.values()
                 )
                 if not closes:
                     return {}
-                told = self.job.figures(self.scene, own)
-                return {name: told[name] for name in self.figures if name in asked} | {
-                    each.name: each.read(machine) for each in others if each.read
-                }
+                return select(self.job.figures(self.scene, design), machine)
             except (BadInput, ValueError, ArithmeticError):
                 return {}
 
-        return read_all(self.model, {**self.nominal, **values}, self.like, many, alone)
+        numbers = {**self.nominal, **values}
+        return read_all(self.model, numbers, self.nominal_sampler, read_batch, read_single)
 
-    def holding(self, found: Mapping[str, Floats], values: Mapping[str, Any]) -> tuple[Mask, dict[str, Mask]]:
-        """Say of each machine whether it assembles with all its figures, and whether each limit holds."""
-        well: Mask = np.all([np.isfinite(found[name]) | np.isposinf(found[name]) for name in found], axis=0)
-        holds = {}
-        for each in self.judged:
-            number = values.get(self.scene.full(each.name))
-            own = {} if number is None else dict.fromkeys(each.follows, number)
-            holds[each.name] = well & each.holds(found[each.name], own)
-        return well, holds
+    def test(self, figures: Mapping[str, Floats], values: Mapping[str, Any]) -> tuple[Mask, dict[str, Mask]]:
+        """Whether every machine assembles with all its figures, and whether it satisfies each criterion, (machines,).
+
+        figures: as `read` returns them. values: the machines' numbers, SI.
+        """
+        complete: Mask = np.all([np.isfinite(row) | np.isposinf(row) for row in figures.values()], axis=0)
+        passes = {}
+        for criterion in self.criteria:
+            number = values.get(self.scene.full(criterion.name))
+            ends = {} if number is None else dict.fromkeys(criterion.follows, number)
+            passes[criterion.name] = complete & criterion.test(figures[criterion.name], ends)
+        return complete, passes
 
 
-def demand_made(scene: Scene) -> None:
-    """Raise BadInput for a scene of which no number has a tolerance."""
-    if not toleranced(scene):
+def demand_tolerances(scene: Scene) -> None:
+    """Raise BadInput for a scene without a tolerance."""
+    if not read_tolerances(scene):
         remedy = 'Add [tolerances] with l1 = { plus_minus = "0.06 mm", sigmas = 3 }, by the names of numbers'
         raise refusal("no number of the scene has a tolerance", scene.origin, "tolerances", remedy=remedy)
 
 
-def planned(
+def plan_tolerance(
     scene: Scene,
     design: Mapping[str, float] | None = None,
     target: str | None = None,
     samples: int = SAMPLES,
     seed: int = 0,
 ) -> Plan:
-    """Return the study of a design (names as a designer calls them, SI; today's without one). Raises BadInput."""
+    """Plan of a tolerance study, checked.
+
+    design: names as in the scene, SI; today's without it. target: its limits are the criteria. samples: number of
+    machines. Raises BadInput.
+    """
     allowed, remedy = f"{SCRAMBLES} to {MOST_SAMPLES}", f"Give {SAMPLES}, or leave it out"
     if not SCRAMBLES <= arguments.whole(samples, "samples", allowed, remedy) <= MOST_SAMPLES:
-        raise refusal("there can be no such number of samples", "", "samples", samples, allowed, remedy)
+        raise refusal("the number of samples is out of range", "", "samples", samples, allowed, remedy)
     if arguments.whole(seed, "seed", "0 or more", "Give 0, or leave it out") < 0:
         raise refusal("it is less than 0", "", "seed", seed, "0 or more", "Give 0, or leave it out")
-    own = {scene.full(name): value for name, value in (design or {}).items()}
-    plan = Plan(scene, target_name(scene, target), own, samples, seed)
-    demand_made(scene)
-    lacking = [each.number for name, each in plan.made.items() if name not in plan.nominal]
-    if lacking:
-        problem = f"{lacking[0]} is no number of the machine as it stands"
-        raise refusal(problem, scene.origin, f"tolerances.{lacking[0]}", remedy="Take it out, or put its effect on")
+    full = {scene.full(name): value for name, value in (design or {}).items()}
+    plan = Plan(scene, target_name(scene, target), full, samples, seed)
+    demand_tolerances(scene)
+    unknown = [tolerance.number for name, tolerance in plan.tolerances.items() if name not in plan.nominal]
+    if unknown:
+        problem = f"{unknown[0]} is not a number of this machine"
+        raise refusal(problem, scene.origin, f"tolerances.{unknown[0]}", remedy="Remove it, or put its effect on")
     plan.job.demand(scene, plan.target)
-    _ = plan.halves, plan.judged
+    # Both raise BadInput here, before anything is computed.
+    _ = plan.half_widths, plan.criteria
     return plan

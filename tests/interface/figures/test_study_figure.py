@@ -19,7 +19,7 @@ from loomopt.studies.front import front
 from loomopt.studies.front.plan import sloped
 from loomopt.studies.run.rows import Row
 
-PLAN = sweep.planned(lo.load("beatup"), {"operation.M0": "700:740:10 N*m"}, "torque")
+PLAN = sweep.plan_sweep(lo.load("beatup"), {"operation.M0": "700:740:10 N*m"}, "torque")
 TODAY = lo.evaluate("beatup")
 
 
@@ -59,7 +59,7 @@ def test_without_a_certified_row_there_is_nothing_to_draw():
 
 def test_several_lines_have_their_legend_off_the_data():
     over = {"operation.M0": ["700 N*m", "710 N*m"], "bounds.l2.max": ["84 mm", "85 mm"]}
-    plan = sweep.planned(lo.load("beatup"), over, "torque")
+    plan = sweep.plan_sweep(lo.load("beatup"), over, "torque")
     places = [(700.0, 0.084), (700.0, 0.085), (710.0, 0.084), (710.0, 0.085)]
     rows = [replace(row(k), place=dict(zip(over, place, strict=True))) for k, place in enumerate(places)]
     figure = plot(plan, rows)
@@ -159,7 +159,7 @@ def test_a_front_of_an_inch_machine_is_drawn_in_inches():
 @pytest.mark.slow
 def test_a_sweep_of_all_that_a_rapier_has_shows_all_of_it():
     scene = lo.load("rapier")
-    plan = sweep.planned(scene, {"operation.s_dwell": "4:8:2 mm"})
+    plan = sweep.plan_sweep(scene, {"operation.s_dwell": "4:8:2 mm"})
     today = registry.of(scene).today(scene)
     rows = [
         replace(
@@ -183,7 +183,7 @@ def two_ways(first, second):
         "operation.M0": [f"{700 + 5 * k} N*m" for k in range(first)],
         "bounds.l2.max": [f"{84 + 0.125 * k} mm" for k in range(second)],
     }
-    plan = sweep.planned(lo.load("beatup"), over, "torque")
+    plan = sweep.plan_sweep(lo.load("beatup"), over, "torque")
     rows = []
     for k in range(first * second):
         one, other = divmod(k, second)

@@ -11,7 +11,7 @@ from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
 from loomopt.scenes.former_names import FormerNameWarning
 from loomopt.studies.front import front
-from loomopt.studies.sweep import planned
+from loomopt.studies.sweep import plan_sweep
 
 PLACES = [
     {"limits": {"NAME": {"max": "1 kN*m"}}},
@@ -96,7 +96,7 @@ def test_axes_and_ranges_of_a_front_and_keys_of_a_sweep_take_the_former_name():
         found = front.trade(scene, ("force.front", "mass"), "torque", minimise="force.front", ranges=ranges)
     assert found.key == front.trade(scene, ("moment.front", "mass"), "torque", ranges={"moment.front": (0.0, 5.0)}).key
     with pytest.warns(FormerNameWarning):
-        sweep = planned(scene, {"limits.force.front.max": ["1 N*m", "2 N*m"]}, "torque")
+        sweep = plan_sweep(scene, {"limits.force.front.max": ["1 N*m", "2 N*m"]}, "torque")
     assert [axis.key for axis in sweep.axes] == ["limits.moment.front.max"]
 
 

@@ -34,7 +34,7 @@ SCALES = {"M3_fdc": 734.985, "peak_torque": 93.850}
 
 @pytest.fixture(scope="module")
 def plan():
-    return study.planned(lo.load("beatup"))
+    return study.plan_effects(lo.load("beatup"))
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,7 @@ def test_shift_and_regret_of_the_reference_table(beatup, name):
 @pytest.mark.parametrize("name", ["shaft_torsion", "speed_fluctuation"])
 def test_an_effect_that_the_reference_leaves_off_changes_no_share(beatup, rows, name):
     """Shares are of the machine that is weighed: the same as with the effect in [available]."""
-    found = effects_text.summarise_effects(study.planned(lo.load("beatup").with_effect(name)), rows)
+    found = effects_text.summarise_effects(study.plan_effects(lo.load("beatup").with_effect(name)), rows)
     assert name not in found.reference.effects
     assert found.reference.scales == pytest.approx(SCALES, abs=6e-4)
     assert alike(found) == alike(beatup)
@@ -96,7 +96,7 @@ def test_an_effect_that_the_reference_leaves_off_changes_no_share(beatup, rows, 
 def test_an_effect_with_which_no_design_is_admissible_changes_no_size():
     """The coil of the packaged shedding: no design keeps its limits."""
     for scene in (lo.load("shedding"), lo.load("shedding").with_effect("coil")):
-        plan = study.planned(scene)
+        plan = study.plan_effects(scene)
         rows = [plan.solved(task, None) for task in plan.batch([])]
         while not (course := study.EffectsCourse(plan, rows)).judge:
             rows += [plan.solved(task, None) for task in plan.batch(rows)]

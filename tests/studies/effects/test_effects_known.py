@@ -53,7 +53,7 @@ def test_what_is_on_and_what_is_available_are_known_alike():
 
 
 def test_nothing_is_invented():
-    found = study.planned(made_up.scene(push=1)).unknown
+    found = study.plan_effects(made_up.scene(push=1)).unknown
     assert found["gravity"] == "no values: set effects.gravity.tilt, effects.gravity.offset"
     assert found["pull"] == "no values: set effects.pull.T"
     assert found["centrifugal"] == "it has no values to set: --with centrifugal"

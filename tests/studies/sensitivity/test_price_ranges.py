@@ -26,7 +26,7 @@ LEAST_RMS = Path(__file__).parent / "least_rms_torque.toml"
 def check_ranges(scene, target=None, only=None):
     """Check both ends of every price's range, or of the limits `only`; the number of ends checked."""
     answer = engine.solve(scene, target)
-    plan = study.planned(scene, answer)
+    plan = study.plan_sensitivity(scene, answer)
     result = study.run(plan)
     binding = {(price.limit, price.side): price for price in answer.binding}
     count = 0

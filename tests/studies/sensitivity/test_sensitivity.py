@@ -27,7 +27,7 @@ RANGE = 2e-5
 def sensitivity(problem, **changes):
     scene = registry.load(problem)
     scene = scene.update(dict(changes)) if changes else scene
-    return study.run(study.planned(scene, engine.solve(scene)))
+    return study.run(study.plan_sensitivity(scene, engine.solve(scene)))
 
 
 def derivative(problem, number, of):
@@ -117,7 +117,7 @@ def test_a_weight_that_has_its_mass_and_a_spring_that_has_one():
         "shedding", "effects.inertia.M", "K1"
     ).value / 9.80665 == pytest.approx(278.921618, abs=6e-7)
     scene = registry.load("shedding").with_effect("spring_inertia").set("effects.spring_inertia.mass", "0 kg")
-    here = study.run(study.planned(scene, engine.solve(scene)))
+    here = study.run(study.plan_sensitivity(scene, engine.solve(scene)))
     (row,) = [row for row in here.rows if (row.number, row.of) == ("effects.spring_inertia.mass", "K1")]
     assert row.side == "up"
     assert row.value == pytest.approx(888.196229, rel=1e-8)
@@ -170,7 +170,7 @@ def test_an_end_of_0_is_printed_as_0():
 @functools.cache
 def rams(target):
     answer = lo.solve(lo.load(RAMS), target=target)
-    return study.run(study.planned(lo.load(RAMS), answer.result))
+    return study.run(study.plan_sensitivity(lo.load(RAMS), answer.result))
 
 
 def test_bounds_that_bind_only_together_have_different_derivatives_on_both_sides():
@@ -210,7 +210,7 @@ def test_a_free_cam_law_with_more_active_rows_than_knots():
     """Repeated solves on both sides confirm it; N_min can only increase, and acts like the weight."""
     scene = registry.load("shedding")
     answer = engine.solve(scene, "law")
-    result = study.run(study.planned(scene, answer))
+    result = study.run(study.plan_sensitivity(scene, answer))
     assert result.refused is None
     rows = {row.number: row for row in result.rows if row.of == "K1"}
     for key, unit, here, step, si in (
@@ -244,7 +244,7 @@ def test_an_answer_that_is_not_certified_is_refused():
     if answer.status == "optimal":
         pytest.skip("the scene has an answer")
     with pytest.raises(BadInput, match="only a certified optimum has derivatives"):
-        study.planned(scene, answer)
+        study.plan_sensitivity(scene, answer)
 
 
 @pytest.mark.slow

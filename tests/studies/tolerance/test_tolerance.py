@@ -1,6 +1,7 @@
-"""Machines as they are made: spreads and yields beside those computed apart, the same bits whoever computes.
+"""Tolerance studies: spreads and yields compared with independent references, and the same bits with any executor.
 
-Reference values: by complex steps and implicit derivatives in 40 digits; yields by 16 scrambles of 2^20 Sobol points.
+The references of spreads are complex steps and implicit derivatives in 40 digits. Those of yields are 16 scrambles of
+2^20 Sobol points.
 """
 
 import functools
@@ -21,7 +22,7 @@ from loomopt.jobs import registry
 from loomopt.model.machines import BLOCK
 from loomopt.solving import engine
 from loomopt.studies.tolerance import study
-from loomopt.studies.tolerance.plan import planned
+from loomopt.studies.tolerance.plan import plan_tolerance
 
 SIX_HUNDREDTHS = "0.06 mm"
 LINKS = dict.fromkeys(("l1", "l2", "l3", "l4"), SIX_HUNDREDTHS)
@@ -29,11 +30,11 @@ DRIVE = dict.fromkeys(("l4", "l5", "l6", "l3p", "C0x", "C0y"), SIX_HUNDREDTHS) |
     ("alpha", "phi40"), "0.03 deg"
 )
 DIGITS = 3e-11
-"""Of a linear standard deviation: slopes by differences of the sixth order."""
-OF_THE_OPTIMUM = 2e-8
-"""The same where the optimum has a free direction, along which a design is settled to 1e-8."""
+"""Relative error of a linear standard deviation: slopes are differences of the sixth order."""
+FREE_DIRECTION = 2e-8
+"""The same where the optimum has a free direction: the design is accurate to 1e-8 there."""
 SE = 4.0
-"""Standard errors, both sides' together, that a sampled value may lie off."""
+"""Largest deviation of a sampled value, in standard errors of both values together."""
 
 
 @functools.cache
@@ -41,20 +42,20 @@ def optimum(problem, target=None):
     return dict(engine.solve(registry.load(problem), target).design)
 
 
-def plan(problem, made, accept=None, samples=20_000, seed=0):
+def make_plan(problem, made, accept=None, samples=20_000, seed=0):
     changes = {"tolerances": made} | ({"accept": accept} if accept else {})
-    return planned(registry.load(problem).update(changes), optimum(problem), None, samples, seed)
+    return plan_tolerance(registry.load(problem).update(changes), optimum(problem), None, samples, seed)
 
 
 @functools.cache
 def beatup():
-    return study.run(plan("beatup", LINKS, {"M3_fdc": "1 N*m"}))
+    return study.run(make_plan("beatup", LINKS, {"M3_fdc": "1 N*m"}))
 
 
 def linear(problem, made):
-    own = plan(problem, made)
-    found = {name: study.shared(own, each.by_number) for name, each in study.slopes(own).items()}
-    return {name: sigma for name, (sigma, _) in found.items()}, {name: share for name, (_, share) in found.items()}
+    plan = make_plan(problem, made)
+    spreads = {name: study.share_variance(plan, figure.by_number) for name, figure in study.slopes(plan).items()}
+    return {name: sigma for name, (sigma, _) in spreads.items()}, {name: share for name, (_, share) in spreads.items()}
 
 
 def test_linear_spread_of_the_balanced_beatup():
@@ -94,11 +95,11 @@ def test_uniform_links():
 
 def test_linear_spread_of_the_rapier():
     sigmas, shares = linear("rapier", DRIVE)
-    assert 1e3 * sigmas["stroke"] == pytest.approx(0.3171858877, rel=OF_THE_OPTIMUM)
-    assert math.degrees(sigmas["dwell_after"]) == pytest.approx(0.2491946306, rel=OF_THE_OPTIMUM)
-    assert math.degrees(sigmas["dwell_before"]) == pytest.approx(0.2604240165, rel=OF_THE_OPTIMUM)
-    assert math.degrees(sigmas["mu_min"]) == pytest.approx(0.0379328956, rel=OF_THE_OPTIMUM)
-    assert sigmas["peak_acceleration"] == pytest.approx(9.027666887e-4, rel=OF_THE_OPTIMUM)
+    assert 1e3 * sigmas["stroke"] == pytest.approx(0.3171858877, rel=FREE_DIRECTION)
+    assert math.degrees(sigmas["dwell_after"]) == pytest.approx(0.2491946306, rel=FREE_DIRECTION)
+    assert math.degrees(sigmas["dwell_before"]) == pytest.approx(0.2604240165, rel=FREE_DIRECTION)
+    assert math.degrees(sigmas["mu_min"]) == pytest.approx(0.0379328956, rel=FREE_DIRECTION)
+    assert sigmas["peak_acceleration"] == pytest.approx(9.027666887e-4, rel=FREE_DIRECTION)
     assert shares["stroke"]["l6"] == pytest.approx(0.266, abs=5e-4)
     assert [round(100 * shares[name]["l4"]) for name in ("dwell_after", "dwell_before", "peak_acceleration")] == [
         89,
@@ -125,79 +126,79 @@ def test_linear_spread_of_the_least_cam_force(made, sigma):
     assert linear("shedding", made)[0]["contact_min"] == pytest.approx(sigma, rel=2e-9)
 
 
-def close(found, value, se):
-    return abs(found.value - value) <= SE * math.hypot(found.se, se)
+def close(share, value, se):
+    return abs(share.value - value) <= SE * math.hypot(share.se, se)
 
 
 def test_yields_of_the_balanced_beatup():
-    found = beatup()
-    assert close(found.yields["swing"], 0.5, 1e-5)
-    assert close(found.yields["theta"], 0.499924, 7e-6)
-    assert close(found.yields["M3_fdc"], 0.872468, 9e-6)
-    assert close(found.yields["all"], 0.262233, 17e-6)
-    assert found.figures["M3_fdc"].sigma == pytest.approx(0.6562, rel=3e-3)
-    assert (found.bad, found.samples) == (0, 20_000)
-    assert found.tighten[0][0] == "l1"
+    result = beatup()
+    assert close(result.yields["swing"], 0.5, 1e-5)
+    assert close(result.yields["theta"], 0.499924, 7e-6)
+    assert close(result.yields["M3_fdc"], 0.872468, 9e-6)
+    assert close(result.yields["all"], 0.262233, 17e-6)
+    assert result.figures["M3_fdc"].sigma == pytest.approx(0.6562, rel=3e-3)
+    assert (result.bad, result.samples) == (0, 20_000)
+    assert result.tighten[0][0] == "l1"
 
 
 def test_yield_of_all_limits_without_a_band():
-    found = study.run(plan("beatup", LINKS))
-    assert close(found.yields["all"], 0.307458, 16e-6)
-    assert found.plan.unjudged == ("M3_fdc",)
-    assert "M3_fdc" not in found.yields
+    result = study.run(make_plan("beatup", LINKS))
+    assert close(result.yields["all"], 0.307458, 16e-6)
+    assert result.plan.goals_without_band == ("M3_fdc",)
+    assert "M3_fdc" not in result.yields
 
 
 def test_yields_of_shedding_and_rapier():
-    shedding = study.run(plan("shedding", {"K1": "5 %", "X0": "1 mm"}, samples=4000))
+    shedding = study.run(make_plan("shedding", {"K1": "5 %", "X0": "1 mm"}, samples=4000))
     assert close(shedding.yields["N_min"], 0.49987, 1e-4)
-    rapier = study.run(plan("rapier", DRIVE, {"stroke": "1 mm"}, samples=4000))
+    rapier = study.run(make_plan("rapier", DRIVE, {"stroke": "1 mm"}, samples=4000))
     assert close(rapier.yields["dwell_after"], 0.500099, 203e-6)
     assert close(rapier.yields["stroke"], 0.998323, 44e-6)
 
 
-def test_the_same_bits_whoever_computes_and_others_by_another_seed():
-    own = plan("beatup", LINKS, samples=1600)
-    alone = study.run(own)
+def test_the_same_bits_with_any_executor_and_others_with_another_seed():
+    plan = make_plan("beatup", LINKS, samples=1600)
+    serial = study.run(plan)
     with ThreadPoolExecutor(2) as executor:
-        assert study.run(own, executor).as_dict() == alone.as_dict()
-    other = study.run(replace(own, seed=1)).as_dict()
-    assert other["figures"]["swing"]["sigma"] != alone.figures["swing"].sigma
+        assert study.run(plan, executor).as_dict() == serial.as_dict()
+    reseeded = study.run(replace(plan, seed=1)).as_dict()
+    assert reseeded["figures"]["swing"]["sigma"] != serial.figures["swing"].sigma
 
 
 def test_the_same_bits_from_processes():
-    own = plan("shedding", {"K1": "5 %"}, samples=1600)
+    plan = make_plan("shedding", {"K1": "5 %"}, samples=1600)
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as executor:
-        found = study.run(own, executor, worst=True).as_dict()
-    assert found == study.run(own, worst=True).as_dict()
+        parallel = study.run(plan, executor, worst=True).as_dict()
+    assert parallel == study.run(plan, worst=True).as_dict()
 
 
 def test_memory_does_not_grow_with_the_machines():
-    """A scramble is summed block by block: four times as many machines take no more at once."""
+    """A scramble is summed block by block: four times as many machines need no more memory."""
     tops = []
     for samples in (16 * 2 * BLOCK, 16 * 8 * BLOCK):
-        own = plan("shedding", {"K1": "5 %"}, samples=samples)
+        plan = make_plan("shedding", {"K1": "5 %"}, samples=samples)
         sigmas = {name: sigma for name, sigma in linear("shedding", {"K1": "5 %"})[0].items() if name in ("K1",)}
-        study.summed(own, sigmas, 0)
+        study.sum_scramble(plan, sigmas, 0)
         tracemalloc.start()
-        study.summed(own, sigmas, 1)
+        study.sum_scramble(plan, sigmas, 1)
         tops.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert tops[1] < 1.1 * tops[0]
 
 
-def test_a_demand_that_is_made_itself_follows():
-    """A travel that is made shorter is not held against the travel that was asked for."""
-    found = study.run(plan("shedding", {"travel": "0.2 mm"}, samples=1600))
-    assert found.yields["travel"].value == 1.0
+def test_a_demand_with_a_tolerance_follows_the_machine():
+    """A machine with a shorter travel must reach its actual travel, not the nominal one."""
+    result = study.run(make_plan("shedding", {"travel": "0.2 mm"}, samples=1600))
+    assert result.yields["travel"].value == 1.0
 
 
 def test_machines_that_do_not_assemble_are_bad():
-    found = study.run(plan("rapier", {"l4": "25 mm", "l5": "25 mm"}, samples=160))
-    assert 0 < found.bad < 160
-    assert found.yields["all"].value <= 1 - found.bad / 160
+    result = study.run(make_plan("rapier", {"l4": "25 mm", "l5": "25 mm"}, samples=160))
+    assert 0 < result.bad < 160
+    assert result.yields["all"].value <= 1 - result.bad / 160
 
 
-def test_draws_have_the_spread_that_is_asked_for():
+def test_machines_have_the_spread_of_their_tolerances():
     group = {"group": "machine", "correlation": 0.64}
     made = {
         "l1": {"plus_minus": "0.06 mm", **group},
@@ -205,29 +206,29 @@ def test_draws_have_the_spread_that_is_asked_for():
         "l3": {"plus_minus": "0.06 mm", "spread": "uniform", **group},
         "l4": {"plus_minus": "0.06 mm", **group},
     }
-    own = plan("beatup", made)
-    drawn = study.drawn(own, 0, 0, 4096)
-    off = {name: drawn[name] - own.nominal[name] for name in made}
-    for name, each in off.items():
-        assert np.std(each) == pytest.approx(own.sigmas[name], rel=0.01), name
+    plan = make_plan("beatup", made)
+    machines = study.draw_machines(plan, 0, 0, 4096)
+    off = {name: machines[name] - plan.nominal[name] for name in made}
+    for name, deviations in off.items():
+        assert np.std(deviations) == pytest.approx(plan.sigmas[name], rel=0.01), name
     assert np.abs(off["l2"]).max() <= 6e-5
     assert np.abs(off["l3"]).max() <= 6e-5
     assert np.corrcoef(off["l1"], off["l4"])[0, 1] == pytest.approx(0.64, abs=0.02)
     assert np.corrcoef(off["l1"], off["l2"])[0, 1] == pytest.approx(0.0, abs=0.02)
-    later = study.drawn(own, 0, 1024, 10)
-    assert all(np.array_equal(later[name], drawn[name][1024:1034]) for name in made)
+    later = study.draw_machines(plan, 0, 1024, 10)
+    assert all(np.array_equal(later[name], machines[name][1024:1034]) for name in made)
 
 
-def test_what_cannot_be_studied_is_refused():
+def test_a_plan_without_tolerances_or_with_a_bad_option_is_refused():
     scene = registry.load("beatup")
     with pytest.raises(BadInput, match="no number of the scene has a tolerance"):
-        planned(scene)
-    with pytest.raises(BadInput, match="swing is no equality and no goal"):
-        planned(scene.update({"tolerances": LINKS, "accept": {"swing": "1 deg"}}))
+        plan_tolerance(scene)
+    with pytest.raises(BadInput, match="swing is neither an equality nor a goal"):
+        plan_tolerance(scene.update({"tolerances": LINKS, "accept": {"swing": "1 deg"}}))
     with pytest.raises(BadInput, match="samples"):
-        planned(scene.update({"tolerances": LINKS}), samples=3)
+        plan_tolerance(scene.update({"tolerances": LINKS}), samples=3)
     with pytest.raises(BadInput, match="seed"):
-        planned(scene.update({"tolerances": LINKS}), seed=-1)
+        plan_tolerance(scene.update({"tolerances": LINKS}), seed=-1)
 
 
 @pytest.mark.slow
@@ -252,23 +253,23 @@ def test_what_cannot_be_studied_is_refused():
     ],
 )
 def test_yields_of_many_machines(problem, made, accept, expected):
-    found = study.run(plan(problem, made, accept, samples=100_000))
+    result = study.run(make_plan(problem, made, accept, samples=100_000))
     for name, value in expected.items():
-        assert close(found.yields[name], value, 2.2e-4 if problem == "rapier" else 6e-5), name
+        assert close(result.yields[name], value, 2.2e-4 if problem == "rapier" else 6e-5), name
 
 
-def test_what_is_drawn_is_kept_and_taken_up_again(tmp_path):
+def test_a_store_keeps_scrambles_and_a_study_resumes_from_it(tmp_path):
     scene = registry.load("shedding").update({"tolerances": {"K1": "5 %"}})
     path = tmp_path / "machines.db"
-    alone = lo.tolerance(scene, samples=1600, worst=False).as_dict()
-    assert lo.tolerance(scene, samples=1600, worst=False, store=path).as_dict() == alone
+    serial = lo.tolerance(scene, samples=1600, worst=False).as_dict()
+    assert lo.tolerance(scene, samples=1600, worst=False, store=path).as_dict() == serial
     with sqlite3.connect(path) as file:
         file.execute("DELETE FROM row WHERE point > 9")
         before = dict(file.execute("SELECT point, seconds FROM row").fetchall())
     assert len(before) == 10
     with pytest.raises(BadInput, match="10 of the 16 scrambles of this study already"):
         lo.tolerance(scene, samples=1600, worst=False, store=path)
-    assert lo.tolerance(scene, samples=1600, worst=False, store=path, resume=True, workers=1).as_dict() == alone
+    assert lo.tolerance(scene, samples=1600, worst=False, store=path, resume=True, workers=1).as_dict() == serial
     with sqlite3.connect(path) as file:
         assert file.execute("SELECT count(*) FROM row").fetchall() == [(16,)]
     lo.tolerance(scene, samples=1600, seed=1, worst=False, store=path)
@@ -280,17 +281,17 @@ def test_what_is_drawn_is_kept_and_taken_up_again(tmp_path):
         recalled(path)
 
 
-def test_a_bound_that_a_row_keeps_judges_no_machine():
+def test_a_bound_of_a_dependent_variable_is_no_criterion():
     scene = lo.load("shedding").free("rise").update({"tolerances": {"speed": "1 %"}})
-    plan = planned(scene, None, "law", 160, 0)
+    plan = plan_tolerance(scene, None, "law", 160, 0)
     assert "near_dwell" in plan.evaluated.design
-    assert "near_dwell" not in [each.name for each in plan.judged]
-    assert plan.read({name: np.full(2, plan.nominal[name]) for name in plan.made})["contact_min"].shape == (2,)
+    assert "near_dwell" not in [criterion.name for criterion in plan.criteria]
+    assert plan.read({name: np.full(2, plan.nominal[name]) for name in plan.tolerances})["contact_min"].shape == (2,)
 
 
-def test_a_limit_that_is_no_figure_is_parted_too():
-    found = lo.tolerance(
+def test_the_loss_of_a_limit_without_a_figure_is_divided_by_number():
+    result = lo.tolerance(
         lo.load("shedding").update({"tolerances": {"K1": "5 %", "speed": "1 %"}}), samples=160, worst=False
     )
-    assert found.yields["N_min"].value == 0.0
-    assert found.tighten[0][0] == "speed"
+    assert result.yields["N_min"].value == 0.0
+    assert result.tighten[0][0] == "speed"

@@ -1,4 +1,4 @@
-"""The worst case within all tolerances: proven, and exceeded by no machine that samples or a local search find."""
+"""The worst case within all tolerances: proven, and no machine of samples or of a local search is worse."""
 
 import functools
 import itertools
@@ -14,7 +14,7 @@ from loomopt.jobs import registry
 from loomopt.maths import sobol
 from loomopt.solving import engine
 from loomopt.studies.tolerance import study, worst
-from loomopt.studies.tolerance.plan import planned
+from loomopt.studies.tolerance.plan import plan_tolerance
 
 LINKS = dict.fromkeys(("l1", "l2", "l3", "l4"), "0.06 mm")
 CLOTH = LINKS | {"M0": "5 %", "speed": "1 %", "J4": "2 %"}
@@ -23,7 +23,7 @@ DRIVE = dict.fromkeys(("l4", "l5", "l6", "l3p", "C0x", "C0y"), "0.06 mm") | dict
     ("alpha", "phi40"), "0.03 deg"
 )
 CLOSE = 1e-5
-"""Of a figure's range: what a proven end may be beyond the farthest machine."""
+"""Largest gap between a proven end and the farthest machine, as a share of the figure's range."""
 
 
 @functools.cache
@@ -31,36 +31,39 @@ def optimum(problem):
     return dict(engine.solve(registry.load(problem)).design)
 
 
-def plan(problem, made):
-    return planned(registry.load(problem).update({"tolerances": made}), optimum(problem), None, 160)
+def make_plan(problem, made):
+    return plan_tolerance(registry.load(problem).update({"tolerances": made}), optimum(problem), None, 160)
 
 
 @functools.cache
 def cases(problem, *names):
+    """Plan of a problem, and the worst cases of some figures, of all without names."""
     made = {"beatup": CLOTH, "shedding": SPRING, "rapier": DRIVE}[problem]
-    own = plan(problem, made)
-    found = worst.farthest(own)
-    assert worst.unproven(own) == ""
-    return own, {name: worst.worst(own, name, found[name]) for name in names or worst.asked(own)}
+    plan = make_plan(problem, made)
+    machines = worst.find_farthest(plan)
+    assert worst.obstacle_to_proof(plan) == ""
+    return plan, {
+        name: worst.find_worst_case(plan, name, machines[name]) for name in names or worst.worst_case_names(plan)
+    }
 
 
-def drawn(own, count, seed=0):
-    """Return machines all over the box, half of them on its faces."""
-    ends = np.array(list(worst.ends(own).values()))
+def draw_machines(plan, count, seed=0):
+    """Machines of the box, half of them on its faces."""
+    ends = np.array(list(worst.box_ends(plan).values()))
     shares = sobol.points(count, len(ends), 77 + seed).T
     half = count // 2
     shares[:, :half] = np.where(
         shares[:, :half] < 1 / 3, 0.0, np.where(shares[:, :half] > 2 / 3, 1.0, shares[:, :half])
     )
-    return dict(zip(own.made, ends[:, :1] * (1 - shares) + ends[:, 1:] * shares, strict=True))
+    return dict(zip(plan.tolerances, ends[:, :1] * (1 - shares) + ends[:, 1:] * shares, strict=True))
 
 
-def unexceeded(own, found, values):
-    read = own.read(values, found)
-    for name, case in found.items():
-        assert np.isfinite(read[name]).all(), name
-        assert case.min <= read[name].min(), name
-        assert read[name].max() <= case.max, name
+def assert_no_machine_is_worse(plan, cases_by_name, values):
+    figures = plan.read(values, cases_by_name)
+    for name, case in cases_by_name.items():
+        assert np.isfinite(figures[name]).all(), name
+        assert case.min <= figures[name].min(), name
+        assert figures[name].max() <= case.max, name
 
 
 @pytest.mark.few(1)
@@ -69,59 +72,61 @@ def unexceeded(own, found, values):
     [("beatup", ()), ("shedding", ()), ("rapier", ("dwell_after",))],
 )
 def test_every_worst_case_is_proven_and_no_machine_is_worse(problem, names):
-    own, found = cases(problem, *names)
-    for name, case in found.items():
+    plan, cases_by_name = cases(problem, *names)
+    for name, case in cases_by_name.items():
         assert case.proven, (name, case.why)
-        width = case.found[1] - case.found[0] + 1e-9 * abs(case.found[1])
-        assert 0 < case.max - case.found[1] < CLOSE * width, name
-        assert 0 < case.found[0] - case.min < CLOSE * width, name
-    unexceeded(own, found, drawn(own, 2048))
+        width = case.farthest[1] - case.farthest[0] + 1e-9 * abs(case.farthest[1])
+        assert 0 < case.max - case.farthest[1] < CLOSE * width, name
+        assert 0 < case.farthest[0] - case.min < CLOSE * width, name
+    assert_no_machine_is_worse(plan, cases_by_name, draw_machines(plan, 2048))
 
 
-def test_the_worst_of_one_machine_is_itself():
-    own = plan("beatup", {"l1": "0 mm"})
-    case = worst.worst(own, "peak_torque", worst.farthest(own)["peak_torque"])
+def test_without_tolerances_the_worst_case_is_the_nominal_figure():
+    plan = make_plan("beatup", {"l1": "0 mm"})
+    case = worst.find_worst_case(plan, "peak_torque", worst.find_farthest(plan)["peak_torque"])
     assert case.proven
-    assert case.max == pytest.approx(own.figures["peak_torque"], rel=3e-11)
+    assert case.max == pytest.approx(plan.figures["peak_torque"], rel=3e-11)
 
 
 def test_the_range_of_a_number_is_its_tolerance():
-    _, found = cases("shedding")
+    _, cases_by_name = cases("shedding")
     nominal = optimum("shedding")["K1"]
-    assert (found["K1"].min, found["K1"].max) == pytest.approx((0.95 * nominal, 1.05 * nominal), rel=1e-6)
+    assert (cases_by_name["K1"].min, cases_by_name["K1"].max) == pytest.approx(
+        (0.95 * nominal, 1.05 * nominal), rel=1e-6
+    )
 
 
-def test_what_cannot_be_boxed_is_undecided_and_says_why():
+def test_a_model_without_boxes_is_undecided_and_names_the_reason():
     scene = registry.load("beatup").with_effect("speed_fluctuation")
-    moving = dict(worst.told(planned(scene.update({"tolerances": LINKS}), samples=160)))
-    assert {case.why for case in moving.values()} == {
-        "a motion of its own is followed turn by turn, which boxes do not enclose"
+    fluctuation = dict(worst.find_worst_cases(plan_tolerance(scene.update({"tolerances": LINKS}), samples=160)))
+    assert {case.why for case in fluctuation.values()} == {
+        "an effect integrates the motion turn by turn, which boxes do not enclose"
     }
     twisted = registry.load("beatup").with_effect("shaft_torsion")
-    found = dict(worst.told(planned(twisted.update({"tolerances": LINKS}), samples=160)))
-    assert "shaft_torsion" in found["peak_torque"].why
-    loose = dict(worst.told(plan("rapier", {"l4": "25 mm", "l5": "25 mm"})))
+    cases_by_name = dict(worst.find_worst_cases(plan_tolerance(twisted.update({"tolerances": LINKS}), samples=160)))
+    assert "shaft_torsion" in cases_by_name["peak_torque"].why
+    loose = dict(worst.find_worst_cases(make_plan("rapier", {"l4": "25 mm", "l5": "25 mm"})))
     assert "all machines assemble" in loose["stroke"].why
-    told = loose["stroke"].as_dict()
-    assert (told["min"], told["max"], told["proven"], told["found"]) == (None, None, False, [None, None])
+    data = loose["stroke"].as_dict()
+    assert (data["min"], data["max"], data["proven"], data["found"]) == (None, None, False, [None, None])
 
 
 @pytest.mark.slow
-def test_the_same_bits_whoever_proves():
-    own = plan("shedding", {"K1": "5 %"})
-    alone = study.run(own, worst=True).as_dict()
+def test_the_same_bits_with_and_without_an_executor():
+    plan = make_plan("shedding", {"K1": "5 %"})
+    serial = study.run(plan, worst=True).as_dict()
     with ThreadPoolExecutor(2) as executor:
-        assert study.run(own, executor, worst=True).as_dict() == alone
-    assert json.loads(json.dumps(alone["worst"])) == alone["worst"]
-    assert study.run(own).as_dict() == {**alone, "worst": {}}
+        assert study.run(plan, executor, worst=True).as_dict() == serial
+    assert json.loads(json.dumps(serial["worst"])) == serial["worst"]
+    assert study.run(plan).as_dict() == {**serial, "worst": {}}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("problem", "count"), [("beatup", 1_000_000), ("shedding", 1_000_000), ("rapier", 20_000)])
 def test_no_machine_of_very_many_is_worse(problem, count):
-    own, found = cases(problem)
+    plan, cases_by_name = cases(problem)
     for seed, first in enumerate(range(0, count, 50_000)):
-        unexceeded(own, found, drawn(own, min(50_000, count - first), seed))
+        assert_no_machine_is_worse(plan, cases_by_name, draw_machines(plan, min(50_000, count - first), seed))
 
 
 @pytest.mark.slow
@@ -130,15 +135,15 @@ def test_no_machine_of_very_many_is_worse(problem, count):
     [("beatup", "peak_torque"), ("shedding", "N_min"), ("rapier", "dwell_before")],
 )
 def test_no_local_search_from_fifty_corners_is_worse(problem, name):
-    own, found = cases(problem, name)
-    case = found[name]
-    ends = np.array(list(worst.ends(own).values()))
+    plan, cases_by_name = cases(problem, name)
+    case = cases_by_name[name]
+    ends = np.array(list(worst.box_ends(plan).values()))
     width = ends[:, 1] - ends[:, 0]
-    size = case.found[1] - case.found[0]
+    size = case.farthest[1] - case.farthest[0]
 
     def read(shares):
         machines = np.clip(ends[:, 0] + np.atleast_2d(shares) * width, ends[:, 0], ends[:, 1])
-        return own.read(dict(zip(own.made, machines.T, strict=True)), {name})[name]
+        return plan.read(dict(zip(plan.tolerances, machines.T, strict=True)), {name})[name]
 
     def slopes(shares, sign):
         steps = np.where(shares < 0.5, 1e-4, -1e-4)
