@@ -330,7 +330,7 @@ def test_no_message_speaks_of_the_command_line_to_python():
 
 def test_no_answer_speaks_of_the_command_line_to_python(monkeypatch):
     assert not [text for text in solution.ADVICE.values() if "--" in text]
-    monkeypatch.setattr(search, "begun", failing)
+    monkeypatch.setattr(search, "draft_certificate", failing)
     assert "--" not in lo.solve(SCENE).message
     law = lo.solve(lo.load("shedding").set("targets.law.intervals", 8), "law")
     assert "--" not in law._repr_html_().replace("-->", "").replace("<!--", "")
