@@ -12,8 +12,8 @@ from loomopt.maths import systems
 from loomopt.physics.effects.kinds import Applied
 from loomopt.physics.mechanisms.chain import Chain
 from loomopt.physics.mechanisms.chain_forces import walked
-from loomopt.physics.mechanisms.dyad import Dyad, Vector
-from loomopt.physics.mechanisms.joint_forces import Wrench, cross, link_and_slider, slotted_lever, two_links
+from loomopt.physics.mechanisms.dyad import Dyad, Vector, cross
+from loomopt.physics.mechanisms.joint_forces import Wrench, link_and_slider, slotted_lever, two_links
 
 SCENE = lo.load("beatup").with_effect("joint_forces")
 CHANGE_POINT = "133 mm"

@@ -25,8 +25,8 @@ from loomopt.physics.mechanisms import chain
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.chain import Chain, Part, Ref, cam_switch
 from loomopt.physics.mechanisms.dwell_cam import stretch
-from loomopt.physics.mechanisms.dyad import Vector, dot
-from loomopt.physics.mechanisms.moving import Joint, cross
+from loomopt.physics.mechanisms.dyad import Vector, cross, dot
+from loomopt.physics.mechanisms.moving import Joint
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN, SAME_ANGLE
 

@@ -15,8 +15,8 @@ from loomopt.maths.systems import Number
 from loomopt.physics.effects.kinds import Applied
 from loomopt.physics.mechanisms import joint_forces
 from loomopt.physics.mechanisms.chain import FRAME_NAME, Chain, ChainPose, Part
-from loomopt.physics.mechanisms.dyad import Dyad, Vector, dot
-from loomopt.physics.mechanisms.joint_forces import Wrench, cross, minus, plus
+from loomopt.physics.mechanisms.dyad import Dyad, Vector, cross, dot
+from loomopt.physics.mechanisms.joint_forces import Wrench, minus, plus
 from loomopt.physics.mechanisms.moving import known, less, polar, total, turned_by
 
 

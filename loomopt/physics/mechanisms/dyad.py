@@ -32,6 +32,11 @@ def dot(a: Vector, b: Vector) -> Number:
     return a.x * b.x + a.y * b.y
 
 
+def cross(a: Vector, b: Vector) -> Number:
+    """Outer product a × b."""
+    return a.x * b.y - a.y * b.x
+
+
 def heron(maths: Maths, a: Number, b: Number, c: Number) -> Number:
     """Return four times the area of the triangle a, b, c (m²), from factors that do not cancel.
 

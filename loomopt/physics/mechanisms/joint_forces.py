@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from loomopt.maths.systems import Number
-from loomopt.physics.mechanisms.dyad import Dyad, Vector, dot
+from loomopt.physics.mechanisms.dyad import Dyad, Vector, cross, dot
 
 
 class Wrench(NamedTuple):
@@ -31,11 +31,6 @@ class PairForces(NamedTuple):
     inner: Vector
     outer1: Vector
     outer2: Vector
-
-
-def cross(a: Vector, b: Vector) -> Number:
-    """a × b."""
-    return a.x * b.y - a.y * b.x
 
 
 def plus(*vectors: Vector) -> Vector:

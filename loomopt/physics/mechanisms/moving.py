@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeVar
 
 from loomopt.base.records import lazy
 from loomopt.maths.systems import Maths, Number
-from loomopt.physics.mechanisms.dyad import Vector, dot
+from loomopt.physics.mechanisms.dyad import Vector, cross, dot
 
 Rates = Callable[[int], Number | None]
 """rates(k): the k-th derivative of an angle, k = 1, 2, 3."""
@@ -44,11 +44,6 @@ def once(formula: Callable[[], Found]) -> Callable[[], Found]:
         return found[0]
 
     return read
-
-
-def cross(a: Vector, b: Vector) -> Number:
-    """Outer product a × b."""
-    return a.x * b.y - a.y * b.x
 
 
 def left_of(a: Vector) -> Vector:

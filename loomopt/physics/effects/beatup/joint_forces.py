@@ -16,7 +16,7 @@ from loomopt.physics.effects import pins
 from loomopt.physics.effects.beatup import ReedPose, gravity
 from loomopt.physics.effects.kinds import Check, Inputs, LinkMass, Loading
 from loomopt.physics.mechanisms import joint_forces
-from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.dyad import Vector, cross
 from loomopt.physics.mechanisms.joint_forces import PairForces, Wrench
 from loomopt.physics.schema import Figure
 
@@ -141,7 +141,7 @@ class CrankRockerForces:
             return None
         force = gravity.weight(self.at.maths, given["rod_inertia.m2"], given["gravity.tilt"])
         share, rod = given["rod_inertia.s2"] / given["today.l2"], self.linkage.dyad.link1
-        return Wrench(force, share * joint_forces.cross(rod, force))
+        return Wrench(force, share * cross(rod, force))
 
     @property
     def _crank_weight(self) -> Vector | None:
@@ -193,7 +193,7 @@ class CrankRockerForces:
         about = self.swung.moment + self.linkage.lengths.l4 * self.swung.force.y
         if self.rod is None:
             return about
-        return about + self.rod.moment + joint_forces.cross(self.linkage.crank, self.rod.force)
+        return about + self.rod.moment + cross(self.linkage.crank, self.rod.force)
 
     def heading(self, part: str) -> Vector:
         """Unit direction of crank, rod or rocker."""

@@ -16,12 +16,11 @@ from loomopt.base.units import ShowValue
 from loomopt.maths.systems import Number
 from loomopt.physics.effects import pins
 from loomopt.physics.effects.kinds import Check, Inputs, Loading, Motion
-from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.dyad import Vector, cross
 from loomopt.physics.mechanisms.joint_forces import (
     PairForces,
     Wrench,
     crank_torque,
-    cross,
     minus,
     plus,
     tooth_force,
