@@ -7,11 +7,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from loomopt.base.errors import BadInput, Faults, clean, misread, near_file, refusal, shown, unknown
+from loomopt.base.errors import BadInput, Faults, clean, near_file, refusal, shown
 from loomopt.base.quantities import Quantity, described, quantities_of, quantity_of
 from loomopt.base.records import Frozen
-from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, show
+from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, show
 from loomopt.physics.effects.kinds import label
+from loomopt.scenes.cursor import Cursor
 from loomopt.scenes.document import Paths, copied, looked_up
 from loomopt.scenes.scene import Call, Jobs, Scene, build
 
@@ -134,47 +135,46 @@ def checked(data: object, scene: Scene, origin: str = "<design>") -> dict[str, f
     if not isinstance(data, Mapping) or not data:
         known = ", ".join(scene.schema.variables)
         raise refusal("there is no design", origin, allowed=f"an object of {known}, SI", remedy=_GIVE)
-    data = {name: value for name, value in data.items() if name not in lists} | _listed(data, lists, origin)
+    whole = Cursor(data, "design", Faults(origin))
+    data = {str(name): value for name, value in data.items() if name not in lists} | _listed(whole, lists)
     design = {}
-    for name, value in data.items():
-        listed = next((lists[of] for of in lists if _place(str(name), of) is not None), None)
+    for name, place in whole.entries(data).items():
+        listed = next((lists[of] for of in lists if _place(name, of) is not None), None)
         if listed:
             kinds[name] = listed
-        of, member, _ = str(name).partition("[")
+        of, member, _ = name.partition("[")
         if member and of in kinds:
             problem = f"{of} is of one member of a family, and this takes one machine"
             remedy = "Give members[0].design of the answer, or another's, with that member's numbers set"
-            raise refusal(problem, origin, f"design.{name}", remedy=remedy)
+            raise place.fault(problem, remedy=remedy)
         if name not in kinds:
-            raise unknown("design variable", str(name), [*kinds, *lists], origin, f"design.{name}")
-        design[name] = _read(value, kinds[name], origin, f"design.{name}")
-        if not isinstance(value, str) and abs(design[name]) > _largest(scene, name, kinds[name].kind):
-            raise _meant(scene, name, kinds[name].kind, design[name], origin)
+            raise place.unknown("design variable", name, [*kinds, *lists])
+        design[name] = _number(place, kinds[name])
+        if not isinstance(place.raw, str) and abs(design[name]) > _largest(scene, name, kinds[name].kind):
+            raise _other_unit(place, scene, kinds[name].kind, design[name])
     for of in lists:
         places = sorted(k for name in design if (k := _place(name, of)) is not None)
         if places != list(range(len(places))):
             remedy = f"Give all from {of}_0 on, or {of} as a list"
-            raise refusal(f"numbers of {of} are missing", origin, f"design.{of}", remedy=remedy)
+            raise whole.at(of).fault(f"numbers of {of} are missing", remedy=remedy)
     fault = scene.schema.fault({**scene.mechanism, **design}, scene.show)
     if fault:
         remedy = "Correct its lengths; numbers without a unit are metres and radians"
-        raise refusal(f"the design does not assemble: {fault}", origin, "design", remedy=remedy)
+        raise whole.fault(f"the design does not assemble: {fault}", remedy=remedy)
     return design
 
 
-def _read(value: object, quantity: Quantity, origin: str, key: str) -> float:
-    """Return one number of a design, SI. Raises BadInput."""
+def _number(cursor: Cursor, quantity: Quantity) -> float:
+    """One number of a design, SI. Raises BadInput."""
+    value = cursor.raw
     if isinstance(value, str):
-        try:
-            return quantity.validate(value)
-        except QuantityError as error:
-            raise misread(error, origin, key, value) from None
+        return cursor.number(quantity)
     allowed = f"{_ALLOWED}, or {described(quantity.kind)}"
     if not isinstance(value, bool) and isinstance(value, int | float) and abs(value) < LARGEST:
         if _fits(quantity, value):
             return float(value)
         allowed = f"{_ALLOWED}; {quantity.range}"
-    raise refusal("no design can have it", origin, key, value, allowed, "Correct the number")
+    raise cursor.fault("no design can have it", value, allowed, "Correct the number")
 
 
 def _largest(scene: Scene, name: str, kind: str) -> float:
@@ -188,25 +188,26 @@ def _largest(scene: Scene, name: str, kind: str) -> float:
     return max(known, abs(bound.min), abs(bound.max)) if bound else known
 
 
-def _meant(scene: Scene, name: str, kind: str, value: float, origin: str) -> BadInput:
-    """Return the error for a bare number that is too large for its unit in SI."""
+def _other_unit(cursor: Cursor, scene: Scene, kind: str, value: float) -> BadInput:
+    """Mistake of a bare number that is too large for its unit in SI."""
     unit = scene.shown_in(kind)
     unit = DISPLAY_UNIT[kind] if unit == SI_UNIT[kind] else unit
     problem = f"a number without a unit is SI, and this is far beyond the machine: {MEANT[kind]}?"
     remedy = f'Write "{value:.6g} {unit}", or "{show(value, SI_UNIT[kind])}" where {MEANT[kind]} are meant'
-    return refusal(problem, origin, f"design.{name}", value, remedy=remedy)
+    return cursor.fault(problem, value, remedy=remedy)
 
 
-def _listed(data: Mapping[str, Any], lists: Mapping[str, Quantity], origin: str) -> dict[str, Any]:
-    """Return the numbers of a design's lists, each under a name of its own. Raises BadInput."""
-    found: dict[str, Any] = {}
+def _listed(design: Cursor, lists: Mapping[str, Quantity]) -> dict[str, object]:
+    """Numbers of a design's lists, each under a name of its own. Raises BadInput."""
+    found: dict[str, object] = {}
+    given = design.table()
     for name in lists:
-        values = data.get(name, [])
+        place, values = design.at(name), given.get(name, [])
         if not isinstance(values, list | tuple) or len(values) > LONGEST:
             allowed = f"a list of up to {LONGEST} numbers"
-            raise refusal("it is not such a list", origin, f"design.{name}", allowed=allowed, remedy=_GIVE)
-        if values and any(_place(str(key), name) is not None for key in data):
-            raise refusal(f"{name} is given as a list and by number", origin, f"design.{name}", remedy=_GIVE)
+            raise place.fault("it is not such a list", allowed=allowed, remedy=_GIVE)
+        if values and any(_place(str(key), name) is not None for key in given):
+            raise place.fault(f"{name} is given as a list and by number", remedy=_GIVE)
         found |= {f"{name}_{k}": value for k, value in enumerate(values)}
     return found
 
