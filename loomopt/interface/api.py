@@ -426,7 +426,7 @@ def compare(*answers: "Evaluation | str", scene: Given | None = None) -> "Compar
     """
     from loomopt.interface.study import comparison
 
-    return comparison.compared(answers, None if scene is None else _scene(scene))
+    return comparison.compare(answers, None if scene is None else _scene(scene))
 
 
 def _scene(given: Given) -> Scene:

@@ -281,13 +281,13 @@ def tables(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str
     more = [f"and {len(reasons) - MOST_REASONS} more, in the table's last column"] if reasons[MOST_REASONS:] else []
     count += f", {found.bettered} bettered from a neighbour's design" if found.bettered else ""
     message = [found.message] if found.message else []
-    said = [change_said(study, change, si) for change in found.changes]
+    said = [change_sentence(study, change, si) for change in found.changes]
     conditions = study.conditions
     held = "".join(f"; {name} {conditions[name]}" for name in ("held", "not held") if name in conditions)
     return [f"{study.heading}: {count}, {outcome}{held}", *message, grid, *said, *reasons[:MOST_REASONS], *more]
 
 
-def change_said(study: SceneStudy, change: Change, si: bool) -> str:
+def change_sentence(study: SceneStudy, change: Change, si: bool) -> str:
     """A change as a sentence."""
     key = next(iter(study.kinds))
     unit = ColumnUnits(study, si).of(key)
@@ -314,7 +314,7 @@ def charts(study: SceneStudy, findings: Findings) -> Charts:
     panels = made["sought"] or shown_columns(study, rows)
     others = [column for column in shown_columns(study, rows) if column not in panels]
     drawn = [_chart(panel, places, findings) for panel in [*panels, *others]]
-    notes = [change_said(study, change, False) for change in findings.changes if change.at is not None]
+    notes = [change_sentence(study, change, False) for change in findings.changes if change.at is not None]
     return Charts(study.heading, drawn, shared=True, first=len(panels), notes=notes, missing=missing)
 
 

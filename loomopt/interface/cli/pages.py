@@ -219,7 +219,7 @@ def compare(
     ]
     scene = registry.load(within) if within else None
     names = ["" if each == comparison.TODAY else Path(each).stem for each in answers]
-    made = comparison.compared(found, scene, names)
+    made = comparison.compare(found, scene, names)
     tell(as_json, made.as_dict, made.tables)
     write(files.out, lambda path: outputs.write_table(path, made.table(), "designs", comma))
     write(figure, made.plot)

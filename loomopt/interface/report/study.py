@@ -45,7 +45,7 @@ def status(study: SceneStudy, solved: Sequence[Row]) -> Status:
 def parts(study: SceneStudy, solved: Sequence[Row]) -> list[Part]:
     """The parts of a study's page; solved: the rows of all points that were."""
     findings = study.read(solved)
-    changes = [study_table.change_said(study, change, False) for change in findings.changes]
+    changes = [study_table.change_sentence(study, change, False) for change in findings.changes]
     above = {findings.message, *changes}
     tables = [block for block in study_table.tables(study, solved) if block not in above]
     shown = charts.block(study_table.charts(study, findings).charts)

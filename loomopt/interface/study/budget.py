@@ -21,7 +21,7 @@ from loomopt.studies.budget import BudgetResult
 if TYPE_CHECKING:
     import pandas as pd
 
-SAID = {
+MOTOR = {
     "rms_torque": ("rms torque", "torque"),
     "mean_power": ("mean power", "power"),
     "peak_power": ("peak power, driving or braking", "power"),
@@ -29,7 +29,7 @@ SAID = {
     "energy_swing": ("a flywheel takes in and gives back each turn", "energy"),
     "flywheel": ("flywheel at the crank", "inertia"),
 }
-"""What of the motor is told: how it is called, its kind of quantity."""
+"""Number of the motor → its name for people and its kind of quantity."""
 
 
 class Budget(StudyResult[BudgetResult]):
@@ -50,7 +50,7 @@ class Budget(StudyResult[BudgetResult]):
         result, scene = self.result, self.result.scene
         peak = scene.show(_rounded(result.total.at_peak, result.total.peak), "torque")
         first = f"{scene.name}: the crank torque is largest, {peak}, at {scene.show(result.found.angle, 'angle')}"
-        motor = tuple((said, _motor(result, name)) for name, (said, _) in SAID.items())
+        motor = tuple((label, _motor(result, name)) for name, (label, _) in MOTOR.items())
         shares = text_table(_columns(result), first=(0, 1, 5))
         return [first, shares, TextTable("Motor", ("", ""), motor), *(f"Remark: {text}." for text in result.remarks)]
 
@@ -117,5 +117,5 @@ def _motor(result: BudgetResult, name: str) -> str:
     value, scene = getattr(result.motor, name), result.scene
     if value is None:
         return f"not known: {result.undefined[name]}"
-    told = scene.show(value, SAID[name][1])
-    return f"{told} for a fluctuation of {result.found.fluctuation:g}" if name == "flywheel" else told
+    text = scene.show(value, MOTOR[name][1])
+    return f"{text} for a fluctuation of {result.found.fluctuation:g}" if name == "flywheel" else text

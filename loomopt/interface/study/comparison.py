@@ -181,8 +181,8 @@ def _broken(row: ComparedRow, designs: Sequence[Named]) -> list[str]:
     return [each.name for each, held in zip(designs, row.held, strict=True) if held is False]
 
 
-def compared(found: Sequence[object], within: Scene | None = None, names: Sequence[str] = ()) -> Comparison:
-    """Return designs side by side: answers, evaluations, or "today" for the first one's machine as it is.
+def compare(found: Sequence[object], within: Scene | None = None, names: Sequence[str] = ()) -> Comparison:
+    """Designs side by side: answers, evaluations, or "today" for the first one's machine as it is.
 
     within: a scene that all are judged in; each in its own without it. names: of each, what it is called. Raises
     BadInput for what is none of them, for one design alone, and for designs of different jobs.
