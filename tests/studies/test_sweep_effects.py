@@ -32,7 +32,9 @@ def machine(job):
     """Return the scene of a job with the effects that take no values in [available]."""
     scene = lo.load(MACHINES[job][0])
     bare = [
-        name for name, said in study.without_values(scene, study.known(scene)).items() if "no values to set" in said
+        name
+        for name, said in study.effects_without_values(scene, study.known_effects(scene)).items()
+        if "no values to set" in said
     ]
     for name in bare:
         scene = scene.with_effect(name).without_effect(name)
@@ -42,10 +44,10 @@ def machine(job):
 def choices(job):
     """Return what is put on: each effect with what it needs, and all that combine together."""
     scene = machine(job)
-    known = study.known(scene)
+    known = study.known_effects(scene)
     alone = {e.name: (*(b for b in e.beside if b not in scene.effects), e.name) for e in known}
     found = {name: own for name, own in alone.items() if name not in scene.effects}
-    together = study.combined(known, uncoiled.scene(scene) if job == "shedding" else scene).effects
+    together = study.combine_effects(known, uncoiled.scene(scene) if job == "shedding" else scene).effects
     return found | {ALL: tuple(e.name for e in together if e.name not in scene.effects and not isinstance(e, Speed))}
 
 

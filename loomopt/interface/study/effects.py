@@ -13,8 +13,8 @@ from loomopt.picture.chart import Bars, Charts, both_sides
 from loomopt.picture.table import Column, TextTable, call, text_table, words, written
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words
+from loomopt.studies.effects.effect_impact import LIMITS, EffectImpact
 from loomopt.studies.effects.study import Effects, EffectsResult, summarise
-from loomopt.studies.effects.worth import LIMITS, Worth
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import Row
 
@@ -51,7 +51,7 @@ class EffectsStudy(StudyResult[EffectsResult]):
         lines += [f"Shares are of natural sizes: {sizes}"] if sizes else []
         table: list[str | TextTable] = []
         if result.rows:
-            base = Worth("nothing", {}, {}, None, True, reference.status, **reference.cost)
+            base = EffectImpact("nothing", {}, {}, None, True, reference.status, **reference.cost)
             columns = _columns(result, (base, *result.rows), timed)
             last = sum(column.head is not None for column in columns) - 1  # what came of the solve, if no optimum
             table = [text_table(columns, (0, last - 1, last) if any(columns[-2].cells) else (0, last - 1))]
@@ -100,7 +100,7 @@ def summarise_effects(study: Effects, rows: Sequence[Row]) -> EffectsStudy:
     return EffectsStudy(summarise(study, rows))
 
 
-def _columns(result: EffectsResult, rows: Sequence[Worth], timed: bool = True, si: bool = False) -> list[Column]:
+def _columns(result: EffectsResult, rows: Sequence[EffectImpact], timed: bool = True, si: bool = False) -> list[Column]:
     units, columns = Words(result.scene), [words("without", [row.effect for row in rows])]
     for name, scale in result.reference.scales.items():
         unit = units.si(name) if si else units.unit(name)
@@ -123,8 +123,8 @@ def _columns(result: EffectsResult, rows: Sequence[Worth], timed: bool = True, s
         *columns,
         Column("limits exceeded [%]", *_percent([_known(row.excess) for row in rows], "limits\nexceeded\n%")),
         Column("may go", [row.may_go for row in rows]),
-        Column("takes away", [", ".join(row.lost) for row in rows]),
-        Column("changes", [", ".join(row.moved) for row in rows]),
+        Column("takes away", [", ".join(row.missing_figures) for row in rows]),
+        Column("changes", [", ".join(row.changed_figures) for row in rows]),
         Column("nodes", [row.nodes for row in rows], "graph\nnodes", nodes, kind="Int64"),
         Column("build [s]", build, "build\ns" if timed else None, [_seconds(value) for value in build]),
         Column("solve [s]", solve, "solve\ns" if timed else None, [_seconds(value) for value in solve]),
@@ -213,9 +213,8 @@ def verdict(result: EffectsResult) -> list[str]:
     said = f"{listed(result.left_out)} may be left out" if result.left_out else "no effect may be left out"
     lines = [f"At {share}, {said}{': ' if solve else ''}{solve}"]
     if result.together and result.largest_omission:
-        lines.append(
-            f"Left out together, and what is found so judged with all on: {_largest_change(result.together.largest)}."
-        )
+        change = _change_text(result.together.largest_change)
+        lines.append(f"Left out together, and what is found so judged with all on: {change}.")
         if len(result.left_out) > 1 and abs(result.largest_omission.value) > SHOWN_AS_ZERO:
             by, of, value = result.largest_omission.by, result.largest_omission.of, result.largest_omission.value
             lines[-1] += f" Most comes from {result.largest_omission.effect}: {_moved(by, of, value)}."
@@ -237,12 +236,11 @@ def omitted(result: EffectsResult) -> list[str]:
     told, names = list[str](), dict[str, None]()
     for row in (*rows, *([result.together] if result.together and len(rows) > 1 else [])):
         single = row in rows
-        parts = [f"{listed(row.lost)} {'is' if len(row.lost) == 1 else 'are'} gone"] if row.lost else []
-        parts += (
-            [f"{listed(row.moved)} {'changes' if len(row.moved) == 1 else 'change'}"] if row.moved and single else []
-        )
+        missing, changed = row.missing_figures, row.changed_figures if single else ()
+        parts = [f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} gone"] if missing else []
+        parts += [f"{listed(changed)} {'changes' if len(changed) == 1 else 'change'}"] if changed else []
         told += [f"{f'without {row.effect}' if single else 'without them all'} {' and '.join(parts)}"] if parts else []
-        names |= dict.fromkeys((*row.lost, *row.moved))
+        names |= dict.fromkeys((*row.missing_figures, *row.changed_figures))
     if not told:
         return []
     read = [name for name in names if name in result.reference.reads]
@@ -250,7 +248,7 @@ def omitted(result: EffectsResult) -> list[str]:
     return [f"Of the other figures: {'; '.join(told)}. Target {result.target} {which}."]
 
 
-def _largest_change(largest: tuple[str, str, float]) -> str:
+def _change_text(largest: tuple[str, str, float]) -> str:
     """The largest change in words."""
     return f"at most {_moved(*largest)}" if abs(largest[2]) > SHOWN_AS_ZERO else "nothing changes"
 
@@ -263,7 +261,7 @@ def _moved(by: str, of: str, value: float) -> str:
     return f"{of} {'shifts by' if by == 'shift' else 'is worse by'} {share}"
 
 
-def _only_figures(row: Worth, tolerance: float) -> bool:
+def _only_figures(row: EffectImpact, tolerance: float) -> bool:
     """Say whether a design found without an effect is good, and only its figures are wrong."""
     told = (*row.regret.values(), row.excess)
     known = [value for value in row.shift.values() if value is not None]

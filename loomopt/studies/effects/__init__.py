@@ -1,1 +1,1 @@
-"""What each effect is worth, and what may be left out."""
+"""Impact of every effect of a scene, and the effects that may be left out."""

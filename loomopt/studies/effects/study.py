@@ -1,4 +1,4 @@
-"""Studies of what each effect is worth: which effects are known, the plan of the study, its course."""
+"""Studies of the impact of effects: known effects, plan of a study, order of its solves, and result."""
 
 import functools
 import json
@@ -12,7 +12,7 @@ from loomopt.base import arguments
 from loomopt.base.errors import BadInput, Broken, refusal
 from loomopt.base.records import freeze
 from loomopt.jobs import registry
-from loomopt.physics.effects.kinds import Effect, Event, Fault, Speed, State, faults, needed, required
+from loomopt.physics.effects.kinds import Effect, Event, Speed, State, faults, needed, required
 from loomopt.physics.schema import Table
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import designs
@@ -24,95 +24,94 @@ from loomopt.scenes.tables import effects as read
 from loomopt.solving import engine
 from loomopt.solving.answer.solution import Words
 from loomopt.solving.options import OMITTED, check_numbers, target_name
-from loomopt.studies.effects.worth import NEEDED, Judge, Worth
+from loomopt.studies.effects.effect_impact import NEEDED, EffectImpact, ReferenceDesign
 from loomopt.studies.run.rows import Row, StudyTask
 from loomopt.studies.sweep import reason
 
 YIELDING = (State, Speed, Event)
-"""Kinds that yield to any other where both cannot be on together."""
+"""Kinds of effects that give way to any other kind that they clash with."""
 
 
-class Together(NamedTuple):
-    """Effects that combine, in the order of the job; out: those that stay out, each with the reason."""
+class Combination(NamedTuple):
+    """Effects that can be on together, in the order of the job; excluded: the rest, each with the reason."""
 
     effects: tuple[Effect, ...]
-    out: Mapping[str, str]
+    excluded: Mapping[str, str]
 
 
-def known(scene: Scene) -> dict[Effect, Table]:
-    """Return the effects of [effects] and [available] with their values, in the order of the job."""
+def known_effects(scene: Scene) -> dict[Effect, Table]:
+    """Effects of [effects] and [available] with their values, in the order of the job."""
     off = read(cursor(scene).at("available"), scene.schema)
-    found = {**off, **dict(zip(scene.active, scene.effects.values(), strict=True))}
+    tables = {**off, **dict(zip(scene.active, scene.effects.values(), strict=True))}
     order = list(scene.schema.effects)
-    return dict(sorted(found.items(), key=lambda pair: (order.index(pair[0].path[0]), pair[0].name)))
+    return dict(sorted(tables.items(), key=lambda pair: (order.index(pair[0].path[0]), pair[0].name)))
 
 
-def without_values(scene: Scene, given: Iterable[Effect]) -> dict[str, str]:
-    """Return the job's other effects, each with what it takes to study it: nothing is invented."""
-    there = {effect.path[0] for effect in given}
-    return {name: _checked_request(effect) for name, effect in scene.schema.effects.items() if name not in there}
+def effects_without_values(scene: Scene, given: Iterable[Effect]) -> dict[str, str]:
+    """Effects of the job that the scene has no values for, each with what to set."""
+    present = {effect.path[0] for effect in given}
+    return {name: _missing_values(effect) for name, effect in scene.schema.effects.items() if name not in present}
 
 
-def _checked_request(effect: Effect) -> str:
-    own = f"effects.{effect.name}.NAME" if effect.many else f"effects.{effect.name}"
-    keys = [f"{own}.{key}" for key in required(effect)]
+def _missing_values(effect: Effect) -> str:
+    """Sentence that says how to study an effect without values."""
+    table = f"effects.{effect.name}.NAME" if effect.many else f"effects.{effect.name}"
+    keys = [f"{table}.{key}" for key in required(effect)]
     if keys or effect.many:
-        return f"no values: set {', '.join(keys) or own}"
+        return f"no values: set {', '.join(keys) or table}"
     return f"it has no values to set: --with {effect.name}"
 
 
-def combined(given: Mapping[Effect, Table], scene: Scene) -> Together:
-    """Return which effects can be on together.
+def combine_effects(given: Mapping[Effect, Table], scene: Scene) -> Combination:
+    """Effects that can be on together.
 
-    Of two that cannot, a state, a speed or an event yields to any other kind, else the later one in the order of the
-    job. What needs a number of the scene that is not there, or an effect that stays out, stays out too.
+    Of two that clash, a state, a speed or an event gives way to any other kind; otherwise the later one in the order of
+    the job. An effect that needs a missing number of the scene, or an excluded effect, is excluded too.
     """
-    out = {e.name: text for e in given if (text := _lacking(e, given[e], scene))}
+    excluded = {e.name: text for e in given if (text := _missing_numbers(e, given[e], scene))}
     while True:
-        chosen, yielding = _chosen({e: own for e, own in given.items() if e.name not in out})
-        fault = next((each for each in faults(chosen) if each.missing), None)
+        chosen, yielding = _select_effects({e: table for e, table in given.items() if e.name not in excluded})
+        fault = next((fault for fault in faults(chosen) if fault.missing), None)
         if fault is None:
-            return Together(tuple(e for e in given if e in chosen), {**out, **yielding})
-        out[fault.effect.name] = f"it needs the effect {fault.other}"
+            return Combination(tuple(e for e in given if e in chosen), {**excluded, **yielding})
+        excluded[fault.effect.name] = f"it needs the effect {fault.other}"
 
 
-def _chosen(given: Mapping[Effect, Table]) -> tuple[dict[Effect, Table], dict[str, str]]:
+def _select_effects(given: Mapping[Effect, Table]) -> tuple[dict[Effect, Table], dict[str, str]]:
+    """Effects without a clash, with their values, and the excluded ones with the reason."""
     chosen: dict[Effect, Table] = {}
-    out: dict[str, str] = {}
-    for effect in sorted(given, key=lambda each: isinstance(each, YIELDING)):
-        fault = next((each for each in faults({**chosen, effect: given[effect]}) if not each.missing), None)
+    excluded: dict[str, str] = {}
+    for effect in sorted(given, key=lambda effect: isinstance(effect, YIELDING)):
+        fault = next((fault for fault in faults({**chosen, effect: given[effect]}) if not fault.missing), None)
         if fault:
-            out[effect.name] = f"it yields to {_other(fault, effect)}: {fault.problem}"
+            opponent = fault.other if fault.effect is effect else fault.effect.name
+            excluded[effect.name] = f"it yields to {opponent}: {fault.problem}"
         else:
             chosen[effect] = given[effect]
-    return chosen, out
+    return chosen, excluded
 
 
-def _other(fault: Fault, effect: Effect) -> str:
-    return fault.other if fault.effect is effect else fault.effect.name
-
-
-def _lacking(effect: Effect, own: Table, scene: Scene) -> str:
-    """Return what of the scene an effect lacks; "" where it has all it needs."""
+def _missing_numbers(effect: Effect, values: Table, scene: Scene) -> str:
+    """Sentence on the numbers of the scene that an effect needs and that are missing; "" without any."""
     given = {f"{name}.{key}" for name, table in scene.tables.items() for key, value in table if value is not None}
-    keys = [key for key in needed(effect, own) if key not in given]
+    keys = [key for key in needed(effect, values) if key not in given]
     return f"it needs {', '.join(keys)}" if keys else ""
 
 
-def with_only(scene: Scene, names: Collection[str]) -> Scene:
-    """Return a scene with these of its known effects on, the others in [available]. Raises BadInput."""
+def enable_only(scene: Scene, names: Collection[str]) -> Scene:
+    """Scene with only these of its known effects on, and the rest in [available]. Raises BadInput."""
     document = {**scene.document, "effects": {}, "available": {}}
-    for effect in known(scene):
-        own = [looked_up(scene.document, (table, *effect.path)) for table in ("effects", "available")]
-        values = own[1] if own[0] is None else own[0]
+    for effect in known_effects(scene):
+        on, off = (looked_up(scene.document, (table, *effect.path)) for table in ("effects", "available"))
+        values = off if on is None else on
         table = "effects" if effect.name in names else "available"
         document = replaced(document, (table, *effect.path), values, scene.origin, f"{table}.{effect.name}")
     return build(document, scene.jobs, scene.origin, scene.paths)
 
 
-def command(scene: Scene, target: str, names: Collection[str]) -> str | None:
-    """Return the call of the shell that solves a scene with these effects alone; None for a scene without a file."""
-    problem = _problem(scene)
+def solve_command(scene: Scene, target: str, names: Collection[str]) -> str | None:
+    """Shell command that solves a scene with only these effects; None for a scene without a file."""
+    problem = _problem_name(scene)
     try:
         file = registry.load(problem)
     except BadInput:
@@ -120,52 +119,52 @@ def command(scene: Scene, target: str, names: Collection[str]) -> str | None:
     words = ["loomopt", "solve", problem, "--target", target]
     before, after = dict(designs.document_values(file.document)), dict(designs.document_values(scene.document))
     if before.keys() - after.keys():
-        return None  # what was taken out of a scene no option takes out
-    idle = tuple(f"effects.{effect.name}." for effect in known(scene) if effect.name not in names)
-    changes = {key: value for key, value in after.items() if before.get(key) != value and not key.startswith(idle)}
+        return None  # no option removes a number from a scene
+    unused = tuple(f"effects.{effect.name}." for effect in known_effects(scene) if effect.name not in names)
+    changes = {key: value for key, value in after.items() if before.get(key) != value and not key.startswith(unused)}
     changes.pop("problem.name", None)
     for key, value in changes.items():
         if isinstance(value, list):
             return None
         words += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
-    on = {*file.effects, *(effect.name for effect in known(scene) if _set(effect.name, changes))}
-    for option, asked in (("--with", set(names) - on), ("--without", on - set(names))):
-        words += [word for effect in known(scene) if effect.name in asked for word in (option, effect.name)]
+    on = {*file.effects, *(effect.name for effect in known_effects(scene) if _is_set(effect.name, changes))}
+    for option, effects in (("--with", set(names) - on), ("--without", on - set(names))):
+        words += [word for effect in known_effects(scene) if effect.name in effects for word in (option, effect.name)]
     return shlex.join(words)
 
 
-def _problem(scene: Scene) -> str:
-    """Return what the command line calls a scene: a packaged name, or its file."""
+def _problem_name(scene: Scene) -> str:
+    """Name of a scene on the command line: a packaged name, or its file."""
     name = scene.origin.removesuffix(".toml")
     file = registry.problems().get(name)
     return name if file and file.parent.absolute() == scene.paths.folder else scene.origin
 
 
-def _set(effect: str, changes: Collection[str]) -> bool:
-    """Say whether a change is one of an effect's own values, which puts it on."""
+def _is_set(effect: str, changes: Collection[str]) -> bool:
+    """Whether one of the changes sets a value of an effect, which puts it on."""
     return any(key.startswith(f"effects.{effect}.") for key in changes)
 
 
 REFUSED = "refused"
-"""The status of what solve does not take."""
+"""Status of a scene that solve does not accept."""
 DESIGNED = "optimal", "uncertified"
-"""Statuses of a solve that ended in a design."""
+"""Statuses of a solve that has a design."""
 Off = frozenset[str]
 """Names of the effects that are off."""
 
 
 @dataclass(frozen=True)
 class Effects:
-    """The plan of the study: small, and it pickles.
+    """Plan of a study of effects; it pickles.
 
-    scene: as given; target: by name; together: the effects that combine, in the order of the job; out, unknown: the
-    others, each with the reason; accuracy, seed: of every solve.
+    scene: as given. target: its name. combination: effects that can be on together, in the order of the job. out,
+    unknown: the remaining effects, each with the reason. accuracy, seed: of every solve.
     """
 
     scene: Scene
     target: str
     tolerance: float
-    together: tuple[str, ...]
+    combination: tuple[str, ...]
     out: Mapping[str, str]
     unknown: Mapping[str, str]
     accuracy: float
@@ -175,12 +174,12 @@ class Effects:
 
     @functools.cached_property
     def key(self) -> str:
-        """A hash of all that its rows depend on."""
+        """Hash of all that its rows depend on."""
         import hashlib
 
         settings = {
             "study": self.name,
-            "scene": with_only(self.scene, self.together).hash,
+            "scene": enable_only(self.scene, self.combination).hash,
             "given": self.scene.hash,
             "files": files(self.scene),
             "target": self.target,
@@ -192,24 +191,22 @@ class Effects:
         return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:32]
 
     def without(self, off: Off) -> Scene:
-        """Return the scene of the effects that combine, but for some. Raises BadInput where these cannot be off."""
-        return with_only(self.scene, [name for name in self.together if name not in off])
+        """Scene of the combination without some effects. Raises BadInput where these cannot be off."""
+        return enable_only(self.scene, [name for name in self.combination if name not in off])
 
     def batch(self, rows: Sequence[Row]) -> list[StudyTask]:
-        """Return the tasks of the next round, from all rows of earlier ones."""
-        wanted = EffectsCourse(self, rows).wanted
-        return [StudyTask(len(rows) + k, None, dict.fromkeys(self._ordered(off), 0.0)) for k, off in enumerate(wanted)]
-
-    def _ordered(self, off: Off) -> list[str]:
-        return [name for name in self.together if name in off]
+        """Tasks of the next round, from all rows of earlier rounds."""
+        first = len(rows)
+        ordered = ([name for name in self.combination if name in off] for off in EffectsCourse(self, rows).next_solves)
+        return [StudyTask(first + k, None, dict.fromkeys(names, 0.0)) for k, names in enumerate(ordered)]
 
     def solved(self, task: StudyTask, parent: Row | None) -> Row:
-        """Return the row of a task: its place names the effects that are off."""
+        """Row of a task, whose place names the effects that are off."""
         from loomopt.solving.nlp import transcribe
 
         scene = self.without(frozenset(task.place))
         try:
-            # What a counterweight is worth to the design is no worth of an effect.
+            # A design without the counterweight would hide the impact of an effect.
             answer = engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed, wholly=False)
         except Broken:
             raise
@@ -242,148 +239,157 @@ def plan_effects(
     accuracy: float = ACCURACY,
     seed: int = 0,
 ) -> Effects:
-    """Return the plan of the study. Raises BadInput for an unknown target or one that the effects cannot serve."""
+    """Plan of a study of effects. Raises BadInput for a target that does not exist or that needs another effect."""
     name = target_name(scene, target)
     check_numbers(accuracy, None, seed)
     allowed, remedy = "a share, more than 0", "Write 0.01 for 1 %, or leave it out"
     if not 0.0 < arguments.number(tolerance, "tolerance", allowed, remedy) < math.inf:
         raise refusal("the tolerance is out of range", "", "tolerance", tolerance, allowed, remedy)
-    given = known(scene)
-    together = combined(given, scene)
-    names = tuple(effect.name for effect in together.effects)
-    unknown = without_values(scene, given)
-    numbers = float(tolerance), float(accuracy), int(seed)
-    study = Effects(scene, name, numbers[0], names, together.out, unknown, *numbers[1:])
-    plain = frozenset(e.name for e in together.effects if isinstance(e, YIELDING))
-    served = study.without(plain)
-    registry.of(served).demand(served, name)
+    given = known_effects(scene)
+    combination = combine_effects(given, scene)
+    study = Effects(
+        scene=scene,
+        target=name,
+        tolerance=float(tolerance),
+        combination=tuple(effect.name for effect in combination.effects),
+        out=combination.excluded,
+        unknown=effects_without_values(scene, given),
+        accuracy=float(accuracy),
+        seed=int(seed),
+    )
+    yielding = frozenset(effect.name for effect in combination.effects if isinstance(effect, YIELDING))
+    steady = study.without(yielding)
+    registry.of(steady).demand(steady, name)
     return study
 
 
 class EffectsCourse:
-    """How far a study has come by some of its rows: what is to be solved next, and what is known by then.
+    """State of a study after some of its rows: the next solves, and what is known.
 
-    base: the effects that the reference leaves off, None without one; reference: its row; measured: of these, effects
-    that solve does not take; aside: effects with which no design is admissible. worths: by effect; together: of those
-    that are left out together, where that was tried.
+    base: effects that are off in the reference, None without one. reference: its row. unsolved: effects of the
+    combination that solve does not accept. inadmissible: effects with which no design is admissible. obstacles: why the
+    target needs effects, by the set that is off. impacts: by effect. together: impact of the effects that are left out
+    together.
     """
 
     def __init__(self, study: Effects, rows: Sequence[Row]) -> None:
         self.study = study
         self.rows = {frozenset(row.place): row for row in rows}
-        self.effects = {effect.name: effect for effect in known(study.scene)}
-        self.measured, self.aside = Off(), Off()
-        self.needed: dict[Off, str] = {}
-        self.worths: dict[str, Worth] = {}
-        self.together: Worth | None = None
+        self.effects = {effect.name: effect for effect in known_effects(study.scene)}
+        self.unsolved, self.inadmissible = Off(), Off()
+        self.obstacles: dict[Off, str] = {}
+        self.impacts: dict[str, EffectImpact] = {}
+        self.together: EffectImpact | None = None
         self.left_out: tuple[str, ...] = ()
-        self.judge: Judge | None = None
-        self.base, self.wanted = self._referred()
+        self.reference_design: ReferenceDesign | None = None
+        self.base, self.next_solves = self._find_reference()
         self.reference = None if self.base is None else self.rows[self.base]
         if self.base is not None and self.reference and self.reference.status in DESIGNED:
             reference = study.without(self.base)
-            given = with_only(study.scene, [name for name in study.scene.effects if name in reference.effects])
-            self.judge = Judge(given, reference, study.target, self.reference)
-            self.wanted = self._measure(self.judge, self.base) or self._verify(self.judge, self.base)
+            given = enable_only(study.scene, [name for name in study.scene.effects if name in reference.effects])
+            design = ReferenceDesign(given, reference, study.target, self.reference)
+            self.reference_design = design
+            self.next_solves = self._measure(design, self.base) or self._verify(design, self.base)
 
-    def _referred(self) -> tuple[Off | None, list[Off]]:
-        """Return the effects that the reference leaves off, None without it, and what must be solved to know."""
-        moving = [name for name in reversed(self.study.together) if isinstance(self.effects[name], YIELDING)]
-        for off in (Off(), *(self._closed({name}) for name in moving), self._closed(moving)):
+    def _find_reference(self) -> tuple[Off | None, list[Off]]:
+        """Effects that are off in the reference, None without it, and the solves that are needed to find it."""
+        moving = [name for name in reversed(self.study.combination) if isinstance(self.effects[name], YIELDING)]
+        for off in (Off(), *(self._with_dependents({name}) for name in moving), self._with_dependents(moving)):
             if off not in self.rows:
                 return None, [off]
             if self.rows[off].status != REFUSED:
-                self.measured = off
+                self.unsolved = off
                 break
         else:
             return None, []
         if self.rows[off].status != "infeasible":
             return off, []
-        singles = [each for each in dict.fromkeys(self.singles(off).values()) if self._possible(each)]
+        singles = [single for single in dict.fromkeys(self.singles(off).values()) if self._is_possible(single)]
         if missing := [single for single in singles if single not in self.rows]:
             return None, missing
-        good = [single for single in singles if self.rows[single].certified] or [off]
-        self.aside = good[-1] - off
-        return good[-1], []
+        certified = [single for single in singles if self.rows[single].certified] or [off]
+        self.inadmissible = certified[-1] - off
+        return certified[-1], []
 
     def singles(self, base: Off) -> dict[str, Off]:
-        """Return what is off without each effect that a reference has on: the effect, and what needs it."""
-        return {name: base | self._closed({name}) for name in self.study.together if name not in base}
+        """For every effect of a reference, the effects that are off without it: itself, and those that need it."""
+        return {name: base | self._with_dependents({name}) for name in self.study.combination if name not in base}
 
-    def _closed(self, off: Collection[str]) -> Off:
-        """Return effects with those that cannot be on without them."""
-        found = Off(off)
-        while more := {name for name in self.study.together if found & set(self.effects[name].beside)} - found:
-            found |= more
-        return found
+    def _with_dependents(self, off: Collection[str]) -> Off:
+        """Effects together with those that need them."""
+        closed = Off(off)
+        while more := {name for name in self.study.combination if closed & set(self.effects[name].beside)} - closed:
+            closed |= more
+        return closed
 
-    def _possible(self, off: Off) -> bool:
-        """Say whether scene and target can do without effects; why not is then told in `needed`."""
-        if off not in self.needed:
-            self.needed[off] = ""
+    def _is_possible(self, off: Off) -> bool:
+        """Whether scene and target can do without effects; `obstacles` has the reason otherwise."""
+        if off not in self.obstacles:
+            self.obstacles[off] = ""
             try:
                 scene = self.study.without(off)
                 registry.of(scene).demand(scene, self.study.target)
             except BadInput as error:
-                self.needed[off] = error.problem
-        return not self.needed[off]
+                self.obstacles[off] = error.problem
+        return not self.obstacles[off]
 
-    def _measure(self, judge: Judge, base: Off) -> list[Off]:
-        """Measure each effect of the reference by itself; return what must be solved before."""
+    def _measure(self, design: ReferenceDesign, base: Off) -> list[Off]:
+        """Measure every effect of the reference; return the solves that are needed first."""
         missing: list[Off] = []
         for name, off in self.singles(base).items():
-            if off in self.rows or not self._possible(off):
-                others = [other for other in self.study.together if other in off - base - {name}]
-                why = f"{', '.join(others)} is off with it" if others else None
-                self.worths[name] = self._worth(judge, name, off, why)
+            if off in self.rows or not self._is_possible(off):
+                dependents = [effect for effect in self.study.combination if effect in off - base - {name}]
+                why = f"{', '.join(dependents)} is off with it" if dependents else None
+                self.impacts[name] = self._measure_omission(design, name, off, why)
             else:
                 missing.append(off)
-        for name in self.measured:
+        for name in self.unsolved:
             scene = self.study.without(base - {name, *self.effects[name].beside})
-            self.worths[name] = judge.beside(name, scene, self.study.tolerance)
+            self.impacts[name] = design.measure_addition(name, scene, self.study.tolerance)
         return list(dict.fromkeys(missing))
 
-    def _worth(self, judge: Judge, name: str, off: Off, why: str | None = None) -> Worth:
-        if self.needed.get(off):
-            return judge.needed(name, self.needed[off])
-        return judge.without(name, self.study.without(off), self.rows[off], self.study.tolerance, why)
+    def _measure_omission(self, design: ReferenceDesign, name: str, off: Off, why: str | None = None) -> EffectImpact:
+        """Impact of leaving out an effect, together with those that need it."""
+        if self.obstacles.get(off):
+            return design.report_needed(name, self.obstacles[off])
+        return design.measure_omission(name, self.study.without(off), self.rows[off], self.study.tolerance, why)
 
-    def _verify(self, judge: Judge, base: Off) -> list[Off]:
-        """Find what may be left out together; return what must be solved before that is known.
+    def _verify(self, design: ReferenceDesign, base: Off) -> list[Off]:
+        """Find the effects that may be left out together; return the solves that are needed first.
 
-        While leaving it out together fails, the effect that is worth most comes back.
+        While the combination fails, the effect with the largest impact is put back.
         """
-        may_go = [name for name in self.study.together if name in self.worths and self.worths[name].may_go]
-        while may_go := [name for name in may_go if self._closed({name}) - base <= set(may_go)]:
+        may_go = [name for name in self.study.combination if name in self.impacts and self.impacts[name].may_go]
+        while may_go := [name for name in may_go if self._with_dependents({name}) - base <= set(may_go)]:
             off = base | Off(may_go)
-            if off not in self.rows and self._possible(off):
+            if off not in self.rows and self._is_possible(off):
                 return [off]
-            self.together = self._joint(judge, base, may_go)
+            self.together = self._measure_together(design, base, may_go)
             if self.together.may_go:
                 break
-            may_go.remove(max(reversed(may_go), key=lambda name: self.worths[name].most))
+            may_go.remove(max(reversed(may_go), key=lambda name: self.impacts[name].largest_share))
         self.together = self.together if may_go else None
         self.left_out = tuple(may_go)
         return []
 
-    def _joint(self, judge: Judge, base: Off, names: Sequence[str]) -> Worth:
-        """Return what leaving effects out together does, also where some of them solve does not take."""
+    def _measure_together(self, design: ReferenceDesign, base: Off, names: Sequence[str]) -> EffectImpact:
+        """Impact of leaving out effects together, including those that solve does not accept."""
         off = base | Off(names)
-        found = self._worth(judge, ", ".join(names), off)
-        beside = self.measured & set(names)
-        if not beside or not self._possible(off):
-            return found
-        needed = {other for name in beside for other in self.effects[name].beside}
-        scene = self.study.without(base - beside - needed)
-        return judge.with_beside(found, scene, self.rows[off], self.study.tolerance)
+        omission = self._measure_omission(design, ", ".join(names), off)
+        unsolved = self.unsolved & set(names)
+        if not unsolved or not self._is_possible(off):
+            return omission
+        needed = {effect for name in unsolved for effect in self.effects[name].beside}
+        scene = self.study.without(base - unsolved - needed)
+        return design.combine(omission, scene, self.rows[off], self.study.tolerance)
 
 
 @dataclass(frozen=True)
 class Reference:
-    """All effects that combine, on and solved; figures of the objectives and their natural sizes, SI.
+    """The optimum with the whole combination on; figures of the objectives and their scales, SI.
 
-    status, why: of its solve; nodes, build_s, solve_s: of its expression graph, s. reads: what the target reads,
-    figures and design variables.
+    status, why: of its solve. nodes, build_s, solve_s: size of its expression graph, and times, s. reads: figures and
+    design variables that the target reads.
     """
 
     effects: tuple[str, ...]
@@ -397,18 +403,18 @@ class Reference:
     reads: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Freeze what a frozen dataclass would leave open."""
+        """Freeze the mappings, which a frozen dataclass leaves mutable."""
         freeze(self, "figures", "scales")
 
     @property
     def cost(self) -> dict[str, Any]:
-        """What its graph and its solve took, by the names of their fields."""
+        """Size of the graph and times of the solve, by the names of the fields."""
         return {"nodes": self.nodes, "build_s": self.build_s, "solve_s": self.solve_s}
 
 
 @dataclass(frozen=True)
 class Omission:
-    """The largest change that leaving out one effect makes: by "shift" or "regret", of a figure or of "limits"."""
+    """Largest change by leaving out one effect: by "shift" or "regret", of a figure or of "limits"."""
 
     effect: str
     by: str
@@ -418,22 +424,21 @@ class Omission:
 
 @dataclass(frozen=True, repr=False)
 class EffectsResult:
-    """What each effect of a scene is worth for a target.
+    """Impact of every effect of a scene on a target.
 
-    tolerance: share of natural sizes within which an effect may go. rows: one per effect that is measured; together:
-    that of those which were left out together, with no one to leave out None. kept, left_out: effects of the reference,
-    and of those that solve does not take, by what they change. judged: the others that solve does not take, which a
-    design should be evaluated with. out: effects that are not measured, with the reason; unknown: those without values.
-    command: the call of the shell that solves without what may be left out; None where the scene is no file.
-    finished: whether all that was to be solved was.
+    tolerance: share of scales within which an effect may go. rows: impact by effect. together: impact of the effects
+    that are left out together, None without any. kept, left_out: effects of the reference, and of those that solve does
+    not accept, by the result. judged: remaining effects that solve does not accept; evaluate the design with them. out:
+    effects that are not measured, with the reason. unknown: effects without values. command: shell command that solves
+    without the effects left out; None where the scene has no file. finished: whether all solves were done.
     """
 
     scene: Scene
     target: str
     tolerance: float
     reference: Reference
-    rows: tuple[Worth, ...]
-    together: Worth | None
+    rows: tuple[EffectImpact, ...]
+    together: EffectImpact | None
     kept: tuple[str, ...]
     left_out: tuple[str, ...]
     judged: tuple[str, ...]
@@ -444,23 +449,23 @@ class EffectsResult:
     finished: bool = True
 
     def __post_init__(self) -> None:
-        """Freeze what a frozen dataclass would leave open."""
+        """Freeze the mappings, which a frozen dataclass leaves mutable."""
         freeze(self, "out", "unknown")
 
     @property
     def units(self) -> dict[str, str]:
-        """The SI unit of each objective's figure."""
+        """SI units of the objectives' figures."""
         words = Words(self.scene)
         return {name: words.si(name) for name in self.reference.scales}
 
     @property
     def statuses(self) -> list[str]:
-        """What came of every solve."""
+        """Statuses of all solves."""
         rows = (*self.rows, *([self.together] if self.together else []))
         return [self.reference.status, *(row.status for row in rows)]
 
     def as_dict(self) -> dict[str, object]:
-        """Return the object that `effects --json` prints."""
+        """The object that `effects --json` prints."""
         omission = self.largest_omission
         return {
             "problem": self.scene.name,
@@ -470,7 +475,8 @@ class EffectsResult:
             "units": self.units,
             "rows": [row.as_dict() for row in self.rows],
             "other_figures": {
-                row.effect: {"takes_away": list(row.lost), "changes": list(row.moved)} for row in self.rows
+                row.effect: {"takes_away": list(row.missing_figures), "changes": list(row.changed_figures)}
+                for row in self.rows
             },
             "tolerance": self.tolerance,
             "together": self.together.as_dict() if self.together else None,
@@ -486,54 +492,57 @@ class EffectsResult:
 
 
 def summarise(study: Effects, rows: Sequence[Row]) -> EffectsResult:
-    """Return what rows of a study show, not all of which need be there. Raises BadInput where solve takes nothing."""
+    """Result of a study from its rows, which may be incomplete. Raises BadInput where solve accepts no combination."""
     course = EffectsCourse(study, rows)
     first = course.reference or course.rows[frozenset()]
-    if course.reference is None and not course.wanted:
+    if course.reference is None and not course.next_solves:
         raise refusal(f"there is nothing to compare with: {first.reason}", study.scene.origin, "effects")
     off = frozenset(first.place)
-    on = tuple(name for name in study.together if name not in off)
-    worths = tuple(course.worths[name] for name in study.together if name in course.worths)
+    on = tuple(name for name in study.combination if name not in off)
+    impacts = tuple(course.impacts[name] for name in study.combination if name in course.impacts)
     kept = tuple(name for name in on if name not in course.left_out)
-    left = [worth for worth in worths if worth.effect in course.left_out]
-    why = f"with it no design is admissible; {course.rows[off - course.aside].reason}" if course.aside else ""
+    omissions = [impact for impact in impacts if impact.effect in course.left_out]
+    why = ""
+    if course.inadmissible:
+        why = f"with it no design is admissible; {course.rows[off - course.inadmissible].reason}"
     return EffectsResult(
         scene=study.scene,
         target=study.target,
         tolerance=study.tolerance,
         reference=_reference(course, first, on),
-        rows=worths or _unmeasured(course),
+        rows=impacts or _unmeasured_effects(course),
         together=course.together,
         kept=kept,
         left_out=course.left_out,
-        judged=tuple(n for n in study.together if n in course.measured and n not in course.left_out),
-        out={**study.out, **{name: why for name in study.together if name in course.aside}},
+        judged=tuple(n for n in study.combination if n in course.unsolved and n not in course.left_out),
+        out={**study.out, **{name: why for name in study.combination if name in course.inadmissible}},
         unknown=study.unknown,
-        largest_omission=_omission(left),
-        command=None if course.wanted else command(study.scene, study.target, kept),
-        finished=not course.wanted,
+        largest_omission=_largest_omission(omissions),
+        command=None if course.next_solves else solve_command(study.scene, study.target, kept),
+        finished=not course.next_solves,
     )
 
 
 def _reference(course: EffectsCourse, row: Row, on: tuple[str, ...]) -> Reference:
-    figures, scales = (course.judge.figures, course.judge.scales) if course.judge else ({}, {})
-    reads = course.judge.reads if course.judge else ()
+    """Record of the reference; row: its solve, or the solve that failed."""
+    design = course.reference_design
+    figures, scales, reads = (design.figures, design.scales, design.reads) if design else ({}, {}, ())
     return Reference(on, figures, scales, row.status, row.reason, **row.warm, reads=reads)
 
 
-def _unmeasured(course: EffectsCourse) -> tuple[Worth, ...]:
-    """Return what came of leaving out each effect where that has led to no reference."""
-    found = []
+def _unmeasured_effects(course: EffectsCourse) -> tuple[EffectImpact, ...]:
+    """Impacts of leaving out every effect where no reference was found."""
+    impacts = []
     for name, off in course.singles(frozenset()).items():
-        row, needed = course.rows.get(off), course.needed.get(off)
+        row, obstacle = course.rows.get(off), course.obstacles.get(off)
         if row:
-            found.append(Worth(name, {}, {}, None, False, row.status, row.reason, **row.warm))
-        elif needed:
-            found.append(Worth(name, {}, {}, None, False, NEEDED, needed))
-    return tuple(found)
+            impacts.append(EffectImpact(name, {}, {}, None, False, row.status, row.reason, **row.warm))
+        elif obstacle:
+            impacts.append(EffectImpact(name, {}, {}, None, False, NEEDED, obstacle))
+    return tuple(impacts)
 
 
-def _omission(left: Sequence[Worth]) -> Omission | None:
-    """Return the largest change of effects that are left out; None where nothing is."""
-    most = max(left, key=lambda worth: worth.most, default=None)
-    return Omission(most.effect, *most.largest) if most else None
+def _largest_omission(impacts: Sequence[EffectImpact]) -> Omission | None:
+    """Largest change among effects that are left out; None without any."""
+    largest = max(impacts, key=lambda impact: impact.largest_share, default=None)
+    return Omission(largest.effect, *largest.largest_change) if largest else None

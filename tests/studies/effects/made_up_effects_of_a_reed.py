@@ -18,11 +18,11 @@ class Parameters(Table):
 
 
 class Moving(Load):
-    """Stands for a kind that yields."""
+    """Kind of effect that yields to any other."""
 
 
 def push(name, rank, kind=Load, sign=1, **declared):
-    """Return an effect that pushes the reed by a steady torque; sign: −1 for the other way."""
+    """Effect that pushes the reed by a steady torque; sign: −1 for the opposite direction."""
     return kind(
         name=name,
         summary="",
@@ -71,9 +71,9 @@ class Jobs:
 
 
 def scene(on=(), **available):
-    """Return the packaged beat-up with these effects available, T in N·m or their tables; on: those that are on."""
+    """Packaged beat-up with more effects in [available], T in N·m or tables; on: names of effects that are on."""
     document = copy.deepcopy(dict(load("beatup").document))
     tables = {k: {"T": f"{v} N*m"} if isinstance(v, int | float) else v for k, v in available.items()}
-    document["available"] = {name: own for name, own in tables.items() if name not in on}
-    document["effects"] |= {name: own for name, own in tables.items() if name in on}
+    document["available"] = {name: table for name, table in tables.items() if name not in on}
+    document["effects"] |= {name: table for name, table in tables.items() if name in on}
     return build(document, Jobs(), "beatup.toml")
