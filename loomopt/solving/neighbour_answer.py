@@ -17,7 +17,7 @@ from loomopt.solving.search.neighbour_newton import Optimum
 from loomopt.solving.search.search import Clock, Search
 
 
-def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> neighbour_newton.Between | None:
+def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> neighbour_newton.NeighbourTask | None:
     """Return a target between two optima; None where more than a search makes its answer, or they are of another one.
 
     beside: both optima as JSON data, and how far the target lies from the first to the second.
@@ -30,7 +30,7 @@ def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> 
     if not (first.serves(program) and second.serves(program)):
         return None
     search = Search(job, program, Settings(accuracy), job.start(program, scene))
-    return neighbour_newton.Between(search, first, second, beside[2], told_peaks(scene, job, program))
+    return neighbour_newton.NeighbourTask(search, first, second, beside[2], told_peaks(scene, job, program))
 
 
 def told_peaks(scene: Scene, job: Job, program: Program) -> tuple[str, ...]:
@@ -59,7 +59,7 @@ def evaluated(scene: Scene, search: Search) -> Evaluated | None:
 def told(scene: Scene, target: str, search: Search) -> Solution:
     """Return the answer of a search that ended beside its neighbours."""
     clock = Clock()
-    with clock.charged("report"):
+    with clock.measure("report"):
         answer = report.answer(scene, target, search, Clash())
     return report.completed(answer, None, 0, clock.seconds(search))
 

@@ -63,16 +63,16 @@ def search(task: Task, session: Session, clock: Clock, stock: Collection[str] = 
     """
     scene, job = task.scene, task.job
     settings = task.settings.at(f"building the {task.target}")
-    with clock.charged("import"):
+    with clock.measure("import"):
         import casadi  # noqa: F401  # so that building is not charged with it
-    with clock.charged("build"):
+    with clock.measure("build"):
         program = task.program(job)
     today = job.start(program, scene)
     # How many positions a solve evaluates does not depend on the one before.
-    session.forget(SAMPLERS, tie_break.JUDGED)
+    session.forget(SAMPLERS, tie_break.TESTED_MOVES)
     before = session.positions
     state = Search(job, program, settings, today)
-    state = multistart.resolved(state, task.starts, task.seed, task.near, task.on_start)
+    state = multistart.run_search(state, task.starts, task.seed, task.near, task.on_start)
     bound: GlobalBound | None = None
     if task.global_proof:
         from loomopt.solving.proof import levels
@@ -82,15 +82,15 @@ def search(task: Task, session: Session, clock: Clock, stock: Collection[str] = 
     if state.best:
         from loomopt.solving.search import mass_tradeoff
 
-        state = mass_tradeoff.settled(state)
+        state = mass_tradeoff.apply_tradeoff(state)
     # Figures are read as finely for every answer: they are no part of what accuracy costs.
     evaluations = session.positions - before
     clash = Clash()
     if state.best is None:
         from loomopt.solving.search import elastic
 
-        with clock.charged("solve"):
+        with clock.measure("solve"):
             clash = elastic.clash(state, Words(scene))
-    with clock.charged("report"):
+    with clock.measure("report"):
         answer = report.answer(scene, task.target, state, clash)
     return Optimum(answer, state, bound, evaluations)

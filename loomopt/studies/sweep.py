@@ -254,11 +254,11 @@ class Sweep:
         """Return the searches between two neighbours' optima; None of a task that must be solved alone."""
         found: list[Search | None] = [None] * len(tasks)
         begun = [(k, each) for k, task in enumerate(tasks) if task.beside and (each := self._begun(task))]
-        for (k, _), search in zip(begun, neighbour_newton.solved([each for _, each in begun]), strict=True):
+        for (k, _), search in zip(begun, neighbour_newton.solve_between([each for _, each in begun]), strict=True):
             found[k] = search
         return found
 
-    def _begun(self, task: StudyTask) -> neighbour_newton.Between | None:
+    def _begun(self, task: StudyTask) -> neighbour_newton.NeighbourTask | None:
         """Return a task between its neighbours' optima; None where it is no scene, which it tells by itself."""
         with contextlib.suppress(BadInput):
             return neighbour_answer.begun(self.scene_at(task.point), self.target, self.accuracy, task.beside)

@@ -118,7 +118,7 @@ def test_an_answer_that_is_not_certified_exits_4_and_says_why(cli, monkeypatch):
         refused = dataclasses.replace(certify(*arguments, **options), passed=False, reasons=("the moon is wrong",))
         return Draft(refused, lambda cycle: refused)
 
-    monkeypatch.setattr(search, "begun", failing)
+    monkeypatch.setattr(search, "draft_certificate", failing)
     data = answered(cli, "beatup", status=4)
     check_contract(data)
     assert data["status"] == "uncertified"

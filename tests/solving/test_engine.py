@@ -130,13 +130,13 @@ def test_the_callback_counts_iterations():
 def test_a_program_is_solved_without_its_scene():
     program = toy.program("xy", BOWL)
     search = Search(toy.ToyJob(program), program, Settings())
-    found = multistart.resolved(search)
+    found = multistart.run_search(search)
     assert found.passed
     assert found.best.x == pytest.approx({"x": 1.0, "y": 0.0}, abs=1e-12)
-    again = multistart.resolved(search, near=[found.candidates[0].point])
+    again = multistart.run_search(search, near=[found.candidates[0].point])
     assert (again.passed, len(again.candidates)) == (True, 1)
     other = replace(found.candidates[0].point, structure="another")
-    assert multistart.resolved(search, near=[other]).candidates[0].point.iterations > 0
+    assert multistart.run_search(search, near=[other]).candidates[0].point.iterations > 0
 
 
 def test_todays_machine_is_evaluated_when_it_is_asked_for(monkeypatch):

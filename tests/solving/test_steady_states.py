@@ -131,7 +131,7 @@ def test_an_optimum_of_too_few_harmonics_is_not_certified():
 
 def test_a_search_that_ends_where_more_are_needed_begins_again_with_them():
     program, job = coarse(8), registry.of(SCENE)
-    search = multistart.resolved(Search(job, program, Settings()), 1)
+    search = multistart.run_search(Search(job, program, Settings()), 1)
     assert counted(program) == "8"
     assert counted(search.program) == "32"
     assert search.passed

@@ -35,7 +35,7 @@ from loomopt.solving.answer.solution import (
 from loomopt.solving.certificate.records import Certificate, GlobalBound
 from loomopt.solving.nlp.point import BEATEN, excess, sampler_at
 from loomopt.solving.options import target_name
-from loomopt.solving.search.search import Candidate, Search, compared
+from loomopt.solving.search.search import Candidate, Search, compare
 
 
 @working()
@@ -226,10 +226,10 @@ def _with(scene: Scene, target: str, search: Search, best: Candidate) -> Solutio
     found = _substituted(search, best) if search.substitute else _sought(search)
     made = with_optimum(job, scene, target, here, best.certificate, solver, today, found, search.substitute)
     made = replace(made, point=point, optima=_optima(search))
-    if search.spared is None:
+    if search.tradeoff is None:
         return made
-    other = evaluation(scene, job, program, job.design(program, search.spared.other))
-    beside = Beside(search.spared.added.least.figure, search.spared.share, search.spared.chosen, other)
+    other = evaluation(scene, job, program, job.design(program, search.tradeoff.alternative))
+    beside = Beside(search.tradeoff.added.least.figure, search.tradeoff.share, search.tradeoff.chosen, other)
     said = _little(Words(scene), beside, made)
     return replace(made, beside=beside, sentences=explained(made, said))
 
@@ -274,18 +274,18 @@ def _counts(search: Search) -> dict[str, Any]:
     same = [c for c in search.candidates if _is_there(c, best)] if best else []
     accuracy = search.settings.accuracy
     counts = {
-        "starts": len(search.candidates) + search.sought,
+        "starts": len(search.candidates) + search.relaxation_starts,
         "starts_at_best": len(same),
         "basins": len(_optima(search)),
     }
-    return {**counts, "designs": search.designs, "accuracy": accuracy}
+    return {**counts, "designs": search.screened, "accuracy": accuracy}
 
 
 def _optima(search: Search) -> tuple[tuple[Mapping[str, float | None], int], ...]:
     """Return figures of the distinct optima the starts ended in, best first, with how many starts did."""
     groups: list[list[Candidate]] = []
     for candidate in search.ranked:
-        if groups and compared(groups[-1][0], candidate) == 0:
+        if groups and compare(groups[-1][0], candidate) == 0:
             groups[-1].append(candidate)
         else:
             groups.append([candidate])
@@ -303,7 +303,7 @@ def _figures(search: Search, candidate: Candidate) -> dict[str, float | None]:
 def _is_there(candidate: Candidate, best: Candidate) -> bool:
     """Say whether a solve ended in the best, or was left where it could only have ended there."""
     if candidate.point.usable:
-        return compared(candidate, best) == 0
+        return compare(candidate, best) == 0
     return abs(candidate.point.value - best.value) <= SAME_OBJECTIVE
 
 
@@ -316,7 +316,7 @@ def _sought(search: Search) -> str:
     solves, found = len(search.candidates), len(_optima(search))
     reached = f"{solves} solve{'s' if solves > 1 else ''}"
     ended = f"Best of {found} optima" if found > 1 else "The only optimum"
-    looked = f", {search.designs} designs sampled" if search.designs else ""
+    looked = f", {search.screened} designs sampled" if search.screened else ""
     return f"{ended} reached by {reached}{looked}."
 
 

@@ -348,15 +348,15 @@ def certify_batch(requests: Sequence[tuple[Program, Mapping[str, float]]], accur
 def _certify_one(
     program: Program,
     x: Mapping[str, float],
-    prepare: tuple[Sampler, ActiveSet] | None,
+    prepared: tuple[Sampler, ActiveSet] | None,
     slopes: BatchDerivatives | None,
     accuracy: float,
 ) -> Certificate:
     """Certificate of one design from the derivatives of the batch, if it has any."""
-    if prepare is None or slopes is None:
+    if prepared is None or slopes is None:
         return certify(program, x, accuracy)
     try:
-        certificate = draft_from(program, x, *prepare, slopes, accuracy).whole
+        certificate = draft_from(program, x, *prepared, slopes, accuracy).whole
     except NO_NUMBER:
         return certify(program, x, accuracy)
     if certificate.clear:

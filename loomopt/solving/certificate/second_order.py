@@ -608,7 +608,7 @@ def _moves(local: Local, basis: Floats, most: float = tie_break.UNCHANGED) -> Fl
         # The variables of a move may be fixed: it has no direction then.
         return bool(np.any(along(move))) and _is_open(basis, along(move))
 
-    moves = tie_break.unchanging(local.program, local.x, is_possible, most)
+    moves = tie_break.flat_directions(local.program, local.x, is_possible, most)
     return np.array([basis.T @ along(move) for move in moves]).reshape(len(moves), basis.shape[1]).T
 
 

@@ -22,7 +22,7 @@ from loomopt.solving.options import GlobalProof
 from loomopt.solving.proof.reading import Reader
 from loomopt.solving.proof.task import BoxTask, OpenError, reduced, silent
 from loomopt.solving.proof.tree import Question, Tree, grown, multipliers
-from loomopt.solving.search.search import Search, compared, judged, tried
+from loomopt.solving.search.search import Search, certify_best, compare, solve_from
 
 HELD = SAME_OBJECTIVE
 """What an earlier level's objective may exceed the answer's by, natural size: that much counts as the same optimum."""
@@ -258,10 +258,10 @@ def claimed(search: Search, asked: GlobalProof, refused: str = "") -> tuple[Sear
 
 def _improved(search: Search, start: Mapping[str, float]) -> Search | None:
     """Return the search after a solve from a design (variables, SI), None where its certified best is no better."""
-    found = judged(tried(search, start))
+    found = certify_best(solve_from(search, start))
     if not found.passed or found.best is None or search.best is None:
         return None
-    return found if compared(found.best, search.best) < 0 else None
+    return found if compare(found.best, search.best) < 0 else None
 
 
 def _bound(outcome: LevelOutcome, boxes: int, began: float) -> GlobalBound:

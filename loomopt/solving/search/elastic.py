@@ -1,7 +1,7 @@
-"""When nothing is admissible: which limits clash, and the least relaxations that help.
+"""Infeasible programs: the limits that clash, and the least relaxations that help.
 
-The sum of all limits' excesses, in natural sizes, is least where a design is nearest to admissible; it is an exact
-penalty, so that one NLP serves every question with other costs [Nocedal and Wright, Numerical Optimization, 2nd ed.,
+The scaled sum of all limits' excesses is least at the design that is nearest to admissible. It is an exact penalty, so
+that one NLP answers every question, with other costs [Nocedal and Wright, Numerical Optimization, 2nd ed.,
 section 17.2; Gill, Murray and Saunders, SIAM Review 47 (2005), elastic mode].
 """
 
@@ -20,9 +20,9 @@ from loomopt.solving.search.search import Search
 
 
 def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Settings) -> Point | None:
-    """Return where the sum of all limits' excesses is least, from several starts, or None where none leads anywhere.
+    """Design with the least sum of all limits' excesses, from several starts; None where none leads anywhere.
 
-    The first start that ends in no excess ends the search: there a design keeps every limit.
+    The search ends at the first start without an excess: its design keeps every limit.
     """
     best = None
     for start in starts:
@@ -35,30 +35,32 @@ def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Set
 
 
 def clash(search: Search, words: Words) -> Clash:
-    """Return the limits that clash and the least relaxations that make a design possible; none where one was reached.
+    """Limits that clash, and the least relaxations that make a design possible; empty if a design exists.
 
-    First the limits of the least sum of all excesses; then each other limit by itself, where that suffices.
+    First the limits of the least sum of all excesses; then each other limit whose relaxation alone suffices.
     """
     program, nearest, settings = search.program, search.nearest, search.settings
     if search.best or nearest is None or not nearest.relaxation:
         return Clash()
-    needs = _by_limit(program, nearest.relaxation)
-    found = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
+    needs = _worst_rows(program, nearest.relaxation)
+    relaxations = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
     known = {program.excess_places[k] for k in needs} if len(needs) == 1 else set()
     single_ways = list(dict.fromkeys(way for way in program.excess_places.values() if way not in known))
     for place, ways in enumerate(single_ways, 1):
         step = settings.at(f"looking for the least relaxation {place} of {len(single_ways)}")
-        single = _alone(program, ways, nearest, step)
-        if single:
-            found += [words.relaxation(program.limits[k], need, alone=True) for k, need in single.items()]
-    return Clash(_priced(program, nearest, words), tuple(found), nearest.x)
+        single_needs = _single_relaxation(program, ways, nearest, step)
+        if single_needs:
+            relaxations += [words.relaxation(program.limits[k], need, alone=True) for k, need in single_needs.items()]
+    return Clash(_clashing_limits(program, nearest, words), tuple(relaxations), nearest.x)
 
 
-def _alone(program: Program, ways: tuple[int, ...], nearest: Point, settings: Settings) -> dict[int, float] | None:
-    """Return what one limit needs, SI, where no other gives way; None where it does not suffice.
+def _single_relaxation(
+    program: Program, ways: tuple[int, ...], nearest: Point, settings: Settings
+) -> dict[int, float] | None:
+    """Relaxation of one limit, SI, with no other relaxed; None where it does not suffice.
 
-    With this limit all but free, the others' excesses fall to nothing exactly where it suffices; only then is its own
-    least sought, with the others firm.
+    With this limit almost free, the excesses of the others are 0 if it suffices; only then is its least relaxation
+    computed, with the others firm.
     """
     count = len(nearest.extra)
     free = tuple(CHEAP if way in ways else 1.0 for way in range(count))
@@ -69,24 +71,26 @@ def _alone(program: Program, ways: tuple[int, ...], nearest: Point, settings: Se
         return None
     firm = tuple(1.0 if way in ways else math.inf for way in range(count))
     point = exchange.solve(program, screened.x, settings, elastic=Elastic(firm, screened))
-    needs = _by_limit(program, point.relaxation) if point.usable else {}
+    needs = _worst_rows(program, point.relaxation) if point.usable else {}
     return needs if len(needs) == 1 else None
 
 
-def _priced(program: Program, point: Point, words: Words) -> dict[str, str]:
-    """Return the limits, phrase → name, with a price in the least relaxation: without any of them it would be less."""
+def _clashing_limits(program: Program, point: Point, words: Words) -> dict[str, str]:
+    """Limits, phrase → name, with a price in the least relaxation: without any of them it would be smaller."""
     prices, places = point.multipliers, [family.limit for family in families(program, elastic=True)]
     if not prices:
         return {}
-    found = list(prices.limits.items())
+    price_list = list(prices.limits.items())
     for rows in (prices.stations, prices.nodes):
-        found += [(place, float(np.abs(own).max(initial=0.0))) for place, own in zip(places, rows, strict=True)]
-    priced = (program.limits[place] for place, price in found if abs(price) > PRICED)
-    return {words.limit(limit): limit.name for limit in priced if limit.name in program.named_limits}
+        price_list += [
+            (place, float(np.abs(row_prices).max(initial=0.0))) for place, row_prices in zip(places, rows, strict=True)
+        ]
+    priced_limits = (program.limits[place] for place, price in price_list if abs(price) > PRICED)
+    return {words.limit(limit): limit.name for limit in priced_limits if limit.name in program.named_limits}
 
 
-def _by_limit(program: Program, relaxed: Mapping[int, float]) -> dict[int, float]:
-    """Return one entry per limit and side: a limit of several rows needs what its worst row needs."""
+def _worst_rows(program: Program, relaxed: Mapping[int, float]) -> dict[int, float]:
+    """One entry for each limit and side: the largest relaxation of its rows."""
     worst: dict[tuple[str, int], int] = {}
     for k, need in relaxed.items():
         key = program.limits[k].name, program.limits[k].sign

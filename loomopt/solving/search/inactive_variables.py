@@ -1,7 +1,7 @@
-"""Free numbers that serve no level of a target: they are put where limits ask least, and not sought.
+"""Free variables that no level of a target reads: they are fixed where limits demand least, and left out of the search.
 
-IPOPT creeps along them, for nothing tells it where to stop. The search goes without them; its best is judged with all
-variables, and goes back toward today's as far as every limit holds.
+IPOPT converges slowly along them, because nothing determines them. The search leaves them out; its best is certified
+with all variables, and moved back toward today's values as far as every limit holds.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,25 +13,26 @@ from loomopt.model.program import LEAST_CHANGE, AxisMove, Preference, Program, V
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE
 from loomopt.solving.certificate.certificate import certify
-from loomopt.solving.search.search import Search, as_read, objectives
-from loomopt.solving.search.tie_break import part_way, reach
+from loomopt.solving.search.search import Search, objectives, printed_design
+from loomopt.solving.search.tie_break import part_way, reachable_share
 
 SAME = 0.1
-"""Natural sizes by which a limit that is read on a few nodes is the same. A wrong guess costs a second search and no
-answer: the best is judged with all variables."""
+"""Scaled difference up to which a limit on a few nodes is the same. An error costs a second search but no answer: the
+best is certified with all variables."""
 
-Apart = Iterable[tuple[Floats, bool]]
-"""Of each limit: by how much more some designs exceed it with a variable at its upper end than at its lower, natural
-sizes, and whether it is an equality."""
+EndDifferences = Iterable[tuple[Floats, bool]]
+"""For each limit: scaled differences of its excess at some designs between the upper and the lower end of a variable,
+and whether it is an equality."""
 
 
-def held(search: Search, unread: Mapping[str, Apart]) -> Program | None:
-    """Return the program with the variables that no level reads fixed where limits ask least; None without any.
+def fix_inactive(search: Search, unread: Mapping[str, EndDifferences]) -> Program | None:
+    """The program with the variables that no level reads fixed where limits demand least; None without any.
 
-    unread: these variables, with what limits say of them. One that they ask both more and less of is left free.
+    unread: these variables, with the differences of the limits' excesses. A variable that limits push both ways stays
+    free.
     """
-    own = {v.name: v for v in search.program.variables}
-    values = {name: _loosest(own[name], search.today.get(name), apart) for name, apart in unread.items()}
+    variables_by_name = {v.name: v for v in search.program.variables}
+    values = {name: _loosest(variables_by_name[name], search.today.get(name), apart) for name, apart in unread.items()}
     fixed = {name: value for name, value in values.items() if value is not None}
     if not fixed:
         return None
@@ -42,17 +43,17 @@ def held(search: Search, unread: Mapping[str, Apart]) -> Program | None:
     return replace(search.program, variables=tuple(variables))
 
 
-def _loosest(variable: Variable, today: float | None, apart: Apart) -> float | None:
-    """Return the end at which no limit asks more than at the other, today's where none tells; None where they differ.
+def _loosest(variable: Variable, today: float | None, apart: EndDifferences) -> float | None:
+    """End at which no limit demands more than at the other, today's value if none differs; None if they conflict.
 
-    An equality that tells the ends apart leaves none.
+    None too if an equality differs between the ends.
     """
     grows, falls = False, False
-    for each, equal in apart:
-        more, fewer = bool(np.any(each > SAME)), bool(np.any(each < -SAME))
-        if equal and (more or fewer):
+    for difference, is_equality in apart:
+        increases, decreases = bool(np.any(difference > SAME)), bool(np.any(difference < -SAME))
+        if is_equality and (increases or decreases):
             return None
-        grows, falls = grows or more, falls or fewer
+        grows, falls = grows or increases, falls or decreases
     if grows and falls:
         return None
     if grows or falls or today is None:
@@ -60,33 +61,33 @@ def _loosest(variable: Variable, today: float | None, apart: Apart) -> float | N
     return min(max(today, variable.lower), variable.upper)
 
 
-def freed(search: Search, program: Program) -> Search:
-    """Return the search in the whole program again, its best moved back toward today's as far as every limit holds."""
+def free_inactive(search: Search, program: Program) -> Search:
+    """The search in the whole program, its best moved back toward today's values as far as every limit holds."""
     best, names = search.best, sorted(search.program.fixed - program.fixed)
     if best is None:
         return replace(search, program=program)
-    own = {v.name: v for v in program.variables}
-    ends = {name: (own[name].lower, own[name].upper) for name in names}
-    wish = (Preference("today", LEAST_CHANGE),)
+    variables_by_name = {v.name: v for v in program.variables}
+    ends = {name: (variables_by_name[name].lower, variables_by_name[name].upper) for name in names}
+    preferences = (Preference("today", LEAST_CHANGE),)
     today = {name: min(max(search.today.get(name, best.x[name]), ends[name][0]), ends[name][1]) for name in names}
-    moves = (AxisMove(own[n].called, (n,), wish, {n: today[n]}, {n: ends[n]}) for n in names)
+    moves = (AxisMove(variables_by_name[n].called, (n,), preferences, {n: today[n]}, {n: ends[n]}) for n in names)
     search = replace(search, program=replace(program, moves=(*program.moves, *moves)), best=None)
-    said = f"{', '.join(own[name].called for name in names)}: serves no level, {LEAST_CHANGE}"
-    for x in (_back(search.program, best.x, names, today), best.x):
-        certificate = certify(search.program, as_read(search, x), search.settings.accuracy)
+    reason = f"{', '.join(variables_by_name[name].called for name in names)}: serves no level, {LEAST_CHANGE}"
+    for x in (_move_back(search.program, best.x, names, today), best.x):
+        certificate = certify(search.program, printed_design(search, x), search.settings.accuracy)
         if certificate.passed:
-            certificate = replace(certificate, tie_breaks=(*best.certificate.tie_breaks, said))
+            certificate = replace(certificate, tie_breaks=(*best.certificate.tie_breaks, reason))
             return replace(search, best=best._replace(moved=x, certificate=certificate))
     return search
 
 
-def _back(
+def _move_back(
     program: Program, x: Mapping[str, float], names: Sequence[str], today: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return a design, SI, with variables moved toward today's, one after the other, as far as nothing gets worse."""
+    """Design x, SI, with variables moved toward today's values one by one, as far as nothing gets worse."""
     for name in names:
         goal = {name: today[name]}
-        moved = part_way(x, goal, reach(program, x, goal))
+        moved = part_way(x, goal, reachable_share(program, x, goal))
         levels = zip(objectives(program, moved), objectives(program, x), strict=True)
-        x = moved if all(abs(now - then) <= FEASIBLE for now, then in levels) else x
+        x = moved if all(abs(value - first_value) <= FEASIBLE for value, first_value in levels) else x
     return dict(x)

@@ -1,7 +1,7 @@
-"""The last level: of all designs that are as good, the one of least change from today's machine.
+"""The last level: of all equally good designs, the one of least change from today's machine.
 
-It is solved only where an optimum leaves more open than the program's own moves settle: every earlier level is held,
-and both the change and the levels before it are certified at the design it ends in.
+It is solved only if an optimum has more free directions than the program's moves decide. Every earlier level is fixed,
+and the change and the levels before it are certified at the final design.
 """
 
 import functools
@@ -20,165 +20,193 @@ from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.records import Certificate
-from loomopt.solving.search.search import Candidate, Search, as_read, corrected, judged_as_is, objectives, tried
-from loomopt.solving.search.tie_break import unchanging
+from loomopt.solving.search.search import (
+    Candidate,
+    Search,
+    certify_uncorrected,
+    correct,
+    objectives,
+    printed_design,
+    solve_from,
+)
+from loomopt.solving.search.tie_break import flat_directions
 
 CHANGE_WEIGHTS = 1e3, 1e4, 1e5, 1e6
-"""Weights of a target's levels against least change from today, in turn, until all of them are held: linear ones are by
-the first. IPOPT fails at a large one from afar; from one to the next, pivots lead."""
+"""Weights of a target's levels against the change, in turn, until every level is kept: linear levels are kept by the
+first. IPOPT fails at a large weight from far away; from one weight to the next, pivots suffice."""
 
 CHANGE = "change from today"
-"""The level's row, and what a certificate calls it."""
+"""Name of the level's row, also in a certificate."""
 CHANGED = Value(CHANGE, CHANGE, 1.0)
 MODELS = 8
-"""Models with the change as a row that are kept: a front has one for every set of variables that are held."""
+"""Cached models with the change as a row: a front has one for every set of fixed variables."""
 
 
 def with_least_change(search: Search) -> Search:
-    """Return the search with its best design moved to the least change that leaves every level as good.
+    """The search with its best design moved to the least change at which every level is as good.
 
-    Where that has no certificate the design stays, and what is open is named.
+    If that has no certificate the design stays, and the open variables are named.
     """
     best = search.best
     if best is None or not best.certificate.passed or not best.certificate.level:
         return search
     began, program = time.perf_counter(), search.program
-    kept, ways = unsettled(search, best)
+    fixed, directions = undecided(search, best)
     unique = best.certificate.unique
-    if len(ways) <= unique:
-        # Of one direction it is known whether limits close it; between two of them there may be a third.
+    if len(directions) <= unique:
+        # For one direction the certificate shows whether limits close it; between two there may be a third.
         return search
     search.settings.at(f"looking for the {LEAST_CHANGE}")
-    moved = _moved(search, best, kept, ways)
-    if moved is None and not unique:
-        moved = best._replace(certificate=replace(best.certificate, open=_called(program, ways, best)))
-    elif moved and unique and not _differ(program, moved.x, best.x):
-        moved = None
-    return replace(search, best=moved or best, tie_broken=search.tie_broken + time.perf_counter() - began)
+    candidate = _solve_least_change(search, best, fixed, directions)
+    if candidate is None and not unique:
+        candidate = best._replace(
+            certificate=replace(best.certificate, open=_designer_names(program, directions, best))
+        )
+    elif candidate and unique and not _are_different(program, candidate.x, best.x):
+        candidate = None
+    return replace(
+        search, best=candidate or best, tie_break_seconds=search.tie_break_seconds + time.perf_counter() - began
+    )
 
 
-def unsettled(search: Search, best: Candidate) -> tuple[frozenset[str], Floats]:
-    """Return the variables that moves settle one by one, and the directions (k, variables) that no move settles."""
-    here = as_read(search, best.x)
-    kept = _kept(search.program, here, best.certificate)
-    return kept, left(search.program, here, best.certificate, kept)
+def undecided(search: Search, best: Candidate) -> tuple[frozenset[str], Floats]:
+    """Variables that moves decide one by one, and the directions (k, variables) that no move decides."""
+    design = printed_design(search, best.x)
+    fixed = _decided_variables(search.program, design, best.certificate)
+    return fixed, open_directions(search.program, design, best.certificate, fixed)
 
 
-def _differ(program: Program, one: Mapping[str, float], other: Mapping[str, float], most: float = MOVED) -> bool:
-    """Say whether two designs (variables, SI) differ by more than `most`, in natural sizes."""
-    return any(abs(one[v.name] - other[v.name]) > most * v.scale for v in program.variables)
+def _are_different(
+    program: Program, first: Mapping[str, float], second: Mapping[str, float], most: float = MOVED
+) -> bool:
+    """Whether two designs (variables, SI) differ by more than `most`, scaled."""
+    return any(abs(first[v.name] - second[v.name]) > most * v.scale for v in program.variables)
 
 
-def _moved(search: Search, best: Candidate, kept: Collection[str], ways: Floats) -> Candidate | None:
-    """Return the design of least change with its certificate; None where it has none, or a level is not as good.
+def _solve_least_change(
+    search: Search, best: Candidate, fixed: Collection[str], directions: Floats
+) -> Candidate | None:
+    """Design of least change with its certificate; None if it has none, or if a level is not as good.
 
-    kept: variables that stay; ways: directions that are open. The weight of the earlier levels against the change is
-    raised, each solve starting warm from the one before, until all of them are held. The first starts from the design
-    itself: its rows are the same ones, and often it has changed least already.
+    fixed: variables that stay; directions: open directions. The weight of the earlier levels against the change is
+    raised, with a warm start from the solve before, until every level is kept. The first solve starts from the design
+    itself, which has the same rows and often already has the least change.
     """
     program = search.program
     warm = replace(best.point, x=dict(best.x))
-    task = changing(program, best.x, kept, search.today)
+    task = change_program(program, best.x, fixed, search.today)
     if task is None:
         return None
     settings = search.settings if len(program.objectives) > 1 else replace(search.settings, penalty=1.0)
     for weight in CHANGE_WEIGHTS:
         weighed = replace(CHANGED, scale=weight / settings.penalty)
-        solved = replace(task, objectives=(*program.objectives, weighed))
-        (candidate,) = tried(Search(search.job, solved, settings), warm.x, warm).candidates
+        weighted_task = replace(task, objectives=(*program.objectives, weighed))
+        (candidate,) = solve_from(Search(search.job, weighted_task, settings), warm.x, warm).candidates
         if not candidate.point.usable:
             continue
         if candidate.point.violation > settings.excess:
-            # The exchange came to no end: at a larger weight it comes to none either.
+            # The exchange did not converge: at a larger weight it does not either.
             break
         warm = candidate.point
-        if not _differ(program, warm.x, best.x, ROUNDING):
+        if not _are_different(program, warm.x, best.x, ROUNDING):
             candidate = candidate._replace(point=replace(warm, x=dict(best.x)))
-        found = _held(search, best, task, candidate) if _as_good(program, warm.x, best.x) else None
-        if found:
-            return _named(found, best, task, ways)
+        certified = _certify_change(search, best, task, candidate) if _is_as_good(program, warm.x, best.x) else None
+        if certified:
+            return _with_rule(certified, best, task, directions)
     return None
 
 
-def _as_good(program: Program, x: Mapping[str, float], best: Mapping[str, float]) -> bool:
-    """Say whether every level of a program is the same at x as at the best (SI)."""
+def _is_as_good(program: Program, x: Mapping[str, float], best: Mapping[str, float]) -> bool:
+    """Whether every level of a program is the same at x as at the best (SI)."""
     levels = zip(objectives(program, x), objectives(program, best), strict=True)
-    return all(abs(now - then) <= FEASIBLE for now, then in levels)
+    return all(abs(value - best_value) <= FEASIBLE for value, best_value in levels)
 
 
-def _held(search: Search, best: Candidate, task: Program, candidate: Candidate) -> tuple[Candidate, Certificate] | None:
-    """Return a solve's end judged by all levels and the change, and by the levels alone; None where either fails."""
-    judging, here = Search(search.job, task, search.settings), as_read(search, best.x)
-    found = judged_as_is(judging, candidate, here)
+def _certify_change(
+    search: Search, best: Candidate, task: Program, candidate: Candidate
+) -> tuple[Candidate, Certificate] | None:
+    """End of a solve certified by all levels and the change, and by the levels alone; None if either fails."""
+    judging, best_design = Search(search.job, task, search.settings), printed_design(search, best.x)
+    changed = certify_uncorrected(judging, candidate, best_design)
     for _ in range(CORRECTIONS):
-        before, found = found, corrected(judging, found)
-        if found is before or (found.certificate.passed and found.certificate.residual <= PRECISE):
+        last, changed = changed, correct(judging, changed)
+        if changed is last or (changed.certificate.passed and changed.certificate.residual <= PRECISE):
             break
-    if not found.certificate.passed or not _as_good(search.program, found.x, best.x):
+    if not changed.certificate.passed or not _is_as_good(search.program, changed.x, best.x):
         return None
-    there = as_read(search, found.x)
-    alone = best.certificate if there == here else certify(search.program, there, search.settings.accuracy)
-    return (found, alone) if alone.passed else None
-
-
-def _named(found: tuple[Candidate, Certificate], best: Candidate, task: Program, ways: Floats) -> Candidate:
-    """Return a design of least change with its certificate, which says what was settled and what is still open."""
-    moved, alone = found
-    said = f"{', '.join(_called(task, ways, best))}: {LEAST_CHANGE}"
-    certificate = replace(
-        alone,
-        unique=best.certificate.unique,
-        tie_breaks=(*best.certificate.tie_breaks, said),
-        change=moved.certificate.levels[-1],
-        open=() if moved.certificate.unique else _called(task, left(task, moved.x, moved.certificate, ()), moved),
+    changed_design = printed_design(search, changed.x)
+    levels_certificate = (
+        best.certificate
+        if changed_design == best_design
+        else certify(search.program, changed_design, search.settings.accuracy)
     )
-    return best._replace(moved=moved.x, certificate=certificate)
+    return (changed, levels_certificate) if levels_certificate.passed else None
 
 
-def changing(
-    program: Program, x: Mapping[str, float], kept: Collection[str], today: Mapping[str, float]
+def _with_rule(pair: tuple[Candidate, Certificate], best: Candidate, task: Program, directions: Floats) -> Candidate:
+    """Design of least change with its certificate, which names the rule and the open variables."""
+    changed, levels_certificate = pair
+    reason = f"{', '.join(_designer_names(task, directions, best))}: {LEAST_CHANGE}"
+    certificate = replace(
+        levels_certificate,
+        unique=best.certificate.unique,
+        tie_breaks=(*best.certificate.tie_breaks, reason),
+        change=changed.certificate.levels[-1],
+        open=()
+        if changed.certificate.unique
+        else _designer_names(task, open_directions(task, changed.x, changed.certificate, ()), changed),
+    )
+    return best._replace(moved=changed.x, certificate=certificate)
+
+
+def change_program(
+    program: Program, x: Mapping[str, float], fixed: Collection[str], today: Mapping[str, float]
 ) -> Program | None:
-    """Return a program with one more level, Σ ((x − today)/width)² over its free variables; None without any.
+    """A program with one more level, Σ ((x − today)/width)² over its free variables; None without any.
 
-    kept: variables that stay as they are at x (SI); today: values, SI, where the program's own say nothing.
+    fixed: variables that stay at x (SI); today: values, SI, of variables without one in the program.
     """
-    own = [(name, value) for move in program.moves for name, value in move.today.items()]
-    known = {**today, **dict(own), **program.today}
-    widths = {v.name: _width(v) for v in program.variables if v.name not in {*kept, *program.tops}}
+    move_values = [(name, value) for move in program.moves for name, value in move.today.items()]
+    today_values = {**today, **dict(move_values), **program.today}
+    widths = {v.name: _width(v) for v in program.variables if v.name not in {*fixed, *program.tops}}
     free = [
-        name for name, width in widths.items() if 0.0 < width < math.inf and math.isfinite(known.get(name, math.inf))
+        name
+        for name, width in widths.items()
+        if 0.0 < width < math.inf and math.isfinite(today_values.get(name, math.inf))
     ]
     if not free:
         return None
-    given = {_today(name): known[name] for name in free} | {_wide(name): widths[name] for name in free}
+    change_parameters = {_today(name): today_values[name] for name in free} | {
+        _wide(name): widths[name] for name in free
+    }
     bounds = program.bound_limits
-    held = tuple(v._replace(lower=x[v.name], upper=x[v.name]) if v.name in kept else v for v in program.variables)
+    variables = tuple(v._replace(lower=x[v.name], upper=x[v.name]) if v.name in fixed else v for v in program.variables)
     return replace(
         program,
-        model=_measuring(program.model, tuple(free)),
-        variables=held,
-        parameters={**program.parameters, **given},
-        limits=tuple(limit for k, limit in enumerate(program.limits) if k not in bounds or limit.row not in kept),
+        model=_change_model(program.model, tuple(free)),
+        variables=variables,
+        parameters={**program.parameters, **change_parameters},
+        limits=tuple(limit for k, limit in enumerate(program.limits) if k not in bounds or limit.row not in fixed),
         objectives=(*program.objectives, CHANGED),
         moves=(),
     )
 
 
 @functools.lru_cache(maxsize=MODELS)
-def _measuring(model: JobModel, names: tuple[str, ...]) -> JobModel:
-    """Return a model with the change of variables as a row: one for all designs, whose formulas are recorded once."""
+def _change_model(model: JobModel, names: tuple[str, ...]) -> JobModel:
+    """A model with the change of variables as a row, one for all designs, so that formulas are recorded once."""
     row = DesignRow(functools.partial(_change, names))
     return replace(model, own_rows={**model.own_rows, CHANGE: row})
 
 
 def _change(names: Iterable[str], at: Instant) -> Number:
-    """Return Σ ((x − today)/width)² of values by name."""
+    """Sum of ((x − today)/width)² over values by name."""
     values = at.values
-    found: Number = 0
+    total: Number = 0
     for name in names:
         share = (values[name] - values[_today(name)]) / values[_wide(name)]
-        found = found + share * share
-    return found
+        total = total + share * share
+    return total
 
 
 def _today(name: str) -> str:
@@ -190,13 +218,13 @@ def _wide(name: str) -> str:
 
 
 def _width(variable: Variable) -> float:
-    """Return the width of a variable's bounds, or without them that of where random starts lie, SI."""
+    """Width of a variable's bounds, SI; of the range of random starts without bounds."""
     width = variable.upper - variable.lower
     return width if math.isfinite(width) else variable.range[1] - variable.range[0]
 
 
-def _kept(program: Program, x: Mapping[str, float], certificate: Certificate) -> frozenset[str]:
-    """Return the variables that moves settle one by one at x (SI): by another rule, or apart from all that is open."""
+def _decided_variables(program: Program, x: Mapping[str, float], certificate: Certificate) -> frozenset[str]:
+    """Variables that moves decide one by one at x (SI): by another rule, or apart from all open directions."""
     values = {**program.parameters, **x}
     axes = [(name, move.wished(values)) for move in program.moves if move.is_apart for name in move.along]
     others = {name for name, wish in axes if wish and not wish.is_least_change}
@@ -207,44 +235,50 @@ def _kept(program: Program, x: Mapping[str, float], certificate: Certificate) ->
 
 
 def _level(certificate: Certificate) -> tuple[list[str], Floats]:
-    """Return the variables of the directions (k, variables) along which nothing curves, and these."""
+    """Variables of the flat directions (k, variables), and the directions."""
     names = list(certificate.level[0]) if certificate.level else []
-    ways = [[way[name] for name in names] for way in certificate.level]
-    return names, np.array(ways).reshape(len(ways), len(names))
+    directions = [[direction[name] for name in names] for direction in certificate.level]
+    return names, np.array(directions).reshape(len(directions), len(names))
 
 
-def left(program: Program, x: Mapping[str, float], certificate: Certificate, kept: Collection[str]) -> Floats:
-    """Return the directions (k, variables), orthonormal in natural sizes, that an optimum x (SI) leaves open.
+def open_directions(
+    program: Program, x: Mapping[str, float], certificate: Certificate, fixed: Collection[str]
+) -> Floats:
+    """Directions (k, variables), orthonormal, scaled, that an optimum x (SI) leaves open.
 
-    Without those along which the program's moves change nothing, and those of variables that are kept.
+    Directions of the program's flat moves and of fixed variables are left out.
     """
     names, level = _level(certificate)
     if not names:
         return level
     scales = {v.name: v.scale for v in program.variables}
-    inside = functools.partial(_inside, level, {name: scales[name] for name in names})
-    # Whether a move changes nothing is looked at only where that counts: most lead out of the level.
-    moves = unchanging(program, x, lambda way: not way.keys() <= set(kept) and inside(way) is not None)
-    found = [shares for move in (*moves, *({name: 1.0} for name in kept)) if (shares := inside(move)) is not None]
-    turned, sizes, _ = np.linalg.svd(np.array(found).reshape(-1, len(level)).T)
+    inside = functools.partial(_shares_in_level, level, {name: scales[name] for name in names})
+    # Moves are tested only within the open directions: most lead out of them.
+    moves = flat_directions(
+        program, x, lambda direction: not direction.keys() <= set(fixed) and inside(direction) is not None
+    )
+    closed_shares = [
+        shares for move in (*moves, *({name: 1.0} for name in fixed)) if (shares := inside(move)) is not None
+    ]
+    turned, sizes, _ = np.linalg.svd(np.array(closed_shares).reshape(-1, len(level)).T)
     return np.asarray(turned[:, int(np.sum(sizes > RANK)) :].T @ level)
 
 
-def _inside(level: Floats, scales: Mapping[str, float], move: Mapping[str, float]) -> Floats | None:
-    """Return a move's direction (k,) in a level (k, variables), in natural sizes; None where it leads out of it.
+def _shares_in_level(level: Floats, scales: Mapping[str, float], move: Mapping[str, float]) -> Floats | None:
+    """Direction (k,) of a move in a level (k, variables), scaled; None where it leads out of the level.
 
     scales: of the level's variables, SI.
     """
-    way = np.array([move.get(name, 0.0) / scale for name, scale in scales.items()])
-    if not way.any():
+    direction = np.array([move.get(name, 0.0) / scale for name, scale in scales.items()])
+    if not direction.any():
         return None
-    way /= np.linalg.norm(way)
-    shares = np.asarray(level @ way)
-    return shares if np.linalg.norm(way - shares @ level) <= RANK else None
+    direction /= np.linalg.norm(direction)
+    shares = np.asarray(level @ direction)
+    return shares if np.linalg.norm(direction - shares @ level) <= RANK else None
 
 
-def _called(program: Program, ways: Floats, of: Candidate) -> tuple[str, ...]:
-    """Return what a designer calls the variables that directions (k, variables) of a judged design move."""
+def _designer_names(program: Program, directions: Floats, candidate: Candidate) -> tuple[str, ...]:
+    """Designer's names of the variables that directions (k, variables) of a certified design move."""
     labels = {v.name: v.called for v in program.variables}
-    pairs = zip(of.certificate.level[0], np.abs(ways).max(axis=0), strict=True) if len(ways) else ()
+    pairs = zip(candidate.certificate.level[0], np.abs(directions).max(axis=0), strict=True) if len(directions) else ()
     return tuple(dict.fromkeys(labels[name] for name, size in pairs if size > RANK))

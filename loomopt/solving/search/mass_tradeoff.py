@@ -1,7 +1,7 @@
-"""What is added must be worth it: the design without it, or with less, where that costs a small share of each figure.
+"""Trade-off of added mass: the design without it, or with less, where that costs a small share of each figure.
 
-The levels of a target are held to that share of what they reach at the best design, the least added mass is sought, and
-then the levels again with no more of it; what that ends in is certified as the optimum it is.
+The levels of a target are limited to that share above their values at the best design, the added mass is minimised, and
+then the levels again with no more mass. The result is certified as an optimum.
 """
 
 import math
@@ -16,32 +16,40 @@ from loomopt.model.sampling import sampled
 from loomopt.physics.tolerances import INDIFFERENT, MOVED, SAME_OBJECTIVE, SHOWN_AS_ZERO
 from loomopt.solving.certificate.records import Level
 from loomopt.solving.nlp.point import Known
-from loomopt.solving.search.search import Candidate, Search, Spared, judged, objectives, tried, worths
+from loomopt.solving.search.search import (
+    Candidate,
+    MassTradeoff,
+    Search,
+    certify_best,
+    objective_values,
+    objectives,
+    solve_from,
+)
 
-LOOKED_AT = 10.0
-"""Shares by which a level may change where what is added is left out and all else stays: what changes more, of its
-natural size or its figure, is worth its place, and no other design is sought without it."""
+MOST_SHARES = 10.0
+"""Shares by which a level may change when the added mass is removed and all else stays. If a level changes more,
+relative to its scale or its figure, no design without the mass is searched."""
 
 
-def settled(search: Search) -> Search:
-    """Return the search with its best as simple as the program asks, and with the least change of what is still open.
+def apply_tradeoff(search: Search) -> Search:
+    """The search with the least added mass that the program wants, and the least change in open directions.
 
-    What was found in its starts stays as it is.
+    The end points of its starts do not change.
     """
-    spared = simpler(search)
-    best = spared.best
+    simpler_search = simplify(search)
+    best = simpler_search.best
     if best and best.certificate.level:
         from loomopt.solving.search import least_change
 
-        spared = least_change.with_least_change(spared)
-    if spared.best is None or search.best is None:
+        simpler_search = least_change.with_least_change(simpler_search)
+    if simpler_search.best is None or search.best is None:
         return search
-    own = spared.best._replace(point=search.best.point)
-    return replace(spared, program=search.program, best=own)
+    best_candidate = simpler_search.best._replace(point=search.best.point)
+    return replace(simpler_search, program=search.program, best=best_candidate)
 
 
-def simpler(search: Search) -> Search:
-    """Return the search with the design that adds less as its best, and the program that it is the best of."""
+def simplify(search: Search) -> Search:
+    """The search with the design of less added mass as its best, and its program."""
     best, added = search.best, search.program.added
     if best is None or added is None or not best.certificate.passed:
         return search
@@ -49,94 +57,104 @@ def simpler(search: Search) -> Search:
     if best.x[added.least.row] <= MOVED * added.least.scale:
         return search
     search.settings.at("looking at what is added")
-    found = _without(search, best, added)
-    if found is None and not added.wholly and added.share:
-        found = _with_less(search, best, added)
-    return search if found is None else replace(found, tie_broken=search.tie_broken + time.perf_counter() - began)
+    result = _without(search, best, added)
+    if result is None and not added.wholly and added.share:
+        result = _with_less(search, best, added)
+    return (
+        search
+        if result is None
+        else replace(result, tie_break_seconds=search.tie_break_seconds + time.perf_counter() - began)
+    )
 
 
 def _without(search: Search, best: Candidate, added: Added) -> Search | None:
-    """Return the search with the best design that adds nothing; None where its levels are worse than by the share.
+    """The search with the best design without added mass; None where a level is worse by more than the share.
 
-    Where no share is to be given away the design stays, and the other is told beside it.
+    If the program allows no share the design stays, and the other one is recorded as the alternative.
     """
-    gone, program = added.without, search.program
-    if not gone:
+    removed, program = added.without, search.program
+    if not removed:
         return None
     share = added.share or INDIFFERENT
-    levels = zip(worths(program, best.x), worths(program, {**best.x, **gone}), strict=True)
-    if any(there - here > LOOKED_AT * share * max(1.0, abs(here)) for here, there in levels):
+    levels = zip(objective_values(program, best.x), objective_values(program, {**best.x, **removed}), strict=True)
+    if any(value_without - value > MOST_SHARES * share * max(1.0, abs(value)) for value, value_without in levels):
         return None
-    variables = (v._replace(lower=gone[v.name], upper=gone[v.name]) if v.name in gone else v for v in program.variables)
-    limits = tuple(limit for limit in program.limits if limit.row not in gone)
+    variables = (
+        v._replace(lower=removed[v.name], upper=removed[v.name]) if v.name in removed else v for v in program.variables
+    )
+    limits = tuple(limit for limit in program.limits if limit.row not in removed)
     task = replace(program, variables=tuple(variables), limits=limits)
-    ended = _solved(search, task, {**best.x, **gone}, _most(program, best.x, share))
-    if ended is None:
+    candidate = _solve_task(search, task, {**best.x, **removed}, _upper_bounds(program, best.x, share))
+    if candidate is None:
         return None
     if not added.share:
-        return replace(search, spared=Spared(added, ended.x, share, chosen=False))
-    none = Level(added.least.figure, 0.0, 0.0, 0.0)
-    certificate = replace(ended.certificate, levels=(*ended.certificate.levels, none))
-    return _taken(search, task, ended._replace(certificate=certificate), Spared(added, best.x, share, chosen=True))
+        return replace(search, tradeoff=MassTradeoff(added, candidate.x, share, chosen=False))
+    zero_level = Level(added.least.figure, 0.0, 0.0, 0.0)
+    certificate = replace(candidate.certificate, levels=(*candidate.certificate.levels, zero_level))
+    return _with_result(
+        search, task, candidate._replace(certificate=certificate), MassTradeoff(added, best.x, share, chosen=True)
+    )
 
 
 def _with_less(search: Search, best: Candidate, added: Added) -> Search | None:
-    """Return the search with the design of least added mass whose levels are worse by no more than the share."""
+    """The search with the design of least added mass whose levels are worse by no more than the share."""
     program = search.program
-    most = _most(program, best.x, added.share)
-    caps = [limit for level, value in zip(program.objectives, most, strict=True) for limit in _capped(level, value)]
+    most = _upper_bounds(program, best.x, added.share)
+    caps = [limit for level, value in zip(program.objectives, most, strict=True) for limit in _cap_limits(level, value)]
     task = replace(program, limits=(*program.limits, *caps), objectives=(added.least, *program.objectives))
-    ended, row = _solved(search, task, best.x, most), added.least.row
-    if ended is None or ended.x[row] >= best.x[row] - MOVED * added.least.scale:
+    candidate, row = _solve_task(search, task, best.x, most), added.least.row
+    if candidate is None or candidate.x[row] >= best.x[row] - MOVED * added.least.scale:
         return None
-    first, *levels = ended.certificate.levels
-    certificate = replace(ended.certificate, levels=(*levels, first))
-    return _taken(search, task, ended._replace(certificate=certificate), Spared(added, best.x, added.share, True))
+    first, *levels = candidate.certificate.levels
+    certificate = replace(candidate.certificate, levels=(*levels, first))
+    return _with_result(
+        search, task, candidate._replace(certificate=certificate), MassTradeoff(added, best.x, added.share, True)
+    )
 
 
-def _taken(search: Search, task: Program, ended: Candidate, spared: Spared) -> Search:
-    """Return the search with a design that adds less as its best, and the task that it is the best of."""
-    said = f"{spared.added.least.figure}: least added mass, every figure held to {100 * spared.share:g} %"
-    certificate = replace(ended.certificate, tie_breaks=(*ended.certificate.tie_breaks, said))
+def _with_result(search: Search, task: Program, candidate: Candidate, tradeoff: MassTradeoff) -> Search:
+    """The search with a design of less added mass as its best, and its program."""
+    reason = f"{tradeoff.added.least.figure}: least added mass, every figure held to {100 * tradeoff.share:g} %"
+    certificate = replace(candidate.certificate, tie_breaks=(*candidate.certificate.tie_breaks, reason))
     best = search.best
     assert best is not None
-    own = ended._replace(objectives=best.objectives, value=best.value, certificate=certificate)
-    return replace(search, program=task, best=own, spared=spared)
+    taken = candidate._replace(objectives=best.objectives, value=best.value, certificate=certificate)
+    return replace(search, program=task, best=taken, tradeoff=tradeoff)
 
 
-def _most(program: Program, x: Mapping[str, float], share: float) -> tuple[float, ...]:
-    """Return what each level may be at most where it may be worse than at x (SI) by a share of its figure, SI.
+def _upper_bounds(program: Program, x: Mapping[str, float], share: float) -> tuple[float, ...]:
+    """Upper bound of each level, SI, that is worse than at x (SI) by a share of its figure.
 
-    A goal that is reached stays reached; what is 0 is measured by its natural size.
+    A goal that is met stays met; the share of a figure of 0 is taken of its scale.
     """
     sampler, goals = sampled(program.model, {**program.parameters, **x}), {goal.figure for goal in program.goals}
-    found = []
+    bounds = []
     for level in program.objectives:
-        here = level.merit(sampler)
-        nothing = abs(here) <= SHOWN_AS_ZERO * level.scale
-        grown = (1.0 + share) ** level.power if level.power > 0 else (1.0 - share) ** level.power
-        size = (0.0 if level.figure in goals else level.scale) if nothing else abs(here)
-        found.append(here + (grown - 1.0) * size)
-    return tuple(found)
+        value = level.merit(sampler)
+        is_zero = abs(value) <= SHOWN_AS_ZERO * level.scale
+        factor = (1.0 + share) ** level.power if level.power > 0 else (1.0 - share) ** level.power
+        size = (0.0 if level.figure in goals else level.scale) if is_zero else abs(value)
+        bounds.append(value + (factor - 1.0) * size)
+    return tuple(bounds)
 
 
-def _capped(level: Objective, most: float) -> list[Limit]:
-    """Return what keeps a level at most so large, SI: of a magnitude that must vanish one equality."""
-    found = level.limits(level.figure, most)
+def _cap_limits(level: Objective, most: float) -> list[Limit]:
+    """Limits that keep a level at most `most`, SI; one equality for a magnitude that must vanish."""
+    limits = level.limits(level.figure, most)
     vanishing = level.is_magnitude and most <= SHOWN_AS_ZERO * level.scale
-    return [replace(found[0], sign=0, value=0.0)] if vanishing else found
+    return [replace(limits[0], sign=0, value=0.0)] if vanishing else limits
 
 
-def _solved(search: Search, task: Program, start: Mapping[str, float], most: Sequence[float]) -> Candidate | None:
-    """Return the certified best of a task near a start (SI) whose levels are no larger than `most`, SI; else None."""
+def _solve_task(search: Search, task: Program, start: Mapping[str, float], most: Sequence[float]) -> Candidate | None:
+    """Certified best of a task near a start (SI) whose levels are at most `most`, SI; else None."""
     levels, penalty = search.program.objectives, search.settings.penalty
     caps = [value / level.scale + SAME_OBJECTIVE for level, value in zip(levels, most, strict=True)]
     known = Known()
     if task.objectives is levels:
-        # An earlier level is no less than at the best: where all together are more, one of them is.
+        # Earlier levels are not less than at the best: if their weighted sum is more, one of them is more.
         known = Known(cutoff=math.fsum(cap * penalty**place for place, cap in enumerate(reversed(caps))))
-    found = judged(tried(Search(search.job, task, search.settings, search.today), start, known=known))
-    if found.best is None or not found.passed:
+    result = certify_best(solve_from(Search(search.job, task, search.settings, search.today), start, known=known))
+    if result.best is None or not result.passed:
         return None
-    reached = objectives(search.program, found.best.x)
-    return found.best if all(now <= cap for now, cap in zip(reached, caps, strict=True)) else None
+    levels_reached = objectives(search.program, result.best.x)
+    return result.best if all(now <= cap for now, cap in zip(levels_reached, caps, strict=True)) else None

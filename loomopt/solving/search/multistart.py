@@ -1,4 +1,4 @@
-"""How wide a search goes: from starts as asked for, or from many designs looked at until the best basin is found."""
+"""Width of a search: the starts that are requested, or screening of many designs until the best basin is known."""
 
 import math
 import time
@@ -23,22 +23,22 @@ from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import BEATEN, SUCCESS, Known, Point, sampler_at
 from loomopt.solving.nlp.rows import chain_roots
 from loomopt.solving.search import fallback, vanishing_levels
-from loomopt.solving.search.search import Candidate, OnStart, Search, at, judged, tried
+from loomopt.solving.search.search import Candidate, OnStart, Search, at_step, certify_best, solve_from
 
 SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8, 3, 2
-"""A search's look at many designs: nodes of a turn, designs, one in how many is moved onto its limits, in so many
-steps, and starts kept of these and of those as drawn (benchmarks/adversarial/attack.py)."""
+"""Screening: nodes of a turn, designs, the reciprocal share of designs that are moved onto their limits, steps of that
+projection, and starts taken from the moved and from the random designs (benchmarks/adversarial/attack.py)."""
 
 
 AT_ENDS = 16
-"""Designs at which a number that no level reads is put to both its ends."""
+"""Designs at which a variable that no level reads is put to both ends."""
 
 
-class Judged(NamedTuple):
-    """What a batch of designs is worth, in natural sizes; infinite where there is no real value.
+class BatchValues(NamedTuple):
+    """Scaled values of a batch of designs; infinite where there is no real value.
 
-    objectives: (designs, levels); residuals: of equalities as they are, of other limits what exceeds them, (limits,)
-    numbers of shape (designs,); equal: whether each is an equality's.
+    objectives: (designs, levels); residuals: of equalities, and excesses of other limits, (limits,) numbers of shape
+    (designs,); equal: whether each is an equality's.
     """
 
     objectives: Floats
@@ -47,16 +47,16 @@ class Judged(NamedTuple):
 
     @property
     def violation(self) -> Floats:
-        """The largest residual of each design."""
-        found = np.zeros(len(self.objectives))
+        """Largest residual of each design, (designs,)."""
+        largest = np.zeros(len(self.objectives))
         for residual, equal in zip(self.residuals, self.equal, strict=True):
             value = plain(residual)
-            found = np.maximum(found, np.abs(value) if equal else value)
-        return np.where(np.isfinite(found), found, np.inf)
+            largest = np.maximum(largest, np.abs(value) if equal else value)
+        return np.where(np.isfinite(largest), largest, np.inf)
 
 
 class Batch:
-    """A programme's formulas for many designs; like: one whose cycle gives the nodes."""
+    """A program's formulas for many designs; like: sampler of a design whose cycle gives the nodes."""
 
     def __init__(self, program: Program, like: Sampler) -> None:
         self.program, self.like = program, like
@@ -67,8 +67,8 @@ class Batch:
         self.limits = [program.limits[k] for k in places]
         self.whole = {limit.row for k, limit in program.cycle_limits.items() if k not in absent}
 
-    def judged(self, x: Floats, directions: Floats | None = None) -> Judged:
-        """Return what designs x, (designs, variables) SI, are worth; directions: (variables, n) for jets, SI."""
+    def values(self, x: Floats, directions: Floats | None = None) -> BatchValues:
+        """Values of designs x, (designs, variables) SI; directions: (variables, n) for jets, SI."""
         self.like.session.positions += len(x) * len(self.u)
         with np.errstate(all="ignore"):
             reading = self._reading(x, directions)
@@ -77,8 +77,8 @@ class Batch:
             reading.look(sorted(names), self.pieces, self.u)
             residuals = [wide(limit.residual(reading) / limit.scale, len(x)) for limit in self.limits]
             columns = [np.broadcast_to(level.worth(reading) / level.scale, (len(x),)) for level in objectives]
-        found = np.stack(columns, axis=1) if columns else np.zeros((len(x), 0))
-        return Judged(np.where(np.isfinite(found), found, np.inf), residuals, [o.sign == 0 for o in self.limits])
+        levels = np.stack(columns, axis=1) if columns else np.zeros((len(x), 0))
+        return BatchValues(np.where(np.isfinite(levels), levels, np.inf), residuals, [o.sign == 0 for o in self.limits])
 
     def _reading(self, x: Floats, directions: Floats | None) -> BatchReading:
         system, columns = systems.numpy(), list(x.T)
@@ -88,21 +88,21 @@ class Batch:
         values = {**known, **dict(zip(self.names, columns, strict=True))}
         return BatchReading(self.program.model, system, values, self.like.cycle, self.like.stills)
 
-    def read(self, x: Floats) -> set[str]:
-        """Return the variables that a level reads at crank angles that stay where they are, at designs x."""
-        count, found = len(self.names), list[Number]()
+    def variables_read(self, x: Floats) -> set[str]:
+        """Variables that a level reads at fixed crank angles, at designs x."""
+        count, values = len(self.names), list[Number]()
         with np.errstate(all="ignore"):
             reading = self._reading(x, np.eye(count))
             node = reading.node(self.pieces, self.u)
             still = node._replace(phi=plain(node.phi))
             for level in self.program.objectives:
-                found += [reading.single(row) for row, _ in level.sides]
-                found += reading.quantities(level.quantities, still).values() if level.quantities else []
-        slopes = [np.abs(np.nan_to_num(each.g)).reshape(-1, count) for each in found if isinstance(each, Jet)]
-        return {self.names[place] for each in slopes for place in np.flatnonzero(each.max(axis=0))}
+                values += [reading.single(row) for row, _ in level.sides]
+                values += reading.quantities(level.quantities, still).values() if level.quantities else []
+        slopes = [np.abs(np.nan_to_num(value.g)).reshape(-1, count) for value in values if isinstance(value, Jet)]
+        return {self.names[place] for value in slopes for place in np.flatnonzero(value.max(axis=0))}
 
     def tops(self, x: Floats) -> Floats:
-        """Return designs with the variables that stand where a quantity is largest put there, roughly."""
+        """Designs with the variables that stand at a quantity's maximum put there, approximately."""
         if not self.program.tops:
             return x
         moved = x.copy()
@@ -117,36 +117,38 @@ class Batch:
 
 
 def _vertex(angles: Floats, values: Floats) -> Floats:
-    """Return the crank angle, rad, of each design where values (nodes, designs) are largest, by a parabola."""
-    known = np.where(np.isfinite(values), values, -np.inf)
-    top = np.argmax(known, axis=0)
+    """Crank angle, rad, of each design at which values (nodes, designs) are largest, by a parabola."""
+    finite = np.where(np.isfinite(values), values, -np.inf)
+    top = np.argmax(finite, axis=0)
     inner = np.clip(top, 1, len(values) - 2)
-    every = np.arange(values.shape[1])
-    low, mid, high = (known[inner + k, every] for k in (-1, 0, 1))
-    before, at, after = (angles[inner + k, every] for k in (-1, 0, 1))
-    first, second = (mid - low) / (at - before), (high - mid) / (after - at)
-    bend = (second - first) / (after - before)
-    found = (before + at) / 2 - first / (2 * bend)
-    even = np.isfinite(found) & (found >= before) & (found <= after)
-    return np.asarray(np.where(even, found, angles[top, every]))
+    columns = np.arange(values.shape[1])
+    low, mid, high = (finite[inner + k, columns] for k in (-1, 0, 1))
+    angle_before, angle_at, angle_after = (angles[inner + k, columns] for k in (-1, 0, 1))
+    first, second = (mid - low) / (angle_at - angle_before), (high - mid) / (angle_after - angle_at)
+    bend = (second - first) / (angle_after - angle_before)
+    angle = (angle_before + angle_at) / 2 - first / (2 * bend)
+    even = np.isfinite(angle) & (angle >= angle_before) & (angle <= angle_after)
+    return np.asarray(np.where(even, angle, angles[top, columns]))
 
 
 MOST_NODES, FEWEST = 65536, 32
-"""Nodes of all designs together, where a cycle has many of its own, and the fewest designs that are looked at."""
+"""Most nodes of all designs together, where a cycle has many, and the fewest designs of a screening."""
 
 APART, CLOSER_TOGETHER, FAR_END, LONGEST_STEP = 0.35, 0.6, 0.02, 0.3
-"""Of the box of variables: distance of starts (rms), its factor until there are enough, what a flipped variable stays
-from its end, and the longest step of a projection."""
+"""Shares of the box of variables: distance of starts (rms), the factor that reduces it until there are enough, distance
+of a flipped variable from its end, and the longest step of a projection."""
 
 LEVELS_APART, VIOLATION_WEIGHT, WORST, REGULAR = 100.0, 10.0, 10.0, 1e-6
-"""A search's merit in natural sizes: factor between objectives, weight of the worst violation, and what stands for no
-value; share of a row's own size by which its projection is held regular."""
+"""Scaled merit of a design: factor between objectives, weight of the worst violation, and value of an infinite one;
+share of a row's size that regularises its projection."""
 
 Start = dict[str, float]
 
 
 class Screening:
-    """Designs of one programme in the box of its free variables; like: a design whose cycle gives the nodes."""
+    """Designs of one program in the box of its free variables; like: sampler of a design whose cycle gives the
+    nodes.
+    """
 
     def __init__(self, program: Program, like: Sampler) -> None:
         self.program, self.batch = program, Batch(program, like)
@@ -155,57 +157,60 @@ class Screening:
         self.low, self.high = (np.array([variable.range[side] for variable in variables]) for side in (0, 1))
         self.least, self.most = (np.array([getattr(v, side) for v in variables]) for side in ("lower", "upper"))
         tops = [variable.name in program.tops for variable in variables]
-        # A spline of its own would need as many designs again; it stays what the programme starts from.
+        # A spline would need as many designs again; it stays at the program's start.
         chained = chain_roots(program.model, [variable.name for variable in variables])
-        kept = [variable.name in program.tops or variable.name in chained for variable in variables]
-        self.free = np.flatnonzero((self.high > self.low) & ~np.array(kept))
+        excluded = [variable.name in program.tops or variable.name in chained for variable in variables]
+        self.free = np.flatnonzero((self.high > self.low) & ~np.array(excluded))
         self.tops = np.flatnonzero(tops)
-        # A cycle of many pieces has many nodes, and its variables are more: the same time for fewer designs.
+        # A cycle of many pieces has many nodes and more variables: fewer designs take the same time.
         self.count = min(DESIGNS, max(MOST_NODES // len(self.batch.u), FEWEST))
 
     def starts(self, seed: int) -> list[Start]:
-        """Return starts far apart: the best of those moved onto their limits, then the best as they were drawn."""
-        drawn = self.placed(points(self.count, len(self.free), seed))
-        merits = self.merits(drawn)
+        """Starts far apart: the best of those moved onto their limits, then the best random ones."""
+        random_designs = self.designs(points(self.count, len(self.free), seed))
+        merits = self.merits(random_designs)
         best = np.argsort(merits, kind="stable")[: self.count // MOVED_SHARE]
-        moved = self.projected(drawn[best])
-        kept = (*self.diverse(moved, self.merits(moved)), *self.diverse(drawn, merits))
-        return [self.start(design) for design in kept]
+        moved = self.project(random_designs[best])
+        chosen = (*self.diverse(moved, self.merits(moved)), *self.diverse(random_designs, merits))
+        return [self.start(design) for design in chosen]
 
     def flipped(self, x: Mapping[str, float]) -> list[Start]:
-        """Return a design with each free variable in turn at its far end.
+        """A design with each free variable in turn at its far end.
 
-        As they are: moved onto the limits they exceed, they would come back to the basin they are to leave.
+        They are not projected: moved onto the limits that they exceed, they would return to the basin.
         """
-        here = np.array([x[name] for name in self.batch.names])
-        designs = np.tile(here, (len(self.free), 1))
+        design = np.array([x[name] for name in self.batch.names])
+        designs = np.tile(design, (len(self.free), 1))
         for row, place in enumerate(self.free):
             low, high = self.low[place], self.high[place]
             inside = FAR_END * (high - low)
-            designs[row, place] = low + inside if here[place] > (low + high) / 2 else high - inside
+            designs[row, place] = low + inside if design[place] > (low + high) / 2 else high - inside
         return [self.start(design) for design in self.batch.tops(designs)] if len(designs) else []
 
-    def placed(self, shares: Floats) -> Floats:
-        """Return designs, (designs, variables) SI, at shares of the free variables' ranges."""
-        found = np.tile(self.base, (len(shares), 1))
-        found[:, self.free] = self.low[self.free] + shares * (self.high - self.low)[self.free]
-        return self.batch.tops(found)
+    def designs(self, shares: Floats) -> Floats:
+        """Designs, (designs, variables) SI, at shares of the free variables' ranges."""
+        designs = np.tile(self.base, (len(shares), 1))
+        designs[:, self.free] = self.low[self.free] + shares * (self.high - self.low)[self.free]
+        return self.batch.tops(designs)
 
     def unread(self) -> dict[str, list[tuple[Floats, bool]]]:
-        """Return the free variables that no level reads, with what limits say of each at some designs.
+        """Free variables that no level reads, with the effect of each on the limits at some designs.
 
-        Of every limit: how much more it is exceeded with the variable at its upper end than at its lower, in natural
-        sizes, and whether it is an equality.
+        For every limit: the scaled difference of its excess between the upper and the lower end of the variable, and
+        whether it is an equality.
         """
-        designs = self.placed(points(AT_ENDS, len(self.free), 0))
-        read, found = self.batch.read(designs), {}
-        for place in (int(each) for each in self.free if self.batch.names[each] not in read):
-            low, high = (self.batch.judged(self._put(designs, place, ends[place])) for ends in (self.low, self.high))
+        designs = self.designs(points(AT_ENDS, len(self.free), 0))
+        read, differences = self.batch.variables_read(designs), {}
+        for place in (int(entry) for entry in self.free if self.batch.names[entry] not in read):
+            low, high = (self.batch.values(self._put(designs, place, ends[place])) for ends in (self.low, self.high))
             pairs = zip(low.residuals, high.residuals, low.equal, strict=True)
             with np.errstate(all="ignore"):
-                apart = [(np.asarray(other) - np.asarray(one), equal) for one, other, equal in pairs]
-            found[self.batch.names[place]] = [(each[np.isfinite(each)], equal) for each, equal in apart]
-        return found
+                changes = [
+                    (np.asarray(upper_excess) - np.asarray(lower_excess), equal)
+                    for lower_excess, upper_excess, equal in pairs
+                ]
+            differences[self.batch.names[place]] = [(entry[np.isfinite(entry)], equal) for entry, equal in changes]
+        return differences
 
     @staticmethod
     def _put(designs: Floats, place: int, value: float) -> Floats:
@@ -214,31 +219,31 @@ class Screening:
         return moved
 
     def start(self, design: Floats) -> Start:
-        """Return a design by variable, SI."""
+        """A design by variable, SI."""
         return dict(zip(self.batch.names, design.tolist(), strict=True))
 
     def merits(self, designs: Floats) -> Floats:
-        """Return what orders designs: objectives, each level far below the one before, and the worst violation."""
-        judged = self.batch.judged(designs)
-        weights = LEVELS_APART ** -np.arange(judged.objectives.shape[1], dtype=np.float64)
-        objectives = np.minimum(judged.objectives, WORST) @ weights
-        return np.asarray(objectives + VIOLATION_WEIGHT * np.minimum(judged.violation, WORST))
+        """Merit of designs, least is best: objectives, each level far below the one before, and the worst violation."""
+        values = self.batch.values(designs)
+        weights = LEVELS_APART ** -np.arange(values.objectives.shape[1], dtype=np.float64)
+        objectives = np.minimum(values.objectives, WORST) @ weights
+        return np.asarray(objectives + VIOLATION_WEIGHT * np.minimum(values.violation, WORST))
 
-    def projected(self, designs: Floats) -> Floats:
-        """Return designs after a few Gauss-Newton steps of least change onto the limits they exceed, in the bounds."""
+    def project(self, designs: Floats) -> Floats:
+        """Designs after Gauss-Newton steps of least change onto the limits they exceed, within bounds."""
         places = np.concatenate([self.free, self.tops])
         sizes = np.where(self.high > self.low, self.high - self.low, 1.0)
         directions = np.zeros((len(self.base), len(places)))
         directions[places, np.arange(len(places))] = sizes[places]
         for _ in range(PROJECTIONS):
-            step = _least_change(self.batch.judged(designs, directions), len(places))
+            step = _projection_step(self.batch.values(designs, directions), len(places))
             designs = designs.copy()
             designs[:, places] += step * sizes[places]
             designs = self.batch.tops(np.clip(designs, self.least, self.most))
         return designs
 
     def diverse(self, designs: Floats, merits: Floats) -> Floats:
-        """Return the best design, then always the next best that is far from all those: nearer ones until enough."""
+        """The best design, then repeatedly the next best that is far from those; nearer ones until enough."""
         order = np.argsort(merits, kind="stable")
         shares = ((designs[:, self.free] - self.low[self.free]) / (self.high - self.low)[self.free])[order]
         chosen, apart = list[int](), APART
@@ -254,14 +259,16 @@ class Screening:
         return designs[order[chosen]]
 
 
-def _least_change(judged: Judged, count: int) -> Floats:
-    """Return the least step, (designs, count), that takes each design's exceeded limits to their bounds, linearised."""
-    designs = len(judged.objectives)
+def _projection_step(values: BatchValues, count: int) -> Floats:
+    """Least step, (designs, count), that takes each design's exceeded limits to their bounds, linearised."""
+    designs = len(values.objectives)
     rows, slopes = np.zeros((designs, 0)), np.zeros((designs, 0, count))
-    if judged.residuals:
-        rows = np.stack([each.v if isinstance(each, Jet) else each for each in judged.residuals], axis=1)
-        slopes = np.stack([_slopes(each, designs, count) for each in judged.residuals], axis=1)
-    exceeded = np.array(judged.equal, dtype=bool) | (rows > 0.0)
+    if values.residuals:
+        rows = np.stack(
+            [residual.v if isinstance(residual, Jet) else residual for residual in values.residuals], axis=1
+        )
+        slopes = np.stack([_slopes(residual, designs, count) for residual in values.residuals], axis=1)
+    exceeded = np.array(values.equal, dtype=bool) | (rows > 0.0)
     exceeded &= np.isfinite(rows) & np.isfinite(slopes).all(axis=2)
     rows, slopes = np.where(exceeded, rows, 0.0), np.where(exceeded[:, :, None], slopes, 0.0)
     sizes = np.maximum(np.linalg.norm(slopes, axis=2), REGULAR)
@@ -278,66 +285,66 @@ def _slopes(residual: Jet | Floats, designs: int, count: int) -> Floats:
 
 
 MORE_STARTS = 8
-"""Starts tried before a target is called infeasible or uncertified: one in eight reaches the optimum of the scenes'
+"""Starts before a target is reported as infeasible or uncertified: one in eight reaches the optimum of the scenes'
 hardest target (tests/jobs/rapier/test_rapier_starts.py: more than half do)."""
 
 BETTER, FLIPS = 1e-8, 2
-"""What another start must be able to fall below the best by, in natural sizes, to be followed to its end; rounds of
-flips."""
+"""Scaled improvement that another start must still allow to be solved to its end; rounds of flips."""
 
 ELSEWHERE = 1e-3
-"""Natural sizes by which a design differs from another that is as good: solves of one optimum are 1e-5 apart."""
+"""Scaled difference of two distinct designs: solves of one optimum are 1e-5 apart."""
 
-RESOLVED = 5
-"""Times a search begins again with what its best needs of a steady state: each doubles it, from the fewest to the most.
-"""
+MOST_RESTARTS = 5
+"""Most restarts of a search with a finer steady state: each restart doubles it, from the fewest to the most."""
 
 
 @working()
-def resolved(
+def run_search(
     search: Search,
     starts: int | None = None,
     seed: int = 0,
     near: Sequence[Point] = (),
     on_start: OnStart | None = None,
 ) -> Search:
-    """Return how far a search comes, begun again as long as its best needs a finer steady state.
+    """Run a search, again with a finer steady state as long as its best needs one.
 
-    No scene is read, nothing is said in words. starts: so many, the job's own first, then random ones from `seed`; None
-    for a search of the best basin; near: where neighbours' solves ended, to start warm from; one of another structure
-    is left alone. Raises KeyboardInterrupt on Ctrl-C.
+    starts: number of starts, the job's first, then random ones from `seed`; None for a search of the best basin; near:
+    end points of neighbours' solves for a warm start; those of another structure are ignored; on_start(number, count):
+    progress. Returns the search. Raises KeyboardInterrupt on Ctrl-C.
     """
-    if ideal := fallback.ideal(search):
+    if ideal := fallback.today_if_ideal(search):
         return ideal
     same = [point for point in near if point.structure == search.program.structure]
-    search = rewarded(search, starts, seed, same, on_start) or searched(search, starts, seed, same, on_start)
-    for _ in range(RESOLVED if search.best else 0):
+    search = search_without_inactive(search, starts, seed, same, on_start) or search_starts(
+        search, starts, seed, same, on_start
+    )
+    for _ in range(MOST_RESTARTS if search.best else 0):
         finer = _finer(search)
         if finer is search.program:
             break
-        search = searched(replace(search, program=finer, candidates=(), best=None), starts, seed, (), on_start)
-    return fallback.no_worse(vanishing_levels.held(search))
+        search = search_starts(replace(search, program=finer, candidates=(), best=None), starts, seed, (), on_start)
+    return fallback.no_worse(vanishing_levels.fix_first_level(search))
 
 
-def rewarded(
+def search_without_inactive(
     search: Search, count: int | None, seed: int, near: Sequence[Point], on_start: OnStart | None
 ) -> Search | None:
-    """Return the search without the numbers that serve no level; None without any, or where it leads to no answer."""
+    """The search without the variables that no level reads; None without any, or if it leads to no answer."""
     if not search.program.any_numbers:
         return None
     from loomopt.solving.search import inactive_variables
 
     screening = _screening(search, exchange.starts(search.program, 1, seed))
-    held = inactive_variables.held(search, screening.unread()) if screening else None
-    if held is None:
+    fixed_program = inactive_variables.fix_inactive(search, screening.unread()) if screening else None
+    if fixed_program is None:
         return None
-    found = searched(replace(search, program=held), count, seed, near, on_start)
-    found = inactive_variables.freed(found, search.program) if found.passed else found
-    return found if found.passed else None
+    result = search_starts(replace(search, program=fixed_program), count, seed, near, on_start)
+    result = inactive_variables.free_inactive(result, search.program) if result.passed else result
+    return result if result.passed else None
 
 
 def _finer(search: Search) -> Program:
-    """Return the program with what the steady state of a search's best needs; itself where it has that, or cannot."""
+    """The program with the steady state that the search's best needs; unchanged if it has that, or cannot."""
     program, best = search.program, search.best
     if not program.model.states or best is None:
         return program
@@ -348,149 +355,156 @@ def _finer(search: Search) -> Program:
     return program if model is program.model else replace(program, model=model)
 
 
-def searched(search: Search, count: int | None, seed: int, near: Sequence[Point], on_start: OnStart | None) -> Search:
-    """Return the search after so many starts, or as wide as it takes; after none where points `near` lead on.
+def search_starts(
+    search: Search, count: int | None, seed: int, near: Sequence[Point], on_start: OnStart | None
+) -> Search:
+    """The search after `count` starts, or after a screening; after none if points `near` lead to an answer.
 
-    count: the job's own starts and random ones; None for a search of the best basin. More are tried where none is
-    certified; where no start leads to a design, only if one is admissible as far as can be seen.
+    count: number of the job's starts and random ones; None for a search of the best basin. More starts are tried if
+    none is certified; if no start leads to a design, only where an admissible design seems to exist.
     """
     for point in near:
-        search = tried(at(search, "start nearby"), point.x, point)
-    if search.reached:
-        search = judged(search)
+        search = solve_from(at_step(search, "start nearby"), point.x, point)
+    if search.usable:
+        search = certify_best(search)
         if search.passed:
             return replace(search, stayed=True)
     if count is None:
-        search = judged(spread(search, seed, on_start))
+        search = certify_best(search_basins(search, seed, on_start))
         if search.passed or search.clashes:
             return search
     done = 0
-    for wanted in dict.fromkeys((count or MORE_STARTS, max(count or 0, MORE_STARTS))):
-        chosen = exchange.starts(search.program, wanted, seed)[:wanted]
+    for total in dict.fromkeys((count or MORE_STARTS, max(count or 0, MORE_STARTS))):
+        chosen = exchange.starts(search.program, total, seed)[:total]
         for place, start in enumerate(chosen[done:], done + 1):
             if on_start:
                 on_start(place, len(chosen))
-            search = tried(at(search, f"start {place} of {len(chosen)}"), start)
+            search = solve_from(at_step(search, f"start {place} of {len(chosen)}"), start)
         done = max(done, len(chosen))
-        search = judged(search)
-        if not search.reached and search.nearest is None:
-            search = judged(relaxed(search, chosen))
+        search = certify_best(search)
+        if not search.usable and search.nearest is None:
+            search = certify_best(find_least_relaxation(search, chosen))
         if search.passed or search.clashes:
             break
     return search
 
 
-def spread(search: Search, seed: int, on_start: OnStart | None) -> Search:
-    """Return the search after the job's own starts, the best of a look at many designs, and the best with flips.
+def search_basins(search: Search, seed: int, on_start: OnStart | None) -> Search:
+    """The search after the job's starts, the best screened designs, and the best with flipped variables.
 
-    From the best, each variable in turn is put to its far end: basins lie side by side along bounds. Where the best is
-    as good as any design can be, nothing more is solved.
+    From the best, each variable in turn is put to its far end, because basins lie side by side along bounds. Where the
+    best is as good as any design can be, the search ends.
     """
-    own = exchange.starts(search.program, 1, seed)
-    search = at(search, "looking at designs")
+    job_starts = exchange.starts(search.program, 1, seed)
+    search = at_step(search, "looking at designs")
     began = time.perf_counter()
-    screening = None if search.program.single else _screening(search, own)
-    drawn = _completed(search, screening.starts(seed)) if screening else []
-    looked, spent = screening.count if screening else 0, time.perf_counter() - began
-    search = replace(search, designs=looked, solved=search.solved + spent)
-    steps = _Steps(on_start, len(own) + len(drawn))
-    for start in own:
-        search = steps.explored(search, start)
-        if not search.reached and search.nearest is None:
-            search = relaxed(search, [*own, *drawn])
+    screening = None if search.program.single else _screening(search, job_starts)
+    screened = _complete_starts(search, screening.starts(seed)) if screening else []
+    design_count, spent = screening.count if screening else 0, time.perf_counter() - began
+    search = replace(search, screened=design_count, solve_seconds=search.solve_seconds + spent)
+    steps = _Steps(on_start, len(job_starts) + len(screened))
+    for start in job_starts:
+        search = steps.explore(search, start)
+        if not search.usable and search.nearest is None:
+            search = find_least_relaxation(search, [*job_starts, *screened])
             if search.clashes:
                 return search
-    for start in drawn:
-        search = steps.explored(search, start)
+    for start in screened:
+        search = steps.explore(search, start)
     for _ in range(FLIPS):
-        if screening is None or not search.reached or unbeatable(search):
+        if screening is None or not search.usable or is_unbeatable(search):
             break
-        before = search.ranked[0]
-        flipped = _completed(search, screening.flipped(before.point.x))
+        last_best = search.ranked[0]
+        flipped = _complete_starts(search, screening.flipped(last_best.point.x))
         steps.count += len(flipped)
         for start in flipped:
-            search = steps.explored(search, start)
-        if search.ranked[0] is before:
+            search = steps.explore(search, start)
+        if search.ranked[0] is last_best:
             break
     return search
 
 
 @dataclass
 class _Steps:
-    """Starts as they are explored: what is told of each; count: how many are known to come."""
+    """Progress of starts; count: number of known starts."""
 
     on_start: OnStart | None
     count: int
     done: int = 0
 
-    def explored(self, search: Search, start: Mapping[str, float]) -> Search:
-        """Return the search after a solve that is left as soon as it cannot be better than the best so far.
+    def explore(self, search: Search, start: Mapping[str, float]) -> Search:
+        """The search after a solve that stops as soon as it cannot be better than the best so far.
 
-        It is not begun where nothing can.
+        Nothing is solved if no design can be better.
         """
         self.done += 1
-        if unbeatable(search):
+        if is_unbeatable(search):
             return search
         if self.on_start:
             self.on_start(self.done, self.count)
-        search = at(search, f"start {self.done} of {self.count}")
-        if search.reached and search.ranked[0].is_left:
-            search = judged(search)
-        if not search.reached:
-            return tried(search, start)
+        search = at_step(search, f"start {self.done} of {self.count}")
+        if search.usable and search.ranked[0].has_failed:
+            search = certify_best(search)
+        if not search.usable:
+            return solve_from(search, start)
         best = search.ranked[0]
-        return tried(search, start, known=Known(best.point.binding, best.value - BETTER, best.objectives))
+        return solve_from(search, start, known=Known(best.point.binding, best.value - BETTER, best.objectives))
 
 
-def tied(search: Search) -> bool:
-    """Say whether other designs may be as good as the best: other starts led there, or its bounds alone stop it."""
+def may_be_tied(search: Search) -> bool:
+    """Whether other designs may be as good as the best: other starts led there, or only its bounds stop it."""
     best, sizes = search.ranked[0], {v.name: v.scale for v in search.program.variables}
 
-    def apart(candidate: Candidate) -> bool:
+    def is_different(candidate: Candidate) -> bool:
         x = candidate.point.x
         return any(abs(x.get(name, value) - value) > ELSEWHERE * sizes[name] for name, value in best.point.x.items())
 
-    # Where the solver gave up its value says nothing.
-    ended = (each for each in search.candidates if each.point.status in {*SUCCESS, BEATEN})
-    alike = (each for each in ended if each.value <= best.value + SAME_OBJECTIVE)
-    return unbeatable(search) or any(map(apart, alike))
+    # The value of a failed solve means nothing.
+    finished = (candidate for candidate in search.candidates if candidate.point.status in {*SUCCESS, BEATEN})
+    equal = (candidate for candidate in finished if candidate.value <= best.value + SAME_OBJECTIVE)
+    return is_unbeatable(search) or any(map(is_different, equal))
 
 
-def unbeatable(search: Search) -> bool:
-    """Say whether the best is as good as bounds alone let any design be: none can be better by as much as counts."""
+def is_unbeatable(search: Search) -> bool:
+    """Whether the best is as good as the bounds alone allow: no design can be better by BETTER."""
     lower = {v.name: v.lower for v in search.program.variables}
     least = 0.0
     for level in search.program.objectives:
         least = search.settings.penalty * least + level.least_within(lower) / level.scale
-    return min((candidate.value for candidate in search.reached), default=math.inf) <= least + BETTER
+    return min((candidate.value for candidate in search.usable), default=math.inf) <= least + BETTER
 
 
-def _screening(search: Search, own: Sequence[Mapping[str, float]]) -> "Screening | None":
-    """Return what looks at many designs, by the nodes of the first start that has a cycle.
+def _screening(search: Search, starts: Sequence[Mapping[str, float]]) -> "Screening | None":
+    """Screening of designs, with the nodes of the first start that has a cycle.
 
-    None without one, and where nothing is free.
+    None without such a start, and where nothing is free.
     """
 
-    for start in (*own, search.today):
+    for start in (*starts, search.today):
         sampler = sampler_at(search.program, start) if start else None
         if sampler is not None:
-            found = Screening(search.program, sampler)
-            return found if len(found.free) else None
+            screening = Screening(search.program, sampler)
+            return screening if len(screening.free) else None
     return None
 
 
-def _completed(search: Search, starts: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
-    """Return the starts that assemble, with the variables that follow from the others."""
-    return [start for start in (exchange.complete_start(search.program, each) for each in starts) if start]
+def _complete_starts(search: Search, starts: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
+    """The starts that assemble, with the variables that follow from the others."""
+    return [start for start in (exchange.complete_start(search.program, values) for values in starts) if start]
 
 
-def relaxed(search: Search, starts: Sequence[Mapping[str, float]]) -> Search:
-    """Return the search with where its limits' excesses are least; solved from there where there are none."""
+def find_least_relaxation(search: Search, starts: Sequence[Mapping[str, float]]) -> Search:
+    """The search with the design of least excesses; solved from there if it has none."""
     from loomopt.solving.search.elastic import least
 
     began = time.perf_counter()
-    search = at(search, "looking for the least relaxation")
+    search = at_step(search, "looking for the least relaxation")
     places = [*starts, *([search.today] if search.today else [])]
     nearest = least(search.program, places, search.settings)
-    search = replace(search, nearest=nearest, sought=len(places), solved=search.solved + time.perf_counter() - began)
-    return search if nearest is None or nearest.relaxation else tried(search, nearest.x)
+    search = replace(
+        search,
+        nearest=nearest,
+        relaxation_starts=len(places),
+        solve_seconds=search.solve_seconds + time.perf_counter() - began,
+    )
+    return search if nearest is None or nearest.relaxation else solve_from(search, nearest.x)

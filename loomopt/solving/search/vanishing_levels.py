@@ -1,8 +1,8 @@
-"""Levels of which the first can vanish: it is held at 0 exactly, and the later levels are sought beside that.
+"""First levels that can vanish: the level is fixed at exactly 0, and the later levels are optimised.
 
-A peak that vanishes has no slope to weigh against a later level: its square is flat there, and an NLP of both trades a
-little of one for the other. What vanishes over the whole cycle vanishes at a few crank angles, as many as the design
-has ways to change it: these are equalities, and the later levels have the rest.
+A vanishing peak has no slope to balance a later level: its square is flat there, and an NLP of both trades a little of
+one for the other. A quantity that vanishes over the whole cycle vanishes at a few crank angles, as many as it has
+degrees of freedom: these rows are equalities, and the later levels are optimised with the rest.
 """
 
 import functools
@@ -25,14 +25,14 @@ from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow
 from loomopt.solving.certificate.records import Level
 from loomopt.solving.nlp.point import sampler_at
-from loomopt.solving.search.search import Search, as_read, at, judged, objectives, tried
+from loomopt.solving.search.search import Search, at_step, certify_best, objectives, printed_design, solve_from
 
 NEAR_ZERO, ANGLES = 1e-3, 12
-"""Share of its natural size from which a level is tried at 0, and the crank angles among which those of equalities are
-chosen: two components at each are more rows than a linkage has ways to change its forces."""
+"""Share of its scale below which a level is tried at 0, and the number of crank angles from which those of the
+equalities are selected: two components at each are more rows than a linkage has degrees of freedom."""
 
-HELD = "held at 0"
-"""What the equalities are called: no limit of a designer's."""
+FIXED_AT_ZERO = "held at 0"
+"""Name of the equalities, which are no limits of the designer."""
 
 
 class Spot(NamedTuple):
@@ -44,58 +44,60 @@ class Spot(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The row's name, which says all that its formula depends on."""
+        """Name of the row, which contains all that its formula depends on."""
         return f"{self.quantity} at {self.phi!r} {self.switch}"
 
     def row(self) -> DesignRow:
-        """Return it as a row of the design."""
+        """Row of the design with this value."""
         return DesignRow(functools.partial(_value, self))
 
 
-def _value(spot: Spot, at: Instant) -> Number:
-    node = Node(at.maths.number(spot.phi), {name: at.maths.number(value) for name, value in spot.switch})
-    return at.model.together(at.maths, at.given, node)(spot.quantity)
+def _value(spot: Spot, instant: Instant) -> Number:
+    node = Node(instant.maths.number(spot.phi), {name: instant.maths.number(value) for name, value in spot.switch})
+    return instant.model.together(instant.maths, instant.given, node)(spot.quantity)
 
 
-def held(search: Search) -> Search:
-    """Return the search with its first level held at 0 and the later ones sought beside it, if that passes.
+def fix_first_level(search: Search) -> Search:
+    """The search with its first level fixed at 0 and the later ones optimised, if that passes.
 
-    As it is where the first level cannot vanish, is not near 0, or has vanished in a best that is certified.
+    Unchanged where the first level cannot vanish, is not near 0, or already vanishes in a certified best.
     """
     program, best = search.program, search.best
     first, *later = program.objectives
     sampler = sampler_at(program, best.x) if best and later else None
-    names = smooth(program.model, first)
+    names = smooth_quantities(program.model, first)
     if best is None or sampler is None or not names:
         return search
     share = (first.merit(sampler) / first.scale) ** (1 / first.power)
     if share > NEAR_ZERO or (search.passed and first.vanishes(sampler)):
         return search
-    bare = replace(search, candidates=(), best=None)
-    alone = tried(at(replace(bare, program=replace(program, objectives=(first,))), "holding 0"), best.x)
-    x = alone.candidates[-1].point.x
+    empty_search = replace(search, candidates=(), best=None)
+    first_search = solve_from(
+        at_step(replace(empty_search, program=replace(program, objectives=(first,))), "holding 0"), best.x
+    )
+    x = first_search.candidates[-1].point.x
     sampler = sampler_at(program, x)
     if sampler is None or not first.vanishes(sampler):
         return search
-    rest = tried(replace(bare, program=_without(program, x, sampler, names)), x)
-    rest = held(judged(rest))
-    found = rest.best
-    if found is None or not rest.passed:
+    later_search = solve_from(replace(empty_search, program=_later_levels(program, x, sampler, names)), x)
+    later_search = fix_first_level(certify_best(later_search))
+    later_best = later_search.best
+    if later_best is None or not later_search.passed:
         return search
-    x = as_read(search, found.x)
+    x = printed_design(search, later_best.x)
     sampler = sampler_at(program, x)
     if sampler is None or not first.vanishes(sampler):
         return search
-    levels = (Level(first.figure, 0.0, 0.0, 0.0), *found.certificate.levels)
-    # Rows and directions are those of another program.
-    certificate = replace(found.certificate, levels=levels, frame=(), level=())
+    levels = (Level(first.figure, 0.0, 0.0, 0.0), *later_best.certificate.levels)
+    # Rows and directions belong to another program.
+    certificate = replace(later_best.certificate, levels=levels, frame=(), level=())
     return replace(
-        search, best=best._replace(objectives=objectives(program, x), moved=found.x, certificate=certificate)
+        search, best=best._replace(objectives=objectives(program, x), moved=later_best.x, certificate=certificate)
     )
 
 
-def smooth(model: JobModel, level: Objective) -> tuple[str, ...]:
-    """Return the quantities that all vanish where a peak does, smooth ones; none of a level that is no such peak."""
+def smooth_quantities(model: JobModel, level: Objective) -> tuple[str, ...]:
+    """Smooth quantities that all vanish where a peak does; empty for a level that is no such peak."""
     if not isinstance(level, Peak) or level.least_of(model.signed) < 0.0:
         return ()
     if level.power == 1:
@@ -104,35 +106,35 @@ def smooth(model: JobModel, level: Objective) -> tuple[str, ...]:
     return parts if all(map(model.has_quantity, parts)) else ()
 
 
-def _without(program: Program, x: Mapping[str, float], sampler: Sampler, names: tuple[str, ...]) -> Program:
-    """Return a program of the later levels, what the first reads being 0 at crank angles as an equality each."""
+def _later_levels(program: Program, x: Mapping[str, float], sampler: Sampler, names: tuple[str, ...]) -> Program:
+    """A program of the later levels, with the first level's quantities 0 at crank angles as equalities."""
     first = program.objectives[0]
     size = first.scale ** (1 / first.power)
     phi = TURN * (np.arange(ANGLES) + 0.5) / ANGLES
     switches = [tuple(sorted(sampler.cycle.switch(int(piece)).items())) for piece in sampler.cycle.located(phi)[0]]
     spots = [Spot(name, float(p), s) for name in names for p, s in zip(phi.tolist(), switches, strict=True)]
     model = replace(program.model, own_rows={**program.model.own_rows, **{spot.name: spot.row() for spot in spots}})
-    rows = [ActiveRow(HELD, spot.name, size, 1.0, 0, 0.0) for spot in spots]
-    read = sampler_at(replace(program, model=model), x)
-    assert read is not None
-    found = JetDerivatives(replace(program, model=model), x, read, rows)
-    slopes = found.gradients()[:, [name not in program.fixed for name in found.names]]
-    chosen = [spots[k] for k in independent(slopes)]
-    model = replace(program.model, own_rows={**program.model.own_rows, **{spot.name: spot.row() for spot in chosen}})
-    limits = [DesignLimit(HELD, 0, spot.name, 0.0, size, relaxable=False, hidden=True) for spot in chosen]
+    rows = [ActiveRow(FIXED_AT_ZERO, spot.name, size, 1.0, 0, 0.0) for spot in spots]
+    sampler_with_rows = sampler_at(replace(program, model=model), x)
+    assert sampler_with_rows is not None
+    derivatives = JetDerivatives(replace(program, model=model), x, sampler_with_rows, rows)
+    slopes = derivatives.gradients()[:, [name not in program.fixed for name in derivatives.names]]
+    selected = [spots[k] for k in independent_rows(slopes)]
+    model = replace(program.model, own_rows={**program.model.own_rows, **{spot.name: spot.row() for spot in selected}})
+    limits = [DesignLimit(FIXED_AT_ZERO, 0, spot.name, 0.0, size, relaxable=False, hidden=True) for spot in selected]
     return replace(program, model=model, limits=(*program.limits, *limits), objectives=program.objectives[1:])
 
 
-def independent(slopes: Floats) -> list[int]:
-    """Return places of rows that span all rows of slopes (rows, variables), the longest first."""
-    left, chosen = slopes.copy(), list[int]()
-    largest = float(np.linalg.norm(left, axis=1).max(initial=0.0))
-    for _ in range(min(left.shape)):
-        lengths = np.linalg.norm(left, axis=1)
+def independent_rows(slopes: Floats) -> list[int]:
+    """Places of rows that span all rows of slopes (rows, variables), the longest first."""
+    remaining, places = slopes.copy(), list[int]()
+    largest = float(np.linalg.norm(remaining, axis=1).max(initial=0.0))
+    for _ in range(min(remaining.shape)):
+        lengths = np.linalg.norm(remaining, axis=1)
         place = int(lengths.argmax())
         if not lengths[place] > RANK * max(largest, math.ulp(1.0)):
             break
-        chosen.append(place)
-        way = left[place] / lengths[place]
-        left = left - np.outer(left @ way, way)
-    return chosen
+        places.append(place)
+        direction = remaining[place] / lengths[place]
+        remaining = remaining - np.outer(remaining @ direction, direction)
+    return places

@@ -29,8 +29,8 @@ from loomopt.solving.certificate.records import Binding, Certificate
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.search import elastic, fallback, least_change, multistart, neighbour_newton
-from loomopt.solving.search.multistart import rewarded, searched, spread, tied
-from loomopt.solving.search.search import Candidate, Search, judged, objectives, tried
+from loomopt.solving.search.multistart import may_be_tied, search_basins, search_starts, search_without_inactive
+from loomopt.solving.search.search import Candidate, Search, certify_best, objectives, solve_from
 from loomopt.studies.front.plan import ALIKE, Touched, sloped
 from loomopt.studies.run import rows
 from loomopt.studies.run.rows import PEAK, Multiplier, Side
@@ -155,12 +155,12 @@ class Solver:
         search = self._searched(asking, near, wide, spare)
         if search.passed and not self._priced(search, asking):
             found = self._begun(asking._replace(levels=2))
-            after = tried(found, search.ranked[0].point.x)
-            after = judged(after) if after.reached else after
-            if wide and after.passed and tied(search):
+            after = solve_from(found, search.ranked[0].point.x)
+            after = certify_best(after) if after.usable else after
+            if wide and after.passed and may_be_tied(search):
                 after = self._spread(after)
             if wide and not after.passed:
-                after = searched(found, None, 0, (), None)
+                after = search_starts(found, None, 0, (), None)
             if after.passed:
                 search, asking = after, asking._replace(levels=2)
         return self._told(least_change.with_least_change(search), asking)
@@ -173,8 +173,8 @@ class Solver:
         begun = []
         for asking, (*optima, share) in zip(asked, ends, strict=True):
             first, second = map(neighbour_newton.read_optimum, optima)
-            begun.append(neighbour_newton.Between(self._begun(asking), first, second, share, self._peaks))
-        searches = zip(asked, neighbour_newton.solved(begun), strict=True)
+            begun.append(neighbour_newton.NeighbourTask(self._begun(asking), first, second, share, self._peaks))
+        searches = zip(asked, neighbour_newton.solve_between(begun), strict=True)
         return [
             self._told(search, of)
             if search and self._priced(search, of) and fallback.is_no_worse_than_today(search)
@@ -190,10 +190,10 @@ class Solver:
         begun = []
         for asking, (*optima, _) in zip(asked, ends, strict=True):
             first, second = map(neighbour_newton.read_optimum, optima)
-            begun.append(neighbour_newton.Between(self._begun(asking), first, second, 0.0))
+            begun.append(neighbour_newton.NeighbourTask(self._begun(asking), first, second, 0.0))
         return [
             None if x is None else self._moved(Point(x, "Solve_Succeeded", True), each.search, 0, led=True)
-            for each, x in zip(begun, neighbour_newton.moved(begun), strict=True)
+            for each, x in zip(begun, neighbour_newton.move_with_rows(begun), strict=True)
         ]
 
     def solved_from(
@@ -210,7 +210,7 @@ class Solver:
             there, (other, end) = share + step, asking.caps
             cap = end if begin is None or end is None else begin + there * (end - begin)
             search = self._from(self._begun(asking._replace(caps=(other, cap))), [near])
-            candidate = search.candidates[0] if search.reached else None
+            candidate = search.candidates[0] if search.usable else None
             if step * steps > 1.0 and (candidate is None or candidate.point.iterations):
                 step /= 2
                 continue
@@ -234,7 +234,7 @@ class Solver:
         search = self._begun(asking)
         at = replace(point, structure=search.program.structure)
         candidate = Candidate(at, objectives(search.program, point.x))
-        search = judged(replace(search, candidates=(candidate,)))
+        search = certify_best(replace(search, candidates=(candidate,)))
         return search.passed and self._priced(search, asking)
 
     @lazy
@@ -264,13 +264,13 @@ class Solver:
         if wide and search.passed:
             search = self._spread(search)
         if not (search.passed or wide is None):
-            search = rewarded(search, None, 0, (), None) or searched(search, None, 0, (), None)
+            search = search_without_inactive(search, None, 0, (), None) or search_starts(search, None, 0, (), None)
         return fallback.no_worse(search)
 
     def _beside(self, search: Search, near: Sequence[Mapping[str, Any]]) -> Search:
         """Return the search after solves from neighbours' rows, its best judged."""
         search = self._from(search, near)
-        return judged(search) if search.reached else search
+        return certify_best(search) if search.usable else search
 
     def _from(self, search: Search, near: Sequence[Mapping[str, Any]]) -> Search:
         """Return the search after solves from neighbours' rows."""
@@ -278,14 +278,14 @@ class Solver:
         for data in near:
             point = rows.read(data["point"], program)
             if point:
-                search = tried(search, point.x, point)
+                search = solve_from(search, point.x, point)
             elif start := exchange.complete_start(program, data["point"]["x"]):
-                search = tried(search, start)
+                search = solve_from(search, start)
         return search
 
     def _spread(self, search: Search) -> Search:
         """Return a search whose best passed after a look at other basins, where there may be any."""
-        return search if search.program.single else judged(spread(search, 0, None))
+        return search if search.program.single else certify_best(search_basins(search, 0, None))
 
     def _priced(self, search: Search, asking: Asking) -> bool:
         """Say whether the limit on the other axis has a price at the level of the first."""
@@ -507,7 +507,7 @@ def clashing(solver: Solver, program: Program) -> Clash:
     """Return the limits of a program that cannot all be kept, and what helps; nothing where that is not found."""
     job, scene = solver.job, solver.scene
     today = job.start(program, scene)
-    search = multistart.resolved(Search(job, program, Settings(solver.accuracy), today))
+    search = multistart.run_search(Search(job, program, Settings(solver.accuracy), today))
     return elastic.clash(search, Words(scene))
 
 

@@ -14,7 +14,7 @@ from loomopt.solving.nlp.point import Settings
 from loomopt.solving.proof import task
 from loomopt.solving.proof.levels import loosening
 from loomopt.solving.proof.task import BoxTask, reduced
-from loomopt.solving.search.multistart import resolved
+from loomopt.solving.search.multistart import run_search
 from loomopt.solving.search.search import Search
 
 
@@ -43,7 +43,7 @@ def solved(name: str, target: str, *changes: str) -> Solved:
     scene = scene.update(numbers) if numbers else scene
     job = registry.of(scene)
     program = job.program(scene, target)
-    return Solved(job, program, resolved(Search(job, program, Settings())))
+    return Solved(job, program, run_search(Search(job, program, Settings())))
 
 
 def quietly(text: str) -> None:

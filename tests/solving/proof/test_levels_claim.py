@@ -12,7 +12,7 @@ from loomopt.jobs import registry
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.options import GlobalProof
 from loomopt.solving.proof.levels import LevelOutcome, Levels, claimed
-from loomopt.solving.search.multistart import resolved
+from loomopt.solving.search.multistart import run_search
 from loomopt.solving.search.search import Search, objectives
 
 
@@ -20,7 +20,7 @@ def test_a_search_that_stands_elsewhere_is_led_to_the_optimum():
     """The best of narrower bounds, taken for the best of all: its certificate there passes by itself."""
     wide = solved("beatup", "torque")
     scene = lo.load("beatup").set("bounds.l3.min", "152 mm")
-    narrow = resolved(Search(wide.job, registry.of(scene).program(scene, "torque"), Settings()))
+    narrow = run_search(Search(wide.job, registry.of(scene).program(scene, "torque"), Settings()))
     assert narrow.best is not None
     here = narrow.best
     worse = replace(narrow, program=wide.program, candidates=(here,))

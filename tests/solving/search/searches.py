@@ -39,7 +39,7 @@ def certified(monkeypatch):
         judged = answer(len(seen)) if callable(answer) else answer
         return Draft(judged, lambda cycle: judged)
 
-    monkeypatch.setattr(searching, "begun", begun)
+    monkeypatch.setattr(searching, "draft_certificate", begun)
     return seen, answers
 
 

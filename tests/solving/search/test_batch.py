@@ -38,7 +38,7 @@ def rows_of(batch, starts):
 @pytest.mark.parametrize(("job", "target", "effects"), TASKS)
 def test_objectives_and_residuals_are_those_of_each_design_alone(job, target, effects):
     program, batch, starts = task(job, target, effects)
-    judged = batch.judged(rows_of(batch, starts))
+    judged = batch.values(rows_of(batch, starts))
     for k, start in enumerate(starts):
         sampler = sampler_at(program, start)
         if sampler.cycle.order != batch.like.cycle.order:
@@ -60,13 +60,13 @@ def test_jets_are_the_slopes_of_the_floats(job, target, effects):
     sizes = np.array([program.variables[k].scale for k in free])
     directions = np.zeros((x.shape[1], len(free)))
     directions[free, np.arange(len(free))] = sizes
-    jets = batch.judged(x, directions)
+    jets = batch.values(x, directions)
     step = 1e-6
     for column, place in enumerate(free):
         up, down = x.copy(), x.copy()
         up[:, place] += step * sizes[column]
         down[:, place] -= step * sizes[column]
-        ends = [batch.judged(moved).residuals for moved in (up, down)]
+        ends = [batch.values(moved).residuals for moved in (up, down)]
         for jet, high, low in zip(jets.residuals, *ends, strict=True):
             slope = (high - low) / (2 * step)
             own = jet.g[:, column] if hasattr(jet, "g") else np.zeros(len(x))
@@ -77,9 +77,9 @@ def test_jets_are_the_slopes_of_the_floats(job, target, effects):
 def test_a_design_that_does_not_assemble_is_worst_and_spoils_no_other():
     _, batch, starts = task("rapier", "stroke-dwell", ())
     x = rows_of(batch, starts[:2])
-    alone = batch.judged(x[:1])
+    alone = batch.values(x[:1])
     x[1, batch.names.index("l5")] = 1e-3
-    both = batch.judged(x)
+    both = batch.values(x)
     assert np.isinf(both.violation[1])
     assert both.violation[0] == alone.violation[0]
     assert np.array_equal(both.objectives[0], alone.objectives[0])

@@ -11,7 +11,7 @@ import pytest
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.solving.nlp.point import Settings
-from loomopt.solving.search.search import Search, judged, tried
+from loomopt.solving.search.search import Search, certify_best, solve_from
 
 SCENE = {
     "problem": {"name": "creeps", "job": "linkage", "title": "A six-bar with a slide", "source": "drawn at random"},
@@ -88,7 +88,7 @@ def test_equal_peaks_that_move_along_a_flat_direction_end_in_a_certificate(level
     program = job.program(scene, "t")
     program = replace(program, objectives=program.objectives[:levels])
     start = job.values(program, {**job.today(scene), **NEAR})
-    found = judged(tried(Search(job, program, Settings(), job.start(program, scene)), start))
+    found = certify_best(solve_from(Search(job, program, Settings(), job.start(program, scene)), start))
     assert found.passed, found.best.certificate.reasons
     assert found.best.x["l2"] == pytest.approx(0.5382228, abs=1e-7)
     assert found.best.x["l3"] == pytest.approx(0.6334228, abs=1e-7)

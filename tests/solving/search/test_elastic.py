@@ -141,4 +141,4 @@ def test_a_limit_that_does_not_suffice_is_not_told():
 def test_both_rows_of_a_limit_need_what_the_worse_one_does():
     program = toy.program("xy", ROWS, limits=(("x", -1, 2.0), ("x", -1, 3.0), ("x", 1, 0.0), ("y", 1, 1.0)))
     needed = {0: 0.5, 1: -1.5, 2: 2.0, 3: 0.9e-9}
-    assert elastic._by_limit(program, needed) == {1: -1.5, 2: 2.0}
+    assert elastic._worst_rows(program, needed) == {1: -1.5, 2: 2.0}

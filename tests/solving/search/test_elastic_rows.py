@@ -21,7 +21,7 @@ def program(limits=LIMITS):
 
 
 def priced(made, prices):
-    return tuple(elastic._priced(made, point_of(made, prices), Words(toy.scene_of(toy.ToyJob(made)))))
+    return tuple(elastic._clashing_limits(made, point_of(made, prices), Words(toy.scene_of(toy.ToyJob(made)))))
 
 
 def point_of(made, prices):
@@ -59,7 +59,7 @@ def test_rows_at_corners_are_priced_with_their_limit():
     for place, named in ((0, True), (21, True), (22, False), (43, False), (44, True), (45, True), (46, False)):
         prices = np.zeros(len(single) + 2 * 22 + 2 * 2)
         prices[len(single) + place] = 1.0
-        found = elastic._priced(made, point_of(made, prices), Words(scene))
+        found = elastic._clashing_limits(made, point_of(made, prices), Words(scene))
         assert found == ({"N_min >= 100 N": "N_min"} if named else {}), place
 
 
@@ -72,7 +72,7 @@ def test_without_multipliers_nothing_has_a_price():
 
 def test_a_need_of_a_billionth_is_none_and_of_two_that_are_equal_the_first_counts():
     made = toy.program("xy", limits=(("x", -1, 2.0), ("x", -1, 3.0), ("y", 1, 1.0), ("y", -1, 1.0)))
-    assert elastic._by_limit(made, {0: 0.5, 1: 0.5, 2: NEEDED, 3: 1.001 * NEEDED}) == {0: 0.5, 3: 1.001 * NEEDED}
+    assert elastic._worst_rows(made, {0: 0.5, 1: 0.5, 2: NEEDED, 3: 1.001 * NEEDED}) == {0: 0.5, 3: 1.001 * NEEDED}
     sized = toy.program("xy", limits=(("x", -1, 2.0),), sizes={"x": 100.0})
-    assert elastic._by_limit(sized, {0: 99 * NEEDED}) == {}
-    assert elastic._by_limit(sized, {0: 101 * NEEDED}) == {0: 101 * NEEDED}
+    assert elastic._worst_rows(sized, {0: 99 * NEEDED}) == {}
+    assert elastic._worst_rows(sized, {0: 101 * NEEDED}) == {0: 101 * NEEDED}

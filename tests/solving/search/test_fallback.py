@@ -23,14 +23,14 @@ def search(today, start=1.5, limits=()):
 
 
 def test_a_certified_optimum_worse_than_todays_machine_is_left_for_the_one_that_today_leads_to():
-    found = multistart.resolved(search(-0.8), starts=1)
+    found = multistart.run_search(search(-0.8), starts=1)
     assert found.passed
     assert found.best.x["x"] == pytest.approx(LEAST, abs=1e-8)
     assert not found.substitute
 
 
 def test_a_machine_of_today_that_breaks_a_limit_counts_for_nothing():
-    found = multistart.resolved(search(-0.8, limits=(("g", 1, 0.5),)), starts=1)
+    found = multistart.run_search(search(-0.8, limits=(("g", 1, 0.5),)), starts=1)
     assert found.passed
     assert found.best.x["x"] == pytest.approx(SECOND, abs=1e-8)
 

@@ -46,7 +46,7 @@ def test_a_number_that_serves_no_level_ends_as_near_to_todays_as_limits_allow(li
     design, certificate = solved(program(*limits))
     assert design["x"] == pytest.approx(2, abs=1e-6)
     assert design["z"] == pytest.approx(value, abs=1e-6)
-    assert "z: serves no level, least change from today" in certificate.settled
+    assert "z: serves no level, least change from today" in certificate.tie_breaks
     assert not certificate.open
 
 
@@ -56,7 +56,7 @@ def test_a_number_that_serves_no_level_ends_as_near_to_todays_as_limits_allow(li
 def test_where_limits_ask_both_more_and_less_of_it_it_is_sought_as_any_other(limits):
     own = program(*limits)
     design, certificate = solved(own)
-    assert not any("serves no level" in said for said in certificate.settled)
+    assert not any("serves no level" in said for said in certificate.tie_breaks)
     assert design["x"] + design["y"] == pytest.approx(4, abs=1e-8)
     plain, _ = solved(replace(own, any_numbers=False))
     assert design == plain
@@ -68,13 +68,15 @@ def test_a_number_that_only_moves_where_a_wave_is_read_serves_no_level():
     own = program(objectives=("peak wave",), waves=waves)
     design, certificate = solved(own)
     assert design["z"] == pytest.approx(5, abs=1e-9)
-    assert any("serves no level" in said for said in certificate.settled)
+    assert any("serves no level" in said for said in certificate.tie_breaks)
 
 
 def test_a_program_whose_every_number_serves_stays_itself_and_so_does_one_of_a_jobs_own_numbers():
     asked: list[object] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(inactive_variables, "held", functools.partial(_noted, asked, inactive_variables.held))
+        patch.setattr(
+            inactive_variables, "fix_inactive", functools.partial(_noted, asked, inactive_variables.fix_inactive)
+        )
         solved(program(objectives=("sum",), any_numbers=True))
         solved(program(any_numbers=False))
     assert asked == [None]
@@ -95,6 +97,6 @@ def test_a_wrong_guess_costs_a_second_search_and_no_answer():
         return replace(search.program, variables=tuple(fixed))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(inactive_variables, "held", worst)
+        patch.setattr(inactive_variables, "fix_inactive", worst)
         design, _ = solved(own)
     assert design["x"] + design["y"] == pytest.approx(4, abs=1e-8)

@@ -16,7 +16,7 @@ from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.search import least_change, tie_break
 from loomopt.solving.search.least_change import with_least_change
-from loomopt.solving.search.search import Search, judged, objectives, tried
+from loomopt.solving.search.search import Search, certify_best, objectives, solve_from
 
 ANGLES = ("rise", "far_dwell", "return", "near_dwell")
 LEAST = "least change from today"
@@ -56,7 +56,7 @@ def degrees(answer):
 def solved(program, start, today):
     """Return the search of a toy after its least change."""
     search = Search(toy.ToyJob(program), program, Settings(), today)
-    return with_least_change(judged(tried(search, start)))
+    return with_least_change(certify_best(solve_from(search, start)))
 
 
 def test_the_sum_of_squares_in_bound_widths_is_least():
@@ -98,9 +98,11 @@ def test_what_has_no_value_of_today_is_named_as_open():
 
 
 def test_a_design_that_gets_no_certificate_stays_and_says_what_is_open(monkeypatch):
-    monkeypatch.setattr(least_change, "_held", lambda *_: None)
+    monkeypatch.setattr(least_change, "_certify_change", lambda *_: None)
     program = toy.program("xy", {"f": lambda v: v["x"] ** 2})
-    search = judged(tried(Search(toy.ToyJob(program), program, Settings(), {"y": 2.0}), {"x": 4.0, "y": 3.0}))
+    search = certify_best(
+        solve_from(Search(toy.ToyJob(program), program, Settings(), {"y": 2.0}), {"x": 4.0, "y": 3.0})
+    )
     best = with_least_change(search).best
     assert best.x == search.best.x
     assert (best.certificate.tie_breaks, best.certificate.open) == ((), ("y",))
@@ -110,7 +112,7 @@ def test_a_design_that_gets_no_certificate_stays_and_says_what_is_open(monkeypat
     "moves", [(), (AxisMove("y", ("y",), (Preference("least", "tidy"),), {"y": 0.0}, {"y": (-9, 9)}),)]
 )
 def test_nothing_is_solved_where_nothing_is_left(moves, monkeypatch):
-    monkeypatch.setattr(least_change, "tried", lambda *_: pytest.fail("solved again"))
+    monkeypatch.setattr(least_change, "solve_from", lambda *_: pytest.fail("solved again"))
     rows = {"f": lambda v: v["x"] ** 2 + (0 if moves else v["y"] ** 2)}
     program = toy.program("xy", rows, moves=moves)
     best = solved(program, {"x": 4.0, "y": 3.0}, {"x": 1.0, "y": 2.0}).best
@@ -166,10 +168,10 @@ def test_a_level_that_is_shown_says_as_much_as_one_that_is_followed():
 
 def test_designs_that_change_share_one_model():
     program = toy.program("xy", {"f": lambda v: v["x"] ** 2})
-    tasks = [least_change.changing(program, {"x": 0.0, "y": y}, (), {"x": 0.0, "y": 2.0}) for y in (1.0, 3.0)]
+    tasks = [least_change.change_program(program, {"x": 0.0, "y": y}, (), {"x": 0.0, "y": 2.0}) for y in (1.0, 3.0)]
     assert tasks[0].model is tasks[1].model
     assert tasks[0].parameters == tasks[1].parameters
-    other = least_change.changing(program, {"x": 0.0, "y": 1.0}, ("x",), {"x": 0.0, "y": 2.0})
+    other = least_change.change_program(program, {"x": 0.0, "y": 1.0}, ("x",), {"x": 0.0, "y": 2.0})
     assert other.model is not tasks[0].model
 
 
@@ -180,16 +182,16 @@ def test_only_moves_along_the_level_are_looked_at(monkeypatch):
         asked.append(set(ends[0]))
         return 0.0
 
-    monkeypatch.setattr(tie_break, "_changed", counted)
+    monkeypatch.setattr(tie_break, "_change_along", counted)
     axes = [AxisMove(n, (n,), (Preference("today", "tidy"),), {n: 0.0}, {n: (-9.0, 9.0)}) for n in "xyz"]
     program = toy.program("xyz", {"f": lambda v: v["x"] ** 2 + (v["y"] - v["z"]) ** 2}, moves=tuple(axes))
     certificate = certify(program, {"x": 0.0, "y": 1.0, "z": 1.0}, 1e-8)
-    ways = least_change.left(program, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ())
+    ways = least_change.open_directions(program, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ())
     assert len(ways) == 1, "y and z together are no move"
     assert asked == []
     flat = toy.program("xyz", {"f": lambda v: v["x"] ** 2}, moves=tuple(axes))
     certificate = certify(flat, {"x": 0.0, "y": 1.0, "z": 1.0}, 1e-8)
-    assert len(least_change.left(flat, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ("y",))) == 0
+    assert len(least_change.open_directions(flat, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ("y",))) == 0
     assert asked == [{"z"}], "y stays whatever it changes"
 
 
@@ -303,14 +305,14 @@ def test_no_earlier_objective_changes(scene, target, monkeypatch):
 
 @pytest.mark.parametrize(("name", "target"), [("beatup", "balance"), ("beatup-light", "balance"), ("beatup", "pulse")])
 def test_a_counterweight_and_a_common_scale_are_settled_by_their_own_rules(name, target, monkeypatch):
-    monkeypatch.setattr(least_change, "tried", lambda *_: pytest.fail("solved again"))
+    monkeypatch.setattr(least_change, "solve_from", lambda *_: pytest.fail("solved again"))
     answer = lo.solve(lo.load(name), target, starts=1)
     assert not answer.certificate.unique
     assert answer.certificate.open == ()
 
 
 def test_what_is_left_open_is_said(monkeypatch):
-    monkeypatch.setattr(least_change, "_moved", lambda *_: None)
+    monkeypatch.setattr(least_change, "_solve_least_change", lambda *_: None)
     answer = lo.solve(freed(operation__speed="60 rpm"), starts=1)
     assert answer.status == "optimal"
     assert "Left open, for others are as good: rise, far_dwell, return." in answer.message

@@ -12,7 +12,7 @@ import loomopt as lo
 from loomopt.solving.nlp import exchange, ipopt
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.search import elastic, multistart
-from loomopt.solving.search.multistart import BETTER, DESIGNS, MORE_STARTS, searched
+from loomopt.solving.search.multistart import BETTER, DESIGNS, MORE_STARTS, search_starts
 from loomopt.solving.search.search import Candidate, Search
 
 __all__ = ["certified", "solved"]
@@ -24,7 +24,7 @@ def test_more_starts_are_tried_where_none_is_certified(certified, solved):
     answers["all"] = BAD
     points += [Point({"x": float(k), "y": 0.0}, "Solve_Succeeded", True) for k in range(MORE_STARTS)]
     told = []
-    found = searched(empty(), 2, 0, (), lambda number, count: told.append((number, count)))
+    found = search_starts(empty(), 2, 0, (), lambda number, count: told.append((number, count)))
     assert told == [(1, 2), (2, 2), *((k, 8) for k in range(3, 9))]
     assert (len(calls), len(found.candidates)) == (8, 8)
     assert len({tuple(start.items()) for start, _, _ in calls}) == 8
@@ -33,10 +33,10 @@ def test_more_starts_are_tried_where_none_is_certified(certified, solved):
 def test_one_certified_start_is_enough(certified, solved):
     calls, points = solved
     points.append(Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, build_seconds=0.25))
-    found = searched(empty(), 1, 0, (), None)
-    assert (len(calls), found.passed, found.built) == (1, True, 0.25)
-    assert found.solved >= 0.0
-    assert found.certified > 0.0
+    found = search_starts(empty(), 1, 0, (), None)
+    assert (len(calls), found.passed, found.build_seconds) == (1, True, 0.25)
+    assert found.solve_seconds >= 0.0
+    assert found.certify_seconds > 0.0
 
 
 def test_a_neighbour_leads_on_or_is_forgotten(certified, solved):
@@ -44,11 +44,11 @@ def test_a_neighbour_leads_on_or_is_forgotten(certified, solved):
     calls, points = solved
     near = Point({"x": 7.0, "y": 1.0}, "Solve_Succeeded", True)
     points.append(near)
-    assert searched(empty(), 3, 0, (near,), None).passed
+    assert search_starts(empty(), 3, 0, (near,), None).passed
     assert calls == [({"x": 7.0, "y": 1.0}, 1000.0, near)]
     answers[7.0] = BAD
     points += [near, Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True)]
-    found = searched(empty(), 1, 0, (near,), None)
+    found = search_starts(empty(), 1, 0, (near,), None)
     assert (len(found.candidates), found.passed, found.best.x["x"]) == (2, True, 1.0)
 
 
@@ -65,29 +65,29 @@ def hills(**more):
 
 
 def wide(program, **more):
-    return searched(Search(toy.ToyJob(program), program, Settings(), **more), None, 0, (), None)
+    return search_starts(Search(toy.ToyJob(program), program, Settings(), **more), None, 0, (), None)
 
 
 def test_the_deeper_basin_is_found_and_what_was_done_is_counted():
     found = wide(hills())
     assert found.best.x["x"] < -1.9
-    assert found.designs == DESIGNS
+    assert found.screened == DESIGNS
     assert len(found.candidates) >= 7, "its own start, four designs, and each variable at its far end"
-    one = searched(Search(toy.ToyJob(hills()), hills(), Settings()), 1, 0, (), None)
+    one = search_starts(Search(toy.ToyJob(hills()), hills(), Settings()), 1, 0, (), None)
     assert one.best.x["x"] > 1.8
-    assert (len(one.candidates), one.designs) == (1, 0)
+    assert (len(one.candidates), one.screened) == (1, 0)
 
 
 def test_where_one_optimum_is_all_there_is_no_designs_are_looked_at():
     found = wide(hills(single="because"))
-    assert (len(found.candidates), found.designs) == (1, 0)
+    assert (len(found.candidates), found.screened) == (1, 0)
     assert found.best.x["x"] > 1.8, "the programme's word is taken"
 
 
 def test_starts_that_cannot_be_better_are_left():
     found = wide(hills())
     left = [c.point for c in found.candidates if c.point.status == "Beaten"]
-    least = min(c.objectives[0] for c in found.reached)
+    least = min(c.objectives[0] for c in found.usable)
     assert left
     assert all(point.value > least - 2 * BETTER for point in left)
 
@@ -114,7 +114,7 @@ def test_nothing_more_is_solved_where_no_design_can_be_better(objectives, least,
 def test_each_start_is_told_with_how_many_there_are():
     told = []
     program = hills()
-    searched(Search(toy.ToyJob(program), program, Settings()), None, 0, (), lambda k, of: told.append((k, of)))
+    search_starts(Search(toy.ToyJob(program), program, Settings()), None, 0, (), lambda k, of: told.append((k, of)))
     assert [k for k, _ in told] == list(range(1, len(told) + 1))
     assert told[-1][0] == told[-1][1]
     assert [of for _, of in told] == sorted(of for _, of in told)
@@ -149,8 +149,8 @@ def test_where_a_design_needs_no_relaxation_it_is_solved_from_there(certified, s
 
 def test_a_neighbours_basin_is_kept_to_and_said():
     first = wide(hills())
-    away = searched(Search(toy.ToyJob(hills()), hills(), Settings()), 1, 0, (), None)
-    warm = searched(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, (away.best.point,), None)
+    away = search_starts(Search(toy.ToyJob(hills()), hills(), Settings()), 1, 0, (), None)
+    warm = search_starts(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, (away.best.point,), None)
     assert (warm.stayed, first.stayed) == (True, False)
     assert warm.best.x["x"] > 1.8
 
@@ -210,11 +210,11 @@ def test_random_beat_ups_are_as_good_as_from_sixteen_random_starts(count):
 
 def test_of_several_neighbours_the_better_basin_counts():
     """Both points lead on; whichever comes first, the deeper of two valleys is the answer."""
-    found = searched(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, (), None)
+    found = search_starts(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, (), None)
     best = found.best.point
-    other = next(c.point for c in found.reached if abs(c.objectives[0] - found.best.objectives[0]) > 1e-3)
+    other = next(c.point for c in found.usable if abs(c.objectives[0] - found.best.objectives[0]) > 1e-3)
     for near in ((other, best), (best, other)):
-        again = searched(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, near, None)
+        again = search_starts(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, near, None)
         assert again.stayed
         assert again.best.objectives == pytest.approx(found.best.objectives)
 
@@ -294,9 +294,9 @@ def test_other_designs_may_be_as_good_where_solves_ended_there_but_not_where_the
     found = wide(program)
     found = replace(found, candidates=(found.ranked[0],))
     lost = Point({"x": 0.5, "y": 0.5}, "Maximum_Iterations_Exceeded", False)
-    assert not multistart.tied(replace(found, candidates=(*found.candidates, Candidate(lost, (), -1.0))))
+    assert not multistart.may_be_tied(replace(found, candidates=(*found.candidates, Candidate(lost, (), -1.0))))
     beaten = Candidate(replace(lost, status="Beaten"), (), found.best.value)
-    assert multistart.tied(replace(found, candidates=(*found.candidates, beaten)))
+    assert multistart.may_be_tied(replace(found, candidates=(*found.candidates, beaten)))
 
 
 def test_a_start_that_ends_beside_the_known_design_is_not_solved_again(monkeypatch):

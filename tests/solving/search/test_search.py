@@ -13,7 +13,7 @@ from loomopt.solving.certificate.records import Certificate, Level
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.search import search as searching
-from loomopt.solving.search.search import MOST_ALIKE, Search, compared, judged, objectives
+from loomopt.solving.search.search import MOST_ALIKE, Search, certify_best, compare, objectives
 
 __all__ = ["certified", "solved"]
 
@@ -32,7 +32,7 @@ __all__ = ["certified", "solved"]
     ],
 )
 def test_candidates_are_ordered_level_by_level(one, other, order):
-    assert compared(candidate(*one), candidate(*other)) == order
+    assert compare(candidate(*one), candidate(*other)) == order
 
 
 def test_two_objectives_agree_to_a_ten_millionth():
@@ -53,24 +53,24 @@ def test_objectives_are_in_natural_sizes_and_true_over_the_cycle():
 def test_the_best_that_was_reached_is_judged(certified):
     seen, _ = certified
     points = candidate(0, x=3.0, reached=False), candidate(2, x=1.0), candidate(1, x=2.0)
-    found = judged(empty(candidates=points))
+    found = certify_best(empty(candidates=points))
     assert seen == [2.0]
     assert (found.best.point, found.passed) == (points[2].point, True)
     assert found.ranked == [points[2], points[1]]
-    assert found.reached == [points[1], points[2]]
+    assert found.usable == [points[1], points[2]]
 
 
 def test_what_was_judged_is_not_judged_again(certified):
     seen, _ = certified
-    found = judged(empty(candidates=(candidate(1, x=1.0),)))
-    assert judged(found).best is found.best
+    found = certify_best(empty(candidates=(candidate(1, x=1.0),)))
+    assert certify_best(found).best is found.best
     more = replace(found, candidates=(*found.candidates, candidate(0.5, x=2.0)))
-    assert judged(more).best.objectives == (0.5,)
+    assert certify_best(more).best.objectives == (0.5,)
     assert seen == [1.0, 2.0]
 
 
 def test_nothing_reached_is_nothing_judged(certified):
-    found = judged(empty(candidates=(candidate(0, reached=False),)))
+    found = certify_best(empty(candidates=(candidate(0, reached=False),)))
     assert (found.best, found.passed, certified[0]) == (None, False, [])
 
 
@@ -78,7 +78,7 @@ def test_where_the_best_does_not_pass_others_with_its_objectives_may(certified):
     seen, answers = certified
     answers |= {1.0: BAD, 2.0: BAD}
     points = tuple(candidate(1, x=float(k)) for k in (1, 2, 3, 4))
-    found = judged(empty(candidates=points))
+    found = certify_best(empty(candidates=points))
     assert seen == [1.0, 2.0, 3.0]
     assert (found.passed, found.best.point) == (True, points[2].point)
 
@@ -87,7 +87,7 @@ def test_a_few_of_them_are_tried_and_then_the_best_stays(certified):
     seen, answers = certified
     answers["all"] = BAD
     points = tuple(candidate(1, x=float(k)) for k in range(1, 10))
-    found = judged(empty(candidates=points))
+    found = certify_best(empty(candidates=points))
     assert MOST_ALIKE == 4
     assert seen == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert (found.passed, found.best.point) == (False, points[0].point)
@@ -96,10 +96,10 @@ def test_a_few_of_them_are_tried_and_then_the_best_stays(certified):
 def test_what_breaks_a_limit_is_no_design_whatever_the_solver_said(certified):
     seen, answers = certified
     answers[1.0] = replace(BAD, feasibility=2 * FEASIBLE)
-    found = judged(empty(candidates=(candidate(1, x=1.0), candidate(1.1, x=2.0))))
+    found = certify_best(empty(candidates=(candidate(1, x=1.0), candidate(1.1, x=2.0))))
     assert (seen, found.passed, found.best.point.x["x"]) == ([1.0, 2.0], True, 2.0)
-    assert [c.point.x["x"] for c in found.reached] == [2.0]
-    alone = judged(empty(candidates=(candidate(1, x=1.0),)))
+    assert [c.point.x["x"] for c in found.usable] == [2.0]
+    alone = certify_best(empty(candidates=(candidate(1, x=1.0),)))
     assert (alone.passed, alone.best.certificate.feasibility) == (False, 2 * FEASIBLE), "what there is to tell"
 
 
@@ -108,7 +108,7 @@ def test_where_a_level_falls_by_its_curvature_it_is_held_harder_from_there(certi
     answers, (calls, points) = certified[1], solved
     answers |= {1.0: replace(BAD, minimum=False), 0.0: second, -1.0: BAD}
     points += [Point({"x": x, "y": 0.0}, "Solve_Succeeded", True) for x in (0.0, -1.0)]
-    found = judged(empty(candidates=(candidate(1, x=1.0),)))
+    found = certify_best(empty(candidates=(candidate(1, x=1.0),)))
     assert [(start["x"], weight) for start, weight, _ in calls] == [(1.0, weight) for weight in weights]
     assert (found.passed, found.best.point.x["x"]) == ((True, 0.0) if second.passed else (False, 1.0))
     assert found.settings.penalty == 1e3, "other starts are weighed as before"
@@ -129,14 +129,14 @@ def test_where_a_slope_or_a_curvature_refuses_the_best_it_is_brought_closer_to_w
     answers[1.0] = replace(BAD, **why)
     beside = replace(candidate(1, x=5.0).point, x={"x": 5.0, "y": 0.0})
     monkeypatch.setattr(exchange, "refine_active_set", lambda *asked: beside)
-    found = judged(replace(empty(candidates=(candidate(1, x=1.0),)), settings=Settings(penalty=1e7)))
+    found = certify_best(replace(empty(candidates=(candidate(1, x=1.0),)), settings=Settings(penalty=1e7)))
     assert (seen, found.passed) == (([1.0, 5.0], True) if closer else ([1.0], False))
 
 
 def test_worse_candidates_do_not_stand_for_the_best(certified):
     seen, answers = certified
     answers[1.0] = BAD
-    found = judged(empty(candidates=(candidate(1, x=1.0), candidate(1 + 1e-6, x=2.0))))
+    found = certify_best(empty(candidates=(candidate(1, x=1.0), candidate(1 + 1e-6, x=2.0))))
     assert (seen, found.passed) == ([1.0], False)
 
 
@@ -163,7 +163,7 @@ def test_a_level_that_gave_way_is_solved_again_with_a_stronger_weight(certified,
     calls, points = solved
     answers[1.0] = certificate
     points.append(Point({"x": 0.0, "y": -1.0}, "Solve_Succeeded", True))
-    found = judged(empty(candidates=(candidate(1, x=1.0),)))
+    found = certify_best(empty(candidates=(candidate(1, x=1.0),)))
     assert calls == ([({"x": 1.0, "y": 0.0}, 100_000.0, None)] if again else [])
     if again:
         assert (found.passed, found.settings.penalty) == (True, 1e5)
@@ -176,7 +176,7 @@ def test_the_weight_grows_to_an_end(certified, solved):
     calls, points = solved
     answers["all"] = gave_way(stationarity=1.0)
     points += [Point({"x": 1.0, "y": -float(k)}, "Solve_Succeeded", True) for k in (1, 2, 3)]
-    found = judged(empty(candidates=(candidate(1, x=1.0),)))
+    found = certify_best(empty(candidates=(candidate(1, x=1.0),)))
     # At last the first level alone, of which no weight holds it against a later one.
     assert [weight for _, weight, _ in calls] == [1e5, 1e7, 1e3]
     assert not found.passed
@@ -187,7 +187,7 @@ def test_a_stronger_weight_that_leads_nowhere_leaves_the_best_as_it_was(certifie
     calls, points = solved
     answers["all"] = gave_way(stationarity=1.0)
     points += [Point({"x": 9.0, "y": 0.0}, "Maximum_Iterations_Exceeded", False)] * 2
-    found = judged(empty(candidates=(candidate(1, x=1.0),)))
+    found = certify_best(empty(candidates=(candidate(1, x=1.0),)))
     assert [weight for _, weight, _ in calls] == [1e5, 1e3]
     assert found.best.x == {"x": 1.0, "y": 0.0}
     assert len(found.candidates) == 2
@@ -206,7 +206,7 @@ def followed(certified, *certificates):
     """Return where the search ends from x = 1, and what was certified on the way."""
     seen, answers = certified
     answers["all"] = lambda count: certificates[count - 1]
-    found = judged(empty(candidates=(candidate(1, x=1.0),)))
+    found = certify_best(empty(candidates=(candidate(1, x=1.0),)))
     return found.best, seen
 
 
@@ -243,7 +243,7 @@ def test_steps_end_after_four_and_stay_within_bounds(certified):
     assert seen == [1.0, 1.5, 2.0, 2.5, 3.0]
     bound = toy.program("xy", {"f": lambda v: v["x"]}, bounds={"x": (0.0, 1.25)}, objectives=("f", "f"))
     certified[0].clear()
-    judged(Search(toy.ToyJob(bound), bound, Settings(), candidates=(candidate(1, 1, x=1.0),)))
+    certify_best(Search(toy.ToyJob(bound), bound, Settings(), candidates=(candidate(1, 1, x=1.0),)))
     assert certified[0][:2] == [1.0, 1.25]
 
 
@@ -251,7 +251,7 @@ def test_steps_end_after_four_and_stay_within_bounds(certified):
 
 
 def test_objectives_that_differ_by_just_as_much_as_is_one_optimum_are_one():
-    assert compared(candidate(0.0, 1.0), candidate(SAME_OBJECTIVE, 0.0)) == 1
+    assert compare(candidate(0.0, 1.0), candidate(SAME_OBJECTIVE, 0.0)) == 1
 
 
 def test_of_several_candidates_the_last_says_whether_a_stronger_weight_led_on(certified, solved):
@@ -260,14 +260,14 @@ def test_of_several_candidates_the_last_says_whether_a_stronger_weight_led_on(ce
     calls, points = solved
     answers["all"] = gave_way(stationarity=1.0)
     points += [Point({"x": 9.0, "y": 0.0}, "Maximum_Iterations_Exceeded", False)] * 2
-    found = judged(empty(candidates=(candidate(1, x=1.0), candidate(2, x=2.0), candidate(3, x=3.0))))
+    found = certify_best(empty(candidates=(candidate(1, x=1.0), candidate(2, x=2.0), candidate(3, x=3.0))))
     assert [weight for _, weight, _ in calls] == [1e5, 1e3]
     assert len(found.candidates) == 4
     assert found.best.x["x"] == 1.0
 
 
 def test_a_variable_that_a_step_does_not_name_stays():
-    assert searching._stepped(PROGRAM, {"x": 1.0, "y": 2.0}, {"x": 0.5}) == {"x": 1.5, "y": 2.0}
+    assert searching._step_within_bounds(PROGRAM, {"x": 1.0, "y": 2.0}, {"x": 0.5}) == {"x": 1.5, "y": 2.0}
 
 
 def test_time_of_solves_is_summed(certified, solved, monkeypatch):
@@ -275,11 +275,11 @@ def test_time_of_solves_is_summed(certified, solved, monkeypatch):
     monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
     points = solved[1]
     points += [Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, build_seconds=0.125) for _ in range(2)]
-    twice = searching.tried(searching.tried(empty(), {"x": 0.0}), {"x": 0.0})
-    assert (twice.solved, twice.built) == (0.75, 0.25)
-    judged = searching._certified(twice, twice.candidates[0])
+    twice = searching.solve_from(searching.solve_from(empty(), {"x": 0.0}), {"x": 0.0})
+    assert (twice.solve_seconds, twice.build_seconds) == (0.75, 0.25)
+    end = searching._certify_candidate(twice, twice.candidates[0])
     # The certificate begun, and then what lies between the refined points.
-    assert (judged.tie_broken, judged.certified) == (1.0, 2.5)
+    assert (end.tie_break_seconds, end.certify_seconds) == (1.0, 2.5)
 
 
 @pytest.mark.parametrize(
@@ -295,19 +295,19 @@ def test_time_of_solves_is_summed(certified, solved, monkeypatch):
 )
 def test_all_levels_but_the_last_may_have_given_way(slopes, weak):
     levels = tuple(Level("f", slope, 0.0, 0.0) for slope in slopes)
-    assert searching._too_weak(Settings(), replace(BAD, levels=levels)) == weak
+    assert searching._is_too_weak(Settings(), replace(BAD, levels=levels)) == weak
 
 
 @pytest.mark.parametrize(("penalty", "weak"), [(1e5, True), (1.001e5, False)])
 def test_a_weight_grows_to_the_strongest_and_no_farther(penalty, weak):
-    assert searching._too_weak(replace(Settings(), penalty=penalty), gave_way(stationarity=1.0)) == weak
+    assert searching._is_too_weak(replace(Settings(), penalty=penalty), gave_way(stationarity=1.0)) == weak
 
 
 @pytest.mark.parametrize(("held", "weak"), [(500.0, True), (499.9, False)])
 def test_a_weight_must_exceed_what_it_holds_twice(held, weak):
-    assert searching._too_weak(replace(Settings(), penalty=1000.0), gave_way(held=held)) == weak
+    assert searching._is_too_weak(replace(Settings(), penalty=1000.0), gave_way(held=held)) == weak
     first = replace(BAD, levels=(Level("f", 0.0, 0.0, 9e9), Level("g", 0.0, 0.0, 0.0)))
-    assert not searching._too_weak(Settings(), first), "what holds a level counts, not what the first one says"
+    assert not searching._is_too_weak(Settings(), first), "what holds a level counts, not what the first one says"
 
 
 def test_a_step_that_leaves_limits_just_held_is_kept(certified):

@@ -24,7 +24,7 @@ def left(value):
     ("made", "sentence"),
     [
         (search(), "The only optimum reached by 1 solve."),
-        (search(left(1002.0), designs=512), "The only optimum reached by 2 solves, 512 designs sampled."),
+        (search(left(1002.0), screened=512), "The only optimum reached by 2 solves, 512 designs sampled."),
         (search(candidate(1, 3, x=2.0), left(7.0)), "Best of 2 optima reached by 3 solves."),
         (search(stayed=True), "Solved again near the answer given; other basins were not looked at."),
     ],

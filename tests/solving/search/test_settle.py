@@ -6,7 +6,7 @@ from support import toy
 
 import loomopt as lo
 from loomopt.model.program import AxisMove, Preference, ScaleMove
-from loomopt.solving.search.tie_break import moved, unchanging
+from loomopt.solving.search.tie_break import apply_moves, flat_directions
 from reference.beatup import DESIGN, LENGTHS, Machine
 
 
@@ -94,7 +94,7 @@ def test_today_s_own_values_are_kept_where_nothing_asks_for_others():
 def slid(rows, goal, limits=(), y=0.5):
     """Return y after the silent level that wants it at goal; f is the objective."""
     program = toy.program("xy", rows, limits=limits, moves=(slide(goal),))
-    x, said = moved(program, {"x": 1.0, "y": y})
+    x, said = apply_moves(program, {"x": 1.0, "y": y})
     assert x["x"] == 1.0
     return x["y"], said
 
@@ -144,7 +144,7 @@ def test_a_met_limit_that_falls_first_stops_where_it_is_met_again():
 def test_nothing_is_said_to_be_settled_where_nothing_moved():
     assert slid(FLAT, 0.5) == (0.5, ())
     program = toy.program("xy", FLAT)
-    assert moved(program, {"x": 1.0, "y": 0.5}) == ({"x": 1.0, "y": 0.5}, ())
+    assert apply_moves(program, {"x": 1.0, "y": 0.5}) == ({"x": 1.0, "y": 0.5}, ())
 
 
 # Goals of a move --------------------------------------------------------------------------------------------------
@@ -219,13 +219,13 @@ def test_a_peak_is_compared_all_round_not_by_its_height():
     """The peak of x cos φ + y sin 2 φ / 9 stays 1 or nearly; the wave does not."""
     waves = {"w": lambda m, v, phi: m.cos(phi) * v["x"] + v["y"] * (1 - m.cos(phi) ** 2) ** 4 / 99}
     program = toy.program("xy", {}, waves, objectives=("peak w",), moves=(slide(0.9),))
-    assert moved(program, {"x": 1.0, "y": 0.5})[0]["y"] == 0.5
+    assert apply_moves(program, {"x": 1.0, "y": 0.5})[0]["y"] == 0.5
 
 
 @pytest.mark.parametrize(("size", "told"), [(1.0, True), (1e3, False), (1e-3, True)])
 def test_a_move_is_told_that_is_no_rounding_in_the_variables_own_size(size, told):
     program = toy.program("xy", FLAT, moves=(slide(0.5 + 1e-7),), sizes={"y": size})
-    assert bool(moved(program, {"x": 1.0, "y": 0.5})[1]) == told
+    assert bool(apply_moves(program, {"x": 1.0, "y": 0.5})[1]) == told
 
 
 # To the last number -----------------------------------------------------------------------------------------------
@@ -240,14 +240,14 @@ def test_a_wish_that_can_be_met_is_met_to_the_last_bit():
 def test_a_limit_that_is_touched_may_change_by_next_to_nothing(change, same):
     rows = FLAT | {"h": lambda v: change * (v["y"] == 9.0)}
     program = toy.program("xy", rows, limits=(("h", 1, 0.0),), moves=(slide(1.0, 0.5, 9.0),))
-    assert bool(unchanging(program, {"x": 1.0, "y": 0.5})) == same
+    assert bool(flat_directions(program, {"x": 1.0, "y": 0.5})) == same
 
 
 @pytest.mark.parametrize(("short", "same"), [(1e-7, False), (1.1e-7, True)])
 def test_a_limit_counts_as_touched_within_a_ten_millionth(short, same):
     rows = FLAT | {"h": lambda v: (v["y"] == 9.0) * 1e-3 - short}
     program = toy.program("xy", rows, limits=(("h", 1, 0.0),), moves=(slide(1.0, 0.5, 9.0),))
-    assert bool(unchanging(program, {"x": 1.0, "y": 0.5})) == same
+    assert bool(flat_directions(program, {"x": 1.0, "y": 0.5})) == same
 
 
 def test_a_limit_gives_way_by_rounding_only():
@@ -257,7 +257,7 @@ def test_a_limit_gives_way_by_rounding_only():
 
 def test_a_limit_that_is_touched_and_stays_where_it_is_does_not_change():
     program = toy.program("xy", FLAT, limits=(("x", 1, 1.0),), moves=(slide(1.0, 0.5, 9.0),))
-    assert unchanging(program, {"x": 1.0 - 5e-8, "y": 0.5}) == [{"y": 1.0}]
+    assert flat_directions(program, {"x": 1.0 - 5e-8, "y": 0.5}) == [{"y": 1.0}]
 
 
 @pytest.mark.parametrize(("end", "flat"), [(0.5, False), (0.5004, False), (0.5006, True), (0.6, True)])
@@ -273,14 +273,14 @@ def test_what_is_no_number_on_the_way_has_changed():
     both = toy.program("xy", FLAT | root, objectives=("f", "g"), moves=move)
     limit = toy.program("xy", FLAT | root, limits=(("g", 1, 0.0),), moves=move)
     with np.errstate(invalid="ignore"):
-        assert unchanging(toy.program("xy", FLAT, moves=move), there) == [{"y": 1.0}]
-        assert unchanging(both, there) == unchanging(limit, there) == []
+        assert flat_directions(toy.program("xy", FLAT, moves=move), there) == [{"y": 1.0}]
+        assert flat_directions(both, there) == flat_directions(limit, there) == []
 
 
 def test_a_bound_of_what_moves_is_no_limit_that_changes_and_any_other_is():
     there, move = {"x": 1.0, "y": 9.0}, (slide(1.0, 0.5, 9.0),)
-    assert unchanging(toy.program("xy", FLAT, bounds={"y": (0.5, 9.0)}, moves=move), there) == [{"y": 1.0}]
-    assert unchanging(toy.program("xy", FLAT, limits=(("y", 1, 9.0),), moves=move), there) == []
+    assert flat_directions(toy.program("xy", FLAT, bounds={"y": (0.5, 9.0)}, moves=move), there) == [{"y": 1.0}]
+    assert flat_directions(toy.program("xy", FLAT, limits=(("y", 1, 9.0),), moves=move), there) == []
 
 
 def test_a_way_is_followed_to_its_wish_and_not_to_where_limits_hold_again_beyond_it():

@@ -26,16 +26,16 @@ def test_the_first_level_is_0_and_the_second_is_least_beside_it():
 
 def test_rows_that_span_all_are_chosen_and_no_more():
     rows = np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 1e-12], [1.0, 1.0, 0.0]])
-    chosen = vanishing_levels.independent(rows)
+    chosen = vanishing_levels.independent_rows(rows)
     assert len(chosen) == 2
     assert np.linalg.matrix_rank(rows[chosen]) == 2
-    assert vanishing_levels.independent(np.zeros((3, 2))) == []
+    assert vanishing_levels.independent_rows(np.zeros((3, 2))) == []
 
 
 def test_only_a_peak_of_a_size_can_be_held_at_0():
     signed = toy.model(waves=WAVES, signed=True)
     plain = toy.model(waves=WAVES)
-    assert vanishing_levels.smooth(plain, Peak("wave", "wave", 1.0)) == ("wave",)
-    assert vanishing_levels.smooth(signed, Peak("wave", "wave", 1.0)) == ()
-    assert vanishing_levels.smooth(plain, Magnitude("f", "f", 1.0)) == ()
-    assert vanishing_levels.smooth(plain, Value("f", "f", 1.0)) == ()
+    assert vanishing_levels.smooth_quantities(plain, Peak("wave", "wave", 1.0)) == ("wave",)
+    assert vanishing_levels.smooth_quantities(signed, Peak("wave", "wave", 1.0)) == ()
+    assert vanishing_levels.smooth_quantities(plain, Magnitude("f", "f", 1.0)) == ()
+    assert vanishing_levels.smooth_quantities(plain, Value("f", "f", 1.0)) == ()

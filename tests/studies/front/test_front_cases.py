@@ -11,7 +11,7 @@ import pytest
 from support import slow
 
 import loomopt as lo
-from loomopt.solving.search.search import NOT_JUDGED, judged
+from loomopt.solving.search.search import NOT_CERTIFIED, certify_best
 from loomopt.studies.front import front, plan
 from loomopt.studies.front import solver as solving
 from loomopt.studies.front.solver import Asking
@@ -97,11 +97,11 @@ def test_a_point_whose_second_level_is_not_certified_keeps_what_the_first_came_t
     solver = front.trade(scene, ("K1", "contact_max"), "stiffness").solver
 
     def refused(search):
-        found = judged(search)
+        found = certify_best(search)
         two = len(found.program.objectives) == len(solver.base.objectives)
-        return replace(found, best=found.best._replace(certificate=NOT_JUDGED)) if found.best and two else found
+        return replace(found, best=found.best._replace(certificate=NOT_CERTIFIED)) if found.best and two else found
 
-    monkeypatch.setattr(solving, "judged", refused)
+    monkeypatch.setattr(solving, "certify_best", refused)
     found = solver.solve(Asking(1, (None, None)), [], False)
     assert found.status == "optimal"
     assert found.warm["axes"]["contact_max"] == pytest.approx(2327.2748160284, rel=1e-9)
