@@ -1,4 +1,4 @@
-"""One point of a front: least of one axis with the other at most so much, then least of the other; its whole answer."""
+"""One point of a front: the least of one axis with the other limited, then the least of the other; its answer."""
 
 import functools
 import math
@@ -39,20 +39,20 @@ if TYPE_CHECKING:
     from loomopt.solving.answer.solution import Proofs
 
 RUNAWAY = 100.0
-"""Natural sizes beyond which a variable without a bound has no end: no machine is so far from today's."""
+"""Scaled value beyond which a variable without a bound runs away: no machine is so far from today's."""
 ENDS = {-1: "min", 0: "fixed", 1: "max"}
 
 
 def capped(axis: Traded) -> str:
-    """Return what the limit on an axis is called."""
+    """Name of the limit on an axis."""
     return f"{axis.axis.name} at most as asked"
 
 
 class Asking(NamedTuple):
     """One program of a front.
 
-    first: which axis comes first, 0 or 1; caps: the largest value of each axis, None for no limit; levels: 1 for the
-    first axis alone, 2 for the other after it.
+    first: the axis that is optimised first, 0 or 1; caps: largest value of each axis, None for no limit; levels: 1 for
+    the first axis alone, 2 for the other after it.
     """
 
     first: Literal[0, 1]
@@ -62,7 +62,7 @@ class Asking(NamedTuple):
 
 @dataclass(frozen=True)
 class Reached:
-    """What a point came to: status, reason and, where there is a design, its figures, prices and where it stood."""
+    """Result of a point: status, reason and, if there is a design, its figures, prices and data for a warm start."""
 
     status: str
     reason: str | None
@@ -74,14 +74,14 @@ class Reached:
 
     @property
     def certified(self) -> bool:
-        """Whether it is as good as an answer."""
+        """Whether the result is certified."""
         return self.status == "optimal"
 
 
 class Moved(NamedTuple):
-    """Where a neighbour's design moves to in another program, not certified.
+    """A neighbour's design moved to another program, not certified.
 
-    figure: of the axis sought there, SI; led: whether it kept to its basin: Newton's method or pivots led all the way.
+    figure: of the optimised axis, SI; same_basin: whether Newton's method or pivots led there all the way.
     """
 
     point: Point
@@ -90,7 +90,7 @@ class Moved(NamedTuple):
 
 
 class Solver:
-    """The programs of one front, and how they are solved; axes: the first is sought, the second is what it costs."""
+    """Programs of one front and their solves; axes: the first is optimised, the second is limited."""
 
     def __init__(self, scene: Scene, target: str | None, asked: Requested, accuracy: float) -> None:
         self.scene, self.accuracy, self.job = scene, accuracy, registry.of(scene)
@@ -99,21 +99,21 @@ class Solver:
 
     @property
     def slope(self) -> Multiplier:
-        """What a row calls the slope of the first axis over the second."""
+        """Multiplier of the slope of the first axis over the second."""
         return sloped((self.axes[0].axis.name, self.axes[1].axis.name))
 
     @property
     def held(self) -> int:
-        """How many levels come before the axes."""
+        """Number of levels before the axes."""
         return len(self.base.objectives) - 2
 
     def runaway(self, x: Mapping[str, float]) -> str:
-        """Return which variable without a bound is out of all proportion at x (SI); "" for none."""
+        """Designer's name of a variable without a bound that runs away at x (SI); "" for none."""
         loose = (v for v in self.base.variables if not math.isfinite(v.upper if x[v.name] > 0 else v.lower))
         return next((v.called for v in loose if abs(x[v.name]) > RUNAWAY * v.scale), "")
 
     def unstopped(self, x: Mapping[str, float]) -> str:
-        """Return which variable is at x (SI) at an end of what it can be that no limit gives it; "" for none."""
+        """Designer's name of a variable at x (SI) at an end of its range that is no limit; "" for none."""
         limits = {(limit.row, limit.sign) for limit in self.base.limits}
         for v in (v for v in self.base.variables if v.lower < v.upper):
             ends = {side for side, end in ((-1, v.lower), (1, v.upper)) if abs(x[v.name] - end) <= ACTIVE * v.scale}
@@ -121,128 +121,131 @@ class Solver:
                 return v.called
         return ""
 
-    def program(self, asking: Asking) -> Program:
-        """Return a program of the front: caps are limits whose values are parameters of what is built."""
+    def program(self, request: Asking) -> Program:
+        """A program of the front; caps are limits whose values are parameters of the built NLP."""
         levels = self.base.objectives
-        pair = levels[-2:] if asking.first == 0 else levels[:-3:-1]
+        pair = levels[-2:] if request.first == 0 else levels[:-3:-1]
         caps = [
             limit
-            for axis, cap in zip(self.axes, asking.caps, strict=True)
+            for axis, cap in zip(self.axes, request.caps, strict=True)
             if cap is not None
             for limit in axis.limits(capped(axis), cap)
         ]
-        levels = (*levels[:-2], *pair[: asking.levels])
-        # What is traded is not left to the least change from today.
+        levels = (*levels[:-2], *pair[: request.levels])
+        # The axes are not subject to the least change from today.
         traded = {row for level in pair for row in level.rows}
         moves = tuple(move for move in self.base.moves if not traded & {*move.along, *map(opposite, move.along)})
         return replace(self.base, objectives=levels, limits=(*self.base.limits, *caps), moves=moves)
 
     def solve(
         self,
-        asking: Asking,
+        request: Asking,
         near: Sequence[Mapping[str, Any]],
         wide: bool | None,
         spare: Sequence[Mapping[str, Any]] = (),
     ) -> Reached:
-        """Return what a program comes to, from neighbours' rows.
+        """Result of a program, from neighbours' rows.
 
-        wide: whether a search goes beyond their basins; None for none even where they lead nowhere; spare: rows from
-        which it starts where the others lead nowhere.
+        wide: whether to search beyond their basins; None for no search even if all of them fail; spare: rows to start
+        from if the others fail.
 
-        Where the limit on the other axis has a price, nothing is as good with less of it: then one level is enough. So
-        it is where the other one cannot be certified after it.
+        If the limit on the other axis has a price, no equal design has less of it: one level is enough. One level is
+        also enough if the other one cannot be certified.
         """
-        search = self._searched(asking, near, wide, spare)
-        if search.passed and not self._priced(search, asking):
-            found = self._begun(asking._replace(levels=2))
-            after = solve_from(found, search.ranked[0].point.x)
-            after = certify_best(after) if after.usable else after
-            if wide and after.passed and may_be_tied(search):
-                after = self._spread(after)
-            if wide and not after.passed:
-                after = search_starts(found, None, 0, (), None)
-            if after.passed:
-                search, asking = after, asking._replace(levels=2)
-        return self._told(least_change.with_least_change(search), asking)
+        search = self._searched(request, near, wide, spare)
+        if search.passed and not self._priced(search, request):
+            two_levels = self._begun(request._replace(levels=2))
+            next_search = solve_from(two_levels, search.ranked[0].point.x)
+            next_search = certify_best(next_search) if next_search.usable else next_search
+            if wide and next_search.passed and may_be_tied(search):
+                next_search = self._spread(next_search)
+            if wide and not next_search.passed:
+                next_search = search_starts(two_levels, None, 0, (), None)
+            if next_search.passed:
+                search, request = next_search, request._replace(levels=2)
+        return self._told(least_change.with_least_change(search), request)
 
-    def solve_neighbours(self, asked: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Reached | None]:
-        """Return what programs of one level come to between two optima; None of one that must be solved alone.
+    def solve_neighbours(self, requests: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Reached | None]:
+        """Results of programs of one level between two optima; None for a program that must be solved alone.
 
-        ends: both optima as JSON data, and how far a program lies from the first to the second.
+        ends: both optima as JSON data, and the share of the way from the first to the second.
         """
-        begun = []
-        for asking, (*optima, share) in zip(asked, ends, strict=True):
+        tasks = []
+        for request, (*optima, share) in zip(requests, ends, strict=True):
             first, second = map(neighbour_newton.read_optimum, optima)
-            begun.append(neighbour_newton.NeighbourTask(self._begun(asking), first, second, share, self._peaks))
-        searches = zip(asked, neighbour_newton.solve_between(begun), strict=True)
+            tasks.append(neighbour_newton.NeighbourTask(self._begun(request), first, second, share, self._peaks))
+        searches = zip(requests, neighbour_newton.solve_between(tasks), strict=True)
         return [
-            self._told(search, of)
-            if search and self._priced(search, of) and fallback.is_no_worse_than_today(search)
+            self._told(search, request_of_search)
+            if search and self._priced(search, request_of_search) and fallback.is_no_worse_than_today(search)
             else None
-            for of, search in searches
+            for request_of_search, search in searches
         ]
 
-    def moved(self, asked: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Moved | None]:
-        """Return where a neighbour's optimum moves to each program with the rows that stop it.
+    def moved(self, requests: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Moved | None]:
+        """Neighbour's optimum moved to each program with its active rows; None where other rows stop it.
 
-        None where other rows stop it there. ends: as of `solve_neighbours`, the neighbour's optimum first.
+        ends: as in `solve_neighbours`, the neighbour's optimum first.
         """
-        begun = []
-        for asking, (*optima, _) in zip(asked, ends, strict=True):
+        tasks = []
+        for request, (*optima, _) in zip(requests, ends, strict=True):
             first, second = map(neighbour_newton.read_optimum, optima)
-            begun.append(neighbour_newton.NeighbourTask(self._begun(asking), first, second, 0.0))
+            tasks.append(neighbour_newton.NeighbourTask(self._begun(request), first, second, 0.0))
         return [
-            None if x is None else self._moved(Point(x, "Solve_Succeeded", True), each.search, 0, led=True)
-            for each, x in zip(begun, neighbour_newton.move_with_rows(begun), strict=True)
+            None if x is None else self._moved(Point(x, "Solve_Succeeded", True), task.search, 0, same_basin=True)
+            for task, x in zip(tasks, neighbour_newton.move_with_rows(tasks), strict=True)
         ]
 
     def solved_from(
-        self, asking: Asking, near: Mapping[str, Any], held: Sequence[float], begin: float | None, steps: int
+        self, request: Asking, near: Mapping[str, Any], higher_levels: Sequence[float], begin: float | None, steps: int
     ) -> Moved | None:
-        """Return where a neighbour's design moves to in a program by solves on the way; None where one ends nowhere.
+        """Neighbour's design moved to a program by solves on the way; None if one of them fails.
 
-        held: what the target holds along the front; where that is not kept, no design counts; begin: the value of the
-        second axis, natural, at the neighbour; steps: how many there may be at most: one that pivots do not lead is
-        halved, as it may leave its basin.
+        higher_levels: values of the target's levels along the front, which must be kept; begin: scaled value of the
+        second axis at the neighbour; steps: most steps: a step that needs more than pivots is halved, as it may leave
+        the basin.
         """
-        share, step, found = 0.0, 1.0, None
+        share, step, result = 0.0, 1.0, None
         while share < 1.0:
-            there, (other, end) = share + step, asking.caps
-            cap = end if begin is None or end is None else begin + there * (end - begin)
-            search = self._from(self._begun(asking._replace(caps=(other, cap))), [near])
+            next_share, (other_cap, end) = share + step, request.caps
+            cap = end if begin is None or end is None else begin + next_share * (end - begin)
+            search = self._from(self._begun(request._replace(caps=(other_cap, cap))), [near])
             candidate = search.candidates[0] if search.usable else None
             if step * steps > 1.0 and (candidate is None or candidate.point.iterations):
                 step /= 2
                 continue
             if candidate is None:
                 return None
-            if any(one > other + ALIKE for one, other in zip(candidate.objectives[: self.held], held, strict=True)):
+            if any(
+                level > other_cap + ALIKE
+                for level, other_cap in zip(candidate.objectives[: self.held], higher_levels, strict=True)
+            ):
                 return None
-            led = not candidate.point.iterations and (found is None or found.led)
-            found, share = self._moved(candidate.point, search, asking.first, led), there
-            near = {"point": rows.written(found.point, search.program)}
-        return found
+            same_basin = not candidate.point.iterations and (result is None or result.led)
+            result, share = self._moved(candidate.point, search, request.first, same_basin), next_share
+            near = {"point": rows.written(result.point, search.program)}
+        return result
 
-    def _moved(self, point: Point, search: Search, first: int, led: bool) -> Moved:
-        return Moved(point, self._figure(self.axes[first], search.program, point.x), led)
+    def _moved(self, point: Point, search: Search, first: int, same_basin: bool) -> Moved:
+        return Moved(point, self._figure(self.axes[first], search.program, point.x), same_basin)
 
-    def rests(self, asking: Asking, point: Point) -> bool:
-        """Say whether a point is a certified optimum of a program, as good or bad as others may be.
+    def rests(self, request: Asking, point: Point) -> bool:
+        """Whether a point is a certified optimum of a program, even if others are better.
 
-        Its cap on the other axis must have a price: else it is only the neighbour's own design, or nothing moves it.
+        Its cap on the other axis must have a price: otherwise it is the neighbour's design itself, or nothing moves it.
         """
-        search = self._begun(asking)
-        at = replace(point, structure=search.program.structure)
-        candidate = Candidate(at, objectives(search.program, point.x))
+        search = self._begun(request)
+        point_here = replace(point, structure=search.program.structure)
+        candidate = Candidate(point_here, objectives(search.program, point.x))
         search = certify_best(replace(search, candidates=(candidate,)))
-        return search.passed and self._priced(search, asking)
+        return search.passed and self._priced(search, request)
 
     @lazy
     def _peaks(self) -> tuple[str, ...]:
         return neighbour_answer.told_peaks(self.scene, self.job, self.base)
 
-    def _begun(self, asking: Asking) -> Search:
-        return Search(self.job, self.program(asking), Settings(self.accuracy), self._today)
+    def _begun(self, request: Asking) -> Search:
+        return Search(self.job, self.program(request), Settings(self.accuracy), self._today)
 
     @lazy
     def _today(self) -> Mapping[str, float]:
@@ -251,16 +254,16 @@ class Solver:
 
     def _searched(
         self,
-        asking: Asking,
+        request: Asking,
         near: Sequence[Mapping[str, Any]],
         wide: bool | None,
         spare: Sequence[Mapping[str, Any]] = (),
     ) -> Search:
-        """Return the search for the best of a program."""
-        search = self._begun(asking)
-        for known in (near, spare):
+        """Search for the best of a program."""
+        search = self._begun(request)
+        for starts in (near, spare):
             if not search.passed:
-                search = self._beside(search, known)
+                search = self._beside(search, starts)
         if wide and search.passed:
             search = self._spread(search)
         if not (search.passed or wide is None):
@@ -268,12 +271,12 @@ class Solver:
         return fallback.no_worse(search)
 
     def _beside(self, search: Search, near: Sequence[Mapping[str, Any]]) -> Search:
-        """Return the search after solves from neighbours' rows, its best judged."""
+        """The search after solves from neighbours' rows, its best certified."""
         search = self._from(search, near)
         return certify_best(search) if search.usable else search
 
     def _from(self, search: Search, near: Sequence[Mapping[str, Any]]) -> Search:
-        """Return the search after solves from neighbours' rows."""
+        """The search after solves from neighbours' rows."""
         program = search.program
         for data in near:
             point = rows.read(data["point"], program)
@@ -284,94 +287,96 @@ class Solver:
         return search
 
     def _spread(self, search: Search) -> Search:
-        """Return a search whose best passed after a look at other basins, where there may be any."""
+        """A passed search after a search of other basins, if there may be any."""
         return search if search.program.single else certify_best(search_basins(search, 0, None))
 
-    def _priced(self, search: Search, asking: Asking) -> bool:
-        """Say whether the limit on the other axis has a price at the level of the first."""
-        sought, paid = self.axes[asking.first], self.axes[1 - asking.first]
+    def _priced(self, search: Search, request: Asking) -> bool:
+        """Whether the limit on the other axis has a price at the level of the first."""
+        optimised, limited = self.axes[request.first], self.axes[1 - request.first]
         prices = search.best.certificate.binding if search.best else ()
-        cap, figure = capped(paid), sought.axis.name
+        cap, figure = capped(limited), optimised.axis.name
         return any(price.limit.name == cap and price.objective.figure == figure for price in prices)
 
-    def _told(self, search: Search, asking: Asking) -> Reached:
+    def _told(self, search: Search, request: Asking) -> Reached:
         best = search.best
         if best is None:
             status = "infeasible" if search.clashes else "failed"
             last = search.candidates[-1].point.status if search.candidates else "no start assembles"
             return Reached(status, "limits clash: no admissible design was found" if search.clashes else last)
         program = search.program
-        here = report.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x), every=True)
-        held = self._held(search, best, asking)
-        certified = best.certificate.passed and here.admissible and not held
-        reason = held or "; ".join(best.certificate.reasons) or "a limit does not hold on independent evaluation"
+        evaluated = report.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x), every=True)
+        cap_reason = self._held(search, best, request)
+        certified = best.certificate.passed and evaluated.admissible and not cap_reason
+        reason = cap_reason or "; ".join(best.certificate.reasons) or "a limit does not hold on independent evaluation"
         status = "optimal" if certified else "uncertified"
         axes = {axis.axis.name: self._figure(axis, program, best.x) for axis in self.axes}
-        told = {
+        warm = {
             "point": rows.written(replace(best.point, x=dict(best.x)), program),
             "active": self._active(program, best.x),
             "axes": axes,
             "held": list(objectives(program, best.x)[: self.held]),
         }
         optimum = None
-        if asking[::2] == (0, 1):
+        if request[::2] == (0, 1):
             optimum = neighbour_newton.optimum(self.job, program, best.x, best.certificate)
-        told |= {"optimum": optimum.as_dict()} if optimum else {}
+        warm |= {"optimum": optimum.as_dict()} if optimum else {}
         return Reached(
             status,
             None if certified else reason,
-            dict(here.design),
-            dict(here.figures.items()),
-            self._multipliers(best, axes, asking),
-            dict(here.reached),
-            told,
+            dict(evaluated.design),
+            dict(evaluated.figures.items()),
+            self._multipliers(best, axes, request),
+            dict(evaluated.reached),
+            warm,
         )
 
-    def _held(self, search: Search, best: Candidate, asking: Asking) -> str:
-        """Return why the point does not count, though one may be there: an axis is above its cap; "" where it does."""
+    def _held(self, search: Search, best: Candidate, request: Asking) -> str:
+        """Reason why the point does not count, because an axis is above its cap; "" if it counts."""
         sampler = sampled(search.program.model, {**search.program.parameters, **best.x})
-        for axis, cap in zip(self.axes, asking.caps, strict=True):
+        for axis, cap in zip(self.axes, request.caps, strict=True):
             size = axis.objective.scale
             if cap is not None and axis.objective.merit(sampler) / size > cap / size + FEASIBLE:
                 return f"{axis.axis.name} comes out above what was asked"
         return ""
 
     def _figure(self, axis: Traded, program: Program, x: Mapping[str, float]) -> float:
-        """Return an axis at variables x (SI): of a magnitude without its sign."""
+        """An axis at variables x (SI); a magnitude has no sign."""
         return axis.figure(axis.objective.merit(sampled(program.model, {**program.parameters, **x})))
 
-    def _multipliers(self, best: Candidate, figures: Mapping[str, float], asking: Asking) -> dict[Multiplier, float]:
-        """Return what each limit is worth for the first objective it moves, SI, and the slope along the front."""
-        sought, paid = self.axes
-        found: dict[Multiplier, float] = {}
+    def _multipliers(self, best: Candidate, figures: Mapping[str, float], request: Asking) -> dict[Multiplier, float]:
+        """Worth of each limit for the first objective that it moves, SI, and the slope along the front."""
+        optimised, limited = self.axes
+        multipliers: dict[Multiplier, float] = {}
         slope, caps = 0.0, [capped(axis) for axis in self.axes]
         for price in best.certificate.binding:
-            if price.limit.name == capped(paid):
-                slope -= price.worth if price.objective.figure == sought.axis.name else 0.0
+            if price.limit.name == capped(limited):
+                slope -= price.worth if price.objective.figure == optimised.axis.name else 0.0
             elif price.limit.name not in caps:
-                each = Multiplier(price.objective.figure, Side(price.limit.name, ENDS[price.side]))
-                found[each] = found.get(each, 0.0) + price.worth
-        here = figures[paid.axis.name]
-        told = {self.slope: sought.sign * slope * paid.slope(here) + 0.0} if asking.first == 0 else {}
-        return {**told, **found}
+                multiplier = Multiplier(price.objective.figure, Side(price.limit.name, ENDS[price.side]))
+                multipliers[multiplier] = multipliers.get(multiplier, 0.0) + price.worth
+        limited_figure = figures[limited.axis.name]
+        slopes = (
+            {self.slope: optimised.sign * slope * limited.slope(limited_figure) + 0.0} if request.first == 0 else {}
+        )
+        return {**slopes, **multipliers}
 
     def _active(self, program: Program, x: Mapping[str, float]) -> list[tuple[str, str, int]]:
-        """Return what is touched, and where the first axis stands highest, as JSON data."""
+        """Touched sides, and the place at which the first axis is largest, as JSON data."""
         sampler = sampled(program.model, {**program.parameters, **x})
-        found = active_set(replace(program, objectives=(self.axes[0].objective,)), sampler)
-        own = {name for axis in self.axes for name in (axis.axis.name, capped(axis))}
+        active = active_set(replace(program, objectives=(self.axes[0].objective,)), sampler)
+        axis_names = {name for axis in self.axes for name in (axis.axis.name, capped(axis))}
         count: Counter[tuple[Side, str]] = Counter()
-        for row in found.rows[: found.limits]:
+        for row in active.rows[: active.limits]:
             limit = row.limit
-            if limit and limit.name not in own and limit.row not in program.fixed:
+            if limit and limit.name not in axis_names and limit.row not in program.fixed:
                 count[Side(limit.name, ENDS[limit.sign]), _place(sampler, row)] += 1
-        for k in found.levels[0]:
-            count[Side(self.axes[0].axis.name, PEAK), _place(sampler, found.rows[k])] += 1
+        for k in active.levels[0]:
+            count[Side(self.axes[0].axis.name, PEAK), _place(sampler, active.rows[k])] += 1
         return sorted(Touched(side, place, times).written() for (side, place), times in count.items())
 
 
 def _place(sampler: Sampler, row: ActiveRow) -> str:
-    """Return where in the cycle a row stands, by the switches there and its sign; "" for a row of no angle."""
+    """Place in the cycle of a row, by the switches there and its sign; "" for a row without an angle."""
     if row.node is None:
         return f"{row.reads} {row.sign:+g}"
     switch = sampler.cycle.switch(row.node.piece)
@@ -379,14 +384,14 @@ def _place(sampler: Sampler, row: ActiveRow) -> str:
 
 
 Cap = tuple[Traded, float]
-"""An axis and the largest value of what is sought the least of."""
+"""An axis and its largest value, in the sense of its objective."""
 
 
 @dataclass(frozen=True)
 class FrontTerms:
-    """What judges the designs of a front: what its target demands of all of them, and limits on its axes.
+    """Limits on the designs of a front: the demands of its target, and limits on its axes.
 
-    traded: both axes; base: what is demanded; program: with the limits on axes too.
+    traded: both axes; base: program of the demands; program: with the limits on axes too.
     """
 
     scene: Scene
@@ -398,12 +403,12 @@ class FrontTerms:
 
     @property
     def said(self) -> str:
-        """Both axes."""
+        """Both axes in words."""
         return " against ".join(axis.called for axis in self.traded)
 
     @property
     def axes(self) -> list[str]:
-        """The figures of both axes."""
+        """Names of the figures of both axes."""
         return [axis.axis.name for axis in self.traded]
 
     @property
@@ -412,56 +417,56 @@ class FrontTerms:
         return registry.of(self.scene)
 
     def evaluation(self, design: Mapping[str, float]) -> Evaluated:
-        """Return a design's figures and limits; design: SI, what it does not name is today's."""
+        """Figures and limits of a design, SI; a missing name has today's value."""
         named = {self.scene.full(name): value for name, value in design.items()}
         return self.whole({**self.job.today(self.scene), **named})
 
     def whole(self, design: Mapping[str, float]) -> Evaluated:
-        """Return figures and limits of a design by full names, SI."""
-        found = report.evaluation(self.scene, self.job, self.base, design)
-        limits = list(found.limits)
-        for finding in (self._finding(cap, found, design) for cap in self.caps):
-            same = next((k for k, limit in enumerate(limits) if limit.name == finding.name), len(limits))
-            limits[same : same + 1] = [_tightest(finding, *limits[same : same + 1])]
-        return replace(found, limits=tuple(limits), terms=self)
+        """Figures and limits of a design by full names, SI."""
+        evaluated = report.evaluation(self.scene, self.job, self.base, design)
+        limits = list(evaluated.limits)
+        for finding in (self._finding(cap, evaluated, design) for cap in self.caps):
+            place = next((k for k, limit in enumerate(limits) if limit.name == finding.name), len(limits))
+            limits[place : place + 1] = [_tightest(finding, *limits[place : place + 1])]
+        return replace(evaluated, limits=tuple(limits), terms=self)
 
     def proofs(self, design: Mapping[str, float], slack: float) -> "Proofs":
-        """Return proofs of a design's limits (SI). Raises BadInput."""
+        """Proofs of a design's limits (SI). Raises BadInput."""
         from loomopt.solving.proof import whole_cycle
 
         program = replace(self.program, limits=_named(self))
         return replace(whole_cycle.prove(self.scene, design, self.target, slack, program), target=self.said)
 
-    def _finding(self, cap: Cap, found: Evaluated, design: Mapping[str, float]) -> Finding:
-        """Return the limit on an axis beside its figure."""
+    def _finding(self, cap: Cap, evaluated: Evaluated, design: Mapping[str, float]) -> Finding:
+        """Limit on an axis, with its figure."""
         axis, most = cap
         values = {**self.program.parameters, **self.job.values(self.program, design)}
         merit = axis.objective.merit(sampled(self.program.model, values))
         ok = merit <= most + FEASIBLE * axis.objective.scale
         name, figure, end = axis.axis.name, axis.figure(merit), _end(axis, most)
         if axis.objective.is_magnitude:
-            return Finding(name, found.figures.get(name) or figure, -end, end, ok)
+            return Finding(name, evaluated.figures.get(name) or figure, -end, end, ok)
         low, high = (None, end) if axis.sign > 0 else (end, None)
         return Finding(name, figure, low, high, ok)
 
 
 def _end(axis: Traded, cap: float) -> float:
-    """Return the figure of the largest value of an axis, SI; what is only rounding is 0."""
+    """Figure of the largest value of an axis, SI; rounding is 0."""
     figure = axis.figure(cap)
     return figure if abs(figure) > SHOWN_AS_ZERO * axis.objective.scale ** (1 / axis.axis.power) else 0.0
 
 
-def _tightest(one: Finding, *others: Finding) -> Finding:
-    """Return limits on the same as one."""
+def _tightest(tightest: Finding, *others: Finding) -> Finding:
+    """Several limits on one figure as one limit."""
     for other in others:
-        low = max((end for end in (one.min, other.min) if end is not None), default=None)
-        high = min((end for end in (one.max, other.max) if end is not None), default=None)
-        one = one._replace(min=low, max=high, ok=one.ok and other.ok)
-    return one
+        low = max((end for end in (tightest.min, other.min) if end is not None), default=None)
+        high = min((end for end in (tightest.max, other.max) if end is not None), default=None)
+        tightest = tightest._replace(min=low, max=high, ok=tightest.ok and other.ok)
+    return tightest
 
 
 def _named(terms: FrontTerms) -> tuple[Limit, ...]:
-    """Return all limits, those on axes under the axis' own name where their row is the figure itself."""
+    """All limits; a limit on an axis has the axis' name if its row is the figure itself."""
     plain = {capped(axis): axis.axis.name for axis, _ in terms.caps if _is_figure(axis)}
     return tuple(replace(limit, name=plain.get(limit.name, limit.name)) for limit in terms.program.limits)
 
@@ -470,41 +475,41 @@ def _is_figure(axis: Traded) -> bool:
     return axis.sign > 0 and axis.axis.power == 1 and axis.axis.offset == 0.0
 
 
-def whole_answer(solver: Solver, target: str | None, found: Reached, asking: Asking, began: float) -> Solution:
-    """Return what a point of a front came to as the answer that a solve gives; began: when its solve did, s.
+def whole_answer(solver: Solver, target: str | None, result: Reached, request: Asking, began: float) -> Solution:
+    """Full answer of a point of a front; began: start of its solve, s.
 
-    asking: what was asked, but for the number of levels.
+    request: the program, except the number of levels.
     """
-    solved = time.perf_counter()
-    caps = tuple((axis, cap) for axis, cap in zip(solver.axes, asking.caps, strict=True) if cap is not None)
-    programs = [solver.program(asking._replace(levels=levels)) for levels in (1, 2)]
+    end = time.perf_counter()
+    caps = tuple((axis, cap) for axis, cap in zip(solver.axes, request.caps, strict=True) if cap is not None)
+    programs = [solver.program(request._replace(levels=levels)) for levels in (1, 2)]
     for program in programs:
-        point = rows.read(found.warm.get("point", {}), program)
+        point = rows.read(result.warm.get("point", {}), program)
         if point:
             terms = FrontTerms(solver.scene, target, solver.axes, solver.base, program, caps)
-            here = terms.whole(solver.job.design(solver.base, point.x))
+            evaluated = terms.whole(solver.job.design(solver.base, point.x))
             certificate = certify(program, _as_read(solver.job, program, point.x), solver.accuracy)
-            made = _certified(solver, terms, here, certificate, found, asking)
-            return replace(made, point=point, time=_time(began, solved))
+            answer = _certified(solver, terms, evaluated, certificate, result, request)
+            return replace(answer, point=point, time=_time(began, end))
     terms = FrontTerms(solver.scene, target, solver.axes, solver.base, programs[0], caps)
-    made = _without(solver, terms, found)
-    return replace(made, terms=terms, time=_time(began, solved))
+    answer = _without(solver, terms, result)
+    return replace(answer, terms=terms, time=_time(began, end))
 
 
-def _without(solver: Solver, terms: FrontTerms, found: Reached) -> Solution:
-    """Return the answer where no design was reached: the nearest one there is, and what clashes."""
-    clash = clashing(solver, terms.program) if found.status == "infeasible" else Clash()
-    here = terms.whole(solver.job.design(solver.base, clash.x)) if clash.x else report.nowhere(solver.scene)
+def _without(solver: Solver, terms: FrontTerms, result: Reached) -> Solution:
+    """Answer of a point without a design: the nearest design, and the limits that clash."""
+    clash = clashing(solver, terms.program) if result.status == "infeasible" else Clash()
+    evaluated = terms.whole(solver.job.design(solver.base, clash.x)) if clash.x else report.nowhere(solver.scene)
     today = functools.partial(terms.evaluation, {})
-    told = {"status": found.reason, "accuracy": solver.accuracy}
+    solver_data = {"status": result.reason, "accuracy": solver.accuracy}
     explained = solver.job.explain(solver.scene, clash.limits.values())
-    made = report.without_optimum(terms.target or "", here, clash, told, today, explained)
-    sentences = Sentences(f"No design was found: {found.reason}.")
-    return made if clash.limits else replace(made, status=found.status, sentences=sentences)
+    answer = report.without_optimum(terms.target or "", evaluated, clash, solver_data, today, explained)
+    sentences = Sentences(f"No design was found: {result.reason}.")
+    return answer if clash.limits else replace(answer, status=result.status, sentences=sentences)
 
 
 def clashing(solver: Solver, program: Program) -> Clash:
-    """Return the limits of a program that cannot all be kept, and what helps; nothing where that is not found."""
+    """Limits of a program that clash, and the relaxations that help; empty if there are none."""
     job, scene = solver.job, solver.scene
     today = job.start(program, scene)
     search = multistart.run_search(Search(job, program, Settings(solver.accuracy), today))
@@ -512,23 +517,23 @@ def clashing(solver: Solver, program: Program) -> Clash:
 
 
 def _certified(
-    solver: Solver, terms: FrontTerms, here: Evaluated, certificate: Certificate, found: Reached, asking: Asking
+    solver: Solver, terms: FrontTerms, evaluated: Evaluated, certificate: Certificate, result: Reached, request: Asking
 ) -> Solution:
-    """Return the answer of a design that was reached."""
+    """Answer of a point with a design."""
     words = Words(solver.scene)
     explicit = _explicit(terms, certificate)
-    prices, together = report.prices(words, explicit), report.joint_prices(words, explicit)
-    if found.reason:
-        sentences = Sentences(f"A design was reached but not certified: {found.reason}.")
+    prices, joint = report.prices(words, explicit), report.joint_prices(words, explicit)
+    if result.reason:
+        sentences = Sentences(f"A design was reached but not certified: {result.reason}.")
     else:
-        sentences = Sentences(_sought(words, terms, asking), report.stops(prices, together))
+        sentences = Sentences(_sought(words, terms, request), report.stops(prices, joint))
     return Solution(
-        **vars(here),
+        **vars(evaluated),
         target=terms.target or "",
-        status=found.status,
+        status=result.status,
         sentences=sentences,
         binding=prices,
-        bind_together=together,
+        bind_together=joint,
         certificate=certificate,
         solver={"accuracy": solver.accuracy},
         today=functools.partial(terms.evaluation, {}),
@@ -536,51 +541,55 @@ def _certified(
 
 
 def _as_read(job: Job, program: Program, x: Mapping[str, float]) -> dict[str, float]:
-    """Return the variables, SI, of the design that a person reads of x (SI)."""
+    """Variables, SI, of the printed design of x (SI)."""
     return job.values(program, job.design(program, x))
 
 
 def _explicit(terms: FrontTerms, certificate: Certificate) -> Certificate:
-    """Return a certificate with what binds, a limit on an axis as a limit of its figure."""
+    """A certificate in which a limit on an axis is a limit of its figure."""
     caps = {capped(axis): (axis, cap) for axis, cap in terms.caps}
 
-    def slope(each: Binding) -> float:
-        if each.limit.name not in caps:
+    def slope(binding: Binding) -> float:
+        if binding.limit.name not in caps:
             return 1.0
-        axis, cap = caps[each.limit.name]
+        axis, cap = caps[binding.limit.name]
         return abs(axis.slope(_end(axis, cap)))
 
-    def told(each: Binding) -> Binding:
-        if each.limit.name not in caps:
-            return each
-        axis, cap = caps[each.limit.name]
-        limit = each.limit
+    def in_figures(binding: Binding) -> Binding:
+        if binding.limit.name not in caps:
+            return binding
+        axis, cap = caps[binding.limit.name]
+        limit = binding.limit
         if not axis.objective.is_magnitude:
             limit = replace(limit, sign=axis.sign, value=_end(axis, cap))
-        worth = each.worth * slope(each)
-        return each._replace(limit=replace(limit, name=axis.axis.name), side=limit.sign, worth=worth)
+        worth = binding.worth * slope(binding)
+        return binding._replace(limit=replace(limit, name=axis.axis.name), side=limit.sign, worth=worth)
 
-    together = []
+    joint_bindings = []
     for joint in certificate.bind_together:
-        slopes = np.array([slope(each) for each in joint.bindings])
-        together.append(replace(joint, bindings=tuple(map(told, joint.bindings)), costs=slopes[:, None] * joint.costs))
-    return replace(certificate, binding=tuple(map(told, certificate.binding)), bind_together=tuple(together))
+        slopes = np.array([slope(binding) for binding in joint.bindings])
+        joint_bindings.append(
+            replace(joint, bindings=tuple(map(in_figures, joint.bindings)), costs=slopes[:, None] * joint.costs)
+        )
+    return replace(
+        certificate, binding=tuple(map(in_figures, certificate.binding)), bind_together=tuple(joint_bindings)
+    )
 
 
-def _sought(words: Words, terms: FrontTerms, asking: Asking) -> str:
-    """Return what was sought as a sentence."""
-    sought, other = terms.traded[asking.first], terms.traded[1 - asking.first]
-    held = [
+def _sought(words: Words, terms: FrontTerms, request: Asking) -> str:
+    """The optimised axis and the limits as a sentence."""
+    optimised, other = terms.traded[request.first], terms.traded[1 - request.first]
+    caps = [
         f"{axis.called} at {'most' if axis.sign > 0 else 'least'} {words.shown(axis.axis.name, _end(axis, cap))}"
         for axis, cap in terms.caps
     ]
     both = len(terms.program.objectives) == len(terms.base.objectives)
     after = f", then the {other.sense} {other.called}" if both else ""
-    return f"The {sought.sense} {sought.called}{' with ' if held else ''}{' and '.join(held)}{after}."
+    return f"The {optimised.sense} {optimised.called}{' with ' if caps else ''}{' and '.join(caps)}{after}."
 
 
 def _time(began: float, solved: float) -> dict[str, float]:
-    """Return the seconds of a solve, and of what was told of it after it."""
+    """Seconds of a solve, and of the certificate after it."""
     now = time.perf_counter()
     parts = {"import_s": 0.0, "build_s": 0.0, "solve_s": solved - began, "settle_s": 0.0, "certify_s": now - solved}
     return {**parts, "report_s": 0.0, "total_s": now - began}

@@ -1,4 +1,4 @@
-"""The plan of a front: its ends, then rounds of points between them, each from a neighbour of an earlier round."""
+"""Plan of a front: its ends, then rounds of points between them, each from a neighbour of an earlier round."""
 
 import functools
 import hashlib
@@ -28,18 +28,18 @@ from loomopt.studies.front.solver import Asking, Moved, Reached, Solver
 from loomopt.studies.run.rows import Findings, Row, StudyTask, enough_together, written
 
 PLAN = 7
-"""Raised when the plan or what a row holds changes: rows of another plan are other rows."""
+"""Version of the plan and of a row's content: it is increased with every change of them."""
 POINTS = 40
 SEARCHED = 1
-"""Of the first round, so many points spread over it are searched for beyond their neighbours' basins."""
+"""Number of points of the first round that are searched beyond their neighbours' basins."""
 WIDE = 8
-"""Times a neighbour's solve that a search beyond its basin takes, roughly."""
+"""Approximate time of a search beyond a basin, in multiples of a solve from a neighbour."""
 DIVERGED = "Diverging_Iterates"
-"""IPOPT's word for an objective that falls without end."""
+"""IPOPT's status for an objective that falls without end."""
 
 
 class Met(NamedTuple):
-    """What a task came to: what was reached, the program that it was reached by, and what was asked, SI, by axis."""
+    """Result of a task: the point's result, its program, and the requested place, SI, by axis."""
 
     found: Reached
     asking: Asking
@@ -48,10 +48,10 @@ class Met(NamedTuple):
 
 @dataclass(frozen=True)
 class Trade:
-    """A front to be computed, as a plan of tasks: two axes with what is sought of each, and what is demanded of both.
+    """A front as a plan of tasks: two axes with their senses, and the demands on all designs.
 
     axes: names; senses: "least" or "most" of each; target: whose demands hold, None for none; ranges: axis → from, to,
-    SI; points: how many; lifted: limits of the scene that do not hold, as they stand in the way of an end, in words.
+    SI; points: number of points; lifted: limits of the scene that are dropped because they stop an end, in words.
     """
 
     scene: Scene
@@ -64,9 +64,18 @@ class Trade:
     lifted: tuple[str, ...] = ()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how to make it again: what is built from it does not pickle."""
-        own = self.scene, self.axes, self.senses, self.target, self.ranges, self.points, self.accuracy, self.lifted
-        return Trade, own
+        """Constructor and arguments for pickle; the programs built from it are not pickled."""
+        arguments = (
+            self.scene,
+            self.axes,
+            self.senses,
+            self.target,
+            self.ranges,
+            self.points,
+            self.accuracy,
+            self.lifted,
+        )
+        return Trade, arguments
 
     name = "pareto"
 
@@ -77,15 +86,15 @@ class Trade:
 
     @property
     def labels(self) -> tuple[str, str]:
-        """What each axis is called: of a magnitude it says so."""
+        """Label of each axis; that of a magnitude says so."""
         first, second = self.solver.axes
         return first.called, second.called
 
     @property
     def kinds(self) -> dict[str, str]:
-        """What each axis is called → kind of quantity, the second axis first."""
+        """Label of each axis → kind of quantity, the second axis first."""
         words = Words(self.scene)
-        kinds = [each.axis.kind or words.kind(each.axis.name) for each in self.solver.axes]
+        kinds = [axis.axis.kind or words.kind(axis.axis.name) for axis in self.solver.axes]
         return dict(zip(self.labels[::-1], kinds[::-1], strict=True))
 
     @property
@@ -95,43 +104,50 @@ class Trade:
 
     @property
     def size(self) -> None:
-        """Nobody knows beforehand how many points it takes."""
+        """None: the number of points is not known beforehand."""
 
     @property
     def conditions(self) -> dict[str, object]:
-        """What is asked of every row, for people."""
+        """Conditions of every row, for people."""
         words, sought = Words(self.scene), zip(self.senses, self.labels, strict=True)
-        found: dict[str, object] = {"axes": ", ".join(f"{sense} {label}" for sense, label in sought)}
-        held, dropped = self.demands
-        found["held"] = ", ".join(["the scene's limits", *held])
-        found |= {"not held": ", ".join(dropped)} if dropped else {}
+        conditions: dict[str, object] = {"axes": ", ".join(f"{sense} {label}" for sense, label in sought)}
+        demanded, dropped = self.demands
+        conditions["held"] = ", ".join(["the scene's limits", *demanded])
+        conditions |= {"not held": ", ".join(dropped)} if dropped else {}
         for name, ends in self.ranges:
-            found[f"range of {name}"] = " ... ".join(words.shown(name, end) for end in ends)
-        return {**found, "points": self.points, "accuracy": self.accuracy}
+            conditions[f"range of {name}"] = " ... ".join(words.shown(name, end) for end in ends)
+        return {**conditions, "points": self.points, "accuracy": self.accuracy}
 
     @functools.cached_property
     def demands(self) -> tuple[list[str], list[str]]:
-        """What the target demands of every row, and what it or the scene demands that does not hold, for people.
+        """Demands of the target on every row, and demands of it or the scene that are dropped, for people.
 
-        Without a target the second is what the job's default would demand, beside limits on axes that are lifted.
+        Without a target the second list has the demands of the job's default, besides the dropped limits on axes.
         """
         base, job, words = self.solver.base, self.solver.job, Words(self.scene)
-        whose = self.target or self.scene.schema.default_target
+        target_name = self.target or self.scene.schema.default_target
         first = {level.figure for level in base.objectives[: self.solver.held]}
-        held = [f"{_demand(words, goal)}{' or as near as it comes' * (goal.figure in first)}" for goal in base.goals]
+        demanded = [
+            f"{_demand(words, goal)}{' or as near as it comes' * (goal.figure in first)}" for goal in base.goals
+        ]
         aimed = {goal.figure for goal in base.goals}
-        held += [f"least {level.figure}" for level in base.objectives[: self.solver.held] if level.figure not in aimed]
+        demanded += [
+            f"least {level.figure}" for level in base.objectives[: self.solver.held] if level.figure not in aimed
+        ]
         try:
-            wanted = job.program(self.scene, whose).goals
+            default_goals = job.program(self.scene, target_name).goals
         except BadInput:
-            # The scene has not what the default target needs: it demands nothing of it.
-            wanted = ()
-        kept = {goal.figure for goal in base.goals}
-        return held, [*self.lifted, *(_demand(words, goal) for goal in wanted if goal.figure not in kept)]
+            # The scene lacks numbers that the default target needs: there are no demands of it.
+            default_goals = ()
+        demanded_figures = {goal.figure for goal in base.goals}
+        return demanded, [
+            *self.lifted,
+            *(_demand(words, goal) for goal in default_goals if goal.figure not in demanded_figures),
+        ]
 
     @property
     def settings(self) -> dict[str, object]:
-        """What its rows depend on, as JSON data."""
+        """Data on which its rows depend, as JSON data."""
         return {
             "study": f"{self.name} {PLAN}",
             "scene": self.scene.hash,
@@ -147,23 +163,23 @@ class Trade:
 
     @functools.cached_property
     def key(self) -> str:
-        """A hash of all that its rows depend on, the order of its axes too."""
-        own = [self.axes, self.settings]
-        return hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()[:32]
+        """Hash of all data on which its rows depend, with the order of the axes."""
+        contents = [self.axes, self.settings]
+        return hashlib.sha256(json.dumps(contents, sort_keys=True).encode()).hexdigest()[:32]
 
     @lazy
     def solver(self) -> Solver:
-        """The programs of the front, built when first asked for."""
+        """Programs of the front, built at their first use."""
         return Solver(self.scene, self.target, dict(zip(self.axes, self.senses, strict=True)), self.accuracy)
 
     @property
     def signs(self) -> tuple[int, int]:
-        """+1 for an axis of which the least is sought, −1 for the most."""
+        """+1 for an axis that is minimised, −1 for one that is maximised."""
         first, second = self.solver.axes
         return first.sign, second.sign
 
     def batch(self, rows: Sequence[Row]) -> list[StudyTask]:
-        """Return the tasks that follow from finished rows: both ends, then rounds of halved gaps. Raises BadInput."""
+        """Tasks that follow from finished rows: both ends, then rounds of halved gaps. Raises BadInput."""
         if not rows:
             return [StudyTask(end, None, {}, {"end": end}) for end in ENDS]
         by_point = {row.point: row for row in rows}
@@ -174,63 +190,68 @@ class Trade:
         scale = self.scale(rows)
         if not all(scale.width):
             return []
-        found = plan.following(rows, scale, self.points)
-        wide = _spread(len(found)) if len(rows) == len(ENDS) else set()
+        next_points = plan.following(rows, scale, self.points)
+        wide = _spread(len(next_points)) if len(rows) == len(ENDS) else set()
         first = len(rows)
-        tasks = [self._task(first + k, each, scale, by_point, k in wide) for k, each in enumerate(found)]
-        return tasks if found and found[0].steps else enough_together(tasks)
+        tasks = [
+            self._task(first + k, next_point, scale, by_point, k in wide) for k, next_point in enumerate(next_points)
+        ]
+        return tasks if next_points and next_points[0].steps else enough_together(tasks)
 
-    def _task(self, point: int, each: Next, scale: FrontScale, rows: Mapping[int, Row], wide: bool) -> StudyTask:
-        others = [rows[other].warm for other in each.near[1:]]
-        held = rows[ENDS[0]].warm["held"]
-        ask = {"also": others, "held": held, "wide": wide}
-        ask |= {"again": each.again, "fine": each.fine, "near": list(each.near)}
-        length = len(each.near) + WIDE * wide
-        if each.steps and each.again is not None:
-            ask |= {"trial": self._known(rows[each.again], rows[each.near[0]], each, scale), "steps": each.steps}
-        if each.end is not None:
-            return StudyTask(point, each.near[0], {}, {**ask, "end": each.end}, length)
-        ask |= {"spare": [rows[each.spare].warm]} if each.spare is not None else {}
-        place = {self.axes[1]: scale.figure(1, each.b)}
-        if each.steps and each.again is not None:
-            optima = [rows[other].warm.get("optimum") for other in (each.near[0], each.again)]
-            beside = [*optima, 0.0] if all(optima) and each.steps == 1 else []
-            return StudyTask(point, each.near[0], dict(rows[each.again].place), ask, length, beside)
-        if wide or each.beside is None:
-            return StudyTask(point, each.near[0], place, ask, length)
-        *ends, share = each.beside
+    def _task(self, point: int, next_point: Next, scale: FrontScale, rows: Mapping[int, Row], wide: bool) -> StudyTask:
+        others = [rows[other].warm for other in next_point.near[1:]]
+        higher_levels = rows[ENDS[0]].warm["held"]
+        ask = {"also": others, "held": higher_levels, "wide": wide}
+        ask |= {"again": next_point.again, "fine": next_point.fine, "near": list(next_point.near)}
+        length = len(next_point.near) + WIDE * wide
+        if next_point.steps and next_point.again is not None:
+            ask |= {
+                "trial": self._known(rows[next_point.again], rows[next_point.near[0]], next_point, scale),
+                "steps": next_point.steps,
+            }
+        if next_point.end is not None:
+            return StudyTask(point, next_point.near[0], {}, {**ask, "end": next_point.end}, length)
+        ask |= {"spare": [rows[next_point.spare].warm]} if next_point.spare is not None else {}
+        place = {self.axes[1]: scale.figure(1, next_point.b)}
+        if next_point.steps and next_point.again is not None:
+            optima = [rows[other].warm.get("optimum") for other in (next_point.near[0], next_point.again)]
+            beside = [*optima, 0.0] if all(optima) and next_point.steps == 1 else []
+            return StudyTask(point, next_point.near[0], dict(rows[next_point.again].place), ask, length, beside)
+        if wide or next_point.beside is None:
+            return StudyTask(point, next_point.near[0], place, ask, length)
+        *ends, share = next_point.beside
         optima = [rows[end].warm.get("optimum") for end in ends]
         beside = [*optima, share] if all(optima) else []
-        return StudyTask(point, each.near[0], place, ask, length, beside)
+        return StudyTask(point, next_point.near[0], place, ask, length, beside)
 
-    def _known(self, row: Row, by: Row, each: Next, scale: FrontScale) -> dict[str, object]:
-        """Return what a trial must beat as JSON data: an axis of a row, SI, and by how much; the neighbour it is from.
+    def _known(self, row: Row, neighbour: Row, next_point: Next, scale: FrontScale) -> dict[str, object]:
+        """Data of a trial as JSON data: the axis of a row to beat, SI, the tolerance, and the neighbour's place.
 
-        begin: its second axis, SI; done: whether the row was solved from it before, so that only what became of its
-        design is asked; inner: whether it is no end. What is an end's by chance, such as the radius of no mass, need
-        not serve beside it, and tells nothing of another basin.
+        begin: second axis of the neighbour, SI; done: whether the row was already solved from it, so that only its
+        design is moved; inner: whether the neighbour is no end. A value at an end may be arbitrary, such as the radius
+        of a mass of 0, and then shows nothing of another basin.
         """
-        axis = each.end or 0
+        axis = next_point.end or 0
         return {
             "best": plan.value(row, self.axes[axis]),
             "slack": plan.ALIKE * scale.width[axis],
-            "begin": plan.value(by, self.axes[1]),
-            "done": each.steps == 1 and by.point in plan.solved_from(row),
-            "inner": by.warm.get("end") is None,
+            "begin": plan.value(neighbour, self.axes[1]),
+            "done": next_point.steps == 1 and neighbour.point in plan.solved_from(row),
+            "inner": neighbour.warm.get("end") is None,
         }
 
     @property
     def sizes(self) -> tuple[float, float]:
-        """Natural sizes of both axes, SI."""
+        """Scales of both axes, SI."""
         first, second = (axis.objective.scale ** (1 / axis.axis.power) for axis in self.solver.axes)
         return first, second
 
     def scale(self, rows: Sequence[Row]) -> FrontScale:
-        """Return the scale of finished rows."""
+        """Scale of finished rows."""
         return plan.scaled({row.point: row for row in rows}, self.axes, self.signs, self.sizes, self.accuracy)
 
     def _refuse(self, rows: Mapping[int, Row]) -> None:
-        """Raise BadInput where an end has no least value: then a number without a bound runs away from its size."""
+        """Raise BadInput if an end has no least value: a number without a bound then runs away."""
         for end, name, other in zip(ENDS, self.axes, self.axes[::-1], strict=True):
             row, sense = rows[end], self.senses[end]
             x = row.warm["point"]["x"] if "point" in row.warm else {}
@@ -248,21 +269,23 @@ class Trade:
                 )
 
     def _reaches(self, ends: Sequence[Row]) -> None:
-        """Raise BadInput where an end lies outside a range: then no point of the front lies in it."""
+        """Raise BadInput if an end lies outside a range: then no point of the front lies in the range."""
         for (name, (low, high)), row in itertools.product(self.ranges, ends):
             value = row.warm["axes"][name] if row.certified else low
-            words, least = Words(self.scene), SAME_OBJECTIVE * max(abs(low), abs(high))
-            if not low - least <= value <= high + least:
+            words, tolerance = Words(self.scene), SAME_OBJECTIVE * max(abs(low), abs(high))
+            if not low - tolerance <= value <= high + tolerance:
                 problem = f"no point of the front lies in the range; it comes to {words.shown(name, value)}"
-                asked = f"{words.shown(name, low)} ... {words.shown(name, high)}"
-                raise BadInput(problem, file=self.scene.origin, key=name, value=asked, remedy="Give another range.")
+                range_text = f"{words.shown(name, low)} ... {words.shown(name, high)}"
+                raise BadInput(
+                    problem, file=self.scene.origin, key=name, value=range_text, remedy="Give another range."
+                )
 
     def place(self, row: Row) -> dict[str, float]:
-        """Return the second axis of a row, SI: as it is there, or as it was asked."""
+        """Second axis of a row, SI: its value there, or the requested one."""
         return self._told(row, 1)
 
     def sought(self, row: Row) -> dict[str, float]:
-        """Return the first axis of a row, SI."""
+        """First axis of a row, SI."""
         return self._told(row, 0)
 
     def _told(self, row: Row, axis: int) -> dict[str, float]:
@@ -270,178 +293,180 @@ class Trade:
         return {self.labels[axis]: known[name]} if name in known else {}
 
     def row_json(self, row: Row) -> dict[str, object]:
-        """Return what `--json` prints of a row: both axes too."""
+        """JSON data of a row for `--json`, with both axes."""
         return {**row.row_json(), "axes": {**self.place(row), **self.sought(row)}}
 
     def read(self, rows: Sequence[Row]) -> Findings:
-        """Return the points of the front in the order of the second axis, then those without a design."""
-        found = read_front(self, rows)
+        """Points of the front in the order of the second axis, then rows without a design."""
+        findings = read_front(self, rows)
         slope = f"{self.solver.slope.text} is the slope of the front."
-        several = len(plan.values(found.rows, self.axes[1])) > 1
-        return found._replace(message=f"{found.message} {slope}") if several else found
+        several = len(plan.values(findings.rows, self.axes[1])) > 1
+        return findings._replace(message=f"{findings.message} {slope}") if several else findings
 
     def scene_at(self, point: int) -> Scene:
-        """Return the scene: all designs of the front stand in it."""
+        """The scene; all designs of the front belong to it."""
         return self.scene
 
     @working()
     def solve(self, task: StudyTask, parent: Row | None) -> Solution:
-        """Return the whole answer of a task: the limit on the other axis is one of its limits. Raises BadInput."""
+        """Full answer of a task; the limit on the other axis is one of its limits. Raises BadInput."""
         began = time.perf_counter()
-        found, asking, _ = self.reach(task, parent)
-        return solver.whole_answer(self.solver, self.target, found, asking, began)
+        result, request, _ = self.reach(task, parent)
+        return solver.whole_answer(self.solver, self.target, result, request, began)
 
     def solved(self, task: StudyTask, parent: Row | None) -> Row:
-        """Return the row of a task; it depends on nothing but its arguments."""
+        """Row of a task; it depends on its arguments only."""
         return self.solved_together([task])[0] or self.solved_alone(task, parent)
 
     def solved_together(self, tasks: Sequence[StudyTask]) -> list[Row | None]:
-        """Return the rows of tasks between two neighbours' optima, whoever stands beside them; None of the others."""
+        """Rows of tasks between two neighbours' optima, independent of the batch; None for the others."""
         began = time.perf_counter()
-        found = self._beside(tasks)
-        shared = (time.perf_counter() - began) / max(1, sum(map(bool, found)))
-        return [_row(task, met, shared) if met else None for task, met in zip(tasks, found, strict=True)]
+        results = self._beside(tasks)
+        shared = (time.perf_counter() - began) / max(1, sum(map(bool, results)))
+        return [_row(task, result, shared) if result else None for task, result in zip(tasks, results, strict=True)]
 
     def solved_alone(self, task: StudyTask, parent: Row | None) -> Row:
-        """Return the row of a task by solves of its own."""
+        """Row of a task by separate solves."""
         began = time.perf_counter()
-        met = self._alone(task, parent)
-        return _row(task, met, time.perf_counter() - began)
+        result = self._alone(task, parent)
+        return _row(task, result, time.perf_counter() - began)
 
     def reach(self, task: StudyTask, parent: Row | None) -> Met:
-        """Return what a task comes to."""
-        (found,) = self._beside([task])
-        return found or self._alone(task, parent)
+        """Result of a task."""
+        (result,) = self._beside([task])
+        return result or self._alone(task, parent)
 
     def _beside(self, tasks: Sequence[StudyTask]) -> list[Met | None]:
-        """Return what tasks between two neighbours' optima come to; None of one that must be solved alone."""
-        found: list[Met | None] = [None] * len(tasks)
+        """Results of tasks between two neighbours' optima; None for a task that must be solved alone."""
+        results: list[Met | None] = [None] * len(tasks)
         places = [k for k, task in enumerate(tasks) if task.beside and "trial" not in task.ask]
-        asked = [self.asking(tasks[k].place) for k in places]
-        for k, asking, reached in zip(
-            places, asked, self.solver.solve_neighbours(asked, [tasks[k].beside for k in places]), strict=True
+        requests = [self.asking(tasks[k].place) for k in places]
+        for k, request, point_result in zip(
+            places, requests, self.solver.solve_neighbours(requests, [tasks[k].beside for k in places]), strict=True
         ):
-            met = reached and _kept(reached, tasks[k].ask["held"])
-            if met and met.certified:
-                between = replace(met, warm={**met.warm, "between": True})
-                found[k] = Met(between, asking, dict(tasks[k].place))
+            kept_result = point_result and _kept(point_result, tasks[k].ask["held"])
+            if kept_result and kept_result.certified:
+                marked_result = replace(kept_result, warm={**kept_result.warm, "between": True})
+                results[k] = Met(marked_result, request, dict(tasks[k].place))
         places = [k for k, task in enumerate(tasks) if task.beside and "trial" in task.ask]
-        asked = [self.asking(tasks[k].place) for k in places]
-        moved = self.solver.moved(asked, [tasks[k].beside for k in places])
-        for k, asking, end in zip(places, asked, moved, strict=True):
-            if tasks[k].ask["trial"]["done"] or (end and self._excess(tasks[k], 0, end.figure) >= 0.0):
-                found[k] = self._stands(tasks[k], asking, end)
-        return found
+        requests = [self.asking(tasks[k].place) for k in places]
+        moved_designs = self.solver.moved(requests, [tasks[k].beside for k in places])
+        for k, request, moved_design in zip(places, requests, moved_designs, strict=True):
+            if tasks[k].ask["trial"]["done"] or (
+                moved_design and self._excess(tasks[k], 0, moved_design.figure) >= 0.0
+            ):
+                results[k] = self._stands(tasks[k], request, moved_design)
+        return results
 
-    def _tried(self, task: StudyTask, asking: Asking, near: Mapping[str, Any]) -> Moved | None:
-        """Return where a neighbour's design comes to at the place of a trial; None for nowhere."""
+    def _tried(self, task: StudyTask, request: Asking, near: Mapping[str, Any]) -> Moved | None:
+        """Neighbour's design at the place of a trial; None if a solve fails."""
         steps = int(task.ask["steps"])
         begin = self.solver.axes[1].value(task.ask["trial"]["begin"]) if steps > 1 else None
-        return self.solver.solved_from(asking, near, task.ask["held"], begin, steps)
+        return self.solver.solved_from(request, near, task.ask["held"], begin, steps)
 
     def _excess(self, task: StudyTask, axis: int, figure: float) -> float:
-        """Return by how much a trial is worse than what it should beat, SI: 0 where both are one, < 0 for better."""
+        """By how much a trial is worse than the row to beat, SI: 0 for equal, < 0 for better."""
         known = task.ask["trial"]
         excess = float(self.signs[axis] * (figure - known["best"]))
         return 0.0 if abs(excess) <= known["slack"] else excess
 
-    def _stands(self, task: StudyTask, asking: Asking, end: Moved | None) -> Met:
-        """Return that a row stands though its neighbour's design was moved there; end: what that came to.
+    def _stands(self, task: StudyTask, request: Asking, end: Moved | None) -> Met:
+        """Result of a trial after which the row stays; end: the moved design.
 
-        What kept to its basin, is worse and an optimum itself is another design.
+        A moved design that stayed in its basin, is worse, and is an optimum itself, is a different design.
         """
-        told = end is not None and end.led and task.ask["trial"]["inner"]
-        worse = told and end is not None and self._excess(task, asking.first, end.figure) > 0.0
-        apart = worse and end is not None and self.solver.rests(asking, end.point)
-        warm = {"apart": list(task.ask["near"]) if apart else []}
-        return Met(Reached("uncertified", "a neighbour's design is no better there", warm=warm), asking, task.place)
+        is_informative = end is not None and end.led and task.ask["trial"]["inner"]
+        is_worse = is_informative and end is not None and self._excess(task, request.first, end.figure) > 0.0
+        is_apart = is_worse and end is not None and self.solver.rests(request, end.point)
+        warm = {"apart": list(task.ask["near"]) if is_apart else []}
+        return Met(Reached("uncertified", "a neighbour's design is no better there", warm=warm), request, task.place)
 
     def asking(self, place: Mapping[str, float]) -> Asking:
-        """Return the program of a place: the second axis, SI, by its name."""
+        """Program of a place: the second axis, SI, by its name."""
         return Asking(0, (self._cap(0), self.solver.axes[1].value(place[self.axes[1]])))
 
     def _alone(self, task: StudyTask, parent: Row | None) -> Met:
-        """Return what a task comes to by solves of its own."""
+        """Result of a task by separate solves."""
         near = [*([parent.warm] if parent else []), *task.ask.get("also", ())]
         end = task.ask.get("end")
-        asking = self.asking(task.place) if end is None else self._asking_of_end(end)
+        request = self.asking(task.place) if end is None else self._asking_of_end(end)
         if "trial" in task.ask:
-            ended = None if task.ask["trial"]["done"] else self._tried(task, asking, near[0])
-            if ended is None or self._excess(task, asking.first, ended.figure) >= 0.0:
-                return self._stands(task, asking, ended)
-            near = [{"point": written(ended.point, self.solver.program(asking))}]
+            moved_design = None if task.ask["trial"]["done"] else self._tried(task, request, near[0])
+            if moved_design is None or self._excess(task, request.first, moved_design.figure) >= 0.0:
+                return self._stands(task, request, moved_design)
+            near = [{"point": written(moved_design.point, self.solver.program(request))}]
         if end is not None:
             return self._end(end, near)
-        found = self.solver.solve(asking, near, bool(task.ask["wide"]), task.ask.get("spare", ()))
-        return Met(_kept(found, task.ask["held"]), asking, dict(task.place))
+        result = self.solver.solve(request, near, bool(task.ask["wide"]), task.ask.get("spare", ()))
+        return Met(_kept(result, task.ask["held"]), request, dict(task.place))
 
     def _cap(self, axis: int, best: bool = False) -> float | None:
-        """Return the largest value of an axis that its range allows, or the least; None without a range."""
-        asked = dict(self.ranges).get(self.axes[axis])
-        if asked is None:
+        """Largest value of an axis that its range allows, or the least with `best`; None without a range."""
+        ends = dict(self.ranges).get(self.axes[axis])
+        if ends is None:
             return None
-        values = sorted(map(self.solver.axes[axis].value, asked))
+        values = sorted(map(self.solver.axes[axis].value, ends))
         return values[0] if best else values[1]
 
     def _asking_of_end(self, end: int) -> Asking:
-        """Return the program of an end of the front, but for its own range."""
+        """Program of an end of the front, without its own range."""
         return Asking(1, (self._cap(0), None)) if end else Asking(0, (None, self._cap(1)))
 
     def _end(self, end: int, near: Sequence[Mapping[str, Any]]) -> Met:
-        """Return an end of the front, and what was asked there: the axis' least, but not beyond its range.
+        """An end of the front, and its requested place: the axis' least within its range.
 
-        near: from where it is solved; without, it is searched for.
+        near: rows to start from; without them it is searched.
         """
-        asking = self._asking_of_end(end)
-        found, sought = self.solver.solve(asking, near, not near), self.solver.axes[end]
-        reached = sought.value(found.warm["axes"][self.axes[end]]) if found.certified else -math.inf
+        request = self._asking_of_end(end)
+        result, axis = self.solver.solve(request, near, not near), self.solver.axes[end]
+        end_value = axis.value(result.warm["axes"][self.axes[end]]) if result.certified else -math.inf
         least = self._cap(end, best=True)
-        if found.status == "infeasible":
-            found = replace(found, reason=self._clash(asking) or found.reason)
-        if least is None or reached >= least:
-            return self._sloped(found) if end and found.certified else Met(found, asking, {})
-        asking = Asking(0, (asking.caps[0], least)) if end else Asking(1, (least, asking.caps[1]))
-        return Met(self.solver.solve(asking, near, not near), asking, {self.axes[end]: sought.figure(least)})
+        if result.status == "infeasible":
+            result = replace(result, reason=self._clash(request) or result.reason)
+        if least is None or end_value >= least:
+            return self._sloped(result) if end and result.certified else Met(result, request, {})
+        request = Asking(0, (request.caps[0], least)) if end else Asking(1, (least, request.caps[1]))
+        return Met(self.solver.solve(request, near, not near), request, {self.axes[end]: axis.figure(least)})
 
-    def _clash(self, asking: Asking) -> str:
-        """Return which limits clash, and why; "" where that is not found."""
-        limits = solver.clashing(self.solver, self.solver.program(asking)).limits
+    def _clash(self, request: Asking) -> str:
+        """Limits that clash, and why; "" if none are known."""
+        limits = solver.clashing(self.solver, self.solver.program(request)).limits
         why = registry.of(self.scene).explain(self.scene, limits.values())
         return "; ".join([f"limits that clash: {', '.join(limits)}", *([why] if why else [])]) if limits else ""
 
-    def _sloped(self, found: Reached) -> Met:
-        """Return the least of the second axis as a point like the others, with its slope, where that is certified."""
-        cap = self.solver.axes[1].value(found.warm["axes"][self.axes[1]])
-        asking = Asking(0, (self._cap(0), cap))
-        again = self.solver.solve(asking, [found.warm], None)
-        known = again.warm.get("axes", {}) if again.certified else {}
-        apart = [abs(known.get(name, math.inf) - found.warm["axes"][name]) for name in self.axes]
-        same = all(a <= SAME_OBJECTIVE * size for a, size in zip(apart, self.sizes, strict=True))
-        return Met(again, asking, {}) if same else Met(found, Asking(1, (self._cap(0), None)), {})
+    def _sloped(self, end_result: Reached) -> Met:
+        """End of the second axis as a point like the others, with its slope, if that is certified."""
+        cap = self.solver.axes[1].value(end_result.warm["axes"][self.axes[1]])
+        request = Asking(0, (self._cap(0), cap))
+        sloped_result = self.solver.solve(request, [end_result.warm], None)
+        sloped_axes = sloped_result.warm.get("axes", {}) if sloped_result.certified else {}
+        differences = [abs(sloped_axes.get(name, math.inf) - end_result.warm["axes"][name]) for name in self.axes]
+        same = all(a <= SAME_OBJECTIVE * size for a, size in zip(differences, self.sizes, strict=True))
+        return Met(sloped_result, request, {}) if same else Met(end_result, Asking(1, (self._cap(0), None)), {})
 
 
-def _row(task: StudyTask, met: Met, seconds: float) -> Row:
-    """Return the row of what a task came to."""
-    found, _, place = met
-    told = {**found.warm, **{name: task.ask.get(name) for name in ("again", "fine", "near", "end", "steps")}}
+def _row(task: StudyTask, task_result: Met, seconds: float) -> Row:
+    """Row of a task's result."""
+    result, _, place = task_result
+    warm = {**result.warm, **{name: task.ask.get(name) for name in ("again", "fine", "near", "end", "steps")}}
     return Row(
         task.point,
         place,
         task.parent,
-        found.status,
-        found.reason,
-        designs.flat(found.design),
-        found.figures,
-        found.multipliers,
-        found.reached,
-        found.certified,
+        result.status,
+        result.reason,
+        designs.flat(result.design),
+        result.figures,
+        result.multipliers,
+        result.reached,
+        result.certified,
         seconds,
-        told,
+        warm,
     )
 
 
 def _demand(words: Words, goal: Goal) -> str:
-    """Return what is asked of a figure in words."""
+    """Demand on a figure in words."""
     low, high = (words.shown(goal.figure, end) if math.isfinite(end) else "" for end in (goal.low, goal.high))
     if low == high:
         return f"{goal.figure} {low}"
@@ -450,43 +475,45 @@ def _demand(words: Words, goal: Goal) -> str:
     return f"{goal.figure} at {'least' if low else 'most'} {low or high}"
 
 
-def _kept(found: Reached, held: Sequence[float]) -> Reached:
-    """Return what was reached, infeasible where what the target holds is not as good as along the front."""
-    now = found.warm.get("held", held)
-    if found.certified and any(one > other + plan.ALIKE for one, other in zip(now, held, strict=True)):
+def _kept(result: Reached, higher_levels: Sequence[float]) -> Reached:
+    """The result; infeasible if the target's levels are not as good as along the front."""
+    levels = result.warm.get("held", higher_levels)
+    if result.certified and any(
+        level > best_level + plan.ALIKE for level, best_level in zip(levels, higher_levels, strict=True)
+    ):
         return Reached("infeasible", "what the target holds is out of reach here")
-    return found
+    return result
 
 
 def _spread(count: int) -> set[int]:
-    """Return which of so many points are searched for widely: evenly spread, the ends' neighbours apart."""
+    """Indices of the points of a round that are searched widely: evenly spread, without the ends' neighbours."""
     return {round((k + 1) * (count + 1) / (SEARCHED + 1)) - 1 for k in range(SEARCHED)} if count else set()
 
 
 UNSEEN = 1e-6
-"""Share of an axis' natural size that shown digits do not tell: six of them."""
+"""Share of an axis' scale that the six shown digits do not resolve."""
 
 
 def read_front(study: "Trade", rows: Sequence[Row]) -> Findings:
-    """Return the front that finished rows make: in the order of the second axis, then those without a design."""
+    """Front of finished rows: in the order of the second axis, then rows without a design."""
     by_point = {row.point: row for row in rows}
     failed = tuple(row for row in rows if not row.certified and not _stood(study, row, by_point))
     if not all(end in by_point for end in ENDS):
         return Findings(tuple(rows), "No front yet: an end is not solved.")
     if not all(by_point[end].certified for end in ENDS):
-        found = [row for row in rows if row.certified]
-        return Findings((*found, *failed), "No front: an end has no certified design.")
+        certified = [row for row in rows if row.certified]
+        return Findings((*certified, *failed), "No front: an end has no certified design.")
     scale = study.scale(rows)
     first, second = study.labels
     if not all(scale.width):
-        said = f"{first} and {second} do not conflict: one design is best in both."
-        return Findings((by_point[ENDS[0]],), said + _apart(study, rows), bettered=0)
+        message_text = f"{first} and {second} do not conflict: one design is best in both."
+        return Findings((by_point[ENDS[0]],), message_text + _apart(study, rows), bettered=0)
     spots, _ = plan.spots(rows, scale)
     changes, gaps = plan.changes_and_gaps(spots, scale, plan.basins_apart(rows))
     best = tuple(by_point[spot.point] for spot in spots)
     message = f"{len(best)} designs between the {study.senses[1]} {second} and the {study.senses[0]} {first}."
     message += _apart(study, rows)
-    # In the order of the figure itself, whichever way is sought.
+    # In the order of the figure itself, for both senses.
     order = sorted(best, key=lambda row: plan.value(row, study.axes[1]))
     changes.sort(key=lambda change: change.at or 0.0)
     bettered = sum(row.warm["again"] is not None for row in best)
@@ -494,21 +521,21 @@ def read_front(study: "Trade", rows: Sequence[Row]) -> Findings:
 
 
 def _stood(study: "Trade", row: Row, rows: Mapping[int, Row]) -> bool:
-    """Say whether what a row sought once more is certified there, and what it came to is no better."""
+    """Whether the row that another row redoes is certified, and the repetition is no better."""
     again = row.warm.get("again")
-    before = None if again is None else rows.get(again)
-    if before is None or not before.certified:
+    first_row = None if again is None else rows.get(again)
+    if first_row is None or not first_row.certified:
         return False
-    first, known = study.solver.axes[0], row.warm.get("axes", {})
-    here = first.value(known[study.axes[0]]) if known else math.inf
-    return here >= first.value(plan.value(before, study.axes[0])) - plan.ALIKE * first.objective.scale
+    first, axes = study.solver.axes[0], row.warm.get("axes", {})
+    repeated = first.value(axes[study.axes[0]]) if axes else math.inf
+    return repeated >= first.value(plan.value(first_row, study.axes[0])) - plan.ALIKE * first.objective.scale
 
 
 def _apart(study: "Trade", rows: Sequence[Row]) -> str:
-    """Say how far apart both ends are where that is not seen in shown digits; "" for more, and for nothing."""
+    """Distance of both ends in words, where the shown digits do not resolve it; "" otherwise."""
     ends = [row for row in rows if row.point in ENDS]
     pairs = ((plan.value(row, axis) for row in ends) for axis in study.axes)
-    apart = max(abs(one - other) / size for (one, other), size in zip(pairs, study.sizes, strict=True))
+    apart = max(abs(first - second) / size for (first, second), size in zip(pairs, study.sizes, strict=True))
     if not SAME_OBJECTIVE < apart < UNSEEN:
         return ""
     return f" Its ends are {apart:.1g} of their size apart; {study.accuracy:g} was asked."

@@ -1,4 +1,4 @@
-"""The rows of a study: plain records that are the same numbers in memory, in a store and in a worker process."""
+"""Rows of a study: plain records with the same numbers in memory, in a store and in a worker process."""
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,9 +16,9 @@ from loomopt.solving.nlp.point import Point
 from loomopt.solving.nlp.rows import Multipliers, row_map
 
 UNTIMED = "seconds"
-"""The one part of a row that is not the same each time."""
+"""Field of a row that differs from run to run."""
 PEAK = "peak"
-"""The end at which a figure is touched where it stands highest in the cycle."""
+"""End of a figure at its largest value in the cycle."""
 ENDS = frozenset({"min", "max", "fixed", PEAK})
 
 
@@ -30,12 +30,12 @@ class Side(NamedTuple):
 
     @property
     def text(self) -> str:
-        """What JSON data call it."""
+        """Name in JSON data."""
         return f"{self.limit} {self.end}" if self.end else self.limit
 
     @classmethod
     def read(cls, text: str) -> "Side":
-        """Return the side that a text names."""
+        """Side of a name."""
         limit, _, end = text.rpartition(" ")
         return cls(limit, end) if end in ENDS else cls(text)
 
@@ -48,23 +48,23 @@ class Multiplier(NamedTuple):
 
     @property
     def text(self) -> str:
-        """What JSON data and the heads of columns call it."""
+        """Name in JSON data and in the heads of columns."""
         return f"{self.figure} per {self.side.text}"
 
     @classmethod
     def read(cls, text: str) -> "Multiplier":
-        """Return the multiplier that a text names."""
+        """Multiplier of a name."""
         figure, _, side = text.partition(" per ")
         return cls(figure, Side.read(side))
 
 
 @dataclass(frozen=True)
 class Row:
-    """What came of one point of a study; numbers SI.
+    """Result of one point of a study; numbers SI.
 
-    point: its number in the plan; place: what was asked, by scene key or axis; parent: the point that it started warm
-    from, None for one that started cold; status: as of a solve; reason: why it is not optimal; reached: goals of the
-    target, met or not; warm: JSON data from which a neighbour can start.
+    point: its number in the plan; place: requested values, by scene key or axis; parent: the point of its warm start,
+    None for a cold start; status: as of a solve; reason: why it is not optimal; reached: whether each goal of the
+    target is met; warm: JSON data for the start of a neighbour.
     """
 
     point: int
@@ -81,7 +81,7 @@ class Row:
     warm: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        """Freeze what a frozen dataclass would leave open; a reason is one line, and nothing that a terminal obeys."""
+        """Freeze the mappings; reduce a reason to one printable line."""
         if self.reason and not self.reason.isprintable():
             plain = "".join(c if c.isprintable() else " " for c in self.reason)
             object.__setattr__(self, "reason", " ".join(plain.split()))
@@ -89,37 +89,37 @@ class Row:
 
     @property
     def shortfall(self) -> str:
-        """The goals that a certified row misses, in words: "M3_fdc not reached"; "" for none."""
+        """Goals that a certified row misses, in words: "M3_fdc not reached"; "" for none."""
         return shortfall(self.reached) if self.certified else ""
 
     @property
     def outcome(self) -> str:
-        """What came of it, for people: its status, and the goals that it misses."""
+        """Status for people, with the goals that it misses."""
         return f"{self.status} but {self.shortfall}" if self.shortfall else self.status
 
     @property
     def narrows(self) -> bool:
-        """Whether it is none of the points that were asked for: it narrows down where something changes."""
+        """Whether the row is an additional point that locates a change."""
         return bool(self.warm.get("fine"))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON data from which `from_dict` makes the same row, bit by bit."""
-        told = {each.text: value for each, value in self.multipliers.items()}
-        return {each.name: getattr(self, each.name) for each in fields(self)} | {"multipliers": told}
+        """JSON data, from which `from_dict` makes the same row, bit by bit."""
+        multipliers = {entry.text: value for entry, value in self.multipliers.items()}
+        return {entry.name: getattr(self, entry.name) for entry in fields(self)} | {"multipliers": multipliers}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Row":
-        """Return the row that JSON data say."""
-        return cls(**{**data, "multipliers": {Multiplier.read(each): v for each, v in data["multipliers"].items()}})
+        """Row of JSON data."""
+        return cls(**{**data, "multipliers": {Multiplier.read(name): v for name, v in data["multipliers"].items()}})
 
     def row_json(self) -> dict[str, Any]:
-        """Return what `--json` prints of it: all but what only a neighbour needs."""
-        told = {name: value for name, value in self.as_dict().items() if name != "warm"}
-        return told | ({"narrows": True} if self.narrows else {})
+        """JSON data for `--json`: all but the data for neighbours."""
+        data = {name: value for name, value in self.as_dict().items() if name != "warm"}
+        return data | ({"narrows": True} if self.narrows else {})
 
 
 def digest(rows: Iterable[Row]) -> str:
-    """Return 64 hex digits that are the same for the same rows, whatever their order; the seconds apart."""
+    """Digest of rows, 64 hex digits, independent of their order and of the seconds."""
     import hashlib
     import json
 
@@ -129,31 +129,35 @@ def digest(rows: Iterable[Row]) -> str:
 
 
 RESOLVED, ROUNDING = 1e-6, 1e-9
-"""How closely a number comes out again on another machine: relative, and SI where it is only rounding. On the same one
-it comes out bit by bit; an answer is right to 1e-8."""
+"""Tolerance of a number that is computed again on another machine: relative, and SI for rounding. On the same machine
+it is the same bit by bit; an answer is accurate to 1e-8."""
 
 
 def agree(row: Row, again: Row) -> bool:
-    """Say whether a row is what solving its point again gives."""
-    mine, other = ({**each.design, **each.figures} for each in (row, again))
+    """Whether a row agrees with the row of solving its point again."""
+    first_numbers, second_numbers = ({**candidate.design, **candidate.figures} for candidate in (row, again))
     outcome = (row.status, row.certified) == (again.status, again.certified)
-    return outcome and mine.keys() == other.keys() and all(_alike(mine[name], other[name]) for name in mine)
+    return (
+        outcome
+        and first_numbers.keys() == second_numbers.keys()
+        and all(_alike(first_numbers[name], second_numbers[name]) for name in first_numbers)
+    )
 
 
-def _alike(one: float | None, other: float | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return one == other or abs(one - other) <= RESOLVED * max(abs(one), abs(other)) + ROUNDING
+def _alike(first: float | None, second: float | None) -> bool:
+    if first is None or second is None:
+        return first is second
+    return first == second or abs(first - second) <= RESOLVED * max(abs(first), abs(second)) + ROUNDING
 
 
 @dataclass(frozen=True)
 class StudyTask:
     """One point to be solved.
 
-    place: as of its row; parent: the point, of an earlier batch, that it starts warm from, None for a cold start;
-    ask: what else is asked, as JSON data; length: how long it takes beside others of its batch, roughly; beside:
-    optima of two neighbours as JSON data and how far it lies from the first to the second, where it may be solved
-    between them along with others of its batch, and comes to the same row as alone.
+    place: as of its row; parent: the point, of an earlier batch, of its warm start, None for a cold start; ask: further
+    requests as JSON data; length: approximate time relative to others of its batch; beside: optima of two neighbours as
+    JSON data and the share of the way from the first to the second, if it may be solved between them in a batch; the
+    row is the same as alone.
     """
 
     point: int
@@ -165,13 +169,13 @@ class StudyTask:
 
 
 def enough_together(tasks: Sequence[StudyTask]) -> list[StudyTask]:
-    """Return tasks; where fewer may be solved together than it takes, each by itself."""
+    """The tasks; if fewer may be solved in a batch than pays off, each is solved alone."""
     enough = sum(bool(task.beside) for task in tasks) >= FEWEST
     return list(tasks) if enough else [replace(task, beside=()) for task in tasks]
 
 
 FEWEST = 4
-"""Tasks of a batch from which on a pass over all of them costs less than solves of their own."""
+"""Least number of tasks for which a batch costs less than separate solves."""
 
 
 class Study(Protocol):
@@ -179,13 +183,13 @@ class Study(Protocol):
 
     @property
     def key(self) -> str:
-        """A hash of all that its rows depend on."""
+        """Hash of all data on which its rows depend."""
 
     def batch(self, rows: Sequence[Row]) -> Sequence[StudyTask]:
-        """Return the next tasks, from all rows of earlier batches and from nothing else; none at the end."""
+        """Next tasks, from all rows of earlier batches only; none at the end."""
 
     def solved(self, task: StudyTask, parent: Row | None) -> Row:
-        """Return the row of a task, from its arguments and from nothing else."""
+        """Row of a task, from its arguments only."""
 
 
 Work = tuple[StudyTask, Row | None]
@@ -194,19 +198,19 @@ Work = tuple[StudyTask, Row | None]
 
 @runtime_checkable
 class Together(Protocol):
-    """A study whose tasks may be solved along with others."""
+    """A study whose tasks may be solved in a batch."""
 
     def solved_together(self, tasks: Sequence[StudyTask]) -> list[Row | None]:
-        """Return the rows of tasks, whoever stands beside them; None of one that must be solved alone."""
+        """Rows of tasks, independent of the batch; None for a task that must be solved alone."""
 
     def solved_alone(self, task: StudyTask, parent: Row | None) -> Row:
-        """Return the row of a task that must."""
+        """Row of a task that must be solved alone."""
 
 
 class Change(NamedTuple):
-    """Between which two values of the number that varies, SI, other limits bind: those that come or go.
+    """Two values of the varied number, SI, between which other limits bind, and these limits.
 
-    kind: "jump", "kink" or "active set"; at: where, as closely as is known; None where only the two values are.
+    kind: "jump", "kink" or "active set"; at: place of the change; None if only the two values are known.
     """
 
     between: tuple[float, float]
@@ -215,17 +219,17 @@ class Change(NamedTuple):
     at: float | None = None
 
     def as_dict(self) -> dict[str, object]:
-        """Return it as JSON data."""
+        """JSON data."""
         at = self.between if self.at is None else self.at
-        found: dict[str, object] = {"at": at, "kind": self.kind, "limits": tuple(side.text for side in self.limits)}
-        return found if self.at is None else {**found, "between": self.between}
+        data: dict[str, object] = {"at": at, "kind": self.kind, "limits": tuple(side.text for side in self.limits)}
+        return data if self.at is None else {**data, "between": self.between}
 
 
 class Findings(NamedTuple):
-    """What rows come to: those that count, in the order they are read in.
+    """Result of a study: its rows in the order of the table.
 
-    message: in a sentence, "" for none; gaps: stretches of the number that varies, SI, without a design of their own;
-    bettered: rows of a front whose design was found from a neighbour's, in place of a worse one; None of no front.
+    message: a sentence, "" for none; gaps: intervals of the varied number, SI, without a design; bettered: number of
+    rows of a front whose design came from a neighbour's, in place of a worse one; None for other studies.
     """
 
     rows: tuple[Row, ...]
@@ -236,76 +240,76 @@ class Findings(NamedTuple):
 
 
 class SceneStudy(Study, Protocol):
-    """A study of one scene, as its table, its figure and its files read it."""
+    """A study of one scene, as its table, figure and files use it."""
 
     @property
     def name(self) -> str:
-        """What it is called: a command of the same name makes it."""
+        """Name of the study and of its command."""
 
     @property
     def scene(self) -> Scene:
-        """The scene that it starts from."""
+        """Scene of the study."""
 
     @property
     def target(self) -> str | None:
-        """Whose demands hold; None for none."""
+        """Target whose demands hold; None for none."""
 
     @property
     def heading(self) -> str:
-        """Scene, target and what is asked beside them, in a few words."""
+        """Scene, target and request in a few words."""
 
     @property
     def kinds(self) -> Mapping[str, str]:
-        """Numbers that its rows are placed by, and what it seeks beside its target → kind of quantity."""
+        """Numbers of a row's place, and quantities that it optimises besides its target → kind of quantity."""
 
     @property
     def shown(self) -> Sequence[str]:
-        """Figures and multipliers that it is about."""
+        """Figures and multipliers that its table shows."""
 
     @property
     def conditions(self) -> Mapping[str, object]:
-        """What is asked of every row, for people."""
+        """Conditions of every row, for people."""
 
     @property
     def settings(self) -> Mapping[str, object]:
-        """What its rows depend on, as JSON data."""
+        """Data on which its rows depend, as JSON data."""
 
     @property
     def size(self) -> int | None:
-        """How many points there are; None where that is not known beforehand."""
+        """Number of points; None if it is not known beforehand."""
 
     def place(self, row: Row) -> Mapping[str, float]:
-        """Return where a row stands, SI: what it is placed by."""
+        """Place of a row, SI."""
 
     def sought(self, row: Row) -> Mapping[str, float]:
-        """Return what it seeks beside its target at a row, SI."""
+        """Quantities that it optimises besides its target, at a row, SI."""
 
     def row_json(self, row: Row) -> dict[str, object]:
-        """Return what `--json` prints of a row."""
+        """JSON data of a row for `--json`."""
 
     def read(self, rows: Sequence[Row]) -> Findings:
-        """Return what finished rows come to."""
+        """Findings of finished rows."""
 
     def scene_at(self, point: int) -> Scene:
-        """Return the scene that a point's design stands in."""
+        """Scene of a point's design."""
 
     def solve(self, task: StudyTask, parent: Row | None) -> Solution:
-        """Return the whole answer of a task, the same digits as its row. Raises BadInput."""
+        """Full answer of a task, with the same digits as its row. Raises BadInput."""
 
 
-def counted(study: SceneStudy, count: int, of: str = "of") -> str:
-    """Return how many points there are, of how many where that is known."""
-    known = f"{count}" if study.size is None else f"{count} {of} {study.size}"
-    return f"{known} point{'' if (study.size or count) == 1 else 's'}"
+def counted(study: SceneStudy, count: int, word: str = "of") -> str:
+    """Number of points in words, with the total if it is known."""
+    text = f"{count}" if study.size is None else f"{count} {word} {study.size}"
+    return f"{text} point{'' if (study.size or count) == 1 else 's'}"
 
 
 Nodes = tuple[tuple[Extreme, ...], ...]
 
 
 def written(point: Point, program: Program) -> dict[str, Any]:
-    """Return a point that a solve of a program ended in as JSON data."""
-    said = point.multipliers
-    raw = {"lam_x": said.lam_x, "lam_g": said.lam_g, "extra": point.extra} if said else {}
+    """JSON data of the end point of a solve."""
+    multipliers = point.multipliers
+    raw = {"lam_x": multipliers.lam_x, "lam_g": multipliers.lam_g, "extra": point.extra} if multipliers else {}
     return {
         "task": _task(program),
         "x": dict(point.x),
@@ -316,7 +320,7 @@ def written(point: Point, program: Program) -> dict[str, Any]:
 
 
 def read(data: Mapping[str, Any], program: Program) -> Point | None:
-    """Return the point that data say, as a start for a program; None where they are of another structure, or none."""
+    """Point of JSON data as a start for a program; None for another structure, or for empty data."""
     if not data or data["task"] != _task(program):
         return None
     nodes, binding = _nodes(data["nodes"]), _nodes(data["binding"])
@@ -333,8 +337,8 @@ def _nodes(families: list[list[list[Any]]]) -> Nodes:
 
 
 def _task(program: Program) -> str:
-    """Return what is alike in programs of one structure and in every process: names, no formulas."""
-    objectives = [each.structure for each in program.objectives]
+    """Hash of what programs of one structure share in every process: names, no formulas."""
+    objectives = [objective.structure for objective in program.objectives]
     limits = [limit.structure for limit in program.limits]
     names = [variable.name for variable in program.variables], list(program.parameters)
     return hashlib.sha256(repr((names, limits, objectives)).encode()).hexdigest()[:16]

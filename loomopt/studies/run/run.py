@@ -1,4 +1,4 @@
-"""Run a study: its batches in turn, each row kept as soon as it is there; the same rows whoever computes them."""
+"""Run a study: its batches in turn; each row is stored at once, and the rows are the same for every executor."""
 
 import contextlib
 import functools
@@ -29,18 +29,18 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""Threads of linear algebra would wait for each other longer than matrices as small as these take."""
+"""Environment variables of linear algebra's threads: with small matrices threads only wait for each other."""
 NEEDED = "casadi", "loomopt.studies.front.trade", "loomopt.studies.sweep"
-"""What a worker imports while it starts."""
+"""Modules that a worker imports at its start."""
 MOST_WORKERS = 1024
 MOST_DEATHS = 3
-"""Worker processes that may die of one point, or one after the other while they start."""
+"""Most deaths of worker processes at one point, or in a row at their start."""
 RETRIES = 3
-"""How often Dask gives a task to another worker when one is lost."""
+"""Number of times that Dask gives a task to another worker after a loss."""
 
 
 def workers(count: int) -> Callable[[], Executor]:
-    """Return what makes an executor of so many processes on this machine. Raises BadInput for no such number."""
+    """Function that makes an executor of `count` processes on this machine. Raises BadInput."""
     remedy = "Write as many as the machine has cores"
     if not 1 <= arguments.whole(count, "workers", f"1 to {MOST_WORKERS}", remedy) <= MOST_WORKERS:
         raise BadInput(
@@ -54,10 +54,10 @@ def workers(count: int) -> Callable[[], Executor]:
 
 
 class Processes(Executor):
-    """Spawned processes that end with whoever made them, however that ends, and leave Ctrl-C to it.
+    """Spawned processes that end with their parent process, and ignore Ctrl-C.
 
-    in_flight: how many tasks it should have at a time. Raises BadInput where processes cannot start, BrokenExecutor
-    where they are killed again and again while they do.
+    in_flight: number of tasks that it should have at a time. Raises BadInput if processes cannot start, BrokenExecutor
+    if they are killed again and again at their start.
     """
 
     def __init__(self, count: int) -> None:
@@ -68,7 +68,7 @@ class Processes(Executor):
         raise BrokenExecutor(f"worker processes were killed {MOST_DEATHS} times while they started: out of memory?")
 
     def _started(self, count: int) -> bool:
-        """Start a pool; say whether its first process is ready, not killed from outside. Raises BadInput."""
+        """Start a pool; False if its first process was killed from outside. Raises BadInput."""
         context = multiprocessing.get_context("spawn")
         theirs, self._lifeline = context.Pipe(duplex=False)
         self._pool = ProcessPoolExecutor(count, context, _begin, (theirs,))
@@ -87,15 +87,15 @@ class Processes(Executor):
         return True
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Return the future of a call, as any executor does."""
+        """Future of a call, as of any executor."""
         with _signals_deferred(), _for_children():
             others = set(multiprocessing.active_children())
-            found = self._pool.submit(fn, *args, **kwargs)
+            future = self._pool.submit(fn, *args, **kwargs)
             self._processes |= set(multiprocessing.active_children()) - others
-            return found
+            return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes; without `wait` at once, whatever they are at, those that are still starting too."""
+        """End the processes; without `wait` at once, also those that are still starting."""
         if not wait:
             self._lifeline.close()
             for process in self._processes:
@@ -106,50 +106,54 @@ class Processes(Executor):
 
 @contextlib.contextmanager
 def _signals_deferred() -> Iterator[None]:
-    """Defer Ctrl-C and SIGTERM to the end: a process that starts meanwhile is known by then, and can be ended."""
+    """Defer Ctrl-C and SIGTERM to the end of the block: a process that starts in it is then known and can be ended."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    came: list[int] = []
-    before = {each: handler for each in SIGNALS if (handler := signal.getsignal(each)) not in (None, signal.SIG_IGN)}
+    received: list[int] = []
+    handlers = {
+        signal_number: handler
+        for signal_number in SIGNALS
+        if (handler := signal.getsignal(signal_number)) not in (None, signal.SIG_IGN)
+    }
     try:
-        for each in before:
-            signal.signal(each, lambda number, frame: came.append(number))
+        for signal_number in handlers:
+            signal.signal(signal_number, lambda number, frame: received.append(number))
         yield
     finally:
-        for each, handler in before.items():
-            signal.signal(each, handler)
-        if came:
-            signal.raise_signal(came[0])
+        for signal_number, handler in handlers.items():
+            signal.signal(signal_number, handler)
+        if received:
+            signal.raise_signal(received[0])
 
 
 @contextlib.contextmanager
 def _for_children() -> Iterator[None]:
-    """Have processes that are started meanwhile inherit one thread for linear algebra, and no Ctrl-C."""
+    """Let processes that start in the block inherit one thread for linear algebra, and a blocked Ctrl-C."""
     masked = hasattr(signal, "pthread_sigmask")
     if masked:
         from multiprocessing import resource_tracker
 
         resource_tracker.ensure_running()  # which would let Ctrl-C through again when it starts
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    own = {name: os.environ.get(name) for name in ONE_THREAD}
+        first_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    first_values = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     try:
         yield
     finally:
-        for name, value in own.items():
+        for name, value in first_values.items():
             if value is None:
                 del os.environ[name]
             else:
                 os.environ[name] = value
         if masked:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            signal.pthread_sigmask(signal.SIG_SETMASK, first_mask)
 
 
 def _begin(lifeline: Connection) -> None:
-    """Begin as a worker: it ends when the other end of its lifeline closes.
+    """Start a worker, which ends when the other end of its lifeline closes.
 
-    What every solve needs is imported before there is a first task, so that none waits for it.
+    The modules of every solve are imported before the first task, so that no task waits for them.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
@@ -165,7 +169,9 @@ def _end_with(lifeline: Connection) -> None:
 
 @contextlib.contextmanager
 def dask(address: str) -> Iterator[Executor]:
-    """Yield the executor of a Dask cluster by the address of its scheduler. Raises BadInput where it is not reached."""
+    """Yield the executor of a Dask cluster, by the address of its scheduler. Raises BadInput if there is no
+    connection.
+    """
     try:
         from distributed import Client
     except ImportError:
@@ -188,7 +194,7 @@ if TYPE_CHECKING:
 
 OnRow = Callable[[Row], None]
 Making = Callable[[], Executor]
-"""Makes an executor, again where the one before has broken."""
+"""Function that makes an executor; it is called again after the executor has broken."""
 
 
 def run(
@@ -197,27 +203,27 @@ def run(
     store: "Store | None" = None,
     on_row: OnRow | None = None,
 ) -> tuple[Row, ...]:
-    """Return the rows of a study in the order of its points, the same whatever the executor.
+    """Run a study; the rows are in the order of its points, and the same for every executor.
 
-    executor: any of `concurrent.futures`, or a function that makes one, so that a broken one is built again; one task
-    after the other here without it. store: where each row is written as it comes, and from which rows that are there
-    are taken; some of them are solved again first. on_row: called with each row, read or computed, as it is there.
-    Raises BadInput where a row of the store does not come out again, and KeyboardInterrupt on Ctrl-C.
+    executor: any of `concurrent.futures`, or a function that makes one, so that a broken one is made again; without it
+    the tasks run here one by one. store: each row is written to it at once, and its rows are taken from it; some of
+    them are solved again first. on_row: called with each row, read or computed. Returns the rows. Raises BadInput if
+    a row of the store is not reproduced, and KeyboardInterrupt on Ctrl-C.
     """
-    known = {row.point: row for row in store.rows(study.key)} if store else {}
-    doubted = {row.point: row for row in _sample(list(known.values()))}
+    stored_rows = {row.point: row for row in store.rows(study.key)} if store else {}
+    checked = {row.point: row for row in _sample(list(stored_rows.values()))}
     rows: dict[int, Row] = {}
 
-    def kept(row: Row, fresh: bool = True) -> None:
+    def add(row: Row, fresh: bool = True) -> None:
         if store and fresh:
             store.add(study.key, row)
         rows[row.point] = row
         if on_row:
             on_row(row)
 
-    def came(row: Row) -> None:
+    def receive(row: Row) -> None:
         if row.point not in rows:
-            kept(row)
+            add(row)
         elif store and not agree(rows[row.point], row):
             why = f": {row.reason}" if row.reason else ""
             problem = f"solving point {row.point} again does not give the row that it holds{why}"
@@ -226,29 +232,29 @@ def run(
 
     with Crew(study, executor) as crew:
         while tasks := study.batch(list(rows.values())):
-            there = [known.pop(task.point) for task in tasks if task.point in known]
-            for row in there:
-                kept(row, fresh=False)
-            left = [task for task in tasks if task.point in doubted or task.point not in rows]
-            left.sort(key=lambda task: task.point not in doubted)
-            crew.work([(task, None if task.parent is None else rows[task.parent]) for task in left], came)
+            stored = [stored_rows.pop(task.point) for task in tasks if task.point in stored_rows]
+            for row in stored:
+                add(row, fresh=False)
+            open_tasks = [task for task in tasks if task.point in checked or task.point not in rows]
+            open_tasks.sort(key=lambda task: task.point not in checked)
+            crew.work([(task, None if task.parent is None else rows[task.parent]) for task in open_tasks], receive)
             rows = dict(sorted(rows.items()))
     return tuple(rows.values())
 
 
 DOUBTED = 3
-"""Rows of a store that are solved again before the others are taken."""
+"""Number of stored rows that are solved again before the others are taken."""
 
 
 def _sample(rows: Sequence[Row]) -> Iterator[Row]:
-    """Yield the rows of a store that are solved again: certified ones, evenly spread."""
+    """Yield the stored rows that are solved again: certified ones, evenly spread."""
     certified = [row for row in rows if row.certified]
     count = min(DOUBTED, len(certified))
     yield from (certified[(2 * k + 1) * len(certified) // (2 * count)] for k in range(count))
 
 
 def tasks(study: Study, rows: Sequence[Row]) -> Iterator[tuple[StudyTask, Row | None]]:
-    """Yield every task of a study that was run, with the row of its parent."""
+    """Yield every task of a finished study, with the row of its parent."""
     known, done = {row.point: row for row in rows}, dict[int, Row]()
     while batch := study.batch(list(done.values())):
         for task in batch:
@@ -259,25 +265,25 @@ def tasks(study: Study, rows: Sequence[Row]) -> Iterator[tuple[StudyTask, Row | 
 
 
 IN_FLIGHT = 256
-"""Tasks that an executor is given at a time, where it does not say how many it wants (`in_flight`)."""
+"""Number of tasks that an executor has at a time, if it has no attribute `in_flight`."""
 KILLED = "KilledWorker"
-"""What Dask raises for a task of which worker after worker has died."""
+"""Error of Dask for a task whose workers have all died."""
 DIED = f"the process that solved it died {MOST_DEATHS} times: out of memory?"
 
 
 def solved(study: bytes, works: "Sequence[Work]") -> list[str]:
-    """Return the rows of tasks as JSON text; what goes wrong is a failed row with its reason."""
+    """Rows of tasks as JSON text; an error becomes a failed row with its reason."""
     with working():
-        known = _unpickled(study)
-        rows = _together(known, [task for task, _ in works])
+        unpickled = _unpickled(study)
+        rows = _together(unpickled, [task for task, _ in works])
         pairs = zip(works, rows, strict=True)
-        return [json.dumps((row or _solved(known, *work, alone=any(rows))).as_dict()) for work, row in pairs]
+        return [json.dumps((row or _solved(unpickled, *work, alone=any(rows))).as_dict()) for work, row in pairs]
 
 
 def _together(study: "Study", tasks: "Sequence[StudyTask]") -> "Sequence[Row | None]":
-    """Return the rows of tasks that can be solved together, None of each other one."""
+    """Rows of tasks that can be solved in a batch; None for the others."""
     if len(tasks) > 1 and isinstance(study, Together):
-        # What fails tells so where it is solved by itself.
+        # A task that fails here is solved alone, and fails there with its reason.
         with contextlib.suppress(Exception, SystemExit):
             return study.solved_together(tasks)
     return [None] * len(tasks)
@@ -288,15 +294,15 @@ def _solved(study: "Study", task: "StudyTask", parent: "Row | None", alone: bool
     try:
         return study.solved_alone(task, parent) if alone and isinstance(study, Together) else study.solved(task, parent)
     except (Exception, SystemExit) as error:
-        told = blamed(error)
-        why = "; ".join([f"{told}" or type(told).__name__, *getattr(told, "__notes__", ())])
-        return _failed(task, " ".join(why.split()), time.perf_counter() - began)
+        cause = blamed(error)
+        reason = "; ".join([f"{cause}" or type(cause).__name__, *getattr(cause, "__notes__", ())])
+        return _failed(task, " ".join(reason.split()), time.perf_counter() - began)
 
 
 @functools.lru_cache(maxsize=4)
 def _unpickled(study: bytes) -> "Study":
-    found: Study = pickle.loads(study)
-    return found
+    unpickled: Study = pickle.loads(study)
+    return unpickled
 
 
 def _unpacked_row(text: str) -> "Row":
@@ -308,15 +314,15 @@ def _failed(task: "StudyTask", reason: str, seconds: float = 0.0) -> "Row":
 
 
 Group = list[Work]
-"""Tasks that are handed out together."""
+"""Tasks that are submitted as one call."""
 TOGETHER = 32
-"""Tasks of a group: lost with Ctrl-C, and long enough for what they share."""
+"""Most tasks of a group: few enough to lose at Ctrl-C, and enough to share a batch."""
 
 
 class Crew:
-    """Whoever works on a study, from the first task to the last.
+    """Executor of a study's tasks, from the first task to the last.
 
-    given: an executor of the caller's, or how to make one; None for this process.
+    given: an executor of the caller, or a function that makes one; None for this process.
     """
 
     def __init__(self, study: "Study", given: Executor | Making | None) -> None:
@@ -335,41 +341,41 @@ class Crew:
         self._leave(finished=kind is None)
 
     def _leave(self, finished: bool) -> None:
-        """End an executor that was made here."""
+        """Shut down an executor that was made here."""
         if self.make and self.executor:
             self.executor.shutdown(wait=finished, cancel_futures=True)
             self.executor = None
 
-    def work(self, tasks: "Sequence[Work]", kept: "Callable[[Row], None]") -> None:
-        """Have tasks solved; `kept` is handed each row as it comes. Raises KeyboardInterrupt on Ctrl-C.
+    def work(self, tasks: "Sequence[Work]", on_row: "Callable[[Row], None]") -> None:
+        """Solve tasks and call `on_row` with each row. Raises KeyboardInterrupt on Ctrl-C.
 
-        Workers begin with the longest tasks, so that they end together.
+        Workers start with the longest tasks, so that they end at the same time.
         """
         if self.executor is None and self.make is None:
             for group in _groups(tasks, TOGETHER):
                 for text in solved(self.payload, group):
-                    kept(_unpacked_row(text))
+                    on_row(_unpacked_row(text))
             return
         try:
             several = max(1, self._most() // 2)
             groups = _groups(tasks, min(TOGETHER, max(1, math.ceil(len(tasks) / several))))
             for row in self._rows(deque(sorted(groups, key=lambda group: -sum(task.length for task, _ in group)))):
-                kept(row)
+                on_row(row)
         except KeyboardInterrupt:
             for future in self.running:
                 if future.done() and not future.cancelled() and future.exception() is None:
                     for text in future.result():
-                        kept(_unpacked_row(text))
+                        on_row(_unpacked_row(text))
             raise
 
     def _most(self) -> int:
-        """Return how many groups of tasks the executor is given at a time."""
+        """Number of groups that the executor has at a time."""
         return int(getattr(self._made(), "in_flight", IN_FLIGHT))
 
     def _rows(self, waiting: "deque[Group]") -> "Iterator[Row]":
-        """Yield the rows of tasks as they come.
+        """Yield the rows of tasks when they are finished.
 
-        Where a pool broke nobody knows which task was to blame: each that was at work then has a new pool to itself.
+        After a pool has broken, the task that broke it is unknown: each running task is solved alone in a new pool.
         """
         suspects: deque[Group] = deque()
         while waiting or suspects or self.running:
@@ -393,18 +399,22 @@ class Crew:
                 suspects.extend([work] for work in lost if self.deaths[work[0].point] < MOST_DEATHS)
 
     def _made(self) -> Executor:
-        """Return the executor, made where there is none yet."""
+        """The executor; it is made if there is none yet."""
         if self.executor is None and self.make:
-            made: object = self.make()
-            if not isinstance(made, Executor):
+            executor: object = self.make()
+            if not isinstance(executor, Executor):
                 remedy = "Give a function that makes one, such as lambda: ThreadPoolExecutor(2)"
-                raise refusal("what it makes is no executor", "", "executor", made, "any of concurrent.futures", remedy)
-            self.executor = made
+                raise refusal(
+                    "what it makes is no executor", "", "executor", executor, "any of concurrent.futures", remedy
+                )
+            self.executor = executor
         assert self.executor
         return self.executor
 
     def _hand_out(self, waiting: "deque[Group]", alone: bool) -> "list[Work]":
-        """Give the executor as many tasks as it wants, or one alone; return what a broken one has not taken."""
+        """Submit as many groups as the executor takes, or one alone; returns the group that a broken executor
+        refused.
+        """
         executor, most = self._made(), 1 if alone else self._most()
         while waiting and len(self.running) < most:
             group = waiting.popleft()
@@ -418,7 +428,7 @@ class Crew:
 
 
 def _groups(works: "Sequence[Work]", most: int) -> "list[Group]":
-    """Return tasks in groups: so many at most of those that take less together, each other one by itself."""
+    """Tasks in groups: at most `most` of those that may share a batch, the others one by one."""
     several = [work for work in works if work[0].beside]
     return [
         *([work] for work in works if not work[0].beside),
