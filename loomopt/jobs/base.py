@@ -150,7 +150,7 @@ class Task(abc.ABC):
         return max(abs(self.known[name]), *map(abs, ends)) or 1.0
 
     def room(self, name: str, ends: Ends) -> Ends:
-        """Return where random starts of a variable lie."""
+        """Range of the random starts of a variable."""
         return ends
 
     @property
@@ -181,12 +181,12 @@ class Task(abc.ABC):
         return next((v for v in self.bounded if v.name == name), Variable(name, least, least, least, (least, least)))
 
     def parameters(self) -> dict[str, float]:
-        """Return every known number that is no variable."""
+        """Every known number that is no variable."""
         taken = {variable.name for variable in self.variables}
         return {name: value for name, value in self.known.items() if name not in taken}
 
     def limits(self) -> list[Limit]:
-        """Return all limits in order."""
+        """All limits in order."""
         return [*self.bounds(), *self.figures(), *self.demands(), *self.margins(), *self.wanted()]
 
     def bounds(self) -> list[Limit]:
@@ -219,7 +219,7 @@ class Task(abc.ABC):
         return kind(name, sign, row, value, scale, relaxable=relaxable)
 
     def demands(self) -> list[Limit]:
-        """Return what checks demand of their rows and quantities while they are on.
+        """Limits that the checks that are on set to their rows and quantities.
 
         What a table asks for may give way; what the nature of the thing demands may not.
         """
@@ -233,7 +233,7 @@ class Task(abc.ABC):
         return found
 
     def margin_size(self, row: str) -> float:
-        """Return what a row of a check is measured by; 0 where the mechanism does not say: by what is demanded."""
+        """Scale of a row of a check; 0 where the mechanism gives none and the demanded value is the scale."""
         return 0.0
 
     def margins(self) -> list[Limit]:
@@ -247,7 +247,7 @@ class Task(abc.ABC):
         return max(self.known[name] for name, kind in self.scene.schema.variables.items() if kind == "length")
 
     def wanted(self) -> list[Limit]:
-        """Return what the target itself asks of figures, and may find out of reach."""
+        """Goals that the target sets for figures, and that may be out of reach."""
         return []
 
     def goals(self) -> tuple[Goal, ...]:
@@ -255,7 +255,7 @@ class Task(abc.ABC):
         return goals(self.wanted())
 
     def held(self) -> tuple[Objective, ...]:
-        """Return what of the target's levels is held before the axes: those before its own last that are no axes."""
+        """Levels of the target that come before the axes: those before its last one that are no axes."""
         added = self.least() if self.target else ()
         own = [level for level in self.objectives() if level not in added] if self.target else []
         return tuple(level for level in own[:-1] if level.figure not in self.traded)
@@ -308,19 +308,19 @@ class Task(abc.ABC):
         return ScaleMove(name, along, (Preference("today", LEAST_CHANGE),), today, bounds)
 
     def follow(self) -> Callable[[JobModel, Numbers], Numbers]:
-        """Return what gives the variables that follow from the others."""
+        """Formulas of the variables that follow from the others."""
         return nothing_follows
 
     def today(self) -> Numbers:
-        """Return today's values of variables that are no numbers of the scene."""
+        """Today's values of variables that are no numbers of the scene."""
         return {}
 
     def single(self) -> str:
-        """Return why every local optimum is the best there is; "" where that is not so."""
+        """Why every local optimum is the best there is; "" where that is not so."""
         return ""
 
     def added(self) -> Added | None:
-        """Return what the target's designs add as mass; None where they add none, or weigh it themselves."""
+        """Mass that the target's designs add; None where they add none, or minimise it themselves."""
         return None
 
     # Natural sizes.
@@ -379,7 +379,7 @@ def ends(low: float | None, high: float | None) -> list[tuple[int, float]]:
 
 
 def distinct(starts: Sequence[dict[str, float]]) -> tuple[dict[str, float], ...]:
-    """Return starts without repeats."""
+    """Starts without repeats."""
     return tuple(start for place, start in enumerate(starts) if start not in starts[:place])
 
 
@@ -453,10 +453,10 @@ Figures = Mapping[str, float | None]
 
 
 class Every:
-    """What holds every name."""
+    """Container of all names."""
 
     def __contains__(self, name: object) -> bool:
-        """Say that it is there."""
+        """True for every name."""
         return True
 
 
@@ -492,10 +492,10 @@ class Job(abc.ABC):
 
     @abc.abstractmethod
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
-        """Return one sentence on what an optimum of the target is worth."""
+        """Sentence on an optimum of the target."""
 
     def say_together(self, members: "Sequence[tuple[Scene, Numbers, Figures]]", own: frozenset[str]) -> str:
-        """Return sentences on why members of a family cannot all reach their goal, "" where physics says nothing.
+        """Sentences on why members of a family cannot all reach their goal, "" where physics says nothing.
 
         members: the scene, design and figures of each, SI; own: numbers of a design of which each has its own.
         """
@@ -503,7 +503,7 @@ class Job(abc.ABC):
 
     @abc.abstractmethod
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
-        """Return what the curves over the cycle show of the motion, and what force and torque are called."""
+        """Curves of the motion over the cycle, and the names of force and torque."""
 
     # What few jobs say otherwise.
 
@@ -512,7 +512,7 @@ class Job(abc.ABC):
         return kept(scene, (self.name, target), lambda: self.task(scene, target).program())
 
     def schema(self, document: Mapping[str, Any]) -> SceneSchema:
-        """Return what a scene may hold; document: the raw scene, on which that may depend."""
+        """Schema of a scene; document: the raw scene, on which the schema may depend."""
         return self.own_schema
 
     @property
@@ -538,21 +538,21 @@ class Job(abc.ABC):
         demand(scene, target)
 
     def tables(self, scene: Scene, target: str) -> "tuple[Record, ...]":
-        """Return what is told of the tables that are read for a target; "" for the scene's default. Raises BadInput."""
+        """Remarks on the tables that are read for a target; "" for the scene's default. Raises BadInput."""
         return numbers.records(scene)
 
     def today(self, scene: Scene) -> dict[str, float]:
-        """Return today's design by full names, with every other number that the scene frees."""
+        """Today's design by full names, with every other number that the scene frees."""
         known, variables = self.numbers(scene), scene.schema.variables
         others = [scene.full(name) for name, bound in scene.bounds.items() if name not in variables and bound.free]
         return {name: known[name] for name in (*variables, *others)}
 
     def numbers(self, scene: Scene) -> dict[str, float]:
-        """Return every number of the scene by full name."""
+        """Every number of the scene by full name."""
         return kept(scene, (self.name, "numbers"), lambda: Frozen(self.task(scene).known))
 
     def numbers_of(self, scene: Scene, design: Numbers) -> dict[str, float]:
-        """Return all numbers of a design, by any name of each; a number it does not name stays the scene's."""
+        """All numbers of a design, by any of their names; a number it does not name stays the scene's."""
         return {**self.numbers(scene), **{scene.full(name): value for name, value in design.items()}}
 
     def sampler(self, scene: Scene, design: Numbers) -> Sampler:
@@ -589,7 +589,7 @@ class Job(abc.ABC):
         return dict(x)
 
     def figures(self, scene: Scene, design: Numbers) -> Figures:
-        """Return every figure of the job; None for one whose numbers the scene does not have.
+        """Every figure of the job; None for one whose numbers the scene does not have.
 
         Those over the cycle that nothing has asked for yet are computed when they are read.
         """
@@ -609,7 +609,7 @@ class Job(abc.ABC):
     def figures_of(
         self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
     ) -> dict[str, Number]:
-        """Return every figure of a machine, or of many at once, SI; None for one whose numbers the scene does not have.
+        """Every figure of a machine, or of many at once, SI; None for one whose numbers the scene does not have.
 
         asked: which of those `over_cycle`, every one without it; the others are None or there too. What a motion of its
         own tells is not among those of many (`machines.at_once`).
@@ -643,7 +643,7 @@ class Job(abc.ABC):
         return program.completed({**program.parameters, **design})
 
     def start(self, program: Program, scene: Scene) -> dict[str, float]:
-        """Return today's machine by the NLP's variables."""
+        """Today's machine by the NLP's variables."""
         # What it has not, such as a free law, stands in the task: others may follow from that.
         return {**self.values(program, {**self.today(scene), **program.today}), **program.today}
 
@@ -656,17 +656,17 @@ class Job(abc.ABC):
         return {name: name for name in model.quantities}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
-        """Return how each figure is read over a box of numbers that can be."""
+        """How each figure is read over a box of numbers that can be."""
         rows = {name: InBox((name,)) for name in scene.schema.figures if model.has_row(name)}
         return rows | {name: InBox(quantity=quantity) for name, quantity in self.peaks(model).items()}
 
     def studied(self, scene: Scene) -> Studied:
-        """Return what studies read: the default target, and every figure that is the largest |value| of a quantity."""
+        """Quantities that studies show: the default target, and figures that are the largest |value| of a quantity."""
         peaks = {name: (name, False) for name in self.model(scene).quantities}
         return Studied((scene.schema.default_target,), peaks)
 
     def crossings(self, scene: Scene) -> Mapping[str, tuple[Crossing, ...]]:
-        """Return figures that are read where a curve passes a level, and jump where it turns there."""
+        """Figures that are read where a curve passes a level, and jump where it turns there."""
         return {}
 
     def adopted(self, scene: Scene, design: Mapping[str, Any], target: str) -> tuple[Scene, str]:
@@ -692,7 +692,7 @@ class Job(abc.ABC):
         return found
 
     def explain(self, scene: Scene, clash: Collection[str]) -> str:
-        """Return what physics says of why the limits named `clash` do; "" where it says nothing."""
+        """Physical reason why the limits `clash` conflict; "" where there is none to give."""
         known = self.numbers(scene)
         limited = numbers.bounds(scene, known)
         told = [check.explain(known, limited, own, clash, scene.show) for check, own in _checks(scene)]
@@ -700,7 +700,7 @@ class Job(abc.ABC):
 
 
 def alone(scene: Scene, sampled: "Sampler | Machines", asked: Container[str]) -> dict[str, Number]:
-    """Return figures that are rows of the model, and its means that are asked for; None for every other."""
+    """Figures that are rows of the model, and its means that are demanded; None for every other."""
     found: dict[str, Number] = {name: sampled.static.get(name) for name in scene.schema.figures}
     means = [name for mean in sampled.model.integrals for name in (mean.name, mean.root)]
     found |= {name: sampled.single(name) for name in means if name in found and name in asked}

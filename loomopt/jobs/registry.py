@@ -53,7 +53,7 @@ def _single(group: str, name: str, what: str) -> "EntryPoint | None":
 
 
 def _loaded(point: "EntryPoint", what: str, kind: type, name: str) -> Any:
-    """Return what an entry point names. Raises BadInput, naming its distribution, where that fails or is another."""
+    """Object of an entry point. Raises BadInput with its distribution where loading fails or the type is another."""
     BROUGHT[point.module] = f"{what} {point.name} of {_distribution(point)}"
     try:
         found = point.load()
@@ -120,7 +120,7 @@ class _Registered:
         return names()
 
     def schema(self, job: str, document: Mapping[str, Any], effects: Collection[str]) -> SceneSchema:
-        """Return what a scene of a job may hold; effects: those it names, which another distribution may bring."""
+        """Schema of a scene of a job; effects: those it names, which another distribution may bring."""
         with naming():
             schema = find(job).schema(document)
             if schema.name != job:
@@ -144,14 +144,14 @@ class _Registered:
 
 
 def _with_family(schema: SceneSchema) -> SceneSchema:
-    """Return what scenes of a job may hold that tell of several machines."""
+    """Schema of scenes of a job that describe several machines."""
     from loomopt.scenes.family import TARGET
 
     return replace(schema, targets={**schema.targets, FAMILY: TARGET})
 
 
 def _brought(schema: SceneSchema, name: str) -> Effect | None:
-    """Return another distribution's effect of a job; None where nobody brings it. Raises BadInput."""
+    """Another distribution's effect of a job; None where nobody brings it. Raises BadInput."""
     point = _single(EFFECTS, f"{schema.name}.{name}", "effect")
     if point is None:
         return None
@@ -185,7 +185,7 @@ def brought() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
 
 
 def heads(names: Iterable[str]) -> tuple[list[packaged.Head], list[BadInput]]:
-    """Return what `loomopt list` tells of scenes that are read whole, and what is wrong with any of them."""
+    """Heads of scenes that are read whole, and the errors of those that cannot be read."""
     found, faults = [], []
     for name in names:
         try:
@@ -203,7 +203,7 @@ def problems() -> dict[str, Path]:
 
 
 def is_packaged(scene: Scene) -> bool:
-    """Say whether a scene was read from the file of a packaged one, whatever the call changed in it."""
+    """Whether a scene was read from the file of a packaged one; changes by the call do not matter."""
     folder = scene.paths.folder
     return folder is not None and (folder / Path(scene.origin).name).resolve() in map(Path.resolve, problems().values())
 
@@ -219,7 +219,7 @@ def _folder(job: str, name: str) -> Path:
 
 
 def declared(name: str) -> SceneSchema:
-    """Return what scenes of a job may hold, effects of other distributions too. Raises BadInput for an unknown job."""
+    """Schema of scenes of a job, with effects of other distributions. Raises BadInput for an unknown job."""
     others = [
         point.name.removeprefix(f"{name}.") for point in entry_points(EFFECTS) if point.name.startswith(f"{name}.")
     ]

@@ -83,7 +83,7 @@ class Record(NamedTuple):
     uncertainty: float | None = None
 
     def as_dict(self) -> dict[str, object]:
-        """Return it as JSON data; what is not smoothed says nothing of smoothing."""
+        """JSON data; without the keys of smoothing where the table is not smoothed."""
         told = {name: value for name, value in self._asdict().items() if value is not None and name != "said"}
         return told | {"precision": dict(self.precision), "misfit": dict(self.misfit)}
 
@@ -117,7 +117,7 @@ class Table(NamedTuple):
         return "; ".join((f"read {', '.join(told)}", *self.remarks))
 
     def record(self, key: str, misfit: Mapping[str, float | None], said: str) -> Record:
-        """Return what is told of it; key: under which the scene names it; said: what became of it, in words."""
+        """Remarks on the table; key: under which the scene names it; said: a sentence on its use."""
         text = f"{key} {self.file}: {said}; {self.said}"
         return Record(key, self.file, len(self.lines), self.precision, misfit, text)
 
@@ -133,7 +133,7 @@ def read(
     twice: bool = False,
     digits: int | None = None,
 ) -> Table:
-    """Return the columns of a table. Raises BadInput.
+    """Columns of a table. Raises BadInput.
 
     given: the file as the scene names it, under `key`; kinds: column name → kind of quantity; marks: columns without a
     unit that may be there, 1 (or x) in the rows that are meant, 0 in all without one; fewest: rows there must be;
@@ -144,7 +144,7 @@ def read(
 
 
 def columns(scene: Scene, given: str, key: str, kinds: Mapping[str, str]) -> tuple[str, ...]:
-    """Return which columns of a table are there; kinds: those it may have. Raises BadInput.
+    """Which columns of a table are there; kinds: those it may have. Raises BadInput.
 
     given: the file as the scene names it, under `key`.
     """
@@ -153,7 +153,7 @@ def columns(scene: Scene, given: str, key: str, kinds: Mapping[str, str]) -> tup
 
 
 def measured(path: Path, kinds: Mapping[str, str]) -> Table:
-    """Return those columns of a caller's table that have a name of `kinds`, its first one always. Raises BadInput.
+    """Columns of a caller's table whose names are in `kinds`, the first of which must be there. Raises BadInput.
 
     kinds: column name → kind of quantity, angles first. An empty cell, but for an angle, is NaN.
     """
@@ -169,12 +169,12 @@ def measured(path: Path, kinds: Mapping[str, str]) -> Table:
 
 
 def header(kinds: Mapping[str, str]) -> str:
-    """Return the header a table should have."""
+    """Header a table should have."""
     return ", ".join(f"{name} [{DISPLAY_UNIT[kind]}]" for name, kind in kinds.items())
 
 
 def _named(scene: Scene, given: str, key: str) -> bytes:
-    """Return what stands in a file that a scene names, or that came with it. Raises BadInput."""
+    """Bytes of a file that a scene names, or that came with it. Raises BadInput."""
     held = scene.paths.text(key)
     reads(scene, given)
     if held is not None:
@@ -183,7 +183,7 @@ def _named(scene: Scene, given: str, key: str) -> bytes:
 
 
 def _bytes(path: Path, given: str, origin: str, key: str) -> bytes:
-    """Return what stands in a file, a byte more than may at most. Raises BadInput."""
+    """Bytes of a file, at most one more than is allowed. Raises BadInput."""
     try:
         if not path.is_file():
             problem = "the table cannot be read: there is no such file"
@@ -209,7 +209,7 @@ def _table(
     digits: int | None = None,
     gaps: bool = False,
 ) -> Table:
-    """Return the table that a file's cells make, with the separator that gives most of the columns."""
+    """Table that a file's cells make, with the separator that gives most of the columns."""
     cells = max(tables, key=lambda each: len(_there(each, kinds)))
     if not cells.rows:
         raise refusal("the table is empty", origin, allowed=header(kinds), remedy="Give a header and rows")
@@ -254,7 +254,7 @@ def _table(
 
 
 def _heading(cell: str) -> tuple[str, str | None]:
-    """Return the name in a heading, and the unit where one stands behind it."""
+    """Name in a heading, and the unit where one stands behind it."""
     plain = " ".join(cell.split())
     for pattern in _HEADINGS:
         found = pattern.fullmatch(plain)
@@ -264,7 +264,7 @@ def _heading(cell: str) -> tuple[str, str | None]:
 
 
 def _places(row: Row, name: str) -> list[int]:
-    """Return the places of a column in a heading: under its name, else whatever its case, else under another name."""
+    """Places of a column in a heading: under its name, else whatever its case, else under another name."""
     headings = [_heading(cell)[0] for cell in row.cells]
     for called in (name, *ALIASES.get(name, ())):
         found = [place for place, each in enumerate(headings) if each == called]
@@ -275,13 +275,13 @@ def _places(row: Row, name: str) -> list[int]:
 
 
 def _there(cells: Cells, kinds: Mapping[str, str]) -> tuple[str, ...]:
-    """Return which columns are there with one separator."""
+    """Which columns are there with one separator."""
     head, _ = _headed(cells, kinds)
     return tuple(name for name in kinds if _places(head, name))
 
 
 def _headed(cells: Cells, kinds: Mapping[str, str]) -> tuple[Row, Sequence[Row]]:
-    """Return the heading and the rows below it: the first row that names most of the columns, or a remark above."""
+    """Heading and the rows below it: the first row that names most of the columns, or a remark above."""
     candidates = [(row, cells.rows[k + 1 :]) for k, row in enumerate(cells.rows[:FIRST_ROWS])]
     candidates += [(row, cells.rows) for row in cells.remarks]
     if not candidates:
@@ -290,7 +290,7 @@ def _headed(cells: Cells, kinds: Mapping[str, str]) -> tuple[Row, Sequence[Row]]
 
 
 def _found(head: Row, rows: Sequence[Row], kinds: Mapping[str, str], origin: str) -> tuple[list[_Column], int]:
-    """Return the columns that a heading names, and how many rows of units stand below it, 0 or 1. Raises BadInput."""
+    """Columns that a heading names, and how many rows of units stand below it, 0 or 1. Raises BadInput."""
     places = {name: _places(head, name) for name in kinds}
     below = 0
     found = []
@@ -320,7 +320,7 @@ def _found(head: Row, rows: Sequence[Row], kinds: Mapping[str, str], origin: str
 
 
 def _cell(text: str) -> str:
-    """Return a cell as a message repeats it: numbers and units are short, and what is long is none of a message."""
+    """Text of a cell in a message: cut where it is longer than any number or unit."""
     return shown(text) if len(text) <= LONGEST_TOLD else f"a text of {len(text)} characters"
 
 
@@ -329,7 +329,7 @@ def _quoted(row: Row) -> str:
 
 
 def _size(unit: str, kind: str, where: str, usual: str, origin: str) -> tuple[float, str]:
-    """Return a unit of a column in SI, and in ASCII. Raises BadInput for one that is none of its kind."""
+    """A unit of a column in SI, and in ASCII. Raises BadInput for one that is none of its kind."""
     plain, meant = ascii_unit(unit), ""
     try:
         if plain == DISPLAY_UNIT[kind] or fits(plain, kind):
@@ -358,7 +358,7 @@ def _check_length(row: Row, head: Row, separator: str, origin: str) -> None:
 def _decimal_sign(
     rows: Sequence[Row], found: Sequence[_Column], separator: str, origin: str
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the decimal sign of the columns that are read, and remarks on it. Raises BadInput where it may be both.
+    """Decimal sign of the columns that are read, and remarks on it. Raises BadInput where it may be both.
 
     A cell shows it where it has both signs, one of them twice, or one that groups no three digits.
     """
@@ -410,12 +410,12 @@ def _decimal_sign(
 
 
 def _bare(text: str) -> str:
-    """Return a number's text with the plain minus sign, and without blanks between thousands."""
+    """A number's text with the plain minus sign, and without blanks between thousands."""
     return _BLANK_GROUPS.sub("", text.replace("\u2212", "-"))
 
 
 def _plain(text: str, decimal: str) -> str:
-    """Return a number's text with a decimal point, and without what groups thousands."""
+    """A number's text with a decimal point, and without what groups thousands."""
     other = COMMA if decimal == POINT else POINT
     whole, sign, rest = _bare(text).partition(decimal)
     whole = whole.replace(other, "") if _GROUPS[other].fullmatch(whole) else whole
@@ -423,7 +423,7 @@ def _plain(text: str, decimal: str) -> str:
 
 
 def _number(text: str, row: Row, column: _Column, origin: str, gap: bool) -> float:
-    """Return a number, SI; gap: whether an empty cell is NaN. Raises BadInput."""
+    """A number, SI; gap: whether an empty cell is NaN. Raises BadInput."""
     if gap and not text:
         return math.nan
     value = plain_number(text)
@@ -444,7 +444,7 @@ def _number(text: str, row: Row, column: _Column, origin: str, gap: bool) -> flo
 
 
 def _precision(column: _Column, texts: Sequence[str], digits: int | None) -> list[float]:
-    """Return half a unit of the last digit of each number of a column, in its own unit; 0 of whole degrees."""
+    """Half a unit of the last digit of each number of a column, in its own unit; 0 of whole degrees."""
     if column.kind != "angle":
         return _halves(texts, digits)
     found = _halves(texts, None)
@@ -452,7 +452,7 @@ def _precision(column: _Column, texts: Sequence[str], digits: int | None) -> lis
 
 
 def _halves(texts: Sequence[str], digits: int | None) -> list[float]:
-    """Return half a unit of the last digit of each number, in its own unit; digits: decimals, None for those printed.
+    """Half a unit of the last digit of each number, in its own unit; digits: decimals, None for those printed.
 
     All numbers have as many decimals as the one that has most: offices strip zeros. Where most would have lost some so,
     numbers are written with a count of digits from the first one on; those with an exponent are so always.
@@ -477,7 +477,7 @@ def _halves(texts: Sequence[str], digits: int | None) -> list[float]:
 
 
 def _marked(head: Row, rows: Sequence[Row], name: str, origin: str) -> tuple[float, ...]:
-    """Return which rows a column marks; none where there is no such column. Raises BadInput."""
+    """Which rows a column marks; none where there is no such column. Raises BadInput."""
     places = _places(head, name)
     if not places:
         return (0.0,) * len(rows)
@@ -493,7 +493,7 @@ def _marked(head: Row, rows: Sequence[Row], name: str, origin: str) -> tuple[flo
 
 
 def _once(rows: Sequence[Row], found: Sequence[_Column]) -> list[Row]:
-    """Return rows without those that only repeat the one before them, all columns that are read alike."""
+    """Rows without those that repeat the one before them in every column that is read."""
     kept: list[Row] = []
     for row in rows:
         if not kept or any(row.cell(column.place) != kept[-1].cell(column.place) for column in found):
@@ -502,7 +502,7 @@ def _once(rows: Sequence[Row], found: Sequence[_Column]) -> list[Row]:
 
 
 def _falls(angles: Sequence[float]) -> bool:
-    """Say whether angles fall from row to row, or stay."""
+    """Whether angles fall from row to row, or stay."""
     return all(angle >= after for angle, after in itertools.pairwise(angles))
 
 

@@ -37,17 +37,17 @@ _GIVE_FILE = "Give the JSON that `loomopt solve --json` prints, or its design ob
 
 
 def read(path: Path, scene: Scene) -> dict[str, float]:
-    """Return the design in a JSON file, SI and rad, by design variable. Raises BadInput."""
+    """Design in a JSON file, SI and rad, by design variable. Raises BadInput."""
     return checked(read_given(path).design, scene, named(path))
 
 
 def named(path: Path) -> str:
-    """Return what messages call the file of a design."""
+    """Name of the file of a design in messages."""
     return "standard input" if str(path) == PIPE else clean(str(path))
 
 
 def loaded(path: Path) -> object:
-    """Return what a JSON file of a design or an answer holds, unchecked; of `-` the pipe. Raises BadInput."""
+    """Unchecked contents of a JSON file of a design or an answer; `-` is the pipe. Raises BadInput."""
     import json
 
     origin = named(path)
@@ -67,7 +67,7 @@ def loaded(path: Path) -> object:
 
 
 def _filed(path: Path) -> bytes:
-    """Return the bytes of a file, one more than allowed at most. Raises BadInput for what is no file."""
+    """Bytes of a file, one more than allowed at most. Raises BadInput for what is no file."""
     if not path.is_file():
         what = "it is no ordinary file" if path.exists() else "there is no such file"
         near = near_file(path)
@@ -78,7 +78,7 @@ def _filed(path: Path) -> bytes:
 
 
 def _piped() -> bytes:
-    """Return the bytes of a pipe, one more than allowed at most. Raises BadInput where nothing comes through it."""
+    """Bytes of a pipe, one more than allowed at most. Raises BadInput where nothing comes through it."""
     raw = b"" if sys.stdin is None else sys.stdin.buffer.read(LARGEST_FILE + 1)
     if not raw.strip():
         remedy = "Pipe an answer in: loomopt solve PROBLEM --json | loomopt evaluate PROBLEM --design -"
@@ -87,7 +87,7 @@ def _piped() -> bytes:
 
 
 def _once(pairs: Sequence[tuple[str, object]], origin: str) -> dict[str, object]:
-    """Return the entries of a JSON object. Raises BadInput where a name comes twice."""
+    """Entries of a JSON object. Raises BadInput where a name comes twice."""
     found: dict[str, object] = {}
     for name, value in pairs:
         if name in found:
@@ -97,7 +97,7 @@ def _once(pairs: Sequence[tuple[str, object]], origin: str) -> dict[str, object]
 
 
 def packed(design: Mapping[str, float], names: Iterable[str]) -> dict[str, float | Sequence[float]]:
-    """Return a design with NAME_0, NAME_1 ... of each named list as one tuple."""
+    """A design with NAME_0, NAME_1 ... of each named list as one tuple."""
     found: dict[str, float | Sequence[float]] = dict(design)
     for name in names:
         members = {k: key for key in design if (k := _place(key, name)) is not None}
@@ -108,7 +108,7 @@ def packed(design: Mapping[str, float], names: Iterable[str]) -> dict[str, float
 
 
 def flat(design: Design) -> dict[str, float]:
-    """Return a design with each list's numbers under names of their own, NAME_0, NAME_1 ..."""
+    """A design with each list's numbers under names of their own, NAME_0, NAME_1 ..."""
     found: dict[str, float] = {}
     for name, value in design.items():
         found |= {name: value} if isinstance(value, float | int) else {f"{name}_{k}": v for k, v in enumerate(value)}
@@ -116,7 +116,7 @@ def flat(design: Design) -> dict[str, float]:
 
 
 def in_list(key: str, lists: Collection[str]) -> bool:
-    """Say whether a number of a flat design is one of a list's."""
+    """Whether a number of a flat design is one of a list's."""
     return any(_place(key, name) is not None for name in lists)
 
 
@@ -126,7 +126,7 @@ def _place(key: str, name: str) -> int | None:
 
 
 def checked(data: object, scene: Scene, origin: str = "<design>") -> dict[str, float]:
-    """Return a design given as a mapping, SI and rad, after checking names, numbers and assembly. Raises BadInput.
+    """A design given as a mapping, SI and rad, after checking names, numbers and assembly. Raises BadInput.
 
     A number in it is SI; text is a number with its unit.
     """
@@ -178,7 +178,7 @@ def _number(cursor: Cursor, quantity: Quantity) -> float:
 
 
 def _largest(scene: Scene, name: str, kind: str) -> float:
-    """Return how large a number without a unit may be before it is taken for one in another unit than SI."""
+    """How large a number without a unit may be before it is taken for one in another unit than SI."""
     if kind not in MEANT:
         return LARGEST
     quantities = quantities_of(scene.schema.mechanism)
@@ -213,7 +213,7 @@ def _listed(design: Cursor, lists: Mapping[str, Quantity]) -> dict[str, object]:
 
 
 def _numbers(scene: Scene) -> dict[str, Quantity]:
-    """Return what kind of quantity each number of a scene is that a design may hold."""
+    """Quantity of each number of a scene that a design may hold."""
     found: dict[str, Quantity | None] = {}
     for model in (scene.schema.mechanism, scene.schema.operation):
         found |= quantities_of(model)
@@ -224,7 +224,7 @@ def _numbers(scene: Scene) -> dict[str, Quantity]:
 
 
 def _fits(quantity: Quantity, value: float) -> bool:
-    """Say whether a number in SI lies in its quantity's range."""
+    """Whether a number in SI lies in its quantity's range."""
     return value >= quantity.least and quantity.above < value < quantity.below
 
 
@@ -250,7 +250,7 @@ class DesignGiven(NamedTuple):
 
 
 def read_given(path: Path) -> DesignGiven:
-    """Return what the file of a design or of a whole answer brings. Raises BadInput."""
+    """Contents of the file of a design or of a whole answer. Raises BadInput."""
     data, origin = loaded(path), named(path)
     if not isinstance(data, dict) or "design" not in data:
         return DesignGiven(data)
@@ -275,7 +275,7 @@ def read_given(path: Path) -> DesignGiven:
 
 
 def _call(told: object, origin: str) -> Call:
-    """Return what the call of an answer changed. Raises BadInput."""
+    """Changes by the call of an answer. Raises BadInput."""
     entries: Mapping[str, Any] = told if isinstance(told, Mapping) else {"": told}
     names = [entries.get(name, []) for name in ("with", "without", "free")]
     values, target = entries.get("set", {}), entries.get("target")
@@ -289,7 +289,7 @@ def _call(told: object, origin: str) -> Call:
 
 
 def read_answer(path: Path, jobs: Jobs) -> tuple[Scene, DesignGiven]:
-    """Return the scene that an answer in a file was found in, and what it brings. Raises BadInput."""
+    """Scene of an answer in a file, and the contents of the file. Raises BadInput."""
     given, origin = read_given(path), named(path)
     if given.document is None:
         remedy = "Give what `loomopt solve --json` prints; a design alone goes with a scene: --design"
@@ -307,7 +307,7 @@ def read_answer(path: Path, jobs: Jobs) -> tuple[Scene, DesignGiven]:
 
 
 def resumed(given: DesignGiven, scene: Scene, later: Call, origin: str) -> Scene:
-    """Return a scene with what an answer's call changed in its own, then a later call. Raises BadInput.
+    """A scene with what an answer's call changed in its own, then a later call. Raises BadInput.
 
     All else is as `scene` has it; a path that the answer's call has set is bound as one that a scene file names.
     """
@@ -336,7 +336,7 @@ def check_job(job: object, scene: Scene, origin: str) -> None:
 
 
 def scene_changes(scene: Scene, given: DesignGiven, origin: str, besides: Call) -> list[str]:
-    """Return what a scene has otherwise than an answer's own, in words; nothing where both are the same.
+    """Sentences on the differences between a scene and an answer's scene; empty where both are the same.
 
     origin: what the answer's file is called; besides: what a call has changed in the scene, which is not told.
     """
@@ -365,12 +365,12 @@ def _shortened(told: Sequence[str]) -> list[str]:
 
 
 def _is_of(call: Call, key: str) -> bool:
-    """Say whether a call has set a key, or a table in which it stands, or has freed its bound."""
+    """Whether a call has set a key, or a table in which it stands, or has freed its bound."""
     return any(f"{key}.".startswith(f"{each}.") for each in (*call.set, *(f"bounds.{name}.free" for name in call.free)))
 
 
 def _on(document: Mapping[str, Any], scene: Scene) -> list[str]:
-    """Return the effects that raw tables have on, each instance by its own name."""
+    """Effects that raw tables have on; every instance by its name."""
     found: list[str] = []
     table = document.get("effects")
     for name, own in table.items() if isinstance(table, Mapping) else ():
@@ -381,7 +381,7 @@ def _on(document: Mapping[str, Any], scene: Scene) -> list[str]:
 
 
 def remark(scene: Scene, given: DesignGiven, later: Call, changes: Sequence[str], origin: str) -> str:
-    """Return in words what an answer brings to a scene beside its design, and what of its own does not count; or "".
+    """Sentence on the values that an answer brings to a scene besides its design, and on those it does not; or "".
 
     later: what this call changes, which is not told; changes: what `scene_changes` tells.
     """

@@ -57,7 +57,7 @@ def units(
     active: Iterable[Effect],
     ranges: tuple[Mapping[str, Bound], Mapping[str, LimitRange]],
 ) -> dict[str, str]:
-    """Return the unit of every kind of quantity; ranges: [bounds] and [limits], which come after the scene's numbers.
+    """Unit of every kind of quantity; ranges: [bounds] and [limits], which come after the scene's numbers.
 
     document: checked; its [display] goes before all.
     """
@@ -69,7 +69,7 @@ def units(
 
 
 def unit_for(si: str, known: Mapping[str, str]) -> str:
-    """Return the unit in which a person sees what has an SI unit; known: unit of every kind of quantity.
+    """Unit in which a person sees what has an SI unit; known: unit of every kind of quantity.
 
     What swings stays in rad/s, whatever unit the shaft's speed has.
     """
@@ -100,7 +100,7 @@ def _written(
 
 
 def _completed(own: Mapping[str, str]) -> dict[str, str]:
-    """Return a unit for every kind: its own one, else one composed of the scene's, else the usual one.
+    """A unit for every kind: the given one, else one composed of the scene's, else the usual one.
 
     The SI's own composed units (N*m, N/m, 1/m) stay wherever lengths, masses and forces are decimal multiples of its
     units.
@@ -125,7 +125,7 @@ def _completed(own: Mapping[str, str]) -> dict[str, str]:
 
 
 def _composed(si: str, letters: Mapping[str, str]) -> str:
-    """Return an SI unit written with a scene's own units; "" where these are the SI's or its decimal multiples."""
+    """An SI unit written with a scene's own units; "" where these are the SI's or its decimal multiples."""
     used = [unit for letter, unit in letters.items() if re.search(rf"\b{letter}\b", si)]
     if all(map(_is_decimal, used)) or not all(unit.isalpha() for unit in used):
         return ""
@@ -133,13 +133,13 @@ def _composed(si: str, letters: Mapping[str, str]) -> str:
 
 
 def _pressure(bases: Mapping[str, str]) -> str:
-    """Return the unit of pressure that goes with a scene's forces."""
+    """Unit of pressure that goes with a scene's forces."""
     force = bases["force"]
     composed = "" if _is_decimal(force) else _composed("N/m^2", {"N": force, "m": bases["length"]})
     return _PRESSURES.get(force) or composed or DISPLAY_UNIT["pressure"]
 
 
 def _is_decimal(unit: str) -> bool:
-    """Say whether a unit is a power of ten of the SI's."""
+    """Whether a unit is a power of ten of the SI's."""
     factor = parse_unit(unit).factor
     return bool(re.fullmatch("10*", str(factor.numerator * factor.denominator)))

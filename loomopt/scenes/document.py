@@ -23,7 +23,7 @@ _LONGEST_NUMBER = 4096
 
 
 def read_document(path: Path | str) -> Mapping[str, Any]:
-    """Return the tables of a TOML file. Raises BadInput for a file that cannot be read as one."""
+    """Tables of a TOML file. Raises BadInput for a file that cannot be read as one."""
     origin = str(path)
     text = _read_text(Path(path), origin)
     try:
@@ -45,7 +45,7 @@ def _tables(text: str) -> dict[str, Any]:
 
 
 def read_list_or_table(text: str) -> list[Any] | dict[str, Any] | None:
-    """Return the list or table that text is as TOML writes it in one line; None for anything else."""
+    """List or table that text is as TOML writes it in one line; None for anything else."""
     if text[:1] not in ("[", "{") or "\n" in text or _DEEP_KEY.search(text):
         return None
     try:
@@ -56,7 +56,7 @@ def read_list_or_table(text: str) -> list[Any] | dict[str, Any] | None:
 
 
 def _read_text(path: Path, origin: str) -> str:
-    """Return the text of a file that is regular, small and UTF-8."""
+    """Text of a file that is regular, small and UTF-8."""
     allowed = "a TOML file of a scene, in UTF-8, up to 1 MB"
     try:
         if path.is_dir():
@@ -85,7 +85,7 @@ def _read_text(path: Path, origin: str) -> str:
 
 
 def copied(table: object, origin: str, path: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return a copy of nested tables and lists.
+    """A copy of nested tables and lists.
 
     Raises BadInput for a name that is no text or empty, for endless nesting and for a number of thousands of digits.
     """
@@ -103,7 +103,7 @@ def copied(table: object, origin: str, path: tuple[str, ...] = ()) -> dict[str, 
 
 
 def _copied_value(value: object, origin: str, path: tuple[str, ...]) -> object:
-    """Return a copy of one value; path: where it stands, of a list counted from 1."""
+    """A copy of one value; path: where it stands, of a list counted from 1."""
     if len(path) > _DEEPEST and isinstance(value, Mapping | list | tuple):
         key, remedy = ".".join(path[:3]) + "...", "Write a scene as `loomopt new` does"
         raise refusal("its tables or lists are nested too deep", origin, key, remedy=remedy)
@@ -120,7 +120,7 @@ def _copied_value(value: object, origin: str, path: tuple[str, ...]) -> object:
 
 
 def looked_up(document: Mapping[str, Any], parts: Sequence[str]) -> object:
-    """Return the raw value of a path of names; None where there is none."""
+    """Raw value of a path of names; None where there is none."""
     value: object = document
     for part in parts:
         if isinstance(value, list):
@@ -133,7 +133,7 @@ def looked_up(document: Mapping[str, Any], parts: Sequence[str]) -> object:
 
 
 def replaced(document: Mapping[str, Any], parts: Sequence[str], value: object, origin: str, key: str) -> dict[str, Any]:
-    """Return tables in which one path has another value; tables on the way are made where they are missing.
+    """Tables in which one path has another value; tables on the way are made where they are missing.
 
     key: the whole path, for the BadInput raised where it leads through a value, or too deep.
     """
@@ -152,12 +152,12 @@ def replaced(document: Mapping[str, Any], parts: Sequence[str], value: object, o
 
 
 def _is_place(part: str, values: Sequence[object]) -> bool:
-    """Say whether a name is the place of a value of a list, counted from 1."""
+    """Whether a name is the place of a value of a list, counted from 1."""
     return part.isascii() and part.isdigit() and 1 <= int(part[:9]) <= len(values)
 
 
 def _replaced_in(values: list[Any], parts: Sequence[str], value: object, origin: str, key: str) -> list[Any]:
-    """Return a list of tables in which one path has another value; its first part counts from 1."""
+    """A list of tables in which one path has another value; its first part counts from 1."""
     if not _is_place(parts[0], values):
         problem = f"the list has no place {shown(parts[0])}"
         raise refusal(problem, origin, key, allowed=f"1 to {len(values)}", remedy="Count from 1")
@@ -170,7 +170,7 @@ def _replaced_in(values: list[Any], parts: Sequence[str], value: object, origin:
 
 
 def removed(document: Mapping[str, Any], parts: Sequence[str]) -> dict[str, Any]:
-    """Return tables in which the last table on a path of names has lost the last name."""
+    """Tables in which the last table on a path of names has lost the last name."""
     first, *rest = parts
     if rest:
         return {**document, first: removed(document[first], rest)}
@@ -189,16 +189,16 @@ class Paths:
     texts: Mapping[str, str] = field(default_factory=Frozen)
 
     def set_by_caller(self, keys: Iterable[str]) -> "Paths":
-        """Return the same with more keys that the caller has set."""
+        """The same paths with more keys that the caller has set."""
         own = self.own | {_on(key) for key in keys}
         return Paths(self.folder, own, self.texts)
 
     def text(self, key: str) -> str | None:
-        """Return the text of a file that came with the scene; None where it did not, or the caller names another."""
+        """Text of a file that came with the scene; None where it did not, or the caller names another."""
         return None if self._is_own(_on(key)) else self.texts.get(_on(key))
 
     def located(self, given: str, key: str, origin: str) -> Path:
-        """Return where a file lies that stands under a dotted key. Raises BadInput for one that a scene may not name.
+        """Path of a file that stands under a dotted key. Raises BadInput for one that a scene may not name.
 
         What a scene file says is looked for beside it, and with all links resolved must lie in its folder or below.
         A caller's path is looked for from the working folder, then beside the scene.
@@ -221,7 +221,7 @@ class Paths:
 
 
 def _on(key: str) -> str:
-    """Return a key as it is with its effect on: values from [available] move to [effects]."""
+    """Key of a value once its effect is on: values from [available] move to [effects]."""
     table, dot, rest = key.partition(".")
     return f"effects{dot}{rest}" if table == "available" else key
 

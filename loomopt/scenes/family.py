@@ -34,14 +34,14 @@ TARGET = Target(FAMILY, "one machine for several sets of numbers: the least wors
 
 
 def table(scene: Scene) -> FamilyTarget:
-    """Return the table of a scene's family."""
+    """Table of a scene's family."""
     found = scene.targets[FAMILY]
     assert isinstance(found, FamilyTarget)
     return found
 
 
 def of_target(scene: Scene) -> str:
-    """Return the target that each member has. Raises BadInput for one that the job does not have."""
+    """Target that each member has. Raises BadInput for one that the job does not have."""
     name = table(scene).of or scene.schema.default_target
     known = [each for each in scene.schema.targets if each != FAMILY]
     if name not in known:
@@ -50,29 +50,29 @@ def of_target(scene: Scene) -> str:
 
 
 def changes(scene: Scene) -> tuple[dict[str, Any], ...]:
-    """Return what each member changes of the scene: dotted key → its value. Raises BadInput."""
+    """Changes of the scene by each member: dotted key → value. Raises BadInput."""
     return tuple(_changes(scene, place) for place in range(len(_members(scene))))
 
 
 def members(scene: Scene) -> tuple[Scene, ...]:
-    """Return the scene of each member. Raises BadInput that names the member and the key."""
+    """Scene of each member. Raises BadInput that names the member and the key."""
     return kept(scene, FAMILY, lambda: tuple(_member(scene, k, each) for k, each in enumerate(changes(scene))))
 
 
 def member_name(name: str, member: int) -> str:
-    """Return what a family calls a member's own: members are counted from 1 where a person reads it."""
+    """Name within the family of a member's number; members are counted from 1 where a person reads them."""
     return f"{name}[{member + 1}]"
 
 
 def sum_name(figure: str, magnitude: bool, power: int = 1) -> str:
-    """Return what a family calls the sum of its members' figures, or the root of the sum of their powers."""
+    """Name of the sum of the members' figures, or of the root of the sum of their powers."""
     if power == 1:
         return f"sum of |{figure}|" if magnitude else f"sum of {figure}"
     return f"root sum of squares of {figure}" if power == 2 else f"root sum of powers of {figure}"
 
 
 def called(scene: Scene) -> Mapping[str, str]:
-    """Return what a family calls its members' numbers and figures → what a member calls it."""
+    """Names of numbers and figures within the family → their names within a member."""
     names = (*scene.schema.figures, *scene.schema.variables, *scene.bounds)
     count = len(table(scene).members)
 
@@ -138,7 +138,7 @@ def _leaves(key: str, value: object) -> Iterator[tuple[str, Any]]:
 
 
 def _alone(scene: Scene) -> Scene:
-    """Return the scene without its family."""
+    """Scene without its family."""
     own = {key: value for key, value in scene.call.set.items() if not f"{key}.".startswith(f"targets.{FAMILY}.")}
     call = replace(scene.call, set=Frozen(own), target=None)
     return build(removed(scene.document, ("targets", FAMILY)), scene.jobs, scene.origin, scene.paths, call)

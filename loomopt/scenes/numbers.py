@@ -21,7 +21,7 @@ WITHOUT_FILES = ("problem", "display")
 
 
 def quantity(scene: Scene, key: str) -> Quantity:
-    """Return what the number under a dotted key may be. Raises BadInput where the scene has no number there."""
+    """Quantity of the number under a dotted key. Raises BadInput where the scene has no number there."""
     known = dict(_quantities(scene))
     table = key.rpartition(".")[0]  # such as a target's weights, each number of which has a name of its own
     if key in known or (table in known and scene.given(key) is not None):
@@ -70,14 +70,14 @@ def _fields(model: type[Table]) -> Iterator[tuple[str, Quantity]]:
 
 
 def files(scene: Scene) -> dict[str, str]:
-    """Return the SHA-256 of every file that a scene names, by the dotted key of its name."""
+    """SHA-256 of every file that a scene names, by the dotted key of its name."""
     import hashlib
 
     return {key: hashlib.sha256(raw).hexdigest() for key, raw in _contents(scene)}
 
 
 def tables(scene: Scene) -> dict[str, str]:
-    """Return every table in a file that a scene names as CSV text, by the dotted key of its name; no huge one's."""
+    """Every table in a file that a scene names as CSV text, by the dotted key of its name; no huge one's."""
     found: dict[str, str] = {}
     for key, raw in _contents(scene, table_cells.ENDINGS):
         with contextlib.suppress(BadInput):
@@ -119,7 +119,7 @@ _ALLOWED = f"{FORM}, such as {EXAMPLE}"
 
 
 def range_values(text: str, key: str) -> list[str]:
-    """Return LO, LO + STEP, … and HI of "LO:HI:STEP UNIT", each as text with the unit; digits are exact.
+    """LO, LO + STEP, … and HI of "LO:HI:STEP UNIT", each as text with the unit; digits are exact.
 
     Where the steps do not meet HI the last one is shorter. Raises BadInput.
     """
@@ -140,7 +140,7 @@ def range_values(text: str, key: str) -> list[str]:
 
 
 def range_ends(text: str, key: str) -> tuple[str, str]:
-    """Return LO and HI of "LO:HI UNIT", each as text with the unit. Raises BadInput."""
+    """LO and HI of "LO:HI UNIT", each as text with the unit. Raises BadInput."""
     found = _ENDS.fullmatch(text.strip())
     if found is None or None in map(plain_number, found.groups()[:2]):
         raise _refused("it is no range of numbers", key, text, allowed="LO:HI UNIT, such as 0:5 kg")
@@ -153,7 +153,7 @@ def _refused(problem: str, key: str, text: str, remedy: str = "Correct the range
 
 
 def sizes(scene: Scene) -> "Sizes":
-    """Return what a scene says of sizes that can be ordered. Raises BadInput."""
+    """Sizes of a scene that can be ordered. Raises BadInput."""
     from loomopt.scenes import sizes as ordered
 
     tables = cursor(scene)

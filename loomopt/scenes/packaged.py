@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @functools.cache
 def entry_points(group: str) -> "tuple[EntryPoint, ...]":
-    """Return the entry points of a group, by name; the same one found twice on the path counts once."""
+    """Entry points of a group, by name; one that stands twice on the path counts once."""
     from importlib.metadata import entry_points
 
     return tuple(sorted(set(entry_points(group=group)), key=lambda point: (point.name, point.value)))
@@ -27,12 +27,12 @@ def _folder(name: str) -> Path:
 
 
 def scenes(folder: Path) -> dict[str, Path]:
-    """Return the files of the scenes in a folder by name, in alphabetical order; none where there is no such folder."""
+    """Files of the scenes in a folder by name, in alphabetical order; none where there is no such folder."""
     return dict(sorted((path.stem, path) for path in folder.glob("*.toml")))
 
 
 def problems() -> dict[str, Path]:
-    """Return the files of the packaged scenes by name, in alphabetical order."""
+    """Files of the packaged scenes by name, in alphabetical order."""
     return scenes(_folder("problems"))
 
 
@@ -47,7 +47,7 @@ class Head(NamedTuple):
 
 
 def head(path: Path) -> Head:
-    """Return the head of a packaged scene, nothing else of which is looked at. Raises BadInput."""
+    """Head of a packaged scene, nothing else of which is looked at. Raises BadInput."""
     document = read_document(path)
     title, job, source = (str(looked_up(document, ("problem", key)) or "") for key in ("title", "job", "source"))
     targets = looked_up(document, ("targets",))
@@ -55,7 +55,7 @@ def head(path: Path) -> Head:
 
 
 def unknown_problem(name: str, known: Mapping[str, Path], faults: Iterable[BadInput] = ()) -> BadInput:
-    """Return the error, with the nearest name, for a scene that is not packaged.
+    """Error, with the nearest name, for a scene that is not packaged.
 
     faults: of jobs that other distributions bring: one that cannot be imported may be what brings the scene.
     """
@@ -73,12 +73,12 @@ def unknown_problem(name: str, known: Mapping[str, Path], faults: Iterable[BadIn
 
 
 def results_path() -> Path:
-    """Return the folder of the reference results."""
+    """Folder of the reference results."""
     return _folder("results")
 
 
 def is_path(name_or_path: str | os.PathLike[str]) -> bool:
-    """Say whether text is a path: with a separator, or ending in .toml or .json; else it is a packaged name."""
+    """Whether text is a path: with a separator, or ending in .toml or .json; else it is a packaged name."""
     text = os.fspath(name_or_path)
     separators = {os.sep, os.altsep or os.sep}
     return isinstance(name_or_path, os.PathLike) or text.endswith((".toml", ".json")) or bool(separators & set(text))

@@ -12,7 +12,7 @@ VERSIONED = ("loomopt", "casadi", "numpy")
 
 
 def versions() -> dict[str, str]:
-    """Return the versions that numbers depend on: this package's, CasADi's with its IPOPT, NumPy's."""
+    """Versions that numbers depend on: this package's, CasADi's with its IPOPT, NumPy's."""
     return {name: _version(name) for name in VERSIONED}
 
 
@@ -24,7 +24,7 @@ def _version(name: str) -> str:
 
 
 def provenance(scene: Scene, **more: object) -> dict[str, str]:
-    """Return where a table comes from: scene, its hash and effects, versions, date, and what else matters to it."""
+    """Origin of a table: scene, its hash and effects, versions, date, and `more`."""
     import datetime
 
     today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
@@ -34,6 +34,6 @@ def provenance(scene: Scene, **more: object) -> dict[str, str]:
 
 
 def csv(frame: "pd.DataFrame") -> str:
-    """Return a table as CSV text, its provenance in comment lines before the header; digits round-trip."""
+    """A table as CSV text, its provenance in comment lines before the header; digits round-trip."""
     head = "".join(f"# {name}: {value}\n" for name, value in frame.attrs.items())
     return head + str(frame.to_csv(index=frame.index.name is not None, lineterminator="\n"))

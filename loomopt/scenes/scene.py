@@ -49,20 +49,20 @@ class Equation(Protocol):
         """It in LaTeX."""
 
     def _repr_latex_(self) -> str:
-        """Return how Jupyter shows it."""
+        """LaTeX that Jupyter shows."""
 
 
 class Jobs(JobNames, Protocol):
     """Where a scene finds its job by name."""
 
     def schema(self, job: str, document: Mapping[str, Any], effects: Collection[str], /) -> SceneSchema:
-        """Return what a scene of a job may hold, with the effects it names where anybody brings them."""
+        """Schema of a scene of a job, with the effects it names where a distribution brings them."""
 
     def check(self, scene: "Scene", /) -> None:
         """Raise BadInput where today's machine is not one that its job can work on."""
 
     def equations(self, scene: "Scene", /) -> tuple[Equation, ...]:
-        """Return the equations that a scene really uses."""
+        """Equations that a scene really uses."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Call:
         return told + [f"{name} free" for name in self.free]
 
     def then(self, later: "Call") -> "Call":
-        """Return the one call that comes to the same as this one and then a later one."""
+        """Call that has the same result as this one followed by a later one."""
         earlier = {key: value for key, value in self.set.items() if key not in later.set}
         off = tuple(name for name in self.off if name not in later.on and not later.sets(f"effects.{name}"))
         free = tuple(name for name in self.free if not {f"bounds.{name}", f"bounds.{name}.free"} & set(later.set))
@@ -96,11 +96,11 @@ class Call:
         )
 
     def sets(self, key: str) -> bool:
-        """Say whether it sets a dotted key, or one inside it."""
+        """Whether it sets a dotted key, or one inside it."""
         return any(f"{each}.".startswith(f"{key}.") for each in self.set)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """JSON data."""
         told = {"with": list(self.on), "without": list(self.off), "free": list(self.free), "target": self.target}
         return {"set": copied(self.set, ""), **told}
 
@@ -143,7 +143,7 @@ class Scene(Shown):
         freeze(self, "operation", "mechanism", "tables", "effects", "bounds", "limits", "targets")
 
     def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Mapping[str, Any], Jobs, str, Paths, Call]]:
-        """Return how to make it again: from its tables, for formulas do not pickle."""
+        """How pickle restores it: from its tables, for formulas do not pickle."""
         return build, (self.document, self.jobs, self.origin, self.paths, self.call)
 
     def __repr__(self) -> str:
@@ -156,7 +156,7 @@ class Scene(Shown):
         return self.schema.name
 
     def own(self, model: type[_Own]) -> _Own | None:
-        """Return the table of an effect that is on, by the model of its values; None where it is off."""
+        """Table of an effect that is on, by the model of its values; None where it is off."""
         return next((table for table in self.effects.values() if isinstance(table, model)), None)
 
     @lazy
@@ -170,11 +170,11 @@ class Scene(Shown):
         return []
 
     def table(self, model: type[_Own]) -> _Own:
-        """Return [operation], [mechanism] or the table of a target, by its model."""
+        """Table [operation], [mechanism] or that of a target, by its model."""
         return next(each for each in (*self.tables.values(), *self.targets.values()) if isinstance(each, model))
 
     def full(self, name: str) -> str:
-        """Return the full name of a number by what a designer calls it; any other name is one already.
+        """Full name of a number by what a designer calls it; any other name is one already.
 
         Where effects that are on have numbers of one name, it is the first that is given.
         """
@@ -187,7 +187,7 @@ class Scene(Shown):
         return owned(*called[0][:2]) if called else name
 
     def given(self, key: str) -> str | None:
-        """Return the raw text of a dotted key such as "mechanism.l1"; None for a table or nothing."""
+        """Raw text of a dotted key such as "mechanism.l1"; None for a table or nothing."""
         value = looked_up(self.document, arguments.text(key, "key", *_KEY).split("."))
         if value is None or isinstance(value, Mapping):
             return None
@@ -199,33 +199,33 @@ class Scene(Shown):
         return display.units(self.document, self.schema, self.active, (self.bounds, self.limits))
 
     def shown_in(self, kind: str) -> str:
-        """Return the unit in which a person sees quantities of a kind."""
+        """Unit in which a person sees quantities of a kind."""
         return self.units[self._kind_of_quantity(kind)]
 
     def _kind_of_quantity(self, kind: str) -> str:
-        """Return a kind of quantity that there is. Raises BadInput for any other."""
+        """A kind of quantity that there is. Raises BadInput for any other."""
         if not isinstance(kind, str) or kind not in self.units:
             allowed = ", ".join(self.units)
             raise refusal("there is no such kind of quantity", "", "kind", kind, allowed, "Choose one of them")
         return kind
 
     def unit_for(self, si: str) -> str:
-        """Return the unit in which a person sees what has an SI unit, such as a curve in m/rad."""
+        """Unit in which a person sees what has an SI unit, such as a curve in m/rad."""
         return display.unit_for(arguments.text(si, "si", *_SI), self.units)
 
     def show(self, value: float, kind: str, digits: int = 6) -> str:
-        """Return an SI value as text with the unit in which a person sees its kind; digits: significant ones."""
+        """An SI value as text with the unit in which a person sees its kind; digits: significant ones."""
         arguments.number(value, "value", "a number in SI", "Give a number")
         if not 1 <= arguments.whole(digits, "digits", *_DIGITS) <= _MOST_DIGITS:
             raise refusal("there is no such number of digits", "", "digits", digits, *_DIGITS)
         return show(value, self.shown_in(kind), digits)
 
     def set(self, key: str, value: object) -> "Scene":
-        """Return the scene with one dotted key set, such as set("operation.M0", "800 N*m"): see `update`."""
+        """Scene with one dotted key set, such as set("operation.M0", "800 N*m"): see `update`."""
         return self.update({arguments.text(key, "key", *_KEY): value})
 
     def update(self, values: Mapping[str, object]) -> "Scene":
-        """Return the scene with several dotted keys set at once.
+        """Scene with several dotted keys set at once.
 
         A key of an effect that is off puts it on, with the other values from [available]. A bound that is one
         value becomes a range once its min and max are set.
@@ -233,14 +233,14 @@ class Scene(Shown):
         return self.change(values)
 
     def change(self, values: Mapping[str, object], on: Iterable[str] = (), off: Iterable[str] = ()) -> "Scene":
-        """Return the scene with keys set, then effects put on, then effects taken off: only the outcome has to hold."""
+        """Scene with keys set, then effects put on, then effects taken off: only the outcome has to hold."""
         values = arguments.table(values, "values", "key of the scene → its value", 'Write {"operation.M0": "800 N*m"}')
         on, off = (arguments.names(each, "effects", ", ".join(self.schema.effects), _NAMES) for each in (on, off))
         changed = self.called(Call(values, tuple(on), tuple(off)), values)
         return self if changed.document is self.document else changed
 
     def called(self, call: Call, own: Iterable[str] = ()) -> "Scene":
-        """Return the scene with what a call changes; own: keys whose paths are the caller's, not the scene's."""
+        """Scene with what a call changes; own: keys whose paths are the caller's, not the scene's."""
         keys = {key: former_names.current_key(key, self.schema.former_names) for key in call.set}
         values = Frozen({keys[key]: value for key, value in copied(call.set, self.origin).items()})
         document = self._off(self._on(self._set(values), call.on), call.off)
@@ -279,7 +279,7 @@ class Scene(Shown):
         return document
 
     def with_effect(self, *names: str) -> "Scene":
-        """Return the scene with effects put on together, their values from [available.NAME]."""
+        """Scene with effects put on together, their values from [available.NAME]."""
         return self.change({}, on=names)
 
     def _on(self, document: Mapping[str, Any], names: Iterable[str]) -> Mapping[str, Any]:
@@ -298,7 +298,7 @@ class Scene(Shown):
             raise refusal(f"effect {name} has no values", self.origin, f"available.{name}", remedy=remedy)
 
     def without_effect(self, *names: str) -> "Scene":
-        """Return the scene with effects taken off together; their values stay in [available.NAME]."""
+        """Scene with effects taken off together; their values stay in [available.NAME]."""
         return self.change({}, off=names)
 
     def _off(self, document: Mapping[str, Any], names: Iterable[str]) -> Mapping[str, Any]:
@@ -310,7 +310,7 @@ class Scene(Shown):
         return document
 
     def free(self, names: Iterable[str] | str) -> "Scene":
-        """Return the scene with bounds freed that `free = false` holds at today's value; names: "J4, M0"."""
+        """Scene with bounds freed that `free = false` holds at today's value; names: "J4, M0"."""
         single = names.replace(",", " ").split() if isinstance(names, str) else names
         named = arguments.names(single, "names", "names of bounds", 'Write ["J4"]')
         ranges = [name for name, bound in self.bounds.items() if bound.min < bound.max]
@@ -328,7 +328,7 @@ class Scene(Shown):
         return build(document, self.jobs, self.origin, self.paths, self.call.then(Call(free=tuple(named))))
 
     def without_limit(self, name: str, sides: Iterable[str]) -> "Scene":
-        """Return the scene without these sides, "min" and "max", of a limit that it has."""
+        """Scene without these sides, "min" and "max", of a limit that it has."""
         place = "limits", *former_names.current(name, self.schema.former_names).split(".")
         own = looked_up(self.document, place)
         left = set(own) - set(sides) if isinstance(own, Mapping) else set()
@@ -338,7 +338,7 @@ class Scene(Shown):
         return build(document, self.jobs, self.origin, self.paths, self.call)
 
     def equations(self) -> tuple[Equation, ...]:
-        """Return the equations the scene really uses: `name`, `text` and `latex` of each, which Jupyter shows."""
+        """Equations the scene really uses: `name`, `text` and `latex` of each, which Jupyter shows."""
         return self.jobs.equations(self)
 
     @property
@@ -363,7 +363,7 @@ class Scene(Shown):
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
 
     def _path(self, key: str) -> list[str]:
-        """Return the names of a dotted key."""
+        """Names of a dotted key."""
         parts = key.split(".")
         known = (*TABLES, *self.schema.tables)
         if all(parts) and (len(parts) > 1 or key in known):
@@ -374,7 +374,7 @@ class Scene(Shown):
         raise refusal(problem, self.origin, key, allowed=", ".join(known), remedy=remedy)
 
     def _keys_of(self, name: str) -> list[str]:
-        """Return the dotted keys under which what a designer calls so may stand."""
+        """Dotted keys under which what a designer calls so may stand."""
         schema = self.schema
         known: dict[str, Iterable[str]] = {
             "operation": schema.operation.model_fields,
@@ -388,15 +388,15 @@ class Scene(Shown):
         return keys or [f"limits.{near}.{side}" for side in sides.get(near, ())]
 
     def _effect(self, name: str) -> Effect:
-        """Return a declared effect; of an instance, its kind."""
+        """A declared effect; of an instance, its kind."""
         return self.jobs.schema(self.job, self.document, (self._kind(name),)).effects[self._kind(name)]
 
     def _kind(self, name: str) -> str:
-        """Return the kind of an effect as the command names it: "mass" of "mass.rod"."""
+        """Kind of an effect as the command names it: "mass" of "mass.rod"."""
         return name.split(".")[0]
 
     def _effect_path(self, name: str) -> list[str]:
-        """Return where an effect's table stands inside [effects]; raises BadInput for one that is not declared."""
+        """Path of an effect's table inside [effects]; raises BadInput for one that is not declared."""
         known = self.jobs.schema(self.job, self.document, (self._kind(name),)).effects
         if self._kind(name) not in known:
             raise unknown("effect", name, known, self.origin, "effects")
@@ -404,7 +404,7 @@ class Scene(Shown):
 
 
 def _stood_for(effect: Effect | None, key: list[str]) -> tuple[str, ...]:
-    """Return the keys of an effect's table that say otherwise what the one that is set says."""
+    """Keys of an effect's table that say otherwise what the one that is set says."""
     curve = effect.tabulated if isinstance(effect, Load) else None
     if curve is None or len(key) != 1:
         return ()
@@ -412,7 +412,7 @@ def _stood_for(effect: Effect | None, key: list[str]) -> tuple[str, ...]:
 
 
 def _deciding(own: Table) -> dict[str, Any]:
-    """Return what of a target's table decides an answer; an indifference and digits only where they are given."""
+    """Values of a target's table that decide an answer; an indifference and digits only where they are given."""
     return own.model_dump(exclude={"expected"} | ({"indifference", "digits"} - own.model_fields_set))
 
 
@@ -426,7 +426,7 @@ def _put_on(document: Mapping[str, Any], *effect: str) -> Mapping[str, Any]:
 def build(
     document: Mapping[str, Any], jobs: Jobs, origin: str, paths: Paths | None = None, call: Call | None = None
 ) -> Scene:
-    """Return the scene that raw tables describe; jobs: those it may name; origin: file name, for messages.
+    """Scene that raw tables describe; jobs: those it may name; origin: file name, for messages.
 
     paths: where the files lie that it names; without, they are the caller's own. call: what made these tables of those
     that were read. Raises BadInput that names all that is wrong, the worst first.
@@ -442,7 +442,7 @@ def _built(
     call: Call | None = None,
     before: Scene | None = None,
 ) -> Scene:
-    """Return the scene that raw tables describe, which nobody else changes.
+    """Scene that raw tables describe, which nobody else changes.
 
     before: a scene whose tables are read again where these are not the very same.
     """
@@ -524,7 +524,7 @@ def _built(
 
 
 def _meant(original: Mapping[str, Any], known: Collection[str]) -> dict[str, Any]:
-    """Return raw tables, empty ones too; one whose name nobody knows stands for the near one that is not there."""
+    """Raw tables, empty ones too; one whose name nobody knows stands for the near one that is not there."""
     raw: dict[str, Any] = {name: {} for name in known} | dict(original)
     for name in original:
         if name not in known:
@@ -534,7 +534,7 @@ def _meant(original: Mapping[str, Any], known: Collection[str]) -> dict[str, Any
 
 
 def _judged(scene: Scene, faults: Faults) -> bool:
-    """Say whether it shows if today's machine can work: of its numbers only those are wrong that it can do without."""
+    """Whether today's machine can be checked: its only wrong numbers are those that it does not need."""
     own = scene.tables["mechanism"]
     wrong = [name for name, value in own if value != value]
     optional = [
@@ -549,12 +549,12 @@ def _judged(scene: Scene, faults: Faults) -> bool:
 
 
 def given(table: Table) -> dict[str, Any]:
-    """Return the values of a table that are given or defaulted, words and lists too."""
+    """Values of a table that are given or defaulted, words and lists too."""
     return {name: value for name, value in table if value is not None}
 
 
 def _keys(tables: Mapping[str, Table]) -> list[str]:
-    """Return the keys of tables that are given or defaulted, those of tables inside them too."""
+    """Keys of tables that are given or defaulted, those of tables inside them too."""
     found = []
     for name, own in tables.items():
         inner = {key: value for key, value in own if isinstance(value, Table)}
@@ -563,7 +563,7 @@ def _keys(tables: Mapping[str, Table]) -> list[str]:
 
 
 def _numbers(table: Table) -> dict[str, float]:
-    """Return the numbers of a table that are given or defaulted; of a table inside it as "table.key"."""
+    """Numbers of a table that are given or defaulted; of a table inside it as "table.key"."""
     found = {name: value for name, value in table if isinstance(value, float) and not math.isnan(value)}
     for name, inner in table:
         found |= {f"{name}.{key}": value for key, value in _numbers(inner).items()} if isinstance(inner, Table) else {}
@@ -571,7 +571,7 @@ def _numbers(table: Table) -> dict[str, float]:
 
 
 def kept(scene: Scene, key: Hashable, make: Callable[[], _Made]) -> _Made:
-    """Return what is made of a scene, kept with it by a key: made once, unless files are read for the scene."""
+    """Object made from a scene and stored with it by a key: once, unless files are read for the scene."""
     if key in scene._kept:
         return cast(_Made, scene._kept[key])
     found = make()

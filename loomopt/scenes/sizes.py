@@ -48,7 +48,7 @@ def _stock(cursor: Cursor, quantity: Quantity) -> tuple[float, ...]:
 
 
 def named(given: Mapping[str, object], bounded: Collection[str]) -> dict[str, object]:
-    """Return steps of a call by number, a pattern such as "l*" as all bounded numbers that fit. Raises BadInput."""
+    """Steps of a call by number, a pattern such as "l*" as all bounded numbers that fit. Raises BadInput."""
     found: dict[str, object] = {}
     for name, step in given.items():
         fitting = fnmatch.filter(bounded, name)
@@ -61,6 +61,6 @@ def named(given: Mapping[str, object], bounded: Collection[str]) -> dict[str, ob
 
 
 def multiples(step: float, low: float, high: float) -> tuple[float, ...]:
-    """Return the multiples of a step between two bounds, both SI."""
+    """Multiples of a step between two bounds, both SI."""
     first, last = math.ceil(low / step - WITHIN), math.floor(high / step + WITHIN)
     return tuple(min(max(float(f"{k * step:.15g}"), low), high) for k in range(first, last + 1))

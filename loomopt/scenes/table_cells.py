@@ -37,7 +37,7 @@ class Row(NamedTuple):
     cells: tuple[str, ...]
 
     def cell(self, place: int) -> str:
-        """Return the cell at a place, counted from 0; "" beyond the end."""
+        """Cell at a place, counted from 0; "" beyond the end."""
         return self.cells[place] if place < len(self.cells) else ""
 
 
@@ -71,7 +71,7 @@ def read(raw: bytes, origin: str) -> Iterator[Cells]:
 
 
 def text(raw: bytes, origin: str) -> str:
-    """Return a table as text, a workbook's first sheet as CSV with commas. Raises BadInput for what is no table."""
+    """A table as text, a workbook's first sheet as CSV with commas. Raises BadInput for what is no table."""
     if raw.startswith(WORKBOOK):
         return _written(_sheet(raw, origin))
     if raw.startswith(PARQUET):
@@ -89,7 +89,7 @@ def text(raw: bytes, origin: str) -> str:
 
 
 def _without_mark(raw: bytes) -> str:
-    """Return the encoding of text without a byte order mark: every other byte of UTF-16 is mostly 0."""
+    """Encoding of text without a byte order mark: every other byte of UTF-16 is mostly 0."""
     head = raw[:400]
     for name, odd in (("utf-16-le", head[1::2]), ("utf-16-be", head[0::2])):
         if len(head) >= 8 and odd.count(0) > 0.8 * len(odd):
@@ -98,7 +98,7 @@ def _without_mark(raw: bytes) -> str:
 
 
 def _parted(lines: Sequence[str], separator: str) -> Cells | None:
-    """Return the cells of lines; None where quotation marks do not fit the separator."""
+    """Cells of lines; None where quotation marks do not fit the separator."""
     numbers: list[int] = []
 
     def kept() -> Iterator[str]:
@@ -124,7 +124,7 @@ def _row(line: int, cells: Iterable[str]) -> Row:
 
 
 def _written(rows: Iterable[Sequence[object]]) -> str:
-    """Return rows of cells as CSV text: numbers with all their digits."""
+    """Rows of cells as CSV text: numbers with all their digits."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     for row in rows:
@@ -133,7 +133,7 @@ def _written(rows: Iterable[Sequence[object]]) -> str:
 
 
 def _sheet(raw: bytes, origin: str) -> list[Sequence[object]]:
-    """Return the rows of a workbook's first sheet that holds something; an empty row for one without cells."""
+    """Rows of a workbook's first sheet that is not empty; one empty row for a workbook without cells."""
     import warnings
 
     from openpyxl import load_workbook
@@ -158,12 +158,12 @@ def _sheet(raw: bytes, origin: str) -> list[Sequence[object]]:
 
 
 def _value(cell: object) -> object:
-    """Return what a cell of a workbook holds: whole numbers without a point, dates as they read."""
+    """Value of a cell of a workbook: whole numbers without a point, dates as text."""
     return int(cell) if isinstance(cell, float) and cell.is_integer() and abs(cell) < 1e15 else cell
 
 
 def _parquet(raw: bytes, origin: str) -> list[Sequence[object]]:
-    """Return the rows of a Parquet file, its heading first."""
+    """Rows of a Parquet file, its heading first."""
     import pandas as pd
 
     try:

@@ -99,10 +99,10 @@ class JobNames(Protocol):
     """The jobs that there are, by name."""
 
     def __contains__(self, name: object, /) -> bool:
-        """Say whether there is a job of a name."""
+        """Whether there is a job of a name."""
 
     def names(self) -> Collection[str]:
-        """Return the names of all jobs."""
+        """Names of all jobs."""
 
 
 class Problem(Table):
@@ -293,7 +293,7 @@ def _places(path: str, model: type[Table], own: Table | None) -> Iterator[Place]
 
 
 def value_of(own: Table, key: str) -> object:
-    """Return a value of a table; of one inside it by "table.key"; None where it is not given."""
+    """A value of a table; of one inside it by "table.key"; None where it is not given."""
     found: object = own
     for name in key.split("."):
         found = getattr(found, name, None)
@@ -301,7 +301,7 @@ def value_of(own: Table, key: str) -> object:
 
 
 def flat(raw: Mapping[str, Any], known: Iterable[str]) -> dict[str, Any]:
-    """Return a table whose keys are labels, which TOML parts at their dots: [bounds.rod] m is "rod.m".
+    """A table whose keys are labels, which TOML parts at their dots: [bounds.rod] m is "rod.m".
 
     Beside what is of a label itself may stand what is of longer ones: mass.max, and mass.rod.mass.max. A key beside
     known ones that begin alike is one too: of rod.m a slip is rod.n, not rod.
@@ -315,7 +315,7 @@ def flat(raw: Mapping[str, Any], known: Iterable[str]) -> dict[str, Any]:
 
 
 def _together(one: object, other: object) -> object:
-    """Return what two entries of one label say: both where they are tables, else the later one."""
+    """Union of two entries of one label where both are tables, else the later one."""
     return {**one, **other} if isinstance(one, Mapping) and isinstance(other, Mapping) else other
 
 

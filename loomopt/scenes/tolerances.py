@@ -66,7 +66,7 @@ class Tolerance(NamedTuple):
         return (low + high) / 2
 
     def sigma(self, nominal: float) -> float:
-        """Return the standard deviation, SI."""
+        """Standard deviation, SI."""
         return self.plus_minus(nominal) * (UNIFORM if self.uniform else 1 / self.sigmas)
 
 

@@ -165,7 +165,7 @@ def _labels(found: CrankRockerDrawing, units: Units) -> list[Label]:
 
 
 def _mass_text(name: str, own: Mass, units: Units) -> str:
-    """Say a centre's mass and radius."""
+    """Text of a centre's mass and radius."""
     mass, radius = MASSES[name]
     return f"{mass} = {show(own.mass, units.mass)}, {radius} = {units.size(own.radius)}"
 

@@ -82,7 +82,7 @@ class Beatup(Job):
                 )
 
     def today(self, scene: Scene) -> dict[str, float]:
-        """Return today's design with every other number that the scene bounds."""
+        """Today's design with every other number that the scene bounds."""
         known, variables = self.numbers(scene), scene.schema.variables
         others = [scene.full(name) for name in scene.bounds if name not in variables]
         return {name: known[name] for name in (*variables, *others)}
@@ -125,7 +125,7 @@ class Beatup(Job):
     def figures_of(
         self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
     ) -> dict[str, Number]:
-        """Return every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
+        """Every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
         found, limited = base.alone(scene, sampled, asked), self.task(scene).limited
         found["mu_min"] = np.minimum(sampled.static["mu_near"], sampled.static["mu_far"])
         signs = dict.fromkeys(sampled.model.quantities, 1) | dict.fromkeys(sampled.model.least, -1)
@@ -147,12 +147,12 @@ class Beatup(Job):
         return {name: name for name in (*model.quantities, *model.least)} | {"mu_min": "obliquity"}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
-        """Return how each figure is read over a box of numbers: the transmission angle at both dead centres."""
+        """How each figure is read over a box of numbers: the transmission angle at both dead centres."""
         found = super().in_boxes(scene, model) | {"mu_min": InBox(("mu_near", "mu_far"))}
         return found | {name: InBox(quantity=name, sign=-1.0) for name in model.least}
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
-        """Say in one sentence what an optimum of the target reached; figures in SI."""
+        """Sentence on an optimum of the target; figures in SI."""
 
         def told(name: str) -> str:
             return scene.show(figures[name] or 0.0, "torque")
@@ -173,7 +173,7 @@ class Beatup(Job):
         return f"Balanced with the least change from today's machine; {peak_text.replace('least ', '')}."
 
     def say_together(self, members: Sequence[tuple[Scene, Numbers, Figures]], own: frozenset[str]) -> str:
-        """Say which M0/ω² the ψ'' at front dead centre balances with the counterweights there are, and which it cannot.
+        """Sentence on the M0/ω² that one ψ'' balances with the counterweights, and on those that it cannot.
 
         M3 = M0 − J ψ'' ω² there, so that a member balances for J = (M0/ω²)/ψ''; said where nothing else acts.
         """
@@ -203,7 +203,7 @@ class Beatup(Job):
         )
 
     def studied(self, scene: Scene) -> Studied:
-        """Return what studies read: the balance, the peak torque, the reed torque at front dead centre."""
+        """Quantities that studies show: the balance, the peak torque, the reed torque at front dead centre."""
         return Studied(("balance",), {"peak_torque": ("peak_torque", False)}, ("M3_fdc",), "psi_2")
 
 

@@ -26,7 +26,7 @@ LENGTHS = ("l1", "l2", "l3", "l4")
 
 
 def today(name: str) -> str:
-    """Return what today's value of a number is called among the numbers of a scene."""
+    """Name of today's value of a number among the numbers of a scene."""
     return f"today.{name}"
 
 
@@ -63,7 +63,7 @@ class FourBar(NamedTuple):
 
 
 def linked(given: Given) -> FourBar:
-    """Return what poses read at once."""
+    """Quantities that all poses of a machine share."""
     found = given.linkage
     assert isinstance(found, FourBar)
     return found
@@ -121,7 +121,7 @@ class CrankRocker:
         return {"": Group(found.quantities, found.closes, found.rows, found.margins, (0.0, math.pi))}
 
     def linkage(self, maths: Maths, values: Values) -> FourBar:
-        """Return lengths and dead centres."""
+        """Lengths and dead centres."""
         lengths = crank_rocker.Lengths(values["l1"], values["l2"], values["l3"], values["l4"])
         return FourBar(lengths, crank_rocker.dead_centres(maths, lengths))
 
@@ -132,7 +132,7 @@ class CrankRocker:
         return found if "s" in values else found | {"s": values["m4e"] * values["r4e"] ** 2}
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
-        """Return nothing: every event has a formula."""
+        """No values: every event has a formula."""
         return {}
 
     def pose(self, maths: Maths, given: Given, node: Node) -> ReedMotion:
@@ -147,7 +147,7 @@ class CrankRocker:
         )
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
-        """Return both dead centres, rad."""
+        """Both dead centres, rad."""
         return {FRONT: given.values["beta"], REAR: maths.pi + given.values["beta_r"]}
 
 

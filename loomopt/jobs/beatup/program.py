@@ -141,11 +141,11 @@ class BeatupTask(Task):
         return max(abs(self.known[name]), *map(abs, self.room(name, ends))) or self.length
 
     def room(self, name: str, ends: Ends) -> Ends:
-        """Return where random starts lie: where a counterweight is of use."""
+        """Range of the random starts: where a counterweight is of use."""
         return self.counterweight.get(name, ends)
 
     def parameters(self) -> dict[str, float]:
-        """Return every known number that is no variable; m4e follows from s where that is one."""
+        """Every known number that is no variable; m4e follows from s where that is one."""
         taken = {variable.name for variable in self.variables} | {"m4e"}
         found = {name: value for name, value in self.known.items() if name not in taken}
         if not self.changes:
@@ -171,7 +171,7 @@ class BeatupTask(Task):
         ]
 
     def wanted(self) -> list[Limit]:
-        """Return what the target itself demands of the reed torque at front dead centre."""
+        """Limit that the target sets to the reed torque at front dead centre."""
         if self.fallen or self.target not in ("retrofit", "torque"):
             return []
         tolerance = self.scene.table(TorqueTarget).M3_tolerance if self.target == "torque" else 0.0
@@ -180,7 +180,7 @@ class BeatupTask(Task):
         return [self.row_limit("M3_fdc", sign, "M3_fdc", value, self.torque) for sign, value in sides]
 
     def goals(self) -> tuple[Goal, ...]:
-        """Return what the target asks of the reed torque; of balance, to what it is called zero."""
+        """Goal of the reed torque; for balance, the tolerance within which it counts as zero."""
         if self.target != "balance":
             return goals(self.wanted())
         return () if self.fallen else (BALANCE,)
@@ -199,7 +199,7 @@ class BeatupTask(Task):
         return *own[self.target], *self.least()
 
     def starts(self) -> tuple[dict[str, float], ...]:
-        """Return today's machine moved just inside its bounds, with a good part of the counterweight in use.
+        """Today's machine moved just inside its bounds, with a good part of the counterweight in use.
 
         Never today's own m4e = r4e = 0 alone, where a gradient sees no way to use a counterweight. Where mass and
         radius matter by themselves, little and much of it are optima of their own: then there is a second start.
@@ -338,7 +338,7 @@ class Band(NamedTuple):
 def balanced_by(
     scene: Scene, design: Mapping[str, float], figures: Mapping[str, float | None], own: Collection[str]
 ) -> Band | None:
-    """Return what a member needs; None where more acts at front dead centre than the cloth and the reed's inertia."""
+    """Balance that a member needs; None where more acts at front dead centre than the cloth and the reed's inertia."""
     front, alpha, inertia = (figures.get(name) for name in ("M3_fdc", "alpha_fdc", "J4"))
     speed, resistance = scene.operation.get("speed"), scene.operation.get("M0")
     if front is None or alpha is None or inertia is None or not speed or not resistance:
@@ -356,7 +356,7 @@ def balanced_by(
 
 
 def served(bands: Sequence[Band], scene: Scene) -> str:
-    """Say which members one ψ'' can balance, and whether any could balance them all; scene: of the first member."""
+    """Sentence on the members that one ψ'' can balance, and on whether any balances all; scene: of the first member."""
     reached = [b.kappa / b.bend for b in bands]
     pairs = list(zip(bands, reached, strict=True))
     if all(b.least * (1 - SHOWN_AS_ZERO) <= j <= b.most * (1 + SHOWN_AS_ZERO) for b, j in pairs):
@@ -370,7 +370,7 @@ def served(bands: Sequence[Band], scene: Scene) -> str:
 
 
 def _ratio(bands: Sequence[Band], scene: Scene) -> str:
-    """Say what one ψ'' serves where members have the same counterweights to choose from."""
+    """Sentence on the members that one ψ'' balances where all have the same counterweights to choose from."""
     first, speed = bands[0], scene.operation["speed"]
     low, high = (scene.show(value, "inertia") for value in (first.least, first.most))
     ends = [scene.show(inertia * first.bend * speed**2, "torque") for inertia in (first.least, first.most)]

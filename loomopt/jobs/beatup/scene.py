@@ -110,7 +110,7 @@ TARGETS = {
 
 
 def fault(design: Mapping[str, float], shown: ShowValue = usual) -> str:
-    """Say why a design's lengths, m, are no crank-rocker; "" when they are, or when it names none of them."""
+    """Reason why a design's lengths, m, are no crank-rocker; "" when they are, or when it names none of them."""
     named = [name for name in ("l1", "l2", "l3", "l4") if name in design]
     return crank_rocker.fault(*(design[name] for name in named), shown=shown) if len(named) == 4 else ""
 

@@ -37,7 +37,7 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
 
 
 def terms(model: JobModel) -> Mapping[str, Expression]:
-    """Return each load's term, N·m, by its effect's name: an expression in φ, ω, q, q', q'' and numbers."""
+    """Term of each load, N·m, by its effect's name: an expression in φ, ω, q, q', q'' and numbers."""
     return effect_equations.terms(model.loads, _pose(), effect_equations.given(model, _Symbols()))
 
 
@@ -121,7 +121,7 @@ class BeatupViews(JobViews):
         return drawing.linkage(numbers, scene.name, drawn_units(scene), forces)
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Return its joints and centres of mass as CSV. Raises BadInput."""
+        """Joints and centres of mass as CSV. Raises BadInput."""
         from loomopt.jobs.beatup import drawing
         from loomopt.picture.shapes import drawn_units
 
@@ -139,7 +139,7 @@ class BeatupViews(JobViews):
         return equations(registry.of(scene).model(scene))
 
     def marks(self, scene: Scene, design: Mapping[str, float]) -> Marks:
-        """Return both dead centres, rad, and where the cloth begins and ceases to resist."""
+        """Both dead centres, rad, and where the cloth begins and ceases to resist."""
         sampler = registry.of(scene).sampler(scene, design)
         model, given = sampler.model, sampler.given
         found: dict[str, float | Span] = {name: float(model.event(FLOAT, given, name)) % TURN for name in (FRONT, REAR)}
@@ -148,7 +148,7 @@ class BeatupViews(JobViews):
         return found | {name.replace("_", " "): tops(sampler, [name])[0] % TURN for name in model.least}
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
-        """Return what there is to remark upon: curves, checks, a reed that twists away while it beats up."""
+        """Remarks: on curves, checks, a reed that twists away while it beats up."""
         found = super().remarks(scene, design) if any(isinstance(e, Check) for e in scene.active) else told(scene)
         if not any(isinstance(effect, State) for effect in scene.active):
             return found
@@ -157,7 +157,7 @@ class BeatupViews(JobViews):
         return (*found, *twisted(scene, registry.of(scene).sampler(scene, design)))
 
     def words(self) -> "Mapping[str, Curve]":
-        """Return what the curves are called."""
+        """Names of the curves."""
         from loomopt.picture.panels import Curve
 
         return {
@@ -174,7 +174,7 @@ class BeatupViews(JobViews):
 
 
 def _numbers(scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
-    """Return all numbers of a design, with the offset of the reed's centre of mass where an effect has one."""
+    """All numbers of a design, with the offset of the reed's centre of mass where an effect has one."""
     found = registry.of(scene).numbers_of(scene, design)
     return found | {"offset": found.get(scene.full("offset"), 0.0)}
 

@@ -49,7 +49,7 @@ class LinkageDrawing:
         return {f"{name} event" if name in TAKEN else name: float(angle) for name, angle in drawn.items()}
 
     def joints(self, phi: float) -> dict[str, Point]:
-        """Return all joints at a crank angle, rad."""
+        """Positions of all joints at a crank angle, rad."""
         pose = self.linkage.at(systems.FLOAT, self.sampler.given, phi).joints
         return {name: Point(*map(float, joint.place)) for name, joint in pose.joints.items()}
 

@@ -36,7 +36,7 @@ class LinkageJob(Job):
     open_boxes = "no global claim: boxes of a chain's designs do not close in any time worth waiting for"
 
     def schema(self, document: Mapping[str, Any]) -> SceneSchema:
-        """Return what a scene may hold, by its own tables. Raises BadInput."""
+        """Schema of a scene: it depends on the scene's tables. Raises BadInput."""
         return scenes.schema(document)
 
     def check(self, scene: Scene) -> None:
@@ -50,7 +50,7 @@ class LinkageJob(Job):
     def figures_of(
         self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
     ) -> dict[str, Number]:
-        """Return every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
+        """Every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
         peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in asked}
         sampled.search(tuple(peaks.values()))
         found = base.alone(scene, sampled, asked)
@@ -69,7 +69,7 @@ class LinkageJob(Job):
         return found | {f"mu.{part}": f"{part}.{OBLIQUITY}" for part in linkage_of(model).oblique}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
-        """Return how each figure is read over a box of numbers."""
+        """How each figure is read over a box of numbers."""
         told = {name: (self.read(name, 0.0), self.read(name, 1.0)) for name in self.peaks(model)}
         peaks = {
             name: InBox(quantity=of, sign=told[name][1] - told[name][0], offset=told[name][0])
@@ -78,7 +78,7 @@ class LinkageJob(Job):
         return super().in_boxes(scene, model) | peaks
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
-        """Say in one sentence what an optimum reached; figures in SI."""
+        """Sentence on an optimum; figures in SI."""
         kinds, told, task = scene.schema.figures, [], LinkageTask(scene, target)
         for name, sense in task.levels:
             value = figures.get(name)
@@ -113,7 +113,7 @@ class LinkageJob(Job):
         self.task(scene, target).demand_figures()
 
     def tables(self, scene: Scene, target: str) -> tuple[Record, ...]:
-        """Return what is told of the tables that are read, that of a path too."""
+        """Remarks on the tables that are read, that of a path too."""
         asked = scenes.path_target(scene, target)
         if asked is None:
             return super().tables(scene, target)
@@ -124,7 +124,7 @@ class LinkageJob(Job):
         return (*super().tables(scene, target), read.record(f"targets.{asked}.table", misfit, "the path to follow"))
 
     def studied(self, scene: Scene) -> Studied:
-        """Return what studies read."""
+        """Quantities that studies show."""
         found = super().studied(scene)
         return found._replace(peaks={name: (name, False) for name in self.model(scene).quantities})
 

@@ -138,7 +138,7 @@ class Window(NamedTuple):
         return f"window {self.name}"
 
     def corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
-        """Return where it begins and ends, rad."""
+        """Crank angles at which it begins and ends, rad."""
         start = given.values[event_value(self.after)]
         return tuple(start + number(maths, given.values, end) for end in (self.begins, self.ends))
 
@@ -168,7 +168,7 @@ class Path(NamedTuple):
 
 
 def nearest_rates(joint: Joint, place: tuple[Number, Number]) -> tuple[Number, Number, Number]:
-    """Return what vanishes where a joint is nearest to a place, m², with its first two derivatives."""
+    """Expression that is zero where a joint is nearest to a place, m², and its first two derivatives."""
     p, p1, p2, p3 = joint.place, *(joint.at(order) or Vector(0, 0) for order in (1, 2, 3))
     away = Vector(p.x - place[0], p.y - place[1])
     return dot(away, p1), dot(p1, p1) + dot(away, p2), 3 * dot(p1, p2) + dot(away, p3)
@@ -243,13 +243,13 @@ class LinkageMotion(Motion):
         return own - other
 
     def since(self, there: "LinkageMotion") -> Number:
-        """Return how far the output is from its place in another pose; of an angle as one atan2."""
+        """How far the output is from its place in another pose; of an angle as one atan2."""
         if self.output.measure != "angle":
             return self.q - there.q
         return self._turned(there.direction)
 
     def _turned(self, since: Vector) -> Number:
-        """Return what the output has made since it had another direction."""
+        """Change of the output since it had another direction."""
         seen = self.direction
         found = self.joints.maths.atan2(cross(since, seen), dot(since, seen))
         found = found if self.factor is None else self.factor * found
@@ -301,7 +301,7 @@ class Turn(NamedTuple):
         return bool(self.rest) and abs(apart(self.rest[1].angle, self.rest[0].angle)) > SAME_ANGLE
 
     def away(self, near: float) -> float:
-        """Return how far it is from a crank angle, rad."""
+        """How far it is from a crank angle, rad."""
         return min(abs(apart(angle, near)) for angle in (self.angle, *(corner.angle for corner in self.rest)))
 
 
@@ -405,7 +405,7 @@ class Linkage(Kinematics):
         return found
 
     def _placed(self, maths: Maths, given: Given, place: Place) -> dict[str, Number]:
-        """Return where the output is at an event."""
+        """Position of the output at an event, by name."""
         pose = self.at_event(maths, given, place.name)
         if self.output.measure != "angle":
             return {output_value(place.name, "q"): pose.q}
@@ -433,7 +433,7 @@ class Linkage(Kinematics):
         return tuple(angle for cam in self.chain.cams for angle in self.chain.corners(cam, maths, given.values))
 
     def _rates(self, maths: Maths, given: Given, place: Place, phi: Number) -> tuple[Number, Number, Number]:
-        """Return what vanishes at an event, with its first two derivatives."""
+        """Expression that is zero at an event, with its first two derivatives."""
         pose = self.pose(maths, given, self._there(given, place.name, phi))
         if place.travel is None:
             return pose.q1, pose.q2, pose.q3
@@ -442,7 +442,7 @@ class Linkage(Kinematics):
         return pose.since(there) + short, pose.q1, pose.q2
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
-        """Return where the events lie, rad, found by a scan of the whole turn. Raises UnfoundError."""
+        """Crank angles of the events, rad, from a scan of the whole turn. Raises UnfoundError."""
         found = self._times(given)
         angles = {name: found[hint_of(name)] for name in self.path.times} if self.path else {}
         if all(place.angle is not None for place in self.places) and not self.chain.cams:
@@ -474,7 +474,7 @@ class Linkage(Kinematics):
         return found | {f"{cam} at {name}": value for name, each in beside.items() for cam, value in each.items()}
 
     def _times(self, given: Given) -> dict[str, float]:
-        """Return near which crank angles, rad, a point without timing is nearest to the places of its path."""
+        """Near which crank angles, rad, a point without timing is nearest to the places of its path."""
         path = self.path
         if path is None or path.phi:
             return {}
@@ -490,7 +490,7 @@ class Linkage(Kinematics):
         return {hint_of(name): float(angle) for name, angle in zip(path.times, phi, strict=True)}
 
     def turns(self, given: Given) -> tuple[Turn, ...]:
-        """Return where the output turns over the whole turn: between samples, then by Newton's method.
+        """Points of the whole turn at which the output turns: between samples, then by Newton's method.
 
         Raises UnfoundError where it has no real position somewhere.
         """
@@ -526,7 +526,7 @@ class Linkage(Kinematics):
         return chosen(self.turns(given), place)
 
     def corner_words(self, corner: Corner) -> str:
-        """Return what happens at a corner of the cams: the return of follower begins."""
+        """Sentence on a corner of the cams, such as "the return of follower begins"."""
         place = corner.place
         for cam in self.chain.cams:
             pieces = len(LAWS[cam.word("law")].breaks) + 1
@@ -538,7 +538,7 @@ class Linkage(Kinematics):
         raise ValueError(f"the cams have no corner {corner.place}")
 
     def _scan(self, given: Given) -> tuple[Node, dict[int, Corner]]:
-        """Return nodes over one turn, in order, and which of them are corners of cams: the ends of their stretches."""
+        """Nodes over one turn, in order, and which of them are corners of cams: the ends of their stretches."""
         places = sorted(
             (BESIDE + (float(angle) - BESIDE) % TURN, place) for place, angle in enumerate(self._corners(FLOAT, given))
         )
@@ -561,7 +561,7 @@ class Linkage(Kinematics):
         return Node(np.concatenate(angles), switch), corners
 
     def _settled(self, given: Given, ends: tuple[float, float], slopes: tuple[float, float]) -> float:
-        """Return where the output turns between two crank angles, rad, at which it has slopes of other signs."""
+        """Crank angle, rad, at which the output turns, between two at which its slopes have opposite signs."""
         (low, high), (at_low, at_high) = ends, slopes
         angle = low - at_low * (high - low) / (at_high - at_low)
         for _ in range(NEWTONS):
@@ -575,7 +575,7 @@ class Linkage(Kinematics):
         return angle
 
     def _crossing(self, given: Given, place: Place, beside: float) -> float:
-        """Return where q is `travel` short of its value at another event, the nearest before or after that."""
+        """Crank angle at which q is `travel` short of its value at another event: the nearest before or after it."""
         there = self.at(FLOAT, given, beside)
         assert place.travel is not None
         level = float(number(FLOAT, given.values, place.travel))
@@ -625,7 +625,7 @@ class Linkage(Kinematics):
     def _sure(
         self, turns: Sequence[Turn], swept: float, maths: Maths, given: Given, at: Sequence[Number]
     ) -> list[tuple[str, Number]]:
-        """Return what is positive where a scan finds the same events as of the design with those turns."""
+        """Expressions that are positive where a scan finds the same events as for the design with those turns."""
         found: list[tuple[str, Number]] = []
         for place in (place for place in self.places if place.extreme):
             extreme = chosen(tuple(turns), place)
@@ -713,7 +713,7 @@ def end_of_rest(turn: Turn, place: Place) -> Corner | None:
 
 
 def _rates_of(linkage: Linkage, place: Place, maths: Maths, given: Given, phi: Number) -> Sequence[Number]:
-    """Return what vanishes at an extreme or a travel, and its slope."""
+    """Expression that is zero at an extreme or a travel, and its slope."""
     pose = linkage.pose(maths, given, Node(phi, {}))
     if place.travel is None:
         return pose.q1, pose.q2
@@ -721,7 +721,7 @@ def _rates_of(linkage: Linkage, place: Place, maths: Maths, given: Given, phi: N
 
 
 def _away(at: Number, angle: float, near: float) -> Number:
-    """Return how far a turn near an angle, rad, is from another one."""
+    """How far a turn near an angle, rad, is from another one."""
     nearest = apart(angle, near)
     off = at - angle + nearest
     return off if nearest >= 0 else -off

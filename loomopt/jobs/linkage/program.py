@@ -139,7 +139,7 @@ class LinkageTask(Task):
             raise refusal(problem, self.scene.origin, key, remedy=f"{remedy}, or take it out")
 
     def margins(self) -> list[Limit]:
-        """Return that every part closes over the whole turn; a limit on its transmission angle says so too."""
+        """Rows by which every part closes over the whole turn; a limit on its transmission angle does so too."""
         return [
             CycleLimit(said, 1, prefix + row, 1.0, 1.0, relaxable=False)
             for prefix, group in self.model.kinematics.groups.items()
@@ -159,7 +159,7 @@ class LinkageTask(Task):
         return tuple(self.level(name, sense) for name, sense in before)
 
     def level(self, name: str, sense: str) -> Objective:
-        """Return one level."""
+        """The level of the target: there is one."""
         size = self.figure_size(name) if self._is_figure(name) else self.size(name)
         if name.startswith("mu."):
             return Peak(name, f"{name[3:]}.{OBLIQUITY}", 1.0)
@@ -176,7 +176,7 @@ class LinkageTask(Task):
         return Magnitude(name, row, size) if name in self._loads else Value(name, row, size)
 
     def starts(self) -> tuple[dict[str, float], ...]:
-        """Return today's linkage, and first one with half of each number of effects: none of it hides what it does."""
+        """Today's linkage, and first one with half of each number of effects: none of it hides what it does."""
         today = self.inside(self.known)
         lengths = self.scene.schema.variables
         half = {

@@ -105,7 +105,7 @@ WINDOW_KEYS: parts.Keys = {
 
 
 def _output_schema() -> Json:
-    """Return the JSON Schema of [output]."""
+    """JSON Schema of [output]."""
     one: Json = {"oneOf": [{"required": [form]} for form in FORMS]}
     found = parts.keys_schema(OUTPUT_KEYS)
     scale = [parts.number_schema(Number(kind, SCALE)) for kind in (PositiveNumber, PositiveLength)]
@@ -113,14 +113,14 @@ def _output_schema() -> Json:
 
 
 def _events_schema() -> Json:
-    """Return the JSON Schema of [events]."""
+    """JSON Schema of [events]."""
     lengths = {**EVENT_KEYS["travel"], "travel": Number(PositiveLength, TRAVEL, True)}
     forms = [parts.keys_schema(keys) for keys in (*EVENT_KEYS.values(), lengths)]
     return {"type": "object", "propertyNames": parts.NAME_SCHEMA, "additionalProperties": {"anyOf": forms}}
 
 
 def _windows_schema() -> Json:
-    """Return the JSON Schema of [windows]."""
+    """JSON Schema of [windows]."""
     own = parts.keys_schema(WINDOW_KEYS)
     return {"type": "object", "propertyNames": parts.NAME_SCHEMA, "additionalProperties": own}
 
@@ -136,7 +136,7 @@ OWN = ("mechanism", *TABLES)
 
 
 def _table_schema(name: str) -> Json:
-    """Return the JSON Schema of one of the scene's own tables."""
+    """JSON Schema of one of the scene's own tables."""
     text, schema = TABLES[name]
     return {"description": text, **schema()}
 
@@ -264,7 +264,7 @@ def _read(text: str) -> Reading:
 
 
 def reading(document: Mapping[str, Any]) -> Reading:
-    """Return what a scene's own tables say. Raises BadInput."""
+    """Contents of the tables that only linkage scenes have. Raises BadInput."""
     return _read(json.dumps({name: document.get(name, {}) for name in OWN}, default=repr))
 
 
@@ -272,7 +272,7 @@ def reading(document: Mapping[str, Any]) -> Reading:
 
 
 def reaches(document: Mapping[str, Any], linked: Chain) -> tuple[Reach, ...]:
-    """Return the reaches of joints that limits or targets speak of."""
+    """Reaches of joints that limits or targets name."""
     limits = document.get("limits", {})
     named = list(limits) if isinstance(limits, Mapping) else []
     for name in REACHES:
@@ -289,7 +289,7 @@ def reaches(document: Mapping[str, Any], linked: Chain) -> tuple[Reach, ...]:
 
 
 def figures(known: Reading, document: Mapping[str, Any]) -> dict[str, Figure]:
-    """Return the figures of a linkage."""
+    """Figures of a linkage."""
     linkage, slides = known.linkage, known.linkage.output.slides
     travel, load = ("length", "force") if slides else ("angle", "torque")
     rates = ("travel velocity", "travel acceleration", "travel jerk") if slides else ("number",) * 3
@@ -323,7 +323,7 @@ def _pathed(document: Mapping[str, Any]) -> bool:
 
 
 def axes(known: Reading, document: Mapping[str, Any]) -> dict[str, Axis]:
-    """Return the axes that are read otherwise than under their own name."""
+    """Axes that are read otherwise than under their own name."""
     load = "force" if known.linkage.output.slides else "torque"
     found = [
         Axis(RMS_TORQUE, "torque", (TORQUE_SQUARE,), senses=("least",), power=2),
@@ -346,7 +346,7 @@ def axes(known: Reading, document: Mapping[str, Any]) -> dict[str, Axis]:
 
 
 def _kind(known: Reading, name: str) -> str:
-    """Return the kind of quantity of a number."""
+    """Kind of quantity of a number."""
     return str(known.numbers[name][0].__metadata__[0].kind)
 
 
@@ -360,7 +360,7 @@ def _sought(document: Mapping[str, Any], *ends: str) -> Iterator[str]:
 
 
 def targets(document: Mapping[str, Any]) -> dict[str, Target]:
-    """Return the scene's own targets, in its order."""
+    """Targets of the scene, in its order."""
     table, found = Cursor(document.get("targets", {}), "targets", Faults()), {}
     for name, place in table.entries(table.table() or DEFAULT).items():
         own, said = place.table(), []
@@ -383,7 +383,7 @@ EMPTY: Mapping[str, Any] = {
 
 
 def schema(document: Mapping[str, Any]) -> SceneSchema:
-    """Return what a scene may hold, by its own tables. Raises BadInput."""
+    """Schema of a scene: it depends on the scene's tables. Raises BadInput."""
     tables = {name: document.get(name, {}) for name in (*OWN, "limits", "targets")}
     if "parts" not in document:
         tables |= {**{name: {} for name in OWN}, **EMPTY}
@@ -422,12 +422,12 @@ def former_names(linkage: Linkage) -> dict[str, str]:
 
 
 def _fitted(effect: kinds.Effect, linkage: Linkage) -> kinds.Effect:
-    """Return an effect as the linkage has it."""
+    """An effect as this linkage uses it."""
     return effect.fitted(linkage.chain) if isinstance(effect, kinds.Check) and effect.fitted else effect
 
 
 def path(scene: Scene, target: str) -> Path | None:
-    """Return the path that a target asks for, else the first target that has one; None where none has. Raises."""
+    """Path of a target, else of the first target that has one; None where none has. Raises BadInput."""
     name = path_target(scene, target)
     if name is None:
         return None
@@ -438,13 +438,13 @@ def path(scene: Scene, target: str) -> Path | None:
 
 
 def path_target(scene: Scene, target: str) -> str | None:
-    """Return the target whose path is read for a target: its own, else the first that has one; None where none has."""
+    """Target whose path is read for a target: its own, else the first that has one; None where none has."""
     own = [name for name, table in scene.targets.items() if isinstance(table, TargetTable) and table.point]
     return target if target in own else next(iter(own), None)
 
 
 def read_path(scene: Scene, name: str) -> csv_tables.Table:
-    """Return the table of the path that a target asks for, with its precision. Raises BadInput."""
+    """Table of the path of a target, with its precision. Raises BadInput."""
     table, key = scene.targets[name], f"targets.{name}.table"
     assert isinstance(table, TargetTable)
     kinds, given = {"phi": "angle", "x": "length", "y": "length"}, str(table.table)
@@ -478,7 +478,7 @@ JUMP, LEVEL = math.pi, 1e-3
 
 
 def fault(linkage: Linkage, design: Mapping[str, float], shown: ShowValue = usual) -> str:
-    """Say at which crank angle a design does not close, or which of its events is not there; "" where it works."""
+    """Sentence on the crank angle at which a design does not close, or on its missing event; "" where it works."""
     reason = chain.fault(linkage.chain, design, shown)
     if reason:
         return reason

@@ -53,7 +53,7 @@ class _SymbolicParts:
     found: list[Equation] = field(default_factory=list)
 
     def angle(self, name: str) -> str:
-        """Return what the angle of a link, or the place of what slides, is called: a number may be called so too."""
+        """Symbol of the angle of a link, or of the position of a slider; it differs from the names of all numbers."""
         return f"theta_{name}" if name in self.taken else name
 
     def link(self, name: str, origin: Joint, angle: Angle) -> Link:
@@ -195,7 +195,7 @@ class SymbolicPose(LinkageMotion):
 
 
 def _output(out: Output, written: _SymbolicParts) -> Expression:
-    """Return what the output is."""
+    """Equation of the output."""
     if out.measure in ("x", "y"):
         found = getattr(written.pose.joints[out.name].place, out.measure)
     else:
@@ -248,7 +248,7 @@ class LinkageViews(JobViews):
         return drawing.linkage(sampler, scene.name, drawn_units(scene), forces)
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Return its joints at its events as CSV. Raises BadInput."""
+        """Joints at the events as CSV. Raises BadInput."""
         from loomopt.jobs.linkage import drawing
         from loomopt.picture.shapes import drawn_units
 
@@ -277,7 +277,7 @@ class LinkageViews(JobViews):
         return found
 
     def words(self) -> "Mapping[str, Curve]":
-        """Return what the curves are called."""
+        """Names of the curves."""
         from loomopt.picture.panels import Curve
 
         return {
@@ -290,7 +290,7 @@ class LinkageViews(JobViews):
         }
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
-        """Return what to know beside the numbers: curves, and events that stand elsewhere than today's."""
+        """Remarks: on the curves, and on events that lie elsewhere than today's."""
         found = (*told(scene), *_without_place(scene))
         moved = self._moved(scene, design)
         return (*found, *self._rests(scene, design), *((moved,) if moved else ()))
@@ -309,7 +309,7 @@ class LinkageViews(JobViews):
             yield f"{place.name} is where {linkage.corner_words(standing)}: the output rests from {begin} to {end}"
 
     def _moved(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Say where a design turns more or less often than today's: its events may be others."""
+        """Remark on a design that turns more or less often than today's: its events may be others."""
         job = registry.of(scene)
         here, today = job.sampler(scene, design), job.sampler(scene, {})
         linkage = linkage_of(here.model)
@@ -327,7 +327,7 @@ class LinkageViews(JobViews):
 
 
 def _without_place(scene: Scene) -> Iterator[str]:
-    """Say which mass of the output forces in joints, or its weight, leave out."""
+    """Remark on the output's mass that the joint forces, or the weight, do not include."""
     out, effects = reading(scene.document).linkage.output, scene.effects
     tellers = " and ".join(each.of_masses for each in scene.active if each.of_masses)
     for name in ("inertia", "counterweight"):

@@ -68,7 +68,7 @@ class Rapier(Job):
             match_table(scene)
 
     def tables(self, scene: Scene, target: str) -> tuple[Record, ...]:
-        """Return what is told of the tables that are read: of head travel for target match."""
+        """Remarks on the tables that are read: head travel for target match."""
         if target != "match":
             return super().tables(scene, target)
         read = read_match(scene)
@@ -87,7 +87,7 @@ class Rapier(Job):
     def figures_of(
         self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
     ) -> dict[str, Number]:
-        """Return every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
+        """Every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
         peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in asked and name != "stroke"}
         sampled.search(("S", *peaks.values()))
         reading = read(sampled) if isinstance(sampled, Sampler) else read_many(sampled)
@@ -115,7 +115,7 @@ class Rapier(Job):
         return {name: name for name in model.quantities} | {"stroke": "S", "mu_min": "obliquity"}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
-        """Return how each figure is read over a box of numbers: dwells end where the head leaves s_dwell."""
+        """How each figure is read over a box of numbers: dwells end where the head leaves s_dwell."""
         found = super().in_boxes(scene, model)
         found |= {"stroke": InBox(quantity="S", largest=True), "sley_mu_min": InBox(("sley_mu_near", "sley_mu_far"))}
         found["mu_min"] = InBox(quantity="obliquity", sign=-1.0, offset=math.pi / 2)
@@ -123,7 +123,7 @@ class Rapier(Job):
         return found | {name: InBox(quantity="dwell_travel", leaves=side) for name, side in sides.items()}
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
-        """Say in one sentence what an optimum of the target reached; figures in SI."""
+        """Sentence on an optimum of the target; figures in SI."""
 
         def told(name: str, digits: int = 9) -> str:
             return scene.show(figures.get(name) or 0.0, FIGURES[name].kind, digits)
@@ -161,13 +161,13 @@ class Rapier(Job):
         )
 
     def studied(self, scene: Scene) -> Studied:
-        """Return what studies read: peak acceleration, stroke, and where the head leaves its dwell."""
+        """Quantities that studies show: peak acceleration, stroke, and where the head leaves its dwell."""
         peaks = {"peak_acceleration": ("peak_acceleration", False), "stroke": ("S", True)}
         leaves = next(iter(self.crossings(scene).get("dwell_after", ())), None)
         return Studied(("stroke-dwell",), peaks, motion="S_2", crossing=leaves)
 
     def crossings(self, scene: Scene) -> Mapping[str, tuple[Crossing, ...]]:
-        """Return where the head leaves its dwells."""
+        """Crank angles at which the head leaves its dwells."""
         if "s_dwell" not in scene.operation:
             return {}
         found = {name: (Crossing(name, "S", "s_dwell", int(side)),) for name, side in SIDES.items()}

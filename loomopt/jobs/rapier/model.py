@@ -109,7 +109,7 @@ class DriveLinkage(NamedTuple):
 
 
 def linked(given: Given) -> DriveLinkage:
-    """Return what poses read at once."""
+    """Quantities that all poses of a machine share."""
     found = given.linkage
     assert isinstance(found, DriveLinkage)
     return found
@@ -135,7 +135,7 @@ class RapierDrive:
         return {"": _five_bar(), "sley_": sley}
 
     def linkage(self, maths: Maths, values: Values) -> DriveLinkage:
-        """Return dimensions, and the sley's dead centres."""
+        """Dimensions, and the sley's dead centres."""
         dimensions = rapier_drive.Dimensions(**{name: values[name] for name in DIMENSIONS})
         return DriveLinkage(dimensions, rapier_drive.Sley(maths, dimensions).centres)
 
@@ -171,7 +171,7 @@ class RapierDrive:
         )
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
-        """Return where the head turns, the first turn onto its way out, and where it is farthest, if called in."""
+        """Crank angles at which the head turns, first turns outwards, and is farthest, where their names are called."""
         if not {TURNS, STROKE} & set(called):
             return {}
 
@@ -190,7 +190,7 @@ class RapierDrive:
         return self.pose(maths, given, Node(0 * maths.pi, switch))
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
-        """Return both dead centres of the sley, rad."""
+        """Both dead centres of the sley, rad."""
         centres = linked(given).centres
         return {"front dead centre": 0, "rear dead centre": maths.pi + centres.beta_r - centres.beta}
 
@@ -323,7 +323,7 @@ class TravelReading:
 
 
 def read(sampler: Sampler) -> TravelReading:
-    """Return stroke and dwells of a sampled drive. Raises ValueError where it does not turn all round."""
+    """Stroke and dwells of a sampled drive. Raises ValueError where it does not turn all round."""
     found = sampler.extremes("S")
     if not found or not all(math.isfinite(extreme.value) for extreme in found):
         raise ValueError("the drive does not assemble all round")
@@ -341,7 +341,7 @@ def read(sampler: Sampler) -> TravelReading:
 
 
 def _dwell(sampler: Sampler, extremes: list[float], room: float, side: int) -> float:
-    """Return how far the crank turns from front dead centre, on one side, before |S| leaves `room` (m)."""
+    """How far the crank turns from front dead centre, on one side, before |S| leaves `room` (m)."""
     even = np.linspace(0.0, TURN, SAMPLES + 1)
     angles = np.unique(np.concatenate([even, np.mod(side * np.array(extremes), TURN)]))
 
@@ -360,7 +360,7 @@ SETTLED_STEPS = 3
 
 
 def read_many(machines: "Machines") -> TravelReading:
-    """Return stroke and dwells of many drives at once, (machines,); no number where one does not turn all round."""
+    """Stroke and dwells of many drives at once, (machines,); no number where one does not turn all round."""
     tops = machines.tops("S", signed=True)
     phi = machines.angles(tops)
     for _ in range(SETTLED_STEPS):

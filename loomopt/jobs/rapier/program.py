@@ -192,7 +192,7 @@ class RapierTask(Task):
     # Limits.
 
     def limits(self) -> list[Limit]:
-        """Return all limits: figures that a variable's bounds imply are not limited twice."""
+        """All limits; a figure whose limit a variable's bounds imply has none."""
         figures = [each for each in self.figures() if not self.implied(each)]
         required = [each for each in self.required() if each.name not in self.demanded]
         return [*self.bounds(), *required, *self.floors(), *self.meant(), *self.margins(), *figures, *self.demands()]
@@ -202,24 +202,24 @@ class RapierTask(Task):
         return [each for v in self.bounded if v.name in self.free for each in bound_limits(v)]
 
     def required(self) -> list[Limit]:
-        """Return what the target keeps, each on the side where a designer could give way."""
+        """Limits on the figures that the target keeps, on the side on which a designer could give way."""
         known = self.known
         kept = [name for name in self.kept if name not in self.free]
         return [BoundLimit(n, REQUIRED[n], n, known[n], self.operated_size(n)) for n in kept]
 
     def wanted(self) -> list[Limit]:
-        """Return what of the bounds and of what is kept the target asks of figures."""
+        """Limits on figures that are goals of the target, from the bounds and from the figures it keeps."""
         return [each for each in (*self.bounds(), *self.required()) if each.name in self.kept and each.name in FIGURES]
 
     def implied(self, limit: Limit) -> bool:
-        """Say whether the bounds of the variable that a limit is named after say as much."""
+        """Whether the bounds of the variable of a limit's name imply the limit."""
         own = next((v for v in self.variables if v.name == limit.name), None)
         if own is None:
             return False
         return (limit.sign > 0 or own.lower >= limit.value) and (limit.sign < 0 or own.upper <= limit.value)
 
     def meant(self) -> list[Limit]:
-        """Return what stroke and dwells mean: the head at rest at its stroke, and within s_dwell on the arcs.
+        """Limits that define stroke and dwells: the head rests at its stroke, and stays within s_dwell on the arcs.
 
         Where no stroke is kept, the hand-over that is traded or limited might be another rest, such as front dead
         centre: it is one at which the head turns back, outside its dwells.
@@ -258,7 +258,7 @@ class RapierTask(Task):
         return [self.row_limit(name, sign, row, value, size) for sign, value in sides for row in rows]
 
     def limit_size(self, name: str, sides: Sequence[tuple[int, float]]) -> float:
-        """Return what a limit on a figure is measured by; sides: of the limit."""
+        """Scale of a limit on a figure; sides: of the limit."""
         if self.model.has_quantity(name):
             return self.sampler.peak(name) or 1.0
         if any(name in check.rows for check in self.model.checks):
@@ -281,7 +281,7 @@ class RapierTask(Task):
         return own[self.target], *self.least()
 
     def starts(self) -> tuple[dict[str, float], ...]:
-        """Return today's drive moved just inside its bounds, and the paper's own construction where it closes."""
+        """Today's drive moved just inside its bounds, and the paper's own construction where it closes."""
         built = constructed(self.known)
         return distinct([self.inside(self.known), *([self.inside({**self.known, **built})] if built else [])])
 
@@ -292,7 +292,7 @@ class RapierTask(Task):
         return [*(self.scale_move(name, along) for name, along in scales if taken >= set(along)), *self.axis_moves()]
 
     def follow(self) -> Callable[[JobModel, Numbers], Numbers]:
-        """Return what gives the hand-over and the least dwell."""
+        """Solved variables: the hand-over and the least dwell."""
         return hand_over
 
     def figure_size(self, name: str) -> float:

@@ -128,13 +128,13 @@ TARGETS = {
 
 
 def match_table(scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return crank angles, rad, and head travels, m, of `targets.match.table`. Raises BadInput."""
+    """Crank angles, rad, and head travels, m, of `targets.match.table`. Raises BadInput."""
     found = read_match(scene).columns
     return found["phi1"], found["S"]
 
 
 def read_match(scene: Scene) -> csv_tables.Table:
-    """Return the table of head travel with its precision. Raises BadInput."""
+    """Table of head travel with its precision. Raises BadInput."""
     given, key = scene.table(MatchTarget).table, "targets.match.table"
     if given is None:
         remedy = f'Write table = "s.csv" in [targets.match]; the file has the columns {csv_tables.header(MATCHED)}'

@@ -139,7 +139,7 @@ class RapierViews(JobViews):
         return drawing.linkage(numbers, scene.name, drawn_units(scene), forces)
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Return its joints as CSV. Raises BadInput."""
+        """Joints as CSV. Raises BadInput."""
         from loomopt.jobs.rapier import drawing
         from loomopt.picture.shapes import drawn_units
 
@@ -166,7 +166,7 @@ class RapierViews(JobViews):
         return {**found, "dwell": Span(TURN - reading.dwell_before, reading.dwell_after)}
 
     def words(self) -> "Mapping[str, Curve]":
-        """Return what the curves are called."""
+        """Names of the curves."""
         from loomopt.picture.panels import Curve
 
         return {

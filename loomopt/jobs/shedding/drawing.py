@@ -56,7 +56,7 @@ MOST_PARTS = 32
 def traced_nodes(
     curves: Callable[[Pieces, Floats], Sequence[Floats]], starts: Floats, allowed: float
 ) -> tuple[Pieces, Floats]:
-    """Return nodes (pieces, u) once round, the last before the first again, that straight lines join closely enough.
+    """Nodes (pieces, u) once round, the last before the first again, that straight lines join closely enough.
 
     curves(pieces, u): points (n, 2) of each curve; none of them is farther than `allowed` from its lines. starts: crank
     angles, rad, where pieces begin, the last one turn after the first; all are nodes.
@@ -74,13 +74,13 @@ def traced_nodes(
 
 
 def deviation(curves: Callable[[Pieces, Floats], Sequence[Floats]], pieces: Pieces, u: Floats) -> float:
-    """Return how far the curves lie from straight lines from node to node; a piece's last may begin the next."""
+    """How far the curves lie from straight lines from node to node; a piece's last may begin the next."""
     begins = np.where(np.diff(pieces) == 0, u[:-1], 0.0)
     return float(np.max(_deviation(curves, pieces[1:], begins, u[1:])))
 
 
 def _divided(pieces: Pieces, left: Floats, right: Floats, parts: NDArray[np.int_]) -> tuple[Pieces, Floats, Floats]:
-    """Return intervals [left, right] of pieces, each divided into so many equal parts."""
+    """Intervals [left, right] of pieces, each divided into so many equal parts."""
     which = np.repeat(np.arange(len(parts)), parts)
     place = np.arange(len(which)) - np.repeat(np.cumsum(parts) - parts, parts)
     low, high, share = left[which], right[which], parts[which]
@@ -91,7 +91,7 @@ def _divided(pieces: Pieces, left: Floats, right: Floats, parts: NDArray[np.int_
 def _deviation(
     curves: Callable[[Pieces, Floats], Sequence[Floats]], pieces: Pieces, left: Floats, right: Floats
 ) -> Floats:
-    """Return how far the curves lie from the straight lines that join the ends of each interval."""
+    """How far the curves lie from the straight lines that join the ends of each interval."""
     u = left[:, None] * (1 - INSIDE) + right[:, None] * INSIDE
     found = curves(np.repeat(pieces, len(INSIDE)), u.ravel())
     return np.asarray(np.max([_off_chord(points.reshape(*u.shape, 2)) for points in found], axis=0))
@@ -165,7 +165,7 @@ class ReturnSpring:
         ]
 
     def legend(self, units: Units) -> tuple[tuple[str, str], ...]:
-        """Return what to say of it below a drawing, each line with its layer."""
+        """Notes below a drawing, each line with its layer."""
         preload = show(self.K1 * self.X0, units.force)
         return (
             (LAYER, f"return spring, K1 of all springs together: stretched by X0 on top, which takes {preload}"),
@@ -173,7 +173,7 @@ class ReturnSpring:
         )
 
     def notes(self, units: Units) -> dict[str, str]:
-        """Return what a table's head says of it."""
+        """Notes for the head of a table."""
         return {
             "K1": f"{show(self.K1, units.stiffness, 9)}, all return springs together",
             "X0": f"{show(self.X0, units.length, 9)} of preload",
@@ -206,17 +206,17 @@ class CamDrawing:
         return follower(self.sampler.given.values)
 
     def stations(self, pieces: Pieces, u: Floats) -> Stations:
-        """Return what stands at nodes (pieces, u) of the sampler's cycle."""
+        """Stations at nodes (pieces, u) of the sampler's cycle."""
         node = self.sampler.node(pieces, u)
         pose = self.sampler.model.instant(systems.numpy(), self.sampler.given, node).pose
         return Stations(node.phi, pose.q, pose.contact(self.follower))
 
     def at(self, theta: Floats) -> Stations:
-        """Return what stands at cam angles, rad; at a corner, just behind it."""
+        """Stations at cam angles, rad; at a corner, just behind it."""
         return self.stations(*self.sampler.cycle.located(theta))
 
     def curves(self, pieces: Pieces, u: Floats) -> tuple[Floats, Floats]:
-        """Return points of the profile and of the roller centre's curve at nodes, (n, 2) m each."""
+        """Points of the profile and of the roller centre's curve at nodes, (n, 2) m each."""
         at = self.stations(pieces, u)
         return at.profile, at.pitch
 
@@ -226,7 +226,7 @@ class CamDrawing:
         return frame(self.sampler.model).spans(self.sampler.given.values)
 
     def spring(self, top: Point = ORIGIN, h: float = 1.0) -> ReturnSpring:
-        """Return spring with the heald frame's upper position at a point; h: text height, m."""
+        """Spring with the heald frame's upper position at a point; h: text height, m."""
         K1, X0, travel = (float(self.sampler.given.values[name]) for name in ("K1", "X0", "travel"))
         return ReturnSpring(K1, X0, travel, top, h, f"frame, {OPEN[NEAR]}", f"frame, {OPEN[FAR]}")
 
@@ -260,12 +260,12 @@ def cam(scene: Scene, design: Mapping[str, float]) -> CamDrawing:
 
 
 def allowed(found: CamDrawing) -> float:
-    """Return how far a cam's curves may lie from the straight lines that are drawn for them, m."""
+    """How far a cam's curves may lie from the straight lines that are drawn for them, m."""
     return max(CURVE_CLOSE, CURVE_NARROW * float(found.follower.arm + found.follower.centre_distance))
 
 
 def traced(found: CamDrawing) -> Stations:
-    """Return stations once round, the last before the first again, that straight lines join as closely as `allowed`.
+    """Stations once round, the last before the first again, that straight lines join as closely as `allowed`.
 
     That holds for the profile and for the roller centre's curve. Corners of the law are stations.
     """
@@ -340,7 +340,7 @@ def motion(found: CamDrawing, angles: Floats) -> MechanismMotion:
 
 
 def _turned(points: Floats, angles: Floats) -> Floats:
-    """Return points of the cam's frame, (n, 2) m, as they stand when the cam has turned by an angle each, rad."""
+    """Points of the cam's frame, (n, 2) m, as they stand when the cam has turned by an angle each, rad."""
     cos, sin = np.cos(angles), np.sin(angles)
     return np.column_stack([points[:, 0] * cos - points[:, 1] * sin, points[:, 0] * sin + points[:, 1] * cos])
 

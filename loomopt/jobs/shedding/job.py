@@ -138,7 +138,7 @@ class Shedding(Job):
         self.parted(scene, self.sampler(scene, self.today(scene)))
 
     def _reads_accelerations(self, scene: Scene) -> bool:
-        """Say whether the cam force, or a limit, depends on s''."""
+        """Whether the cam force, or a limit, depends on s''."""
         if {"law_acceleration", "curvature_min", "curvature_max"} & set(scene.limits):
             return True
         model, numbers = self.model(scene), self.numbers(scene)
@@ -152,7 +152,7 @@ class Shedding(Job):
         return bool(force(1.0) != force(0.0))
 
     def tables(self, scene: Scene, target: str) -> tuple[Record, ...]:
-        """Return what is told of the tables that are read, the cam law's first."""
+        """Remarks on the tables that are read, the cam law's first."""
         if scene.table(HealdFrame).law != "table" or target == "law":
             return super().tables(scene, target)
         return (read_law(scene).record(scene), *super().tables(scene, target))
@@ -186,14 +186,14 @@ class Shedding(Job):
         return changed, "stiffness" if target == "law" else target
 
     def figures(self, scene: Scene, design: Numbers) -> Figures:
-        """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
+        """Every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
         found, parted = super().figures(scene, design), self.parted(scene, self.sampler(scene, design))
         return {**found, **parted.figures} if parted else found
 
     def figures_of(
         self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
     ) -> dict[str, Number]:
-        """Return every figure of a machine, or of many, but those of a frame that parts; None without its numbers."""
+        """Every figure of a machine, or of many, but those of a frame that parts; None without its numbers."""
         found = base.alone(scene, sampled, asked)
         peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in asked}
         sampled.search(("lift", *peaks.values()))
@@ -218,12 +218,12 @@ class Shedding(Job):
         return found | {name: name for name in told}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
-        """Return how each figure is read over a box of numbers: the least cam force and curvature are opposites."""
+        """How each figure is read over a box of numbers: the least cam force and curvature are opposites."""
         opposite = {name: of for name, of in self.peaks(model).items() if of in ("concavity", "lift")}
         return super().in_boxes(scene, model) | {n: InBox(quantity=of, sign=-1.0) for n, of in opposite.items()}
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
-        """Say what an optimum of the target reached, and what today's spring would do; figures in SI."""
+        """Sentence on an optimum of the target and on today's spring; figures in SI."""
         dwells = judged(self.model(scene))
         kept = f"keeps the roller on the cam {f'in {dwells}' if dwells else 'all round'}"
         if target == "speed":
@@ -262,7 +262,7 @@ class Shedding(Job):
         )
 
     def studied(self, scene: Scene) -> Studied:
-        """Return what studies read: least springs, the cam force, and what a free law tends to."""
+        """Quantities that studies show: least springs, the cam force, and the limit of a free law."""
         # Points over the whole turn would read a force that is known in the dwells only.
         peaks = {} if self.model(scene).known_in else {"contact_max": ("cam_force", False)}
         family = LawFamily("spline intervals", "law", "targets.law.intervals", self.law_limit)
@@ -294,7 +294,7 @@ def _refused(scene: Scene, key: str, problem: str, allowed: str, remedy: str = "
 
 
 def _chosen(variable: Variable, value: float) -> bool:
-    """Say whether a variable is a choice: it has room, or it had to give way."""
+    """Whether a variable is a choice: it has room, or it had to give way."""
     return variable.lower < variable.upper or abs(value - variable.lower) > GAVE_WAY * variable.scale
 
 
@@ -314,7 +314,7 @@ def judged(model: JobModel) -> str:
 
 
 def _today(scene: Scene, sampler: Sampler) -> str:
-    """Say whether today's spring holds the roller on the cam, and where and by how much it would lift off."""
+    """Sentence on today's spring: whether it holds the roller on the cam, or where and how far the roller lifts off."""
     sampler.search(("lift", "cam_force"))
     (least, angle), most = _least(sampler.extremes("lift"), sampler), sampler.peak("cam_force")
     wanted, force = scene.operation["N_min"], scene.show(least, "force")

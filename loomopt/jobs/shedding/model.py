@@ -114,7 +114,7 @@ class FrameMotion(Motion):
         return self.travel * self.law.s3 * self.rate**3
 
     def contact(self, follower: Follower) -> Contact:
-        """Return roller and cam at this position."""
+        """Roller and cam at this position."""
         swing = follower.arm_swing
         return Contact(
             self.maths,
@@ -184,7 +184,7 @@ class CamFrame:
         return 0.0, float(values["begin.far"] + values["begin.return"]) / 2
 
     def linkage(self, maths: Maths, values: Values) -> None:
-        """Return nothing: poses read the numbers."""
+        """No values: poses read the numbers."""
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """Angles where segments begin, the law's knots, and where the shed is half open if called in."""
@@ -211,7 +211,7 @@ class CamFrame:
         return followed(rates, values[MIDDLE])
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
-        """Return where a law that is not symmetric passes the middle of the shed, and on which piece."""
+        """Cam angle at which a law that is not symmetric passes the middle of the shed, and its piece."""
         if HALF_OPEN not in called or self.law.symmetric:
             return {}
         return dict(zip((MIDDLE, MIDDLE_PIECE), middle(self.law, given.values), strict=True))
@@ -232,7 +232,7 @@ class CamFrame:
         return self.pose(maths, given, Node(0, {**switch, SEGMENT: 0.0, LAW: 0.0}))
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
-        """Return where the segments begin, rad."""
+        """Cam angles at which the segments begin, rad."""
         names = ("begin.far", "begin.return", "begin.near")
         return {"begin.rise": 0, **{name: given.values[name] for name in names}}
 
@@ -296,7 +296,7 @@ class ProgramMotion(FrameMotion):
         return self.span * self.law.s3 * self.rate**3
 
     def contact(self, follower: Follower) -> Contact:
-        """Return roller and cam at this position."""
+        """Roller and cam at this position."""
         swing = follower.arm_swing / self.travel
         return Contact(self.maths, follower, swing * self.q, swing * self.q1, swing * self.q2)
 
@@ -375,7 +375,7 @@ class CamProgram(CamFrame):
         return found
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
-        """Return nothing: every event has a formula."""
+        """No values: every event has a formula."""
         return {}
 
     def pose(self, maths: Maths, given: Given, node: Node) -> FrameMotion:
@@ -427,7 +427,7 @@ class CamProgram(CamFrame):
         return self.pose(maths, given, Node(0, {**switch, SEGMENT: 0.0}))
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
-        """Return where the segments begin, rad."""
+        """Cam angles at which the segments begin, rad."""
         return {f"begin.{k + 1}": given.values[f"begin.{k + 1}"] for k in range(len(self.moves))}
 
 
@@ -437,7 +437,7 @@ def follower(values: Values) -> Follower:
 
 
 def contact(at: Instant) -> Contact:
-    """Return roller and cam at an instant."""
+    """Roller and cam at an instant."""
     found: Contact = at.pose.contact(follower(at.values))
     return found
 

@@ -66,7 +66,7 @@ def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most:
 def followed(
     name: str, reached: Callable[[Sampler], float], model: JobModel, values: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return, by name, the speed, rad/s, that follows from all else; nothing where there is no such speed."""
+    """Speed, rad/s, that follows from all other numbers, by name; {} where no such speed exists."""
     speed = reached(sampled(model, values))
     return {name: speed} if math.isfinite(speed) else {}
 
@@ -138,7 +138,7 @@ MEGA = 1e6
 
 
 def scene_numbers(scene: Scene) -> dict[str, float]:
-    """Return every number of the scene by name, SI, the knots of a spline law included."""
+    """Every number of the scene by name, SI, the knots of a spline law included."""
     return (
         numbers(scene)
         | program_numbers(scene)
@@ -163,7 +163,7 @@ def survived(sampler: Sampler, least: float) -> float:
 
 
 def races(physics: JobModel) -> bool:
-    """Say whether the speed up to which the roller stays on the cam is known, and any ends that."""
+    """Whether a load grows with the speed, so that the roller leaves the cam at a speed that is known."""
     unknown = drive.motor(physics.effects) or physics.known_in
     return not unknown and any(load.moved for load in physics.loads if isinstance(load, Load))
 
@@ -194,7 +194,7 @@ def contact_speeds(machines: "Machines") -> Floats | None:
 
 
 def _inverse_shares(machines: "Machines", runs: "Sequence[Machines]", least: Floats) -> Floats:
-    """Return each machine's speed over the one up to which its cam force stays at least `least`, N, (machines,).
+    """Speed of each machine over the one up to which its cam force stays at least `least`, N, (machines,).
 
     runs: the machines at rest, at their speed, and backward.
     """
@@ -333,7 +333,7 @@ class SheddingTask(Task):
         return [effect for effect in self.scene.active if isinstance(effect, Check)]
 
     def decides(self, check: Check[Any]) -> bool:
-        """Say whether a check is more than figures: it demands, is made least, or is limited or sought."""
+        """Whether a check affects the program: it demands something, or is minimised, limited or sought."""
         asked = {*self.scene.limits, *self.traded}
         return bool(check.demands or check.least or check.axes or asked & {*check.over_cycle, *check.rows})
 
@@ -375,7 +375,7 @@ class SheddingTask(Task):
         return max(finite) or 1.0
 
     def room(self, name: str, ends: Ends) -> Ends:
-        """Return where random starts lie, SI."""
+        """Range of the random starts, SI."""
         if name == "K1":
             least = min(max(ends[0], 0.1 * self.sizes.needed), ends[1])
             return least, min(ends[1], 10.0 * self.sizes.needed)
@@ -384,7 +384,7 @@ class SheddingTask(Task):
     # Limits.
 
     def limits(self) -> list[Limit]:
-        """Return all limits in order."""
+        """All limits in order."""
         own = [*self.bounds(), *self.floors(), *self.contact(), *self.angles()]
         return [*own, *self.figures(), *self.demands(), *self.law_limits()]
 
@@ -414,7 +414,7 @@ class SheddingTask(Task):
         return [found, *raced]
 
     def angles(self) -> list[Limit]:
-        """Return what the near dwell, which takes the rest of the turn, must keep where another angle is free."""
+        """Limit on the near dwell, which takes the rest of the turn, where another angle is free."""
         if not any(self.scene.bounds[name].free for name in SEGMENTS if name in self.scene.bounds):
             return []
         low, high = self.limited.get("near_dwell", (0.0, math.inf))
@@ -435,14 +435,14 @@ class SheddingTask(Task):
         return [self.row_limit(name, sign, row, value, self.limit_size(name, value)) for sign, value in sides]
 
     def limit_size(self, name: str, value: float) -> float:
-        """Return what a limit on a figure is measured by: forces by the loads, others by what is asked."""
+        """Scale of a limit on a figure: the loads for a force, else the demanded value."""
         if name.startswith("contact"):
             return self.sizes.force
         row = CYCLE.get(name, name)
         return abs(value) or (abs(self.sampler.peak(row)) if self.model.has_quantity(row) else 0.0) or 1.0
 
     def margin_size(self, row: str) -> float:
-        """Return what a check's margins are measured by; 0 where nothing of the frame says."""
+        """Scale of a check's margins; 0 where the frame gives none."""
         known = {"stiffness": self.sizes.stiffness, "pressure": 100 * MEGA, "force": self.sizes.force}
         return known.get(self.scene.schema.margins.get(row, ""), 0.0)
 
@@ -454,7 +454,7 @@ class SheddingTask(Task):
         return float(self.scene.table(LawTarget).acceleration if own is None else own)
 
     def law_limits(self) -> list[Limit]:
-        """Return what makes a free law a cam law: it reaches 1 at rest, never falls, and keeps its peak s''."""
+        """Limits that make a free law a cam law: it reaches 1 at rest, never falls, and keeps its peak s''."""
         law = self.law
         if law is None:
             return []
@@ -472,7 +472,7 @@ class SheddingTask(Task):
         ]
 
     def goals(self) -> tuple[Goal, ...]:
-        """Return contact, which may be out of reach."""
+        """Goal of contact, which may be out of reach."""
         return goals(replace(n, name="contact_min") for n in self.contact() if n.name == "N_min" and n.row == LIFT)
 
     # Levels, starts and moves.
@@ -486,7 +486,7 @@ class SheddingTask(Task):
         return Value("K1", "K1", self.sizes.stiffness), *self.least()
 
     def starts(self) -> tuple[dict[str, float], ...]:
-        """Return today's spring moved inside its bounds, stiff enough for contact; for the force, a short one too."""
+        """Today's spring moved inside its bounds, stiff enough for contact; for the force, a short one too."""
         found, room = [], START_ROOM
         for preload in (1.0 - room, room) if self.target == "force" else (1.0 - room,):
             start = self.inside(self.known)
@@ -502,13 +502,13 @@ class SheddingTask(Task):
         return tuple(found)
 
     def moves(self) -> list[Move]:
-        """Return what may leave everything unchanged: a preload that is not needed, and what checks name."""
+        """Variables that may not change anything: a preload that is not needed, and those that checks name."""
         rooms = {v.name for v in self.variables if v.lower < v.upper}
         preload = [self.move("preload", "X0")] if "X0" in rooms else []
         return [*preload, *(move for move in self.axis_moves() if set(move.along) <= rooms)]
 
     def follow(self) -> Callable[[JobModel, Numbers], Numbers]:
-        """Return what gives the speed up to which contact holds, where that is sought."""
+        """Solved variable for the speed up to which contact holds, where that is sought."""
         reached = functools.partial(survived, least=self.known["N_min"])
         return functools.partial(followed, CONTACT_SPEED, reached) if self.lasting else nothing_follows
 
@@ -519,7 +519,7 @@ class SheddingTask(Task):
         return named_knots(accelerations(chosen(self.scene), scene_numbers(self.scene), self.law.intervals))
 
     def single(self) -> str:
-        """Return why every local optimum is the best there is; "" where that is not so.
+        """Why every local optimum is the best there is; "" where that is not so.
 
         Every force is linear in K1 and K1 X0, and in the speed's square, but power is not [Qiu21, eq 6]. With a free
         law any stiffer spring keeps contact too, and the laws that do for one stiffness are convex.

@@ -169,7 +169,7 @@ TARGETS = {
 
 
 def dwelt(mechanism: Mapping[str, Any]) -> tuple[bool, bool]:
-    """Say whether there is a far dwell, and a near one in what the others leave of the turn: rounding is none."""
+    """Whether there is a far dwell, and a near one in the rest of the turn; a rest that is rounding is none."""
     rise, far, turn, near = (float(mechanism[name]) for name in SEGMENTS)
     return far > SAME_ANGLE, min(near, 2 * math.pi - (rise + far + turn)) > SAME_ANGLE
 
@@ -212,14 +212,14 @@ def check_motion(scene: Scene) -> None:
 
 
 def _opens_once(scene: Scene) -> bool:
-    """Say whether the segments move down once and up once, by symmetric laws without a break in the middle."""
+    """Whether the segments move down once and up once, by symmetric laws without a break in the middle."""
     own = [move for move in moves(scene) if move.law]
     symmetric = all(move.law and move.law.symmetric and Fraction(1, 2) not in move.law.breaks for move in own)
     return symmetric and sorted(move.rises for move in own) == [False, True]
 
 
 def moves(scene: Scene) -> tuple[Segment, ...]:
-    """Return the segments of a motion in several; none of a motion in four. Raises BadInput."""
+    """Segments of a motion in several; none of a motion in four. Raises BadInput."""
     own = scene.table(HealdFrame)
     if own.segments is None:
         return ()
@@ -234,7 +234,7 @@ def moves(scene: Scene) -> tuple[Segment, ...]:
 
 
 def heights(scene: Scene) -> list[float]:
-    """Return X, m, at the end of each segment of a motion in several."""
+    """X, m, at the end of each segment of a motion in several."""
     own = scene.table(HealdFrame).segments or ()
     told = [each.to for each in own if each.to is not None]
     before, found = told[-1], []
@@ -245,7 +245,7 @@ def heights(scene: Scene) -> list[float]:
 
 
 def program_numbers(scene: Scene) -> dict[str, float]:
-    """Return angles, rad, heights and travel, m, of a motion in several segments by name; {} of one in four."""
+    """Angles, rad, heights and travel, m, of a motion in several segments by name; {} of one in four."""
     own = scene.table(HealdFrame).segments
     if own is None:
         return {}
@@ -255,7 +255,7 @@ def program_numbers(scene: Scene) -> dict[str, float]:
 
 
 def chosen(scene: Scene) -> CamLaw:
-    """Return the scene's own cam law. Raises BadInput."""
+    """Cam law of the scene. Raises BadInput."""
     name = scene.table(HealdFrame).law
     if name == "spline":
         return Spline(len(_coefficients(scene)) - 1)
@@ -320,7 +320,7 @@ class LawRead(NamedTuple):
         return self.read.columns["s"][-1]
 
     def record(self, scene: Scene) -> csv_tables.Record:
-        """Return what is told of it: what smoothing changed, and how far s'' is known."""
+        """Remarks: the change by smoothing, and the accuracy of s''."""
         found = self.law.found
         change, misfit = found.change * self.travel, found.misfit * self.travel
         moved = f"smoothed by {scene.show(change, 'length', 2)} at most" if change else "not smoothed"
@@ -335,7 +335,7 @@ class LawRead(NamedTuple):
         return record._replace(change=change, uncertainty=found.uncertainty)
 
     def needed(self) -> str:
-        """Return the digits, or the spacing, with which its s'' would be clear enough."""
+        """Digits, or the spacing, with which its s'' would be clear enough."""
         unit = factor(self.read.units["s"])
         size = 2 * max(self.half) * self.travel / unit
         decimals = max(0, round(-math.log10(size))) if size else 15
@@ -371,7 +371,7 @@ def refuse_unclear(scene: Scene, reads_accelerations: bool) -> None:
 
 
 def read_law(scene: Scene) -> LawRead:
-    """Return the law of `mechanism.law_table`: cam angles and displacements of the rise, from 0 on. Raises BadInput."""
+    """Law of `mechanism.law_table`: cam angles and displacements of the rise, from 0 on. Raises BadInput."""
     key = LAW_TABLE
     given = scene.table(HealdFrame).law_table
     columns = {"angle": "angle", "s": "length"}
@@ -403,7 +403,7 @@ def _steps(heights: Sequence[float], angles: Sequence[float]) -> Iterator[tuple[
 
 
 def _even(angles: Sequence[float], halves: Sequence[float]) -> tuple[list[float], list[float]]:
-    """Return angles as shares of the last one, and what rounding leaves open of them.
+    """Angles as shares of the last one, and what rounding leaves open of them.
 
     Angles that are evenly spaced but for their rounding are taken as evenly spaced.
     """
@@ -417,14 +417,14 @@ def _even(angles: Sequence[float], halves: Sequence[float]) -> tuple[list[float]
 
 
 def unfollowed(numbers: Mapping[str, Any], shown: ShowValue) -> str:
-    """Say why a scene's follower cannot work; "" when it can, or when the scene does not give one."""
+    """Reason why a scene's follower cannot work; "" when it can, or when the scene does not give one."""
     if any(numbers.get(name) is None for name in FOLLOWER):
         return ""
     return cam_follower.fault(cam_follower.Follower(**{name: numbers[name] for name in FOLLOWER}), shown)
 
 
 def fault(numbers: Mapping[str, Any], shown: ShowValue = usual) -> str:
-    """Say why a design, SI, cannot work as this cam; "" when it can."""
+    """Reason why a design, SI, cannot work as this cam; "" when it can."""
     coefficients = tuple(map(float, knots(numbers)))
     reason = cam_spline.fault(coefficients) if coefficients else ""
     if reason:

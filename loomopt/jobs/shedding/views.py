@@ -75,16 +75,16 @@ class Unwritten:
         return self.law.symmetric
 
     def prepared(self, maths: Maths, values: Values) -> dict[str, Number]:
-        """Return nothing."""
+        """Nothing."""
         return {}
 
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
-        """Return symbols."""
+        """Symbols."""
         return LawDerivatives(*(symbol(name) for name in (*PRIMES, "s'''")))
 
 
 def law(found: CamLaw) -> list[Equation]:
-    """Return s(u) and its first two derivatives as the law has them: by pieces of u, or what it is made of."""
+    """S(u) and its first two derivatives as the law has them: by pieces of u, or what it is made of."""
     if isinstance(found, Spline):
         return _spline(found)
     if isinstance(found, Tabulated):
@@ -118,7 +118,7 @@ def expanded(formula: Expression, u: Expression) -> Expression:
 
 
 def _knots(letter: str, count: int) -> tuple[Expression, ...]:
-    """Return what stands at a knot k and the next, padded to so many knots."""
+    """Values at a knot k and the next one, padded to a number of knots."""
     return symbol(f"{letter}_k"), *[symbol(f"{letter}_(k+1)")] * (count - 1)
 
 
@@ -138,7 +138,7 @@ def _spline(found: Spline) -> list[Equation]:
 
 
 def _table(found: cam_spline.LawTable) -> list[Equation]:
-    """Say what the law through a table is: a cubic between each point and the next."""
+    """Sentence on the law through a table: a cubic between each point and the next."""
     points = len(found.u)
     said = f"the C2 cubic through the table's {points} points (u, s), s' = 0 at both ends"
     u, k = symbol("u"), symbol("u_k")
@@ -183,7 +183,7 @@ class FrameSymbols(Motion):
         return {RISE: 1, RETURN: -1}.get(self.segment, self.worst)
 
     def contact(self, follower: Follower) -> SimpleNamespace:
-        """Return roller and cam by the pressure angle, and the outward normal n."""
+        """Roller and cam by the pressure angle, and the outward normal n."""
         sp, angle = sympy(), symbol("pressure_angle")
         toward = Vector(-symbol("n_x"), -symbol("n_y"))
         swing = symbol("phi'")
@@ -444,7 +444,7 @@ class SheddingViews(JobViews):
         return marks(parted, found)
 
     def words(self) -> Mapping[str, Curve]:
-        """Return what the curves are called."""
+        """Names of the curves."""
         return {
             "X": Curve("frame travel"),
             "X_cam": Curve("cam"),
@@ -462,7 +462,7 @@ class SheddingViews(JobViews):
         }
 
     def panels(self, scene: Scene, design: Mapping[str, float], columns: Sequence[str]) -> tuple[Panel, ...]:
-        """Return all panels, with what contact and the roller ask for."""
+        """All panels, with the lines that contact and the roller demand."""
         values = registry.of(scene).numbers_of(scene, design)
         levels = {"N [N]": {"contact is lost below N_min =": (values["N_min"],)}}
         if "roller_radius" in values:
@@ -481,7 +481,7 @@ class SheddingViews(JobViews):
         return together(shown, ("X [m]", "X_cam [m]"), "travel of frame and cam")
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
-        """Return what there is to remark upon: forces known in the dwells only, a roller that floats, an undercut."""
+        """Remarks: on forces that are known in the dwells only, a roller that floats, an undercut."""
         job = registry.of(scene)
         sampler = job.sampler(scene, design)
         undercut = () if self.missing(scene) else _undercut(scene, design)
@@ -498,7 +498,7 @@ class SheddingViews(JobViews):
 
 
 def _parted(scene: Scene, parted: "Parted | None") -> Iterator[str]:
-    """Say where the roller leaves the cam, where an effect says what then becomes of the frame."""
+    """Remark on where the roller leaves the cam, where an effect models the frame's flight."""
     if parted:
         from loomopt.picture.parted import remarks
 
@@ -506,7 +506,7 @@ def _parted(scene: Scene, parted: "Parted | None") -> Iterator[str]:
 
 
 def _floating(scene: Scene, sampler: Sampler) -> Iterator[str]:
-    """Say over which cam angles nothing holds the roller on the cam, where no least force is asked for."""
+    """Remark on cam angles at which nothing holds the roller on the cam, where no least force is demanded."""
     if scene.operation["N_min"] > 0.0:
         return
     spans = near_zero(sampler, "lift", FLOATS * abs(sampler.static["spring_force_max"]), NARROW)
@@ -535,7 +535,7 @@ def _undercut(scene: Scene, design: Mapping[str, float]) -> Iterator[str]:
 
 
 def _partly(sampler: Sampler) -> Iterator[str]:
-    """Say of loads that are known in the dwells only what acts where contact is then not judged."""
+    """Remark on loads that are known in the dwells only, and on the arcs on which contact is not checked."""
     acting = " and ".join(_acting(sampler)) if sampler.model.known_in else ""
     for load in sampler.model.loads:
         words = sampler.model.words_of(load.name)
@@ -566,7 +566,7 @@ def _acting(sampler: Sampler) -> list[str]:
 
 
 def _terms(sampler: Sampler, segment: int) -> dict[str, Number]:
-    """Return each load's term a quarter of the way into a move, on the law's first formula."""
+    """Term of each load a quarter of the way into a move, on the law's first formula."""
     values = sampler.given.values
     begin, share, length = {RISE: (0, 1, "rise"), RETURN: (values["begin.near"], -1, "return")}[segment]
     node = Node(begin + share * values[length] / 4, {SEGMENT: segment, LAW: 0.0})
