@@ -1,6 +1,6 @@
-"""The proof of an answer, level by level: that no admissible design in the bounds is better by more than a gap.
+"""Proof of an answer, level by level: no admissible design within the bounds is better by more than a gap.
 
-Each level is asked of all designs that are as good as the answer at the levels before it, up to a stated tolerance.
+Each level is bounded over all designs that are as good as the answer at the levels before it, up to a tolerance.
 """
 
 import math
@@ -83,20 +83,20 @@ class Levels:
 
     def _outcome(self, better: Mapping[str, float] | None = None) -> LevelOutcome:
         shown = tuple(level.shown() for level in self._levels)
-        still = [level for level, found in zip(self._levels, shown, strict=True) if not found.proven]
+        still = [level for level, level_bound in zip(self._levels, shown, strict=True) if not level_bound.proven]
         why = "; ".join(level.why() for level in still) or self.why
         lowest = still[0].lowest() if still else None
         return LevelOutcome(shown, sum(level.tree.boxes for level in self._levels), why, better, lowest)
 
 
 def loosening(job: Job, program: Program) -> tuple[str, ...]:
-    """Return the variables of a program that its job says only loosen limits."""
+    """Variables of a program that only loosen limits, by its job."""
     names = {v.name for v in program.variables}
     return tuple(name for name, other in job.loosening.items() if {name, other} <= names)
 
 
 def _unserved(program: Program, sampler: Sampler) -> str:
-    """Return why boxes say nothing of a program, "" where they do."""
+    """Reason why boxes cannot bound a program; "" if they can."""
     if sampler.hints and _read(program, sampler):
         return "corners of the cycle are found by iteration, which boxes do not enclose"
     if names := ", ".join(state.name for state in program.model.states):
@@ -105,7 +105,7 @@ def _unserved(program: Program, sampler: Sampler) -> str:
 
 
 def _read(program: Program, sampler: Sampler) -> bool:
-    """Say whether a program reads events that no formula gives: without their hints it is another, or none."""
+    """Whether a program reads events without a formula: it needs their hints."""
     model, system = program.model, systems.numpy()
     read = {row for limit in program.limits for row in limit.reads}
     read |= {row for objective in program.objectives for row in objective.rows}
@@ -119,7 +119,7 @@ def _read(program: Program, sampler: Sampler) -> bool:
         both = [model.static(systems.FLOAT, given, sampler.stills, rows) for given in (plain, sampler.given)]
         together = [model.together(system, given, sampler.node(*sampler.grid())) for given in (plain, sampler.given)]
         pairs = ([value(name) for value in together] for name in quantities)
-        same = (np.array_equal(one, other, equal_nan=True) for one, other in pairs)
+        same = (np.array_equal(first, second, equal_nan=True) for first, second in pairs)
         return both[0] != both[1] or not all(same)
     except (ArithmeticError, KeyError, ValueError):
         # The angle of an event is not given, or none that is real follows from what is.
@@ -127,7 +127,7 @@ def _read(program: Program, sampler: Sampler) -> bool:
 
 
 def _no_larger(program: Program, merits: list[float]) -> dict[str, float]:
-    """Return what variables that are the first objective need not exceed, SI: the answer's own."""
+    """Upper bounds, SI, of variables that are the first objective: the answer's own values."""
     first = program.objectives[0]
     if not first.is_smooth or first.row not in {v.name for v in program.variables}:
         return {}
@@ -141,11 +141,11 @@ class _Level:
         self.task, self.place, self.gap = task, place, gap
         self.objective, self.best = task.program.objectives[place], merits[place]
         lowest = _lessened(self.objective, self.best, gap)
-        held = tuple(merit + HELD for merit in merits[:place])
-        at = task.place(x)
-        reader = Reader(task, place + 1, at)
-        weights = multipliers(reader, at, place)
-        self.question = Question(reader, place, lowest, weights, held, self._better)
+        higher_levels = tuple(merit + HELD for merit in merits[:place])
+        point = task.place(x)
+        reader = Reader(task, place + 1, point)
+        weights = multipliers(reader, point, place)
+        self.question = Question(reader, place, lowest, weights, higher_levels, self._better)
         self.least = self.objective.least_of(task.program.model.signed)
         nothing_less = self.best <= self.least + FEASIBLE
         self.tree = Tree.empty(len(task.names)) if nothing_less else Tree.whole(task.low, task.high)
@@ -158,35 +158,35 @@ class _Level:
     def search(self, until: float, say: Callable[[str], None]) -> dict[str, float] | None:
         """Grow the tree; returns a better design, the program's variables, SI, if one turns up."""
         while not self.tree.closed and time.perf_counter() < until:
-            found = grown(self.tree, self.question, until)
+            better = grown(self.tree, self.question, until)
             say(f"proving {self.objective.figure}: {self._gap_said()}, {self.tree.boxes} boxes")
-            if found is not None:
-                return self.task.design(found)
+            if better is not None:
+                return self.task.design(better)
         return None
 
     def lowest(self) -> dict[str, float] | None:
-        """Return the middle of the open box with the least bound, the program's variables, SI."""
+        """Middle of the open box with the least bound, the program's variables, SI."""
         middle = self.tree.lowest()
         return None if middle is None else self.task.design(middle)
 
     def _better(self, middles: Floats) -> Floats | None:
-        """Return a middle that is an admissible design with a better objective, judged as any design is."""
+        """A middle that is an admissible design with a better objective, by the usual evaluation."""
         program = self.task.program
         for k in range(min(middles.shape[1], LOOKED_AT)):
             x = self.task.design(middles[:, k])
             try:
                 sampler = Sampler(program.model, {**program.parameters, **x})
-                kept = all(limit.violation(sampler) <= FEASIBLE for limit in program.limits)
+                is_admissible = all(limit.violation(sampler) <= FEASIBLE for limit in program.limits)
                 merits = [objective.merit(sampler) / objective.scale for objective in program.objectives]
             except (ArithmeticError, TypeError, ValueError):
                 continue
-            same = all(merit <= held for merit, held in zip(merits, self.question.held, strict=False))
-            if kept and same and merits[self.place] < self.question.cut:
+            same = all(merit <= bound for merit, bound in zip(merits, self.question.held, strict=False))
+            if is_admissible and same and merits[self.place] < self.question.cut:
                 return middles[:, k]
         return None
 
     def shown(self) -> GlobalLevel:
-        """Return what the tree shows."""
+        """Bound that the tree shows."""
         objective = self.objective
         least = min(self.question.cut, self.tree.bound)
         bound = _figure(objective, max(least, self.least))
@@ -196,7 +196,7 @@ class _Level:
         return GlobalLevel(objective.figure, objective.sought, best, bound, gap, band, self.proven)
 
     def why(self) -> str:
-        """Return why the level is not proven."""
+        """Reason why the level is not proven."""
         small = ", and what is left open is too small to halve" if self.tree.closed else ""
         return f"{self.objective.figure} is open, {self._gap_said()}{small}"
 
@@ -206,7 +206,7 @@ class _Level:
 
 
 def _figure(objective: Objective, merit: float) -> float:
-    """Return the figure, SI, of an objective of natural size; of an inverse one it is the larger the less that is."""
+    """Figure, SI, of a scaled objective; that of an inverse objective rises as the objective falls."""
     value, power = merit * objective.scale, objective.power
     if power == 1 or math.isinf(value):
         return value
@@ -216,12 +216,12 @@ def _figure(objective: Objective, merit: float) -> float:
 
 
 def _size(objective: Objective, figure: float) -> float:
-    """Return what a gap is relative to, SI: the figure, or a share of its natural size where that is more."""
+    """Reference of a gap, SI: the figure, or a share of its scale if that is larger."""
     return max(abs(figure), abs(_figure(objective, LEAST_SIZE))) if objective.power > 0 else abs(figure)
 
 
 def _lessened(objective: Objective, best: float, gap: float) -> float:
-    """Return the objective, natural size, of a figure that is better by the gap."""
+    """Scaled objective of a figure that is better by the gap."""
     figure = _figure(objective, best)
     better = figure - math.copysign(gap * _size(objective, figure), objective.power)
     return math.copysign(abs(better) ** objective.power, better) / objective.scale
@@ -231,41 +231,41 @@ FIRST = 0.5
 """Share of the time after which a local solve is tried from the most promising open box."""
 
 
-def claimed(search: Search, asked: GlobalProof, refused: str = "") -> tuple[Search, GlobalBound]:
-    """Return what is proven of a search's best, and the search: with a better best where boxes led to one.
+def claimed(search: Search, request: GlobalProof, refused: str = "") -> tuple[Search, GlobalBound]:
+    """Proof of a search's best, and the search, with a better best if boxes led to one.
 
-    refused: why nothing can be, "" where that is not known.
+    refused: reason why nothing can be proven, "" if none is known.
     """
-    began = time.perf_counter()
-    until = began + asked.seconds
+    start_time = time.perf_counter()
+    until = start_time + request.seconds
     reason = refused or ("" if search.passed else "there is no certified answer")
     if reason or search.best is None:
-        return search, _bound(LevelOutcome(why=reason), 0, began)
+        return search, _bound(LevelOutcome(why=reason), 0, start_time)
     boxes = 0
     while True:
-        levels = Levels(search.program, search.job, search.best.x, asked.gap)
+        levels = Levels(search.program, search.job, search.best.x, request.gap)
         now = time.perf_counter()
-        outcome = levels.run(now + FIRST * (until - now), asked.say)
+        outcome = levels.run(now + FIRST * (until - now), request.say)
         start = outcome.better or outcome.lowest
-        found = _improved(search, start) if start else None
-        if found is None and outcome.better:
+        improved = _improved(search, start) if start else None
+        if improved is None and outcome.better:
             why = "a better design turned up, and no certified optimum was reached from it"
-            return search, _bound(LevelOutcome(outcome.levels, outcome.boxes, why), boxes, began)
-        if found is None:
-            return search, _bound(levels.run(until, asked.say), boxes, began)
-        search, boxes = found, boxes + outcome.boxes
+            return search, _bound(LevelOutcome(outcome.levels, outcome.boxes, why), boxes, start_time)
+        if improved is None:
+            return search, _bound(levels.run(until, request.say), boxes, start_time)
+        search, boxes = improved, boxes + outcome.boxes
 
 
 def _improved(search: Search, start: Mapping[str, float]) -> Search | None:
-    """Return the search after a solve from a design (variables, SI), None where its certified best is no better."""
-    found = certify_best(solve_from(search, start))
-    if not found.passed or found.best is None or search.best is None:
+    """The search after a solve from a design (variables, SI); None if its certified best is no better."""
+    improved = certify_best(solve_from(search, start))
+    if not improved.passed or improved.best is None or search.best is None:
         return None
-    return found if compare(found.best, search.best) < 0 else None
+    return improved if compare(improved.best, search.best) < 0 else None
 
 
 def _bound(outcome: LevelOutcome, boxes: int, began: float) -> GlobalBound:
-    """Return what an outcome says; boxes: read for answers that were given up before."""
+    """Bound of an outcome; boxes: number of boxes of earlier answers."""
     seconds = time.perf_counter() - began
     after = f" after {seconds:.3g} s" if outcome.levels and outcome.why else ""
     return GlobalBound(outcome.levels, boxes + outcome.boxes, seconds, outcome.why + after)

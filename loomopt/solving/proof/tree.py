@@ -21,35 +21,35 @@ USED = 1e-9
 """Multiplier below which a row says nothing."""
 
 
-def multipliers(reader: Reader, at: Floats, level: int) -> Floats:
-    """Return a multiplier of each row under which the Lagrangian of a level is stationary at a point (names,).
+def multipliers(reader: Reader, point: Floats, level: int) -> Floats:
+    """Multipliers of the rows for which a level's Lagrangian is stationary at a point (names,).
 
-    All are 0 or more, those of the level's own pieces add up to 1. Whatever they are, the row that they make is valid.
+    All are at least 0, and those of the level's pieces sum to 1. The weighted row is valid for any multipliers.
     """
-    read = reader.read(at[:, None], at[:, None])
+    read = reader.read(point[:, None], point[:, None])
     sizes = reader.task.sizes
     values = (read.middle.low + read.middle.high)[:, 0] / 2
     slopes = ((read.slope.low + read.slope.high)[:, :, 0] / 2).T * sizes
-    of = np.array(read.of)
-    top = values[of == level].max(initial=-np.inf)
-    near = np.where(of == LIMIT, values > -ACTIVE, of < level)
-    near |= (of == level) & (values >= top - ACTIVE)
+    levels = np.array(read.of)
+    top = values[levels == level].max(initial=-np.inf)
+    near = np.where(levels == LIMIT, values > -ACTIVE, levels < level)
+    near |= (levels == level) & (values >= top - ACTIVE)
     rows = np.flatnonzero(near & np.isfinite(values) & np.isfinite(slopes).all(axis=1))
-    columns = [np.append(slopes[k], WEIGHT * (of[k] == level)) for k in rows]
+    columns = [np.append(slopes[k], WEIGHT * (levels[k] == level)) for k in rows]
     for k, (low, high) in enumerate(zip(reader.task.low, reader.task.high, strict=True)):
         for end, sign in ((low, -1.0), (high, 1.0)):
-            if abs(at[k] - end) <= ACTIVE * sizes[k]:
+            if abs(point[k] - end) <= ACTIVE * sizes[k]:
                 columns.append(sign * np.eye(len(sizes) + 1)[k])
-    found = np.zeros(len(of))
+    weights = np.zeros(len(levels))
     if len(rows):
         target = np.append(np.zeros(len(sizes)), WEIGHT)
-        found[rows] = nnls(np.array(columns).T, target)[: len(rows)]
-    found[found < USED] = 0.0
-    return found
+        weights[rows] = nnls(np.array(columns).T, target)[: len(rows)]
+    weights[weights < USED] = 0.0
+    return weights
 
 
 def with_cut(read: Read, weights: Floats, bounds: Floats) -> tuple[Read, Floats]:
-    """Return rows with one more, the sum of all by their weights, and what a better design keeps of each.
+    """Rows with one more, their weighted sum, and the bounds of a better design.
 
     bounds: (rows,); the sum's own is theirs by the same weights, so it holds wherever they do.
     """
@@ -59,21 +59,21 @@ def with_cut(read: Read, weights: Floats, bounds: Floats) -> tuple[Read, Floats]
     value, middle = (_sum([part[k] for k in used], weights[used]) for part in (read.value, read.middle))
     slope = _sum([Interval(read.slope.low[:, k], read.slope.high[:, k]) for k in used], weights[used])
     bound = _sum([Interval(bounds[k], bounds[k]) for k in used], weights[used]).high
-    more = Read(
+    extended = Read(
         _after(read.value, value, 0), _after(read.middle, middle, 0), _after(read.slope, slope, 1), (*read.of, LIMIT)
     )
-    return more, np.append(bounds, bound)
+    return extended, np.append(bounds, bound)
 
 
 def _sum(parts: Sequence[Interval], weights: Floats) -> Interval:
-    found: Interval = parts[0] * float(weights[0])
+    total: Interval = parts[0] * float(weights[0])
     for part, weight in zip(parts[1:], weights[1:], strict=True):
-        found = found + part * float(weight)
-    return found
+        total = total + part * float(weight)
+    return total
 
 
 def _after(whole: Interval, last: Interval, axis: int) -> Interval:
-    """Return rows with one more at the end of an axis."""
+    """Rows with one more at the end of an axis."""
     ends = ((whole.low, last.low), (whole.high, last.high))
     return Interval(*(np.concatenate([a, np.expand_dims(b, axis)], axis=axis) for a, b in ends))
 
@@ -106,17 +106,17 @@ class Tree:
 
     @classmethod
     def whole(cls, low: Floats, high: Floats) -> "Tree":
-        """Return the tree of one box (names,)."""
+        """Tree of one box (names,)."""
         return cls(low[:, None].copy(), high[:, None].copy(), np.array([-math.inf]))
 
     @classmethod
     def empty(cls, names: int) -> "Tree":
-        """Return the tree of no box."""
+        """Tree without boxes."""
         return cls(np.empty((names, 0)), np.empty((names, 0)), np.empty(0))
 
     @property
     def bound(self) -> float:
-        """What the objective is at least in all that is not discarded."""
+        """Lower bound of the objective in all boxes that are not discarded."""
         return min(float(self.least.min(initial=math.inf)), self.stuck)
 
     @property
@@ -125,7 +125,7 @@ class Tree:
         return not self.low.shape[1]
 
     def lowest(self) -> Floats | None:
-        """Return the middle (names,) of the open box with the least bound, None without one."""
+        """Middle (names,) of the open box with the least bound; None without one."""
         if self.closed:
             return None
         k = int(self.least.argmin())
@@ -136,10 +136,10 @@ class Tree:
         count = self.low.shape[1]
         order = np.argpartition(self.least, BATCH) if count > BATCH else np.arange(count)
         taken, rest = order[:BATCH], order[BATCH:]
-        found = self.low[:, taken], self.high[:, taken], self.least[taken]
+        boxes = self.low[:, taken], self.high[:, taken], self.least[taken]
         self.low, self.high, self.least = self.low[:, rest], self.high[:, rest], self.least[rest]
-        self.boxes += found[0].shape[1]
-        return found
+        self.boxes += boxes[0].shape[1]
+        return boxes
 
     def put(self, low: Floats, high: Floats, least: Floats) -> None:
         """Put boxes in."""
@@ -154,7 +154,7 @@ class Tree:
 
 @dataclass(frozen=True)
 class Question:
-    """Whether a level's objective can be less than `cut`, natural size.
+    """The question whether a level's objective can be less than `cut`, scaled.
 
     weights: of the rows, whose sum is one more; held: what earlier levels keep, by level; better(middles): a design
     among the middles (names, boxes) that is admissible and better, if there is one.
@@ -169,9 +169,9 @@ class Question:
 
     @property
     def bounds(self) -> Floats:
-        """What a better design keeps of each row."""
+        """Bound of each row for a better design."""
         ends = {LIMIT: 0.0, self.level: self.cut, **dict(enumerate(self.held))}
-        return np.array([ends.get(of, math.inf) for of in self.reader.of])
+        return np.array([ends.get(level, math.inf) for level in self.reader.of])
 
 
 def grown(tree: Tree, question: Question, until: float = math.inf) -> Floats | None:
@@ -190,31 +190,31 @@ def grown(tree: Tree, question: Question, until: float = math.inf) -> Floats | N
     below = _at_least(read, half)
     # Written so that what is no number discards nothing.
     alive = ~(below > bounds[:, None]).any(axis=0)
-    own = np.array([of == question.level for of in read.of])
-    least = np.fmax(least, np.fmax.reduce(below[own], axis=0, initial=-math.inf))
-    found = question.better(_promising(read, question, low, high))
+    is_level_row = np.array([of == question.level for of in read.of])
+    least = np.fmax(least, np.fmax.reduce(below[is_level_row], axis=0, initial=-math.inf))
+    better = question.better(_promising(read, question, low, high))
     narrow_low, narrow_high = _narrowed(read, bounds, low, high, half)
     alive &= ~(narrow_low > narrow_high).any(axis=0)
     smear = _smear(read, half)
-    boxes = tuple(each[:, alive] for each in (low, high, narrow_low, narrow_high, smear))
+    boxes = tuple(part[:, alive] for part in (low, high, narrow_low, narrow_high, smear))
     _branch(tree, boxes, least[alive], question.reader.task.sizes)
-    return found
+    return better
 
 
 def _half(low: Floats, high: Floats) -> Floats:
-    """Return how far boxes reach from their middles, rounded upward."""
+    """Distance of the boxes' ends from their middles, rounded upward."""
     middle = low + (high - low) / 2
     return np.asarray(np.nextafter(np.maximum(high - middle, middle - low), math.inf))
 
 
 def _falls(read: Read, half: Floats) -> Floats:
-    """Return the most that each variable may take off each row: (variables, rows, boxes), 0 or less."""
+    """Most that each variable can take off each row: (variables, rows, boxes), at most 0."""
     steps = Interval(-half[:, None], half[:, None])
     return np.asarray(np.minimum((read.slope * steps).low, 0.0))
 
 
 def _at_least(read: Read, half: Floats) -> Floats:
-    """Return what rows are at least over boxes: by their values, and by their middles and slopes."""
+    """Lower bounds of rows over boxes: by their values, and by their middles and slopes."""
     falls = _falls(read, half)
     total = falls.sum(axis=0)
     line = read.middle.low + total * (1 + ROOM) - ROOM * np.abs(read.middle.low)
@@ -222,15 +222,15 @@ def _at_least(read: Read, half: Floats) -> Floats:
 
 
 def _promising(read: Read, question: Question, low: Floats, high: Floats) -> Floats:
-    """Return the middles (names, boxes) that may be admissible and better."""
+    """Middles (names, boxes) that may be admissible and better."""
     size = len(question.reader.of)
     room = np.where(np.array(question.reader.of) == LIMIT, FEASIBLE, 0.0)
-    there = (read.middle.low[:size] <= (question.bounds + room)[:, None]).all(axis=0)
-    return np.asarray((low + (high - low) / 2)[:, there])
+    promising = (read.middle.low[:size] <= (question.bounds + room)[:, None]).all(axis=0)
+    return np.asarray((low + (high - low) / 2)[:, promising])
 
 
 def _narrowed(read: Read, bounds: Floats, low: Floats, high: Floats, half: Floats) -> tuple[Floats, Floats]:
-    """Return boxes without what each row by itself forbids: middle + slopes · step ≤ bound, one step at a time."""
+    """Boxes without the parts that a single row forbids: middle + slopes · step ≤ bound, one step at a time."""
     middle, falls = low + (high - low) / 2, _falls(read, half)
     zero = np.zeros_like(falls[:1])
     others = np.concatenate([zero, np.cumsum(falls[:-1], axis=0)]) + np.concatenate(
@@ -251,7 +251,7 @@ def _narrowed(read: Read, bounds: Floats, low: Floats, high: Floats, half: Float
 
 
 def _smear(read: Read, half: Floats) -> Floats:
-    """Return how much each variable moves all rows together: (variables, boxes)."""
+    """Total effect of each variable on all rows: (variables, boxes)."""
     most = np.maximum(np.abs(read.slope.low), np.abs(read.slope.high)) * half[:, None]
     return np.asarray(np.where(np.isfinite(most), most, STEEP).sum(axis=1))
 

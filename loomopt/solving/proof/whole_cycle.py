@@ -69,26 +69,28 @@ claim gets more."""
 
 
 def _decided(program: Program, job: Job, words: Words, reads: "tuple[_Read, _Read]") -> list[Proof]:
-    """Return the proofs: each claim gets a few boxes, then those that are open more, while time is left."""
-    begun = time.process_time()
+    """Proofs: each claim gets a few boxes, then open claims get more, while time is left."""
+    start_time = time.process_time()
 
     def late(boxes: int) -> bool:
-        return boxes >= taylor_bounds.MOST_BOXES or time.process_time() - begun > SECONDS
+        return boxes >= taylor_bounds.MOST_BOXES or time.process_time() - start_time > SECONDS
 
     claims = list(_claims(program, job, words, *reads))
     few = min(FIRST_BOXES, taylor_bounds.MOST_BOXES)
-    found = [each if isinstance(each, Proof) else _over_cycle(*each, lambda boxes: boxes >= few) for each in claims]
-    for place, each in enumerate(claims):
-        if not isinstance(each, Proof) and found[place].status == "undecided" and not late(few):
-            more = _over_cycle(*each, late)
-            found[place] = more if more.boxes >= found[place].boxes else found[place]
-    return found
+    proofs = [
+        claim if isinstance(claim, Proof) else _over_cycle(*claim, lambda boxes: boxes >= few) for claim in claims
+    ]
+    for place, claim in enumerate(claims):
+        if not isinstance(claim, Proof) and proofs[place].status == "undecided" and not late(few):
+            more = _over_cycle(*claim, late)
+            proofs[place] = more if more.boxes >= proofs[place].boxes else proofs[place]
+    return proofs
 
 
-def _merged(found: list[Proof]) -> Iterator[Proof]:
+def _merged(proofs: list[Proof]) -> Iterator[Proof]:
     """Yield one proof for all rows of one limit: the worst status, the least margin, all boxes."""
     groups: dict[tuple[str, str], list[Proof]] = {}
-    for proof in found:
+    for proof in proofs:
         groups.setdefault((proof.limit, proof.text), []).append(proof)
     for rows in groups.values():
         worst = max(rows, key=lambda proof: (RANK[proof.status], -proof.margin))
