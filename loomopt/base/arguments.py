@@ -67,7 +67,7 @@ def whole(given: object, key: str, allowed: str, remedy: str) -> int:
 
 
 def text(given: object, key: str, allowed: str, remedy: str) -> str:
-    """Return text, of Python or of NumPy. Raises BadInput for anything else."""
+    """Text, of Python or of NumPy. Raises BadInput for anything else."""
     if not isinstance(given, str):
         raise refusal("it is not text", "", key, given, allowed, remedy)
     return str(given)
@@ -81,7 +81,7 @@ def texts(given: object, key: str, allowed: str, remedy: str) -> tuple[str, ...]
 
 
 def names(given: object, key: str, allowed: str, remedy: str) -> tuple[str, ...]:
-    """Return names in whatever order they come. Raises BadInput for anything else, a single name too."""
+    """Names of an iterable, in its order. Raises BadInput for anything else, a single name too."""
     try:
         found = None if isinstance(given, str | bytes | Mapping) else iter(given)  # type: ignore[call-overload]
     except TypeError:
@@ -99,7 +99,7 @@ def listed(given: object, key: str, allowed: str, remedy: str) -> list[Any]:
 
 
 def table(given: object, key: str, allowed: str, remedy: str) -> dict[str, Any]:
-    """Return what names are mapped to. Raises BadInput for anything else."""
+    """Mapping by names. Raises BadInput for anything else."""
     if not isinstance(given, Mapping):
         raise refusal("it is not a mapping", "", key, given, allowed, remedy)
     return {text(name, key, allowed, remedy): value for name, value in given.items()}
@@ -113,7 +113,7 @@ def path(given: object, key: str, allowed: str, remedy: str) -> str:
 
 
 def called(given: object, key: str, allowed: str, remedy: str) -> Callable[..., Any]:
-    """Return what can be called. Raises BadInput for anything else."""
+    """Function or other callable. Raises BadInput for anything else."""
     if not callable(given):
         raise refusal("it cannot be called", "", key, given, allowed, remedy)
     return given

@@ -24,7 +24,7 @@ _MOST, _MOST_TOLD = 100, 20
 
 
 def clean(text: str, longest: int = 1000) -> str:
-    """Return text without control characters, shortened to about `longest` characters."""
+    """Text without control characters, shortened to about `longest` characters."""
     ending = f"... ({len(text)} characters)" if len(text) > longest else ""
     kept = text[:longest]
     if not kept.isprintable():
@@ -66,7 +66,7 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
         return self.text
 
     def _render_traceback_(self) -> list[str]:
-        """Return what Jupyter and IPython show in place of a traceback: the sentence."""
+        """Lines that Jupyter and IPython show in place of a traceback: the message."""
         return [f"{type(self).__name__}: {self}"]
 
     @property
@@ -82,12 +82,12 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
         return first.together(others) if others else first
 
     def _in(self, file: str) -> "BadInput":
-        """Return this mistake alone, as one of a file."""
+        """This mistake alone, as one of a file."""
         more = {name: getattr(self, name) for name in ("key", "value", "allowed", "remedy", "grade")}
         return type(self)(self.problem, file=file, **more)
 
     def together(self, others: "Sequence[BadInput]") -> "BadInput":
-        """Return one error of this mistake and of others, a line each."""
+        """One error of this mistake and of others, a line each."""
         found = copy.copy(self)
         found.others = tuple(others)
         told, more = others[: _MOST_TOLD - 1], len(others) - _MOST_TOLD + 1
@@ -119,7 +119,7 @@ class Faults:
             self.tell()
 
     def within(self, *tables: str) -> bool:
-        """Say whether a mistake stands in one of these tables."""
+        """Whether a mistake is in one of these tables."""
         return any(each.key.split(".")[0] in tables for each in self.found)
 
     def told(self) -> BadInput:
@@ -163,7 +163,7 @@ def blamed(error: BaseException) -> BaseException:
 
 
 def _is_of(module: str, brought: str) -> bool:
-    """Say whether a module is that of an entry point, or of the same package."""
+    """Whether a module is that of an entry point, or of the same package."""
     package = brought.partition(".")[0]
     return module == brought or (package != __name__.partition(".")[0] and module.partition(".")[0] == package)
 

@@ -74,7 +74,7 @@ def suffix(path: Path, allowed: Sequence[str]) -> str:
 
 
 def _place(path: Path) -> Path:
-    """Return where a file lies, all links followed. Raises BadInput where it may not be written."""
+    """Path of a file, all links followed. Raises BadInput where it may not be written."""
     try:
         place = Path(os.path.realpath(path))
         _check(place, path)

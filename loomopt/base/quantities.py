@@ -171,7 +171,7 @@ def plain_number(text: str) -> float | None:
 
 
 def is_beyond(text: str) -> bool:
-    """Say whether text is a number by the same pattern that is too large or too small to compute with."""
+    """Whether text is a number by the same pattern that is too large or too small to compute with."""
     return plain_number(text) is None and bool(_PLAIN.fullmatch(text)) and len(text) <= _LONGEST_TEXT
 
 
@@ -187,7 +187,7 @@ def unit_of(text: str) -> str:
 
 
 def described(kind: str) -> str:
-    """Return what a quantity of a kind looks like: 'a length such as "31 mm"'."""
+    """Example of a kind of quantity: 'a length such as "31 mm"'."""
     if kind == "number":
         return "a number without unit, such as 1.5 or a ratio such as 300/18"
     article = "an" if kind[0] in "aeiou" else "a"
@@ -249,7 +249,7 @@ def _perhaps(unit: str) -> str:
 
 
 def misfit(unit_text: str, kind: str) -> str:
-    """Return what a unit is of that is none of a kind of quantity, in words."""
+    """Kind of a unit that does not fit the kind of quantity, in words."""
     others = [other for other in SI_UNIT if other != "number" and fits(unit_text, other)]
     what = f"a unit of {others[0]}, not of {kind}" if others else f"not a unit of {kind}"
     return f'"{unit_text}" is {what}'
@@ -302,7 +302,7 @@ class Quantity(NamedTuple):
     below: float = math.inf
 
     def validate(self, raw: object) -> float:
-        """Return raw text (a pure number may be a number) in SI units. Raises QuantityError."""
+        """Value in SI units of raw text (a pure number may be a number). Raises QuantityError."""
         if isinstance(raw, str):
             value = read(raw, self.kind)
         elif isinstance(raw, bool) or not isinstance(raw, int | float):
@@ -332,7 +332,7 @@ class Quantity(NamedTuple):
         return core_schema.no_info_plain_validator_function(self.validate)
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Return what an editor may check of it."""
+        """JSON Schema with which an editor checks the value."""
         return self.schema()
 
     def schema(self) -> dict[str, Any]:
@@ -348,7 +348,7 @@ class NumberList(NamedTuple):
     longest: int = 1000
 
     def validate(self, raw: object) -> tuple[float, ...]:
-        """Return raw as numbers. Raises QuantityError."""
+        """Numbers of a raw value. Raises QuantityError."""
         values = _parsed(raw) if isinstance(raw, str) else raw
         numbers = values if isinstance(values, list | tuple) else []
         if not numbers or len(numbers) > self.longest or not all(_is_number(value) for value in numbers):
@@ -361,7 +361,7 @@ class NumberList(NamedTuple):
         return core_schema.no_info_plain_validator_function(self.validate)
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Return what an editor may check of it."""
+        """JSON Schema with which an editor checks the value."""
         return {"type": "array", "items": {"type": "number"}, "minItems": 1, "maxItems": self.longest}
 
 
@@ -383,14 +383,14 @@ MOST_MODELS = 256
 
 
 def quantity_of(model: type[BaseModel], field: str) -> Quantity | None:
-    """Return what a model's field may be, also for `X | None`; None for a field that holds no quantity."""
+    """Quantity of a model's field, also for `X | None`; None for a field without a quantity."""
     info = model.model_fields[field]
     return _find_quantity(*info.metadata, info.annotation)
 
 
 @functools.lru_cache(maxsize=MOST_MODELS)
 def quantities_of(model: type[BaseModel]) -> Mapping[str, Quantity]:
-    """Return what a model's fields may be that hold a quantity; those of a table inside it under "table.key"."""
+    """Quantities of a model's fields; those of a table inside the model under "table.key"."""
     found: dict[str, Quantity] = {}
     for name in model.model_fields:
         quantity, inner = quantity_of(model, name), table_inside(model, name)

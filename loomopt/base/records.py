@@ -14,7 +14,7 @@ class Frozen(dict[str, Any]):
     __setitem__ = __delitem__ = __ior__ = clear = pop = popitem = setdefault = update = _refuse
 
     def __reduce__(self) -> tuple[type["Frozen"], tuple[dict[str, Any]]]:
-        """Return how to make it again: unpickling would otherwise set items one by one."""
+        """Constructor and items with which pickle makes it again: it would otherwise set items one by one."""
         return Frozen, (dict(self),)
 
 
@@ -41,7 +41,7 @@ class Awaited(Mapping[str, float | None]):
         return self._known[name]
 
     def items(self) -> ItemsView[str, float | None]:
-        """Return all names with their values, those that were not there computed together."""
+        """Names with their values; missing values are computed together."""
         self._asked = True
         return {name: self[name] for name in self._names}.items()
 
@@ -55,14 +55,14 @@ class Awaited(Mapping[str, float | None]):
         return name in self._names
 
     def __or__(self, other: Mapping[str, float | None]) -> dict[str, float | None]:
-        """Return both as a dict, the other's values where both have one."""
+        """Union as a dict; the other's value counts where both have one."""
         return {**self, **other}
 
     def __repr__(self) -> str:
         return repr(dict(self))
 
     def __reduce__(self) -> tuple[type[Frozen], tuple[dict[str, float | None]]]:
-        """Return how to make it again: of its values, computed by now."""
+        """Constructor and values with which pickle makes it again; missing values are computed first."""
         return Frozen, (dict(self),)
 
 
@@ -104,5 +104,5 @@ class Shown:
 
 
 def show_by(html: Callable[[Shown], str]) -> None:
-    """Say how everything is shown."""
+    """Set the function that shows records as HTML."""
     _SHOWN_BY[:] = [html]

@@ -130,7 +130,7 @@ _LOOKALIKE = str.maketrans({"·": "*", "⋅": "*", "µ": "u", "μ": "u", "°": "
 
 
 def factor(unit_text: str) -> float:
-    """Return how many SI units one `unit_text` is. Raises QuantityError for an unknown unit."""
+    """Number of SI units in one `unit_text`. Raises QuantityError for an unknown unit."""
     return float(parse_unit(unit_text).factor)
 
 
@@ -146,7 +146,7 @@ def usual(value: float, kind: str, digits: int = 6) -> str:
 
 
 def fits(unit_text: str, kind: str) -> bool:
-    """Say whether a unit is one of a kind of quantity. Raises QuantityError for an unknown unit."""
+    """Whether a unit is one of a kind of quantity. Raises QuantityError for an unknown unit."""
     *mechanical, angle = parse_unit(unit_text).powers
     *asked, asked_angle = parse_unit(SI_UNIT[kind]).powers
     return mechanical == asked and (angle == asked_angle or angle == 0 > asked_angle)
@@ -261,7 +261,7 @@ def _letters(unit: str) -> str:
 
 
 def _slips(one: str, other: str) -> int:
-    """Return how many letters are to be put in, taken out, changed or exchanged to make one word of another."""
+    """Number of letters to insert, delete, change or exchange to make one word of another."""
     before: list[int] = []
     row = list(range(len(other) + 1))
     for i, a in enumerate(one):

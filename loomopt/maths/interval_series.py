@@ -97,7 +97,7 @@ def _whole(x: Number) -> SeriesTerms:
 
 
 def _waves(x: IntervalSeries) -> tuple[IntervalSeries, IntervalSeries]:
-    """Return sine and cosine."""
+    """Sine and cosine."""
     angle, slope, bend = x.terms
     sine, cosine, half = intervals.sin(angle), intervals.cos(angle), slope * slope / 2
     return (

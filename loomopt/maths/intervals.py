@@ -94,7 +94,7 @@ class Interval:
         return (self ** (power // 2)).square() if power else interval(1.0)
 
     def __getitem__(self, places: Number) -> "Interval":
-        """Return entries of the ends."""
+        """Entries of the ends."""
         return Interval(self.low[places], self.high[places])
 
     @property
@@ -125,7 +125,7 @@ class Interval:
         return Interval(np.maximum(_down(low), 0.0), np.where(self.high < 0, np.inf, _up(high)))
 
     def meet(self, other: "Interval") -> "Interval":
-        """Return what both hold; two enclosures of one number have that in common."""
+        """Intersection of two enclosures of one number."""
         return Interval(np.maximum(self.low, other.low), np.minimum(self.high, other.high))
 
 
@@ -181,7 +181,7 @@ NEAR_A_TOP = 1e-9
 
 
 def _sine_cosine(x: Floats) -> tuple[Floats, Floats]:
-    """Return sine and cosine of angles up to LARGEST_ANGLE, rad, right to TRIG_ERROR."""
+    """Sine and cosine of angles up to LARGEST_ANGLE, rad, right to TRIG_ERROR."""
     quarters = np.rint(x * (2 / math.pi))
     r = ((x - quarters * QUARTERS[0]) - quarters * QUARTERS[1]) - quarters * QUARTERS[2]
     z = r * r
@@ -223,7 +223,7 @@ def _angle(y: Interval, x: Interval) -> Interval:
 
 
 def _across_the_cut(y: Interval, x: Interval) -> NDArray[np.bool_]:
-    """Say where an angle may jump: the negative x-axis, its end included, is touched."""
+    """Mask of angles that may jump: the negative x-axis, its end included, is touched."""
     return np.asarray(y.holds_zero & (x.low <= 0))
 
 

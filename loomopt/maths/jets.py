@@ -108,7 +108,7 @@ class Jet:
         return self.mapped(v, rate * v, rate * rate * v)
 
     def __getitem__(self, places: Number) -> "Jet":
-        """Return entries of the values' first axis."""
+        """Entries of the values' first axis."""
         whole = self.whole()
         return Jet(whole.v[places], whole.g[places], None if whole.h is None else whole.h[places])
 
@@ -138,12 +138,12 @@ class Jet:
 
 
 def _wide(values: Number) -> Number:
-    """Return values with an axis for directions; a scalar needs none."""
+    """Values with an axis for directions; a scalar is returned as it is."""
     return values[..., None] if isinstance(values, np.ndarray) else values
 
 
 def _mixed(one: Floats, other: Floats) -> Floats:
-    """Return one_i other_j + one_j other_i."""
+    """Symmetric product one_i other_j + one_j other_i."""
     outer = one[..., :, None] * other[..., None, :]
     return np.asarray(outer + outer.swapaxes(-1, -2))
 
@@ -154,7 +154,7 @@ def _shaped(v: Number, like: Jet) -> Jet:
 
 
 def variables(values: Sequence[Number], directions: Floats, curved: bool) -> list[Jet]:
-    """Return jets of variables, each a number or an array of shape S; directions: (variables, n), what each moves by.
+    """Jets of variables, each a number or an array of shape S; directions: (variables, n), what each moves by.
 
     curved: whether second derivatives are carried along.
     """
@@ -214,7 +214,7 @@ def floor(x: Number) -> Number:
 
 
 def stacked(values: Sequence[Number]) -> Number:
-    """Return scalar numbers as one of shape (count,); a jet where one of them is."""
+    """Scalar numbers as one of shape (count,); a jet where one of them is."""
     own = next((value for value in values if isinstance(value, Jet)), None)
     if own is None:
         return np.array([float(value) for value in values])
@@ -226,7 +226,7 @@ def stacked(values: Sequence[Number]) -> Number:
 
 
 def spread(numbers: Sequence[float], beside: Iterable[Number]) -> Floats:
-    """Return floats as an array of shape (count, 1 ...) that broadcasts with all that stands beside it."""
+    """Floats as an array of shape (count, 1 ...) that broadcasts with the other operands."""
     axes = max((np.ndim(each.v if isinstance(each, Jet) else each) for each in beside), default=0)
     return np.array(numbers, dtype=np.float64).reshape(-1, *(1,) * axes)
 

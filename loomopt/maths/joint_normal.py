@@ -51,7 +51,7 @@ def within(ways: Floats, low: Floats, high: Floats) -> float:
 
 
 def _merged(units: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return values of which none is another one, or its opposite: their bounds are one value's."""
+    """Values without repetition, opposites included: repeated values share one bound."""
     kept: list[int] = []
     low, high = low.copy(), high.copy()
     for k, unit in enumerate(units):
@@ -78,7 +78,7 @@ def _factored(correlation: Floats) -> Floats:
 
 
 def _ends(factor: Floats, k: int, before: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
-    """Return between what the k-th independent number lies, (points,); before: those before it, (points, k)."""
+    """Bounds of the k-th independent number, (points,); before: the numbers before it, (points, k)."""
     known = before @ factor[k, :k]
     if factor[k, k] > 0.0:
         return (low[k] - known) / factor[k, k], (high[k] - known) / factor[k, k]

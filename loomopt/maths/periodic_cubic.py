@@ -64,7 +64,7 @@ class PeriodicCubic(NamedTuple):
         return found or tuple(map(float, range(self.samples)))
 
     def since(self, k: int) -> tuple[float, ...]:
-        """Return how far, rad, the middle of each interval lies behind where interval k begins, within one turn."""
+        """Distance, rad, from the start of interval k to the middle of each interval, within one turn."""
         return tuple((middle - self.begins[k]) % TURN for middle in self.middles)
 
     def _value(self, k: int, angle: float) -> float:
@@ -79,7 +79,7 @@ class PeriodicCubic(NamedTuple):
         return c0 + t * (c1 + t * (c2 + t * c3))
 
     def from_middle(self, maths: Maths, angle: Number, interval: Number) -> Number:
-        """Return how far an angle on any turn lies behind its interval's middle, rad."""
+        """Distance of an angle on any turn from its interval's middle, rad."""
         return within_half_turn(maths, angle - maths.choose(interval, [maths.number(value) for value in self.middles]))
 
 
@@ -180,7 +180,7 @@ class _Row(NamedTuple):
 
 
 def _sides(rows: Sequence[tuple[float, float, bool]]) -> list[_Row]:
-    """Return samples in the order of their angles; two of one angle are both sides of a corner."""
+    """Samples in the order of their angles; two of one angle are both sides of a corner."""
     found: list[_Row] = []
     for angle, value, mark in rows:
         if found and found[-1].angle == angle:

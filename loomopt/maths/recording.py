@@ -121,7 +121,7 @@ class Tape:
         return number if self.operations[number.place].template == INPUT else self.input()
 
     def call(self, system: int, function: str, *operands: Number) -> Recorded:
-        """Return what a function of a number system gives; system: its place among those of `Program`."""
+        """Result of a function of a number system; system: its place among those of `Program`."""
         listed = ", ".join(f"{{{k}}}" for k in range(len(operands)))
         return self.record(f"{function}_{system}({listed})", *operands)
 
@@ -130,7 +130,7 @@ class Tape:
         return self.call(system, "choose", place, self.listed(values))
 
     def listed(self, values: Iterable[Number]) -> Recorded:
-        """Return numbers as a tuple of them."""
+        """Numbers as a tuple of them."""
         operands = tuple(values)
         listed = "".join(f"{{{k}}}, " for k in range(len(operands)))
         return self.record(f"({listed})", *operands)
@@ -168,7 +168,7 @@ class Tape:
     def program(
         self, outputs: tuple[Number, ...], called: Sequence[Recorded], known: Sequence[Recorded], since: int = 0
     ) -> Program:
-        """Return program(systems) → bind(known) → function(*called) → outputs.
+        """Program(systems) → bind(known) → function(*called) → outputs.
 
         called, known: inputs, of each call and of all calls; since: place from which on what may fail is always done.
         """
@@ -218,7 +218,7 @@ class _Written:
         self.last = self._last_read()
 
     def _named(self) -> set[int]:
-        """Return what has a name: read several times, never or later than it is known, or else nested too deeply."""
+        """Values that need a name: read several times, never, or later than computed, or nested too deeply."""
         found, depth = set(), dict.fromkeys(self.needed, 0)
         for place in self.needed:
             template, operands, _ = self.operations[place]
@@ -293,7 +293,7 @@ class _Written:
         )
 
     def _literal(self, place: int, value: Number) -> str:
-        """Return how a literal is written: by a name where it has no exact text."""
+        """Text of a literal: a name where it has no exact text."""
         if type(value) in (int, float) and math.isfinite(value):
             return repr(value) if math.copysign(1.0, value) > 0 else f"({value!r})"
         self.literals[f"k{place}"] = value

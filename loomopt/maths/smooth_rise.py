@@ -344,7 +344,7 @@ def _jump(spline: _Spline, s: "Floats", half: "Floats", weight: float, jumps: Se
 
 
 def _coarseness(before: "Floats", after: "Floats", jumps: Sequence[int]) -> "Floats":
-    """Return what the spacing leaves open of s'' at points: a cubic's s'' is off by a twelfth of its second difference.
+    """Error of s'' at points from the spacing: a cubic's s'' is off by a twelfth of its second difference.
 
     Each point has the largest of its own and its neighbours'; a difference across a jump is none.
     """

@@ -59,7 +59,7 @@ def turns(slope: Callable[[Floats], Any]) -> list[float]:
 
 
 def crossing(excess: Callable[[float], float], low: float, high: float) -> float:
-    """Return where a function that is not positive at `low` and positive at `high` crosses zero, to rounding."""
+    """Root of a function that is not positive at `low` and positive at `high`, to rounding."""
     at_low, at_high = excess(low), excess(high)
     for turn in range(CROSSING_STEPS):
         width = high - low
@@ -78,7 +78,7 @@ def crossing(excess: Callable[[float], float], low: float, high: float) -> float
 
 
 def crossings(excess: Callable[[Floats, NDArray[np.intp]], tuple[Floats, Floats]], low: Floats, high: Floats) -> Floats:
-    """Return where many functions, not positive at `low` and positive at `high`, cross zero, to rounding.
+    """Roots of many functions, not positive at `low` and positive at `high`, to rounding.
 
     excess(x, which): value and slope of some of them, each at its own x. Newton's steps, halved where they leave what
     brackets the root.
@@ -108,12 +108,12 @@ of an angle of 2π (0.02/2^44 = 1e-15); golden sections of what brackets it: 0.6
 
 
 def inside_samples(values: Floats, margin: Floats) -> Floats:
-    """Return values moved into [margin, 1 − margin]."""
+    """Values moved into [margin, 1 − margin]."""
     return np.minimum(np.maximum(values, margin), 1 - margin)
 
 
 def vertex(values: Floats) -> Floats:
-    """Return where a polynomial through three or five equidistant values is highest, in steps from the middle one."""
+    """Maximiser of a polynomial through three or five equidistant values, in steps from the middle one."""
     middle = len(values) // 2
     low, mid, high = values[middle - 1 : middle + 2]
     slope, bend = (high - low) / 2, low - 2 * mid + high
@@ -131,7 +131,7 @@ GOLDEN = (5**0.5 - 1) / 2
 
 
 def graded_nodes(centre: float) -> Floats:
-    """Return angles, rad, in order, graded toward a centre from both sides."""
+    """Angles, rad, in order, graded toward a centre from both sides."""
     offsets = SPIKE_WIDEST * 0.5 ** np.arange(SPIKE_HALVINGS)
     return np.concatenate([centre - offsets, [centre], centre + offsets[::-1]])
 
@@ -147,7 +147,7 @@ def spike_peaks(heights: Callable[[Floats], Floats], centre: float) -> list[floa
 
 
 def sectioned(heights: Callable[[Floats], Floats], low: float, high: float) -> float:
-    """Return where a function with one maximum between low and high is highest, by golden sections."""
+    """Maximiser of a function with one maximum between low and high, by golden sections."""
     for _ in range(SPIKE_SECTIONS):
         left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         if not low < left < right < high:

@@ -51,7 +51,7 @@ class Traded(NamedTuple):
         return float(self.sign * self.axis.power * root ** (self.axis.power - 1))
 
     def limits(self, name: str, value: float) -> list[Limit]:
-        """Return what keeps the value at most at `value`, as limits of a name: a magnitude on both sides, always."""
+        """Limits that bound the value by `value`, under a name; a magnitude is bounded on both sides."""
         return self.objective.limits(name, value)
 
 

@@ -182,7 +182,7 @@ def _rule(cycle: Cycle, edges: Edges) -> _Quadrature:
 
 
 def _integrated(sampler: Sampler, names: Sequence[str]) -> tuple[Edges, dict[str, float], dict[str, float]]:
-    """Return stretches fine enough, and over the turn the integrals of quantities, J, and of their squares, (N·m)²."""
+    """Fine stretches, and the integrals of quantities over the turn, J, and of their squares, (N·m)²."""
     widths, found = np.diff(sampler.cycle.starts), tuple[dict[str, float], ...]()
     for halved in range(HALVINGS):
         counts = np.maximum(np.ceil(widths * 2**halved / WIDEST), 1).astype(int)

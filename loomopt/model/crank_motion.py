@@ -109,15 +109,15 @@ class TurnedCrank(Kinematics):
         return self.steady.breaks
 
     def linkage(self, maths: Maths, values: Values) -> object:
-        """Return what poses read of the scene's numbers at once."""
+        """Record of the scene's numbers for poses."""
         return self.steady.linkage(maths, values)
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> Mapping[str, Number]:
-        """Return what follows from the scene's numbers, and the speed, rad/s, that the motor has without load."""
+        """Values that follow from the scene's numbers, and the motor's speed without load, rad/s."""
         return {**self.steady.derived(maths, given, called), NO_LOAD: self.turning.no_load}
 
     def hints(self, given: Given, called: Collection[str]) -> Mapping[str, float]:
-        """Return where events lie that no formula gives."""
+        """Angles of events that no formula gives."""
         return self.steady.hints(given, called)
 
     def pose(self, maths: Maths, given: Given, node: Node) -> Motion:

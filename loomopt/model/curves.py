@@ -146,7 +146,7 @@ def drive_name(load: Acting) -> str:
 
 
 def load_name(load: Acting) -> str:
-    """Return what a load's column is called."""
+    """Name of a load's column."""
     return getattr(load, "symbol", "") or load.name
 
 
@@ -162,7 +162,7 @@ def _column(formula: Formula, at: Instant, u: Floats) -> Floats:
 
 
 def rows(sampler: Sampler, columns: Columns, steps: int, also: Sequence[float]) -> Rows:
-    """Return nodes (pieces, u) and their crank angles, rad, in order; a corner at 0 ends the turn at 2π too."""
+    """Nodes (pieces, u) and their crank angles, rad, in order; a corner at 0 ends the turn at 2π too."""
     cycle = sampler.cycle
     even = np.linspace(0.0, TURN, steps, endpoint=False)
     phi = np.unique(np.concatenate([even, np.mod([*columns.also, *also], TURN)]))
@@ -233,7 +233,7 @@ def _around_tops(columns: Mapping[str, Floats], least: float) -> tuple[list[floa
 
 
 def _on_levels(phi: Floats, sizes: Floats, tops: Pieces) -> NDArray[np.bool_]:
-    """Say of each top whether it cannot rise: on one side, of any corner too, two rows are as large as it is."""
+    """Whether a top cannot rise: two rows on one side, of a corner too, are as large as the top."""
     found = np.zeros(len(tops), dtype=bool)
     for side in (-1, 1):
         near, beyond = tops + side, tops + 2 * side
@@ -259,7 +259,7 @@ def _rise(phi: Floats, sizes: Floats, k: int) -> float:
 
 
 def _bent(phi: Floats, sizes: Floats, k: int, side: int) -> float | None:
-    """Return what the bend leaves open beside a corner that the curve rises to; None where it does not rise."""
+    """Error from the curvature beside a corner to which the curve rises; None where it does not rise."""
     near, far = k + side, k + 2 * side
     if not 0 <= far < len(sizes) or phi[far] == phi[near] or not np.isfinite(sizes[far]):
         return None
@@ -271,7 +271,7 @@ def _bent(phi: Floats, sizes: Floats, k: int, side: int) -> float | None:
 
 
 def _between(phi: Floats, sizes: Floats, k: int) -> list[float]:
-    """Return angles, rad, between row k and its neighbours: thirds, and the vertex of their parabola."""
+    """Angles, rad, between row k and its neighbours: thirds, and the vertex of their parabola."""
     before, after = phi[k] - phi[k - 1], phi[k + 1] - phi[k]
     found = [phi[k] - share * before for share in (1 / 3, 2 / 3)] if before > 0.0 else []
     found += [phi[k] + share * after for share in (1 / 3, 2 / 3)] if after > 0.0 else []

@@ -24,7 +24,7 @@ KINDS = {SPEED: "angular speed", MOTOR: "torque"}
 
 
 def quantities(effects: Iterable[Effect], known: Collection[str]) -> dict[str, CycleQuantity]:
-    """Return torque, N·m, and power, W, of the crank as effects load it; none without a load, no power without speed.
+    """Torque, N·m, and power, W, of the crank as effects load it; none without a load, no power without speed.
 
     known: names of scene numbers that are given.
     """
@@ -48,7 +48,7 @@ def motor(effects: Iterable[Effect]) -> Speed | None:
 
 
 def motor_torque(at: Instant, crank_torque: Number) -> Number:
-    """Return what the motor gives, N·m, of which the crank takes so much; the rest turns the flywheel."""
+    """Motor's torque, N·m, from the crank's torque; the difference accelerates the flywheel."""
     omega_dot, own = at.pose.omega_dot, motor(at.model.effects)
     if omega_dot is None or own is None:
         return crank_torque

@@ -157,15 +157,15 @@ class Kinematics(Protocol):
         return frozenset()
 
     def linkage(self, maths: Maths, values: Values) -> object:
-        """Return what poses read of the scene's numbers at once, as a record of its own; None without any."""
+        """Record of the scene's numbers for poses; None where there are none."""
         return None
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> Mapping[str, Number]:
-        """Return what numbers follow from the scene's at once; called: events that effects call in."""
+        """Numbers that follow from the scene's numbers; called: events that effects declare."""
         return {}
 
     def hints(self, given: Given, called: Collection[str]) -> Mapping[str, float]:
-        """Return, by name of value, where events lie that no formula gives: Newton's method starts there."""
+        """Angles of events that no formula gives, by name of value: Newton's method starts there."""
         return {}
 
     def pose(self, maths: Maths, given: Given, node: Node) -> Motion:

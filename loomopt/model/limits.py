@@ -74,19 +74,19 @@ class Limit(abc.ABC):
 
     @abc.abstractmethod
     def residual(self, rows: Rows) -> Number:
-        """Return how far it is exceeded, SI, in the number system of the rows; of an equality the difference."""
+        """Excess over the limit, SI, in the number system of the rows; of an equality the difference."""
 
     def excess(self, sampler: Sampler) -> float:
-        """Return how far a design exceeds it, in its natural size; of an equality the difference."""
+        """Excess of a design, as a multiple of the scale; of an equality the difference."""
         return float(self.residual(sampler.rows)) / self.scale
 
     def violation(self, sampler: Sampler) -> float:
-        """Return how far a design exceeds it, in its natural size; of an equality how far it is missed."""
+        """Excess of a design, as a multiple of the scale; of an equality the magnitude of the difference."""
         excess = self.excess(sampler)
         return abs(excess) if self.sign == 0 else excess
 
     def factor(self, rows: Rows) -> Number:
-        """Return what its value is multiplied by before the row is compared with it."""
+        """Factor of the limit's value in the comparison with the row."""
         return 1.0
 
     def touches(self, sampler: Sampler) -> list[Touch]:
@@ -102,7 +102,7 @@ class SingleLimit(Limit):
     """A limit that is one row of the design."""
 
     def residual(self, rows: Rows, bound: Number = None) -> Number:
-        """Return how far it is exceeded, SI, in the number system of the rows; of an equality the difference.
+        """Excess over the limit, SI, in the number system of the rows; of an equality the difference.
 
         bound: its value as a number of that system, its own without one.
         """
@@ -115,7 +115,7 @@ class SingleLimit(Limit):
         """Row, SI."""
 
     def _compared(self, rows: Rows, bound: Number) -> Number:
-        """Return what the row is compared with, SI."""
+        """Bound of the row, SI."""
         return bound
 
 
@@ -194,15 +194,15 @@ class CycleLimit(Limit):
         return super().structure, self.where
 
     def residual(self, rows: Rows) -> Number:
-        """Return how far the quantity exceeds it at its worst, SI."""
+        """Largest excess of the quantity over the bound, SI."""
         return rows.highest(self.row, self.where) - self.bound
 
     def figure(self, sampler: Sampler) -> float:
-        """Return what of a design the value is compared with, SI."""
+        """Quantity of a design that is compared with the value, SI."""
         return self.told(sampler.peak(self.row, self.where))
 
     def told(self, peak: float) -> float:
-        """Return what of a quantity's peak, SI, the value is compared with, SI."""
+        """Part of a quantity's peak, SI, that is compared with the value, SI."""
         return self.sign * (peak - self.complement)
 
     def near(self, sampler: Sampler) -> list[Extreme]:

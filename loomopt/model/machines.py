@@ -122,7 +122,7 @@ class Machines:
         return self._each((name,), machines, lambda rows, part: rows.own_node(pieces[part], u[..., part]), u.shape)[0]
 
     def at_angles(self, names: Sequence[str], angles: Floats, machines: Places | None = None) -> list[Floats]:
-        """Return quantities that no switch changes, SI, at crank angles, rad, (…, chosen), of machines (chosen,)."""
+        """Quantities that no switch changes, SI, at crank angles, rad, (…, chosen), of machines (chosen,)."""
         chosen = np.arange(self.count) if machines is None else machines
         return self._each(names, chosen, lambda rows, part: Node(angles[..., part], {}), angles.shape)
 
@@ -133,7 +133,7 @@ class Machines:
         node: Callable[[BatchReading, slice], Node],
         shape: tuple[int, ...],
     ) -> list[Floats]:
-        """Return quantities, (…, chosen), of machines (chosen,); so many at a time that it stays in the cache."""
+        """Quantities, (…, chosen), of machines (chosen,), in blocks that fit the processor's cache."""
         found = [np.empty(shape) for _ in names]
         step = max(1, POSITIONS // math.prod(shape[:-1]))
         for begin in range(0, shape[-1], step):
@@ -151,7 +151,7 @@ class Machines:
         return found
 
     def tops(self, name: str, where: Where | None = None, signed: bool = False) -> Tops:
-        """Return where |quantity| (of a signed one, the quantity) is highest over the cycle or the pieces `where`.
+        """Position where |quantity| (of a signed one, the quantity) is highest over the cycle or the pieces `where`.
 
         signed: whether it counts as one that is signed. Of tops alike to rounding the first in the cycle counts.
         """
@@ -167,7 +167,7 @@ class Machines:
         return self._tops[key]
 
     def highest(self, values: Floats, signed: bool, on: NDArray[np.bool_], at: At) -> Tops:
-        """Return where a curve is highest; values: of it on the grid, (nodes, machines); on: the pieces that count."""
+        """Position where a curve is highest; values: on the grid, (nodes, machines); on: the pieces that count."""
         known = on[self.pieces]
         lost = ~np.isfinite(values[known]).all(axis=0)
         heights = np.where(known[:, None] & ~lost, values if signed else np.abs(values), -np.inf)
@@ -178,14 +178,14 @@ class Machines:
         return _Refined(self, nodes[near], machines[near], values, signed).highest(at)
 
     def _local(self, heights: Floats) -> NDArray[np.bool_]:
-        """Say which nodes are locally highest; those of a piece are compared with those of that piece."""
+        """Mask of locally highest nodes; a node is compared with nodes of the same piece only."""
         left, right = np.empty_like(heights), np.empty_like(heights)
         left[1:], right[:-1] = heights[:-1], heights[1:]
         left[self._first] = right[self._last] = -np.inf
         return np.asarray((heights > left) & (heights >= right))
 
     def leaving(self, name: str, slope: str, most: Number, side: int, slack: float) -> Floats:
-        """Return how far each crank turns from angle 0, on one side, before |quantity| exceeds `most`, SI, (machines,).
+        """Angle through which each crank turns from 0, on one side, before |quantity| exceeds `most`, SI, (machines,).
 
         slope: the quantity's derivative in the crank angle; slack: share by which it may touch and not exceed.
         """
@@ -214,7 +214,7 @@ class Machines:
         return np.where(first > last, TURN, crossings(excess, low, high))
 
     def _turned(self, name: str, side: int) -> tuple[Floats, Floats]:
-        """Return how far each crank has turned from angle 0 at the nodes, in order, rad, and |quantity| there, SI."""
+        """Angles of each crank from 0 at the nodes, in order, rad, and |quantity| there, SI."""
         angles = np.mod(side * np.asarray(self.rows.node(self.pieces, self.u).phi), TURN)
         order = np.argsort(angles, axis=0, kind="stable")
         turned = np.broadcast_to(np.take_along_axis(angles, order, axis=0), (len(order), self.count))
@@ -319,7 +319,7 @@ ALIKE = 1e-12
 
 
 def at_once(model: JobModel) -> bool:
-    """Say whether many machines can be read at once: not where a motion of its own is followed through each cycle."""
+    """Whether many machines can be computed at once: not where an integrated motion follows every cycle."""
     return not any(isinstance(effect, Event | Speed) for effect in model.effects)
 
 
@@ -328,7 +328,7 @@ Alone = Callable[[Mapping[str, float]], Mapping[str, float]]
 
 
 def read_all(model: JobModel, values: Values, like: Sampler, read: Read, alone: Alone) -> dict[str, Floats]:
-    """Return what is read of every machine, (machines,), SI; not a number where it has none.
+    """Values of a name for every machine, (machines,), SI; NaN where a machine has none.
 
     values: the model's numbers, any of them (machines,); like: a machine near all of them; read(machines): of many;
     alone(values): of one, where many cannot be read at once.
@@ -380,13 +380,13 @@ def _in_order(model: JobModel, values: Values, like: Sampler) -> Iterator[tuple[
 
 
 def _angles(model: JobModel, like: Sampler) -> tuple[list[float], list[float]]:
-    """Return corners and events of one machine, rad."""
+    """Corners and events of one machine, rad."""
     corners = [float(angle) for angle in model.corners(FLOAT, like.given)]
     return corners, [float(model.event(FLOAT, like.given, event)) for event in model.events_read]
 
 
 def _orders(corners: Floats, events: Floats) -> NDArray[np.float64]:
-    """Return what is equal for machines of one order of corners, (…, machines): see `cycle.split`."""
+    """Data that machines with one order of corners share, (…, machines): see `cycle.split`."""
     if not len(corners):
         return np.zeros((1, corners.shape[1]))
     turns = -np.floor((corners - corners[0]) / TURN)

@@ -83,12 +83,12 @@ class Instant:
         return self.given.inputs(self.maths, effect, self.pose, self.node.switch)
 
     def terms(self) -> dict[str, Number]:
-        """Return each load's term by its name, N or N·m."""
+        """Term of every load by name, N or N·m."""
         found = balance.terms(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
         return {load.name: term for load, term in found}
 
     def joints(self, check: "Check[Any]") -> Number:
-        """Return what a check reads of the forces in the joints; checks that read the same share it."""
+        """Values that a check reads of the forces in the joints; checks that read the same values share them."""
         if check.joints not in self._joints:
             loaded = balance.Loaded(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
             assert check.joints is not None
@@ -212,7 +212,7 @@ def slowness(at: Instant) -> Number:
 
 
 def heading_name(part: str, axis: str) -> str:
-    """Return what a component of a part's unit direction is called."""
+    """Name of a component of a part's unit direction."""
     return f"direction of {part}_{axis}"
 
 
@@ -226,7 +226,7 @@ FRAME = "frame"
 
 
 def jointed(check: Check[Any], known: Collection[str]) -> dict[str, CycleQuantity]:
-    """Return what a check reads of the forces in the joints; known: names of scene numbers that are given."""
+    """Values that a check reads of the forces in the joints; known: names of scene numbers that are given."""
     found: dict[str, CycleQuantity] = {}
     lacked = lacking(check, known)
     for name in (name for name in check.vectors if name not in lacked):
@@ -271,7 +271,7 @@ class Cornered(NamedTuple):
 
 
 def cornered(model: "JobModel", maths: Maths, given: Given) -> list[Cornered]:
-    """Return each switch of a model."""
+    """Switches of a model."""
     found: list[Cornered] = []
     for arc in (*model.kinematics.arcs, *model.arcs):
         angles = arc.corners(maths, given)
@@ -296,7 +296,7 @@ def with_states_eliminated(maths: Maths, kinematics: Kinematics, loads: Sequence
 
 
 def carried_by(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], given: Given, state: State) -> Carried:
-    """Return what moves with a state's coordinate."""
+    """Bodies that move with a state's coordinate."""
     own = [load for load in loads if isinstance(load, Load) and load.name in state.carries]
     inertias = [load.moved(given.inputs(maths, load)) for load in own if load.moved]
     smooth = [load for load in own if not load.corners]
@@ -314,7 +314,7 @@ def carried_by(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], gi
 
 
 def read_at(state: State, at: Instant) -> StateInstant:
-    """Return what is read of a state at an instant."""
+    """Values of a state at an instant."""
 
     def coordinate() -> Number:
         reply = balance.replied(at.maths, state, at.model.loads, at.pose, at.given, at.node.switch)
@@ -324,12 +324,12 @@ def read_at(state: State, at: Instant) -> StateInstant:
 
 
 def state_value(state: State, formula: Callable[[StateInstant], Number], sign: int, at: Instant) -> Number:
-    """Return what a formula reads of a state, SI."""
+    """Values of a state that a formula reads, SI."""
     return formula(read_at(state, at)) if sign > 0 else -formula(read_at(state, at))
 
 
 def state_quantities(states: Sequence[State]) -> dict[str, CycleQuantity]:
-    """Return what states tell over the cycle; of a least value its opposite, which is no figure."""
+    """Whole-cycle quantities of states; a least value is stored as its opposite, which is no figure."""
     return {
         name: CycleQuantity(
             functools.partial(state_value, state, peak.read, -1 if peak.least else 1), not peak.least, signed=peak.least
@@ -349,7 +349,7 @@ def state_columns(states: Sequence[State]) -> Mapping[str, Callable[[Instant], N
 
 
 def uncovered(effects: Sequence[Effect], own: Mapping[str, Values]) -> tuple[str, ...]:
-    """Return what neither proofs nor studies of accuracy cover, by states and events; own: values by effect."""
+    """Parts of states and events that neither proofs nor studies of accuracy cover; own: values by effect."""
     return tuple(each.rests(own[each.name]) for each in effects if isinstance(each, State | Event))
 
 
@@ -432,7 +432,7 @@ class JobModel:
         return self.known_in if self._quantities[name].loaded else ()
 
     def counted(self, cycle: Cycle, name: str, where: Where | None = None) -> NDArray[np.bool_]:
-        """Say of each piece of a cycle, of those `where` alone, whether a quantity is known there and counts."""
+        """Whether a quantity is known and counts, by piece of a cycle; where: the pieces to look at."""
         known, asked = [cycle.on(place) for place in self.known_of(name)], cycle.on(where)
         return asked & np.any(known, axis=0) if known else asked
 
@@ -499,11 +499,11 @@ class JobModel:
         return self._quantities[name].square
 
     def has_quantity(self, name: str) -> bool:
-        """Say whether a name is that of a whole-cycle quantity."""
+        """Whether a name is that of a whole-cycle quantity."""
         return name in self._quantities
 
     def has_row(self, name: str) -> bool:
-        """Say whether a name is that of a row this model has the numbers for."""
+        """Whether a name is that of a row for which this model has the numbers."""
         means = {each for mean in self.integrals for each in (mean.name, mean.root)}
         turned = {row for effect in self.effects if isinstance(effect, Speed) for row in effect.rows}
         return name in {*self._rows, *means, *turned}
@@ -574,7 +574,7 @@ class JobModel:
         return with_states_eliminated(maths, self.kinematics, self.loads, self.plain(maths, values))
 
     def samples(self, given: Given) -> int:
-        """Return how many samples of one turn the states of a design need; 0 without any."""
+        """Number of samples per turn that the states of a design need; 0 without states."""
         return max((math.ceil(each.samples(given.inputs(FLOAT, each))) for each in self.states), default=0)
 
     def plain(self, maths: Maths, values: Values) -> Given:
@@ -613,7 +613,7 @@ class JobModel:
         return cycle.split(corners, self.switches, lambda angle: [each.switch(angle, each.angles) for each in found])
 
     def hints(self, given: Given) -> dict[str, float]:
-        """Return where corners that no formula gives lie, by name of value: what `given` starts from."""
+        """Angles of corners that no formula gives, by name of value: the start of `given`."""
         return dict(self.kinematics.hints(given, self.called))
 
     def singular(self, squares: Squares) -> tuple[float, ...]:
@@ -636,14 +636,14 @@ class JobModel:
         return self.together(maths, given, node)(name)
 
     def together(self, maths: Maths, given: Given, node: Node) -> Callable[[str], Number]:
-        """Return what reads whole-cycle quantities by name, SI, at a node whose pose is computed once for all."""
+        """Reader of whole-cycle quantities by name, SI, at a node; it computes the pose once."""
         instant = Instant(self, maths, given, node)
         return lambda name: self._quantities[name].formula(instant)
 
     def static(
         self, maths: Maths, given: Given, stills: Stills, names: Collection[str] | None = None
     ) -> dict[str, Number]:
-        """Return figures and rows that need one position only; all it has without names."""
+        """Figures and rows that need one position only; all of them without names."""
         if names is None:
             known = given.values
             names = [name for name, row in self._rows.items() if all(need in known for need in row.needs)]
@@ -685,7 +685,7 @@ def with_words_fixed(model: JobModel, values: Mapping[str, float]) -> JobModel:
 
 
 def unserved(model: JobModel, values: Mapping[str, float]) -> str:
-    """Return why the model is none for a design (SI), "" where it serves it."""
+    """Reason why the model is not valid for a design (SI); "" where it is valid."""
     try:
         return (
             "" if with_words_fixed(model, values) is model else "a steady state needs more here than it was solved with"
@@ -695,7 +695,7 @@ def unserved(model: JobModel, values: Mapping[str, float]) -> str:
 
 
 def _parts(model: JobModel, values: Mapping[str, float]) -> tuple[int, ...]:
-    """Return into how many parts each mean's pieces are cut, so that its rule resolves what rings on them."""
+    """Number of parts into which the pieces of a mean are cut, so that the rule resolves their oscillation."""
     given = model.given(FLOAT, values)
     samples, cycle = model.samples(given), model.split(FLOAT, given)
     stretches = [cycle.stretch(mean.where) for mean in model.integrals]

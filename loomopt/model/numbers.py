@@ -16,7 +16,7 @@ CORNER = "corner"
 
 
 def numbers(scene: Scene) -> dict[str, float]:
-    """Return every number of the scene by full name, SI."""
+    """Every number of the scene by full name, SI."""
     found = {**scene.mechanism, **scene.operation}
     for effect, own in zip(scene.active, scene.effects.values(), strict=True):
         for key in keys(effect.table):
@@ -86,7 +86,7 @@ def _curve(scene: Scene, load: Load[Any], own: Table) -> tuple[Curve, csv_tables
 
 
 def bounds(scene: Scene, known: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Return lower and upper bound of the design variables and of every bounded number, by full name, SI.
+    """Lower and upper bound of the design variables and of every bounded number, by full name, SI.
 
     What is held stands at today's value.
     """
@@ -98,17 +98,17 @@ def bounds(scene: Scene, known: Mapping[str, float]) -> dict[str, tuple[float, f
 
 
 def labels(scene: Scene) -> dict[str, str]:
-    """Return what a designer calls each number of the effects that are on, by its full name."""
+    """Labels of the numbers of the active effects, by full name."""
     return {owned(effect, key): label(effect, key) for effect in scene.active for key in keys(effect.table)}
 
 
 def told(scene: Scene) -> tuple[str, ...]:
-    """Return what to know of the curves that loads are read from: each a sentence without its full stop."""
+    """Remarks on the curves of the loads: sentences without full stop."""
     return tuple(record.said for record in records(scene))
 
 
 def records(scene: Scene) -> tuple[csv_tables.Record, ...]:
-    """Return what is told of the tables that loads are read from. Raises BadInput."""
+    """Remarks on the tables of the loads. Raises BadInput."""
     found = []
     loads = {load.name: load for load in scene.active if isinstance(load, Load)}
     for (name, key), (curve, read) in _curves(scene).items():

@@ -80,12 +80,12 @@ class Objective(abc.ABC):
         return "least" if self.power > 0 else "most"
 
     def worth(self, rows: Rows) -> Number:
-        """Return what it is worth, SI, of a design or of many at once."""
+        """Value, SI, for a design or for many at once."""
         found = [*(sign * rows.single(row) for row, sign in self.sides), *map(rows.highest, self.quantities)]
         return functools.reduce(np.maximum, found)
 
     def merit(self, sampler: Sampler) -> float:
-        """Return what a design is worth, SI."""
+        """Value of a design, SI."""
         return float(self.worth(sampler.rows))
 
     def figure_of(self, sampler: Sampler) -> float:
@@ -98,21 +98,21 @@ class Objective(abc.ABC):
         return now - then if most else then - now
 
     def least_of(self, signed: Collection[str]) -> float:
-        """Return what it is never less than, SI; signed: the quantities of which the value counts, not the size."""
+        """Lower bound of the value, SI; signed: quantities whose value counts, not their magnitude."""
         return -math.inf if any(name in signed for name in self.quantities) else self.least
 
     def vanishes(self, sampler: Sampler) -> bool:
-        """Say whether a design has it at 0, in the natural size of the figure, and no design has less."""
+        """Whether a design has the value 0, to the scale of the figure, and no design has less."""
         if self.least_of(sampler.model.signed) < 0.0 or self.power < 0:
             return False
         return abs(self.merit(sampler)) <= FEASIBLE**self.power * self.scale
 
     def least_within(self, lower: Mapping[str, float]) -> float:
-        """Return what lower bounds of the variables alone leave it to be at least, SI."""
+        """Least value that follows from lower bounds of the variables alone, SI."""
         return -math.inf
 
     def watched(self, designs: BatchReading) -> Floats:
-        """Return what changes where it does, SI, (values, designs), of designs whose cycles are looked at."""
+        """Values that change with the figure, SI, (values, designs), of designs whose cycles are computed."""
         return np.asarray(wide(self.worth(designs), designs.count))[None]
 
     def pieces(self, sampler: Sampler) -> list[Piece]:
@@ -122,7 +122,7 @@ class Objective(abc.ABC):
 
     @abc.abstractmethod
     def limits(self, name: str, most: float) -> list[Limit]:
-        """Return what keeps it at `most`, SI, as limits of a name."""
+        """Limits that bound the value by `most`, SI, under a name."""
 
 
 class Value(Objective):

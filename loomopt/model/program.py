@@ -33,7 +33,7 @@ class Alias(str):
         return found
 
     def __reduce__(self) -> tuple[type["Alias"], tuple[str, str]]:
-        """Return how to make it again."""
+        """Constructor and values with which pickle makes it again."""
         return Alias, (str(self), self.of)
 
 
@@ -76,11 +76,11 @@ class Move(abc.ABC):
 
     @abc.abstractmethod
     def goal(self, wish: Preference, x: Numbers) -> dict[str, float]:
-        """Return where a wish would go from x (SI), within the bounds; nothing where there is no room."""
+        """Target of a wish from x (SI), within the bounds; empty where there is no room."""
 
     @abc.abstractmethod
     def directions(self, x: Numbers) -> list[dict[str, float]]:
-        """Return its directions, SI, at x (SI) that have room, but not without end."""
+        """Directions of the wish, SI, at x (SI) that have room, but not without end."""
 
     @abc.abstractmethod
     def ends(self, way: Numbers, x: Numbers) -> Iterator[dict[str, float]]:
@@ -98,7 +98,7 @@ class AxisMove(Move):
     is_apart = True
 
     def goal(self, wish: Preference, x: Numbers) -> dict[str, float]:
-        """Return where a wish would go from x (SI), within the bounds; nothing where there is no room."""
+        """Target of a wish from x (SI), within the bounds; empty where there is no room."""
         goal = {}
         for name in self.along:
             low, high = self.bounds[name]
@@ -190,7 +190,7 @@ class Goal(NamedTuple):
     beside: str = ""
 
     def reached(self, figures: Mapping[str, float | None]) -> bool:
-        """Say whether a design's figures, SI, meet it."""
+        """Whether a design's figures, SI, satisfy it."""
         value, size = figures.get(self.figure), figures.get(self.beside, 1.0)
         slack = self.slack * abs(size or 0.0)
         return value is not None and self.low - slack <= value <= self.high + slack
@@ -203,7 +203,7 @@ def shortfall(reached: Mapping[str, bool]) -> str:
 
 
 def goals(limits: Iterable[Limit]) -> tuple[Goal, ...]:
-    """Return limits that a target asks for by itself as goals of the figures they are named after, as closely held."""
+    """Limits that come from targets, as goals of the figures after which they are named, with the same tolerance."""
     sides: dict[str, list[Limit]] = {}
     for limit in limits:
         sides.setdefault(limit.name, []).append(limit)
@@ -216,7 +216,7 @@ def goals(limits: Iterable[Limit]) -> tuple[Goal, ...]:
 
 
 def nothing_follows(model: JobModel, values: Numbers) -> Numbers:
-    """Return nothing: every variable stands for itself."""
+    """Empty: no variable is replaced by another one."""
     return {}
 
 
@@ -350,5 +350,5 @@ class Program:
         return {name: implied.get(name, value) for name, value in given.items()}
 
     def values(self, design: Mapping[str, Number], maths: Maths) -> dict[str, Number]:
-        """Return all values of one number system, with `design` for the variables."""
+        """Values in one number system, with `design` for the variables."""
         return {name: maths.number(value) for name, value in self.parameters.items()} | dict(design)

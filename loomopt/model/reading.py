@@ -79,7 +79,7 @@ class Quantities:
         self._bound: dict[tuple[tuple[str, ...], tuple[str, ...]], AtNode] = {}
 
     def __call__(self, names: tuple[str, ...], node: Node) -> tuple[Number, ...]:
-        """Return quantities by their names at a node, or at nodes, in one pass."""
+        """Quantities by their names at a node, or at nodes, in one pass."""
         switches = tuple(node.switch)
         run = self._bound.get((names, switches))
         if run is None:
@@ -108,7 +108,7 @@ class Quantities:
 def recorded_quantities(
     model: JobModel, names: tuple[str, ...], switches: tuple[str, ...], known: frozenset[str]
 ) -> Recording:
-    """Return quantities written down; switches: names of what nodes tell; known: of the scene's numbers.
+    """Recorded quantities; switches: names of the nodes' data; known: names of the scene's numbers.
 
     Raises what a formula raises that cannot be recorded.
     """
@@ -135,7 +135,7 @@ DATUM = "datum"
 
 @functools.cache
 def gauss(count: int = GAUSS_NODES) -> tuple[Floats, Floats]:
-    """Return nodes and weights of the Gauss-Legendre rule on [0, 1]."""
+    """Nodes and weights of the Gauss-Legendre rule on [0, 1]."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     return (nodes + 1) / 2, weights / 2
 
@@ -155,7 +155,7 @@ def fixed_nodes(cycle: Cycle, integral: Integral) -> Node:
 
 
 def quadrature(cycle: Cycle, integral: Integral) -> tuple[Pieces, Floats, Floats]:
-    """Return nodes (pieces, u) and weights in u of a mean over pieces of the cycle."""
+    """Nodes (pieces, u) and weights in u of a mean over pieces of the cycle."""
     active = np.flatnonzero(cycle.on(integral.where))
     if integral.where and isinstance(integral.where[1], tuple) and integral.parts == 1:
         rules = [gauss(_enough(width)) for width in np.diff(cycle.starts)[active].tolist()]
@@ -258,7 +258,7 @@ class BatchReading(Reading):
         self._looked: tuple[Pieces, dict[str, Number]] = np.zeros(0, dtype=np.intp), {}
 
     def node(self, pieces: Pieces, u: Floats) -> Node:
-        """Return nodes (pieces, u), each (nodes,), of all designs; their angles (nodes, 1) where no corner moves."""
+        """Nodes (pieces, u), each (nodes,), of all designs; their angles (nodes, 1) where no corner moves."""
         begin, end = self._begun(pieces), self._begun(pieces + 1)
         switch = {name: column[:, None] for name, column in self.cycle.switch(pieces).items()}
         return Node(begin + u[:, None] * (end - begin), switch)
@@ -271,12 +271,12 @@ class BatchReading(Reading):
         return Node(begin + u * (end - begin), self.cycle.switch(pieces))
 
     def of(self, places: Pieces) -> "BatchReading":
-        """Return some of the designs, by their places; one may be there several times."""
+        """Designs by their places; a place may occur several times."""
         values = {name: value[places] if np.ndim(value) else value for name, value in self.values.items()}
         return BatchReading(self.model, self.maths, values, self.cycle, self.stills)
 
     def _begun(self, pieces: Pieces) -> Number:
-        """Return where pieces begin, rad, (pieces, designs), or (pieces, 1) where no design has its own."""
+        """Starts of the pieces, rad, (pieces, designs), or (pieces, 1) where all designs share them."""
         return self._starts[pieces]
 
     @lazy
@@ -286,7 +286,7 @@ class BatchReading(Reading):
         return _stacked([wide(start, self.count) for start in self.starts])
 
     def quantities(self, names: Sequence[str], node: Node) -> dict[str, Number]:
-        """Return whole-cycle quantities (nodes, designs) at nodes, their poses computed once for all."""
+        """Whole-cycle quantities (nodes, designs) at nodes, their poses computed once for all."""
         read = self.model.together(self.maths, self.given, node)
         shape = np.broadcast_shapes(np.shape(plain(node.phi)), (self.count,))
         return {name: _shaped(read(name), shape) for name in names}
@@ -340,7 +340,7 @@ def _shaped(value: Number, shape: tuple[int, ...]) -> Number:
 
 
 def _stacked(numbers: Sequence[Number]) -> Number:
-    """Return numbers (designs,) as one, (numbers, designs)."""
+    """Numbers (designs,) as one, (numbers, designs)."""
     if not any(isinstance(number, Jet) for number in numbers):
         return np.array(numbers)
     width = next(number.g.shape[-1] for number in numbers if isinstance(number, Jet))

@@ -57,7 +57,7 @@ class Extreme(NamedTuple):
 
 @functools.cache
 def _grid(counts: tuple[int, ...]) -> tuple[Pieces, Floats]:
-    """Return nodes with so many evenly spread over each piece."""
+    """Nodes that are evenly spread over each piece."""
     pieces = np.repeat(np.arange(len(counts)), counts)
     return pieces, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts])
 
@@ -109,7 +109,7 @@ class Sampler:
         return self.static | {name: self.single(name) for name in self._means}
 
     def figure(self, name: str) -> float | None:
-        """Return one of the figures, SI; None for what is none of them."""
+        """Figure by name, SI; None where no figure has this name."""
         return self.single(name) if name in self.static or name in self._means else None
 
     @lazy
@@ -140,7 +140,7 @@ class Sampler:
         return self.together((name,), pieces, u)[name]
 
     def together(self, names: Sequence[str], pieces: Pieces, u: Floats) -> dict[str, Floats]:
-        """Return several quantities at nodes (pieces, u), SI: the pose is computed once for all."""
+        """Several quantities at nodes (pieces, u), SI: the pose is computed once for all."""
         found = {name: np.empty(u.shape) for name in names}
         self.session.positions += len(u) * len(found)
         for begin in range(0, len(u), CHUNK):
@@ -152,7 +152,7 @@ class Sampler:
         return found
 
     def at_angle(self, names: tuple[str, ...], phi: float) -> tuple[float, ...]:
-        """Return quantities that no load's switch changes at one crank angle, rad, SI; raises without a real value."""
+        """Quantities that no load's switch changes at one crank angle, rad, SI; raises without a real value."""
         self.session.positions += 1
         return self._floats(names, Node(phi, self.cycle.switch(self.cycle.place(phi)[0])))
 
@@ -161,11 +161,11 @@ class Sampler:
         return Quantities(self.model, (systems.FLOAT, systems.FLOAT), self.given)
 
     def node(self, pieces: Pieces, u: Floats) -> Node:
-        """Return nodes (pieces, u) with their crank angles, rad, and switches."""
+        """Nodes (pieces, u) with their crank angles, rad, and switches."""
         return Node(self.cycle.angles(pieces, u), self.cycle.switch(pieces))
 
     def node_at(self, angles: Floats) -> Node:
-        """Return nodes at crank angles, rad, with the switches there.
+        """Nodes at crank angles, rad, with the switches there.
 
         Those of another turn are told as of the cycle's own: a cam's formulas hold on the turn that it begins.
         """
@@ -173,7 +173,7 @@ class Sampler:
         return Node(angles, self.cycle.switch(self.cycle.located(angles)[0]))
 
     def grid(self, samples: int = 0) -> tuple[Pieces, Floats]:
-        """Return nodes spread evenly over the turn, the sampler's own number without one; ends of pieces included."""
+        """Nodes spread evenly over the turn, as many as the sampler has by default; ends of pieces included."""
         return _grid(self._counts(samples) if samples else self._own_counts)
 
     @lazy
@@ -181,7 +181,7 @@ class Sampler:
         return self._counts(self.samples)
 
     def _counts(self, samples: int) -> tuple[int, ...]:
-        """Return how many nodes each piece has."""
+        """Number of nodes of each piece."""
         widths = self.cycle.starts[1:] - self.cycle.starts[:-1]
         least = max(samples // max(LEAST_SHARE, len(widths) // 2), LEAST_NODES)
         return tuple((np.maximum(np.ceil(samples * widths / TURN).astype(int), least) + 1).tolist())
@@ -198,11 +198,11 @@ class Sampler:
         return [e for e in found if on[e.piece]]
 
     def knows(self, name: str) -> bool:
-        """Say whether the extremes of a quantity have been found already."""
+        """Whether the extremes of a quantity are computed already."""
         return name in self._extremes
 
     def on(self, name: str, where: Where | None = None) -> NDArray[np.bool_]:
-        """Say of each piece, of those `where` alone, whether a quantity is known there and counts."""
+        """Whether a quantity is known and counts, by piece; where: the pieces to look at."""
         return self.model.counted(self.cycle, name, where)
 
     def search(self, names: Iterable[str]) -> None:
@@ -238,14 +238,14 @@ class Sampler:
         return frozenset(self.given.values.items())
 
     def _holds(self, other: "Sampler") -> bool:
-        """Say whether all that another sampler knows of its design is known here, and is the same."""
+        """Whether this sampler has all values of another sampler's design, and the same ones."""
         if other.model is not self.model or other.samples != self.samples:
             return False
         mine = self.given.values
         return all(_is_same(mine.get(name), value) for name, value in other.given.values.items())
 
     def _peaks(self, size: Floats) -> Pieces | None:
-        """Return where heights on the sampler's own grid are locally largest; None where one is no number."""
+        """Places where heights on the sampler's grid are locally largest; None where a height is not a number."""
         if not np.all(np.isfinite(size)):
             return None
         left, right = np.empty_like(size), np.empty_like(size)
@@ -296,7 +296,7 @@ class Sampler:
         return np.broadcast_to(np.asarray(values, dtype=np.float64), angles.shape)
 
     def heights(self, name: str, values: Floats) -> Floats:
-        """Return what of a quantity's values is compared with a bound: their magnitude, or themselves."""
+        """Part of a quantity's values that is compared with a bound: the magnitude, or the signed value."""
         return values if name in self.model.signed else np.abs(values)
 
     def _refined(self, values: Mapping[str, Floats], peaks: Mapping[str, Pieces]) -> dict[str, list[Extreme]]:
@@ -337,7 +337,7 @@ class Sampler:
         return {n: [Extreme(*extreme, signed=n in signed) for extreme in found[span]] for n, span in spans.items()}
 
     def _each_at(self, spans: Mapping[str, slice], pieces: Pieces, u: Floats) -> Floats:
-        """Return each quantity, SI, at those columns of nodes (pieces, u) that are its own."""
+        """Values of quantities, SI, each at its columns of nodes (pieces, u)."""
         read = self.together(tuple(spans), pieces.ravel(), u.ravel())
         if len(spans) == 1:
             return read[next(iter(spans))].reshape(u.shape)
@@ -375,13 +375,13 @@ class Sampler:
         return float(np.dot(widths, values) / np.sum(widths))
 
     def _pushing(self, pieces: Pieces, u: Floats) -> NDArray[np.bool_]:
-        """Say where Q is not negative."""
+        """Mask of the nodes where Q is not negative."""
         force = self.model.instant(systems.numpy(), self.given, self.node(pieces, u)).force
         return np.broadcast_to(np.asarray(force) >= 0.0, u.shape)
 
 
 def _is_same(one: Number, other: Number) -> bool:
-    """Say whether two numbers are the same float, to the sign of a zero."""
+    """Whether two numbers are the same float, the sign of a zero included."""
     floats = isinstance(one, float) and isinstance(other, float)
     return floats and one == other and math.copysign(1.0, one) == math.copysign(1.0, other)
 

@@ -124,7 +124,7 @@ def _refused(event: Event, load: Acting, why: str) -> UnfollowedError:
 
 
 def _switch(sampler: Sampler, event: Event, load: Acting, low: float, high: float) -> float:
-    """Return which of its formulas a load has while the output is between two positions."""
+    """Switches of a load while the output is between two positions."""
     if isinstance(load, State):
         raise _refused(event, load, "it moves on its own")
     if load.known_in(sampler.model.words_of(load.name)):

@@ -28,7 +28,7 @@ class Session:
         self._beside: weakref.WeakKeyDictionary[object, dict[Hashable, object]] = weakref.WeakKeyDictionary()
 
     def kept(self, what: str, most: int, key: Hashable, make: Callable[[], Made]) -> Made:
-        """Return what is kept by a key, made where it is not there; the least recently used of more than `most` goes.
+        """Cached value of a key, made where it is missing; beyond `most` values the least recently used is dropped.
 
         what: of which there are so many at most.
         """
@@ -43,7 +43,7 @@ class Session:
             return cast(Made, found[key])
 
     def beside(self, owner: object, key: Hashable, make: Callable[[], Made]) -> Made:
-        """Return what is kept of an owner by a key, made where it is not there; it goes with its owner."""
+        """Cached value of an owner by a key, made where it is missing; it is dropped with its owner."""
         with LOCK:
             found = self._beside.setdefault(owner, {})
             if key not in found:
@@ -55,7 +55,7 @@ class Session:
         return reversed(self._kept.get(what, OrderedDict()).values())
 
     def count(self, what: str) -> int:
-        """Return how many are kept."""
+        """Number of cached values."""
         return len(self._kept.get(what, ()))
 
     def forget(self, *sorts: str) -> None:

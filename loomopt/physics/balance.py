@@ -191,7 +191,7 @@ class Loaded:
 def masses(
     maths: Maths, loads: Sequence[Acting], given: Given, motions: tuple[Motion, Motion]
 ) -> list[tuple[LinkMass, Motion]]:
-    """Return what loads move, inertia alone where one tells no mass; motions: the output's, and of what is carried."""
+    """Masses that loads move, inertia alone where a load has no mass; motions: the output's, and of carried parts."""
     found = []
     gone = carried(loads)
     for load in (load for load in loads if isinstance(load, Load)):

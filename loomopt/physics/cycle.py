@@ -60,7 +60,7 @@ class Cycle:
         return np.ascontiguousarray(self.switches.T)
 
     def on(self, where: Where | None) -> NDArray[np.bool_]:
-        """Say of each piece whether it is meant; all are without `where`."""
+        """Mask of the pieces `where`; all pieces without it."""
         if where is None:
             return np.ones(self.pieces, dtype=bool)
         return np.isin(self.switches[:, self.names.index(where[0])], where[1])
@@ -74,11 +74,11 @@ class Cycle:
         return float(self.starts[:-1][begins][0]), float(self.starts[1:][ends][0])
 
     def angles(self, pieces: Pieces, u: Floats) -> Floats:
-        """Return crank angles, rad, of nodes (pieces, u)."""
+        """Crank angles, rad, of nodes (pieces, u)."""
         return self.starts[pieces] * (1 - u) + self.starts[pieces + 1] * u
 
     def coefficients(self, piece: int, u: float, corners: int) -> tuple[float, Floats]:
-        """Return offset, rad, and the coefficient of each declared corner in the node's angle."""
+        """Offset, rad, and the coefficient of each declared corner in the node's angle."""
         turns, weights = self.shares(piece, u, corners)
         return TURN * turns, weights
 
@@ -94,7 +94,7 @@ class Cycle:
         return first[1] * (1 - u) + wrapped * u, weights
 
     def begins(self, corners: Sequence[Number], pi: Number) -> list[Number]:
-        """Return `starts` in another number system: corners: as declared, flat, rad; pi: that system's own."""
+        """Starts in another number system; corners: as declared, flat, rad; pi: π of that system."""
         found = [corners[place] + 2 * pi * turn for place, turn in self.order] or [0 * pi]
         return [*found, found[0] + 2 * pi]
 
@@ -131,7 +131,7 @@ def split(corners: Sequence[float], names: Sequence[str], read: Callable[[float]
 
 
 def _switches(starts: Floats, read: Callable[[float], Sequence[float]]) -> Floats:
-    """Return each switch on each piece, read at the piece's middle."""
+    """Switches on the pieces, read at the middle of each piece."""
     middles = (starts[:-1] + starts[1:]) / 2
     return np.array([read(float(middle)) for middle in middles], dtype=np.float64).reshape(len(middles), -1)
 

@@ -167,7 +167,7 @@ class ModelNeeds(NamedTuple):
 
 
 def model_of(effect: "Effect", own: Table) -> ModelNeeds:
-    """Return what an effect needs with the model that its table names; nothing where it has one model only."""
+    """Numbers that an effect needs with the model that its table names; none where it has one model only."""
     return effect.models.get(str(getattr(own, "model", "")), ModelNeeds())
 
 
@@ -333,12 +333,12 @@ def inertia_load(
 
 
 def nothing_sold(own: Any) -> Mapping[str, Sequence[float]]:
-    """Return nothing: no number of the effect comes in sizes."""
+    """Empty: no number of the effect comes in sizes."""
     return {}
 
 
 def nothing_remarked(at: Inputs[None], shown: ShowValue) -> str:
-    """Return nothing: the figures stand for themselves."""
+    """Empty: the figures need no explanation."""
     return ""
 
 
@@ -349,7 +349,7 @@ def nothing_explained(
     clash: Collection[str],
     shown: ShowValue,
 ) -> str:
-    """Return nothing: physics has nothing general to say."""
+    """Empty: the effect has no general explanation."""
     return ""
 
 
@@ -523,7 +523,7 @@ class Event(Effect):
     rules: Callable[[EventTerms], Sequence[Rule]]
 
     def rests(self, own: Values) -> str:
-        """Return what of it no proof and no study of accuracy covers."""
+        """Parts of the effect that no proof and no study of accuracy covers."""
         return f"{self.name}, which is simulated ({', '.join(figure.name for figure in self.figures)})"
 
 
@@ -533,12 +533,12 @@ EVALUATED = (Speed,)
 
 @functools.cache
 def instance(effect: Effect, name: str) -> Effect:
-    """Return one instance of an effect that there may be many of: the same object for the same name."""
+    """Instance of an effect that a scene may have several times: the same object for the same name."""
     return replace(effect, name=f"{effect.name}.{name}", kind=effect.name, instance=name)
 
 
 def ranked(effects: Iterable[Effect]) -> dict[str, Effect]:
-    """Return effects by name, in the order of their ranks."""
+    """Effects by name, in the order of their ranks."""
     return {effect.name: effect for effect in sorted(effects, key=lambda effect: (effect.rank, effect.name))}
 
 
@@ -635,7 +635,7 @@ def lacking(check: Check[Any], known: Collection[str]) -> dict[str, tuple[str, .
 
 
 def asked(missing: Collection[str], known: Collection[str]) -> str:
-    """Return scene keys in words; of a table within an effect's table that gives nothing the table alone."""
+    """Scene keys in words; of an empty table inside an effect's table the name of the table alone."""
     given = {tuple(name.split(".")[:2]) for name in known}
     cut = {key: key.split(".") for key in missing}
     named = (".".join(parts[: len(parts) if tuple(parts[1:3]) in given else 3]) for parts in cut.values())
@@ -643,7 +643,7 @@ def asked(missing: Collection[str], known: Collection[str]) -> str:
 
 
 def label(effect: Effect, key: str) -> str:
-    """Return what a designer calls a number of an effect's table; of an instance the label names that too."""
+    """Label of a number of an effect's table; of an instance it contains the instance's name."""
     return f"{effect.instance}.{key}" if effect.instance else key
 
 

@@ -126,7 +126,7 @@ class TwoLinks:
         return self._rates[1] if order == 1 else self._second_2 if order == 2 else self._third_2
 
     def links(self) -> tuple[Link, Link]:
-        """Return both links, each from its own joint."""
+        """Both links, each from its own joint."""
         return (
             Link(self.first, lambda: self.closed.link1, self.rates_1, self.r1),
             Link(self.second, lambda: self.closed.link2, self.rates_2, self.r2),
@@ -211,7 +211,7 @@ class OnGuide:
         return self.reach - dot(self._base, self.d)
 
     def _on(self, order: int) -> tuple[Number | None, Number | None]:
-        """Return what the base's derivative is along the guide and across it."""
+        """Components of the base's derivative along the guide and across it."""
         base = self.base(order)
         return along(base, self.d), along(base, self.n)
 
@@ -326,7 +326,7 @@ class Slotted:
         return left_of(self.d)
 
     def _on(self, order: int) -> tuple[Number | None, Number | None]:
-        """Return what the base's derivative is along the line and across it."""
+        """Components of the base's derivative along the line and across it."""
         base = self._base_1 if order == 1 else self.base(order)
         return along(base, self.d), along(base, self.n)
 

@@ -168,7 +168,7 @@ def _points(points: Vector) -> "Floats":
 
 
 def fault(follower: Follower, shown: ShowValue = usual) -> str:
-    """Say why a follower of floats (m, rad) cannot work; "" when it can.
+    """Reason why a follower of floats (m, rad) cannot work; "" when it can.
 
     shown(value, kind): a value as text in the reader's unit.
     """

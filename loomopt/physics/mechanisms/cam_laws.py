@@ -43,7 +43,7 @@ class Law:
 
 
 def _halves(maths: Maths, u: Number) -> tuple[Number, Number]:
-    """Return sin(πu/2) and cos(πu/2), the cosine as the sine of the rest: exactly 0 at u = 1, both equal at 1/2."""
+    """Sin(πu/2) and cos(πu/2), the cosine as the sine of the rest: exactly 0 at u = 1, both equal at 1/2."""
     return maths.sin(maths.pi * u / 2), maths.sin(maths.pi * (1 - u) / 2)
 
 

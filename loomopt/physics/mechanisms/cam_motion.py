@@ -34,7 +34,7 @@ class CamLaw(Hashable, Protocol):
         """Whether s(u) + s(1 − u) = 1."""
 
     def prepared(self, maths: Maths, values: Values) -> dict[str, Number]:
-        """Return what every position shares."""
+        """Values that all positions share."""
 
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
         """s and its derivatives at u."""
@@ -62,7 +62,7 @@ class NamedLaw:
         return LAWS[self.name].symmetric
 
     def prepared(self, maths: Maths, values: Values) -> dict[str, Number]:
-        """Return nothing."""
+        """Empty."""
         return {}
 
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
@@ -109,7 +109,7 @@ class Spline:
         return tuple(itertools.chain(*zip(self.knots["s"][1:], self.knots["v"][1:], strict=True)))
 
     def accelerations(self, values: Mapping[str, Number]) -> tuple[Number, ...]:
-        """Return s'' at all knots."""
+        """S'' at all knots."""
         if self.mirrored:
             return cam_spline.mirrored([values[f"{PREFIX}{k}"] for k in range(self.intervals // 2)])
         return tuple(values[f"{PREFIX}{k}"] for k in range(self.intervals + 1))
@@ -156,11 +156,11 @@ class LawColumn(Sequence[Number]):
         self.values, self.names = values, names
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Number of them."""
         return len(self.names)
 
     def __iter__(self) -> Iterator[Number]:
-        """Return them one after the other."""
+        """Sequence of the values."""
         return map(self.values.__getitem__, self.names)
 
     def __getitem__(self, place: Number) -> Number:
@@ -190,7 +190,7 @@ class Tabulated:
         return False
 
     def prepared(self, maths: Maths, values: Values) -> dict[str, Number]:
-        """Return nothing."""
+        """Empty."""
         return {}
 
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
@@ -199,23 +199,23 @@ class Tabulated:
 
 
 def knots(values: Mapping[str, Number]) -> tuple[Number, ...]:
-    """Return s'' at the knots of a spline law among values, law_0, law_1 ...; none without one."""
+    """S'' at the knots of a spline law among values, law_0, law_1 ...; empty without one."""
     names = itertools.takewhile(values.__contains__, (f"{PREFIX}{k}" for k in itertools.count()))
     return tuple(values[name] for name in names)
 
 
 def of_knots(name: str) -> bool:
-    """Say whether a number is one of a spline law's knots, by its name."""
+    """Whether a number is a knot of a spline law, by name."""
     return name.startswith(PREFIX)
 
 
 def named_knots(accelerations: Iterable[Number]) -> dict[str, Number]:
-    """Return s'' at the knots of a spline law by name."""
+    """S'' at the knots of a spline law by name."""
     return {f"{PREFIX}{k}": value for k, value in enumerate(accelerations)}
 
 
 def accelerations(law: CamLaw, values: Values, intervals: int) -> tuple[float, ...]:
-    """Return s'' of a law of floats at the knots of so many equal intervals; at a break of its own, that after it."""
+    """S'' of a law of floats at the knots of equal intervals; at a break of the law the value after it."""
     ready = {**values, **law.prepared(FLOAT, values)}
     shares = [Fraction(k, intervals) for k in range(intervals + 1)]
     return tuple(float(law.at(FLOAT, ready, float(u), bisect.bisect_right(law.breaks, u)).s2) for u in shares)

@@ -59,7 +59,7 @@ class SplineData:
         return self.s[-1], self.v[-1]
 
     def at(self, maths: Maths, u: Number, piece: Number) -> LawDerivatives:
-        """Return s(u) and its derivatives on interval `piece`."""
+        """S(u) and its derivatives on interval `piece`."""
         columns = self.s[:-1], self.v[:-1], self.a[:-1], self.a[1:]
         return cubic(self.intervals * u - piece, self.intervals, *(maths.choose(piece, values) for values in columns))
 
@@ -137,7 +137,7 @@ class LawTable:
         return tuple(Fraction(u) for u in self.u[1:-1])
 
     def at(self, maths: Maths, u: Number, piece: Number) -> LawDerivatives:
-        """Return s(u) and its derivatives on interval `piece`."""
+        """S(u) and its derivatives on interval `piece`."""
         begin, end, s, v, a, after = (
             maths.choose(piece, [maths.number(value) for value in values])
             for values in (self.u[:-1], self.u[1:], self.s[:-1], self.v[:-1], self.a[:-1], self.ahead[1:])
@@ -165,7 +165,7 @@ def tabulated(u: Sequence[float], s: Sequence[float], half: Sequence[float] = ()
 
 
 def _table_fault(u: "Floats", s: "Floats") -> str:
-    """Say why two columns are no rise from (0, 0) to (1, 1); "" when they are one."""
+    """Reason why two columns are no rise from (0, 0) to (1, 1); "" when they are one."""
     if u.ndim != 1 or u.shape != s.shape:
         return f"u and s must be two columns of one length; they have {u.size} and {s.size} values"
     if len(u) < 4:
@@ -202,7 +202,7 @@ def _refuse_a_fall(found: SmoothRise, dip: float) -> None:
 
 
 def fault(accelerations: tuple[float, ...]) -> str:
-    """Say why second derivatives at evenly spaced knots make no cam law; "" when they do."""
+    """Reason why second derivatives at evenly spaced knots make no cam law; "" when they do."""
     intervals = len(accelerations) - 1
     if not FEWEST <= intervals <= MOST:
         return f"it has {intervals} intervals; {FEWEST} to {MOST} are allowed"

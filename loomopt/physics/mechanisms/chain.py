@@ -354,7 +354,7 @@ def _apart(part: Part, a: str, b: str) -> Mapping[str, str]:
 
 
 def has_transmission_angle(part: Part) -> bool:
-    """Say whether a part has one that is not always a right angle."""
+    """Whether a part has a transmission angle that is not always a right angle."""
     return part.kind in ("dyad", "slider") or (part.numbers.get("offset", NOTHING) != NOTHING and part.kind == "slot")
 
 
@@ -437,7 +437,7 @@ close, a hundred times the rounding of a place."""
 
 
 def fault(chain: Chain, values: Values, shown: ShowValue = usual) -> str:
-    """Say which part does not close, and at which crank angle, also where it only touches; "" where all do.
+    """Reason with the part that does not close and the crank angle, also where it only touches; "" where all close.
 
     values: numbers by name, SI; shown(value, kind): a value as text in the reader's unit.
     """
@@ -457,7 +457,7 @@ def fault(chain: Chain, values: Values, shown: ShowValue = usual) -> str:
 
 
 def _spans(part: Part) -> Mapping[str, str]:
-    """Return what must close, and of a dyad that its joints do not meet: equal links fold nowhere else."""
+    """Quantities that must be positive for a part to close; of a dyad also the distance of its outer joints."""
     own = closes(part)
     return {**own, **_apart(part, *part.names("joins"))} if part.kind == "dyad" else own
 
@@ -498,7 +498,7 @@ def _cam_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> st
 
 
 def _gear_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> str:
-    """Say where the angle that a gear of no whole ratio counts passes its end, or that it does not come back."""
+    """Reason where the angle that a gear of no whole ratio counts passes its end or does not come back."""
     import numpy as np
 
     if isinstance(part.ratio, int):

@@ -69,14 +69,14 @@ def held(linked: Chain) -> Iterator[tuple[str, str]]:
 
 
 def names(linked: Chain) -> dict[tuple[str, str], str]:
-    """Return what the force of each joint and part is called: by the joint, and by the part where several share it."""
+    """Names of the forces by joint and part: after the joint, and after the part too where several parts share it."""
     found = list(held(linked))
     shared = [joint for joint, _ in found]
     return {each: each[0] if shared.count(each[0]) == 1 else f"{each[0]}_{each[1]}" for each in found}
 
 
 def pinned(linked: Chain) -> dict[tuple[str, str], str]:
-    """Return which of them are forces in pins: all but those of guides."""
+    """Forces in pins: all but those of guides."""
     return {place: name for place, name in names(linked).items() if place[0] != place[1]}
 
 
@@ -98,13 +98,13 @@ def joined(linked: Chain, place: tuple[str, str]) -> tuple[str, str]:
 
 
 def guides(linked: Chain) -> dict[str, str]:
-    """Return what turns each slider: the body that it slides on."""
+    """Body that turns a slider, by slider: the one that it slides on."""
     sliders = (part for part in linked.parts if part.kind == "slider")
     return {slider_of(part.name): part.word("guide") or FRAME_NAME for part in sliders}
 
 
 def turned(linked: Chain, pose: ChainPose, place: tuple[str, str]) -> Number:
-    """Return how the second body of a pin turns from the first one, per rad of the crank."""
+    """Rotation of the second body of a pin relative to the first one, per rad of the crank."""
     with_it = guides(linked)
     first, second = (pose.links[with_it.get(body, body)].rates(1) for body in joined(linked, place))
     return known(total(second, less(first)))
@@ -143,7 +143,7 @@ class Walk:
         return origins(self.linked)
 
     def at(self, joint: str) -> Vector:
-        """Return where a joint is, m."""
+        """Position of a joint, m."""
         return self.pose.joints[joint].place
 
     def push(self, body: str, force: Vector | None, place: Vector, couple: Number | None = None) -> None:
@@ -155,7 +155,7 @@ class Walk:
         self.loads.setdefault(body, []).append(Wrench(force or Vector(0, 0), moment))
 
     def acting(self, body: str, joint: str) -> Wrench | None:
-        """Return what acts on a body, about one of its joints; None for nothing."""
+        """Load on a body about one of its joints; None without any."""
         found = joint_forces.together(self.loads.get(body, ()))
         return None if found is None else Wrench(found.force, found.moment - cross(self.at(joint), found.force))
 
@@ -247,7 +247,7 @@ def walked(linked: Chain, pose: ChainPose, applied: Sequence[Applied]) -> Walk:
 
 
 def shaken(applied: Sequence[Applied], pose: ChainPose, about: Vector) -> Wrench:
-    """Return what all moving masses do to the frame: force, N, and moment about a point, N·m."""
+    """Force, N, and moment about a point, N·m, of all moving masses on the frame."""
     found = []
     for load in (load for load in applied if load.inertial):
         force = load.force or Vector(0, 0)

@@ -246,7 +246,7 @@ def front_pose(maths: Maths, lengths: Lengths, centres: "DeadCentres") -> Still:
 
 
 def dead_centres(maths: Maths, lengths: Lengths) -> DeadCentres:
-    """Return both dead centres of a crank-rocker; lengths in m."""
+    """Both dead centres of a crank-rocker; lengths in m."""
     return DeadCentres(maths, lengths)
 
 
@@ -293,7 +293,7 @@ TELLING = 1e-15
 
 
 def fault(l1: float, l2: float, l3: float, l4: float, *, shown: ShowValue = usual) -> str:
-    """Say why four lengths (m) are no crank-rocker: the inequality and where the crank stops; "" when they are one.
+    """Reason why four lengths (m) are no crank-rocker: the inequality and where the crank stops; "" when they are one.
 
     shown(value, kind): a value as text in the reader's unit.
     """
@@ -309,7 +309,7 @@ def fault(l1: float, l2: float, l3: float, l4: float, *, shown: ShowValue = usua
 
 
 def _where_it_stops(l1: float, l2: float, l3: float, l4: float, shown: ShowValue) -> str:
-    """Say over which crank angles the dyad does not close, for lengths in m."""
+    """Sentence with the crank angles over which the dyad does not close, for lengths in m."""
     reach, fold = l2 + l3, abs(l2 - l3)
     if l1 + l4 < fold or abs(l4 - l1) > reach:
         return "it assembles at no crank angle"

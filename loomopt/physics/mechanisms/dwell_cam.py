@@ -70,7 +70,7 @@ class DwellCam:
         return self.maths.choose(self.stretch, (*up, above, *down, below))
 
     def _moving(self, up: Number, down: Number) -> Number:
-        """Return what is `up` in the rise and `down` in the return; in the dwells either will do."""
+        """Value `up` in the rise and `down` in the return; in the dwells either is right."""
         pieces = len(LAWS[self.lasts.law].breaks) + 1
         return self.maths.choose(self.stretch, (*itertools.repeat(up, pieces + 1), *itertools.repeat(down, pieces + 1)))
 

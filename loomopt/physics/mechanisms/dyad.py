@@ -38,7 +38,7 @@ def cross(a: Vector, b: Vector) -> Number:
 
 
 def heron(maths: Maths, a: Number, b: Number, c: Number) -> Number:
-    """Return four times the area of the triangle a, b, c (m²), from factors that do not cancel.
+    """Four times the area of the triangle a, b, c (m²), from factors that do not cancel.
 
     The factors are the margins by which the triangle closes; a negative one makes the root fail or NaN.
     """
@@ -61,7 +61,7 @@ def close(maths: Maths, base: Vector, r1: Number, r2: Number, side: Number) -> D
 
 
 def rates(dyad: Dyad, base_1: Vector) -> tuple[Number, Number]:
-    """Return dφ₁/dφ and dφ₂/dφ of both links, from the loop's linear equations.
+    """Rates dφ₁/dφ and dφ₂/dφ of both links, from the loop's linear equations.
 
     base_1: d(base)/dφ. Their determinant is the triangle's area: the rates grow without bound as it vanishes.
     """
@@ -87,14 +87,14 @@ def square(x: Number) -> Number:
 
 
 def cube(x: Number) -> Number:
-    """Return x³, as products likewise."""
+    """Cube, x³, as products likewise."""
     return x * x * x
 
 
 def third_rate_1(
     dyad: Dyad, base_3: Vector, rates: tuple[Number, Number], seconds: tuple[Number, Number], r2: Number
 ) -> Number:
-    """Return d³φ₁/dφ³ of link 1; base_3: d³(base)/dφ³, rates and seconds of both links as from `rates`."""
+    """Third derivative d³φ₁/dφ³ of link 1; base_3: d³(base)/dφ³, rates and seconds of both links as from `rates`."""
     mutual = dot(dyad.link1, dyad.link2)
     bent = 3 * (rates[0] * seconds[0] * mutual - rates[1] * seconds[1] * (r2 * r2))
     return cube(rates[0]) + 2 / dyad.area4 * (dot(dyad.link2, base_3) + bent)
@@ -103,7 +103,7 @@ def third_rate_1(
 def third_rate_2(
     dyad: Dyad, base_3: Vector, rates: tuple[Number, Number], seconds: tuple[Number, Number], r1: Number
 ) -> Number:
-    """Return d³φ₂/dφ³ of link 2; base_3: d³(base)/dφ³, rates and seconds of both links as from `rates`."""
+    """Third derivative d³φ₂/dφ³ of link 2; base_3: d³(base)/dφ³, rates and seconds of both links as from `rates`."""
     mutual = dot(dyad.link1, dyad.link2)
     bent = 3 * (rates[0] * seconds[0] * (r1 * r1) - rates[1] * seconds[1] * mutual)
     return cube(rates[1]) + 2 / dyad.area4 * (dot(dyad.link1, base_3) + bent)

@@ -53,7 +53,7 @@ def unit(vector: Vector, length: Number) -> Vector:
 
 
 def turned(direction: Vector, along: Number, across: Number) -> Vector:
-    """Return what lies `along` a unit direction and `across` it, to its left."""
+    """Components along a unit direction and across it, to its left."""
     return Vector(along * direction.x - across * direction.y, along * direction.y + across * direction.x)
 
 
@@ -71,7 +71,7 @@ def together(wrenches: Iterable[Wrench]) -> Wrench | None:
 def inertia(
     mass: Number, first: Vector, second: Number, turning: tuple[Number, Number], carried: Vector | None = None
 ) -> Wrench:
-    """Return what a link's own mass adds: −m a_S, and −J α less what the joint's own acceleration takes.
+    """Inertia load of a link's mass: −m a_S, and −J α less the part of the joint's acceleration.
 
     mass: kg; first: mass times the way from the joint to its centre, kg·m; second: inertia about the joint, kg·m²;
     turning: the link's angular speed, rad/s, and acceleration, rad/s²; carried: the joint's acceleration, m/s², None

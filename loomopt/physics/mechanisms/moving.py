@@ -167,7 +167,7 @@ class Link:
         return vector if self.span is None else Vector(vector.x / self.span, vector.y / self.span)
 
     def unit(self) -> Vector:
-        """Return its direction, of length 1."""
+        """Unit direction."""
         return self._unit
 
     def point(self, along: Number | None, across: Number | None = None) -> Joint:

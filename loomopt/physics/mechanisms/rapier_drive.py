@@ -318,7 +318,7 @@ Floats = NDArray[np.float64]
 
 
 def fault(dimensions: Dimensions, shown: ShowValue = usual) -> str:
-    """Say why a drive (m, rad) does not turn all round, and at which crank angles from FDC; "" when it does.
+    """Reason why a drive (m, rad) does not turn fully, with the crank angles from FDC; "" when it does.
 
     shown(value, kind): a value as text in the reader's unit.
     """
@@ -349,7 +349,7 @@ def _span(d: Dimensions, phi1: NDArray[np.floating[Any]]) -> Floats:
 
 
 def _angles(d: Dimensions) -> Floats:
-    """Return crank angles of one turn, rad: evenly spread, and where C and B2 are farthest apart and closest."""
+    """Crank angles of one turn, rad: evenly spread, and where C and B2 are farthest apart and closest."""
     step = 2 * math.pi / FAULT_SAMPLES
     even: Floats = step * np.arange(FAULT_SAMPLES, dtype=np.float64)
     span = _span(d, even)
@@ -380,7 +380,7 @@ def _stretches(angles: Floats, open_at: NDArray[np.bool_], shown: ShowValue) -> 
 
 
 def fault_of(design: Mapping[str, float], shown: ShowValue = usual) -> str:
-    """Return `fault` of numbers by name, SI; "" where some of them are not named."""
+    """Reason as of `fault`, from numbers by name, SI; "" where numbers are missing."""
     names = Dimensions.__dataclass_fields__
     if not all(name in design for name in names):
         return ""

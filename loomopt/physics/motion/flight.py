@@ -140,7 +140,7 @@ class Course:
 
 
 def follow(body: Body, cam: Cam, restitution: float, turns: int) -> Course:
-    """Return what becomes of a body in contact at angle 0, until its state there repeats; at most so many turns.
+    """Motion of a body in contact at angle 0, until its state there repeats; turns: the most that are followed.
 
     Raises ArithmeticError where a turn does not end in a reasonable number of pieces.
     """
@@ -158,7 +158,7 @@ def follow(body: Body, cam: Cam, restitution: float, turns: int) -> Course:
 
 
 def _same(one: FlightState | None, other: FlightState | None, cam: Cam) -> bool:
-    """Say whether two states are one."""
+    """Whether two states are equal."""
     if one is None or other is None:
         return one is other
     near = abs(one.x - other.x) <= REPEATED * cam.stroke
@@ -211,7 +211,7 @@ class _Rule:
         return next((pull for pull in self.cam.pulls if pull[1] > angle), (TURN, TURN))
 
     def _blind(self, angle: float, end: float) -> float:
-        """Return how long, s, after leaving without relative speed at `angle` no landing is possible.
+        """Time, s, after leaving without relative speed at `angle` during which no landing is possible.
 
         The gap g obeys M g̈ + C ġ + k g = −N, with N < 0 the force that would hold the body on the cam: it grows until N
         is positive again or, at the earliest, a quarter of a period has passed.
@@ -242,7 +242,7 @@ class _Rule:
         return FreePiece(angle, state.x, state.v, zone, sign, sigma, kappa, push, stuck)
 
     def _ends(self, piece: FreePiece, blind: float) -> tuple[float, str]:
-        """Return how long, s, a piece lasts and what ends it: "landing", "rest", a corner's number, or the "turn"."""
+        """Duration of a piece, s, and its end: "landing", "rest", a corner's number, or the "turn"."""
         omega = self.cam.omega
         last, time = (TURN - piece.begin) / omega, 0.0
         least = LEAST_STEP * TURN / omega

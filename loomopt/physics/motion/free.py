@@ -31,7 +31,7 @@ class Body:
     zones: tuple[Zone, ...]
 
     def rest(self, zone: int, x: float) -> float:
-        """Return what holds the body back at rest, N."""
+        """Force that holds the body back at rest, N."""
         return self.zones[zone].stiffness * x + self.zones[zone].force
 
     @property
@@ -140,7 +140,7 @@ def unhindered(piece: FreePiece, at: Moving, body: Body, left: float) -> Iterato
 
 
 def bound(piece: FreePiece, at: Moving, left: float) -> float:
-    """Return what |ẍ| cannot exceed during the time left, s: ẍ² + x⃛²/kappa never grows, nor does x⃛² + kappa ẍ²."""
+    """Bound of |ẍ| during the time left, s: neither ẍ² + x⃛²/kappa nor x⃛² + kappa ẍ² ever grows."""
     if piece.stuck:
         return 0.0
     jerk = piece.jerk(at)
@@ -151,7 +151,7 @@ def bound(piece: FreePiece, at: Moving, left: float) -> float:
 
 
 def safe(value: float, slope: float, bend: float) -> float:
-    """Return for how long value + slope t − bend t²/2 stays positive: 0 for a value that is not, unless it grows."""
+    """Time during which value + slope t − bend t²/2 is positive: 0 for a value that is not, unless it grows."""
     if value <= 0.0 and slope <= 0.0:
         return 0.0
     value = max(value, 0.0)

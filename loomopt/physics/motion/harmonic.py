@@ -53,7 +53,7 @@ class Oscillator:
         return 2 * self.maths.pi / self.of.omega
 
     def free(self, elapsed: Number) -> Pair:
-        """Return e^(−decay t) C(t) and e^(−decay t) S(t): S'' = −square S, S(0) = 0, S'(0) = 1, C = S'."""
+        """Damped waves e^(−decay t) C(t) and e^(−decay t) S(t): S'' = −square S, S(0) = 0, S'(0) = 1, C = S'."""
         return REGIMES[self.regime](self.maths, self.of, elapsed)
 
     def steady(self, frequency: Number) -> Pair:
@@ -111,7 +111,7 @@ REGIMES = {"under": _under, "critical": _critical, "over": _over}
 
 
 def regime(inertia: float, damping: float, stiffness: float) -> str:
-    """Return how an oscillator is damped."""
+    """Damping of an oscillator."""
     natural, decay = stiffness / inertia, (damping / (2 * inertia)) ** 2
     if abs(natural - decay) <= CRITICAL * natural:
         return "critical"
@@ -176,7 +176,7 @@ _kept = functools.lru_cache(maxsize=16)(_made)
 
 
 def enough(weigh: Weigh, maths: Maths, begun: int = FEWEST) -> int:
-    """Return how many harmonics a smooth force needs, at least `begun`. Raises ArithmeticError where MOST are too few.
+    """Number of harmonics of a smooth force, at least `begun`. Raises ArithmeticError where MOST are too few.
 
     maths: of floats.
     """
@@ -204,7 +204,7 @@ def answered(oscillator: Oscillator, force: FourierSeries) -> tuple[FourierSerie
 
 
 def named(prefix: str, values: Constants | FourierSeries) -> dict[str, Number]:
-    """Return numbers by name, as `read_constants` and `read_series` find them again."""
+    """Numbers by name, as `read_constants` and `read_series` find them again."""
     if isinstance(values, Constants):
         return {f"{prefix}.{name}": value for name, value in values._asdict().items()}
     found = {f"{prefix}.cos {n}": value for n, value in enumerate(values.cosines)}

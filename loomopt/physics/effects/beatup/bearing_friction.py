@@ -29,12 +29,12 @@ class Parameters(Table):
 
 
 def corners(at: Inputs[object]) -> tuple[Number, ...]:
-    """Return front and rear dead centre, rad: β, π + β_r."""
+    """Front and rear dead centre, rad: β, π + β_r."""
     return at.values["beta"], at.maths.pi + at.values["beta_r"]
 
 
 def switch(angle: float, corners: tuple[float, ...]) -> float:
-    """Return sgn q˙: −1 from front to rear dead centre, where ψ grows, +1 on the way back; angle in rad."""
+    """Sign of q˙: −1 from front to rear dead centre, where ψ grows, +1 on the way back; angle in rad."""
     front, rear = corners
     turn = 6.283185307179586
     return -1.0 if (angle - front) % turn < (rear - front) % turn else 1.0

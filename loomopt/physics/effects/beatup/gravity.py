@@ -68,7 +68,7 @@ def weight(maths: Maths, mass: Number, tilt: Number) -> Vector:
 
 
 def mass(at: Inputs[object]) -> LinkMass:
-    """Return reed and counterweight, whose centre lies aside of the rocker's line."""
+    """Reed and counterweight, whose centre lies aside of the rocker's line."""
     moment = at.values["m4"] * at.values["r4"] - at.values["m4e"] * at.values["r4e"]
     aside = at.maths.cos(at.table["offset"]), at.maths.sin(at.table["offset"])
     return LinkMass("reed", at.values["m4"] + at.values["m4e"], moment * aside[0], moment * aside[1], 0)

@@ -210,7 +210,7 @@ class CrankRockerForces:
 
 
 def remark(at: Inputs[object], shown: ShowValue) -> str:
-    """Say that the cloth's couple has no place yet."""
+    """Remark that the forces do not contain the cloth's couple."""
     if at.values.get("resistance.pulse") is None or at.values.get("resistance.reach") is not None:
         return ""
     return (

@@ -38,7 +38,7 @@ class Parameters(Table):
 
 
 def corners(at: Inputs[object]) -> tuple[Number, ...]:
-    """Return where the pulse begins and ends, rad: β ∓ δ/2; of a table where its intervals begin."""
+    """Angles where the pulse begins and ends, rad: β ∓ δ/2; of a table those where its intervals begin."""
     if "table" in at.table:
         return tuple(at.values["beta"] + at.maths.number(begin) for begin in at.table["table"].begins)
     return at.values["beta"] - at.table["pulse"] / 2, at.values["beta"] + at.table["pulse"] / 2

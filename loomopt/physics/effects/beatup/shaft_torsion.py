@@ -44,7 +44,7 @@ class Parameters(Table):
 
 
 def fixed(at: Inputs[object], carried: "Carried") -> Mapping[str, str]:
-    """Return how the shaft is damped, and how many harmonics its motion needs. Raises UnsteadyError."""
+    """Damping of the shaft and the number of harmonics of its motion. Raises UnsteadyError."""
     from loomopt.physics.effects.kinds import UnsteadyError
     from loomopt.physics.motion import harmonic
 
@@ -122,7 +122,7 @@ def moved(at: "Inputs[Motion]", coordinate: Number, force: Number, acceleration:
 
 
 def samples(at: Inputs[object]) -> float:
-    """Return how many samples of a turn show every swing of the shaft, or what decays faster than it would swing."""
+    """Number of samples per turn that resolve every oscillation of the shaft, or a decay that is faster."""
     square = at.values[f"{NAME}.stiffness"] / at.values[f"{NAME}.inertia"]
     half = at.values[f"{NAME}.damping"] / at.values[f"{NAME}.inertia"] / 2
     rate = half + (half**2 - square) ** 0.5 if half**2 > square else square**0.5
@@ -130,7 +130,7 @@ def samples(at: Inputs[object]) -> float:
 
 
 def motion(written: "Written", own: Values) -> tuple[Number, Number]:
-    """Return both sides of J z¨ + c z˙ + k z = F."""
+    """Both sides of J z¨ + c z˙ + k z = F."""
     z, z1, z2 = written.coordinate
     omega = written.omega
     return written.inertia * omega**2 * z2 + own["damping"] * omega * z1 + own["stiffness"] * z, written.force
@@ -142,7 +142,7 @@ def term(written: "Written", own: Values) -> Number:
 
 
 def rests(own: Values) -> str:
-    """Say how the steady state is summed."""
+    """Remark on the sum that gives the steady state."""
     from loomopt.physics.motion import harmonic
 
     return (

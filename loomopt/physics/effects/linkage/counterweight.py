@@ -25,7 +25,7 @@ def moved(at: Inputs[object]) -> Number:
 
 
 def applied(at: Inputs[LinkagePose]) -> list[Applied]:
-    """Return what the mass resists with, in its place."""
+    """Inertia force of the counterweight, in its centre."""
     if at.pose.output.carrier == "":
         return []
     place = opposite(at.maths, at.pose, at.table["radius"], at.table.get("angle"))

@@ -30,7 +30,7 @@ class Sliding(Table):
 
 
 def corners(at: Inputs[object]) -> tuple[Number, ...]:
-    """Return where it begins and ends, rad."""
+    """Angles where the force begins and ends, rad."""
     return event_angle(at.values, at.table["begins"]), event_angle(at.values, at.table["ends"])
 
 

@@ -48,7 +48,7 @@ def moved(at: Inputs[object]) -> Number:
 
 
 def applied(at: Inputs[LinkagePose]) -> list[Applied]:
-    """Return what the mass resists with, in its centre; nothing without a mass."""
+    """Inertia force of the mass, in its centre; empty without a mass."""
     if "m" not in at.table or at.pose.output.carrier == "":
         return []
     place = on_output(at.maths, at.pose, at.table["centre"], at.table.get("offset"))

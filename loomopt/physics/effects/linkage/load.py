@@ -30,7 +30,7 @@ class Parameters(Table):
 
 
 def corners(at: Inputs[object]) -> tuple[Number, ...]:
-    """Return where it begins and ends, rad; of a table where its intervals begin; none where it acts all over."""
+    """Angles where the load begins and ends, rad; of a table those where its intervals begin; none for a whole turn."""
     if "table" in at.table:
         begins = at.table["table"].begins
         start = event_angle(at.values, at.table["at"]) if "at" in at.table else 0

@@ -39,7 +39,7 @@ def force(at: Inputs[LinkagePose]) -> Number:
 
 
 def applied(at: Inputs[LinkagePose]) -> list[Applied]:
-    """Return what the mass resists with, in its centre."""
+    """Inertia force of the mass, in its centre."""
     link = at.pose.joints.links.get(at.table["instance"])
     body = centre(at.pose.joints, at.table["instance"], at.table.get("along"), at.table.get("across"))
     square, change, inertia = at.pose.omega**2, at.pose.omega_dot, at.table.get("J")

@@ -41,7 +41,7 @@ class Sliding(Table):
 
 
 def corners(at: Inputs[object]) -> tuple[Number, ...]:
-    """Return where the pulse begins and ends, rad; of a table where its intervals begin."""
+    """Angles where the pulse begins and ends, rad; of a table those where its intervals begin."""
     middle = event_angle(at.values, at.table["at"])
     if "table" in at.table:
         return tuple(middle + at.maths.number(begin) for begin in at.table["table"].begins)

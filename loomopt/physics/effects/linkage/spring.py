@@ -55,7 +55,7 @@ def stretched(at: Inputs[LinkagePose]) -> Number:
 
 
 def pulls(at: Inputs[LinkagePose]) -> list[Applied]:
-    """Return what a spring between two joints pulls them with."""
+    """Pull of a spring between two joints."""
     a, b = (at.pose.joints.joints[at.table[key]].place for key in ("begins", "ends"))
     base = Vector(b.x - a.x, b.y - a.y)
     length = at.maths.sqrt(dot(base, base))
@@ -67,7 +67,7 @@ def pulls(at: Inputs[LinkagePose]) -> list[Applied]:
 
 
 def pushed(at: Inputs[LinkagePose]) -> Number:
-    """Return what a spring on the output takes, N·m or N, against q."""
+    """Resistance of a spring on the output, N·m or N, against q."""
     return at.table["preload"] + at.table["stiffness"] * at.pose.travelled(at.values, at.table["at"])
 
 

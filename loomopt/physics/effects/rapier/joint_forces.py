@@ -167,7 +167,7 @@ class RapierForces:
 
 
 def remark(at: Inputs[object], shown: ShowValue) -> str:
-    """Say that nothing of the head is in the forces."""
+    """Remark that the forces contain nothing of the head."""
     if "head_inertia.mass" in at.values or "tape_friction.force" in at.values:
         return ""
     return "forces in the joints have nothing of the head in them: put on head_inertia or tape_friction"

@@ -25,7 +25,7 @@ def corners(at: Inputs[object]) -> tuple[Number, ...]:
 
 
 def direction(angle: float, corners: tuple[float, ...]) -> float:
-    """Return +1 where the head moves outward, −1 where it returns, 0 for a head that never turns."""
+    """Sign of the head's motion: +1 outward, −1 on the return, 0 for a head that never turns."""
     if not corners:
         return 0.0
     turn, first = 2 * math.pi, corners[0]

@@ -27,12 +27,12 @@ class Parameters(Table):
 
 
 def head_overrun(at: Inputs[object]) -> Number:
-    """Return how far the head goes beyond its stroke, m."""
+    """Distance of the head beyond its stroke, m."""
     return -at.values[MASS] * at.values[ACCELERATION] * at.values["speed"] ** 2 / at.table["stiffness"]
 
 
 def remark(at: Inputs[object], shown: ShowValue) -> str:
-    """Say where the stretch is no longer quasi-static."""
+    """Remark where the stretch is no longer quasi-static."""
     natural = math.sqrt(at.table["stiffness"] / at.values[MASS])
     if natural >= SLOW * at.values["speed"]:
         return ""

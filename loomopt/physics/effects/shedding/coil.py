@@ -245,7 +245,7 @@ class Parameters(Table):
 
 
 def coil(own: Values) -> Coil:
-    """Return one of the coils."""
+    """Coil by name."""
     return Coil(
         own["wire"],
         own["diameter"],
@@ -322,7 +322,7 @@ def explain(
     clash: Collection[str],
     shown: ShowValue = usual,
 ) -> str:
-    """Say why coils that surge late enough are stressed too much, and what helps; "" where that is not what clashes.
+    """Reason why coils that surge late enough are stressed too much, and a remedy; "" where these do not conflict.
 
     shown(value, kind, digits): a value as text in the reader's unit.
     tau >= 2 K_W (X0 + travel) f sqrt(2 G rho) follows from rate, surge frequency and shear stress [Shigley, ch. 10].

@@ -95,7 +95,7 @@ def read(course: "Course") -> dict[str, float | None]:
 
 
 def rules(terms: EventTerms) -> Sequence[Rule]:
-    """Return where the frame leaves the cam, its motion in flight, and what a landing makes of it."""
+    """Take-off of the frame from the cam, its motion in flight, and its state after a landing."""
     symbol, total = terms.symbol, terms.total
     X, omega = symbol("X"), symbol("omega")
     before, after, face = symbol("X'_before"), symbol("X'_after"), symbol("X'_cam")
