@@ -62,7 +62,7 @@ class NamedLaw:
         return LAWS[self.name].symmetric
 
     def prepared(self, maths: Maths, values: Values) -> dict[str, Number]:
-        """Empty."""
+        """Empty: the law needs no computed values."""
         return {}
 
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
@@ -156,11 +156,11 @@ class LawColumn(Sequence[Number]):
         self.values, self.names = values, names
 
     def __len__(self) -> int:
-        """Number of them."""
+        """Number of values."""
         return len(self.names)
 
     def __iter__(self) -> Iterator[Number]:
-        """Sequence of the values."""
+        """Iterator over the values."""
         return map(self.values.__getitem__, self.names)
 
     def __getitem__(self, place: Number) -> Number:
@@ -190,7 +190,7 @@ class Tabulated:
         return False
 
     def prepared(self, maths: Maths, values: Values) -> dict[str, Number]:
-        """Empty."""
+        """Empty: the law needs no computed values."""
         return {}
 
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
