@@ -71,7 +71,7 @@ MACHINES = 100_000
 
 
 def load(name_or_path: str | os.PathLike[str]) -> Loaded:
-    """Return the scene of a packaged name or of a TOML file; of an answer's JSON file the answer, in its own scene.
+    """Scene of a packaged name or of a TOML file; of an answer's JSON file the answer, in its own scene.
 
     An answer comes as the `Evaluation` of its design, computed anew. Raises BadInput.
     """
@@ -182,7 +182,7 @@ def solve(
 
 
 def evaluate(scene: Given, design: Design | Evaluation | None = None, target: str | None = None) -> Evaluation:
-    """Return figures and limits of a design (SI and rad; today's where it names nothing). Raises BadInput.
+    """Figures and limits of a design (SI and rad; today's where it names nothing). Raises BadInput.
 
     scene: as `load` takes it; without a design, an answer is judged as it is. design: a mapping, or an answer, of which
     the design alone is taken. target: whose limits, the answer's own or the job's default without one.
@@ -194,7 +194,7 @@ def evaluate(scene: Given, design: Design | Evaluation | None = None, target: st
 def prove(
     scene: Given, design: Design | Evaluation | None = None, target: str | None = None, *, slack: float = SLACK
 ) -> "Proofs":
-    """Return proofs that a design's limits (SI; today's without one) hold at every crank angle, or where they fail.
+    """Proofs that a design's limits (SI; today's without one) hold at every crank angle, or where they fail.
 
     design: a mapping, or an answer, of which the design alone is taken. target: whose limits,
     the job's default without one. slack: what binding limits leave open, relative to each quantity's largest magnitude
@@ -219,7 +219,7 @@ def simulate(
     accuracy: float | None = None,
     measured: str | os.PathLike[str] | None = None,
 ) -> "pd.DataFrame":
-    """Return the curves of a design (SI; today's without one) over the cycle, units in the column names.
+    """Curves of a design (SI; today's without one) over the cycle, units in the column names.
 
     design: a mapping, or an answer, of which the design alone is taken. target: what it was found for, to be named in
     the table's provenance. accuracy: as few rows as show each column's largest magnitude to it; every half degree
@@ -260,7 +260,7 @@ def sweep(
     seed: int = 0,
     on_row: "Callable[[Row], None] | None" = None,
 ) -> "StudyTable":
-    """Return a row for every combination of scene numbers, solved for a target (the job's default without one).
+    """A row for every combination of scene numbers, solved for a target (the job's default without one).
 
     over: dotted key → its values as a scene gives them, or "LO:HI:STEP UNIT". executor: any of `concurrent.futures`, or
     a function that makes one; workers: so many processes on this machine instead. The rows are the same, whoever
@@ -302,7 +302,7 @@ def effects(
 def sensitivity(
     answer: Answer | Given, target: str | None = None, *, on_step: Callable[[str], None] | None = None
 ) -> "SensitivityStudy":
-    """Return how an answer moves with every number of its scene, and how far its prices hold.
+    """How an answer moves with every number of its scene, and how far its prices hold.
 
     answer: what `solve` returned; a scene, or what `load` takes, is solved first, for `target`. on_step(what):
     progress. Raises BadInput, also for an answer that is not certified, and KeyboardInterrupt on Ctrl-C.
@@ -330,7 +330,7 @@ def tolerance(
     resume: bool = False,
     on_step: Callable[[str], None] | None = None,
 ) -> "ToleranceStudy":
-    """Return how the machines of a design (SI; today's without one) spread as [tolerances] has them made.
+    """How the machines of a design (SI; today's without one) spread as [tolerances] has them made.
 
     design, target: as in `evaluate`. samples: machines that are drawn, over 16 scrambles of Sobol's points by `seed`.
     worst: whether the worst case of each figure within all tolerances is proven too, which takes seconds.
@@ -363,7 +363,7 @@ def pareto(
     accuracy: float = ACCURACY,
     on_row: "Callable[[Row], None] | None" = None,
 ) -> "StudyTable":
-    """Return the front of two axes: what the first costs of the second, every point certified.
+    """Front of two axes: what the first costs of the second, every point certified.
 
     axes: figures or numbers that the scene bounds, freed where it holds them; M3_fdc counts by magnitude. target: whose
     demands hold at every point, of all but the axes: the job's default without one, "none" for the scene's limits
@@ -394,7 +394,7 @@ def accuracy(scene: Given, *, full: bool = False, on_step: Callable[[str], None]
 
 
 def problems() -> "tuple[Head, ...]":
-    """Return the packaged problems: name, title, job, targets and source of each. Raises BadInput."""
+    """Packaged problems: name, title, job, targets and source of each. Raises BadInput."""
     from loomopt.interface import listing
 
     return listing.problems()[0]
@@ -412,14 +412,14 @@ def new(job: str, path: str | os.PathLike[str]) -> "Path":
 
 
 def schema(job: str) -> dict[str, object]:
-    """Return the JSON Schema of a job's scenes, for editors. Raises BadInput."""
+    """JSON Schema of a job's scenes, for editors. Raises BadInput."""
     from loomopt.interface.text import json_schema
 
     return json_schema.scene(registry.declared(arguments.text(job, "job", "a loom job", "Name one, such as beatup")))
 
 
 def compare(*answers: "Evaluation | str", scene: Given | None = None) -> "Comparison":
-    """Return designs side by side in one unit, with what differs marked; their curves by `.plot()`.
+    """Designs side by side in one unit, with what differs marked; their curves by `.plot()`.
 
     answers: answers or evaluations of one job, and "today" for the first one's machine as it is. scene: in which all
     are judged; each in its own without it. Raises BadInput.
@@ -430,12 +430,12 @@ def compare(*answers: "Evaluation | str", scene: Given | None = None) -> "Compar
 
 
 def _scene(given: Given) -> Scene:
-    """Return a scene that is given as itself, by its name or by its path; of an answer its own. Raises BadInput."""
+    """A scene that is given as itself, by its name or by its path; of an answer its own. Raises BadInput."""
     return _opened(given)[0]
 
 
 def _opened(given: Given) -> tuple[Scene, dict[str, float] | None]:
-    """Return a scene; of an answer its own, which knows its target, and its design, checked. Raises BadInput."""
+    """A scene; of an answer its own, which knows its target, and its design, checked. Raises BadInput."""
     from loomopt.scenes import designs
 
     if isinstance(given, Scene):
@@ -449,7 +449,7 @@ def _opened(given: Given) -> tuple[Scene, dict[str, float] | None]:
 
 
 def _request(scene: Given, design: Design | Evaluation | None) -> tuple[Scene, dict[str, float]]:
-    """Return a scene and a design in it, checked: of an answer its own, where none is given; else today's, as nothing.
+    """A scene and a design in it, checked: of an answer its own, where none is given; else today's, as nothing.
 
     Of an answer given as the design, its design alone. Raises BadInput.
     """

@@ -58,13 +58,13 @@ class TurnedForce(NamedTuple):
         return float((np.sum(np.diff(phi) * (values[1:] + values[:-1]) / 2) / TURN) ** (1 / power))
 
     def on(self, part: str) -> tuple[Floats, Floats]:
-        """Return the components, N, along axes that turn with a part, x along its line."""
+        """Components, N, along axes that turn with a part, x along its line."""
         cosine, sine = self.headings[part]
         return self.x * cosine + self.y * sine, self.y * cosine - self.x * sine
 
 
 def found(scene: Scene, curves: "pd.DataFrame", design: Mapping[str, float] = TODAY) -> Mapping[str, TurnedForce]:
-    """Return the forces, by name, of which a design's curves (SI) have both components. Raises BadInput without any."""
+    """Forces, by name, of which a design's curves (SI) have both components. Raises BadInput without any."""
     columns = {split(str(column)): column for column in curves}
     known = {name: curves[column].to_numpy() for (name, unit), column in columns.items() if unit == "N"}
     names = [name for name in known if f"{name}_x" in known and f"{name}_y" in known]

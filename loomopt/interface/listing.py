@@ -17,7 +17,7 @@ STAMP = (2000, 1, 1, 0, 0, 0)
 
 
 def problems() -> tuple[tuple[Head, ...], list[BadInput]]:
-    """Return the heads of all problems in alphabetical order, and what kept others from being read."""
+    """Heads of all problems in alphabetical order, and what kept others from being read."""
     heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
     silent = [head.name for head in heads if not head.targets]
     if silent or packaged.entry_points("loomopt.jobs"):  # whose targets only their jobs know: those are read whole
@@ -74,7 +74,7 @@ def copied(name: str, path: Path) -> Path:
 
 
 def _named(scene: Path) -> dict[str, str]:
-    """Return the files that a packaged scene names, by name, with what stands in them. Raises BadInput."""
+    """Files that a packaged scene names, by name, with what stands in them. Raises BadInput."""
     from loomopt.jobs import registry
     from loomopt.scenes.numbers import tables
 

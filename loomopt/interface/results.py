@@ -55,13 +55,13 @@ class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
         return self.result.as_dict(self.target)
 
     def table(self) -> "pd.DataFrame":
-        """Return design and figures, a row each, beside today's machine and the limits, in the scene's own units."""
+        """Design and figures, a row each, beside today's machine and the limits, in the scene's own units."""
         from loomopt.interface import tables
 
         return tables.answer(self.result, self.scene)
 
     def to_frame(self, *, si: bool = False) -> "pd.DataFrame":
-        """Return design and figures as one row, units in the column names, to be set beside others by `pd.concat`.
+        """Design and figures as one row, units in the column names, to be set beside others by `pd.concat`.
 
         si: in SI, so that rows of scenes in different units have the same columns; else in the scene's own units.
         """
@@ -70,14 +70,14 @@ class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
         return tables.row(self.result, self.scene, self.sought, self._outcome, si=arguments.flag(si, "si"))
 
     def curves(self) -> "pd.DataFrame":
-        """Return the curves of the design over the cycle, SI, units in the column names."""
+        """Curves of the design over the cycle, SI, units in the column names."""
         return self.simulate()
 
     @renamed(beside="measured")
     def plot(
         self, path: str | os.PathLike[str] | None = None, *, measured: str | os.PathLike[str] | None = None
     ) -> "Figure":
-        """Return the curves over the cycle as a figure, which shows itself in Jupyter.
+        """Curves over the cycle as a figure, which shows itself in Jupyter.
 
         path: a file to write it to as well: .png, .svg or .pdf. measured: as in `loomopt.simulate`. Raises BadInput.
         """
@@ -88,7 +88,7 @@ class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
         return outputs.plot(self.result, self.scene, self.target, place, measured)
 
     def plot_forces(self, path: str | os.PathLike[str] | None = None) -> "Figure":
-        """Return the forces that an effect tells by components: size over the turn, and each one's polar diagram.
+        """Forces that an effect tells by components: size over the turn, and each one's polar diagram.
 
         path: a file to write it to as well: .png, .svg or .pdf. Raises BadInput, also where no effect tells any.
         """
@@ -100,7 +100,7 @@ class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
         return drawn
 
     def draw(self) -> "Sketch":
-        """Return the mechanism drawn at full scale, which shows itself in Jupyter. Raises BadInput."""
+        """Mechanism drawn at full scale, which shows itself in Jupyter. Raises BadInput."""
         solution.demand_single(self.result, "drawing")
         from loomopt.interface.files import outputs
         from loomopt.interface.text import notebook
@@ -132,7 +132,7 @@ class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
         return place
 
     def animate(self, path: str | os.PathLike[str] | None = None) -> "MovingPicture":
-        """Return the mechanism moving through its turn, which shows itself in Jupyter. Raises BadInput.
+        """Mechanism moving through its turn, which shows itself in Jupyter. Raises BadInput.
 
         path: a file to write it to as well: .html, .gif, or .mp4 where ffmpeg is found.
         """
@@ -144,7 +144,7 @@ class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
         return animation.animated(self.scene, self.design, place, outputs.what(self.result))
 
     def evaluate(self) -> "Evaluation":
-        """Return figures and limits of the design in its own scene, judged by the limits of its own target."""
+        """Figures and limits of the design in its own scene, judged by the limits of its own target."""
         solution.demand_single(self.result, "figures to evaluate")
         design = designs.checked(self.design, self.scene)
         if self.terms:
@@ -155,7 +155,7 @@ class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
     def simulate(
         self, *, accuracy: float | None = None, measured: str | os.PathLike[str] | None = None
     ) -> "pd.DataFrame":
-        """Return the curves of the design in its own scene; accuracy, measured: as in `loomopt.simulate`."""
+        """Curves of the design in its own scene; accuracy, measured: as in `loomopt.simulate`."""
         solution.demand_single(self.result, "curves")
         from loomopt.interface import tables
 
@@ -171,7 +171,7 @@ class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
         return compute(self.scene, designs.checked(self.design, self.scene), fluctuation)
 
     def prove(self, *, slack: float = SLACK) -> "Proofs":
-        """Return proofs of the limits of its own scene and target; slack: as in `loomopt.prove`. Raises BadInput."""
+        """Proofs of the limits of its own scene and target; slack: as in `loomopt.prove`. Raises BadInput."""
         from loomopt.solving.proof import whole_cycle
 
         solution.demand_single(self.result, "proofs")

@@ -51,18 +51,18 @@ class ColumnUnits:
         self.study, self.si, self.words = study, si, Words(study.scene)
 
     def of(self, name: str) -> str:
-        """Return the unit of a key that varies, a design variable or a figure."""
+        """Unit of a key that varies, a design variable or a figure."""
         kind = _kind(self.study, name)
         return SI_UNIT[kind] if self.si else self.study.scene.shown_in(kind)
 
     def price(self, multiplier: Multiplier) -> tuple[str, float]:
-        """Return the unit of a multiplier, and its size in SI."""
+        """Unit of a multiplier, and its size in SI."""
         over, under = self.of(multiplier.figure), self.of(multiplier.side.limit)
         return (over if under == "1" else f"{over}/{grouped(under)}"), factor(over) / factor(under)
 
 
 def columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> dict[str, list[NumberColumn]]:
-    """Return the numbers of rows as columns: "place", "sought", "design", "figures", "multipliers"; none that is empty.
+    """Numbers of rows as columns: "place", "sought", "design", "figures", "multipliers"; none that is empty.
 
     In the units of the scene, where what is only rounding beside the largest of its unit is 0; si: in SI, as they are.
     """
@@ -97,7 +97,7 @@ NAMED = re.compile(r"(?P<key>[^\s=]+)\s*=\s*(?P<value>.+)|(?P<name>[A-Za-z_]\S*)
 def labelled_point(
     study: SceneStudy, rows: Sequence[Row], solved: Sequence[Row], label: int | str | Mapping[str, str | float]
 ) -> int:
-    """Return the number of the point that a label names. Raises BadInput for none, and for more than one.
+    """Number of the point that a label names. Raises BadInput for none, and for more than one.
 
     rows: those that the table shows, of which a place is one; solved: all, of which a number is one.
     label: the number, also as the table prints it ("3", "3*"); the place, as "715 N*m", or of several columns
@@ -123,7 +123,7 @@ def labelled_point(
 def _named_places(
     study: SceneStudy, rows: Sequence[Row], label: str | Mapping[str, str | float], allowed: str
 ) -> list[tuple[NumberColumn, float]]:
-    """Return the columns that a label names, each with the value that it gives, SI. Raises BadInput."""
+    """Columns that a label names, each with the value that it gives, SI. Raises BadInput."""
     made, remedy = columns(study, rows), "Write the number of the row, or its place with its unit"
     known = {column.name: column for part in made.values() for column in part}
     first = next(iter(made["place"]), None)
@@ -167,7 +167,7 @@ def _kind(study: SceneStudy, name: str) -> str:
 
 
 def _place_example(study: SceneStudy, rows: Sequence[Row]) -> str:
-    """Return how a row's place is written, by its first number."""
+    """How a row's place is written, by its first number."""
     column = next(iter(columns(study, rows)["place"]), None)
     value = next((each for each in column.shown if each is not None), None) if column else None
     if column is None or value is None:
@@ -223,7 +223,7 @@ def study_provenance(study: SceneStudy) -> dict[str, str]:
 
 
 def units(study: SceneStudy, rows: Sequence[Row]) -> dict[str, str]:
-    """Return the SI unit of everything that rows name."""
+    """SI unit of everything that rows name."""
     return {column.name: column.unit for part in columns(study, rows, si=True).values() for column in part}
 
 

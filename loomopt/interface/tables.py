@@ -51,7 +51,7 @@ def answer(solution: Evaluated, scene: Scene) -> "pd.DataFrame":
 
 
 def rows(solution: Evaluated, scene: Scene, before: Evaluated | None = None) -> list[dict[str, Any]]:
-    """Return the rows of `answer` as plain data, what is only rounding as 0; before: today's.
+    """Rows of `answer` as plain data, what is only rounding as 0; before: today's.
 
     A figure the scene cannot have is left out.
     """
@@ -77,7 +77,7 @@ def rows(solution: Evaluated, scene: Scene, before: Evaluated | None = None) -> 
 
 
 def _as_written(value: float, size: float) -> float:
-    """Return an SI value in units of a size: with 15 digits where these are the same value, as 23.4 is for 23.4 deg."""
+    """An SI value in units of a size: with 15 digits where these are the same value, as 23.4 is for 23.4 deg."""
     exact = value / size
     short = float(f"{exact:.15g}")
     return short if math.isclose(short * size, value, rel_tol=sys.float_info.epsilon) else exact
@@ -92,7 +92,7 @@ PER_SECOND = {
 
 
 def _per_second(row: dict[str, Any], kind: str, scene: Scene, speed: float | None) -> list[dict[str, Any]]:
-    """Return the row of a motion in time beside one per crank angle, where the speed is known; speed: the design's."""
+    """Row of a motion in time beside one per crank angle, where the speed is known; speed: the design's."""
     known = scene.operation.get("speed")
     if kind not in PER_SECOND or known is None:
         return []
@@ -107,7 +107,7 @@ def _per_second(row: dict[str, Any], kind: str, scene: Scene, speed: float | Non
 
 
 def _without_rounding(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return rows whose numbers are 0 where they are only rounding beside the largest one of their unit."""
+    """Rows whose numbers are 0 where they are only rounding beside the largest one of their unit."""
     sizes = largest(found)
     for row in found:
         for column in ("today", "design"):
@@ -117,7 +117,7 @@ def _without_rounding(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def largest(found: list[dict[str, Any]]) -> dict[str, float]:
-    """Return the largest magnitude in rows of each unit."""
+    """Largest magnitude in rows of each unit."""
     sizes: dict[str, float] = {}
     for row in found:
         sizes[row["unit"]] = max(sizes.get(row["unit"], 0.0), abs(row["design"]), abs(row["today"] or 0.0))
@@ -125,7 +125,7 @@ def largest(found: list[dict[str, Any]]) -> dict[str, float]:
 
 
 def row(solution: Evaluated, scene: Scene, target: str, outcome: str, *, si: bool = False) -> "pd.DataFrame":
-    """Return design and figures as one row, units in the column names; si: in SI, else in the scene's own units.
+    """Design and figures as one row, units in the column names; si: in SI, else in the scene's own units.
 
     A figure the scene cannot have is left out; part of a design that is a list is a tuple in its cell, SI.
     """
@@ -151,7 +151,7 @@ EVALUATED = 14
 
 
 def filed(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
-    """Return curves, SI, as a file has them: in the units of the scene's tables, in digits that mean something."""
+    """Curves, SI, as a file has them: in the units of the scene's tables, in digits that mean something."""
     from loomopt.model.curves import split
 
     found, names = frame.copy(), {}
@@ -164,7 +164,7 @@ def filed(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
 
 
 def meaningful(frame: "pd.DataFrame", digits: int | None = None) -> "pd.DataFrame":
-    """Return a table whose numbers have the digits that mean something, and no -0 or what is only rounding beside a 0.
+    """A table whose numbers have the digits that mean something, and no -0 or what is only rounding beside a 0.
 
     digits: significant ones; without, two more than the accuracy that the table says it was found with.
     """
@@ -188,7 +188,7 @@ def curves(
     target: str | None = None,
     measured: str | os.PathLike[str] | None = None,
 ) -> "pd.DataFrame":
-    """Return the curves of a design (SI; what it does not name stays today's) over one turn, SI.
+    """Curves of a design (SI; what it does not name stays today's) over one turn, SI.
 
     Every half degree; or, with an accuracy, as few rows as show each column's largest magnitude to it, relative.
     target: what the design was found for, where that is known. measured: a CSV file of measured curves, `phi [deg]` and
@@ -228,7 +228,7 @@ PHI, MEASURED, RMS = "phi", "_measured", "rms_"
 
 
 def _kinds(columns: "Mapping[str, Floats]") -> dict[str, str]:
-    """Return the kind of quantity of each column of curves that has one, by name, angles phi first."""
+    """Kind of quantity of each column of curves that has one, by name, angles phi first."""
     from loomopt.model.curves import split
 
     kinds = {unit: kind for kind, unit in SI_UNIT.items()}
@@ -258,7 +258,7 @@ def _put_beside(
 
 
 def _told(table: csv_tables.Table) -> dict[str, object]:
-    """Return the precision of measured columns, SI, and how what can be read in two ways was read."""
+    """Precision of measured columns, SI, and how what can be read in two ways was read."""
     precision = {f"precision_{name}": size for name, size in table.precision.items() if size}
     return precision | ({"read": "; ".join(table.remarks)} if table.remarks else {})
 
@@ -268,7 +268,7 @@ SAME = 1e-9
 
 
 def _place(apart: "Floats", before: int) -> int:
-    """Return the row of curves for a measured row; apart: from each of them, rad; before: rows of the same angle."""
+    """Row of curves for a measured row; apart: from each of them, rad; before: rows of the same angle."""
     import numpy as np
 
     near = np.flatnonzero(apart <= apart.min() + SAME)

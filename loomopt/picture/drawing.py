@@ -40,14 +40,14 @@ class Label(NamedTuple):
 
 
 def along(layer: str, one: Point, other: Point, side: float, text: str) -> Label:
-    """Return the label of a link between two joints: beside its middle, else nearer to an end."""
+    """Label of a link between two joints: beside its middle, else nearer to an end."""
     return Label(
         layer, one.part(other), side, text, tuple(one.part(other, share) for share in (0.62, 0.38, 0.75, 0.25))
     )
 
 
 def around(layer: str, centre: Point, radius: float, begin: float, end: float, text: str) -> Label:
-    """Return the label of an arc from begin to end, rad: outside its middle, else nearer to an end."""
+    """Label of an arc from begin to end, rad: outside its middle, else nearer to an end."""
     first, *also = (centre.towards(begin + share * (end - begin), radius) for share in (0.5, 0.7, 0.3, 0.9, 0.1))
     return Label(layer, first, (begin + end) / 2, text, tuple(also))
 
@@ -65,7 +65,7 @@ def place(labels: Sequence[Label], strokes: Sequence[Primitive], height: float) 
 
 
 def _written(label: Label, spot: shapes.LabelSpot, h: float) -> list[Text | Line]:
-    """Return a label in its spot, and the leader from its point where it stands far off; h: text height, m."""
+    """A label in its spot, and the leader from its point where it stands far off; h: text height, m."""
     box, near = spot.box, Point(spot.x, spot.y)
     text = Text(label.layer, Point((box.left + box.right) / 2, (box.bottom + box.top) / 2), label.text)
     end = Point(*box.nearest(*near))
@@ -75,7 +75,7 @@ def _written(label: Label, spot: shapes.LabelSpot, h: float) -> list[Text | Line
 
 
 def sheet(body: Drawing) -> Drawing:
-    """Return a drawing with its title above and its legend below as texts: what a renderer draws."""
+    """A drawing with its title above and its legend below as texts: what a renderer draws."""
     box, h = shapes.extent(body), body.height
     columns = max(20, int((box.right - box.left) / (1.4 * CHARACTER * h)))
     title = " ".join(plain(body.title).split())
@@ -102,12 +102,12 @@ COILS = 8
 
 
 def arrow(layer: str, tip: Point, angle: float, length: float) -> Line:
-    """Return an open arrow head of a length, m, that points in the direction of an angle, rad."""
+    """An open arrow head of a length, m, that points in the direction of an angle, rad."""
     return Line(layer, (tip.towards(angle + 2.8, length), tip, tip.towards(angle - 2.8, length)))
 
 
 def pointer(near: Point, angle: float, h: float) -> list[Primitive]:
-    """Return an arrow that points away from a point in the direction of an angle, rad; h: text height, m."""
+    """An arrow that points away from a point in the direction of an angle, rad; h: text height, m."""
     tip = near.towards(angle, POINTER * h)
     return [Line("notes", (near.towards(angle, 1.5 * h), tip)), arrow("notes", tip, angle, 1.2 * h)]
 
@@ -115,7 +115,7 @@ def pointer(near: Point, angle: float, h: float) -> list[Primitive]:
 def angle_between(
     centre: Point, radius: float, begin: float, end: float, h: float, both: bool = False
 ) -> list[Primitive]:
-    """Return an angle's arc from begin to end, rad, with an arrow head at its end, or at both ends."""
+    """An angle's arc from begin to end, rad, with an arrow head at its end, or at both ends."""
     turn = math.copysign(math.pi / 2, end - begin)
     found: list[Primitive] = [Arc("dimensions", centre, radius, min(begin, end), max(begin, end))]
     heads = [(end, turn), *([(begin, -turn)] if both else [])]
@@ -123,7 +123,7 @@ def angle_between(
 
 
 def fixed_pivot(pivot: Point, h: float) -> list[Primitive]:
-    """Return a pivot on hatched ground; h: text height, m."""
+    """A pivot on hatched ground; h: text height, m."""
     left, right = Point(pivot.x - h, pivot.y - 1.6 * h), Point(pivot.x + h, pivot.y - 1.6 * h)
     return [
         Circle("frame", pivot, 0.45 * h),
@@ -133,7 +133,7 @@ def fixed_pivot(pivot: Point, h: float) -> list[Primitive]:
 
 
 def ground(layer: str, middle: Point, side: float, h: float) -> list[Line]:
-    """Return a straight piece of hatched ground; side: direction, rad, in which the hatched side lies."""
+    """A straight piece of hatched ground; side: direction, rad, in which the hatched side lies."""
     along = side - math.pi / 2
     starts = [middle.towards(along, (1.0 - 0.6 * step) * h) for step in range(5)]
     return [
@@ -143,7 +143,7 @@ def ground(layer: str, middle: Point, side: float, h: float) -> list[Line]:
 
 
 def mass(centre: Point, h: float) -> list[Primitive]:
-    """Return the sign of a centre of mass: a circle with a cross; h: text height, m."""
+    """Sign of a centre of mass: a circle with a cross; h: text height, m."""
     r = MASS * h
     return [
         Circle("masses", centre, r),
@@ -153,7 +153,7 @@ def mass(centre: Point, h: float) -> list[Primitive]:
 
 
 def spring(layer: str, one: Point, other: Point, width: float) -> Line:
-    """Return a tension spring between two points as a zigzag of a width, m, with a straight hook at either end."""
+    """A tension spring between two points as a zigzag of a width, m, with a straight hook at either end."""
     along = math.atan2(other.y - one.y, other.x - one.x)
     hook, turn = 0.1, (1.0 - 0.2) / (2 * COILS)
     zigzag = [
@@ -164,7 +164,7 @@ def spring(layer: str, one: Point, other: Point, width: float) -> Line:
 
 
 def dimension(one: Point, other: Point, h: float) -> list[Primitive]:
-    """Return a straight dimension line with an arrow head at either end; nothing where the two points are one."""
+    """A straight dimension line with an arrow head at either end; nothing where the two points are one."""
     length, along = math.dist(one, other), math.atan2(other.y - one.y, other.x - one.x)
     if not length:
         return []
@@ -229,7 +229,7 @@ class Skeleton:
         return found
 
     def csv(self, units: Units = METRIC) -> str:
-        """Return the joints as CSV; of centres of mass, where there are any, mass and radius too. Digits round-trip."""
+        """Joints as CSV; of centres of mass, where there are any, mass and radius too. Digits round-trip."""
         length, mass = units.length, units.mass
         heading = f"joint,position,x [{length}],y [{length}]"
         lines = [f"{heading},mass [{mass}],radius [{length}]" if self.masses else heading]

@@ -45,7 +45,7 @@ MOTION = frozenset({"phi", "theta", "omega", "omega_dot", "q", "beta"})
 
 
 def given(model: JobModel, values: Values) -> Given:
-    """Return a scene's numbers as symbols, with the symbols and words of every effect's table that it gives."""
+    """A scene's numbers as symbols, with the symbols and words of every effect's table that it gives."""
     taken, own = {*MOTION, *values, *model.known} - set(model.labels), dict[str, Values]()
     # A model of formulas alone does not say which of its effects' numbers are given.
     told = not model.known.isdisjoint(model.labels)
@@ -88,7 +88,7 @@ def forces(
 
 
 def turning(pose: AnyMotion, model: JobModel) -> AnyMotion:
-    """Return a pose of symbols with the change of its speed where an effect gives the crank a speed of its own."""
+    """A pose of symbols with the change of its speed where an effect gives the crank a speed of its own."""
     if motor(model.effects) is None:
         return pose
     return replace(pose, omega_dot=symbol("omega_dot"))  # type: ignore[type-var]  # poses are dataclasses
@@ -166,7 +166,7 @@ def _tabulated(load: Load[Any], name: Expression, known: Given) -> Equation:
 
 
 def force(load: Acting, pose: Motion, known: Given, switch: float) -> Expression:
-    """Return a load's formula at a switch, on the turn on which its corners lie: no whole turns are taken off."""
+    """A load's formula at a switch, on the turn on which its corners lie: no whole turns are taken off."""
     if isinstance(load, State):
         return load.term(_in_symbols(pose, 0, 0), known.own[load.name])
     sp = sympy()
@@ -175,7 +175,7 @@ def force(load: Acting, pose: Motion, known: Given, switch: float) -> Expression
 
 
 def pieces(load: Acting, pose: Motion, known: Given) -> list[Piece]:
-    """Return a load's formula between each corner and the next, the last ending a turn after the first."""
+    """A load's formula between each corner and the next, the last ending a turn after the first."""
     whole_turn = 2 * systems.sympy().pi
     if not isinstance(load, Load) or load.corners is None:
         return [(force(load, pose, known, 0), (0, whole_turn))]

@@ -63,7 +63,7 @@ class Angle(NamedTuple):
 
 
 def moving(name: str) -> Angle:
-    """Return an angle whose derivatives are symbols with primes."""
+    """An angle whose derivatives are symbols with primes."""
     return Angle(name, symbol(f"{name}'"), symbol(f"{name}''"))
 
 
@@ -74,7 +74,7 @@ def loop(
     known: Sequence[Angle] = (),
     kind: str = "",
 ) -> list[Equation]:
-    """Return a loop's closure, and its first and second derivatives: linear in the rates of the unknown angles.
+    """A loop's closure, and its first and second derivatives: linear in the rates of the unknown angles.
 
     sides: left and right side of each equation; variable: the crank angle; kind: of which loop, before each name.
     """
@@ -102,7 +102,7 @@ def sums(
     torque: tuple[str, str] = ("crank torque", "Md"),
     within: Sequence[Expression] = (),
 ) -> list[Equation]:
-    """Return the output's balance and the crank torque by the balance's own sums; a load's term: LETTER_name.
+    """Output's balance and the crank torque by the balance's own sums; a load's term: LETTER_name.
 
     torque: what the crank's torque is called, and its symbol; within: what output loads take inside the drive besides.
     """
@@ -121,14 +121,14 @@ def sums(
 
 
 def _shown(load: Acting, value: Expression) -> Acting:
-    """Return a load whose force is one symbol, and which no state needs to answer."""
+    """A load whose force is one symbol, and which no state needs to answer."""
     if isinstance(load, Load):
         return dataclasses.replace(load, force=lambda *_: value, response=None, upon=None, inside=None)
     return dataclasses.replace(load, force=lambda *_: value)
 
 
 def own_values(effect: Effect, words: Mapping[str, str], keys: Iterable[str], taken: Collection[str]) -> Values:
-    """Return the symbols of an effect's table; words: values that choose a formula; keys: of its numbers.
+    """Symbols of an effect's table; words: values that choose a formula; keys: of its numbers.
 
     One whose letter is taken, and every one of an instance, is told by whose it is.
     """
@@ -141,7 +141,7 @@ def own_values(effect: Effect, words: Mapping[str, str], keys: Iterable[str], ta
 
 
 def equation(name: str, left: Expression, right: Expression) -> Equation:
-    """Return an equation of two expressions."""
+    """An equation of two expressions."""
     return relation(name, left, "=", right)
 
 
@@ -163,7 +163,7 @@ Case = tuple[Expression | str, str | tuple[Expression, Expression, Expression]]
 
 
 def cases(name: str, left: Expression, rows: Sequence[Case]) -> Equation:
-    """Return an equation whose right side is one formula after another; a single one needs no condition."""
+    """An equation whose right side is one formula after another; a single one needs no condition."""
     if len(rows) == 1:
         return equation(name, left, rows[0][0])
     written = ", ".join(f"{_said(value, text)} {_where(when, text)}" for value, when in rows)
@@ -191,12 +191,12 @@ def _where(when: str | tuple[Expression, ...], write: Callable[[Expression], str
 
 
 def text(expression: Expression) -> str:
-    """Return an expression as plain text."""
+    """An expression as plain text."""
     return str(sympy().sstr(expression, full_prec=False)).replace("**", "^")
 
 
 def latex(expression: Expression) -> str:
-    """Return an expression in LaTeX."""
+    """An expression in LaTeX."""
     sp = sympy()
     expression = sp.sympify(expression)
     names = {free: _latex_name(free.name) for free in expression.free_symbols}
@@ -204,7 +204,7 @@ def latex(expression: Expression) -> str:
 
 
 def _latex_name(name: str) -> str:
-    """Return a symbol's name in LaTeX: its letter with primes or dot, what follows as index; words stay words."""
+    """A symbol's name in LaTeX: its letter with primes or dot, what follows as index; words stay words."""
     head, _, rest = name.partition("_")
     if rest == "dot":
         return rf"\dot{{{_latex_name(head)}}}"
@@ -226,7 +226,7 @@ GREEK_LETTERS = dict(zip(sorted(_GREEK), ("α", "β", "χ", "δ", "γ", "ω", "�
 
 
 def name_parts(name: str) -> tuple[str, str, str]:
-    """Return a symbol's letter, its index and its primes, as `latex` writes them; words stay words."""
+    """A symbol's letter, its index and its primes, as `latex` writes them; words stay words."""
     head, _, rest = name.partition("_")
     if rest == "dot":
         letter, index, primes = name_parts(head)
@@ -245,10 +245,10 @@ def name_parts(name: str) -> tuple[str, str, str]:
 
 @functools.cache
 def symbol(name: str) -> Expression:
-    """Return the real symbol of a name; one with dots stands with underscores, so that SymPy reads it back."""
+    """Real symbol of a name; one with dots stands with underscores, so that SymPy reads it back."""
     return sympy().Symbol(name.replace(".", "_"), real=True)
 
 
 def sympy() -> Any:
-    """Return SymPy, imported when it is first asked for."""
+    """SymPy, imported when it is first asked for."""
     return importlib.import_module("sympy")

@@ -52,7 +52,7 @@ class ForceArrow(NamedTuple):
 
 
 def told(sampler: Sampler, events: Sequence[str], places: Mapping[str, str] = NOWHERE) -> list[ForceArrow]:
-    """Return the forces in all joints that a design tells by components: just before each event, and at their peaks.
+    """Forces in all joints that a design tells by components: just before each event, and at their peaks.
 
     places: the joints of forces that are not called after them.
     """
@@ -113,7 +113,7 @@ class Sheet(NamedTuple):
 def drawn(
     forces: Sequence[ForceArrow], motion: "MechanismMotion", sizes: Mapping[ForceArrow, str], height: float
 ) -> tuple[list[Primitive], list[Label]]:
-    """Return arrows, as long as forces are large, and their labels; a joint at a peak stands as an open circle.
+    """Arrows, as long as forces are large, and their labels; a joint at a peak stands as an open circle.
 
     motion: joints at the forces' angles, one after another; sizes: each one with its unit; height: of texts, m.
     """

@@ -34,7 +34,7 @@ def tells_forces(scene: "Scene") -> bool:
 
 
 def sized(scene: "Scene", forces: "Iterable[ForceArrow]") -> "dict[ForceArrow, str]":
-    """Return forces, each with its size in the scene's unit."""
+    """Forces, each with its size in the scene's unit."""
     return {force: scene.show(force.size, "force", 4) for force in forces}
 
 
@@ -49,23 +49,23 @@ class JobViews(abc.ABC):
 
     @abc.abstractmethod
     def linkage(self, scene: "Scene", design: Numbers) -> "Drawing":
-        """Return the mechanism drawn at full scale in the positions that matter. Raises BadInput."""
+        """Mechanism drawn at full scale in the positions that matter. Raises BadInput."""
 
     @abc.abstractmethod
     def joints_csv(self, scene: "Scene", design: Numbers) -> str:
         """Return what `linkage` draws as CSV in its unit: joints and masses, or a profile. Raises BadInput."""
 
     def motion(self, scene: "Scene", design: Numbers, angles: "Floats") -> "MechanismMotion | None":
-        """Return the mechanism at crank angles, (n,) rad, as it moves; None where a job has none. Raises BadInput."""
+        """Mechanism at crank angles, (n,) rad, as it moves; None where a job has none. Raises BadInput."""
         return None
 
     @abc.abstractmethod
     def equations(self, scene: "Scene") -> "tuple[Equation, ...]":
-        """Return the equations the scene really uses."""
+        """Equations the scene really uses."""
 
     @abc.abstractmethod
     def marks(self, scene: "Scene", design: Numbers) -> Marks:
-        """Return the crank angles and stretches of the cycle a reader looks for."""
+        """Crank angles and stretches of the cycle a reader looks for."""
 
     def panels(self, scene: "Scene", design: Numbers, columns: Sequence[str]) -> "tuple[Panel, ...]":
         """Return what a figure of the curves shows: all columns in the words of `words`, unless a job knows better."""
@@ -91,5 +91,5 @@ class JobViews(abc.ABC):
         return tuple(text for text in found if text)
 
     def missing(self, scene: "Scene") -> tuple[str, ...]:
-        """Return the keys without which the scene cannot be drawn."""
+        """Keys without which the scene cannot be drawn."""
         return ()

@@ -14,7 +14,7 @@ POSES = 180
 
 
 def crank_angles() -> Floats:
-    """Return the crank angles of a turn that a moving picture is made of, (POSES,) rad."""
+    """Crank angles of a turn that a moving picture is made of, (POSES,) rad."""
     return np.asarray(TURN / POSES * np.arange(POSES), dtype=np.float64)
 
 

@@ -77,7 +77,7 @@ class Panel(NamedTuple):
 
 
 def in_units(scene: Scene, panel: Panel) -> Panel:
-    """Return a panel shown in the unit in which the scene's reader sees its kind of quantity."""
+    """A panel shown in the unit in which the scene's reader sees its kind of quantity."""
     kind = _KIND.get(panel.si)
     return panel._replace(unit=scene.shown_in(kind) if kind else panel.si)
 
@@ -85,7 +85,7 @@ def in_units(scene: Scene, panel: Panel) -> Panel:
 def arranged(
     scene: Scene, design: Mapping[str, float], columns: Sequence[str], words: Mapping[str, Curve]
 ) -> tuple[Panel, ...]:
-    """Return the panels of all columns, limits as levels; effects share theirs, and a motion is shown per second.
+    """Panels of all columns, limits as levels; effects share theirs, and a motion is shown per second.
 
     words: what is known of columns, by name; of name_1, name_2 it holds for name_t, name_tt too.
     """
@@ -106,7 +106,7 @@ def arranged(
 
 
 def _called(column: str, curve: Curve) -> str:
-    """Return a column's name in words with its symbol: "crank torque Md"; in its own words without any."""
+    """A column's name in words with its symbol: "crank torque Md"; in its own words without any."""
     symbol = split(column)[0]
     return f"{curve.name} {symbol}" if curve.name else symbol.replace("_", " ")
 
@@ -136,7 +136,7 @@ def _of_effects(scene: Scene) -> dict[str, Curve]:
 
 
 def _timed(known: Collection[str], speed: float) -> dict[str, tuple[str, float]]:
-    """Return name → (name of what is shown for it, its size over the first's): where there is one, the one by time."""
+    """Name → (name of what is shown for it, its size over the first's): where there is one, the one by time."""
     orders = {f"{name}_{k}": (f"{name}_{'t' * k}", speed**k) for name in known for k in range(1, ORDERS + 1)}
     instead = {name: later for name, later in orders.items() if later[0] in known}
     shown = {later for later, _ in instead.values()}
@@ -154,7 +154,7 @@ def _levels(curve: Curve, limits: Mapping[str, LimitRange], scale: float) -> Ite
 
 
 def each(columns: Sequence[str]) -> tuple[Panel, ...]:
-    """Return a panel for every column that has a unit."""
+    """A panel for every column that has a unit."""
     return tuple(Panel((name,)) for name in columns if COLUMN.fullmatch(name) and name != ANGLE)
 
 

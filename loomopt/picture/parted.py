@@ -43,7 +43,7 @@ def _landing_speed(scene: Scene, landing: Landing) -> str:
 
 
 def marks(parted: Parted, every: Marks) -> Marks:
-    """Return marks over the period, rad: those of every turn, where contact is lost, and where wide flights end."""
+    """Marks over the period, rad: those of every turn, where contact is lost, and where wide flights end."""
     found, lifts, landings = dict[str, float | Span](), list[float](), list[float]()
     turns = parted.course.periodic
     for k, turn in enumerate(turns):
@@ -61,7 +61,7 @@ def marks(parted: Parted, every: Marks) -> Marks:
 
 
 def _of_turn(mark: float | Span, turn: int, turns: int) -> float | Span:
-    """Return a mark in one of several turns, counted from 0."""
+    """A mark in one of several turns, counted from 0."""
     if not isinstance(mark, Span):
         return turn * TURN + mark
     ahead = TURN if turns > 1 and mark.end < mark.begin else 0.0
@@ -69,7 +69,7 @@ def _of_turn(mark: float | Span, turn: int, turns: int) -> float | Span:
 
 
 def together(panels: Sequence[Panel], columns: tuple[str, str], name: str) -> tuple[Panel, ...]:
-    """Return panels with two columns in the panel of the first, across the figure."""
+    """Panels with two columns in the panel of the first, across the figure."""
     first, second = (next(panel for panel in panels if panel.columns[0] == column) for column in columns)
     names = (*first.labels, *second.labels)
     joined = first._replace(columns=columns, name=name, names=names, wide=True)

@@ -39,7 +39,7 @@ class Box(NamedTuple):
     top: float
 
     def nearest(self, x: float, y: float) -> tuple[float, float]:
-        """Return the point of the box that lies nearest to another."""
+        """Point of the box that lies nearest to another."""
         return min(max(x, self.left), self.right), min(max(y, self.bottom), self.top)
 
 
@@ -61,7 +61,7 @@ class LabelSpot(NamedTuple):
 
 
 def place(wishes: Iterable[LabelWish], strokes: Floats, unit: float, leader: float = math.inf) -> list[LabelSpot]:
-    """Return a spot for each wish, in order; strokes: (n, 2) points of what is drawn; unit: a text height.
+    """A spot for each wish, in order; strokes: (n, 2) points of what is drawn; unit: a text height.
 
     No box meets a stroke or an earlier box. leader: distance of a box from its point, in text heights, from which on
     a straight line will join the two: that meets no box either.
@@ -76,7 +76,7 @@ def place(wishes: Iterable[LabelWish], strokes: Floats, unit: float, leader: flo
 
 
 def _found(wish: LabelWish, strokes: Floats, taken: Sequence[LabelSpot], unit: float, leader: float) -> LabelSpot:
-    """Return the free spot of a wish that costs least, in text heights: of distance, turn and what lies between."""
+    """Free spot of a wish that costs least, in text heights: of distance, turn and what lies between."""
     best, least = None, math.inf
     for ring in itertools.chain(RINGS, (RINGS[-1] * FARTHER**k for k in itertools.count(1))):
         if best and ring >= least:
@@ -95,7 +95,7 @@ def _found(wish: LabelWish, strokes: Floats, taken: Sequence[LabelSpot], unit: f
 
 
 def _beside(wish: LabelWish, near: tuple[float, float], gap: float, side: float) -> LabelSpot:
-    """Return the wish's box at a gap from a point in the direction of an angle, rad."""
+    """Wish's box at a gap from a point in the direction of an angle, rad."""
     across, up = math.cos(side), math.sin(side)
     half_width, half_height = wish.width / 2, wish.height / 2
     reach = gap + min(half_width / max(abs(across), 1e-9), half_height / max(abs(up), 1e-9))
@@ -121,12 +121,12 @@ def _within(points: Floats, left: float, bottom: float, right: float, top: float
 
 
 def _gap(spot: LabelSpot) -> float:
-    """Return how far a spot's box is from its point."""
+    """How far a spot's box is from its point."""
     return math.dist(spot.box.nearest(spot.x, spot.y), (spot.x, spot.y))
 
 
 def _between(spot: LabelSpot, unit: float) -> Floats:
-    """Return points from a spot's point to its box, (n, 2)."""
+    """Points from a spot's point to its box, (n, 2)."""
     end = spot.box.nearest(spot.x, spot.y)
     return np.linspace((spot.x, spot.y), end, 2 + int(_gap(spot) / (STEP * unit)))
 
@@ -170,11 +170,11 @@ class Units(NamedTuple):
         return "lengths in inches" if self.length == "in" else "lengths in mm"
 
     def size(self, metres: float, digits: int = 6) -> str:
-        """Return a length as its number in the drawing's unit."""
+        """A length as its number in the drawing's unit."""
         return f"{metres / units.factor(self.length) + 0.0:.{digits}g}"
 
     def within(self, metres: float) -> str:
-        """Return a tolerance, m, with its unit: one digit, rounded up, so that it is promised and kept."""
+        """A tolerance, m, with its unit: one digit, rounded up, so that it is promised and kept."""
         value = metres / units.factor(self.length)
         if not value:
             return f"0 {self.length}"
@@ -187,7 +187,7 @@ METRIC = Units()
 
 
 def drawn_units(scene: "Scene") -> Units:
-    """Return the units a scene is drawn in: inches where its lengths are in whole inches, as feet are; else mm."""
+    """Units a scene is drawn in: inches where its lengths are in whole inches, as feet are; else mm."""
     inches = units.parse_unit(scene.shown_in("length")).factor / units.parse_unit("in").factor
     kinds = {kind: scene.shown_in(kind) for kind in ("mass", "force", "stiffness")}
     return Units("in" if inches.denominator == 1 else "mm", **kinds)
@@ -200,11 +200,11 @@ class Point(NamedTuple):
     y: float
 
     def towards(self, angle: float, distance: float) -> "Point":
-        """Return the point at a distance, m, in the direction of an angle, rad."""
+        """Point at a distance, m, in the direction of an angle, rad."""
         return Point(self.x + distance * math.cos(angle), self.y + distance * math.sin(angle))
 
     def part(self, other: "Point", share: float = 0.5) -> "Point":
-        """Return the point that lies a share of the way to another."""
+        """Point that lies a share of the way to another."""
         return Point(self.x + share * (other.x - self.x), self.y + share * (other.y - self.y))
 
 
@@ -332,12 +332,12 @@ class Drawing:
 
 
 def plain(text: str) -> str:
-    """Return text without control characters, which neither XML nor DXF can hold."""
+    """Text without control characters, which neither XML nor DXF can hold."""
     return "".join(character if character.isprintable() else " " for character in text)
 
 
 def scaled(drawing: Drawing, size: float) -> Drawing:
-    """Return a drawing with every length times a size, such as 1000 for one whose unit is 1 mm."""
+    """A drawing with every length times a size, such as 1000 for one whose unit is 1 mm."""
 
     def of(point: Point) -> Point:
         return Point(size * point.x, size * point.y)
@@ -360,7 +360,7 @@ def scaled(drawing: Drawing, size: float) -> Drawing:
 
 
 def text_box(text: Text, height: float) -> Box:
-    """Return the room a text takes, by a generous estimate of its width; height: text height, in the same unit."""
+    """Room a text takes, by a generous estimate of its width; height: text height, in the same unit."""
     tall = height * text.size
     wide = tall * sum(map(_width, text.text))
     left = text.at.x - (wide / 2 if text.anchor == "centre" else 0.0)
@@ -368,7 +368,7 @@ def text_box(text: Text, height: float) -> Box:
 
 
 def _width(character: str) -> float:
-    """Return the width to reserve for a character, in text heights."""
+    """Width to reserve for a character, in text heights."""
     if character in "mwMW@%…—" or unicodedata.east_asian_width(character) in "WF":
         return WIDE
     return CAPITAL_LETTER if character.isupper() or character in "=+−<>~" else CHARACTER
@@ -383,7 +383,7 @@ def extent(drawing: Drawing, margin: float = 2.0) -> Box:
 
 
 def marks(primitive: Primitive, height: float) -> Floats:
-    """Return points along a primitive, no farther apart than STEP text heights, or two corners of a text, (n, 2)."""
+    """Points along a primitive, no farther apart than STEP text heights, or two corners of a text, (n, 2)."""
     if isinstance(primitive, Text):
         box = text_box(primitive, height)
         return np.array([[box.left, box.bottom], [box.right, box.top]])

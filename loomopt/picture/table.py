@@ -31,17 +31,17 @@ class TextTable:
 
 
 def joined(text: str) -> str:
-    """Return text that stays on one line, such as "l1 >= 30 mm"."""
+    """Text that stays on one line, such as "l1 >= 30 mm"."""
     return text.replace(" ", JOINED)
 
 
 def call(text: str) -> str:
-    """Return a call of the shell that, where it is too long for a line, goes on in the next as the shell reads it."""
+    """A call of the shell that, where it is too long for a line, goes on in the next as the shell reads it."""
     return joined(text).replace(f"{JOINED}--", f"{OPTION}--")
 
 
 def spaced(text: str) -> str:
-    """Return text as it is printed."""
+    """Text as it is printed."""
     return text.replace(JOINED, " ").replace(OPTION, " ")
 
 

@@ -39,12 +39,12 @@ _TOLD = re.compile(r'^#define IPOPT_VERSION "(.+)"', re.MULTILINE)
 
 
 def line() -> str:
-    """Return the line that `loomopt --version` prints."""
+    """Line that `loomopt --version` prints."""
     return f"loomopt {__version__} (CasADi {importlib.metadata.version('casadi')}, IPOPT {ipopt()})"
 
 
 def ipopt() -> str:
-    """Return the version of IPOPT, by the header that it was built with."""
+    """Version of IPOPT, by the header that it was built with."""
     spec = importlib.util.find_spec("casadi")
     folders = [*(spec.submodule_search_locations or () if spec else ()), sys.prefix]
     for header in (Path(folder) / HEADER for folder in folders):
@@ -248,7 +248,7 @@ EXAMPLES = {
 
 
 def application(words: list[str]) -> typer.Typer:
-    """Return the command line that reads words: with the one command they begin with, else with all of them."""
+    """Command line that reads words: with the one command they begin with, else with all of them."""
     app = typer.Typer(
         add_completion=not words or words[0] not in COMMANDS,  # what one command never needs
         pretty_exceptions_enable=False,
@@ -305,7 +305,7 @@ def run(arguments: list[str] | None = None) -> int:
 
 
 def not_ours(error: BaseException) -> str:
-    """Return an error as one line where another distribution's code takes part; "" where loomopt itself has failed."""
+    """An error as one line where another distribution's code takes part; "" where loomopt itself has failed."""
     told = blamed(error)
     if isinstance(told, BadInput):
         return str(told)

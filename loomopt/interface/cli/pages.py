@@ -92,7 +92,7 @@ def _checked_input(
     studies: Sequence[str],
     prove: bool = False,
 ) -> Input:
-    """Return an argument, a scene, an answer's file or a store, read and checked. Raises BadInput."""
+    """An argument, a scene, an answer's file or a store, read and checked. Raises BadInput."""
     from loomopt.base.errors import refusal
     from loomopt.interface.files import answer_file, store_file
     from loomopt.interface.report import document
@@ -141,7 +141,7 @@ def _check_studies(scene: "Scene", target: str | None, studies: Sequence[str]) -
 
 
 def _solved(scene: "Scene", target: str | None, prove: bool, studies: Sequence[str], say: Say) -> "list[Chapter]":
-    """Return the chapters of a scene, which is solved."""
+    """Chapters of a scene, which is solved."""
     from loomopt.interface import api
     from loomopt.interface.report import document
 
@@ -226,7 +226,7 @@ def compare(
 
 
 def _answer(given: str) -> Path:
-    """Return the path of an answer's file. Raises BadInput for what is none."""
+    """Path of an answer's file. Raises BadInput for what is none."""
     from loomopt.base.errors import refusal
     from loomopt.jobs import registry
 

@@ -31,7 +31,7 @@ OPTIONS = {
 
 
 def read_value(text: str) -> object:
-    """Return the value of KEY=VALUE: a list or a table as TOML writes it, anything else as text without its quotes."""
+    """Value of KEY=VALUE: a list or a table as TOML writes it, anything else as text without its quotes."""
     from loomopt.scenes.document import read_list_or_table
 
     text = text.strip()
@@ -61,7 +61,7 @@ def read_request(
     target: str | None,
     read_call: "Callable[[Scene], Call]",
 ) -> DesignRequest:
-    """Return the scene of the file, as an answer's own call has changed it, with what the command line changes.
+    """Scene of the file, as an answer's own call has changed it, with what the command line changes.
 
     An answer in place of the file is judged in its own scene. A remark names what is otherwise than in the file, and
     what the answer was found in that does not count. read_call: reads the changes.
@@ -103,7 +103,7 @@ def only(option: str, given: list[Path] | None) -> Path | None:
 
 
 def read_number(option: str, text: str, kind: type[Number]) -> Number:
-    """Return an option's number. Raises BadInput."""
+    """An option's number. Raises BadInput."""
     from loomopt.base.errors import refusal
 
     try:
@@ -118,7 +118,7 @@ def read_number(option: str, text: str, kind: type[Number]) -> Number:
 
 
 def read_steps(text: str) -> dict[str, str]:
-    """Return the steps of an option, by number or pattern. Raises BadInput."""
+    """Steps of an option, by number or pattern. Raises BadInput."""
     from loomopt.base.errors import refusal
 
     pairs = [each.partition("=") for each in text.split(",")]
@@ -132,7 +132,7 @@ def read_steps(text: str) -> dict[str, str]:
 
 
 def call_progress() -> "Progress":
-    """Return the progress of one call, on stderr."""
+    """Progress of one call, on stderr."""
     from loomopt.interface.progress import Progress
 
     return Progress()

@@ -144,7 +144,7 @@ def pareto(
 
 
 def _axes(minimise: list[str], maximise: list[str], against: str) -> tuple[str, str]:
-    """Return the axis that is sought and the one that pays for it. Raises BadInput."""
+    """Axis that is sought and the one that pays for it. Raises BadInput."""
     from loomopt.base.errors import refusal
 
     named = [*minimise, *maximise]
@@ -160,7 +160,7 @@ def _axes(minimise: list[str], maximise: list[str], against: str) -> tuple[str, 
 
 
 def _parted(items: list[str], option: str, example: str, form: str) -> dict[str, str]:
-    """Return key → what an option gives for it. Raises BadInput."""
+    """Key → what an option gives for it. Raises BadInput."""
     from loomopt.base.errors import refusal
 
     found: dict[str, str] = {}
@@ -202,7 +202,7 @@ def run(study: "SceneStudy", how: RunOptions) -> int:
 
 
 def status(rows: "tuple[Row, ...]") -> int:
-    """Return the exit status: rows that are certified or shown infeasible are as good as there can be."""
+    """Exit status: rows that are certified or shown infeasible are as good as there can be."""
     if all(row.status == "infeasible" for row in rows):
         return INFEASIBLE
     return OK if all(row.certified or row.status == "infeasible" for row in rows) else NOT_CERTIFIED
@@ -319,7 +319,7 @@ def tolerance(
 
 
 def outcome(statuses: Sequence[str]) -> int:
-    """Return the exit status of a study by those of its solves; what need not be solved counts as it is."""
+    """Exit status of a study by those of its solves; what need not be solved counts as it is."""
     solved = [status for status in statuses if status not in ANSWERED]
     if all(status == "infeasible" for status in solved):
         return INFEASIBLE

@@ -54,11 +54,11 @@ class DrawnTurn(NamedTuple):
         return 360.0 * max(1, round(float(self.angles[-1] - self.angles[0]) / 360.0))
 
     def told(self, angle: float) -> str:
-        """Return a crank angle, deg, as text."""
+        """A crank angle, deg, as text."""
         return f"{angle:.2f} deg" if self.unit == "deg" else show(math.radians(angle), self.unit, 5)
 
     def of(self, column: str) -> Floats:
-        """Return a column, SI, as long as the angles."""
+        """A column, SI, as long as the angles."""
         values = self.columns[column].to_numpy(dtype=float)
         return np.append(values, values[:1]) if len(self.angles) > len(values) else values
 
@@ -73,7 +73,7 @@ def curves(
     angle: str = "crank angle",
     unit: str = "deg",
 ) -> Any:
-    """Return small diagrams over `phi [rad]`; written as PNG, PDF or SVG where there is a path.
+    """Small diagrams over `phi [rad]`; written as PNG, PDF or SVG where there is a path.
 
     marks: such as both dead centres; a stretch such as the pulse is shaded. panels: what to show, one panel per
     column with its unit without them. today: curves and marks of today's machine, drawn dashed beside a design's.
@@ -103,7 +103,7 @@ def curves(
 
 
 def turned(frame: "pd.DataFrame", marks: Marks, unit: str) -> DrawnTurn:
-    """Return a table's curves with angles that never fall, closed where the table covers a turn but for its end."""
+    """A table's curves with angles that never fall, closed where the table covers a turn but for its end."""
     angles = np.degrees(np.unwrap(frame[ANGLE].to_numpy(dtype=float)))
     closes = 350.0 < angles[-1] - angles[0] < 360.0 - SAME
     return DrawnTurn(np.append(angles, angles[0] + 360.0) if closes else angles, frame, marks, unit)
@@ -119,7 +119,7 @@ class Cell(NamedTuple):
 
 
 def _grid(panels: Sequence[Panel], title: str, below: str) -> tuple[Any, list[Cell]]:
-    """Return a figure and its axes: wide ones on top, the others below in columns of their own; below: what phi is."""
+    """A figure and its axes: wide ones on top, the others below in columns of their own; below: what phi is."""
     on_top, others = [p for p in panels if p.wide], [p for p in panels if not p.wide]
     wide = 1 if len(panels) <= 4 else 2
     rows, height = math.ceil(len(others) / wide), len(on_top)
@@ -141,7 +141,7 @@ def _grid(panels: Sequence[Panel], title: str, below: str) -> tuple[Any, list[Ce
 
 
 def _height(cells: Sequence[Cell], heads: Sequence[float]) -> float:
-    """Return the height of a page, inches, on which axes are as high as they are meant; heads: above each, inches."""
+    """Height of a page, inches, on which axes are as high as they are meant; heads: above each, inches."""
     rows: dict[int, tuple[float, float]] = {}
     for cell, head_high in zip(cells, heads, strict=True):
         high, above = rows.get(cell.row, (0.0, 0.0))
@@ -150,7 +150,7 @@ def _height(cells: Sequence[Cell], heads: Sequence[float]) -> float:
 
 
 def _both() -> list[Entry]:
-    """Return which curves are the design's and which today's."""
+    """Which curves are the design's and which today's."""
     from matplotlib.lines import Line2D
 
     design = Line2D([], [], color=COLOURS[0], linewidth=1.4)
@@ -158,13 +158,13 @@ def _both() -> list[Entry]:
 
 
 def _bracketed(panel: Panel) -> str:
-    """Return the unit a panel is shown in, in brackets; "" of a pure number."""
+    """Unit a panel is shown in, in brackets; "" of a pure number."""
     unit = shown_unit(panel)
     return "" if unit == "1" else f" [{unit}]"
 
 
 def shown_unit(panel: Panel) -> str:
-    """Return the unit a panel is shown in."""
+    """Unit a panel is shown in."""
     return panel.unit or ("deg" if panel.si == "rad" else panel.si)
 
 
@@ -200,7 +200,7 @@ def _panel(axes: Any, panel: Panel, design: DrawnTurn, before: DrawnTurn | None)
 
 
 def column_measured(column: str) -> str:
-    """Return the column of what was measured beside a column of the curves."""
+    """Column of what was measured beside a column of the curves."""
     name, unit = split(column)
     return f"{name}_measured [{unit}]"
 
@@ -256,7 +256,7 @@ def _points(axes: Any, panel: Panel, turn: DrawnTurn, colour: str, said: str) ->
 
 
 def marked_row(values: Floats, turn: DrawnTurn, how: str) -> int | None:
-    """Return the row of what is marked, the first of those alike; None where nothing is known."""
+    """Row of what is marked, the first of those alike; None where nothing is known."""
     if how not in WORDS:
         mark = turn.marks.get(how, math.nan)
         place = math.nan if isinstance(mark, Span) else math.degrees(mark)
@@ -313,6 +313,6 @@ def _mark(axes: Any, of: DrawnTurn) -> list[tuple[float, str]]:
 
 
 def _turns(angle: float, low: float, high: float, whole: float) -> list[float]:
-    """Return the multiples of the whole, deg, that may bring an angle between low and high."""
+    """Multiples of the whole, deg, that may bring an angle between low and high."""
     first, last = math.floor((low - angle) / whole), math.ceil((high - angle) / whole)
     return [whole * turn for turn in range(first, last + 1)]

@@ -117,7 +117,7 @@ def own_style(*texts: str) -> Iterator[None]:
 
 
 def blank(width: float, height: float) -> Any:
-    """Return an empty figure, inches, that belongs to no window."""
+    """An empty figure, inches, that belongs to no window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     from loomopt.interface.figures.shown_figure import ShownFigure
@@ -139,7 +139,7 @@ OWN, BOXES = "DejaVu Sans", "Last Resort High-Efficiency"
 
 
 def families(text: str) -> list[str]:
-    """Return the fonts to write a text in, the first that has a character first; what none has stays an empty box."""
+    """Fonts to write a text in, the first that has a character first; what none has stays an empty box."""
     from matplotlib import font_manager
 
     lacking = {character for character in text if character.isprintable()} - _characters(font_manager.findfont(OWN))
@@ -156,7 +156,7 @@ def families(text: str) -> list[str]:
 
 @functools.cache
 def _characters(path: str) -> frozenset[str]:
-    """Return the characters that a font file has; none where it cannot be read, or holds pictures of one size."""
+    """Characters that a font file has; none where it cannot be read, or holds pictures of one size."""
     from matplotlib.ft2font import FT2Font
 
     try:
@@ -181,7 +181,7 @@ HEAD_LEGEND |= {"columnspacing": 1.4, "handlelength": 2.6}
 
 
 def page(width: float, height: float, title: str) -> Any:
-    """Return an empty figure, inches, laid out by matplotlib at every size it is given; its title is wrapped to it."""
+    """An empty figure, inches, laid out by matplotlib at every size it is given; its title is wrapped to it."""
     figure = blank(width, height)
     figure.laid_out()
     written = figure.suptitle("", fontsize=11, parse_math=False)
@@ -241,7 +241,7 @@ def _below(figure: Any, entries: Sequence[Entry], columns: int, title: str, scal
 
 
 def _legend(where: Any, entries: Sequence[Entry], columns: int, scale: float, **more: Any) -> Any:
-    """Return a legend of axes or of a figure."""
+    """A legend of axes or of a figure."""
     legend = where.legend(
         [line for line, _ in entries],
         [plain(text) for _, text in entries],
@@ -257,18 +257,18 @@ def _legend(where: Any, entries: Sequence[Entry], columns: int, scale: float, **
 
 
 def _high(legend: Any) -> float:
-    """Return the height of a legend, pt."""
+    """Height of a legend, pt."""
     root = _page(legend)
     return float(legend.get_window_extent(root.canvas.get_renderer()).height) * 72.0 / float(root.dpi)
 
 
 def _page(artist: Any) -> Any:
-    """Return the whole figure that something stands in."""
+    """Whole figure that something stands in."""
     return artist.get_figure(root=True)
 
 
 def _columns(entries: Sequence[Entry], where: Any, width: float) -> int:
-    """Return how many columns of a legend have room in a width, pixels."""
+    """How many columns of a legend have room in a width, pixels."""
     root = _page(where)
     for count in range(min(len(entries), 4), 1, -1):
         legend = _legend(where, entries, count, 1.0)

@@ -41,7 +41,7 @@ DRAWN = {
 
 
 def plot(scene: Scene, forces: Mapping[str, TurnedForce], path: Path | None = None) -> Any:
-    """Return the figure; path: a file to write it to as well. Raises BadInput."""
+    """Figure; path: a file to write it to as well. Raises BadInput."""
     if path:
         suffix(path, outputs.PICTURES)
     drawn = _drawn(scene, forces)
@@ -90,7 +90,7 @@ def _sizes(axes: Any, scene: Scene, forces: Mapping[str, TurnedForce]) -> list[E
 
 
 def _said(force: TurnedForce) -> list[str]:
-    """Return in what words each part stands that turns with a force."""
+    """In what words each part stands that turns with a force."""
     return list(DRAWN)[-len(force.headings) :] if force.headings else []
 
 

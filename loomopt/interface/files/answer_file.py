@@ -39,7 +39,7 @@ class Recalled(NamedTuple):
 
 
 def recalled(path: Path) -> Recalled:
-    """Return the answer in a JSON file, judged in its own scene. Raises BadInput."""
+    """Answer in a JSON file, judged in its own scene. Raises BadInput."""
     scene, handed = registry.answered(path)
     evaluation = results.evaluated(scene, designs.checked(handed.design, scene, scene.origin), None)
     told = designs.loaded(path)
@@ -98,7 +98,7 @@ def _record(kind: Callable[..., Read], entries: Mapping[str, Any]) -> Read:
 
 
 def _price(told: Mapping[str, Any], words: Words) -> Price:
-    """Return a limit's price with its reading in the scene's units."""
+    """A limit's price with its reading in the scene's units."""
     (figure, worth), *_ = told["worth"].items()
     limit, side = str(told["limit"]), str(told["side"])
     reading = words.price_reading(figure, limit, float(worth))

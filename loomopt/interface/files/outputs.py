@@ -71,12 +71,12 @@ def document(found: Serialisable) -> str:
 
 
 def json_text(data: Mapping[str, object]) -> str:
-    """Return data as one JSON object; what is undefined is null."""
+    """Data as one JSON object; what is undefined is null."""
     return json.dumps(_speakable(data), indent=1, allow_nan=False)
 
 
 def _speakable(data: object) -> object:
-    """Return data without the numbers JSON cannot say."""
+    """Data without the numbers JSON cannot say."""
     if isinstance(data, Mapping):
         return {name: _speakable(value) for name, value in data.items()}
     if isinstance(data, list | tuple):
@@ -135,7 +135,7 @@ def _is_workbook(path: Path) -> bool:
 
 
 def answer_sheets(solution: Solution, scene: Scene) -> "dict[str, pd.DataFrame]":
-    """Return the sheets of an answer's workbook: its design, its figures, its limits and its curves."""
+    """Sheets of an answer's workbook: its design, its figures, its limits and its curves."""
     import pandas as pd
 
     shown = tables.meaningful(tables.answer(solution, scene))
@@ -250,7 +250,7 @@ def plot(
     path: Path | None,
     measured: str | os.PathLike[str] | None = None,
 ) -> "Figure":
-    """Return the curves of an evaluated design as a figure; path: a file to write it to as well. Raises BadInput."""
+    """Curves of an evaluated design as a figure; path: a file to write it to as well. Raises BadInput."""
     from loomopt.interface.figures import figure
 
     if path:
@@ -266,7 +266,7 @@ def plot(
 def plotted(
     frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], said: DrawnSubject | None = None
 ) -> "Figure":
-    """Return curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
+    """Curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
 
     design: SI; today's without one. said: what it is, as `what` says it.
     """
@@ -305,7 +305,7 @@ def what(found: Evaluated, target: str | None = None, status: str | None = None)
 
 @working()
 def drawing(scene: Scene, design: Design, said: DrawnSubject | None = None) -> "Drawing":
-    """Return a design's mechanism in the positions that matter; said: what the design is, for the title."""
+    """A design's mechanism in the positions that matter; said: what the design is, for the title."""
     found = registry.of(scene).views.linkage(scene, flat(design))
     return replace(found, title=f"{scene.name}: {said.text if said else GIVEN if design else TODAY}")
 

@@ -31,7 +31,7 @@ MADE = datetime.datetime(2000, 1, 1)
 
 
 def decimal_comma(given: str) -> bool:
-    """Return whether `--decimal` asks for a comma. Raises BadInput for what is neither."""
+    """Whether `--decimal` asks for a comma. Raises BadInput for what is neither."""
     if given not in DECIMALS:
         raise refusal("it is no decimal sign", "", "--decimal", given, ", ".join(DECIMALS), "Choose one of them")
     return DECIMALS[given]
@@ -61,7 +61,7 @@ def write_text(path: Path, text: str, name: str, comma: bool = False) -> None:
 
 
 def separated(text: str, comma: bool) -> str:
-    """Return CSV text with decimal commas and semicolons, where that is asked for; comment lines stay."""
+    """CSV text with decimal commas and semicolons, where that is asked for; comment lines stay."""
     if not comma:
         return text
     lines = text.splitlines(keepends=True)
@@ -108,7 +108,7 @@ def _fill(sheet: "Worksheet", rows: Sequence[Sequence[object]]) -> None:
 
 
 def _rows(frame: "pd.DataFrame") -> list[list[object]]:
-    """Return a table as rows of cells, its index first where that has a name."""
+    """A table as rows of cells, its index first where that has a name."""
     named = frame.reset_index() if frame.index.name is not None else frame
     return [list(map(str, named.columns)), *([_cell(cell) for cell in row] for row in named.itertuples(index=False))]
 

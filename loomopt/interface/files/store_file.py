@@ -29,7 +29,7 @@ def is_store(path: Path) -> bool:
 
 
 def recalled(path: Path) -> list[StudyTable]:
-    """Return every study of a store with the rows that are there, in the order they were begun. Raises BadInput.
+    """Every study of a store with the rows that are there, in the order they were begun. Raises BadInput.
 
     Machines as they are made are no designs, and left out.
     """
@@ -45,7 +45,7 @@ def recalled(path: Path) -> list[StudyTable]:
 
 
 def _study(told: Mapping[str, Any], path: Path) -> SceneStudy:
-    """Return the plan that a store tells of. Raises BadInput."""
+    """Plan that a store tells of. Raises BadInput."""
     try:
         paths = Paths(path.absolute().parent, texts=dict(told["files"]))
         scene = build(told["document"], REGISTERED, str(path), paths)
@@ -74,7 +74,7 @@ def _front(told: Mapping[str, Any], scene: Scene) -> SceneStudy:
 
 
 def _over(told: Mapping[str, Any], scene: Scene) -> dict[str, list[str | float]]:
-    """Return key → its values as a scene gives them, in the unit in which that shows them."""
+    """Key → its values as a scene gives them, in the unit in which that shows them."""
     found: dict[str, list[str | float]] = {}
     for key, values in told["over"]:
         unit = told["units"][quantity(scene, key).kind]

@@ -27,7 +27,7 @@ NAMESPACE = "http://www.w3.org/2000/svg"
 
 
 def render(drawing: Drawing) -> str:
-    """Return the drawing as an SVG document: one user unit is 1 mm, its size in the drawing's own unit, y turned up."""
+    """Drawing as an SVG document: one user unit is 1 mm, its size in the drawing's own unit, y turned up."""
     size, unit = factor("mm") / factor(drawing.unit), drawing.unit
     drawing = scaled(sheet(drawing), 1 / factor("mm"))
     box = extent(drawing)

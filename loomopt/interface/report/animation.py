@@ -88,7 +88,7 @@ def checked(path: Path) -> None:
 def animated(
     scene: Scene, design: Design, path: Path | None = None, what: outputs.DrawnSubject | None = None
 ) -> MovingPicture:
-    """Return a design's mechanism as it moves, today's behind it. Raises BadInput.
+    """A design's mechanism as it moves, today's behind it. Raises BadInput.
 
     path: a file to write it to as well; what: what the design is, for the title.
     """
@@ -112,7 +112,7 @@ def animated(
 
 @working()
 def morphed(study: SceneStudy, rows: Sequence[Row], path: Path | None = None) -> MovingPicture:
-    """Return the certified designs among rows of a study as one moving picture. Raises BadInput."""
+    """Certified designs among rows of a study as one moving picture. Raises BadInput."""
     from loomopt.interface.report.study import stages
 
     if path:

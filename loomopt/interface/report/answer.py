@@ -116,13 +116,13 @@ def _certified(found: Solution, scene: Scene) -> Status:
 
 
 def parts(subject: Subject) -> list[Part]:
-    """Return the parts of a design's page, in order; none that has nothing to say, of a family none of one machine."""
+    """Parts of a design's page, in order; none that has nothing to say, of a family none of one machine."""
     made = [make for make in PARTS if make not in ONE_MACHINE] if subject.found.members else PARTS
     return [part for make in made for part in make(subject)]
 
 
 def members(family: Subject) -> list[tuple[str, Status, list[Part]]]:
-    """Return the heading, the status and the parts of each member of a family: what the whole cannot show."""
+    """Heading, the status and the parts of each member of a family: what the whole cannot show."""
     whole, found = status(family), list[tuple[str, Status, list[Part]]]()
     for place, member in enumerate(family.found.members, 1):
         assert member.scene is not None

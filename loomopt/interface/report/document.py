@@ -48,7 +48,7 @@ class Judged(Protocol):
 
 
 def of_answer(found: Judged, beside: Sequence[object] = (), doubts: Sequence[str] = ()) -> list[Chapter]:
-    """Return the chapter of an answer, of a family one for each of its members too; the rest as of `of_design`."""
+    """Chapter of an answer, of a family one for each of its members too; the rest as of `of_design`."""
     first = of_design(found, beside, doubts)
     if not found.result.members:
         return [first]
@@ -56,7 +56,7 @@ def of_answer(found: Judged, beside: Sequence[object] = (), doubts: Sequence[str
 
 
 def of_design(found: Judged, beside: Sequence[object] = (), doubts: Sequence[str] = ()) -> Chapter:
-    """Return the chapter of an answer or an evaluation, which knows its scene.
+    """Chapter of an answer or an evaluation, which knows its scene.
 
     beside: what was computed of the same scene; doubts: why what its file says is not believed. Raises BadInput.
     """
@@ -69,7 +69,7 @@ def _subject(found: Judged, doubts: Sequence[str] = ()) -> Subject:
 
 
 def of_study(plan: SceneStudy, solved: Sequence[Row], beside: Sequence[object] = ()) -> Chapter:
-    """Return the chapter of a study; solved: the rows of all points that were. Raises BadInput."""
+    """Chapter of a study; solved: the rows of all points that were. Raises BadInput."""
     parts = [*study.parts(plan, solved), *_more(beside)]
     return _chapter(f"{plan.name} of {plan.heading}", plan.scene, study.status(plan, solved), parts)
 
@@ -94,13 +94,13 @@ def _parts(thing: object) -> list[Part]:
 
 
 def part_of_study(plan: SceneStudy, solved: Sequence[Row]) -> list[Part]:
-    """Return a study as parts of another chapter, its own status first."""
+    """A study as parts of another chapter, its own status first."""
     told = study.status(plan, solved)
     return [Part(f"{plan.name} of {plan.heading}", (told.verdict, *told.told)), *study.parts(plan, solved)]
 
 
 def html(chapters: Sequence[Chapter]) -> str:
-    """Return the page of chapters as text."""
+    """Page of chapters as text."""
     return page(chapters)
 
 

@@ -36,7 +36,7 @@ class Frame:
     size: float
 
     def at(self, points: Floats) -> Floats:
-        """Return points, (n, 2) m, in the picture."""
+        """Points, (n, 2) m, in the picture."""
         moved = np.column_stack([points[:, 0] - self.box.left, self.box.top - points[:, 1]])
         return np.round(moved * self.size + MARGIN, 1)
 
@@ -53,7 +53,7 @@ class Frame:
 
 @working()
 def part(scene: Scene, design: Design) -> Part | None:
-    """Return the moving mechanism of a design, SI, with today's behind it where it is another; None without one."""
+    """Moving mechanism of a design, SI, with today's behind it where it is another; None without one."""
     job, own = registry.of(scene), flat(design)
     now = job.today(scene)
     full = {**now, **own}
@@ -69,7 +69,7 @@ def part(scene: Scene, design: Design) -> Part | None:
 
 
 def assembled(scene: Scene, design: Mapping[str, float], angles: Floats) -> MechanismMotion | None:
-    """Return today's mechanism; None where it does not assemble."""
+    """Today's mechanism; None where it does not assemble."""
     from loomopt.base.errors import BadInput
 
     try:
@@ -86,7 +86,7 @@ def widget(
     first: int = 0,
     told: Sequence[str] = (),
 ) -> str:
-    """Return a moving picture with its slider: of one design, or of several stages, such as points of a front.
+    """A moving picture with its slider: of one design, or of several stages, such as points of a front.
 
     ghost: the machine behind it; angle, unit: what phi is and in which unit it is told; first: the pose that is shown
     at first, and that remains where no script runs; told: what each stage is.
@@ -130,7 +130,7 @@ def _shown(angles: Floats, unit: str) -> Floats:
 
 
 def framed(motions: Sequence[MechanismMotion]) -> Frame:
-    """Return the frame that takes all positions of all machines."""
+    """Frame that takes all positions of all machines."""
     points = [np.asarray(list(each.pivots.values()), dtype=float) for each in motions]
     points += [at for each in motions for at in each.joints.values()]
     for each in motions:
@@ -146,12 +146,12 @@ def framed(motions: Sequence[MechanismMotion]) -> Frame:
 
 
 def _all(motion: MechanismMotion, joint: str) -> Floats:
-    """Return a joint's positions, (n, 2) m; of a fixed one its only one."""
+    """A joint's positions, (n, 2) m; of a fixed one its only one."""
     return motion.joints[joint] if joint in motion.joints else np.asarray([motion.pivots[joint]], dtype=float)
 
 
 def _poses(motion: MechanismMotion, frame: Frame) -> dict[str, object]:
-    """Return positions of moving joints in the picture, in tenths, and turns of its pieces, in degrees."""
+    """Positions of moving joints in the picture, in tenths, and turns of its pieces, in degrees."""
     joints = {name: (10 * frame.at(at)).round().astype(int).ravel().tolist() for name, at in motion.joints.items()}
     turns = [np.round(-np.degrees(piece.turns), 2).tolist() for piece in motion.turning]
     fixed = {name: (10 * frame.at(_all(motion, name))).round().astype(int).ravel().tolist() for name in motion.pivots}
@@ -195,7 +195,7 @@ def _layer(motion: MechanismMotion, frame: Frame, kind: str, pose: int) -> str:
 
 
 def named(motion: MechanismMotion, frame: Frame) -> list[str]:
-    """Return the joints whose names have room: no moving one that comes too near to a pivot or to one before it."""
+    """Joints whose names have room: no moving one that comes too near to a pivot or to one before it."""
     found: list[str] = []
     for name in (*motion.pivots, *motion.joints):
         if name not in motion.unnamed:
@@ -221,7 +221,7 @@ def _joined(one: str, other: str) -> str:
 
 
 def _ground(x: float, y: float) -> str:
-    """Return the sign of a fixed joint."""
+    """Sign of a fixed joint."""
     low = y + 1.4 * GROUND
     return f"M{x - GROUND} {low:.1f}L{x} {y}L{x + GROUND} {low:.1f}Z"
 
@@ -231,13 +231,13 @@ def _centre(joint: str, at: Mapping[str, Floats]) -> str:
 
 
 def _path(points: Floats) -> str:
-    """Return the way of a joint over the turn, every second position."""
+    """Way of a joint over the turn, every second position."""
     told = " ".join(f"{x:.0f},{y:.0f}" for x, y in points[::2].tolist())
     return f'<polygon class="way" points="{told}"/>'
 
 
 def _spring(one: Floats, other: Floats) -> str:
-    """Return a spring's sign between two points; the script draws the same."""
+    """A spring's sign between two points; the script draws the same."""
     (x, y), (u, v) = one.tolist(), other.tolist()
     long = math.hypot(u - x, v - y) or 1.0
     nx, ny = -(v - y) / long * 12, (u - x) / long * 12

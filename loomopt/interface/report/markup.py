@@ -33,17 +33,17 @@ class Part:
 
 
 def text(told: str) -> str:
-    """Return text escaped, with places in long names where a line may break, and none in what is joined."""
+    """Text escaped, with places in long names where a line may break, and none in what is joined."""
     return escape(spaced(told.replace(JOINED, "\u00a0"))).replace("_", "_<wbr>")
 
 
 def part(shown: Part) -> str:
-    """Return a part as a section."""
+    """A part as a section."""
     return f"<section><h3>{text(shown.title)}</h3>{''.join(map(block, shown.blocks))}</section>"
 
 
 def block(shown: Block) -> str:
-    """Return a paragraph, a table or markup."""
+    """A paragraph, a table or markup."""
     if isinstance(shown, Markup):
         return shown.html
     if isinstance(shown, TextTable):
@@ -52,7 +52,7 @@ def block(shown: Block) -> str:
 
 
 def table(grid: TextTable) -> str:
-    """Return a table that scrolls by itself where it is too wide, and breaks between rows on paper."""
+    """A table that scrolls by itself where it is too wide, and breaks between rows on paper."""
     dense = " denser" if len(grid.columns) > DENSER else " dense" if len(grid.columns) > DENSE else ""
     heads = "".join(
         f'<th{_right(place in grid.right)} scope="col">{_lines(cell)}</th>' for place, cell in enumerate(grid.columns)

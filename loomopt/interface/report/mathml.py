@@ -16,7 +16,7 @@ SIGNS = {"<=": "≤", ">=": "≥", "=": "="}
 
 
 def page(equations: Sequence[Equation]) -> str:
-    """Return equations, those of one name together."""
+    """Equations, those of one name together."""
     groups = itertools.groupby(equations, key=lambda each: each.name)
     return "".join(
         f'<div class="equations"><h4>{escape(name)}</h4>{"".join(map(markup, group))}</div>' for name, group in groups

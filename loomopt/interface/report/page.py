@@ -24,7 +24,7 @@ class Chapter:
 
 
 def page(chapters: Sequence[Chapter]) -> str:
-    """Return a page of chapters; the status of each stands before all else."""
+    """A page of chapters; the status of each stands before all else."""
     title = "; ".join(f"{each.status.verdict}: {each.heading}" for each in chapters)
     toc = _contents(chapters) if len(chapters) > 1 else ""
     body = "".join(_chapter(place, each) for place, each in enumerate(chapters, 1))

@@ -67,7 +67,7 @@ def _stages(study: SceneStudy, rows: Sequence[Row]) -> Part | None:
 
 
 def stages(study: SceneStudy, rows: Sequence[Row]) -> dict[str, MechanismMotion]:
-    """Return the mechanisms of some certified rows along a study, by their places; none where they cannot be drawn."""
+    """Mechanisms of some certified rows along a study, by their places; none where they cannot be drawn."""
     certified = [row for row in rows if row.certified]
     picked = sorted({round(k) for k in np.linspace(0, len(certified) - 1, min(STAGES, len(certified)))})
     angles, motions = crank_angles(), dict[str, MechanismMotion]()

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @working()
 def part(scene: Scene, design: Design) -> Part:
-    """Return the curves of a design, SI, over the turn, beside today's machine where it is another."""
+    """Curves of a design, SI, over the turn, beside today's machine where it is another."""
     job, view, own = registry.of(scene), registry.of(scene).views, flat(design)
     now = job.today(scene)
     full = {**now, **own}
@@ -58,7 +58,7 @@ def _key(shown: DrawnTurn, beside: bool) -> str:
 
 
 def chart(panel: Panel, shown: DrawnTurn, before: DrawnTurn | None) -> Chart:
-    """Return a panel as a chart."""
+    """A panel as a chart."""
     unit = shown_unit(panel)
     size, angle = factor(unit), math.degrees(factor(shown.unit))
     kept = _kept(panel, shown)
@@ -107,7 +107,7 @@ def chart(panel: Panel, shown: DrawnTurn, before: DrawnTurn | None) -> Chart:
 
 
 def _kept(panel: Panel, turn: DrawnTurn) -> "NDArray[np.intp]":
-    """Return the rows a curve is drawn through: every so many degrees, corners, the last, and what is marked."""
+    """Rows a curve is drawn through: every so many degrees, corners, the last, and what is marked."""
     kept = thinned(turn.angles)
     for how in panel.marked:
         row = marked_row(turn.of(panel.columns[0]), turn, how)

@@ -119,7 +119,7 @@ class Comparison(Presentation):
         return _overlaid([(each.name, each.found.scene, each.found.design) for each in self.designs])
 
     def as_dict(self) -> dict[str, object]:
-        """Return the object that `compare --json` prints, SI."""
+        """Object that `compare --json` prints, SI."""
         told = [(each.name, each.found.as_dict()) for each in self.designs]
         units = {name: unit for _, found in told for name, unit in found["units"].items()}
         kept = ("problem", "design", "figures", "limits")
@@ -150,7 +150,7 @@ def _number(value: object) -> float | None:
 def _row(
     name: str, values: Sequence[float | None], limits: Sequence[Mapping[str, Finding]], words: Words
 ) -> ComparedRow:
-    """Return a row in the unit that a reader of the first design's scene sees it in."""
+    """A row in the unit that a reader of the first design's scene sees it in."""
     unit, known = words.unit(name), [abs(value) for value in values if value is not None]
     size = max(known, default=0.0)
     first = next((value for value in values if value is not None), None)
@@ -161,7 +161,7 @@ def _row(
 
 
 def _cleaned(rows: Sequence[ComparedRow]) -> list[ComparedRow]:
-    """Return rows in which what is only rounding beside the largest of its unit is 0, and does not differ."""
+    """Rows in which what is only rounding beside the largest of its unit is 0, and does not differ."""
     sizes: dict[str, float] = {}
     for row in rows:
         sizes[row.unit] = max(sizes.get(row.unit, 0.0), *(abs(value or 0.0) for value in row.values))
@@ -214,7 +214,7 @@ def compare(found: Sequence[object], within: Scene | None = None, names: Sequenc
 
 
 def _within(found: Evaluation, scene: Scene) -> Evaluation:
-    """Return a design judged in another scene, by the same target where that has one of its name."""
+    """A design judged in another scene, by the same target where that has one of its name."""
     target = found.target if found.target in scene.schema.targets else None
     return results.evaluated(scene, designs.checked(found.design, scene), target)
 

@@ -24,7 +24,7 @@ HEADINGS = {"infeasible": "relaxed", "failed": "stopped"}
 
 
 def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
-    """Return the parts of a solved target: sentence, table, what binds, certificate, time."""
+    """Parts of a solved target: sentence, table, what binds, certificate, time."""
     heading = HEADINGS.get(answer.status, "design")
     parts: list[str | TextTable] = [f"{answer.problem}, {answer.sought}: {answer.outcome}"]
     explanation = answer.explanation
@@ -57,7 +57,7 @@ def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
 
 
 def evaluation(found: Evaluated, scene: Scene, before: Evaluated | None) -> list[str | TextTable]:
-    """Return the parts of an evaluated design; before: today's machine, where the design is another."""
+    """Parts of an evaluated design; before: today's machine, where the design is another."""
     broken = ", ".join(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
     rounded = ", ".join(limit.name for limit in found.limits if limit.rounding)
     held = f"NOT admissible: {broken}" if broken else "all limits held"
@@ -68,7 +68,7 @@ def evaluation(found: Evaluated, scene: Scene, before: Evaluated | None) -> list
 
 
 def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading: str) -> TextTable:
-    """Return design and figures beside today's machine and the limits; what binds and what is reached is marked."""
+    """Design and figures beside today's machine and the limits; what binds and what is reached is marked."""
     table = [row for row in rows(found, scene, before) if not (found.members and _of_member(row["name"], found))]
     words = Words(scene)
     apart = {
@@ -146,7 +146,7 @@ def members(found: Solution, scene: Scene) -> TextTable:
 
 
 def retyped(found: Evaluated, scene: Scene) -> str:
-    """Return a design to type again, with the digits it takes to be the same: a JSON object, text with units."""
+    """A design to type again, with the digits it takes to be the same: a JSON object, text with units."""
     words, told = Words(scene), []
     for name, value in found.design.items():
         if name not in scene.schema.lists:
@@ -156,7 +156,7 @@ def retyped(found: Evaluated, scene: Scene) -> str:
 
 
 def _limit(low: float | None, high: float | None) -> str:
-    """Return a range as text."""
+    """A range as text."""
     if low is not None and low == high:
         return f"= {low:.6g}"
     if low is not None and high is not None:
@@ -175,7 +175,7 @@ def relaxation(answer: Solution) -> TextTable:
 
 
 def binding(answer: Solution) -> str | TextTable:
-    """Return the limits that bind, each with its price, then those that are worth more together."""
+    """Limits that bind, each with its price, then those that are worth more together."""
     if not answer.binding:
         return "No limit binds beside the sizes." if answer.rounded else "No limit binds."
     lines = tuple((price.text, next(iter(price.worth)), price.reading) for price in answer.binding)
@@ -184,7 +184,7 @@ def binding(answer: Solution) -> str | TextTable:
 
 
 def certificate(answer: Solution) -> list[str]:
-    """Return the certificate in one line, and in a second one what chose among equally good designs."""
+    """Certificate in one line, and in a second one what chose among equally good designs."""
     found = answer.certificate
     assert found is not None
     if not found.passed:
@@ -223,7 +223,7 @@ def everywhere(found: GlobalBound, scene: Scene) -> str:
 
 
 def starts(answer: Solution, scene: Scene) -> str:
-    """Return how many starts found the best, and what other optima there are."""
+    """How many starts found the best, and what other optima there are."""
     solver, words = answer.solver, Words(scene)
     if not solver["starts_at_best"]:
         return f"Starts: {solver['starts']}, none reached an admissible design"
@@ -252,7 +252,7 @@ def proven(found: "Proofs") -> list[str]:
 
 
 def proofs(found: "Proofs") -> list[str | TextTable]:
-    """Return the parts of a proof: a sentence, and what was shown of each limit."""
+    """Parts of a proof: a sentence, and what was shown of each limit."""
     words, angle, lines = Words(found.scene), found.scene.shown_in("angle"), []
     for proof in found.proofs:
         unit = words.unit(proof.name)

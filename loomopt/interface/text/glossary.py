@@ -45,7 +45,7 @@ class Source(NamedTuple):
 
 
 def read(job: str) -> Source:
-    """Return the source of a job's scenes. Raises BadInput where the job names none."""
+    """Source of a job's scenes. Raises BadInput where the job names none."""
     place = registry.find(job).resources / "sources.csv"
     if not place.is_file():
         remedy = "Where a scene's numbers come from stands in its file: see `loomopt show`"
@@ -81,19 +81,19 @@ class Symbol(NamedTuple):
 
 
 def parts(scene: Scene) -> list[str | TextTable]:
-    """Return the tables of `loomopt show --symbols`; units are those of the scene's tables, of curves SI."""
+    """Tables of `loomopt show --symbols`; units are those of the scene's tables, of curves SI."""
     drawn = labels(scene)
     grids = (_grid(title, symbols, drawn) for title, symbols in _tables(scene).items())
     return [f"{scene.name}: {scene.schema.title}", *grids]
 
 
 def symbols(scene: Scene) -> list[Symbol]:
-    """Return every symbol; one that names a number of the scene and a figure too comes twice, the figure last."""
+    """Every symbol; one that names a number of the scene and a figure too comes twice, the figure last."""
     return [symbol for symbols in _tables(scene).values() for symbol in symbols]
 
 
 def _tables(scene: Scene) -> dict[str, list[Symbol]]:
-    """Return the symbols by what they are."""
+    """Symbols by what they are."""
     schema, words = scene.schema, Words(scene)
     return {
         "Operation": _numbers(scene, schema.operation),
@@ -124,7 +124,7 @@ def _grid(title: str, symbols: list[Symbol], drawn: frozenset[str]) -> TextTable
 
 
 def _numbers(scene: Scene, model: type[BaseModel], path: str = "") -> list[Symbol]:
-    """Return the keys of a table with their units and descriptions; a word or a list has no unit."""
+    """Keys of a table with their units and descriptions; a word or a list has no unit."""
     found = []
     for name, field in model.model_fields.items():
         inner = table_inside(model, name)
@@ -174,13 +174,13 @@ def _derivative(name: str) -> str:
 
 
 def sketched(scene: Scene) -> dict[str, float]:
-    """Return the design, SI, that a sketch shows: today's, and what is 0 today in the middle of its bounds."""
+    """Design, SI, that a sketch shows: today's, and what is 0 today in the middle of its bounds."""
     bounds = {name: bound for name, bound in scene.bounds.items() if scene.mechanism.get(name) == 0.0}
     return {name: (bound.min + bound.max) / 2 for name, bound in bounds.items() if bound.max < math.inf}
 
 
 def labels(scene: Scene) -> frozenset[str]:
-    """Return the symbols that the sketch of a scene names; none where it cannot be drawn."""
+    """Symbols that the sketch of a scene names; none where it cannot be drawn."""
     views = registry.of(scene).views
     if views.missing(scene):
         return frozenset()
@@ -190,7 +190,7 @@ def labels(scene: Scene) -> frozenset[str]:
 
 
 def printed(scene: Scene) -> list[str | TextTable]:
-    """Return the tables of `loomopt show --sources`: what is printed, what is computed, the verdict and why.
+    """Tables of `loomopt show --sources`: what is printed, what is computed, the verdict and why.
 
     Of a scene that is not packaged, whose machine no source prints, it is what the scene itself says.
     """

@@ -39,7 +39,7 @@ NAMED_BY_SCENE: Mapping[str, Json] = {
 
 
 def scene(schema: SceneSchema) -> Json:
-    """Return the JSON Schema (draft 2020-12) of a job's scenes."""
+    """JSON Schema (draft 2020-12) of a job's scenes."""
     makers: Mapping[str, Callable[[SceneSchema], Json]] = {
         "problem": _problem,
         "operation": lambda of: _model(of.operation),
@@ -100,7 +100,7 @@ def _bounds(schema: SceneSchema) -> Json:
 
 
 def _by_number(schema: SceneSchema, made: Callable[[Quantity], Json]) -> Json:
-    """Return a table with a key for every number; made: what stands there, of what the number may be."""
+    """A table with a key for every number; made: what stands there, of what the number may be."""
     kinds: dict[str, list[Quantity]] = {}
     effects = [effect for effect in schema.effects.values() if not effect.many]
     for model in (schema.mechanism, schema.operation, *(effect.table for effect in effects)):
@@ -187,7 +187,7 @@ def _mechanism(schema: SceneSchema) -> Json:
 
 
 def _given(key: str, effect: Effect | None = None) -> Json:
-    """Return the rule that a key is given; effect: where that is on, always without one."""
+    """Rule that a key is given; effect: where that is on, always without one."""
     table = next(table for table in TABLES if key.startswith(f"{table}."))
     then = {"required": [table], "properties": {table: {"required": [key.removeprefix(f"{table}.")]}}}
     if not effect:
@@ -206,7 +206,7 @@ def _own_targets(schema: SceneSchema) -> Json:
 
 
 def _closed(properties: Mapping[str, Json], required: list[str] | None = None) -> Json:
-    """Return a table that holds nothing else."""
+    """A table that holds nothing else."""
     found: Json = {"type": "object", "additionalProperties": False, "properties": dict(properties)}
     return found | ({"required": required} if required else {})
 
@@ -221,13 +221,13 @@ def _quantity(quantity: Quantity) -> Json:
 
 
 def _model(model: type[Table], summary: str = "") -> Json:
-    """Return a table by its model; summary: what it is, in the words of its job."""
+    """A table by its model; summary: what it is, in the words of its job."""
     found = _without_null(model.model_json_schema())
     return found | ({"description": summary} if summary else {})
 
 
 def _each(part: Json, change: Callable[[Json], Json]) -> Json:
-    """Return a schema with all schemas inside it changed."""
+    """A schema with all schemas inside it changed."""
 
     def inner(value: object) -> object:
         if isinstance(value, list):
@@ -238,7 +238,7 @@ def _each(part: Json, change: Callable[[Json], Json]) -> Json:
 
 
 def _without_null(part: Json) -> Json:
-    """Return a part of a schema without null, which no scene can say: a key is there or it is not."""
+    """A part of a schema without null, which no scene can say: a key is there or it is not."""
     found = _each({key: value for key, value in part.items() if key != "default" or value is not None}, _without_null)
     if "anyOf" in found:
         rest = [each for each in found.pop("anyOf") if each != {"type": "null"}]
@@ -247,7 +247,7 @@ def _without_null(part: Json) -> Json:
 
 
 def _hoisted(whole: Json) -> Json:
-    """Return a schema in which each kind of quantity stands once, under $defs; a place keeps its own description.
+    """A schema in which each kind of quantity stands once, under $defs; a place keeps its own description.
 
     Defaults are SI numbers inside, where a scene has text with a unit: they are not told.
     """

@@ -31,7 +31,7 @@ ONE_CELL = re.compile(
 
 
 def width() -> int | None:
-    """Return the terminal's width, or COLUMNS; None for a pipe or a file, where nothing is wrapped."""
+    """Terminal's width, or COLUMNS; None for a pipe or a file, where nothing is wrapped."""
     known = sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdigit()
     return max(40, shutil.get_terminal_size().columns) if known else None
 
@@ -42,7 +42,7 @@ def show(*parts: str | TextTable) -> None:
 
 
 def render(parts: Sequence[str | TextTable], columns: int | None) -> str:
-    """Return paragraphs and tables as text no wider than `columns` where that can be."""
+    """Paragraphs and tables as text no wider than `columns` where that can be."""
     blocks = [_spread(part) if isinstance(part, TextTable) else part.split("\n") for part in parts]
     if all(_fits(block, columns or UNWRAPPED) for block in blocks):
         text = "\n".join(line for block in blocks for line in block)
@@ -58,7 +58,7 @@ def _fits(lines: list[str], columns: int) -> bool:
 
 
 def _spread(grid: TextTable) -> list[str]:
-    """Return a table's lines unwrapped, a blank one around it; none for a wider title, no heading, an empty column."""
+    """A table's lines unwrapped, a blank one around it; none for a wider title, no heading, an empty column."""
     rows = [[cell.split("\n") for cell in row] for row in (grid.columns, *grid.lines)]
     widths = [max(len(line) for cell in column for line in cell) for column in zip(*rows, strict=True)]
     below = max(map(len, rows[0]))
@@ -77,7 +77,7 @@ def _spread(grid: TextTable) -> list[str]:
 
 
 def narrowed(grid: TextTable, columns: int) -> tuple[TextTable, str]:
-    """Return a table with as many of its columns as fit without cutting a word, and which are not among them; or ""."""
+    """A table with as many of its columns as fit without cutting a word, and which are not among them; or ""."""
     least = _least(grid, columns)
     rank = [*grid.first, *(place for place in range(len(least)) if place not in grid.first)]
     kept = {place for place in rank if place not in grid.units}
@@ -98,17 +98,17 @@ def narrowed(grid: TextTable, columns: int) -> tuple[TextTable, str]:
 
 
 def _enough(grid: TextTable, columns: int) -> int:
-    """Return how wide a terminal is, wider than `columns`, that shows all columns of a table."""
+    """How wide a terminal is, wider than `columns`, that shows all columns of a table."""
     return next(wide for wide in itertools.count(columns + 1) if _total(_least(grid, wide)) <= wide)
 
 
 def _with_units(grid: TextTable, kept: Collection[int]) -> list[int]:
-    """Return the places of columns with those of their units, from the left."""
+    """Places of columns with those of their units, from the left."""
     return [p for p in range(len(grid.columns)) if (p - 1 if p in grid.units else p) in kept]
 
 
 def _least(grid: TextTable, columns: int) -> list[int]:
-    """Return how wide each column is at least: of what may be wrapped its longest word, else its longest line.
+    """How wide each column is at least: of what may be wrapped its longest word, else its longest line.
 
     The first column is wrapped only where not all columns fit otherwise.
     """
@@ -121,7 +121,7 @@ def _least(grid: TextTable, columns: int) -> list[int]:
 
 
 def _unbroken(word: str) -> int:
-    """Return how many characters of a word stay on one line: all but of an address, or of what is as long as one."""
+    """How many characters of a word stay on one line: all but of an address, or of what is as long as one."""
     return len(word) if JOINED in word else min(len(word), LONGEST_WORD)
 
 
@@ -130,7 +130,7 @@ def _total(widths: Iterable[int]) -> int:
 
 
 def _widths(grid: TextTable, columns: int) -> list[int]:
-    """Return how wide columns are where not all words stand on one line: the widest that may wrap gives way first."""
+    """How wide columns are where not all words stand on one line: the widest that may wrap gives way first."""
     least = _least(grid, columns)
     widths = [
         max(len(line) for cell in column for line in cell.split("\n"))
@@ -142,7 +142,7 @@ def _widths(grid: TextTable, columns: int) -> list[int]:
 
 
 def _wrapped(parts: Sequence[str | TextTable], columns: int) -> str:
-    """Return paragraphs and tables as Rich lays them out, wrapped where they are wider than `columns`."""
+    """Paragraphs and tables as Rich lays them out, wrapped where they are wider than `columns`."""
     from rich.console import Console
     from rich.text import Text
 
@@ -186,7 +186,7 @@ def _called(line: str, columns: int) -> tuple[list[str], list[str]]:
 
 
 def _paragraph(line: str) -> Any:
-    """Return a line of text; an indented line stays indented where it wraps."""
+    """A line of text; an indented line stays indented where it wraps."""
     from rich.padding import Padding
     from rich.text import Text
 
@@ -195,7 +195,7 @@ def _paragraph(line: str) -> Any:
 
 
 def _table(grid: TextTable, widths: Sequence[int]) -> Any:
-    """Return a table in Rich's terms without its title, a blank line after it; widths: of its columns."""
+    """A table in Rich's terms without its title, a blank line after it; widths: of its columns."""
     from rich import box
     from rich.padding import Padding
     from rich.table import Table

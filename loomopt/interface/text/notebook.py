@@ -46,7 +46,7 @@ class Sketch:
 
 
 def sketch(scene: Scene, design: Design, said: outputs.DrawnSubject | None = None) -> Sketch:
-    """Return a design's mechanism in the positions that matter; said: what the design is, for the title.
+    """A design's mechanism in the positions that matter; said: what the design is, for the title.
 
     Raises BadInput where the scene cannot be drawn.
     """
@@ -54,7 +54,7 @@ def sketch(scene: Scene, design: Design, said: outputs.DrawnSubject | None = Non
 
 
 def html(thing: object) -> str:
-    """Return a scene, a design's evaluation, an answer or proofs as HTML: what the terminal shows, and the mechanism.
+    """A scene, a design's evaluation, an answer or proofs as HTML: what the terminal shows, and the mechanism.
 
     The mechanism is drawn where the scene gives what a drawing needs. Raises TypeError for anything else.
     """
@@ -71,25 +71,25 @@ def html(thing: object) -> str:
 
 
 def _drawn(scene: Scene, design: Design, said: outputs.DrawnSubject | None = None) -> str:
-    """Return the mechanism as SVG where the scene gives what a drawing needs, else ""."""
+    """Mechanism as SVG where the scene gives what a drawing needs, else ""."""
     return "" if registry.of(scene).views.missing(scene) else sketch(scene, design, said)._repr_svg_()
 
 
 def _on_page(size: re.Match[str]) -> str:
-    """Return a drawing's size as one that a page takes; letters, as large as the drawing asks, go with it."""
+    """A drawing's size as one that a page takes; letters, as large as the drawing asks, go with it."""
     sides = [float(side) for side in size.groups()]
     width, height = (round(PAGE * side / max(sides)) for side in sides)
     return f'width="{width}" height="{height}"'
 
 
 def page(parts: Sequence[str | TextTable], drawn: str = "") -> str:
-    """Return paragraphs and tables, then a drawing."""
+    """Paragraphs and tables, then a drawing."""
     told = (table(part) if isinstance(part, TextTable) else f"<p>{_escaped(part)}</p>" for part in parts)
     return f"<div>{''.join(told)}{drawn}</div>"
 
 
 def table(grid: TextTable) -> str:
-    """Return a table as HTML, numbers to the right."""
+    """A table as HTML, numbers to the right."""
     head = "".join(f"<th>{_escaped(heading)}</th>" for heading in grid.columns)
     rows = ("".join(_cell(cell, place in grid.right) for place, cell in enumerate(line)) for line in grid.lines)
     body = "".join(f"<tr>{row}</tr>" for row in rows)

@@ -31,7 +31,7 @@ STEP = 15
 
 
 def parts(scene: Scene) -> list[str | TextTable]:
-    """Return the tables of `loomopt show`."""
+    """Tables of `loomopt show`."""
     words = Words(scene)
     lines = []
     for key, name, value in _values(scene):
@@ -58,7 +58,7 @@ def parts(scene: Scene) -> list[str | TextTable]:
 
 
 def _kinds(scene: Scene) -> dict[str, str]:
-    """Return the kinds of quantity, by their keys in [display], of a scene's design variables and figures."""
+    """Kinds of quantity, by their keys in [display], of a scene's design variables and figures."""
     kinds = [*scene.schema.variables.values(), *(figure.kind for figure in scene.schema.figures.values())]
     keys = {kind: key for key, kind in KINDS.items()}
     return {keys[kind]: kind for kind in dict.fromkeys(kinds) if kind in keys}
@@ -74,7 +74,7 @@ def _targets(scene: Scene) -> list[tuple[str, str, str]]:
 
 
 def _family(scene: Scene) -> list[str | TextTable]:
-    """Return the members of the scene's family, where it has one. Raises BadInput for one that is no scene."""
+    """Members of the scene's family, where it has one. Raises BadInput for one that is no scene."""
     if FAMILY not in scene.schema.targets:
         return []
     table, members = family.table(scene), family.members(scene)
@@ -86,7 +86,7 @@ def _family(scene: Scene) -> list[str | TextTable]:
 
 
 def listed(values: str | Sequence[float]) -> str:
-    """Return a list of numbers in a few words; "" for a word."""
+    """A list of numbers in a few words; "" for a word."""
     return "" if isinstance(values, str) else f"{len(values)} numbers, {min(values):.3g} ... {max(values):.3g}"
 
 
@@ -112,18 +112,18 @@ def _values(scene: Scene) -> Iterator[tuple[str, str, float | str | Sequence[flo
 
 
 def _ended(scene: Scene, key: str, end: str) -> str:
-    """Return the key of a limit's end; a limit given as one value has no ends."""
+    """Key of a limit's end; a limit given as one value has no ends."""
     return key if scene.given(key) else f"{key}.{end}"
 
 
 def equations(scene: Scene) -> list[str]:
-    """Return the equations a scene really uses, as text, those of one name together."""
+    """Equations a scene really uses, as text, those of one name together."""
     groups = itertools.groupby(scene.equations(), key=lambda equation: equation.name)
     return ["\n".join([name, *(f"    {equation.text}" for equation in group)]) for name, group in groups]
 
 
 def curves(scene: Scene, design: Design, width: int | None) -> list[str | TextTable]:
-    """Return the curves every 15 degrees and at the marks, both sides of a jump, in the scene's display units.
+    """Curves every 15 degrees and at the marks, both sides of a jump, in the scene's display units.
 
     More tables where one is too wide.
     """
@@ -152,7 +152,7 @@ def curves(scene: Scene, design: Design, width: int | None) -> list[str | TextTa
 
 
 def beside(scene: Scene, frame: "pd.DataFrame") -> TextTable:
-    """Return how far curves, SI, lie off what was measured, in the scene's display units."""
+    """How far curves, SI, lie off what was measured, in the scene's display units."""
     lines = []
     for column in frame.columns:
         name, _, unit = column.removesuffix("]").partition("_measured [")
@@ -172,24 +172,24 @@ def beside(scene: Scene, frame: "pd.DataFrame") -> TextTable:
 
 
 def _angles(marks: Marks) -> dict[str, float]:
-    """Return the marks that are one crank angle, rad."""
+    """Marks that are one crank angle, rad."""
     return {name: mark for name, mark in marks.items() if not isinstance(mark, Span) and math.isfinite(mark)}
 
 
 def _table(some: Sequence[tuple[str, list[str]]], rows: Sequence[int]) -> TextTable:
-    """Return some curves as a table; rows: places of the rows it shows."""
+    """Some curves as a table; rows: places of the rows it shows."""
     lines = tuple(tuple(texts[k] for _, texts in some) for k in rows)
     return TextTable("", tuple(head for head, _ in some), lines, right=tuple(range(len(some))))
 
 
 def _width(curve: tuple[str, list[str]]) -> int:
-    """Return the characters a curve's column takes with the gap after it."""
+    """Characters a curve's column takes with the gap after it."""
     head, texts = curve
     return max(len(text) for text in (*head.split("\n"), *texts)) + len(GAP)
 
 
 def _curve(scene: Scene, name: str, values: Floats) -> tuple[str, list[str]]:
-    """Return a curve's heading and its cells in its display unit, four digits of the largest; empty where undefined."""
+    """A curve's heading and its cells in its display unit, four digits of the largest; empty where undefined."""
     symbol, si = split(name)
     unit = scene.unit_for(si)
     numbers = np.asarray(values, dtype=float) * (1.0 if unit == si else factor(si) / factor(unit))
@@ -201,7 +201,7 @@ def _curve(scene: Scene, name: str, values: Floats) -> tuple[str, list[str]]:
 
 
 def forces(scene: Scene, frame: "pd.DataFrame", design: Mapping[str, float]) -> list[str | TextTable]:
-    """Return a line for each force of curves (SI): its peak, where that is, and the means that bearings go by."""
+    """A line for each force of curves (SI): its peak, where that is, and the means that bearings go by."""
     from loomopt.interface.forces import CUBIC, ROLLER, found
 
     lines, force, angle = [], scene.shown_in("force"), scene.shown_in("angle")
