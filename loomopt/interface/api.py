@@ -75,8 +75,8 @@ def load(name_or_path: str | os.PathLike[str]) -> Loaded:
 
     An answer comes as the `Evaluation` of its design, computed anew. Raises BadInput.
     """
-    own, design = _opened(name_or_path)
-    return own if design is None else results.evaluated(own, design, None)
+    loaded, design = _opened(name_or_path)
+    return loaded if design is None else results.evaluated(loaded, design, None)
 
 
 @renamed(near="warm_start", everywhere="global_proof", yield_="min_yield", steps="round_to")
@@ -133,7 +133,7 @@ def solve(
     from loomopt.interface.progress import cell_progress
     from loomopt.solving import engine
 
-    own = _scene(scene)
+    loaded = _scene(scene)
     for key, hook in (("on_iteration", on_iteration), ("on_start", on_start), ("on_step", on_step)):
         if hook is not None:
             arguments.called(hook, key, "a function", "Give a function, or leave it out")
@@ -144,9 +144,9 @@ def solve(
     if not isinstance(round_to, bool):
         round_to = arguments.table(round_to, "round_to", "numbers and their steps", "Write {'l1': '0.5 mm'}, or True")
     with cell_progress() as say:
-        told = on_step or say
-        proof = GlobalProof(gap, seconds, told or (lambda text: None)) if global_proof else None
-        hooks: dict[str, Any] = {"on_iteration": on_iteration, "on_start": on_start, "on_step": told}
+        on_text = on_step or say
+        proof = GlobalProof(gap, seconds, on_text or (lambda text: None)) if global_proof else None
+        hooks: dict[str, Any] = {"on_iteration": on_iteration, "on_start": on_start, "on_step": on_text}
         anywhere = functools.partial(
             engine.solve,
             target=target,
@@ -156,7 +156,7 @@ def solve(
             near=[warm_start.point] if warm_start and warm_start.point else [],
             **hooks,
         )
-        once = functools.partial(anywhere, own)
+        once = functools.partial(anywhere, loaded)
         if round_to:
             from loomopt.studies.rounding import size_rounding
 
@@ -166,19 +166,19 @@ def solve(
             if proof:
                 remedy = "Leave out the proof: an answer in sizes says what of the lattice was read"
                 raise refusal("sizes and the global proof cannot be combined", "", "round_to", remedy=remedy)
-            rounding = size_rounding.asked(own, target, None if round_to is True else round_to)
+            rounding = size_rounding.asked(loaded, target, None if round_to is True else round_to)
             told_last = functools.partial(anywhere, prove=prove)
-            found = size_rounding.solved(rounding, anywhere, told_last, told)
+            solution = size_rounding.solved(rounding, anywhere, told_last, on_text)
         elif robust is None and min_yield is None:
-            found = once(prove=prove, global_proof=proof)
+            solution = once(prove=prove, global_proof=proof)
         else:
             from loomopt.studies.robust import backoff
 
-            asked = backoff.asked(own, target, robust, min_yield, seed)
+            request = backoff.asked(loaded, target, robust, min_yield, seed)
             check_global_proof(proof)
             last = functools.partial(once, prove=prove, global_proof=proof)
-            found = backoff.solved(asked, once, last, told)
-    return results.solved(found, own, own.call.target if target is None else target)
+            solution = backoff.solved(request, once, last, on_text)
+    return results.solved(solution, loaded, loaded.call.target if target is None else target)
 
 
 def evaluate(scene: Given, design: Design | Evaluation | None = None, target: str | None = None) -> Evaluation:
@@ -187,8 +187,8 @@ def evaluate(scene: Given, design: Design | Evaluation | None = None, target: st
     scene: as `load` takes it; without a design, an answer is judged as it is. design: a mapping, or an answer, of which
     the design alone is taken. target: whose limits, the answer's own or the job's default without one.
     """
-    own, given = _request(scene, design)
-    return results.evaluated(own, given, target)
+    loaded, given = _request(scene, design)
+    return results.evaluated(loaded, given, target)
 
 
 def prove(
@@ -203,11 +203,11 @@ def prove(
     from loomopt.interface.progress import cell_progress
     from loomopt.solving.proof import whole_cycle
 
-    own, given = _request(scene, design)
+    loaded, given = _request(scene, design)
     with cell_progress() as say:
         if say:
             say("proving")
-        return whole_cycle.prove(own, given, target, slack)
+        return whole_cycle.prove(loaded, given, target, slack)
 
 
 @renamed(beside="measured")
@@ -230,9 +230,9 @@ def simulate(
 
     if accuracy is not None:
         check_numbers(accuracy, 1)
-    own, given = _request(scene, design)
-    name = None if target is None and own.call.target is None else target_name(own, target)
-    return tables.curves(own, given, accuracy, name, measured)
+    loaded, given = _request(scene, design)
+    name = None if target is None and loaded.call.target is None else target_name(loaded, target)
+    return tables.curves(loaded, given, accuracy, name, measured)
 
 
 def budget(scene: Given, design: Design | Evaluation | None = None, *, fluctuation: float | None = None) -> "Budget":
@@ -340,11 +340,11 @@ def tolerance(
     from loomopt.interface.study.tolerance import run_tolerance
     from loomopt.studies.tolerance.plan import plan_tolerance
 
-    own, given = _request(scene, design)
+    loaded, given = _request(scene, design)
     if on_step is not None:
         arguments.called(on_step, "on_step", "a function", "Give a function, or leave it out")
     proving, going_on = arguments.flag(worst, "worst"), arguments.flag(resume, "resume")
-    plan = plan_tolerance(own, given, target, samples, seed)
+    plan = plan_tolerance(loaded, given, target, samples, seed)
     return run_tolerance(plan, executor, workers, on_step, proving, store, going_on)
 
 
@@ -376,10 +376,10 @@ def pareto(
     from loomopt.interface.study.points import run_study
     from loomopt.studies.front import front
 
-    own = _scene(scene)
-    asked = front.si(own, {} if ranges is None else ranges)
-    whose = front.demanding(own, target)
-    study = front.trade(own, axes, whose, maximise=maximise, ranges=asked, points=points, accuracy=accuracy)
+    loaded = _scene(scene)
+    axis_ranges = front.si(loaded, {} if ranges is None else ranges)
+    whose = front.demanding(loaded, target)
+    study = front.trade(loaded, axes, whose, maximise=maximise, ranges=axis_ranges, points=points, accuracy=accuracy)
     return run_study(study, executor, workers, store, resume, on_row)
 
 
@@ -443,8 +443,8 @@ def _opened(given: Given) -> tuple[Scene, dict[str, float] | None]:
     if isinstance(given, Evaluation):
         return given.scene.called(Call(target=given.target or None)), designs.checked(given.design, given.scene)
     if path := registry.answer_path(given):
-        own, handed = registry.answered(path)
-        return own, designs.checked(handed.design, own, own.origin)
+        loaded, handed = registry.answered(path)
+        return loaded, designs.checked(handed.design, loaded, loaded.origin)
     return registry.load(given), None
 
 
@@ -455,10 +455,10 @@ def _request(scene: Given, design: Design | Evaluation | None) -> tuple[Scene, d
     """
     from loomopt.scenes import designs
 
-    own, known = _opened(scene)
+    loaded, stored_design = _opened(scene)
     if isinstance(design, Evaluation):
-        designs.check_job(design.scene.job, own, "<answer>")
+        designs.check_job(design.scene.job, loaded, "<answer>")
         design = design.design
     if design is None or (isinstance(design, Mapping) and not design):
-        return own, known or {}
-    return own, designs.checked(design, own)
+        return loaded, stored_design or {}
+    return loaded, designs.checked(design, loaded)

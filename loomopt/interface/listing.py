@@ -36,8 +36,8 @@ def new(name: str, path: str | os.PathLike[str]) -> Path:
     """
     from loomopt.jobs import registry
 
-    own = name in packaged.problems() and (name not in registry.own_names() or Path(path).suffix.lower() == ZIP)
-    return copied(name, Path(path)) if own else template(name, Path(path))
+    is_packaged = name in packaged.problems() and (name not in registry.own_names() or Path(path).suffix.lower() == ZIP)
+    return copied(name, Path(path)) if is_packaged else template(name, Path(path))
 
 
 def template(job: str, path: Path) -> Path:
@@ -62,13 +62,13 @@ def copied(name: str, path: Path) -> Path:
     if ending == SCENE:
         beside = {path.with_name(file): text for file, text in _named(known[name]).items()}
         contents = {path: known[name].read_text(encoding="utf-8"), **beside}
-        for each in contents:
-            _check_new(each)
+        for source in contents:
+            _check_new(source)
         together({place: functools.partial(_put, text) for place, text in contents.items()})
         return path
     _check_new(path)
     job = packaged.head(known[name]).job
-    scenes = [each for each in known.values() if packaged.head(each).job == job]
+    scenes = [scene for scene in known.values() if packaged.head(scene).job == job]
     atomically(path, functools.partial(_zipped, scenes))
     return path
 
@@ -78,8 +78,8 @@ def _named(scene: Path) -> dict[str, str]:
     from loomopt.jobs import registry
     from loomopt.scenes.numbers import tables
 
-    own = registry.load(scene)
-    return {name: text for key, text in tables(own).items() if (name := own.given(key))}
+    document = registry.load(scene)
+    return {name: text for key, text in tables(document).items() if (name := document.given(key))}
 
 
 def _check_new(path: Path) -> None:

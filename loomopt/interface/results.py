@@ -48,7 +48,7 @@ class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
     @lazy
     def members(self) -> "tuple[Evaluation, ...]":
         """Of a family each machine by itself."""
-        return tuple(_judged(each, self.scene, family.of_target(self.scene)) for each in self.result.members)
+        return tuple(_judged(member, self.scene, family.of_target(self.scene)) for member in self.result.members)
 
     def as_dict(self) -> dict[str, Any]:
         """Object that `--json` prints."""
@@ -119,16 +119,16 @@ class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
         outputs.linkage(place, self.scene, self.design, outputs.what(self.result))
         return place
 
-    def report(self, path: str | os.PathLike[str], *beside: object) -> Path:
+    def report(self, path: str | os.PathLike[str], *results: object) -> Path:
         """Write one self-contained page, which says first what the design truly is; return the file. Raises BadInput.
 
-        path: one that ends in .html. beside: what was computed of the same scene, to stand on the page too: fronts,
+        path: one that ends in .html. results: studies of the same scene that the page shows too: fronts,
         sweeps, effects, sensitivities, tolerances, torque budgets, accuracy, proofs.
         """
         from loomopt.interface.report import document
 
         place = Path(arguments.path(path, "path", "a path that ends in .html", "Name a file"))
-        document.write(place, document.of_answer(self, beside))
+        document.write(place, document.of_answer(self, results))
         return place
 
     def animate(self, path: str | os.PathLike[str] | None = None) -> "MovingPicture":
@@ -202,15 +202,15 @@ class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
         if not self.terms and self.target:
             job = registry.of_target(self.scene, self.target)
             objectives = job.program(self.scene, self.target).objectives
-            sizes = {each.figure: each.scale if each.power == 1 else 0.0 for each in objectives}
+            sizes = {objective.figure: objective.scale if objective.power == 1 else 0.0 for objective in objectives}
         words, all_of = Words(self.scene), {**self.design, **self.figures}
-        told = list[str]()
+        parts = list[str]()
         for name in self.terms.axes if self.terms else sizes:
             value = all_of.get(name)
             if value is not None:
                 value = 0.0 if abs(value) <= SHOWN_AS_ZERO * sizes.get(name, 0.0) else value
-                told.append(f"{name} {words.shown(name, value)}")
-        return ", ".join(told)
+                parts.append(f"{name} {words.shown(name, value)}")
+        return ", ".join(parts)
 
     def __str__(self) -> str:
         from loomopt.interface.text import answers, layout
@@ -259,7 +259,9 @@ class Answer(Evaluation):
 def _fields_signature(record: type) -> inspect.Signature:
     """Names of what is in a record: whoever reads `help` looks for them."""
     known = inspect.signature(record).parameters.values()
-    return inspect.Signature([each.replace(annotation=each.empty, default=each.empty) for each in known])
+    return inspect.Signature(
+        [parameter.replace(annotation=parameter.empty, default=parameter.empty) for parameter in known]
+    )
 
 
 Answer.__signature__ = _fields_signature(solution.Solution)  # type: ignore[attr-defined]
@@ -280,10 +282,10 @@ def evaluated(scene: Scene, design: Mapping[str, float] | None, target: str | No
     return _judged(report.evaluate(scene, design, target), scene, target_name(scene, target))
 
 
-def solved(found: solution.Solution, scene: Scene, target: str | None = None) -> Answer:
+def solved(record: solution.Solution, scene: Scene, target: str | None = None) -> Answer:
     """What a solve says as an object to work with; target: as the call named it."""
-    return Answer(dataclasses.replace(found, scene=scene, asked=target), found.target)
+    return Answer(dataclasses.replace(record, scene=scene, asked=target), record.target)
 
 
-def _judged(found: solution.Evaluated, scene: Scene, target: str) -> Evaluation:
-    return Evaluation(found if found.scene else dataclasses.replace(found, scene=scene), target)
+def _judged(evaluated: solution.Evaluated, scene: Scene, target: str) -> Evaluation:
+    return Evaluation(evaluated if evaluated.scene else dataclasses.replace(evaluated, scene=scene), target)

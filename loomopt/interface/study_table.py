@@ -72,21 +72,21 @@ def columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> dict[st
         "design": [row.design for row in rows],
         "figures": [row.figures for row in rows],
     }
-    units, found = ColumnUnits(study, si), dict[str, list[NumberColumn]]()
+    units, parts = ColumnUnits(study, si), dict[str, list[NumberColumn]]()
     for part, numbers in numbers_of.items():
-        taken = {column.name for columns in found.values() for column in columns}
+        taken = {column.name for columns in parts.values() for column in columns}
         taken |= {"change"} if part == "figures" else set()
-        names = dict.fromkeys(name for each in numbers for name in each if name not in taken)
-        found[part] = _filled(
-            NumberColumn(name, units.of(name), factor(units.of(name)), tuple(each.get(name) for each in numbers))
+        names = dict.fromkeys(name for row in numbers for name in row if name not in taken)
+        parts[part] = _filled(
+            NumberColumn(name, units.of(name), factor(units.of(name)), tuple(row.get(name) for row in numbers))
             for name in names
         )
     multipliers = dict.fromkeys(multiplier for row in rows for multiplier in row.multipliers)
-    found["multipliers"] = _filled(
-        NumberColumn(each.text, *units.price(each), tuple(row.multipliers.get(each) for row in rows))
-        for each in multipliers
+    parts["multipliers"] = _filled(
+        NumberColumn(price.text, *units.price(price), tuple(row.multipliers.get(price) for row in rows))
+        for price in multipliers
     )
-    return found if si else _without_rounding(found)
+    return parts if si else _without_rounding(parts)
 
 
 PRINTED = 1e-5
@@ -107,17 +107,17 @@ def labelled_point(
     allowed = f"{', '.join(map(str, numbers[:20]))}, or a place such as {_place_example(study, rows)}"
     remedy = "Choose one of them"
     if not isinstance(label, str | Mapping):
-        found = [k for k in numbers if k == arguments.whole(label, "point", allowed, remedy)]
+        points = [k for k in numbers if k == arguments.whole(label, "point", allowed, remedy)]
     elif isinstance(label, str) and (mark := label.strip().removeprefix("point ").rstrip("*")) in map(str, numbers):
-        found = [int(mark)]
+        points = [int(mark)]
     else:
         places = _named_places(study, rows, label, allowed)
-        found = [row.point for k, row in enumerate(rows) if all(_is_there(c, k, value) for c, value in places)]
-    if len(found) != 1:
-        problem = f"it names the points {', '.join(map(str, found[:20]))}" if found else "the study has no such point"
-        remedy = "Name more columns, or the number" if found else remedy
+        points = [row.point for k, row in enumerate(rows) if all(_is_there(c, k, value) for c, value in places)]
+    if len(points) != 1:
+        problem = f"it names the points {', '.join(map(str, points[:20]))}" if points else "the study has no such point"
+        remedy = "Name more columns, or the number" if points else remedy
         raise refusal(problem, "", "point", label, allowed, remedy)
-    return found[0]
+    return points[0]
 
 
 def _named_places(
@@ -135,7 +135,7 @@ def _named_places(
         if match is None or first is None:
             raise refusal("it is no label of a row", "", "point", label, allowed, remedy)
         named.append((match["key"] or match["name"] or first.name, match["value"] or match["rest"] or match["bare"]))
-    found = []
+    places = []
     for name, given in named:
         if name not in known:
             raise refusal(f"the table has no column {name}", "", "point", label, ", ".join(known), remedy)
@@ -146,13 +146,16 @@ def _named_places(
             if not _is_number(given):
                 raise refusal(error.problem, "", "point", label, error.allowed, remedy) from None
             value = float(given) * column.size
-        found.append((column, float(value)))
-    return found
+        places.append((column, float(value)))
+    return places
 
 
 def _is_there(column: NumberColumn, at: int, value: float) -> bool:
-    own, largest = column.values[at], max((abs(each) for each in column.values if each is not None), default=0.0)
-    return own is not None and abs(own - value) <= PRINTED * largest
+    point_value, largest = (
+        column.values[at],
+        max((abs(number) for number in column.values if number is not None), default=0.0),
+    )
+    return point_value is not None and abs(point_value - value) <= PRINTED * largest
 
 
 def _is_number(text: object) -> bool:
@@ -169,7 +172,7 @@ def _kind(study: SceneStudy, name: str) -> str:
 def _place_example(study: SceneStudy, rows: Sequence[Row]) -> str:
     """How a row's place is written, by its first number."""
     column = next(iter(columns(study, rows)["place"]), None)
-    value = next((each for each in column.shown if each is not None), None) if column else None
+    value = next((number for number in column.shown if number is not None), None) if column else None
     if column is None or value is None:
         return '"3"'
     return f'"{value:.6g}{"" if column.unit == "1" else f" {column.unit}"}"'
@@ -179,11 +182,14 @@ def _filled(columns: Iterable[NumberColumn]) -> list[NumberColumn]:
     return [column for column in columns if any(value is not None for value in column.values)]
 
 
-def _without_rounding(found: dict[str, list[NumberColumn]]) -> dict[str, list[NumberColumn]]:
+def _without_rounding(parts: dict[str, list[NumberColumn]]) -> dict[str, list[NumberColumn]]:
     sizes: dict[str, float] = {}
-    for column in itertools.chain(*found.values()):
+    for column in itertools.chain(*parts.values()):
         sizes[column.unit] = max(sizes.get(column.unit, 0.0), *(abs(value or 0.0) for value in column.values))
-    return {part: [_cleaned(column, sizes[column.unit]) for column in each] for part, each in found.items()}
+    return {
+        part: [_cleaned(column, sizes[column.unit]) for column in columns_of_part]
+        for part, columns_of_part in parts.items()
+    }
 
 
 def _cleaned(column: NumberColumn, largest: float) -> NumberColumn:
@@ -208,9 +214,9 @@ def frame(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> "pd.DataF
         cells["narrows"] = [row.narrows for row in rows]
     cells["parent"] = pd.array([row.parent for row in rows], dtype="Int64")
     cells |= {"time [s]": [row.seconds for row in rows], "reason": [row.reason for row in rows]}
-    found = TableFrame(cells, index=pd.Index([row.point for row in rows], name="point"))
-    found.attrs.update(study_provenance(study))
-    return found
+    table = TableFrame(cells, index=pd.Index([row.point for row in rows], name="point"))
+    table.attrs.update(study_provenance(study))
+    return table
 
 
 def _floats(column: NumberColumn) -> list[float]:
@@ -257,34 +263,41 @@ def tables(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str
 
     rows: of all points that were solved.
     """
-    found = study.read(rows)
-    shown = [*columns(study, found.rows, si)["place"], *shown_columns(study, found.rows, si)]
+    findings = study.read(rows)
+    shown = [*columns(study, findings.rows, si)["place"], *shown_columns(study, findings.rows, si)]
     heads = ["", *(column.name if column.unit == "1" else f"{column.name}\n{column.unit}" for column in shown)]
     lines = []
-    for place, row in enumerate(found.rows):
-        cells = ["" if each is None else f"{each:.6g}" for each in (column.shown[place] for column in shown)]
+    for place, row in enumerate(findings.rows):
+        cells = ["" if value is None else f"{value:.6g}" for value in (column.shown[place] for column in shown)]
         mark = f"{row.point}{NARROWS}" if row.narrows else str(row.point)
         lines.append((mark, *cells, row.shortfall or ("" if row.status == "optimal" else row.status)))
-    counts = Counter(row.outcome for row in found.rows)
+    counts = Counter(row.outcome for row in findings.rows)
     outcome = ", ".join(f"{count} {status}" for status, count in counts.items())
     whole = study.size is None or len(rows) == study.size
-    narrowing = sum(row.narrows for row in found.rows)
-    number = len(found.rows) - narrowing
+    narrowing = sum(row.narrows for row in findings.rows)
+    number = len(findings.rows) - narrowing
     count = f"{number} point{'' if number == 1 else 's'}" if whole else counted(study, len(rows))
     count += f" and {narrowing} that narrow{'s' * (narrowing == 1)} changes down ({NARROWS})" if narrowing else ""
-    asked = range(min(len(study.kinds) + 2, len(heads)))  # the point, its place, what is sought there
+    first_columns = range(min(len(study.kinds) + 2, len(heads)))  # the point, its place, what is sought there
     right = tuple(range(len(heads)))
     grid = TextTable(
-        "", (*heads, "status"), tuple(lines), right, first=(*asked, len(heads)), more="--out F.csv, --json"
+        "", (*heads, "status"), tuple(lines), right, first=(*first_columns, len(heads)), more="--out F.csv, --json"
     )
-    reasons = [f"point {row.point}, {row.status}: {row.reason}" for row in found.rows if row.reason]
+    reasons = [f"point {row.point}, {row.status}: {row.reason}" for row in findings.rows if row.reason]
     more = [f"and {len(reasons) - MOST_REASONS} more, in the table's last column"] if reasons[MOST_REASONS:] else []
-    count += f", {found.bettered} bettered from a neighbour's design" if found.bettered else ""
-    message = [found.message] if found.message else []
-    said = [change_sentence(study, change, si) for change in found.changes]
+    count += f", {findings.bettered} bettered from a neighbour's design" if findings.bettered else ""
+    message = [findings.message] if findings.message else []
+    sentences = [change_sentence(study, change, si) for change in findings.changes]
     conditions = study.conditions
-    held = "".join(f"; {name} {conditions[name]}" for name in ("held", "not held") if name in conditions)
-    return [f"{study.heading}: {count}, {outcome}{held}", *message, grid, *said, *reasons[:MOST_REASONS], *more]
+    condition_text = "".join(f"; {name} {conditions[name]}" for name in ("held", "not held") if name in conditions)
+    return [
+        f"{study.heading}: {count}, {outcome}{condition_text}",
+        *message,
+        grid,
+        *sentences,
+        *reasons[:MOST_REASONS],
+        *more,
+    ]
 
 
 def change_sentence(study: SceneStudy, change: Change, si: bool) -> str:
@@ -331,12 +344,15 @@ def _chart(panel: NumberColumn, places: Sequence[NumberColumn], findings: Findin
     step = max(1, -(-len(lines) // LINES))
     series, key = list[Series](), list[tuple[str, str]]()
     dots = list[tuple[float, float, str]]()
-    for place, (values, own) in enumerate(sorted(lines.items())[::step]):
+    for place, (values, point_row) in enumerate(sorted(lines.items())[::step]):
         kind = f"c{place % COLOURS}"
-        label = ", ".join(valued(column, own[0]) for column, _ in zip(others, values, strict=True))
-        series += [Series(*_broken(x[own], y[own], gaps), kind, label), Series(x[own], y[own], kind, points=True)]
+        label = ", ".join(valued(column, point_row[0]) for column, _ in zip(others, values, strict=True))
+        series += [
+            Series(*_broken(x[point_row], y[point_row], gaps), kind, label),
+            Series(x[point_row], y[point_row], kind, points=True),
+        ]
         key += [(kind, label)] if label else []
-        missed = [k for k in own if rows[k].shortfall]
+        missed = [k for k in point_row if rows[k].shortfall]
         dots += [(x[k], y[k], "missed") for k in missed]
         key += [("dot missed", " and ".join(dict.fromkeys(rows[k].shortfall for k in missed)))] if missed else []
     if step > 1:

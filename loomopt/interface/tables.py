@@ -37,12 +37,12 @@ def answer(solution: Evaluated, scene: Scene) -> "pd.DataFrame":
 
     from loomopt.interface.table_frame import TableFrame
 
-    found = rows(solution, scene)
+    table = rows(solution, scene)
     left_out = {"reached"} if not solution.reached else set[str]()
     if not isinstance(solution, Solution):
         left_out |= {"binds", "today"}
     relaxed = isinstance(solution, Solution) and solution.relaxation
-    frame = TableFrame([{name: cell for name, cell in row.items() if name not in left_out} for row in found])
+    frame = TableFrame([{name: cell for name, cell in row.items() if name not in left_out} for row in table])
     more = {}
     if isinstance(solution, Solution):
         more = {"target": solution.sought, "accuracy": solution.solver["accuracy"]}
@@ -60,7 +60,7 @@ def rows(solution: Evaluated, scene: Scene, before: Evaluated | None = None) -> 
     limits = {limit.name: limit for limit in solution.limits}
     prices = solution.binding if isinstance(solution, Solution) else ()
     binding = {price.limit: price.side for price in prices}
-    found = []
+    table = []
     for name, value in {**solution.design, **solution.figures}.items():
         if value is None or getattr(name, "of", name) == "change" or name in scene.schema.lists:
             continue
@@ -71,9 +71,9 @@ def rows(solution: Evaluated, scene: Scene, before: Evaluated | None = None) -> 
         numbers = {"today": old, "design": value, "min": low, "max": high}
         shown = {column: None if number is None else _as_written(number, size) for column, number in numbers.items()}
         marks = {"binds": binding.get(name, ""), "reached": REACHED[solution.reached.get(name)]}
-        found.append({"name": name, "unit": unit, **shown, "ok": limit.ok if limit else True, **marks})
-        found += _per_second(found[-1], words.kind(name), scene, solution.design.get("speed"))
-    return _without_rounding(found)
+        table.append({"name": name, "unit": unit, **shown, "ok": limit.ok if limit else True, **marks})
+        table += _per_second(table[-1], words.kind(name), scene, solution.design.get("speed"))
+    return _without_rounding(table)
 
 
 def _as_written(value: float, size: float) -> float:
@@ -106,20 +106,20 @@ def _per_second(row: dict[str, Any], kind: str, scene: Scene, speed: float | Non
     ]
 
 
-def _without_rounding(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _without_rounding(table: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Rows whose numbers are 0 where they are only rounding beside the largest one of their unit."""
-    sizes = largest(found)
-    for row in found:
+    sizes = largest(table)
+    for row in table:
         for column in ("today", "design"):
             if row[column] is not None and abs(row[column]) <= SHOWN_AS_ZERO * sizes[row["unit"]]:
                 row[column] = 0.0
-    return found
+    return table
 
 
-def largest(found: list[dict[str, Any]]) -> dict[str, float]:
+def largest(table: list[dict[str, Any]]) -> dict[str, float]:
     """Largest magnitude in rows of each unit."""
     sizes: dict[str, float] = {}
-    for row in found:
+    for row in table:
         sizes[row["unit"]] = max(sizes.get(row["unit"], 0.0), abs(row["design"]), abs(row["today"] or 0.0))
     return sizes
 
@@ -132,7 +132,7 @@ def row(solution: Evaluated, scene: Scene, target: str, outcome: str, *, si: boo
 
     from loomopt.interface.table_frame import TableFrame
 
-    words, shown = Words(scene), {} if si else {each["name"]: each["design"] for each in rows(solution, scene)}
+    words, shown = Words(scene), {} if si else {row["name"]: row["design"] for row in rows(solution, scene)}
     cells: dict[str, object] = {"problem": solution.problem, "target": target, "outcome": outcome}
     for name, value in {**solution.design, **solution.figures}.items():
         listed = name in scene.schema.lists
@@ -154,13 +154,13 @@ def filed(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
     """Curves, SI, as a file has them: in the units of the scene's tables, in digits that mean something."""
     from loomopt.model.curves import split
 
-    found, names = frame.copy(), {}
+    shown, names = frame.copy(), {}
     for column in frame.columns:
         name, si = split(column)
         unit = scene.shown_in("angular speed") if name == SHAFT else scene.unit_for(si)
         if unit != si:
-            found[column], names[column] = frame[column] / factor(unit), f"{name} [{unit}]"
-    return meaningful(found.rename(columns=names), EVALUATED)
+            shown[column], names[column] = frame[column] / factor(unit), f"{name} [{unit}]"
+    return meaningful(shown.rename(columns=names), EVALUATED)
 
 
 def meaningful(frame: "pd.DataFrame", digits: int | None = None) -> "pd.DataFrame":
@@ -170,14 +170,14 @@ def meaningful(frame: "pd.DataFrame", digits: int | None = None) -> "pd.DataFram
     """
     if digits is None:
         digits = 2 + math.ceil(-math.log10(float(frame.attrs.get("accuracy", ACCURACY))))
-    found = frame.copy()
+    cleaned = frame.copy()
     for place, column in enumerate(frame.columns):
         values = frame[column]
         if values.dtype.kind == "f":
             tiny = 10.0**-digits * values.abs().max()
-            kept = [v if math.isnan(v) else 0.0 if abs(v) <= tiny else float(f"{v:.{digits}g}") for v in values]
-            found.isetitem(place, kept)
-    return found
+            rounded = [v if math.isnan(v) else 0.0 if abs(v) <= tiny else float(f"{v:.{digits}g}") for v in values]
+            cleaned.isetitem(place, rounded)
+    return cleaned
 
 
 @working()
@@ -244,7 +244,7 @@ def _put_beside(
 
     from loomopt.model.curves import ANGLE, split
 
-    phi, told = np.asarray(columns[ANGLE]) % TURN, {}
+    phi, measured_values = np.asarray(columns[ANGLE]) % TURN, {}
     apart = np.abs((phi[:, None] - np.array(angles) + math.pi) % TURN - math.pi)
     places = [_place(row, angles[:k].count(angles[k])) for k, row in enumerate(apart.T)]
     for column in [column for column in columns if split(column)[0] in measured]:
@@ -253,8 +253,8 @@ def _put_beside(
         values[places] = measured[name]
         columns[f"{name}{MEASURED} [{unit}]"] = values
         off = np.asarray(columns[column])[places] - np.asarray(measured[name])
-        told[f"{RMS}{name} [{unit}]"] = float(np.sqrt(np.nanmean(off**2)))
-    return told
+        measured_values[f"{RMS}{name} [{unit}]"] = float(np.sqrt(np.nanmean(off**2)))
+    return measured_values
 
 
 def _told(table: csv_tables.Table) -> dict[str, object]:

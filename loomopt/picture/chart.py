@@ -33,7 +33,9 @@ class Axis:
 
     def share(self, values: Floats | float) -> Floats:
         """Where values lie between the ends, from 0 to 1."""
-        low, high, at = (self._scaled(np.asarray(each, dtype=float)) for each in (self.low, self.high, values))
+        low, high, at = (
+            self._scaled(np.asarray(values_in, dtype=float)) for values_in in (self.low, self.high, values)
+        )
         return np.asarray((at - low) / (high - low))
 
     def text(self, value: float) -> str:
@@ -96,7 +98,7 @@ class Chart:
     @lazy
     def y(self) -> Axis:
         """The vertical axis."""
-        return self.upright or fitted([each.y for each in self.series], self.levels)
+        return self.upright or fitted([curve.y for curve in self.series], self.levels)
 
     @property
     def caption(self) -> str:
@@ -216,9 +218,9 @@ def thinned(angles: Floats) -> NDArray[np.bool_]:
     near = np.abs(angles / EVERY - np.round(angles / EVERY)) < 1e-9
     half = np.abs(2 * angles - np.round(2 * angles)) < 1e-7
     again = np.concatenate([[False], np.diff(angles) < 1e-6])
-    kept = near | ~half | again | np.append(again[1:], False)
-    kept[[0, -1]] = True
-    return np.asarray(kept)
+    needed = near | ~half | again | np.append(again[1:], False)
+    needed[[0, -1]] = True
+    return np.asarray(needed)
 
 
 def headed(title: str, unit: str) -> str:

@@ -117,9 +117,9 @@ def angle_between(
 ) -> list[Primitive]:
     """An angle's arc from begin to end, rad, with an arrow head at its end, or at both ends."""
     turn = math.copysign(math.pi / 2, end - begin)
-    found: list[Primitive] = [Arc("dimensions", centre, radius, min(begin, end), max(begin, end))]
+    primitives: list[Primitive] = [Arc("dimensions", centre, radius, min(begin, end), max(begin, end))]
     heads = [(end, turn), *([(begin, -turn)] if both else [])]
-    return found + [arrow("dimensions", centre.towards(at, radius), at + side, HEAD * h) for at, side in heads]
+    return primitives + [arrow("dimensions", centre.towards(at, radius), at + side, HEAD * h) for at, side in heads]
 
 
 def fixed_pivot(pivot: Point, h: float) -> list[Primitive]:
@@ -214,19 +214,21 @@ class Skeleton:
     def strokes(self, h: float) -> list[Primitive]:
         """Return what every drawing shows; h: text height, m."""
         frame = [link for link in self.links if set(link) <= set(self.pivots)]
-        found: list[Primitive] = [Line("paths", (self.pivots[one], self.pivots[other])) for one, other in frame]
+        primitives: list[Primitive] = [Line("paths", (self.pivots[one], self.pivots[other])) for one, other in frame]
         for pivot in self.pivots.values():
-            found += fixed_pivot(pivot, h)
-        found += [Circle("paths", self.pivots[name], radius) for name, radius in self.guides if name in self.pivots]
-        found += self.traces
+            primitives += fixed_pivot(pivot, h)
+        primitives += [
+            Circle("paths", self.pivots[name], radius) for name, radius in self.guides if name in self.pivots
+        ]
+        primitives += self.traces
         for event, joints in self.joints.items():
             at = self.at(event)
-            found += [Line(event, (at[one], at[other])) for one, other in self.links if (one, other) not in frame]
-            found += [Circle(event, joints[name], radius) for name, radius in self.guides if name in joints]
+            primitives += [Line(event, (at[one], at[other])) for one, other in self.links if (one, other) not in frame]
+            primitives += [Circle(event, joints[name], radius) for name, radius in self.guides if name in joints]
             sizes = {name: self.sizes.get(name, JOINT) for name in joints if name not in self.masses}
-            found += [Circle("joints", joints[name], size * h) for name, size in sizes.items() if size]
-            found += [part for name in joints if name in self.masses for part in mass(joints[name], h)]
-        return found
+            primitives += [Circle("joints", joints[name], size * h) for name, size in sizes.items() if size]
+            primitives += [part for name in joints if name in self.masses for part in mass(joints[name], h)]
+        return primitives
 
     def csv(self, units: Units = METRIC) -> str:
         """Joints as CSV; of centres of mass, where there are any, mass and radius too. Digits round-trip."""
@@ -238,8 +240,8 @@ class Skeleton:
             for name, point in joints.items():
                 numbers = [axis / factor(length) for axis in point]
                 if name in self.masses:
-                    own = self.masses[name]
-                    numbers += [own.mass / factor(mass), own.radius / factor(length)]
+                    joint_mass = self.masses[name]
+                    numbers += [joint_mass.mass / factor(mass), joint_mass.radius / factor(length)]
                 blank = "" if name in self.masses or not self.masses else ",,"
                 lines.append(f"{name}{prime},{event},{','.join(map(repr, numbers))}{blank}")
         return "".join(f"{line}\n" for line in lines)

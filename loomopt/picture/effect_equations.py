@@ -46,45 +46,47 @@ MOTION = frozenset({"phi", "theta", "omega", "omega_dot", "q", "beta"})
 
 def given(model: JobModel, values: Values) -> Given:
     """A scene's numbers as symbols, with the symbols and words of every effect's table that it gives."""
-    taken, own = {*MOTION, *values, *model.known} - set(model.labels), dict[str, Values]()
+    taken, symbols_of_effects = {*MOTION, *values, *model.known} - set(model.labels), dict[str, Values]()
     # A model of formulas alone does not say which of its effects' numbers are given.
-    told = not model.known.isdisjoint(model.labels)
+    has_labels = not model.known.isdisjoint(model.labels)
     for effect in model.effects:
         words = model.words_of(effect.name)
-        given_keys = [key for key in keys(effect.table) if not told or owned(effect, key) in model.known]
-        own[effect.name] = own_values(effect, words, given_keys, taken)
-        taken |= {str(value) for key, value in own[effect.name].items() if key not in words}
+        given_keys = [key for key in keys(effect.table) if not has_labels or owned(effect, key) in model.known]
+        symbols_of_effects[effect.name] = own_values(effect, words, given_keys, taken)
+        taken |= {str(value) for key, value in symbols_of_effects[effect.name].items() if key not in words}
     asks = any(check.joints for check in model.checks)
-    asks = asks or (told and any(isinstance(load, Load) and load.inside for load in model.loads))
+    asks = asks or (has_labels and any(isinstance(load, Load) and load.inside for load in model.loads))
     if not asks:
-        return Given(values, own)
+        return Given(values, symbols_of_effects)
     # Where a formula asks whether a number is given, those are that the scene gives.
-    there = {owned(effect, key): value for effect in model.effects for key, value in own[effect.name].items()}
+    there = {
+        owned(effect, key): value for effect in model.effects for key, value in symbols_of_effects[effect.name].items()
+    }
     there |= {name: values[name] for name in sorted(model.known) if name not in there}
-    return Given(ChainMap(there, values), own)  # type: ignore[arg-type]  # it is only read
+    return Given(ChainMap(there, values), symbols_of_effects)  # type: ignore[arg-type]  # it is only read
 
 
 def forces(
     model: JobModel,
     pose: Motion,
-    known: Given,
+    inputs: Given,
     total: str,
     letter: str,
     torque: tuple[str, str] = ("crank torque", "Md"),
 ) -> list[Equation]:
     """Write each term, their balance and the crank torque, the crank's motion, then what checks read and demand."""
     at = turning(pose, model)
-    found = [each for load in model.loads for each in _written(model, load, at, known, letter)]
+    equations = [item for load in model.loads for item in _written(model, load, at, inputs, letter)]
     within = dict[str, Expression]()
     for load in model.loads:
-        value = balance.inside(systems.sympy(), load, at, known)
+        value = balance.inside(systems.sympy(), load, at, inputs)
         if value is not None:
             within[f"{letter}_{load.name}_drive"] = value
-            found.append(equation(load.name, symbol(f"{letter}_{load.name}_drive"), sympy().sympify(value)))
-    found += sums(model.loads, at, symbol(total), letter, torque, tuple(map(symbol, within)))
-    found += crank_motion(model, at, known, torque[1])
-    found += [each for check in model.checks for each in check_equations(check, at, known)]
-    return found + joint_equations(model, at, known, symbol(total), letter)
+            equations.append(equation(load.name, symbol(f"{letter}_{load.name}_drive"), sympy().sympify(value)))
+    equations += sums(model.loads, at, symbol(total), letter, torque, tuple(map(symbol, within)))
+    equations += crank_motion(model, at, inputs, torque[1])
+    equations += [item for check in model.checks for item in check_equations(check, at, inputs)]
+    return equations + joint_equations(model, at, inputs, symbol(total), letter)
 
 
 def turning(pose: AnyMotion, model: JobModel) -> AnyMotion:
@@ -94,37 +96,39 @@ def turning(pose: AnyMotion, model: JobModel) -> AnyMotion:
     return replace(pose, omega_dot=symbol("omega_dot"))  # type: ignore[type-var]  # poses are dataclasses
 
 
-def crank_motion(model: JobModel, pose: Motion, known: Given, torque: str) -> list[Equation]:
+def crank_motion(model: JobModel, pose: Motion, inputs: Given, torque: str) -> list[Equation]:
     """Write the motor's line, the crank's own equation of motion, and what its mean speed demands; none without."""
-    own = motor(model.effects)
-    if own is None:
+    drive = motor(model.effects)
+    if drive is None:
         return []
     sp = sympy()
     own_names = {name: symbol(name) for name in ("speed", "no_load_speed")}
-    values = ChainMap(own_names, known.values)  # type: ignore[arg-type]  # it is only read
-    at = known._replace(values=values).inputs(systems.sympy(), own)
+    values = ChainMap(own_names, inputs.values)  # type: ignore[arg-type]  # it is only read
+    at = inputs._replace(values=values).inputs(systems.sympy(), drive)
     given_torque, omega, phi = symbol("M_motor"), symbol("omega"), pose.phi
     taken = [symbol(torque)] if model.loads else []
     once_round = sp.Integral(1 / sp.Function("omega")(phi), (phi, 0, 2 * sp.pi))
     return [
-        equation(own.name, given_torque, own.motor(at, omega)),
-        equation(own.name, given_torque, sum(taken) + own.flywheel(at) * pose.omega_dot),
-        equation(own.name, pose.omega_dot, omega * symbol("omega'")),
+        equation(drive.name, given_torque, drive.motor(at, omega)),
+        equation(drive.name, given_torque, sum(taken) + drive.flywheel(at) * pose.omega_dot),
+        equation(drive.name, pose.omega_dot, omega * symbol("omega'")),
         equation("mean speed", once_round, 2 * sp.pi / values["speed"]),
     ]
 
 
-def _written(model: JobModel, load: Acting, pose: Motion, known: Given, letter: str) -> Iterator[Equation]:
+def _written(model: JobModel, load: Acting, pose: Motion, inputs: Given, letter: str) -> Iterator[Equation]:
     """Yield a load's term, after the equation of motion of a state."""
     if isinstance(load, State):
-        own = [each for each in model.loads if isinstance(each, Load) and each.name in load.carries]
-        inertia = balance.total([each.moved(known.inputs(systems.sympy(), each)) for each in own if each.moved])
-        carried = balance.total([symbol(f"{letter}_{each.name}") for each in own])
-        left, right = load.motion(_in_symbols(pose, inertia, carried), known.own[load.name])
+        carried_loads = [item for item in model.loads if isinstance(item, Load) and item.name in load.carries]
+        inertia = balance.total(
+            [item.moved(inputs.inputs(systems.sympy(), item)) for item in carried_loads if item.moved]
+        )
+        carried = balance.total([symbol(f"{letter}_{item.name}") for item in carried_loads])
+        left, right = load.motion(_in_symbols(pose, inertia, carried), inputs.own[load.name])
         yield equation(load.name, left, right)
         moved, still = map(symbol, load.between)
         yield relation(load.name, symbol("z"), "=", moved - still, "after every turn the same")
-    yield term(load, pose, known, letter)
+    yield term(load, pose, inputs, letter)
 
 
 def _in_symbols(pose: Motion, inertia: Expression, carried: Expression) -> "Written":
@@ -133,69 +137,69 @@ def _in_symbols(pose: Motion, inertia: Expression, carried: Expression) -> "Writ
     return Written((symbol("z"), symbol("z'"), symbol("z''")), pose.omega, inertia, carried)
 
 
-def term(load: Acting, pose: Motion, known: Given, letter: str) -> Equation:
+def term(load: Acting, pose: Motion, inputs: Given, letter: str) -> Equation:
     """Write a load's term, with where each of its formulas holds."""
     name = symbol(f"{letter}_{load.name}")
-    if isinstance(load, Load) and load.tabulated and load.tabulated.key in known.own[load.name]:
-        return _tabulated(load, name, known)
+    if isinstance(load, Load) and load.tabulated and load.tabulated.key in inputs.own[load.name]:
+        return _tabulated(load, name, inputs)
     if isinstance(load, Load) and load.told:
-        rows: list[Case] = [(force(load, pose, known, switch), where) for switch, where in load.told.items()]
+        rows: list[Case] = [(force(load, pose, inputs, switch), where) for switch, where in load.told.items()]
         alike = len({formula for formula, _ in rows}) == 1
         return equation(load.name, name, rows[0][0]) if alike else cases(load.name, name, rows)
-    *inner, (last, _) = pieces(load, pose, known)
+    *inner, (last, _) = pieces(load, pose, inputs)
     if not inner:
         return equation(load.name, name, last)
     phi = symbol("phi")
-    told = [f"{text(one)} for {text(a)} <= {text(phi)} <= {text(b)}" for one, (a, b) in inner]
+    parts = [f"{text(one)} for {text(a)} <= {text(phi)} <= {text(b)}" for one, (a, b) in inner]
     lines = [rf"{latex(one)} & {latex(a)} \le {latex(phi)} \le {latex(b)}" for one, (a, b) in inner]
     choice = r" \\ ".join([*lines, rf"{latex(last)} & \text{{else}}"])
     written = rf"{latex(name)} = \begin{{cases}} {choice} \end{{cases}}"
     form = ((name, "="), *((one, (a, phi, b)) for one, (a, b) in inner), (last, "else"))
-    return Equation(load.name, f"{text(name)} = {', '.join(told)}, else {text(last)}", written, form)
+    return Equation(load.name, f"{text(name)} = {', '.join(parts)}, else {text(last)}", written, form)
 
 
-def _tabulated(load: Load[Any], name: Expression, known: Given) -> Equation:
+def _tabulated(load: Load[Any], name: Expression, inputs: Given) -> Equation:
     """Say what a load's curve is: of each interval only its own numbers differ."""
     assert load.tabulated is not None
-    curve = known.own[load.name][load.tabulated.key]
+    curve = inputs.own[load.name][load.tabulated.key]
     bent = f"{curve.corners} corners" if curve.corners != 1 else "one corner"
-    said = f"a cubic between each of the table's {curve.samples} samples and the next, C2 but for {bent}"
-    said += f", angles {load.tabulated.angle}"
-    written = rf"{latex(name)}:\ \text{{{said}}}"
-    return Equation(load.name, f"{text(name)}: {said}", written, ((name, f": {said}"),))
+    description = f"a cubic between each of the table's {curve.samples} samples and the next, C2 but for {bent}"
+    description += f", angles {load.tabulated.angle}"
+    written = rf"{latex(name)}:\ \text{{{description}}}"
+    return Equation(load.name, f"{text(name)}: {description}", written, ((name, f": {description}"),))
 
 
-def force(load: Acting, pose: Motion, known: Given, switch: float) -> Expression:
+def force(load: Acting, pose: Motion, inputs: Given, switch: float) -> Expression:
     """A load's formula at a switch, on the turn on which its corners lie: no whole turns are taken off."""
     if isinstance(load, State):
-        return load.term(_in_symbols(pose, 0, 0), known.own[load.name])
+        return load.term(_in_symbols(pose, 0, 0), inputs.own[load.name])
     sp = sympy()
-    found = load.force(known.inputs(systems.sympy(), load, pose, {load.name: sp.Rational(switch)}))
-    return sp.sympify(found).replace(sp.floor, lambda turns: sp.Integer(0))
+    value = load.force(inputs.inputs(systems.sympy(), load, pose, {load.name: sp.Rational(switch)}))
+    return sp.sympify(value).replace(sp.floor, lambda turns: sp.Integer(0))
 
 
-def pieces(load: Acting, pose: Motion, known: Given) -> list[Piece]:
+def pieces(load: Acting, pose: Motion, inputs: Given) -> list[Piece]:
     """A load's formula between each corner and the next, the last ending a turn after the first."""
     whole_turn = 2 * systems.sympy().pi
     if not isinstance(load, Load) or load.corners is None:
-        return [(force(load, pose, known, 0), (0, whole_turn))]
-    corners = tuple(map(sympy().sympify, load.corners(known.inputs(systems.sympy(), load))))
+        return [(force(load, pose, inputs, 0), (0, whole_turn))]
+    corners = tuple(map(sympy().sympify, load.corners(inputs.inputs(systems.sympy(), load))))
     if not corners:
-        return [(force(load, pose, known, 0), (0, whole_turn))]
+        return [(force(load, pose, inputs, 0), (0, whole_turn))]
     numbers = tuple(float(corner.subs(dict.fromkeys(corner.free_symbols, 1))) for corner in corners)
     ends, number_ends = (*corners[1:], corners[0] + whole_turn), (*numbers[1:], numbers[0] + 2 * math.pi)
     middles = [(begin + end) / 2 for begin, end in zip(numbers, number_ends, strict=True)]
     return [
-        (force(load, pose, known, load.switch(middle, numbers)), span)
+        (force(load, pose, inputs, load.switch(middle, numbers)), span)
         for middle, span in zip(middles, zip(corners, ends, strict=True), strict=True)
     ]
 
 
-def check_equations(check: Check[Any], pose: Motion, known: Given) -> list[Equation]:
+def check_equations(check: Check[Any], pose: Motion, inputs: Given) -> list[Equation]:
     """Write each figure and row of an effect that takes no part in the balance, and what it must keep."""
-    at = known.inputs(systems.sympy(), check, pose)
-    found = {name: read(at) for name, read in (*check.quantities.items(), *check.rows.items())}
-    return [each for name, value in found.items() for each in _kept(check, name, value)]
+    at = inputs.inputs(systems.sympy(), check, pose)
+    values = {name: read(at) for name, read in (*check.quantities.items(), *check.rows.items())}
+    return [item for name, value in values.items() for item in _kept(check, name, value)]
 
 
 class WrittenLoading(NamedTuple):
@@ -213,7 +217,7 @@ class WrittenLoading(NamedTuple):
         return balance.total([mass.second for mass, _ in self.masses])
 
 
-def joint_equations(model: JobModel, pose: Motion, known: Given, total: Expression, letter: str) -> list[Equation]:
+def joint_equations(model: JobModel, pose: Motion, inputs: Given, total: Expression, letter: str) -> list[Equation]:
     """Write the components of each force in a joint, and the moments, that checks read, once for all of them."""
     checks = [check for check in model.checks if check.joints]
     if not checks:
@@ -223,37 +227,41 @@ def joint_equations(model: JobModel, pose: Motion, known: Given, total: Expressi
         psi = [-symbol(f"psi_r{dots}") for dots in ("", "_dot", "_ddot")]
         moved = SimpleNamespace(q=psi[0], velocity=psi[1], acceleration=psi[2])  # type: ignore[assignment]
     terms = [(load, symbol(f"{letter}_{load.name}")) for load in model.loads]
-    masses = balance.masses(system, model.loads, known, (pose, moved))
-    loading = WrittenLoading(total, moved, masses, balance.pushes(system, terms, known, (pose, moved)))
-    found: dict[str, Equation] = {}
+    masses = balance.masses(system, model.loads, inputs, (pose, moved))
+    loading = WrittenLoading(total, moved, masses, balance.pushes(system, terms, inputs, (pose, moved)))
+    equations: dict[str, Equation] = {}
     for check in checks:
         assert check.joints is not None
         if check.said:
-            found[check.name] = Equation(check.name, check.said, rf"\text{{{check.said}}}")
+            equations[check.name] = Equation(check.name, check.said, rf"\text{{{check.said}}}")
             continue
-        joints = check.joints(known.inputs(system, check, pose), loading)
+        joints = check.joints(inputs.inputs(system, check, pose), loading)
         for name in check.between:
-            found |= {each: equation(check.name, symbol(each), value) for each, value in _between(joints, name)}
+            equations |= {
+                component: equation(check.name, symbol(component), value) for component, value in _between(joints, name)
+            }
         for name in (name for name in (*check.vectors, *check.scalars) if name in model.told):
             parts = [""] if name in check.scalars else [f"_{axis}" for axis in COMPONENTS]
             for part in parts:
                 value = getattr(joints, name)
                 value = getattr(value, part[1:]) if part else value
-                found.setdefault(name + part, equation(check.name, symbol(name + part), sympy().sympify(value)))
-        for name, work in ((each, check.worked[each]) for each in model.worked if each in check.worked):
+                equations.setdefault(name + part, equation(check.name, symbol(name + part), sympy().sympify(value)))
+        for name, work in (
+            (work_name, check.worked[work_name]) for work_name in model.worked if work_name in check.worked
+        ):
             value = sum(share * symbol(vector) for vector, share in getattr(joints, work).items())
-            found[name] = equation(check.name, symbol(f"dW_{name}/dphi"), value)
-    return list(found.values())
+            equations[name] = equation(check.name, symbol(f"dW_{name}/dphi"), value)
+    return list(equations.values())
 
 
 def _between(joints: Number, name: str) -> Iterator[tuple[str, Expression]]:
     """Yield what acts on a link by its own mass, and let symbols stand for it from there on; nothing without any."""
-    own = getattr(joints, name)
-    if own is not None:
+    joint = getattr(joints, name)
+    if joint is not None:
         parts = [f"F_{name}_x", f"F_{name}_y", f"N_{name}"]
-        yield from zip(parts, map(sympy().sympify, (*own.force, own.moment)), strict=True)
+        yield from zip(parts, map(sympy().sympify, (*joint.force, joint.moment)), strict=True)
         x, y, moment = map(symbol, parts)
-        joints.__dict__[name] = type(own)(type(own.force)(x, y), moment)
+        joints.__dict__[name] = type(joint)(type(joint.force)(x, y), moment)
 
 
 def _kept(check: Check[Any], name: str, value: Expression) -> list[Equation]:
@@ -262,35 +270,35 @@ def _kept(check: Check[Any], name: str, value: Expression) -> list[Equation]:
     value = sp.sympify(value).replace(sp.Abs, lambda positive: positive)
     whole = " " in name
     written = [] if whole else [equation(check.name, symbol(name), value)]
-    for each in (demand for demand in check.demands if demand.row == name):
-        own = isinstance(each.value, str)
-        limit = symbol(f"{each.value}_{ENDS[each.sign]}") if own else sp.nsimplify(each.value)
+    for requirement in (demand for demand in check.demands if demand.row == name):
+        is_name = isinstance(requirement.value, str)
+        limit = symbol(f"{requirement.value}_{ENDS[requirement.sign]}") if is_name else sp.nsimplify(requirement.value)
         kind = f"{check.name}: {name}" if whole else check.name
-        written.append(relation(kind, value if whole else symbol(name), SIGNS[each.sign], limit))
+        written.append(relation(kind, value if whole else symbol(name), SIGNS[requirement.sign], limit))
     return written
 
 
-def event_equations(model: JobModel, poses: tuple[Motion, Motion], known: Given, letter: str) -> list[Equation]:
+def event_equations(model: JobModel, poses: tuple[Motion, Motion], inputs: Given, letter: str) -> list[Equation]:
     """Write how the output parts from its mechanism, moves on its own and meets it again, as an event says it.
 
     poses: of symbols, on the output's way forward and back; none without an event.
     """
     sp, omega = sympy(), symbol("omega")
     output = [load for load in model.loads if load.acts == "output"]
-    forward, back = ([sp.expand(force(load, pose, known, 0)) for load in output] for pose in poses)
+    forward, back = ([sp.expand(force(load, pose, inputs, 0)) for load in output] for pose in poses)
     total = sum(symbol(f"{letter}_{load.name}") for load in output)
     mass = sum(form.coeff(poses[0].q2) for form in forward) / omega**2
     friction = sum((one - other) / 2 for one, other in zip(forward, back, strict=True))
     terms = EventTerms(symbol, total, sp.simplify(friction), sp.simplify(mass))
     rules = [rule for event in model.effects if isinstance(event, Event) for rule in event.rules(terms)]
-    return [relation(each.name, sp.sympify(each.left), each.sign, sp.sympify(each.right), each.where) for each in rules]
+    return [relation(rule.name, sp.sympify(rule.left), rule.sign, sp.sympify(rule.right), rule.where) for rule in rules]
 
 
-def terms(loads: Sequence[Acting], pose: Motion, known: Given) -> Mapping[str, Expression]:
+def terms(loads: Sequence[Acting], pose: Motion, inputs: Given) -> Mapping[str, Expression]:
     """Return each load's term by its effect's name, one expression over the whole turn."""
-    sp, phi, found = sympy(), symbol("phi"), {}
+    sp, phi, expressions = sympy(), symbol("phi"), {}
     for load in loads:
-        own = pieces(load, pose, known)
-        parts = [(formula, (begin <= phi) & (phi <= end)) for formula, (begin, end) in own[:-1]]
-        found[load.name] = sp.Piecewise(*parts, (own[-1][0], True)) if parts else own[0][0]
-    return found
+        intervals = pieces(load, pose, inputs)
+        parts = [(formula, (begin <= phi) & (phi <= end)) for formula, (begin, end) in intervals[:-1]]
+        expressions[load.name] = sp.Piecewise(*parts, (intervals[-1][0], True)) if parts else intervals[0][0]
+    return expressions

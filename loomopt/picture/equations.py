@@ -79,7 +79,7 @@ def loop(
     sides: left and right side of each equation; variable: the crank angle; kind: of which loop, before each name.
     """
     sp, angles = sympy(), (*unknown, *known)
-    found = [equation(f"{kind}loop closure", left, right) for left, right in sides]
+    equations = [equation(f"{kind}loop closure", left, right) for left, right in sides]
     functions = [(sp.Function(angle.name)(variable), angle) for angle in angles]
     for order, name in ((1, "rates"), (2, "second rates")):
         rates = [angle.rate if order == 1 else angle.second for angle in unknown]
@@ -90,8 +90,8 @@ def loop(
                 change = change.subs(function.diff(variable, 2), angle.second)
                 change = change.subs(function.diff(variable), angle.rate).subs(function, angle.symbol)
             matrix, rest = sp.linear_eq_to_matrix([change], rates)
-            found.append(equation(f"{kind}{name}", (matrix * sp.Matrix(rates))[0], rest[0]))
-    return found
+            equations.append(equation(f"{kind}{name}", (matrix * sp.Matrix(rates))[0], rest[0]))
+    return equations
 
 
 def sums(
@@ -106,18 +106,20 @@ def sums(
 
     torque: what the crank's torque is called, and its symbol; within: what output loads take inside the drive besides.
     """
-    system, found = systems.sympy(), []
+    system, equations = systems.sympy(), []
     shown = [_shown(load, symbol(f"{letter}_{load.name}")) for load in loads]
     output, gone = [load for load in shown if load.acts == "output"], balance.carried(loads)
     given = balance.Given({}, {load.name: {} for load in loads})
     if output:
-        found.append(equation("balance", total, balance.output_force(system, shown, pose, given, {})))
-    summed = [_shown(load, total) for load in [each for each in output if each.name not in gone][:1]]
+        equations.append(equation("balance", total, balance.output_force(system, shown, pose, given, {})))
+    summed = [_shown(load, total) for load in [item for item in output if item.name not in gone][:1]]
     summed += [load for load in shown if load.acts == "drive"]
     if summed:
         name, sign = torque
-        found.append(equation(name, symbol(sign), sum(within, balance.crank_torque(system, summed, pose, given, {}))))
-    return found
+        equations.append(
+            equation(name, symbol(sign), sum(within, balance.crank_torque(system, summed, pose, given, {})))
+        )
+    return equations
 
 
 def _shown(load: Acting, value: Expression) -> Acting:
@@ -147,9 +149,9 @@ def equation(name: str, left: Expression, right: Expression) -> Equation:
 
 def relation(name: str, left: Expression, sign: str, right: Expression, where: str = "") -> Equation:
     """Return what a number must keep: sign is "=", "<=" or ">="; where: words that follow."""
-    told = f"{text(left)} {sign} {text(right)}{f' {where}' if where else ''}"
+    sentence = f"{text(left)} {sign} {text(right)}{f' {where}' if where else ''}"
     form = (left, sign, right, *([where] if where else []))
-    return Equation(name, told, functools.partial(_related, left, sign, right, where), (form,))
+    return Equation(name, sentence, functools.partial(_related, left, sign, right, where), (form,))
 
 
 def _related(left: Expression, sign: str, right: Expression, where: str) -> str:
@@ -167,8 +169,8 @@ def cases(name: str, left: Expression, rows: Sequence[Case]) -> Equation:
     if len(rows) == 1:
         return equation(name, left, rows[0][0])
     written = ", ".join(f"{_said(value, text)} {_where(when, text)}" for value, when in rows)
-    told = f"{text(left)} = {written}"
-    return Equation(name, told, functools.partial(_parted, left, rows), ((left, "="), *rows))
+    sentence = f"{text(left)} = {written}"
+    return Equation(name, sentence, functools.partial(_parted, left, rows), ((left, "="), *rows))
 
 
 def _parted(left: Expression, rows: Sequence[Case]) -> str:

@@ -57,17 +57,17 @@ def told(sampler: Sampler, events: Sequence[str], places: Mapping[str, str] = NO
     places: the joints of forces that are not called after them.
     """
     names = [name for name in sampler.model.told if name.startswith(PREFIX) and f"{name}_x" in sampler.model.told]
-    cycle, found = sampler.cycle, []
+    cycle, arrows = sampler.cycle, []
     for event in events if names else ():
         angle = float(sampler.model.event(FLOAT, sampler.given, event))
         piece = cycle.piece_before(angle)
         width = cycle.starts[piece + 1] - cycle.starts[piece]
         u = ((angle - cycle.starts[piece]) % TURN) / width
-        found += [_read(sampler, name, piece, u or 1.0, event, places) for name in names]
+        arrows += [_read(sampler, name, piece, u or 1.0, event, places) for name in names]
     for name in names:
         top = sampler.extremes(name)[0]
-        found.append(_read(sampler, name, top.piece, top.u, "", places))
-    return found
+        arrows.append(_read(sampler, name, top.piece, top.u, "", places))
+    return arrows
 
 
 def _read(sampler: Sampler, name: str, piece: int, u: float, event: str, places: Mapping[str, str]) -> ForceArrow:

@@ -84,11 +84,11 @@ class JobViews(abc.ABC):
         from loomopt.physics.effects.kinds import Check, Inputs, owned
 
         known = numbers(scene) | {scene.full(name): value for name, value in design.items()}
-        found = list(told(scene))
+        sentences = list(told(scene))
         for check in (effect for effect in scene.active if isinstance(effect, Check)):
-            own = {key: known.get(owned(check, key)) for key in check.table.model_fields}
-            found.append(check.remark(Inputs(FLOAT, known, own, None), scene.show))
-        return tuple(text for text in found if text)
+            inputs = {key: known.get(owned(check, key)) for key in check.table.model_fields}
+            sentences.append(check.remark(Inputs(FLOAT, known, inputs, None), scene.show))
+        return tuple(text for text in sentences if text)
 
     def missing(self, scene: "Scene") -> tuple[str, ...]:
         """Keys without which the scene cannot be drawn."""

@@ -91,18 +91,18 @@ def arranged(
     """
     known = {split(column)[0]: column for column in columns if COLUMN.fullmatch(column) and column != ANGLE}
     speed = design.get("speed", scene.operation.get("speed", 1.0))
-    said = {split(POWER)[0]: Curve(peak=PEAK_POWER)} | _of_effects(scene) | dict(words)
-    found: dict[str, Panel] = {}
+    curves = {split(POWER)[0]: Curve(peak=PEAK_POWER)} | _of_effects(scene) | dict(words)
+    panels: dict[str, Panel] = {}
     for name, (shown, scale) in _timed(known, float(speed)).items():
-        curve = said.get(shown, said.get(name, Curve()))
+        curve = curves.get(shown, curves.get(name, Curve()))
         if curve.shown:
-            levels = dict(_levels(curve, scene.limits, 1.0 if shown in said else scale))
+            levels = dict(_levels(curve, scene.limits, 1.0 if shown in curves else scale))
             marked = (*(extreme for extreme in EXTREMES if getattr(curve, extreme)), *curve.at)
             called, kind = _called(known[shown], curve), _KIND.get(split(known[shown])[1], "curve")
             title = f"{kind}s {curve.panel}" if curve.panel else called
             alone = Panel((known[shown],), title, (called,), marked, Frozen(levels), curve.wide)
-            found[title] = _joined(found[title], alone) if title in found else alone
-    return tuple(found.values())
+            panels[title] = _joined(panels[title], alone) if title in panels else alone
+    return tuple(panels.values())
 
 
 def _called(column: str, curve: Curve) -> str:
@@ -117,22 +117,22 @@ def _joined(panel: Panel, other: Panel) -> Panel:
 
 def _of_effects(scene: Scene) -> dict[str, Curve]:
     """Return what is known of the columns of effects that are on."""
-    found = {}
+    curves = {}
     for effect in scene.active:
         if isinstance(effect, Load | State):
             symbol = load_name(effect)
             name = effect.name.replace("_", " ") if symbol != effect.name else ""
-            found[symbol] = Curve(name, BY_EFFECT if effect.acts == "output" else DRIVE)
+            curves[symbol] = Curve(name, BY_EFFECT if effect.acts == "output" else DRIVE)
             if isinstance(effect, Load) and effect.inside:
-                found[drive_name(effect)] = Curve(f"{effect.name.replace('_', ' ')} of rod and crank", DRIVE)
+                curves[drive_name(effect)] = Curve(f"{effect.name.replace('_', ' ')} of rod and crank", DRIVE)
         elif isinstance(effect, Check):
-            found |= {name: Curve(peak=name) for name in (*effect.quantities, *effect.scalars)}
-            found |= {name: Curve(panel="in the joints", peak=name) for name in effect.vectors}
+            curves |= {name: Curve(peak=name) for name in (*effect.quantities, *effect.scalars)}
+            curves |= {name: Curve(panel="in the joints", peak=name) for name in effect.vectors}
             parts = (f"{name}_{axis}" for name in effect.vectors for axis in COMPONENTS)
-            found |= {part: Curve(shown=False) for part in parts}
+            curves |= {part: Curve(shown=False) for part in parts}
         elif isinstance(effect, Speed):
-            found |= {SPEED: Curve("crank speed"), MOTOR: Curve(most=effect.most)}
-    return found
+            curves |= {SPEED: Curve("crank speed"), MOTOR: Curve(most=effect.most)}
+    return curves
 
 
 def _timed(known: Collection[str], speed: float) -> dict[str, tuple[str, float]]:
@@ -166,10 +166,10 @@ TWIST_SAMPLES = 3600
 
 def twisted(scene: Scene, sampler: Sampler) -> tuple[str, ...]:
     """Say where a state's coordinate exceeds a tenth of the output's travel while a load with corners acts on it."""
-    model, found = sampler.model, []
+    model, names = sampler.model, []
     pieces, u = sampler.grid(TWIST_SAMPLES)
     for state in model.states:
-        for load in (each for each in model.loads if isinstance(each, Load) and each.corners):
+        for load in (item for item in model.loads if isinstance(item, Load) and item.corners):
             on = sampler.cycle.on((load.name, 1.0))[pieces]
             if load.name not in state.carries or not on.any():
                 continue
@@ -177,10 +177,10 @@ def twisted(scene: Scene, sampler: Sampler) -> tuple[str, ...]:
             largest = float(np.abs(read_at(state, at).coordinate()).max())
             travel = float(np.ptp(at.pose.q))
             if largest > MOST_TWIST * travel:
-                found.append(
+                names.append(
                     f"while {load.name} acts the twist reaches {scene.show(largest, 'angle', 3)}, "
                     f"{100 * largest / travel:.3g} % of the rocker's travel there ({scene.show(travel, 'angle', 3)}): "
                     f"{load.name} as a function of the crank angle no longer stands. What helps: a stiffer shaft, or a "
                     f"measured pulse"
                 )
-    return tuple(found)
+    return tuple(names)

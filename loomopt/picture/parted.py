@@ -20,12 +20,12 @@ def remarks(scene: Scene, parted: Parted) -> Iterator[str]:
         yield f"{name}: contact is never lost"
         return
     (begin, end), first = course.first, course.first_landing
-    told = f"{name}: contact is lost at {scene.show(begin, 'angle')}"
+    sentence = f"{name}: contact is lost at {scene.show(begin, 'angle')}"
     if first is None or end is None:
-        told += " and never found again"
+        sentence += " and never found again"
     else:
-        told += f" and found again at {scene.show(end, 'angle')}, at {_landing_speed(scene, first)} against the cam"
-    yield f"{told}; figures of forces and torque are those of an output held on its cam, and no solve reads {name}"
+        sentence += f" and found again at {scene.show(end, 'angle')}, at {_landing_speed(scene, first)} against the cam"
+    yield f"{sentence}; figures of forces and torque are those of an output held on its cam, and no solve reads {name}"
     if course.period is None:
         turns = len(course.turns)
         yield f"{name}: not periodic in {turns} turns; curves are those of the last one"
@@ -44,20 +44,22 @@ def _landing_speed(scene: Scene, landing: Landing) -> str:
 
 def marks(parted: Parted, every: Marks) -> Marks:
     """Marks over the period, rad: those of every turn, where contact is lost, and where wide flights end."""
-    found, lifts, landings = dict[str, float | Span](), list[float](), list[float]()
+    marks_by_name, lifts, landings = dict[str, float | Span](), list[float](), list[float]()
     turns = parted.course.periodic
     for k, turn in enumerate(turns):
         for name, mark in every.items():
-            found[f"{name} of turn {k + 1}" if k else name] = _of_turn(mark, k, len(turns))
+            marks_by_name[f"{name} of turn {k + 1}" if k else name] = _of_turn(mark, k, len(turns))
         lifts += [k * TURN + angle for angle in turn.lifts]
         landings += [k * TURN + landing.angle for landing in turn.landings]
     whole, events = len(turns) * TURN, sorted([*lifts, *landings])
     wide = [
-        each for each in landings if (each - events[events.index(each) - 1]) % whole >= WIDE_FLIGHT or len(events) == 1
+        landing
+        for landing in landings
+        if (landing - events[events.index(landing) - 1]) % whole >= WIDE_FLIGHT or len(events) == 1
     ]
     for word, angles in (("lift-off", lifts), ("landing", wide)):
-        found |= {f"{word} {k + 1}" if k else word: angle for k, angle in enumerate(angles)}
-    return found
+        marks_by_name |= {f"{word} {k + 1}" if k else word: angle for k, angle in enumerate(angles)}
+    return marks_by_name
 
 
 def _of_turn(mark: float | Span, turn: int, turns: int) -> float | Span:

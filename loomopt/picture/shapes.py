@@ -68,10 +68,10 @@ def place(wishes: Iterable[LabelWish], strokes: Floats, unit: float, leader: flo
     """
     taken: list[LabelSpot] = []
     for wish in wishes:
-        found = _found(wish, strokes, taken, unit, leader)
-        taken.append(found)
-        if _gap(found) > leader * unit:
-            strokes = np.concatenate([strokes, _between(found, unit)])
+        spot = _found(wish, strokes, taken, unit, leader)
+        taken.append(spot)
+        if _gap(spot) > leader * unit:
+            strokes = np.concatenate([strokes, _between(spot, unit)])
     return taken
 
 
@@ -87,8 +87,8 @@ def _found(wish: LabelWish, strokes: Floats, taken: Sequence[LabelSpot], unit: f
             for turn, spot in itertools.compress(zip(TURNS, spots, strict=True), free):
                 cost = ring + (abs(turn) + which) / 3
                 way = _between(spot, unit)
-                led = leader * unit < _gap(spot) < OUTSIDE * unit
-                if cost < least and not (led and _meets(way, taken, unit)):
+                has_leader = leader * unit < _gap(spot) < OUTSIDE * unit
+                if cost < least and not (has_leader and _meets(way, taken, unit)):
                     cost += BEHIND if _crossed(way, strokes, unit) else 0.0
                     best, least = (spot, cost) if cost < least else (best, least)
     raise AssertionError("rings go on without end")

@@ -48,8 +48,8 @@ def ipopt() -> str:
     spec = importlib.util.find_spec("casadi")
     folders = [*(spec.submodule_search_locations or () if spec else ()), sys.prefix]
     for header in (Path(folder) / HEADER for folder in folders):
-        if header.is_file() and (found := _TOLD.search(header.read_text(encoding="utf-8", errors="replace"))):
-            return found[1]
+        if header.is_file() and (version := _TOLD.search(header.read_text(encoding="utf-8", errors="replace"))):
+            return version[1]
     return UNTOLD
 
 
@@ -174,13 +174,13 @@ def accuracy(
             climbs.extend(study.climbs(scene, full, progress.say))
     finally:
         if climbs:
-            found = AccuracyStudy(study.summarise(scene, climbs, full))
-            tell(as_json, found.as_dict, found.tables)
+            result = AccuracyStudy(study.summarise(scene, climbs, full))
+            tell(as_json, result.as_dict, result.tables)
     for path in out or ():
         if path.suffix.lower() in outputs.PICTURES:
-            found.plot(path)
+            result.plot(path)
         else:
-            sheets.write(path, {"accuracy": found.table()}, comma)
+            sheets.write(path, {"accuracy": result.table()}, comma)
         remark(f"Wrote {path}")
 
 
@@ -282,9 +282,9 @@ def run(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:  # nobody reads on
         return 0
     except OSError as error:
-        told = blamed(error)
-        what = told if isinstance(told, BadInput) else f"the output cannot be written: {error.strerror or error}"
-        remark(f"loomopt: {what}")
+        blame = blamed(error)
+        message = blame if isinstance(blame, BadInput) else f"the output cannot be written: {error.strerror or error}"
+        remark(f"loomopt: {message}")
         return BAD_INPUT
     except BaseException as error:
         if isinstance(error, SystemExit) and isinstance(error.__context__, BrokenPipeError):
@@ -306,9 +306,9 @@ def run(arguments: list[str] | None = None) -> int:
 
 def not_ours(error: BaseException) -> str:
     """An error as one line where another distribution's code takes part; "" where loomopt itself has failed."""
-    told = blamed(error)
-    if isinstance(told, BadInput):
-        return str(told)
+    blame = blamed(error)
+    if isinstance(blame, BadInput):
+        return str(blame)
     if isinstance(error, SystemExit):  # so Typer leaves where it has answered a shell's completion
         return ""
     notes = getattr(error, "__notes__", ())

@@ -55,11 +55,11 @@ def remarked(scene: "Scene", design: "DesignGiven") -> None:
         remark(f"Remark: {text}.")
 
 
-def printed(found: "Evaluation") -> None:
+def printed(evaluation: "Evaluation") -> None:
     """Print one JSON object."""
     from loomopt.interface.files import outputs
 
-    print(outputs.document(found))
+    print(outputs.document(evaluation))
 
 
 def list_problems(as_json: Json = False) -> None:
@@ -135,16 +135,16 @@ def show(
     from loomopt.interface.text import glossary, layout, scenes
 
     scene, given, name, status = read_request(problem, design, None, changes.call)
-    said = (
+    parts = (
         outputs.what(api.evaluate(scene, given, name).result, name, status) if given and (figure or animate) else None
     )
-    write(figure, lambda path: outputs.picture(path, scene, given, said))
+    write(figure, lambda path: outputs.picture(path, scene, given, parts))
     if animate:
         from loomopt.interface.report import animation
 
         for path in animate:
             animation.checked(path)
-        write(animate, lambda path: animation.animated(scene, given, path, said))
+        write(animate, lambda path: animation.animated(scene, given, path, parts))
     shown: list[str | TextTable] = [*scenes.equations(scene)] if equations else []
     shown += glossary.parts(scene) if symbols else []
     shown += glossary.printed(scene) if sources else []
@@ -163,15 +163,15 @@ def evaluate(
     from loomopt.interface import api
 
     scene, given, name, _ = read_request(problem, design, target, changes.call)
-    found = api.evaluate(scene, given, name)
+    evaluation = api.evaluate(scene, given, name)
     remarked(scene, given)
     if as_json:
-        printed(found)
+        printed(evaluation)
         return
     from loomopt.interface.text import answers, layout
 
     before = api.evaluate(scene, None, name).result if given else None
-    layout.show(*answers.evaluation(found.result, scene, before))
+    layout.show(*answers.evaluation(evaluation.result, scene, before))
 
 
 def prove(
@@ -189,9 +189,9 @@ def prove(
     scene, given, name, _ = read_request(problem, design, target, changes.call)
     with call_progress() as progress:
         progress.say("proving")
-        found = api.prove(scene, given, name, slack=read_number("--slack", slack, float))
-    tell(as_json, found.as_dict, lambda: answers.proofs(found))
-    raise typer.Exit(0 if found.passed else DIFFERS)
+        proofs = api.prove(scene, given, name, slack=read_number("--slack", slack, float))
+    tell(as_json, proofs.as_dict, lambda: answers.proofs(proofs))
+    raise typer.Exit(0 if proofs.passed else DIFFERS)
 
 
 def simulate(
@@ -220,20 +220,20 @@ def simulate(
 
     comma = sheets.decimal_comma(decimal)
     scene, given, name, status = read_request(problem, design, target, changes.call)
-    asked = None if accuracy is None else read_number("--accuracy", accuracy, float)
-    if asked is not None:
-        check_numbers(asked, 1)
-    told = scenes.forces(scene, api.simulate(scene, given, name), given) if forces else ()
+    relative = None if accuracy is None else read_number("--accuracy", accuracy, float)
+    if relative is not None:
+        check_numbers(relative, 1)
+    force_parts = scenes.forces(scene, api.simulate(scene, given, name), given) if forces else ()
     compared = [scenes.beside(scene, api.simulate(scene, given, name, measured=beside))] if beside else []
-    said = outputs.what(api.evaluate(scene, given, name).result, name, status) if given and out else None
+    subject = outputs.what(api.evaluate(scene, given, name).result, name, status) if given and out else None
     for path in out or ():
         if forces and path.suffix.lower() in outputs.PICTURES:
             api.evaluate(scene, given, name).plot_forces(path)
         else:
-            outputs.curves(path, scene, given, asked, name, said, beside, comma)
+            outputs.curves(path, scene, given, relative, name, subject, beside, comma)
         remark(f"Wrote {path}")
     if forces:
-        layout.show(*told, *compared)
+        layout.show(*force_parts, *compared)
     elif not out:
         layout.show(*scenes.curves(scene, given, layout.width()), *compared)
     elif compared:
@@ -259,11 +259,11 @@ def budget(
 
     outputs.check_files(figures or ())
     scene, given, _, _ = read_request(problem, design, None, changes.call)
-    asked = None if fluctuation is None else read_number("--fluctuation", fluctuation, float)
-    found = compute(scene, given, asked)
+    irregularity = None if fluctuation is None else read_number("--fluctuation", fluctuation, float)
+    result = compute(scene, given, irregularity)
     remarked(scene, given)
-    tell(as_json, found.as_dict, found.tables)
-    write(figures, found.plot)
+    tell(as_json, result.as_dict, result.tables)
+    write(figures, result.plot)
 
 
 def export(
@@ -288,10 +288,10 @@ def export(
 
     comma = sheets.decimal_comma(decimal)
     scene, given, name, status = read_request(problem, design, target, changes.call)
-    said = outputs.what(api.evaluate(scene, given, name).result, name, status) if given else None
+    subject = outputs.what(api.evaluate(scene, given, name).result, name, status) if given else None
     how = outputs.workshop(dxf, arcs, only)
     outputs.check_workshop(out, how)
-    write(out, lambda path: outputs.linkage(path, scene, given, said, comma, how))
+    write(out, lambda path: outputs.linkage(path, scene, given, subject, comma, how))
     remarked(scene, given)
 
 

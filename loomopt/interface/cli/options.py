@@ -143,8 +143,8 @@ NO_CHANGES, ALONE, NO_STORE, NO_TABLE = SceneOptions(), ComputerOptions(), Store
 def expanded(command: Callable[..., None]) -> Callable[..., None]:
     """Command whose groups of options are parameters of their own, as Typer reads them."""
     known = inspect.signature(command).parameters.values()
-    groups = {each.name: each.annotation for each in known if _is_group(each.annotation)}
-    flat = [option for each in known for option in _flat(each.name, each.default, each.annotation)]
+    groups = {parameter.name: parameter.annotation for parameter in known if _is_group(parameter.annotation)}
+    flat = [option for parameter in known for option in _flat(parameter.name, parameter.default, parameter.annotation)]
 
     @functools.wraps(command)
     def call(**given: object) -> None:
@@ -164,8 +164,8 @@ def _is_group(annotation: object) -> TypeGuard[type[Options]]:
 def _flat(name: str, default: object, annotation: object) -> Iterator[inspect.Parameter]:
     """Parameters of an option, or of all options of a group."""
     if _is_group(annotation):
-        for each in fields(annotation):
-            yield from _flat(each.name, each.default, each.type)
+        for field in fields(annotation):
+            yield from _flat(field.name, field.default, field.type)
     else:
         yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 

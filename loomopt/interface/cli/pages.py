@@ -54,15 +54,15 @@ def report(
         if name not in STUDIES:
             raise refusal("there is no such study", "", "--study", name, ", ".join(STUDIES), "Choose one of them")
     inputs = [_checked_input(thing, target, changes, wanted, proven) for thing in things]
-    if wanted and not any(each.scene for each in inputs):
+    if wanted and not any(source.scene for source in inputs):
         remedy = "Leave out --study, or name an answer or a scene too"
         raise refusal(
             "a store's fronts and sweeps have no studies beside them", "", "--study", wanted[0], remedy=remedy
         )
     chapters: list[Chapter] = []
     with call_progress() as progress:
-        for each in inputs:
-            chapters += each.chapters(progress.say)
+        for source in inputs:
+            chapters += source.chapters(progress.say)
         progress.say("writing the page")
         document.write(path, chapters)
     remark(f"Wrote {path}")
@@ -104,13 +104,13 @@ def _checked_input(
         raise refusal("it is judged as it was found", "", thing, remedy=remedy)
     if store:
         tables = store_file.recalled(Path(thing))
-        return Input(lambda say: [document.of_study(each.study, each.solved) for each in tables])
+        return Input(lambda say: [document.of_study(table.study, table.solved) for table in tables])
     if answer:
-        found = answer_file.recalled(answer)
-        _check_studies(found.found.scene, found.found.target or None, studies)
+        stored = answer_file.recalled(answer)
+        _check_studies(stored.found.scene, stored.found.target or None, studies)
         return Input(
-            lambda say: document.of_answer(found.found, _beside(found.found, studies, say), found.doubts),
-            found.found.scene,
+            lambda say: document.of_answer(stored.found, _beside(stored.found, studies, say), stored.doubts),
+            stored.found.scene,
         )
     scene = changes.scene(thing)
     _check_studies(scene, target, studies)
@@ -151,49 +151,51 @@ def _solved(scene: "Scene", target: str | None, prove: bool, studies: Sequence[s
     return document.of_answer(solved, _beside(solved, studies, say))
 
 
-def _beside(found: "Evaluation", studies: Sequence[str], say: Say) -> list[object]:
+def _beside(evaluation: "Evaluation", studies: Sequence[str], say: Say) -> list[object]:
     """Return what studies find of a design in its scene, each as its own command does by default. Raises BadInput."""
     made = []
     for name in studies:
-        say(f"{name} of {found.problem}")
-        made.append(STUDIES[name](found, say))
+        say(f"{name} of {evaluation.problem}")
+        made.append(STUDIES[name](evaluation, say))
     return made
 
 
-def _tolerance(found: "Evaluation", say: Callable[[str], None]) -> object:
+def _tolerance(evaluation: "Evaluation", say: Callable[[str], None]) -> object:
     from loomopt.interface import api
 
-    return api.tolerance(found.scene, found, found.target or None, on_step=say)
+    return api.tolerance(evaluation.scene, evaluation, evaluation.target or None, on_step=say)
 
 
-def _sensitivity(found: "Evaluation", say: Callable[[str], None]) -> object:
+def _sensitivity(evaluation: "Evaluation", say: Callable[[str], None]) -> object:
     from loomopt.interface import api
     from loomopt.interface.results import Answer
 
     return api.sensitivity(
-        found if isinstance(found, Answer) and found.point else found.scene, found.target, on_step=say
+        evaluation if isinstance(evaluation, Answer) and evaluation.point else evaluation.scene,
+        evaluation.target,
+        on_step=say,
     )
 
 
-def _effects(found: "Evaluation", say: Callable[[str], None]) -> object:
+def _effects(evaluation: "Evaluation", say: Callable[[str], None]) -> object:
     from loomopt.interface import api
 
-    return api.effects(found.scene, found.target or None)
+    return api.effects(evaluation.scene, evaluation.target or None)
 
 
-def _accuracy(found: "Evaluation", say: Callable[[str], None]) -> object:
+def _accuracy(evaluation: "Evaluation", say: Callable[[str], None]) -> object:
     from loomopt.interface import api
 
-    return api.accuracy(found.scene, on_step=say)
+    return api.accuracy(evaluation.scene, on_step=say)
 
 
 STUDIES: "dict[str, Callable[[Evaluation, Callable[[str], None]], object]]" = {
-    "budget": lambda found, say: found.budget(),
+    "budget": lambda evaluation, say: evaluation.budget(),
     "tolerance": _tolerance,
     "sensitivity": _sensitivity,
     "effects": _effects,
     "accuracy": _accuracy,
-    "proof": lambda found, say: found.prove(),
+    "proof": lambda evaluation, say: evaluation.prove(),
 }
 """What may stand on a page beside a design → how it is computed."""
 
@@ -214,12 +216,12 @@ def compare(
 
     comma = files.comma
     outputs.check_files(figure or (), files.out or ())
-    found: list[Any] = [
-        each if each == comparison.TODAY else answer_file.recalled(_answer(each)).found for each in answers
+    designs: list[Any] = [
+        answer if answer == comparison.TODAY else answer_file.recalled(_answer(answer)).found for answer in answers
     ]
     scene = registry.load(within) if within else None
-    names = ["" if each == comparison.TODAY else Path(each).stem for each in answers]
-    made = comparison.compare(found, scene, names)
+    names = ["" if answer == comparison.TODAY else Path(answer).stem for answer in answers]
+    made = comparison.compare(designs, scene, names)
     tell(as_json, made.as_dict, made.tables)
     write(files.out, lambda path: outputs.write_table(path, made.table(), "designs", comma))
     write(figure, made.plot)

@@ -35,9 +35,9 @@ def read_value(text: str) -> object:
     from loomopt.scenes.document import read_list_or_table
 
     text = text.strip()
-    found = read_list_or_table(text)
-    if found is not None:
-        return found
+    value = read_list_or_table(text)
+    if value is not None:
+        return value
     if len(text) > 1 and text[0] == text[-1] and text[0] in "\"'":  # quotes that the shell has kept
         return text[1:-1]
     return text
@@ -72,8 +72,8 @@ def read_request(
 
     handed, changes = designs.DesignGiven({}), list[str]()
     if path := registry.answer_path(problem):
-        scene, found = registry.answered(path)
-        handed = found if design is None else handed
+        scene, stored = registry.answered(path)
+        handed = stored if design is None else handed
     else:
         scene = registry.load(problem)
     call = read_call(scene)
@@ -83,13 +83,13 @@ def read_request(
         handed, origin = designs.read_given(design), designs.named(design)
         scene = designs.resumed(handed, scene, call, origin)
         changes = designs.scene_changes(scene, handed, origin, call)
-        if told := designs.remark(scene, handed, call, changes, origin):
-            remark(f"Remark: {told}.")
+        if difference := designs.remark(scene, handed, call, changes, origin):
+            remark(f"Remark: {difference}.")
     given = designs.checked(handed.design, scene, origin) if design or handed.design else {}
     name = target_name(scene, target)
-    own = name == handed.target
-    as_found = own and not call.said and not changes
-    known = target or scene.call.target or own
+    same_target = name == handed.target
+    as_found = same_target and not call.said and not changes
+    known = target or scene.call.target or same_target
     return DesignRequest(scene, given, name if known else None, handed.status if as_found else None)
 
 
@@ -111,24 +111,24 @@ def read_number(option: str, text: str, kind: type[Number]) -> Number:
             raise ValueError
         return kind(text)
     except ValueError:
-        what = "a whole number" if kind is int else "a number"
+        form = "a whole number" if kind is int else "a number"
         allowed = "such as 20" if kind is int else "such as 1e-8"
         remedy = "Correct the number"
-        raise refusal(f"it is not {what}", key=option, origin="", value=text, allowed=allowed, remedy=remedy) from None
+        raise refusal(f"it is not {form}", key=option, origin="", value=text, allowed=allowed, remedy=remedy) from None
 
 
 def read_steps(text: str) -> dict[str, str]:
     """Steps of an option, by number or pattern. Raises BadInput."""
     from loomopt.base.errors import refusal
 
-    pairs = [each.partition("=") for each in text.split(",")]
+    pairs = [pair.partition("=") for pair in text.split(",")]
     if not all(name.strip() and step.strip() for name, _, step in pairs):
         remedy = 'Write --round "l1=0.5 mm,l2=0.5 mm", or --round scene for [steps] and [stock] of the scene'
         raise refusal("these are no steps", "", "--round", text, "NAME=STEP,…", remedy)
-    found = {name.strip(): step.strip() for name, _, step in pairs}
-    if len(found) < len(pairs):
+    steps = {name.strip(): step.strip() for name, _, step in pairs}
+    if len(steps) < len(pairs):
         raise refusal("a number has two steps", "", "--round", text, remedy="Give each number one step")
-    return found
+    return steps
 
 
 def call_progress() -> "Progress":
@@ -147,7 +147,7 @@ def remark(text: str) -> None:
 @contextlib.contextmanager
 def former_names_as_remarks() -> Iterator[None]:
     """Context in which each former name that a scene or an option uses is remarked upon once."""
-    told = set[str]()
+    reported = set[str]()
 
     def show(
         message: Warning | str,
@@ -159,8 +159,8 @@ def former_names_as_remarks() -> Iterator[None]:
     ) -> None:
         if not issubclass(category, FormerNameWarning):
             usual(message, category, filename, lineno, file, line)
-        elif (text := f"Remark: {message}.") not in told:
-            told.add(text)
+        elif (text := f"Remark: {message}.") not in reported:
+            reported.add(text)
             remark(text)
 
     with warnings.catch_warnings():

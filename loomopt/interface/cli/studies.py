@@ -70,16 +70,16 @@ class RunOptions(Options):
                 remedy = "Name another file for one of them"
                 raise refusal("it is the store's own file", str(path), "--store", remedy=remedy)
 
-    def hand_over(self, found: "StudyTable", more: str = "") -> None:
+    def hand_over(self, table: "StudyTable", more: str = "") -> None:
         """Print a study and write its files; more: what is said of them beside their name."""
         from loomopt.interface.files import outputs
 
-        tell(self.as_json, found.as_dict, lambda: found.tables(si=self.si))
+        tell(self.as_json, table.as_dict, lambda: table.tables(si=self.si))
         for path in self.table.out or ():
-            outputs.write_table(path, found.table(si=self.si), comma=self.table.comma)
+            outputs.write_table(path, table.table(si=self.si), comma=self.table.comma)
             remark(f"Wrote {path}{more}")
-        drawn = any(row.certified for row in found.rows)
-        for paths, draw in ((self.figure, found.plot), (self.animate, found.animate)):
+        drawn = any(row.certified for row in table.rows)
+        for paths, draw in ((self.figure, table.plot), (self.animate, table.animate)):
             for path in paths or ():
                 if drawn:
                     draw(path)
@@ -163,14 +163,14 @@ def _parted(items: list[str], option: str, example: str, form: str) -> dict[str,
     """Key → what an option gives for it. Raises BadInput."""
     from loomopt.base.errors import refusal
 
-    found: dict[str, str] = {}
+    parts: dict[str, str] = {}
     for item in items:
         key, equals, values = (part.strip() for part in item.partition("="))
-        if not equals or key in found:
+        if not equals or key in parts:
             problem = f"{key} is given twice" if equals else f"it is not {form}"
             raise refusal(problem, "", option, item, remedy=f'Write {option} "{example}"')
-        found[key] = values
-    return found
+        parts[key] = values
+    return parts
 
 
 def run(study: "SceneStudy", how: RunOptions) -> int:
@@ -191,14 +191,14 @@ def run(study: "SceneStudy", how: RunOptions) -> int:
     try:
         with how.computer.executor() as executor, call_progress() as progress:
             progress.say(counted(study, 0))
-            found = run_study(study, executor, count, how.rows.store, how.rows.resume, on_row)
+            table = run_study(study, executor, count, how.rows.store, how.rows.resume, on_row)
     except (KeyboardInterrupt, BrokenExecutor):
         if rows:
             finished = StudyTable(study, tuple(rows[point] for point in sorted(rows)))
             how.hand_over(finished, f", {counted(study, len(rows), 'of the')}, as far as they were finished")
         raise
-    how.hand_over(found)
-    return status(found.rows)
+    how.hand_over(table)
+    return status(table.rows)
 
 
 def status(rows: "tuple[Row, ...]") -> int:
@@ -234,23 +234,23 @@ def effects(
         rows[row.point] = row
         progress.say(f"{len(rows)} solved")
 
-    def show(found: EffectsStudy) -> None:
-        tell(as_json, found.as_dict, found.tables)
+    def show(result: EffectsStudy) -> None:
+        tell(as_json, result.as_dict, result.tables)
 
     try:
         with computer.executor() as executor, call_progress() as progress:
             progress.say("solving with all effects on")
-            found = run_effects(study, executor, count, on_row)
+            result = run_effects(study, executor, count, on_row)
     except KeyboardInterrupt:
         if rows:
             show(summarise_effects(study, tuple(rows.values())))
         raise
-    show(found)
+    show(result)
     for path in figure or ():
-        if found.reference.scales:
-            found.plot(path)
-        remark(f"Wrote {path}" if found.reference.scales else f"{path} is not written: no effect was measured")
-    raise typer.Exit(outcome(found.statuses))
+        if result.reference.scales:
+            result.plot(path)
+        remark(f"Wrote {path}" if result.reference.scales else f"{path} is not written: no effect was measured")
+    raise typer.Exit(outcome(result.statuses))
 
 
 def sensitivity(
@@ -279,11 +279,11 @@ def sensitivity(
             else:
                 remark(answer.message)
             raise typer.Exit(INFEASIBLE if answer.status == "infeasible" else NOT_CERTIFIED)
-        found = run_sensitivity(plan_sensitivity(scene, answer.result), progress.say)
-    tell(as_json, found.as_dict, found.tables)
-    write(table.out, lambda path: outputs.write_table(path, found.table(), comma=comma))
-    write(figure, found.plot)
-    raise typer.Exit(NOT_CERTIFIED if found.refused else OK)
+        result = run_sensitivity(plan_sensitivity(scene, answer.result), progress.say)
+    tell(as_json, result.as_dict, result.tables)
+    write(table.out, lambda path: outputs.write_table(path, result.table(), comma=comma))
+    write(figure, result.plot)
+    raise typer.Exit(NOT_CERTIFIED if result.refused else OK)
 
 
 def tolerance(
@@ -312,10 +312,10 @@ def tolerance(
     scene, given, name, _ = read_request(problem, design, target, changes.call)
     plan = plan_tolerance(scene, given, name, drawn, begin)
     with computer.executor() as executor, call_progress() as progress:
-        found = run_tolerance(plan, executor, count, progress.say, worst, rows.store, rows.resume)
-    tell(as_json, found.as_dict, found.tables)
-    write(table.out, lambda path: outputs.write_table(path, found.table(), comma=comma))
-    write(figure, found.plot)
+        result = run_tolerance(plan, executor, count, progress.say, worst, rows.store, rows.resume)
+    tell(as_json, result.as_dict, result.tables)
+    write(table.out, lambda path: outputs.write_table(path, result.table(), comma=comma))
+    write(figure, result.plot)
 
 
 def outcome(statuses: Sequence[str]) -> int:

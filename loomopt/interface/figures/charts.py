@@ -125,7 +125,7 @@ def _curves(axes: Any, chart: Chart) -> list[Entry]:
     for level in (level for level in chart.levels if chart.y.low <= level <= chart.y.high):
         axes.axhline(level, color=MISSED, **DASHED)
     for kind in dict.fromkeys(kind for *_, kind in chart.dots):
-        x, y = zip(*((x, y) for x, y, own in chart.dots if own == kind), strict=True)
+        x, y = zip(*((x, y) for x, y, dot_kind in chart.dots if dot_kind == kind), strict=True)
         axes.plot(x, y, linestyle="none", **_dot(kind))
     for place, _ in chart.names:
         axes.axvline(place, ymax=BELOW - 0.05, color=INK, linewidth=0.5, linestyle=(0, (1, 3)), zorder=0.5)
@@ -273,5 +273,5 @@ def _place_drawings(column: Any, drawings: Sequence[tuple[str, Drawing]]) -> Non
         x, y = (box.left + box.right) / 2, (box.bottom + box.top) / 2
         axes.set(xlim=(x - size / 2, x + size / 2), ylim=(y - size / 2, y + size / 2), xticks=[], yticks=[])
         for order, (name, layer) in enumerate(drawing.layers.items()):
-            for primitive in (each for each in drawing.primitives if each.layer == name):
+            for primitive in (primitive for primitive in drawing.primitives if primitive.layer == name):
                 put(axes, primitive, layer, size / FINE, 72 * SKETCH / size, order)

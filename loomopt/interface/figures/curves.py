@@ -94,8 +94,8 @@ def curves(
         heads = []
         for cell, shown in zip(cells, entries, strict=True):
             names = _mark(cell.axes, design)
-            said = f"{cell.panel.title}{_bracketed(cell.panel)}"
-            heads.append(head(cell.axes, said, shown, names if cell.first else ()) / 72)
+            label = f"{cell.panel.title}{_bracketed(cell.panel)}"
+            heads.append(head(cell.axes, label, shown, names if cell.first else ()) / 72)
         page.finish(_height(cells, heads) + foot)
     if path:
         figure.save(page, path)
@@ -191,8 +191,8 @@ def _panel(axes: Any, panel: Panel, design: DrawnTurn, before: DrawnTurn | None)
         label = f"{plain(panel.labels[place])}, today"
         assert before
         axes.plot(before.angles, values, color=colour, linewidth=1.1, linestyle=DASHED, label=label, zorder=2.1)
-    for turn, colour, said in ((design, COLOURS[0], ""), (before, TODAY, "today: ")):
-        entries += _points(axes, panel, turn, colour, said) if turn else []
+    for turn, colour, prefix in ((design, COLOURS[0], ""), (before, TODAY, "today: ")):
+        entries += _points(axes, panel, turn, colour, prefix) if turn else []
     _frame(axes, np.concatenate([*drawn, *old]), design)
     if panel.si == "m/s^2":
         _in_g(axes, size)
@@ -240,7 +240,7 @@ def _in_g(axes: Any, size: float) -> None:
     scale.spines["right"].set_visible(False)
 
 
-def _points(axes: Any, panel: Panel, turn: DrawnTurn, colour: str, said: str) -> list[Entry]:
+def _points(axes: Any, panel: Panel, turn: DrawnTurn, colour: str, prefix: str) -> list[Entry]:
     """Mark what of a panel's first column is marked; return what is to say of it."""
     values, unit = turn.of(panel.columns[0]), shown_unit(panel)
     entries = []
@@ -251,7 +251,7 @@ def _points(axes: Any, panel: Panel, turn: DrawnTurn, colour: str, said: str) ->
             value = 0.0 if abs(value) <= ROUNDING * float(np.nanmax(np.abs(values))) else value
             where = f" at {turn.told(angle)}" if how in WORDS else ""
             (dot,) = axes.plot(angle, value / factor(unit), "o", color=colour, markersize=4.0, zorder=3)
-            entries.append((dot, f"{said}{WORDS.get(how, f'at {how}')} {show(value, unit)}{where}"))
+            entries.append((dot, f"{prefix}{WORDS.get(how, f'at {how}')} {show(value, unit)}{where}"))
     return entries
 
 

@@ -110,8 +110,8 @@ def own_style(*texts: str) -> Iterator[None]:
     """Draw texts in matplotlib's own defaults, whatever the user's settings; a character no font has is a box."""
     from matplotlib import style
 
-    own = {**_STYLE, "font.family": families("".join(texts))}
-    with warnings.catch_warnings(), style.context(["default", own]):
+    settings = {**_STYLE, "font.family": families("".join(texts))}
+    with warnings.catch_warnings(), style.context(["default", settings]):
         warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
         yield
 
@@ -143,15 +143,15 @@ def families(text: str) -> list[str]:
     from matplotlib import font_manager
 
     lacking = {character for character in text if character.isprintable()} - _characters(font_manager.findfont(OWN))
-    found = [OWN]
+    fonts = [OWN]
     if lacking:
         plain = (entry for entry in font_manager.fontManager.ttflist if entry.style == "normal" and entry.weight == 400)
         for name, path in sorted({(entry.name, entry.fname) for entry in plain if entry.name not in (OWN, BOXES)}):
             had = lacking & _characters(path)
             if had:
-                found.append(name)
+                fonts.append(name)
                 lacking -= had
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(fonts))
 
 
 @functools.cache

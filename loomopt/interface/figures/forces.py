@@ -64,7 +64,7 @@ def _drawn(scene: Scene, forces: Mapping[str, TurnedForce]) -> Any:
             for place, (name, force) in enumerate(forces.items())
         ]
         polar = [_polar(axes, scene, force) for axes, _, force in cells]
-        foot = below(figure, list({said: (line, said) for each in polar for line, said in each}.values()))
+        foot = below(figure, list({label: (line, label) for legend in polar for line, label in legend}.values()))
         figure.get_layout_engine().execute(figure)
         above = head(over, "", entries)
         for axes, name, _ in cells:
@@ -99,11 +99,13 @@ def _polar(axes: Any, scene: Scene, force: TurnedForce) -> list[Entry]:
     size = factor(scene.shown_in("force"))
     entries: list[Entry] = []
     seen = [((force.x, force.y), "in the frame")]
-    seen += [(force.on(part), said) for part, said in zip(force.headings, _said(force), strict=True)]
-    for (x, y), said in seen:
-        colour, style = DRAWN[said]
-        (line,) = axes.plot(*(np.append(each, each[:1]) / size for each in (x, y)), style, color=colour, linewidth=1.2)
-        entries.append((line, said))
+    seen += [(force.on(part), label) for part, label in zip(force.headings, _said(force), strict=True)]
+    for (x, y), label in seen:
+        colour, style = DRAWN[label]
+        (line,) = axes.plot(
+            *(np.append(component, component[:1]) / size for component in (x, y)), style, color=colour, linewidth=1.2
+        )
+        entries.append((line, label))
     peak = int(force.size.argmax())
     (line,) = axes.plot([0.0, force.x[peak] / size], [0.0, force.y[peak] / size], color="black", linewidth=0.9)
     entries.append((line, "at its peak, in the frame"))
@@ -111,10 +113,10 @@ def _polar(axes: Any, scene: Scene, force: TurnedForce) -> list[Entry]:
     most = ROOMY * force.peak / size or 1.0
     axes.set(xlim=(-most, most), ylim=(-most, most), aspect="equal")
     largest, mean, ball, roller = (
-        scene.show(each, "force", 4) for each in (force.peak, *map(force.mean, (1.0, CUBIC, ROLLER)))
+        scene.show(value, "force", 4) for value in (force.peak, *map(force.mean, (1.0, CUBIC, ROLLER)))
     )
     turning = f"on {' and '.join(force.headings)}" if force.headings else ""
-    told = turning, f"peak {largest}, mean {mean}", f"p = 3: {ball}, p = 10/3: {roller}"
-    axes.set_xlabel("\n".join(map(plain, filter(None, told))), fontsize=HEAD_SIZE)
+    lines = turning, f"peak {largest}, mean {mean}", f"p = 3: {ball}, p = 10/3: {roller}"
+    axes.set_xlabel("\n".join(map(plain, filter(None, lines))), fontsize=HEAD_SIZE)
     frame(axes)
     return entries

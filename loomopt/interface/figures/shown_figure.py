@@ -48,7 +48,7 @@ class ShownFigure(Figure):
         super().set_size_inches(w, h, forward)
         if self.made_for:
             pairs = zip(self.get_size_inches(), self.made_for, strict=True)
-            scale = min(1.0, *(float(now / own) for now, own in pairs))
+            scale = min(1.0, *(float(now / size) for now, size in pairs))
             if 0.0 < scale != self.scale:
                 self._shrink(scale)
 
@@ -69,8 +69,8 @@ class ShownFigure(Figure):
                 x, y = map(float, text.xyann)
                 text.xyann = ratio * x, ratio * y
         for axes in self.axes:
-            for each in (axes, *axes.child_axes):
-                each.tick_params(**{name: scale * size for name, size in TICK.items()})
-                each.xaxis.labelpad = each.yaxis.labelpad = LABEL * scale
+            for drawn_axes in (axes, *axes.child_axes):
+                drawn_axes.tick_params(**{name: scale * size for name, size in TICK.items()})
+                drawn_axes.xaxis.labelpad = drawn_axes.yaxis.labelpad = LABEL * scale
         for write in self.written:
             write(scale)

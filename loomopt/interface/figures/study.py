@@ -72,5 +72,9 @@ def _heading(letter: str, columns: Sequence[NumberColumn], row: Row, at: int) ->
 def _sketch(study: SceneStudy, row: Row) -> Drawing:
     """A row's mechanism without its texts: it is drawn small."""
     drawing = outputs.drawing(study.scene_at(row.point), row.design)
-    primitives = (each for each in drawing.primitives if not isinstance(each, Text) and each.layer not in LEFT_OUT)
+    primitives = (
+        primitive
+        for primitive in drawing.primitives
+        if not isinstance(primitive, Text) and primitive.layer not in LEFT_OUT
+    )
     return replace(drawing, primitives=tuple(primitives), legend=())

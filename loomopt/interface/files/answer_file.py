@@ -42,26 +42,26 @@ def recalled(path: Path) -> Recalled:
     """Answer in a JSON file, judged in its own scene. Raises BadInput."""
     scene, handed = registry.answered(path)
     evaluation = results.evaluated(scene, designs.checked(handed.design, scene, scene.origin), None)
-    told = designs.loaded(path)
-    if not isinstance(told, Mapping) or told.get("status") not in STATUSES:
+    document = designs.loaded(path)
+    if not isinstance(document, Mapping) or document.get("status") not in STATUSES:
         return Recalled(evaluation)
     try:
-        found = _answer(told, evaluation, scene)
+        answer = _answer(document, evaluation, scene)
     except (AttributeError, KeyError, TypeError, ValueError, ArithmeticError):
         remedy = "Give the answer as it was printed, or its design object alone"
         raise refusal("it is no answer as solve prints it", str(path), remedy=remedy) from None
-    return Recalled(found, tuple(_doubts(told, found)))
+    return Recalled(answer, tuple(_doubts(document, answer)))
 
 
-def _answer(told: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> Answer:
+def _answer(document: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> Answer:
     """Return what the file tells as an answer, with what was computed anew. Raises what a damaged file makes fail."""
-    target, limits = told.get("target"), evaluation.limits
-    if target is None or not _of_target(told, evaluation, scene):  # a point of a front, of which its message tells
+    target, limits = document.get("target"), evaluation.limits
+    if target is None or not _of_target(document, evaluation, scene):  # a point of a front, of which its message tells
         target = None
-        named = {str(each["name"]) for each in told["limits"]}
+        named = {str(limit["name"]) for limit in document["limits"]}
         limits = tuple(limit for limit in limits if limit.name in named)
-    certificate = _certificate(told["certificate"]) if told.get("certificate") else None
-    bound = _everywhere(told["global"], told["figures"]) if told.get("global") else None
+    certificate = _certificate(document["certificate"]) if document.get("certificate") else None
+    bound = _everywhere(document["global"], document["figures"]) if document.get("global") else None
     fields = {name: getattr(evaluation, name) for name in ("problem", "effects", "design", "figures", "units")}
     record = Solution(
         **fields,
@@ -69,118 +69,124 @@ def _answer(told: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> An
         reached=evaluation.reached,
         scene=scene,
         target="" if target is None else evaluation.target,
-        status=str(told["status"]),
-        sentences=Sentences(str(told.get("message", ""))),
-        binding=tuple(_price(each, Words(scene)) for each in told.get("binding", ())),
-        bind_together=tuple(map(_joint_price, told.get("bind_together", ()))),
+        status=str(document["status"]),
+        sentences=Sentences(str(document.get("message", ""))),
+        binding=tuple(_price(price, Words(scene)) for price in document.get("binding", ())),
+        bind_together=tuple(map(_joint_price, document.get("bind_together", ()))),
         certificate=certificate,
-        relaxation=tuple(_record(Relaxation, each) for each in told.get("relaxation", ())),
-        clash=tuple(map(str, told.get("clash", ()))),
-        solver={str(name): value for name, value in told.get("solver", {}).items()},
-        time={str(name): float(value) for name, value in told.get("time", {}).items()},
-        proofs=_proofs(told["proofs"], evaluation) if told.get("proofs") else None,
+        relaxation=tuple(_record(Relaxation, relaxation) for relaxation in document.get("relaxation", ())),
+        clash=tuple(map(str, document.get("clash", ()))),
+        solver={str(name): value for name, value in document.get("solver", {}).items()},
+        time={str(name): float(value) for name, value in document.get("time", {}).items()},
+        proofs=_proofs(document["proofs"], evaluation) if document.get("proofs") else None,
         global_bound=bound,
         today=functools.partial(report.evaluate, scene, None, evaluation.target or None),
     )
     return Answer(record, record.target)
 
 
-def _of_target(told: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> bool:
+def _of_target(document: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> bool:
     """Say whether an optimum's message is that of its target, numbers apart: of a point of a front it is another."""
-    if told["status"] != "optimal":
+    if document["status"] != "optimal":
         return True
-    said = registry.of(scene).say(scene, evaluation.target, evaluation.figures)
-    return NUMBER.sub("", str(told["message"])).startswith(NUMBER.sub("", said))
+    message = registry.of(scene).say(scene, evaluation.target, evaluation.figures)
+    return NUMBER.sub("", str(document["message"])).startswith(NUMBER.sub("", message))
 
 
 def _record(kind: Callable[..., Read], entries: Mapping[str, Any]) -> Read:
     return kind(**{str(name): value for name, value in entries.items()})
 
 
-def _price(told: Mapping[str, Any], words: Words) -> Price:
+def _price(record: Mapping[str, Any], words: Words) -> Price:
     """A limit's price with its reading in the scene's units."""
-    (figure, worth), *_ = told["worth"].items()
-    limit, side = str(told["limit"]), str(told["side"])
+    (figure, worth), *_ = record["worth"].items()
+    limit, side = str(record["limit"]), str(record["side"])
     reading = words.price_reading(figure, limit, float(worth))
     return Price(
-        limit, side, float(told["value"]), str(told["text"]), {figure: float(worth)}, dict(told["unit"]), reading
+        limit, side, float(record["value"]), str(record["text"]), {figure: float(worth)}, dict(record["unit"]), reading
     )
 
 
-def _joint_price(told: Mapping[str, Any]) -> JointPrice:
+def _joint_price(record: Mapping[str, Any]) -> JointPrice:
     """Return what limits are worth together, as it was told."""
-    worth = {str(figure): float(value) for figure, value in told["worth"].items()}
-    alone = tuple(float(next(iter(each.values()))) for each in told["alone"])
-    names, sides = (tuple(map(str, told[key])) for key in ("limits", "sides"))
-    return JointPrice(names, sides, worth, dict(told["unit"]), alone, str(told["reading"]))
+    worth = {str(figure): float(value) for figure, value in record["worth"].items()}
+    alone = tuple(float(next(iter(price.values()))) for price in record["alone"])
+    names, sides = (tuple(map(str, record[key])) for key in ("limits", "sides"))
+    return JointPrice(names, sides, worth, dict(record["unit"]), alone, str(record["reading"]))
 
 
-def _certificate(told: Mapping[str, Any]) -> Certificate:
+def _certificate(record: Mapping[str, Any]) -> Certificate:
     levels = tuple(
         Level(str(each["objective"]), float(each["stationarity"]), float(each["complementarity"]), 0.0)
-        for each in told["levels"]
+        for each in record["levels"]
     )
     return Certificate(
-        bool(told["passed"]),
-        tuple(map(str, told["reasons"])),
+        bool(record["passed"]),
+        tuple(map(str, record["reasons"])),
         levels,
-        float(told["feasibility"]),
-        float(told["whole_cycle"]["violation"]),
-        bool(told["minimum"]),
-        bool(told.get("design_unique", told["unique"])),
-        by=str(told["by"]),
-        whole_cycle=str(told["whole_cycle"]["by"]),
-        tie_breaks=tuple(map(str, told.get("settled", ()))),
-        prices_unique=bool(told.get("prices_unique", True)),
+        float(record["feasibility"]),
+        float(record["whole_cycle"]["violation"]),
+        bool(record["minimum"]),
+        bool(record.get("design_unique", record["unique"])),
+        by=str(record["by"]),
+        whole_cycle=str(record["whole_cycle"]["by"]),
+        tie_breaks=tuple(map(str, record.get("settled", ()))),
+        prices_unique=bool(record.get("prices_unique", True)),
     )
 
 
-def _everywhere(told: Mapping[str, Any], figures: Mapping[str, Any]) -> GlobalBound:
+def _everywhere(record: Mapping[str, Any], figures: Mapping[str, Any]) -> GlobalBound:
     """Return what is proven of all designs; of which side of a bound the best is, the bound itself tells."""
-    gap = math.inf if told["gap"] is None else float(told["gap"])
+    gap = math.inf if record["gap"] is None else float(record["gap"])
     levels = []
-    for name, bound in told["bound"].items():
+    for name, bound in record["bound"].items():
         best = float(figures[name])
         sense: Sought = "most" if bound > best else "least"
         levels.append(
             GlobalLevel(
-                name, sense, best, float(bound), gap, float(told.get("band", {}).get(name, 0.0)), bool(told["proven"])
+                name,
+                sense,
+                best,
+                float(bound),
+                gap,
+                float(record.get("band", {}).get(name, 0.0)),
+                bool(record["proven"]),
             )
         )
-    return GlobalBound(tuple(levels), int(told["boxes"]), float(told["seconds"]), str(told["why"] or ""))
+    return GlobalBound(tuple(levels), int(record["boxes"]), float(record["seconds"]), str(record["why"] or ""))
 
 
-def _proofs(told: Sequence[Mapping[str, Any]], evaluation: Evaluation) -> Proofs:
-    found = []
-    for each in told:
-        name, kind = str(each["limit"]), "peak" if str(each["limit"]).startswith("peak ") else "limit"
-        entries = {key: value for key, value in each.items() if key != "limit"}
-        found.append(Proof(name=name.removeprefix("peak "), kind=kind, **entries))  # type: ignore[arg-type]
-    return Proofs(evaluation.problem, evaluation.target, tuple(found), evaluation.scene)
+def _proofs(records: Sequence[Mapping[str, Any]], evaluation: Evaluation) -> Proofs:
+    proofs = []
+    for entry in records:
+        name, kind = str(entry["limit"]), "peak" if str(entry["limit"]).startswith("peak ") else "limit"
+        entries = {key: value for key, value in entry.items() if key != "limit"}
+        proofs.append(Proof(name=name.removeprefix("peak "), kind=kind, **entries))  # type: ignore[arg-type]
+    return Proofs(evaluation.problem, evaluation.target, tuple(proofs), evaluation.scene)
 
 
-def _doubts(told: Mapping[str, Any], found: Answer) -> Iterator[str]:
+def _doubts(document: Mapping[str, Any], answer: Answer) -> Iterator[str]:
     """Yield what speaks against the status that a file tells: figures, limits, thresholds."""
     sizes: dict[str, float] = {}
-    for name, value in found.figures.items():
-        unit = found.units.get(name, "1")
+    for name, value in answer.figures.items():
+        unit = answer.units.get(name, "1")
         sizes[unit] = max(sizes.get(unit, 0.0), abs(value or 0.0))
     differing = 0
-    for name, value in found.figures.items():
-        said = told.get("figures", {}).get(name)
-        if value is None or not isinstance(said, int | float):
+    for name, value in answer.figures.items():
+        printed = document.get("figures", {}).get(name)
+        if value is None or not isinstance(printed, int | float):
             continue
-        if not abs(said - value) <= AGREES * max(abs(value), 1e-3 * sizes[found.units.get(name, "1")]):
+        if not abs(printed - value) <= AGREES * max(abs(value), 1e-3 * sizes[answer.units.get(name, "1")]):
             differing += 1
             if differing <= MOST_TOLD:
-                now, then = (Words(found.scene).shown(name, each, 9) for each in (value, float(said)))
+                now, then = (Words(answer.scene).shown(name, number, 9) for number in (value, float(printed)))
                 yield f"{name} is {now} for its design, the file says {then}."
     if differing > MOST_TOLD:
         yield f"So it is with {differing - MOST_TOLD} more of its figures."
-    if found.status != "optimal":
+    if answer.status != "optimal":
         return
-    yield from (f"It says optimal, and limit {limit.name} does not hold." for limit in found.limits if not limit.ok)
-    certificate = found.certificate
+    yield from (f"It says optimal, and limit {limit.name} does not hold." for limit in answer.limits if not limit.ok)
+    certificate = answer.certificate
     if certificate is None or not certificate.passed:
         yield "It says optimal, and holds no certificate that has passed."
     elif certificate.reasons or not (certificate.feasibility <= FEASIBLE and certificate.residual <= STATIONARY):

@@ -102,7 +102,7 @@ def _measured(document: Any, space: Any, drawing: Drawing) -> list[tuple[float, 
     sizes = {"dimtxt": h, "dimasz": 0.8 * h, "dimexo": 0.5 * h, "dimexe": 0.5 * h, "dimgap": 0.4 * h}
     style = sizes | {"dimtxsty": _TEXT_STYLE, "dimdec": DECIMALS, "dimzin": 8, "dimtad": 1, "dimlunit": 2}
     style |= {"dimscale": 1.0, "dimclrd": MEASURED, "dimclre": MEASURED, "dimclrt": MEASURED}
-    ends = [point for each in drawing.measures for point in (each.one, each.other)]
+    ends = [point for measure in drawing.measures for point in (measure.one, measure.other)]
     middle = [sum(axis) / len(ends) for axis in zip(*ends, strict=True)]
     for name, *both, band in drawing.measures:
         one, other = sorted(both)  # from left to right, so that no text stands on its head
@@ -117,8 +117,8 @@ def _measured(document: Any, space: Any, drawing: Drawing) -> list[tuple[float, 
             dxfattribs={"layer": MEASURES},
         )
         made.render()
-        lines = [each for each in made.dimension.get_geometry_block() if each.dxftype() == "LINE"]
-        reached += [(end.x, end.y) for each in lines for end in (each.dxf.start, each.dxf.end)]
+        lines = [entity for entity in made.dimension.get_geometry_block() if entity.dxftype() == "LINE"]
+        reached += [(end.x, end.y) for line in lines for end in (line.dxf.start, line.dxf.end)]
     return reached
 
 

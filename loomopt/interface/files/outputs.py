@@ -65,9 +65,9 @@ class Serialisable(Protocol):
         """Its JSON data."""
 
 
-def document(found: Serialisable) -> str:
+def document(result: Serialisable) -> str:
     """An evaluation or an answer as one JSON object; what is undefined is null."""
-    return json_text({"loomopt": __version__, **found.as_dict()})
+    return json_text({"loomopt": __version__, **result.as_dict()})
 
 
 def json_text(data: Mapping[str, object]) -> str:
@@ -145,15 +145,15 @@ def answer_sheets(solution: Solution, scene: Scene) -> "dict[str, pd.DataFrame]"
     for limit in solution.limits:
         unit = words.unit(limit.name)
         ends = {"value": limit.value, "min": limit.min, "max": limit.max}
-        told = {key: None if value is None else value / factor(unit) for key, value in ends.items()}
-        rows.append({"name": limit.name, "unit": unit, **told, "held": limit.ok})
+        record = {key: None if value is None else value / factor(unit) for key, value in ends.items()}
+        rows.append({"name": limit.name, "unit": unit, **record, "held": limit.ok})
     limits = tables.meaningful(pd.DataFrame(rows, columns=["name", "unit", "value", "min", "max", "held"]))
-    others = [not own for own in is_design]
-    found = {"design": shown[is_design], "figures": shown[others], "limits": limits}
+    others = [not flag for flag in is_design]
+    sheets = {"design": shown[is_design], "figures": shown[others], "limits": limits}
     if solution.members:
-        return found
+        return sheets
     curves = tables.filed(tables.curves(scene, solution.design, target=solution.target), scene)
-    return found | {"curves": curves}
+    return sheets | {"curves": curves}
 
 
 def check_answer(path: Path) -> None:
@@ -223,28 +223,28 @@ def curves(
     design: Design,
     accuracy: float | None = None,
     target: str | None = None,
-    said: DrawnSubject | None = None,
-    beside: Path | None = None,
+    subject: DrawnSubject | None = None,
+    measured: Path | None = None,
     comma: bool = False,
 ) -> None:
     """Write a design's curves as a table or a figure, by the file's ending; accuracy: of peaks, for few rows.
 
-    target: what the design was found for, to be named in the table; said: what it is, for a figure's title.
-    beside: a file of what was measured; comma: whether CSV has decimal commas.
+    target: the one the design was found for, named in the table; subject: the design in words, for the title.
+    measured: a file of measured curves; comma: whether CSV has decimal commas.
     """
     ending = suffix(path, CURVES)
-    frame = tables.curves(scene, design, accuracy, target, beside)
+    frame = tables.curves(scene, design, accuracy, target, measured)
     if ending in sheets.ENDINGS:
         sheets.write(path, {"curves": tables.filed(frame, scene)}, comma)
     else:
         from loomopt.interface.figures import figure
 
-        drawn = plotted(frame, scene, flat(design), said)
+        drawn = plotted(frame, scene, flat(design), subject)
         atomically(path, functools.partial(figure.save, drawn))
 
 
 def plot(
-    found: Evaluated,
+    evaluated: Evaluated,
     scene: Scene,
     target: str,
     path: Path | None,
@@ -255,8 +255,8 @@ def plot(
 
     if path:
         suffix(path, PICTURES)
-    frame = tables.curves(scene, found.design, target=target, measured=measured)
-    drawn = plotted(frame, scene, flat(found.design), what(found))
+    frame = tables.curves(scene, evaluated.design, target=target, measured=measured)
+    drawn = plotted(frame, scene, flat(evaluated.design), what(evaluated))
     if path:
         atomically(path, functools.partial(figure.save, drawn))
     return drawn
@@ -264,50 +264,50 @@ def plot(
 
 @working()
 def plotted(
-    frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], said: DrawnSubject | None = None
+    frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], design_subject: DrawnSubject | None = None
 ) -> "Figure":
     """Curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
 
-    design: SI; today's without one. said: what it is, as `what` says it.
+    design: SI; today's without one. design_subject: the design in words, for the title.
     """
     from loomopt.interface.figures import curves
     from loomopt.picture.panels import in_units
 
     job, view = registry.of(scene), registry.of(scene).views
     now = job.today(scene)
-    own = {**now, **design}
+    full_design = {**now, **design}
     columns = tuple(column for column in frame.columns if f"{tables.MEASURED} [" not in column)
     panels = [in_units(scene, panel) for panel in view.panels(scene, design, columns)]
-    today = None if own == now else (tables.curves(scene, {}), view.marks(scene, now))
-    subject = said or DrawnSubject(GIVEN if design else TODAY)
+    today = None if full_design == now else (tables.curves(scene, {}), view.marks(scene, now))
+    subject = design_subject or DrawnSubject(GIVEN if design else TODAY)
     short = ", limits not held" if subject.broken else f", {subject.shortfall}" if subject.shortfall else ""
     title = f"{scene.name}: {subject.name}{short}, curves over the cycle"
     unit = scene.shown_in("angle")
-    drawn: Figure = curves.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle, unit)
+    drawn: Figure = curves.curves(frame, None, title, view.marks(scene, full_design), panels, today, view.angle, unit)
     return drawn
 
 
-def what(found: Evaluated, target: str | None = None, status: str | None = None) -> DrawnSubject:
+def what(evaluated: Evaluated, target: str | None = None, status: str | None = None) -> DrawnSubject:
     """Say what the design of an evaluation or of an answer is.
 
     target, status: of the answer whose design was evaluated, where it was one's.
     """
-    broken = tuple(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
-    if isinstance(found, Solution):
-        missed = shortfall(found.reached) if found.status == "optimal" else ""
-        return DrawnSubject(FOUND[found.status].format(found.sought), broken, missed)
+    broken = tuple(limit.name for limit in evaluated.limits if not limit.ok and not limit.rounding)
+    if isinstance(evaluated, Solution):
+        missed = shortfall(evaluated.reached) if evaluated.status == "optimal" else ""
+        return DrawnSubject(FOUND[evaluated.status].format(evaluated.sought), broken, missed)
     if target and status in FOUND and not (broken and status == "optimal"):
-        return DrawnSubject(FOUND[status].format(target), broken, shortfall(found.reached))
-    own, scene = flat(found.design), found.scene
+        return DrawnSubject(FOUND[status].format(target), broken, shortfall(evaluated.reached))
+    full_design, scene = flat(evaluated.design), evaluated.scene
     now = registry.of(scene).today(scene) if scene else {}
-    return DrawnSubject(TODAY if own.items() <= now.items() else GIVEN, broken)
+    return DrawnSubject(TODAY if full_design.items() <= now.items() else GIVEN, broken)
 
 
 @working()
-def drawing(scene: Scene, design: Design, said: DrawnSubject | None = None) -> "Drawing":
-    """A design's mechanism in the positions that matter; said: what the design is, for the title."""
-    found = registry.of(scene).views.linkage(scene, flat(design))
-    return replace(found, title=f"{scene.name}: {said.text if said else GIVEN if design else TODAY}")
+def drawing(scene: Scene, design: Design, subject: DrawnSubject | None = None) -> "Drawing":
+    """A design's mechanism in the positions that matter; subject: the design in words, for the title."""
+    drawn = registry.of(scene).views.linkage(scene, flat(design))
+    return replace(drawn, title=f"{scene.name}: {subject.text if subject else GIVEN if design else TODAY}")
 
 
 class Workshop(NamedTuple):
@@ -364,7 +364,7 @@ def linkage(
     path: Path,
     scene: Scene,
     design: Design,
-    said: DrawnSubject | None = None,
+    subject: DrawnSubject | None = None,
     comma: bool = False,
     how: Workshop = USUAL,
 ) -> None:
@@ -374,29 +374,29 @@ def linkage(
     """
     ending = suffix(path, tuple(DRAWINGS))
     if ending == ".dxf":
-        _dxf(path, scene, design, said, how)
+        _dxf(path, scene, design, subject, how)
         return
     if how.only:
         from loomopt.interface.files import svg
 
-        text(path, svg.render(only(drawing(scene, design, said), how.only)))
+        text(path, svg.render(only(drawing(scene, design, subject), how.only)))
         return
     if suffix(path, tuple(DRAWINGS)) == ".csv" and comma:
         sheets.write_text(path, registry.of(scene).views.joints_csv(scene, flat(design)), "joints", comma)
     else:
-        DRAWINGS[suffix(path, tuple(DRAWINGS))](path, scene, design, said)
+        DRAWINGS[suffix(path, tuple(DRAWINGS))](path, scene, design, subject)
 
 
-def _joints(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) -> None:
+def _joints(path: Path, scene: Scene, design: Design, subject: DrawnSubject | None) -> None:
     """Write a linkage's joints as CSV, or as a workbook."""
     sheets.write_text(path, registry.of(scene).views.joints_csv(scene, flat(design)), "joints")
 
 
-def _svg(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) -> None:
+def _svg(path: Path, scene: Scene, design: Design, subject: DrawnSubject | None) -> None:
     """Write a linkage as SVG at true scale."""
     from loomopt.interface.files import svg
 
-    text(path, svg.render(drawing(scene, design, said)))
+    text(path, svg.render(drawing(scene, design, subject)))
 
 
 def only(drawn: "Drawing", layer: str) -> "Drawing":
@@ -407,8 +407,10 @@ def only(drawn: "Drawing", layer: str) -> "Drawing":
         raise refusal(
             "the drawing has no such layer", "", "--only", layer, ", ".join(drawn.layers), "Choose one of them"
         )
-    kept = tuple(each for each in drawn.primitives if each.layer == layer and not isinstance(each, Text))
-    return replace(drawn, title="", legend=(), primitives=kept, measures=())
+    primitives = tuple(
+        primitive for primitive in drawn.primitives if primitive.layer == layer and not isinstance(primitive, Text)
+    )
+    return replace(drawn, title="", legend=(), primitives=primitives, measures=())
 
 
 def rounded(drawn: "Drawing", tolerance: float) -> "Drawing":
@@ -416,12 +418,12 @@ def rounded(drawn: "Drawing", tolerance: float) -> "Drawing":
     from loomopt.maths.arcs import closed_biarcs
     from loomopt.picture.shapes import Line, Point
 
-    def bent(each: "Primitive") -> "Primitive":
-        if not (isinstance(each, Line) and each.closed and len(each.points) > CORNERED):
-            return each
-        arcs = closed_biarcs([(point.x, point.y) for point in each.points], ARCS_SHARE * tolerance)
+    def bent(primitive: "Primitive") -> "Primitive":
+        if not (isinstance(primitive, Line) and primitive.closed and len(primitive.points) > CORNERED):
+            return primitive
+        arcs = closed_biarcs([(point.x, point.y) for point in primitive.points], ARCS_SHARE * tolerance)
         points = tuple(Point(at.real, at.imag) for at, _ in arcs)
-        return replace(each, points=points, bulges=tuple(bulge for _, bulge in arcs))
+        return replace(primitive, points=points, bulges=tuple(bulge for _, bulge in arcs))
 
     return replace(drawn, primitives=tuple(map(bent, drawn.primitives)))
 
@@ -430,19 +432,19 @@ CORNERED = 12
 """Points up to which a closed line is an arrow or a symbol with corners, and no curve."""
 
 
-def _dxf(path: Path, scene: Scene, design: Design, said: DrawnSubject | None, how: Workshop = USUAL) -> None:
+def _dxf(path: Path, scene: Scene, design: Design, subject: DrawnSubject | None, how: Workshop = USUAL) -> None:
     """Write a linkage as DXF at true scale, its lengths with their tolerances."""
     from loomopt.interface.files import dxf
     from loomopt.studies.tolerance.plan import read_tolerances
 
-    found, made = drawing(scene, design, said), read_tolerances(scene)
+    drawn, made = drawing(scene, design, subject), read_tolerances(scene)
     nominal = registry.of(scene).numbers_of(scene, flat(design))
-    bands = {each.number: each.band(nominal[name]) for name, each in made.items() if name in nominal}
-    measures = tuple(each._replace(band=bands.get(each.name, (0.0, 0.0))) for each in found.measures)
-    found = replace(found, measures=measures)
-    found = only(found, how.only) if how.only else found
-    found = found if how.arcs is None else rounded(found, how.arcs)
-    atomically(path, functools.partial(dxf.write, found, version=how.version))
+    bands = {tolerance.number: tolerance.band(nominal[name]) for name, tolerance in made.items() if name in nominal}
+    measures = tuple(measure._replace(band=bands.get(measure.name, (0.0, 0.0))) for measure in drawn.measures)
+    drawn = replace(drawn, measures=measures)
+    drawn = only(drawn, how.only) if how.only else drawn
+    drawn = drawn if how.arcs is None else rounded(drawn, how.arcs)
+    atomically(path, functools.partial(dxf.write, drawn, version=how.version))
 
 
 Writer = Callable[[Path, Scene, Design, DrawnSubject | None], None]
@@ -450,9 +452,9 @@ DRAWINGS: dict[str, Writer] = {".svg": _svg, ".dxf": _dxf, ".csv": _joints, ".xl
 """Ending of a file → what writes a linkage to it."""
 
 
-def picture(path: Path, scene: Scene, design: Design, said: DrawnSubject | None = None) -> None:
+def picture(path: Path, scene: Scene, design: Design, subject: DrawnSubject | None = None) -> None:
     """Draw a design's linkage in the positions that matter as a picture."""
     from loomopt.interface.figures import figure
 
     suffix(path, PICTURES)
-    atomically(path, functools.partial(figure.draw, drawing(scene, design, said)))
+    atomically(path, functools.partial(figure.draw, drawing(scene, design, subject)))

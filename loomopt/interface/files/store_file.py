@@ -34,49 +34,53 @@ def recalled(path: Path) -> list[StudyTable]:
     Machines as they are made are no designs, and left out.
     """
     with Store(path) as store:
-        told = {key: (about, tuple(store.rows(key))) for key, about in store.studies().items()}
-    found = [StudyTable(_study(about, path), rows) for about, rows in told.values() if rows and "samples" not in about]
-    if not found and any(rows for _, rows in told.values()):
+        studies = {key: (about, tuple(store.rows(key))) for key, about in store.studies().items()}
+    tables = [
+        StudyTable(_study(about, path), rows) for about, rows in studies.values() if rows and "samples" not in about
+    ]
+    if not tables and any(rows for _, rows in studies.values()):
         problem = "the store holds machines of a tolerance study, which are no designs"
         raise refusal(problem, str(path), "store", remedy="Give the design's answer and --study tolerance")
-    if not found:
+    if not tables:
         raise refusal("the store holds no row yet", str(path), "store", remedy="Run its study first")
-    return found
+    return tables
 
 
-def _study(told: Mapping[str, Any], path: Path) -> SceneStudy:
+def _study(record: Mapping[str, Any], path: Path) -> SceneStudy:
     """Plan that a store tells of. Raises BadInput."""
     try:
-        paths = Paths(path.absolute().parent, texts=dict(told["files"]))
-        scene = build(told["document"], REGISTERED, str(path), paths)
-        if "axes" in told:
-            return _front(told, scene)
-        return plan_sweep(scene, _over(told, scene), told["target"], accuracy=told["accuracy"], seed=told["seed"])
+        paths = Paths(path.absolute().parent, texts=dict(record["files"]))
+        scene = build(record["document"], REGISTERED, str(path), paths)
+        if "axes" in record:
+            return _front(record, scene)
+        return plan_sweep(
+            scene, _over(record, scene), record["target"], accuracy=record["accuracy"], seed=record["seed"]
+        )
     except BadInput:
         raise
     except (KeyError, TypeError, ValueError, AttributeError):
         raise refusal("what it says of a study is damaged", str(path), "store", remedy="Run the study again") from None
 
 
-def _front(told: Mapping[str, Any], scene: Scene) -> SceneStudy:
-    senses: Mapping[str, str] = told["axes"]
-    named = {sense: [name for name, own in senses.items() if own == sense] for sense in ("least", "most")}
+def _front(record: Mapping[str, Any], scene: Scene) -> SceneStudy:
+    senses: Mapping[str, str] = record["axes"]
+    named = {sense: [name for name, name_sense in senses.items() if name_sense == sense] for sense in ("least", "most")}
     return front.trade(
         scene,
         tuple(senses),
-        told["target"],
+        record["target"],
         maximise=named["most"],
         minimise=named["least"],
-        ranges={name: (float(low), float(high)) for name, (low, high) in told["ranges"].items()},
-        points=told["points"],
-        accuracy=told["accuracy"],
+        ranges={name: (float(low), float(high)) for name, (low, high) in record["ranges"].items()},
+        points=record["points"],
+        accuracy=record["accuracy"],
     )
 
 
-def _over(told: Mapping[str, Any], scene: Scene) -> dict[str, list[str | float]]:
+def _over(record: Mapping[str, Any], scene: Scene) -> dict[str, list[str | float]]:
     """Key → its values as a scene gives them, in the unit in which that shows them."""
-    found: dict[str, list[str | float]] = {}
-    for key, values in told["over"]:
-        unit = told["units"][quantity(scene, key).kind]
-        found[key] = [value if unit == "1" else f"{value / factor(unit):.15g} {unit}" for value in values]
-    return found
+    texts: dict[str, list[str | float]] = {}
+    for key, values in record["over"]:
+        unit = record["units"][quantity(scene, key).kind]
+        texts[key] = [value if unit == "1" else f"{value / factor(unit):.15g} {unit}" for value in values]
+    return texts

@@ -55,8 +55,8 @@ class MovingPicture:
     @property
     def widget(self) -> str:
         """The moving picture as markup."""
-        told = list(self.stages) if len(self.stages) > 1 else ()
-        return machine.widget(list(self.stages.values()), self.ghost, self.angle, self.unit, 0, told)
+        labels = list(self.stages) if len(self.stages) > 1 else ()
+        return machine.widget(list(self.stages.values()), self.ghost, self.angle, self.unit, 0, labels)
 
     @property
     def page(self) -> str:
@@ -86,28 +86,28 @@ def checked(path: Path) -> None:
 
 @working()
 def animated(
-    scene: Scene, design: Design, path: Path | None = None, what: outputs.DrawnSubject | None = None
+    scene: Scene, design: Design, path: Path | None = None, subject: outputs.DrawnSubject | None = None
 ) -> MovingPicture:
     """A design's mechanism as it moves, today's behind it. Raises BadInput.
 
-    path: a file to write it to as well; what: what the design is, for the title.
+    path: a file to write it to as well; subject: the design in words, for the title.
     """
     if path:
         checked(path)
-    job, own = registry.of(scene), flat(design)
+    job, full_design = registry.of(scene), flat(design)
     now, angles = job.today(scene), crank_angles()
-    full = {**now, **own}
+    full = {**now, **full_design}
     moving = job.views.motion(scene, full, angles)
     if moving is None:
         keys = ", ".join(job.views.missing(scene))
         problem = "the mechanism cannot be drawn" if keys else f"job {scene.job} does not say how its mechanism moves"
         raise refusal(problem, scene.origin, keys, remedy="Give these" if keys else "Draw it still: --figure F.svg")
     ghost = None if full == now else machine.assembled(scene, now, angles)
-    said = what.text if what else outputs.GIVEN if own and full != now else outputs.TODAY
-    found = MovingPicture(f"{scene.name}: {said}", job.views.angle, scene.shown_in("angle"), {said: moving}, ghost)
+    label = subject.text if subject else outputs.GIVEN if full_design and full != now else outputs.TODAY
+    picture = MovingPicture(f"{scene.name}: {label}", job.views.angle, scene.shown_in("angle"), {label: moving}, ghost)
     if path:
-        found.save(path)
-    return found
+        picture.save(path)
+    return picture
 
 
 @working()
@@ -117,11 +117,11 @@ def morphed(study: SceneStudy, rows: Sequence[Row], path: Path | None = None) ->
 
     if path:
         checked(path)
-    found = stages(study, rows)
-    if not found:
+    motions = stages(study, rows)
+    if not motions:
         raise refusal("there is nothing to animate: no row is certified, or none can be drawn", "", "animate")
     view, title = registry.of(study.scene).views, f"{study.name} of {study.heading}"
-    made = MovingPicture(title, view.angle, study.scene.shown_in("angle"), found)
+    made = MovingPicture(title, view.angle, study.scene.shown_in("angle"), motions)
     if path:
         made.save(path)
     return made
@@ -136,7 +136,7 @@ def _gif(picture: MovingPicture, path: Path) -> None:
     from PIL.Image import Dither
 
     palette = first.quantize(COLOURS)
-    rest = [each.quantize(COLOURS, palette=palette, dither=Dither.NONE) for each in others]
+    rest = [image.quantize(COLOURS, palette=palette, dither=Dither.NONE) for image in others]
 
     def write(place: Path) -> None:
         palette.save(
@@ -156,14 +156,17 @@ def _mp4(picture: MovingPicture, path: Path) -> None:
     size = f"{width}x{height}"
     head = ["ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATE)]
     tail = ["-i", "-", "-pix_fmt", "yuv420p", "-f", "mp4"]
-    raw = b"".join(each.tobytes() for each in images)
+    raw = b"".join(image.tobytes() for image in images)
 
     def write(place: Path) -> None:
         done = subprocess.run([*head, *tail, str(place)], input=raw, capture_output=True, check=False)
         if done.returncode:
-            told = done.stderr.decode(errors="replace").strip().splitlines()
+            messages = done.stderr.decode(errors="replace").strip().splitlines()
             raise refusal(
-                f"ffmpeg fails: {told[-1] if told else 'no word'}", str(path), "--animate", remedy="Write a .gif"
+                f"ffmpeg fails: {messages[-1] if messages else 'no word'}",
+                str(path),
+                "--animate",
+                remedy="Write a .gif",
             )
 
     atomically(path, write)
@@ -177,14 +180,14 @@ def frames(picture: MovingPicture) -> Iterator["Image"]:
     """Yield the frames of a turn; of several stages a turn each, one after the other."""
     motions = list(picture.stages.values())
     frame = machine.framed([*motions, *([picture.ghost] if picture.ghost else [])])
-    for told, motion in picture.stages.items():
+    for label, motion in picture.stages.items():
         for pose in range(0, len(motion.angles), EVERY if len(motions) == 1 else 3 * EVERY):
             layers = [(picture.ghost, True), (motion, False)]
-            shown = [(each, ghosted) for each, ghosted in layers if each is not None]
-            yield _frame(shown, frame, pose, told if len(motions) > 1 else picture.title)
+            shown = [(layer, ghosted) for layer, ghosted in layers if layer is not None]
+            yield _frame(shown, frame, pose, label if len(motions) > 1 else picture.title)
 
 
-def _frame(layers: Sequence[tuple[MechanismMotion, bool]], frame: machine.Frame, pose: int, told: str) -> "Image":
+def _frame(layers: Sequence[tuple[MechanismMotion, bool]], frame: machine.Frame, pose: int, label: str) -> "Image":
     """Return one frame: drawn finer than it is shown."""
     from PIL import Image, ImageDraw
 
@@ -195,7 +198,7 @@ def _frame(layers: Sequence[tuple[MechanismMotion, bool]], frame: machine.Frame,
     for motion, ghosted in layers:
         _draw(pen, motion, frame, pose, scale, ghosted)
     shown = image.reduce(FINE)
-    ImageDraw.Draw(shown).text((8, 6), told, fill=INK)
+    ImageDraw.Draw(shown).text((8, 6), label, fill=INK)
     return shown
 
 
@@ -208,9 +211,9 @@ def _draw(
         for name, points in motion.joints.items()
     }
     link, piece, size = (GHOST, GHOST, scale * frame.size) if ghosted else (DESIGN, PIECE, scale * frame.size)
-    for each in motion.turning:
-        (x, y), cos, sin = at[each.joint], float(np.cos(each.turns[pose])), float(np.sin(each.turns[pose]))
-        outline = [(x + size * (u * cos - v * sin), y - size * (u * sin + v * cos)) for u, v in each.points]
+    for turning in motion.turning:
+        (x, y), cos, sin = at[turning.joint], float(np.cos(turning.turns[pose])), float(np.sin(turning.turns[pose]))
+        outline = [(x + size * (u * cos - v * sin), y - size * (u * sin + v * cos)) for u, v in turning.points]
         pen.line([*outline, outline[0]], fill=piece, width=2 * FINE)
         pen.line([(x, y), outline[0]], fill=piece, width=FINE)
     for joint, radius in motion.rings:

@@ -22,7 +22,7 @@ from loomopt.solving.certificate.certificate import COMPLEMENTARY
 
 
 class Status(NamedTuple):
-    """What a design truly is: level is "ok", "open" or "bad"; verdict in a few words; told: sentences.
+    """What a design truly is: level is "ok", "open" or "bad"; verdict in a few words; sentences: what follows.
 
     exit: the status that a command ends with.
     """
@@ -49,7 +49,7 @@ class Subject:
     @property
     def heading(self) -> str:
         """Problem and what is sought."""
-        return ", ".join(each for each in (self.found.problem, self.sought) if each)
+        return ", ".join(word for word in (self.found.problem, self.sought) if word)
 
     @lazy
     def before(self) -> Evaluated | None:
@@ -75,44 +75,53 @@ VERDICTS = {
 
 def status(subject: Subject) -> Status:
     """Return what a design truly is, from what was checked, not from one word of its solver."""
-    found = subject.found
-    broken = tuple(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
-    kept = (f"Limits NOT held: {', '.join(broken)}.",) if broken else ()
+    evaluated = subject.found
+    broken = tuple(limit.name for limit in evaluated.limits if not limit.ok and not limit.rounding)
+    violations = (f"Limits NOT held: {', '.join(broken)}.",) if broken else ()
     if subject.doubts:
-        return Status("bad", "NOT CONFIRMED: the file contradicts itself", (*subject.doubts, *kept), NOT_CERTIFIED)
-    if not isinstance(found, Solution):
+        return Status(
+            "bad", "NOT CONFIRMED: the file contradicts itself", (*subject.doubts, *violations), NOT_CERTIFIED
+        )
+    if not isinstance(evaluated, Solution):
         verdict = "NOT ADMISSIBLE" if broken else "All limits held"
-        return Status("bad" if broken else "open", f"{verdict}; evaluated, nothing was optimised", kept)
-    if found.status != "optimal":
-        told = (found.message, Words(subject.scene).worse(found.worse), *kept)
-        verdict = VERDICTS.get(found.status, found.status.upper())
-        return Status("bad", verdict, tuple(each for each in told if each), EXIT.get(found.status, NOT_CERTIFIED))
-    if found.certificate is None or not found.certificate.passed or broken:
-        reasons = found.certificate.reasons if found.certificate else ("there is no certificate",)
-        return Status("bad", "NOT CERTIFIED", (*(f"{reason}." for reason in reasons), *kept), NOT_CERTIFIED)
-    return _certified(found, subject.scene)
+        return Status("bad" if broken else "open", f"{verdict}; evaluated, nothing was optimised", violations)
+    if evaluated.status != "optimal":
+        sentences = (evaluated.message, Words(subject.scene).worse(evaluated.worse), *violations)
+        verdict = VERDICTS.get(evaluated.status, evaluated.status.upper())
+        return Status(
+            "bad",
+            verdict,
+            tuple(sentence for sentence in sentences if sentence),
+            EXIT.get(evaluated.status, NOT_CERTIFIED),
+        )
+    if evaluated.certificate is None or not evaluated.certificate.passed or broken:
+        reasons = evaluated.certificate.reasons if evaluated.certificate else ("there is no certificate",)
+        return Status("bad", "NOT CERTIFIED", (*(f"{reason}." for reason in reasons), *violations), NOT_CERTIFIED)
+    return _certified(evaluated, subject.scene)
 
 
-def _certified(found: Solution, scene: Scene) -> Status:
+def _certified(solution: Solution, scene: Scene) -> Status:
     """Return what a certified optimum is, and what of what was asked for is not proven."""
-    opened, told = list[str](), list[str]()
-    missed = found.outcome.partition(" but ")[2]
+    opened, proofs = list[str](), list[str]()
+    missed = solution.outcome.partition(" but ")[2]
     if missed:
         opened.append(missed)
-    if found.proofs and not found.proofs.passed:
+    if solution.proofs and not solution.proofs.passed:
         opened.append("NOT PROVEN at every crank angle")
-    if found.global_bound:
-        opened += [] if found.global_bound.proven else ["NOT PROVEN best of all admissible designs"]
-        told.append(answers.everywhere(found.global_bound, scene) + ".")
+    if solution.global_bound:
+        opened += [] if solution.global_bound.proven else ["NOT PROVEN best of all admissible designs"]
+        proofs.append(answers.everywhere(solution.global_bound, scene) + ".")
     else:
-        told.append("No admissible design nearby is better; that none anywhere is was not asked (--global).")
-    said = (
-        found.message if found.terms or not found.target else registry.of(scene).say(scene, found.target, found.figures)
+        proofs.append("No admissible design nearby is better; that none anywhere is was not asked (--global).")
+    verdict_text = (
+        solution.message
+        if solution.terms or not solution.target
+        else registry.of(scene).say(scene, solution.target, solution.figures)
     )
-    told += [worse] if (worse := Words(scene).worse(found.worse)) else []
+    proofs += [worse] if (worse := Words(scene).worse(solution.worse)) else []
     verdict = "; ".join(["Optimal and certified", *opened])
-    unproven = found.global_bound is not None and not found.global_bound.proven
-    return Status("open" if opened else "ok", verdict, (said, *told), NOT_CERTIFIED if unproven else 0)
+    unproven = solution.global_bound is not None and not solution.global_bound.proven
+    return Status("open" if opened else "ok", verdict, (verdict_text, *proofs), NOT_CERTIFIED if unproven else 0)
 
 
 def parts(subject: Subject) -> list[Part]:
@@ -123,56 +132,62 @@ def parts(subject: Subject) -> list[Part]:
 
 def members(family: Subject) -> list[tuple[str, Status, list[Part]]]:
     """Heading, the status and the parts of each member of a family: what the whole cannot show."""
-    whole, found = status(family), list[tuple[str, Status, list[Part]]]()
+    whole, chapters = status(family), list[tuple[str, Status, list[Part]]]()
     for place, member in enumerate(family.found.members, 1):
         assert member.scene is not None
         subject = Subject(member, member.scene, family_table.of_target(family.scene))
         broken = [limit.name for limit in member.limits if not limit.ok and not limit.rounding]
-        held = f"Limits NOT held: {', '.join(broken)}" if broken else f"Member {place}: all limits held"
-        told = Status("bad" if broken else whole.level, held, (f"Of the family: {whole.verdict}.",))
+        verdict = f"Limits NOT held: {', '.join(broken)}" if broken else f"Member {place}: all limits held"
+        member_status = Status("bad" if broken else whole.level, verdict, (f"Of the family: {whole.verdict}.",))
         shown = [part for make in (_compared, *ONE_MACHINE) for part in make(subject)]
-        found.append((f"{family.heading}, member {place}: {changed(member)}", told, shown))
-    return found
+        chapters.append((f"{family.heading}, member {place}: {changed(member)}", member_status, shown))
+    return chapters
 
 
 def _compared(subject: Subject) -> Iterator[Part]:
-    found, scene, before = subject.found, subject.scene, subject.before
-    heading = "nearest" if isinstance(found, Solution) and found.relaxation else "design" if before else "today"
-    blocks: list[Block] = [answers.comparison(found, scene, before, heading), *answers.lists(found, scene)]
+    evaluated, scene, before = subject.found, subject.scene, subject.before
+    heading = "nearest" if isinstance(evaluated, Solution) and evaluated.relaxation else "design" if before else "today"
+    blocks: list[Block] = [answers.comparison(evaluated, scene, before, heading), *answers.lists(evaluated, scene)]
     yield Part("Today against the design" if before else "Today's machine", tuple(blocks))
 
 
 def _moving(subject: Subject) -> Iterator[Part]:
-    found = machine.part(subject.scene, subject.found.design)
-    if found:
-        yield found
+    moving = machine.part(subject.scene, subject.found.design)
+    if moving:
+        yield moving
 
 
 def _clash(subject: Subject) -> Iterator[Part]:
-    found = subject.found
-    if isinstance(found, Solution) and found.relaxation:
-        clash = f"Limits that clash: {', '.join(found.clash)}. The design below is the nearest one, and not admissible."
-        yield Part("What stands in the way", (clash, answers.relaxation(found)))
+    solution = subject.found
+    if isinstance(solution, Solution) and solution.relaxation:
+        clash = (
+            f"Limits that clash: {', '.join(solution.clash)}. The design below is the nearest one, and not admissible."
+        )
+        yield Part("What stands in the way", (clash, answers.relaxation(solution)))
 
 
 def _binding(subject: Subject) -> Iterator[Part]:
     if isinstance(subject.found, Solution) and subject.found.certificate:
-        told = "By how much the best gets better for each unit that a limit is loosened; solving again confirms it."
+        caption = "By how much the best gets better for each unit that a limit is loosened; solving again confirms it."
         bound = answers.binding(subject.found)
-        shown = (bound,) if isinstance(bound, str) else (told, replace(bound, title=""))
+        shown = (bound,) if isinstance(bound, str) else (caption, replace(bound, title=""))
         yield Part("What binds, and what it is worth", shown)
 
 
 def _certificate(subject: Subject) -> Iterator[Part]:
     """Say the certificate in words: what was asked of the design, what was found."""
-    found = subject.found.certificate if isinstance(subject.found, Solution) else None
-    if found is None:
+    certificate = subject.found.certificate if isinstance(subject.found, Solution) else None
+    if certificate is None:
         return
     lines = [
-        ("every limit holds, by its own size", f"{found.feasibility:.1e}", f"{FEASIBLE:.0e}"),
-        (f"whole-cycle values between the points, {found.whole_cycle}", f"{found.violation:.1e}", "the accuracy asked"),
+        ("every limit holds, by its own size", f"{certificate.feasibility:.1e}", f"{FEASIBLE:.0e}"),
+        (
+            f"whole-cycle values between the points, {certificate.whole_cycle}",
+            f"{certificate.violation:.1e}",
+            "the accuracy asked",
+        ),
     ]
-    for place, level in enumerate((*found.levels, *([found.change] if found.change else [])), 1):
+    for place, level in enumerate((*certificate.levels, *([certificate.change] if certificate.change else [])), 1):
         lines += [
             (
                 f"{place}. {level.objective}: slopes balance, nothing better nearby",
@@ -185,24 +200,24 @@ def _certificate(subject: Subject) -> Iterator[Part]:
                 f"{COMPLEMENTARY:.0e}",
             ),
         ]
-    head = "Passed" if found.passed else "NOT PASSED"
-    curved = "the curvature says a minimum" if found.minimum else "the curvature does NOT say a minimum"
-    unique = "the only one nearby" if found.unique else "not the only one: others are as good"
-    if not found.prices_unique:
+    head = "Passed" if certificate.passed else "NOT PASSED"
+    curved = "the curvature says a minimum" if certificate.minimum else "the curvature does NOT say a minimum"
+    unique = "the only one nearby" if certificate.unique else "not the only one: others are as good"
+    if not certificate.prices_unique:
         unique += "; prices are not unique, for limits bind only together"
-    told: list[Block] = [
-        f"{head}. It was checked apart from the solver, by {found.by}: {curved}, and it is {unique}.",
+    blocks: list[Block] = [
+        f"{head}. It was checked apart from the solver, by {certificate.by}: {curved}, and it is {unique}.",
         TextTable("", ("what was checked", "found", "at most"), tuple(lines), right=(1, 2)),
-        *(f"Reason: {reason}." for reason in found.reasons),
+        *(f"Reason: {reason}." for reason in certificate.reasons),
     ]
-    told += [f"Chosen among equals: {'; '.join(found.choices)}."] if found.choices else []
-    yield Part("The certificate in words", tuple(told))
+    blocks += [f"Chosen among equals: {'; '.join(certificate.choices)}."] if certificate.choices else []
+    yield Part("The certificate in words", tuple(blocks))
 
 
 def _proofs(subject: Subject) -> Iterator[Part]:
-    found = subject.found.proofs if isinstance(subject.found, Solution) else None
-    if found:
-        yield Part("Proof at every crank angle", tuple(answers.proofs(found)))
+    proofs = subject.found.proofs if isinstance(subject.found, Solution) else None
+    if proofs:
+        yield Part("Proof at every crank angle", tuple(answers.proofs(proofs)))
 
 
 def _curves(subject: Subject) -> Iterator[Part]:
@@ -222,9 +237,9 @@ def _members(subject: Subject) -> Iterator[Part]:
 
 
 def _remarks(subject: Subject) -> Iterator[Part]:
-    told = registry.of(subject.scene).views.remarks(subject.scene, flat(subject.found.design))
-    if told:
-        yield Part("Remarks", tuple(f"{each}." for each in told))
+    remarks = registry.of(subject.scene).views.remarks(subject.scene, flat(subject.found.design))
+    if remarks:
+        yield Part("Remarks", tuple(f"{remark}." for remark in remarks))
 
 
 def _sketch(subject: Subject) -> Iterator[Part]:
@@ -247,13 +262,15 @@ def _scene(subject: Subject) -> Iterator[Part]:
 
 
 def _search(subject: Subject) -> Iterator[Part]:
-    found = subject.found
-    if isinstance(found, Solution) and found.time:
-        time = found.time
-        told = [answers.starts(found, subject.scene)] if found.solver.get("starts", 1) > 1 else []
-        told.append(f"IPOPT said {found.solver.get('status', 'nothing')}; {time.get('total_s', 0.0):.3f} s in all.")
-        told.append(answers.retyped(found, subject.scene))
-        yield Part("How it was found", tuple(told))
+    solution = subject.found
+    if isinstance(solution, Solution) and solution.time:
+        time = solution.time
+        sentences = [answers.starts(solution, subject.scene)] if solution.solver.get("starts", 1) > 1 else []
+        sentences.append(
+            f"IPOPT said {solution.solver.get('status', 'nothing')}; {time.get('total_s', 0.0):.3f} s in all."
+        )
+        sentences.append(answers.retyped(solution, subject.scene))
+        yield Part("How it was found", tuple(sentences))
 
 
 PARTS: tuple[Callable[[Subject], Iterator[Part]], ...] = (

@@ -47,30 +47,33 @@ class Judged(Protocol):
         """What it answers."""
 
 
-def of_answer(found: Judged, beside: Sequence[object] = (), doubts: Sequence[str] = ()) -> list[Chapter]:
+def of_answer(judged: Judged, results: Sequence[object] = (), doubts: Sequence[str] = ()) -> list[Chapter]:
     """Chapter of an answer, of a family one for each of its members too; the rest as of `of_design`."""
-    first = of_design(found, beside, doubts)
-    if not found.result.members:
+    first = of_design(judged, results, doubts)
+    if not judged.result.members:
         return [first]
-    return [first, *(Chapter(heading, "", told, parts) for heading, told, parts in answer.members(_subject(found)))]
+    return [
+        first,
+        *(Chapter(heading, "", status, parts) for heading, status, parts in answer.members(_subject(judged))),
+    ]
 
 
-def of_design(found: Judged, beside: Sequence[object] = (), doubts: Sequence[str] = ()) -> Chapter:
+def of_design(judged: Judged, results: Sequence[object] = (), doubts: Sequence[str] = ()) -> Chapter:
     """Chapter of an answer or an evaluation, which knows its scene.
 
-    beside: what was computed of the same scene; doubts: why what its file says is not believed. Raises BadInput.
+    results: studies of the same scene; doubts: why the file is not believed. Raises BadInput.
     """
-    subject = _subject(found, doubts)
-    return _chapter(subject.heading, subject.scene, answer.status(subject), [*answer.parts(subject), *_more(beside)])
+    subject = _subject(judged, doubts)
+    return _chapter(subject.heading, subject.scene, answer.status(subject), [*answer.parts(subject), *_more(results)])
 
 
-def _subject(found: Judged, doubts: Sequence[str] = ()) -> Subject:
-    return Subject(found.result, found.scene, found.target, found.sought, tuple(doubts))
+def _subject(judged: Judged, doubts: Sequence[str] = ()) -> Subject:
+    return Subject(judged.result, judged.scene, judged.target, judged.sought, tuple(doubts))
 
 
-def of_study(plan: SceneStudy, solved: Sequence[Row], beside: Sequence[object] = ()) -> Chapter:
+def of_study(plan: SceneStudy, solved: Sequence[Row], results: Sequence[object] = ()) -> Chapter:
     """Chapter of a study; solved: the rows of all points that were. Raises BadInput."""
-    parts = [*study.parts(plan, solved), *_more(beside)]
+    parts = [*study.parts(plan, solved), *_more(results)]
     return _chapter(f"{plan.name} of {plan.heading}", plan.scene, study.status(plan, solved), parts)
 
 
@@ -78,8 +81,8 @@ def _chapter(heading: str, scene: Scene, status: Status, parts: Sequence[Part]) 
     return Chapter(heading, scene.title, status, parts, f"Source: {scene.source}" if scene.source else "")
 
 
-def _more(beside: Sequence[object]) -> list[Part]:
-    return [part for each in beside for part in _parts(each)]
+def _more(results: Sequence[object]) -> list[Part]:
+    return [part for result in results for part in _parts(result)]
 
 
 def _parts(thing: object) -> list[Part]:
@@ -95,8 +98,8 @@ def _parts(thing: object) -> list[Part]:
 
 def part_of_study(plan: SceneStudy, solved: Sequence[Row]) -> list[Part]:
     """A study as parts of another chapter, its own status first."""
-    told = study.status(plan, solved)
-    return [Part(f"{plan.name} of {plan.heading}", (told.verdict, *told.told)), *study.parts(plan, solved)]
+    status = study.status(plan, solved)
+    return [Part(f"{plan.name} of {plan.heading}", (status.verdict, *status.told)), *study.parts(plan, solved)]
 
 
 def html(chapters: Sequence[Chapter]) -> str:

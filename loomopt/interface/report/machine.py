@@ -54,9 +54,9 @@ class Frame:
 @working()
 def part(scene: Scene, design: Design) -> Part | None:
     """Moving mechanism of a design, SI, with today's behind it where it is another; None without one."""
-    job, own = registry.of(scene), flat(design)
+    job, full_design = registry.of(scene), flat(design)
     now = job.today(scene)
-    full = {**now, **own}
+    full = {**now, **full_design}
     angles = crank_angles()
     moving = job.views.motion(scene, full, angles)
     if moving is None:
@@ -84,24 +84,24 @@ def widget(
     angle: str,
     unit: str,
     first: int = 0,
-    told: Sequence[str] = (),
+    labels: Sequence[str] = (),
 ) -> str:
     """A moving picture with its slider: of one design, or of several stages, such as points of a front.
 
     ghost: the machine behind it; angle, unit: what phi is and in which unit it is told; first: the pose that is shown
-    at first, and that remains where no script runs; told: what each stage is.
+    at first, and that remains where no script runs; labels: one for each stage.
     """
     frame = framed([*stages, *([ghost] if ghost else [])])
     at_first = max(range(len(stages)), key=lambda k: len(stages[k].joints))  # some have parts that others have not
     both = ((ghost, "today"), (stages[at_first], "design"))
-    layers = [_layer(each, frame, kind, first) for each, kind in both if each]
+    layers = [_layer(layer, frame, kind, first) for layer, kind in both if layer]
     sides = f"0 0 {frame.width:.0f} {frame.height:.0f}"
     shown = f'<svg viewBox="{sides}" role="img" aria-label="the mechanism">{"".join(layers)}</svg>'
-    poses = {"design": [_poses(each, frame) for each in stages]}
+    poses = {"design": [_poses(stage, frame) for stage in stages]}
     poses |= {"today": [_poses(ghost, frame)]} if ghost else {}
     size = math.degrees(TURN / len(stages[0].angles)) if unit == "deg" else 0.0
     turns = [] if size else [f"{value:.4g}" for value in _shown(stages[0].angles, unit)]
-    data = {"unit": unit, "step": size, "angles": turns, "poses": poses, "told": list(told)}
+    data = {"unit": unit, "step": size, "angles": turns, "poses": poses, "told": list(labels)}
     packed = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
     second = (
         f"<label>design {_slider('which', len(stages), at_first)}<output></output></label>" if len(stages) > 1 else ""
@@ -131,15 +131,15 @@ def _shown(angles: Floats, unit: str) -> Floats:
 
 def framed(motions: Sequence[MechanismMotion]) -> Frame:
     """Frame that takes all positions of all machines."""
-    points = [np.asarray(list(each.pivots.values()), dtype=float) for each in motions]
-    points += [at for each in motions for at in each.joints.values()]
-    for each in motions:
-        for joint, radius in each.rings:
-            at = _all(each, joint)
+    points = [np.asarray(list(motion.pivots.values()), dtype=float) for motion in motions]
+    points += [at for motion in motions for at in motion.joints.values()]
+    for motion in motions:
+        for joint, radius in motion.rings:
+            at = _all(motion, joint)
             points += [at - radius, at + radius]
-        for piece in each.turning:
+        for piece in motion.turning:
             reach = max(math.hypot(*point) for point in piece.points)
-            points += [_all(each, piece.joint) - reach, _all(each, piece.joint) + reach]
+            points += [_all(motion, piece.joint) - reach, _all(motion, piece.joint) + reach]
     (left, bottom), (right, top) = np.min(np.vstack(points), axis=0), np.max(np.vstack(points), axis=0)
     size = (SIDE - 2 * MARGIN) / max(right - left, top - bottom)
     return Frame(Box(float(left), float(bottom), float(right), float(top)), float(size))
@@ -168,41 +168,41 @@ def _layer(motion: MechanismMotion, frame: Frame, kind: str, pose: int) -> str:
     """Return one machine at one pose, marked for the script: which joints its lines join, which turn."""
     at = {name: frame.at(_all(motion, name))[0] for name in motion.pivots}
     at |= {name: frame.at(points)[pose] for name, points in motion.joints.items()}
-    found = [
+    marks = [
         _path(frame.at(points))
         for name, points in motion.joints.items()
         if kind == "design" and name not in motion.unnamed
     ]
-    found += [_piece(place, piece, at, frame, pose) for place, piece in enumerate(motion.turning)]
+    marks += [_piece(place, piece, at, frame, pose) for place, piece in enumerate(motion.turning)]
     for place, (joint, radius) in enumerate(motion.rings):
         still = "guide" if joint in motion.pivots else "ring"
         size = f'r="{radius * frame.size:.1f}"'
-        found.append(f'<circle class="{still}" data-ring="{place}" {_centre(joint, at)} {size}/>')
+        marks.append(f'<circle class="{still}" data-ring="{place}" {_centre(joint, at)} {size}/>')
     for one, other in motion.links:
         still = " frame" if one in motion.pivots and other in motion.pivots else ""
         ends = f'x1="{at[one][0]}" y1="{at[one][1]}" x2="{at[other][0]}" y2="{at[other][1]}"'
-        found.append(f'<line class="link{still}" {_joined(one, other)} {ends}/>')
+        marks.append(f'<line class="link{still}" {_joined(one, other)} {ends}/>')
     for one, other in motion.springs:
-        found.append(f'<path class="return-spring" {_joined(one, other)} d="{_spring(at[one], at[other])}"/>')
-    found += [f'<path class="ground" data-at="{escape(name)}" d="{_ground(*at[name])}"/>' for name in motion.pivots]
-    found += [f'<circle class="joint" {_centre(name, at)} r="{JOINT}"/>' for name in at if name not in motion.unnamed]
+        marks.append(f'<path class="return-spring" {_joined(one, other)} d="{_spring(at[one], at[other])}"/>')
+    marks += [f'<path class="ground" data-at="{escape(name)}" d="{_ground(*at[name])}"/>' for name in motion.pivots]
+    marks += [f'<circle class="joint" {_centre(name, at)} r="{JOINT}"/>' for name in at if name not in motion.unnamed]
     if kind == "design":
-        found += [
+        marks += [
             f'<text data-at="{escape(name)}" x="{at[name][0] + 10}" y="{at[name][1] - 10}">{escape(name)}</text>'
             for name in named(motion, frame)
         ]
-    return f'<g class="{kind}">{"".join(found)}</g>'
+    return f'<g class="{kind}">{"".join(marks)}</g>'
 
 
 def named(motion: MechanismMotion, frame: Frame) -> list[str]:
     """Joints whose names have room: no moving one that comes too near to a pivot or to one before it."""
-    found: list[str] = []
+    joints: list[str] = []
     for name in (*motion.pivots, *motion.joints):
         if name not in motion.unnamed:
-            apart = (np.hypot(*(frame.at(_all(motion, name)) - frame.at(_all(motion, other))).T) for other in found)
-            if all(float(np.min(each)) > 1.3 * TEXT for each in apart):
-                found.append(name)
-    return found
+            apart = (np.hypot(*(frame.at(_all(motion, name)) - frame.at(_all(motion, other))).T) for other in joints)
+            if all(float(np.min(distance)) > 1.3 * TEXT for distance in apart):
+                joints.append(name)
+    return joints
 
 
 def _piece(place: int, piece: Turning, at: Mapping[str, Floats], frame: Frame, pose: int) -> str:
@@ -232,8 +232,8 @@ def _centre(joint: str, at: Mapping[str, Floats]) -> str:
 
 def _path(points: Floats) -> str:
     """Way of a joint over the turn, every second position."""
-    told = " ".join(f"{x:.0f},{y:.0f}" for x, y in points[::2].tolist())
-    return f'<polygon class="way" points="{told}"/>'
+    coordinates = " ".join(f"{x:.0f},{y:.0f}" for x, y in points[::2].tolist())
+    return f'<polygon class="way" points="{coordinates}"/>'
 
 
 def _spring(one: Floats, other: Floats) -> str:
@@ -241,8 +241,8 @@ def _spring(one: Floats, other: Floats) -> str:
     (x, y), (u, v) = one.tolist(), other.tolist()
     long = math.hypot(u - x, v - y) or 1.0
     nx, ny = -(v - y) / long * 12, (u - x) / long * 12
-    told = [f"M{x:.1f} {y:.1f}"]
+    commands = [f"M{x:.1f} {y:.1f}"]
     for k in range(1, 2 * COILS):
         share, side = k / (2 * COILS), (1 if k % 2 else -1)
-        told.append(f"L{x + share * (u - x) + side * nx:.1f} {y + share * (v - y) + side * ny:.1f}")
-    return "".join([*told, f"L{u:.1f} {v:.1f}"])
+        commands.append(f"L{x + share * (u - x) + side * nx:.1f} {y + share * (v - y) + side * ny:.1f}")
+    return "".join([*commands, f"L{u:.1f} {v:.1f}"])

@@ -32,9 +32,9 @@ class Part:
     blocks: tuple[Block, ...]
 
 
-def text(told: str) -> str:
+def text(string: str) -> str:
     """Text escaped, with places in long names where a line may break, and none in what is joined."""
-    return escape(spaced(told.replace(JOINED, "\u00a0"))).replace("_", "_<wbr>")
+    return escape(spaced(string.replace(JOINED, "\u00a0"))).replace("_", "_<wbr>")
 
 
 def part(shown: Part) -> str:

@@ -26,7 +26,7 @@ def page(equations: Sequence[Equation]) -> str:
 @functools.lru_cache(512)
 def markup(equation: Equation) -> str:
     """Return one equation as a block of MathML; its text stands where no browser knows MathML."""
-    rows = [[_cell(each) for each in row] for row in equation.form]
+    rows = [[_cell(cell) for cell in row] for row in equation.form]
     if not rows:
         inner = f"<mtext>{escape(equation.text)}</mtext>"
     elif len(rows) == 1:
@@ -42,12 +42,16 @@ def markup(equation: Equation) -> str:
     return f'<div class="equation{size}"><math display="block" alttext="{escape(equation.text)}">{inner}</math></div>'
 
 
-def _cell(what: Expression) -> str:
-    if isinstance(what, str):
-        return f"<mo>{SIGNS[what]}</mo>" if what in SIGNS else f"<mtext>&#160;{escape(what)}&#160;</mtext>"
-    if isinstance(what, tuple):
-        return "<mrow>" + "<mo>≤</mo>".join(map(_cell, what)) + "</mrow>"
-    return str(_printer()(sympy().sympify(what)))
+def _cell(expression: Expression) -> str:
+    if isinstance(expression, str):
+        return (
+            f"<mo>{SIGNS[expression]}</mo>"
+            if expression in SIGNS
+            else f"<mtext>&#160;{escape(expression)}&#160;</mtext>"
+        )
+    if isinstance(expression, tuple):
+        return "<mrow>" + "<mo>≤</mo>".join(map(_cell, expression)) + "</mrow>"
+    return str(_printer()(sympy().sympify(expression)))
 
 
 @functools.cache
@@ -59,8 +63,8 @@ def _printer() -> Expression:
         def _print_Symbol(self, symbol: Expression, style: str = "plain") -> Expression:
             letter, index, primes = name_parts(symbol.name)
             base = self.dom.createElement("mi")
-            told = letter if len(letter) < 3 else f"\u2009{letter}\u2009"  # words need room about them
-            base.appendChild(self.dom.createTextNode(told))
+            label = letter if len(letter) < 3 else f"\u2009{letter}\u2009"  # words need room about them
+            base.appendChild(self.dom.createTextNode(label))
             made = base
             if index:
                 below = self.dom.createElement("mi")
@@ -78,7 +82,7 @@ def _printer() -> Expression:
         def _print_AppliedUndef(self, called: Expression) -> Expression:
             made = self.dom.createElement("mrow")
             made.appendChild(self._print_Symbol(sympy().Symbol(called.func.__name__)))
-            inner = [part for each in called.args for part in (self._sign(","), self._print(each))][1:]
+            inner = [part for argument in called.args for part in (self._sign(","), self._print(argument))][1:]
             for part in (self._sign("("), *inner, self._sign(")")):
                 made.appendChild(part)
             return made
@@ -91,7 +95,7 @@ def _printer() -> Expression:
             return made
 
     def printed(expression: Expression) -> str:
-        told = str(Printer()._print(expression).toxml()).replace("<mo>-</mo>", "<mo>−</mo>")
-        return ENTITY.sub(lambda each: unescape(each[0]), told)
+        text = str(Printer()._print(expression).toxml()).replace("<mo>-</mo>", "<mo>−</mo>")
+        return ENTITY.sub(lambda each: unescape(each[0]), text)
 
     return printed

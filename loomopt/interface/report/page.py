@@ -25,9 +25,9 @@ class Chapter:
 
 def page(chapters: Sequence[Chapter]) -> str:
     """A page of chapters; the status of each stands before all else."""
-    title = "; ".join(f"{each.status.verdict}: {each.heading}" for each in chapters)
+    title = "; ".join(f"{chapter.status.verdict}: {chapter.heading}" for chapter in chapters)
     toc = _contents(chapters) if len(chapters) > 1 else ""
-    body = "".join(_chapter(place, each) for place, each in enumerate(chapters, 1))
+    body = "".join(_chapter(place, chapter) for place, chapter in enumerate(chapters, 1))
     made = f"Made by loomopt {__version__}, {date.today().isoformat()}. The page holds all it shows."
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
@@ -40,19 +40,19 @@ def page(chapters: Sequence[Chapter]) -> str:
 
 def _contents(chapters: Sequence[Chapter]) -> str:
     rows = "".join(
-        f'<li class="{each.status.level}"><a href="#c{place}">{text(each.heading)}</a>: '
-        f"{text(each.status.verdict)}</li>"
-        for place, each in enumerate(chapters, 1)
+        f'<li class="{chapter.status.level}"><a href="#c{place}">{text(chapter.heading)}</a>: '
+        f"{text(chapter.status.verdict)}</li>"
+        for place, chapter in enumerate(chapters, 1)
     )
     return f"<nav><h1>{len(chapters)} reports</h1><ul>{rows}</ul></nav>"
 
 
 def _chapter(place: int, shown: Chapter) -> str:
-    told = "".join(f"<p>{text(each)}</p>" for each in shown.status.told)
+    sentences = "".join(f"<p>{text(sentence)}</p>" for sentence in shown.status.told)
     sub = "".join(f"<p>{text(line)}</p>" for line in (shown.title, shown.source) if line)
     return (
         f'<article id="c{place}"><header class="status {shown.status.level}">'
-        f'<p class="verdict">{text(shown.status.verdict)}</p><h2>{text(shown.heading)}</h2>{told}</header>'
+        f'<p class="verdict">{text(shown.status.verdict)}</p><h2>{text(shown.heading)}</h2>{sentences}</header>'
         f'<div class="source">{sub}</div>{"".join(map(part, shown.parts))}</article>'
     )
 

@@ -23,15 +23,15 @@ def status(study: SceneStudy, solved: Sequence[Row]) -> Status:
     findings = study.read(solved)
     rows = findings.rows
     counts = Counter("certified" if row.certified else row.status for row in rows)
-    told = ", ".join(f"{count} {word}" for word, count in counts.items()) or "no point"
+    summary = ", ".join(f"{count} {word}" for word, count in counts.items()) or "no point"
     size = study.size
     unfinished = [f"{size - len(solved)} of {size} points are not solved yet"] if size and len(solved) < size else []
     if not rows or not counts["certified"]:
-        level, verdict = "bad", f"NO POINT IS CERTIFIED: {told}"
+        level, verdict = "bad", f"NO POINT IS CERTIFIED: {summary}"
     elif counts["certified"] + counts["infeasible"] < len(rows):
-        level, verdict = "bad", f"NOT ALL POINTS ARE CERTIFIED: {told}"
+        level, verdict = "bad", f"NOT ALL POINTS ARE CERTIFIED: {summary}"
     elif counts["infeasible"] or unfinished:
-        level, verdict = "open", f"{told} of {len(rows)} points"
+        level, verdict = "open", f"{summary} of {len(rows)} points"
     else:
         level, verdict = "ok", f"All {len(rows)} points certified"
     missed = Counter(row.shortfall for row in rows if row.shortfall)

@@ -26,18 +26,18 @@ if TYPE_CHECKING:
 @working()
 def part(scene: Scene, design: Design) -> Part:
     """Curves of a design, SI, over the turn, beside today's machine where it is another."""
-    job, view, own = registry.of(scene), registry.of(scene).views, flat(design)
+    job, view, full_design = registry.of(scene), registry.of(scene).views, flat(design)
     now = job.today(scene)
-    full = {**now, **own}
+    full = {**now, **full_design}
     unit = scene.shown_in("angle")
     shown = _turn(scene, full, unit)
     before = None if full == now else _turn(scene, now, unit)
-    known = view.panels(scene, own, tuple(shown.columns.columns))
+    known = view.panels(scene, full_design, tuple(shown.columns.columns))
     panels = [in_units(scene, panel) for panel in sorted(known, key=lambda panel: not panel.wide)]
     key = _key(shown, before is not None)
-    said = f"Over the {view.angle} phi, {unit}."
+    intro = f"Over the {view.angle} phi, {unit}."
     charts = block([chart(panel, shown, before) for panel in panels])
-    return Part("Curves over the turn", (Markup(f'<p class="marks">{text(said)} {key}</p>'), *charts))
+    return Part("Curves over the turn", (Markup(f'<p class="marks">{text(intro)} {key}</p>'), *charts))
 
 
 def _turn(scene: Scene, full: Design, unit: str) -> DrawnTurn:
@@ -46,27 +46,27 @@ def _turn(scene: Scene, full: Design, unit: str) -> DrawnTurn:
 
 def _key(shown: DrawnTurn, beside: bool) -> str:
     """Return what vertical lines and shaded stretches are."""
-    told = []
+    sentences = []
     for name, mark in shown.marks.items():
         if isinstance(mark, Span):
             ends = f"{shown.told(math.degrees(mark.begin))} to {shown.told(math.degrees(mark.end))}"
-            told.append(f'<span class="k-span"><i></i>{text(f"{name} {ends}")}</span>')
+            sentences.append(f'<span class="k-span"><i></i>{text(f"{name} {ends}")}</span>')
         elif math.isfinite(mark):
-            told.append(f'<span class="k-place"><i></i>{text(f"{name} {shown.told(math.degrees(mark))}")}</span>')
-    told += ['<span class="k-today"><i></i>today, dashed</span>'] if beside else []
-    return " ".join(told)
+            sentences.append(f'<span class="k-place"><i></i>{text(f"{name} {shown.told(math.degrees(mark))}")}</span>')
+    sentences += ['<span class="k-today"><i></i>today, dashed</span>'] if beside else []
+    return " ".join(sentences)
 
 
 def chart(panel: Panel, shown: DrawnTurn, before: DrawnTurn | None) -> Chart:
     """A panel as a chart."""
     unit = shown_unit(panel)
     size, angle = factor(unit), math.degrees(factor(shown.unit))
-    kept = _kept(panel, shown)
+    sampled = _kept(panel, shown)
     series = [
-        Series(shown.angles[kept] / angle, shown.of(column)[kept] / size, f"c{place % COLOURS}", label)
+        Series(shown.angles[sampled] / angle, shown.of(column)[sampled] / size, f"c{place % COLOURS}", label)
         for place, (column, label) in enumerate(zip(panel.columns, panel.labels, strict=True))
     ]
-    key = [(each.kind, each.label) for each in series if len(series) > 1 or each.label != panel.title]
+    key = [(curve.kind, curve.label) for curve in series if len(series) > 1 or curve.label != panel.title]
     ghosts = []
     if before:
         old = _kept(panel, before)
@@ -82,15 +82,15 @@ def chart(panel: Panel, shown: DrawnTurn, before: DrawnTurn | None) -> Chart:
         ]
     dots = []
     for turn, kind, word in ((shown, "c0", ""), (before, "ghost", "today: ")):
-        for told in _marked(panel, turn, unit) if turn else ():
-            dots.append((told[0] / angle, told[1], kind))
-            key.append((f"dot {kind}", f"{word}{told[2]}"))
+        for place_mark in _marked(panel, turn, unit) if turn else ():
+            dots.append((place_mark[0] / angle, place_mark[1], kind))
+            key.append((f"dot {kind}", f"{word}{place_mark[2]}"))
     levels = [value / size for values in panel.levels.values() for value in values]
     key += [("k-level", f"{name} {show(values[0], unit)}") for name, values in panel.levels.items()]
     whole = shown.whole
     places = [math.degrees(m) for m in shown.marks.values() if not isinstance(m, Span) and math.isfinite(m)]
     low, high = float(shown.angles.min()), float(shown.angles.max())
-    spans = [each for mark in shown.marks.values() if isinstance(mark, Span) for each in _parts(mark, low, high, whole)]
+    spans = [span for mark in shown.marks.values() if isinstance(mark, Span) for span in _parts(mark, low, high, whole)]
     step = TICKS * whole / 360.0
     numbered = [step * k / angle for k in range(math.ceil(low / step), math.floor(high / step + 1e-9) + 1)]
     return Chart(
@@ -108,26 +108,26 @@ def chart(panel: Panel, shown: DrawnTurn, before: DrawnTurn | None) -> Chart:
 
 def _kept(panel: Panel, turn: DrawnTurn) -> "NDArray[np.intp]":
     """Rows a curve is drawn through: every so many degrees, corners, the last, and what is marked."""
-    kept = thinned(turn.angles)
+    sampled = thinned(turn.angles)
     for how in panel.marked:
         row = marked_row(turn.of(panel.columns[0]), turn, how)
         if row is not None:
-            kept[row] = True
-    return np.flatnonzero(kept)
+            sampled[row] = True
+    return np.flatnonzero(sampled)
 
 
 def _marked(panel: Panel, turn: DrawnTurn, unit: str) -> list[tuple[float, float, str]]:
     """Return what of a panel's first column is marked: angle, deg, value in the unit, and words."""
-    values, found = turn.of(panel.columns[0]), []
+    values, marks = turn.of(panel.columns[0]), []
     for how in panel.marked:
         row = marked_row(values, turn, how)
         if row is not None:
             value = float(values[row])
             value = 0.0 if abs(value) <= ROUNDING * float(np.nanmax(np.abs(values))) else value
             where = f" at {turn.told(float(turn.angles[row]))}" if how in WORDS else ""
-            told = f"{WORDS.get(how, f'at {how}')} {show(value, unit)}{where}"
-            found.append((float(turn.angles[row]), value / factor(unit), told))
-    return found
+            label = f"{WORDS.get(how, f'at {how}')} {show(value, unit)}{where}"
+            marks.append((float(turn.angles[row]), value / factor(unit), label))
+    return marks
 
 
 def _parts(span: Span, low: float, high: float, whole: float) -> Sequence[tuple[float, float]]:

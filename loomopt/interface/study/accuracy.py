@@ -61,8 +61,8 @@ class AccuracyStudy(StudyResult[AccuracyResult]):
             known = [row for row in rows if row.error is not None and row.seconds]
             if known:
                 ladders.setdefault(known[0].quantity, []).append(known)
-        sized = {name: own for name, own in ladders.items() if any(_sized(rows) for rows in own)}
-        shown = [_chart(self.result, name, own) for name, own in sized.items()]
+        sized = {name: row_sets for name, row_sets in ladders.items() if any(_sized(rows) for rows in row_sets)}
+        shown = [_chart(self.result, name, row_sets) for name, row_sets in sized.items()]
         return Charts(f"{self.result.problem}: what accuracy costs", shown, missing="no method has an error at sizes")
 
     def __repr__(self) -> str:
@@ -114,7 +114,7 @@ def _chart(result: AccuracyResult, quantity: str, ladders: Sequence[Sequence[Lad
     ladders = [rows for rows in ladders if rows[0].method != NUMBERS]
     places = [[_place(row, alike) for row in rows if _sized(rows) or not alike] for rows in ladders]
     errors = [[max(row.error or 0.0, LEAST) for row in rows] for rows in ladders]
-    across = decades([x for own in places for x in own], "step [rad]" if alike else "time of one run [s]")
+    across = decades([x for values in places for x in values], "step [rad]" if alike else "time of one run [s]")
     series, key = [], []
     for place, (rows, x, y) in enumerate(zip(ladders, places, errors, strict=True)):
         kind, name = f"c{place % COLOURS}", f"{quantity}, {rows[0].method}"
@@ -125,7 +125,7 @@ def _chart(result: AccuracyResult, quantity: str, ladders: Sequence[Sequence[Lad
             series += [Series(np.array(x), np.array(y), kind)] if _sized(rows) else []
             series.append(Series(np.array(x), np.array(y), kind, points=True))
         key.append((kind, f"{rows[0].method}{order}"))
-    upright = decades([error for own in errors for error in own], "relative error")
+    upright = decades([error for values in errors for error in values], "relative error")
     return Chart(quantity, across, series, key=key, upright=upright)
 
 

@@ -56,12 +56,12 @@ class Budget(StudyResult[BudgetResult]):
 
     def charts(self) -> Charts:
         """Each effect's share over the turn, and their sum."""
-        scene, found = self.result.scene, self.result.found
+        scene, record = self.result.scene, self.result.found
         unit, shown = scene.shown_in("torque"), scene.shown_in("angle")
         size, angle = factor(unit), factor(shown)
-        rows = thinned(np.degrees(found.phi))
-        phi = found.phi[rows] / angle
-        shares = {name: curve[rows] / size for name, curve in found.curves.items()}
+        rows = thinned(np.degrees(record.phi))
+        phi = record.phi[rows] / angle
+        shares = {name: curve[rows] / size for name, curve in record.curves.items()}
         total = Series(phi, np.sum(list(shares.values()), axis=0), "c0", "crank torque")
         series = [Series(phi, y, f"c{(k + 1) % COLOURS}", name) for k, (name, y) in enumerate(shares.items())]
         step = math.radians(TICKS)
@@ -70,10 +70,10 @@ class Budget(StudyResult[BudgetResult]):
             headed("torque", unit),
             Axis(float(phi.min()), float(phi.max()), numbered, f"crank angle phi [{shown}]"),
             [*series, total],
-            dots=[(found.angle / angle, found.total.at_peak / size, "c0")],
+            dots=[(record.angle / angle, record.total.at_peak / size, "c0")],
             key=[
-                *((each.kind, each.label) for each in (total, *series)),
-                ("dot c0", f"peak {scene.show(found.total.at_peak, 'torque')}"),
+                *((curve.kind, curve.label) for curve in (total, *series)),
+                ("dot c0", f"peak {scene.show(record.total.at_peak, 'torque')}"),
             ],
             cursor=True,
         )

@@ -71,21 +71,21 @@ class Comparison(Presentation):
     def rows(self) -> tuple[ComparedRow, ...]:
         """Dimensions, then figures, then limits on what is neither."""
         words = Words(self.scene)
-        parts = [each.found.design for each in self.designs], [each.found.figures for each in self.designs]
-        limits = [{limit.name: limit for limit in each.found.limits} for each in self.designs]
+        parts = [design.found.design for design in self.designs], [design.found.figures for design in self.designs]
+        limits = [{limit.name: limit for limit in design.found.limits} for design in self.designs]
         rows, taken = [], set[str]()
         for numbers in parts:
-            for name in dict.fromkeys(name for each in numbers for name in each):
-                values = [_number(each.get(name)) for each in numbers]
+            for name in dict.fromkeys(name for row in numbers for name in row):
+                values = [_number(row.get(name)) for row in numbers]
                 if name not in taken and any(value is not None for value in values):
                     rows.append(_row(name, values, limits, words))
                     taken.add(name)
         margins = self.scene.schema.margins
         for name in dict.fromkeys(
-            name for each in limits for name in each if name not in taken and name not in margins
+            name for design_limits in limits for name in design_limits if name not in taken and name not in margins
         ):
-            found = [each.get(name) for each in limits]
-            rows.append(_row(name, [limit.value if limit else None for limit in found], limits, words))
+            limit_row = [design_limits.get(name) for design_limits in limits]
+            rows.append(_row(name, [limit.value if limit else None for limit in limit_row], limits, words))
         return tuple(_cleaned(rows))
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
@@ -93,7 +93,7 @@ class Comparison(Presentation):
         from loomopt.interface.table_frame import frame
         from loomopt.scenes.provenance import provenance
 
-        attrs = provenance(self.scene, designs=", ".join(each.name for each in self.designs))
+        attrs = provenance(self.scene, designs=", ".join(design.name for design in self.designs))
         return frame(self._columns(arguments.flag(si, "si")), attrs, "name")
 
     def _columns(self, si: bool = False) -> list[Column]:
@@ -101,11 +101,11 @@ class Comparison(Presentation):
         shown = [units.si(row.name) if si else row.unit for row in rows]
         sizes = [factor(row.unit) if si else 1.0 for row in rows]
         columns = [words("name", [row.name for row in rows], ""), Column("unit", shown)]
-        for place, each in enumerate(self.designs):
+        for place, design in enumerate(self.designs):
             values = [row.values[place] for row in rows]
             in_unit = [None if value is None else value * size for value, size in zip(values, sizes, strict=True)]
             cells = [_cell(value, row.held[place]) for value, row in zip(values, rows, strict=True)]
-            columns.append(Column(each.name, in_unit, each.name, cells))
+            columns.append(Column(design.name, in_unit, design.name, cells))
         names = ["" if row.unit == "1" else row.unit for row in rows]
         return [
             *columns,
@@ -116,31 +116,30 @@ class Comparison(Presentation):
 
     def charts(self) -> Charts:
         """Curves over the cycle of all designs laid over each other, a chart for each."""
-        return _overlaid([(each.name, each.found.scene, each.found.design) for each in self.designs])
+        return _overlaid([(design.name, design.found.scene, design.found.design) for design in self.designs])
 
     def as_dict(self) -> dict[str, object]:
         """Object that `compare --json` prints, SI."""
-        told = [(each.name, each.found.as_dict()) for each in self.designs]
-        units = {name: unit for _, found in told for name, unit in found["units"].items()}
-        kept = ("problem", "design", "figures", "limits")
-        found = [{"name": name, **{key: each[key] for key in kept}} for name, each in told]
-        return {"designs": found, "units": units, "differs": [row.name for row in self.rows if row.differs]}
+        documents = [(design.name, design.found.as_dict()) for design in self.designs]
+        units = {name: unit for _, document in documents for name, unit in document["units"].items()}
+        keys = ("problem", "design", "figures", "limits")
+        entries = [{"name": name, **{key: document[key] for key in keys}} for name, document in documents]
+        return {"designs": entries, "units": units, "differs": [row.name for row in self.rows if row.differs]}
 
     def tables(self) -> list[str | TextTable]:
         """Which limits each design holds, and all numbers side by side."""
         lines: list[str | TextTable] = []
-        for each in self.designs:
-            broken = [limit.name for limit in each.found.limits if not limit.ok and not limit.rounding]
-            held = f"NOT admissible (!): {', '.join(broken)}" if broken else "all limits held"
-            lines.append(f"{each.name}: {each.found.problem}, {each.found.sought or 'no target'}: {held}")
+        for design in self.designs:
+            broken = [limit.name for limit in design.found.limits if not limit.ok and not limit.rounding]
+            verdict = f"NOT admissible (!): {', '.join(broken)}" if broken else "all limits held"
+            lines.append(f"{design.name}: {design.found.problem}, {design.found.sought or 'no target'}: {verdict}")
         count = len(self.designs)
         return [*lines, text_table(self._columns(), (0, *range(1, count + 1), count + 1))]
 
     def __repr__(self) -> str:
         count = sum(row.differs for row in self.rows)
-        return (
-            f"<Comparison of {', '.join(each.name for each in self.designs)}: {count} of {len(self.rows)} rows differ>"
-        )
+        names = ", ".join(design.name for design in self.designs)
+        return f"<Comparison of {names}: {count} of {len(self.rows)} rows differ>"
 
 
 def _number(value: object) -> float | None:
@@ -155,9 +154,9 @@ def _row(
     size = max(known, default=0.0)
     first = next((value for value in values if value is not None), None)
     differs = any(value is None or abs(value - (first or 0.0)) > DIFFERS * size for value in values) and size > 0.0
-    held = tuple((limit.ok or limit.rounding) if (limit := each.get(name)) else None for each in limits)
+    satisfied = tuple((limit.ok or limit.rounding) if (limit := entry.get(name)) else None for entry in limits)
     shown = tuple(None if value is None else value / factor(unit) for value in values)
-    return ComparedRow(name, unit, shown, held, differs)
+    return ComparedRow(name, unit, shown, satisfied, differs)
 
 
 def _cleaned(rows: Sequence[ComparedRow]) -> list[ComparedRow]:
@@ -165,46 +164,49 @@ def _cleaned(rows: Sequence[ComparedRow]) -> list[ComparedRow]:
     sizes: dict[str, float] = {}
     for row in rows:
         sizes[row.unit] = max(sizes.get(row.unit, 0.0), *(abs(value or 0.0) for value in row.values))
-    found = []
+    cleaned = []
     for row in rows:
         tiny = SHOWN_AS_ZERO * sizes[row.unit]
         values = tuple(value if value is None or abs(value) > tiny else 0.0 for value in row.values)
-        found.append(row._replace(values=values, differs=row.differs and len(set(values)) > 1))
-    return found
+        cleaned.append(row._replace(values=values, differs=row.differs and len(set(values)) > 1))
+    return cleaned
 
 
-def _cell(value: float | None, held: bool | None) -> str:
-    return "" if value is None else f"{value:.6g}{' !' if held is False else ''}"
+def _cell(value: float | None, satisfied: bool | None) -> str:
+    return "" if value is None else f"{value:.6g}{' !' if satisfied is False else ''}"
 
 
 def _broken(row: ComparedRow, designs: Sequence[Named]) -> list[str]:
-    return [each.name for each, held in zip(designs, row.held, strict=True) if held is False]
+    return [design.name for design, satisfied in zip(designs, row.held, strict=True) if satisfied is False]
 
 
-def compare(found: Sequence[object], within: Scene | None = None, names: Sequence[str] = ()) -> Comparison:
+def compare(given_designs: Sequence[object], within: Scene | None = None, names: Sequence[str] = ()) -> Comparison:
     """Designs side by side: answers, evaluations, or "today" for the first one's machine as it is.
 
     within: a scene that all are judged in; each in its own without it. names: of each, what it is called. Raises
     BadInput for what is none of them, for one design alone, and for designs of different jobs.
     """
-    known = [each for each in found if isinstance(each, Evaluation)]
-    stray = next((each for each in found if not isinstance(each, Evaluation) and each != TODAY), None)
+    known = [design for design in given_designs if isinstance(design, Evaluation)]
+    stray = next((design for design in given_designs if not isinstance(design, Evaluation) and design != TODAY), None)
     allowed = f'answers, evaluations, and "{TODAY}"'
     if stray is not None:
         raise refusal("it is no design to compare", "", "compare", type(stray).__name__, allowed, "Give answers")
-    if not known or len(found) < 2:
+    if not known or len(given_designs) < 2:
         raise refusal("there is nothing to compare", "", "compare", allowed=allowed, remedy="Give two designs at least")
     first = known[0]
     home = within or first.scene
     judged = []
-    for each in found:
-        if not isinstance(each, Evaluation):
+    for design in given_designs:
+        if not isinstance(design, Evaluation):
             target = first.target if home.job == first.scene.job else None
             judged.append(results.evaluated(home, None, target or None))
             continue
-        designs.check_job(each.scene.job, home, f"<{each.problem}>")
-        judged.append(_within(each, within) if within else each)
-    called = [name or _called(each) for name, each in zip([*names, *[""] * len(found)], found, strict=False)]
+        designs.check_job(design.scene.job, home, f"<{design.problem}>")
+        judged.append(_within(design, within) if within else design)
+    called = [
+        name or _called(design)
+        for name, design in zip([*names, *[""] * len(given_designs)], given_designs, strict=False)
+    ]
     counts, seen = Counter(called), Counter[str]()
     unique = []
     for name in called:
@@ -213,14 +215,14 @@ def compare(found: Sequence[object], within: Scene | None = None, names: Sequenc
     return Comparison(tuple(map(Named, unique, judged)))
 
 
-def _within(found: Evaluation, scene: Scene) -> Evaluation:
+def _within(evaluation: Evaluation, scene: Scene) -> Evaluation:
     """A design judged in another scene, by the same target where that has one of its name."""
-    target = found.target if found.target in scene.schema.targets else None
-    return results.evaluated(scene, designs.checked(found.design, scene), target)
+    target = evaluation.target if evaluation.target in scene.schema.targets else None
+    return results.evaluated(scene, designs.checked(evaluation.design, scene), target)
 
 
-def _called(each: object) -> str:
-    return f"{each.problem}, {each.sought}" if isinstance(each, Evaluation) else TODAY
+def _called(design: object) -> str:
+    return f"{design.problem}, {design.sought}" if isinstance(design, Evaluation) else TODAY
 
 
 @working()

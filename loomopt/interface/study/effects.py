@@ -210,8 +210,8 @@ def verdict(result: EffectsResult) -> list[str]:
         return ["Not finished: what may be left out is not known."]
     if not result.reference.scales:
         return ["Without a design for the reference nothing can be measured."]
-    said = f"{listed(result.left_out)} may be left out" if result.left_out else "no effect may be left out"
-    lines = [f"At {share}, {said}{': ' if solve else ''}{solve}"]
+    sentence = f"{listed(result.left_out)} may be left out" if result.left_out else "no effect may be left out"
+    lines = [f"At {share}, {sentence}{': ' if solve else ''}{solve}"]
     if result.together and result.largest_omission:
         change = _change_text(result.together.largest_change)
         lines.append(f"Left out together, and what is found so judged with all on: {change}.")
@@ -233,19 +233,21 @@ def verdict(result: EffectsResult) -> list[str]:
 def omitted(result: EffectsResult) -> list[str]:
     """Sentences on which figures are gone or others without what is left out, and which of them the target reads."""
     rows = [row for row in result.rows if row.effect in result.left_out]
-    told, names = list[str](), dict[str, None]()
+    sentences, names = list[str](), dict[str, None]()
     for row in (*rows, *([result.together] if result.together and len(rows) > 1 else [])):
         single = row in rows
         missing, changed = row.missing_figures, row.changed_figures if single else ()
         parts = [f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} gone"] if missing else []
         parts += [f"{listed(changed)} {'changes' if len(changed) == 1 else 'change'}"] if changed else []
-        told += [f"{f'without {row.effect}' if single else 'without them all'} {' and '.join(parts)}"] if parts else []
+        sentences += (
+            [f"{f'without {row.effect}' if single else 'without them all'} {' and '.join(parts)}"] if parts else []
+        )
         names |= dict.fromkeys((*row.missing_figures, *row.changed_figures))
-    if not told:
+    if not sentences:
         return []
     read = [name for name in names if name in result.reference.reads]
     which = f"reads {listed(read)} of them" if read else "reads none of these figures"
-    return [f"Of the other figures: {'; '.join(told)}. Target {result.target} {which}."]
+    return [f"Of the other figures: {'; '.join(sentences)}. Target {result.target} {which}."]
 
 
 def _change_text(largest: tuple[str, str, float]) -> str:
@@ -263,9 +265,9 @@ def _moved(by: str, of: str, value: float) -> str:
 
 def _only_figures(row: EffectImpact, tolerance: float) -> bool:
     """Say whether a design found without an effect is good, and only its figures are wrong."""
-    told = (*row.regret.values(), row.excess)
+    numbers = (*row.regret.values(), row.excess)
     known = [value for value in row.shift.values() if value is not None]
-    good = bool(known) and all(value is not None and value <= tolerance for value in told)
+    good = bool(known) and all(value is not None and value <= tolerance for value in numbers)
     return good and max(map(abs, known)) > tolerance
 
 

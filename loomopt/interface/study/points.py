@@ -89,15 +89,15 @@ class StudyTable(Presentation):
 
         return study.lettered(self.study, self.findings, self.charts())
 
-    def report(self, path: str | os.PathLike[str], *beside: object) -> Path:
+    def report(self, path: str | os.PathLike[str], *results: object) -> Path:
         """Write one self-contained page, which says first how many points are certified; return the file.
 
-        path: one that ends in .html. beside: as of an answer's `report`. Raises BadInput.
+        path: one that ends in .html. results: as in an answer's `report`. Raises BadInput.
         """
         from loomopt.interface.report import document
 
         place = Path(arguments.path(path, "path", "a path that ends in .html", "Name a file"))
-        document.write(place, [document.of_study(self.study, self.solved, beside)])
+        document.write(place, [document.of_study(self.study, self.solved, results)])
         return place
 
     def report_parts(self) -> "list[Part]":

@@ -95,11 +95,11 @@ def _columns(result: SensitivityResult, rows: Sequence[Row], name: str = "", si:
     """Derivatives of figures; name: the one figure that people read of."""
     units = Words(result.scene)
     numbers = [result.scene.shown_in(result.kinds[row.number]) for row in rows]
-    sizes = [(factor(own), factor(units.unit(row.of))) for row, own in zip(rows, numbers, strict=True)]
-    slopes = [row.value * own / of for row, (own, of) in zip(rows, sizes, strict=True)]
-    per = [f"{units.unit(row.of)}/{_under(own)}" for row, own in zip(rows, numbers, strict=True)]
-    shown = [units.unit(row.of) if own == "1" else text for row, own, text in zip(rows, numbers, per, strict=True)]
-    steps = [f"{result.sizes[row.number] / own:.4g}" for row, (own, _) in zip(rows, sizes, strict=True)]
+    sizes = [(factor(unit), factor(units.unit(row.of))) for row, unit in zip(rows, numbers, strict=True)]
+    slopes = [row.value * size / of for row, (size, of) in zip(rows, sizes, strict=True)]
+    per = [f"{units.unit(row.of)}/{_under(unit)}" for row, unit in zip(rows, numbers, strict=True)]
+    shown = [units.unit(row.of) if unit == "1" else text for row, unit, text in zip(rows, numbers, per, strict=True)]
+    steps = [f"{result.sizes[row.number] / size:.4g}" for row, (size, _) in zip(rows, sizes, strict=True)]
     moved = [f"{effect(result, row) / of:.4g}" for row, (_, of) in zip(rows, sizes, strict=True)]
     return [
         words("number", [row.number for row in rows]),
@@ -124,11 +124,10 @@ def _prices(result: SensitivityResult) -> TextTable:
 
 def _valid(result: SensitivityResult) -> list[str]:
     """Sentences on between which values of a number of the operation the same limits hold the optimum."""
-    said = []
-    for each in result.holds:
-        unit = result.scene.shown_in(result.kinds[each.number])
-        low, high = (f"{end / factor(unit):.7g}" for end in each.range)
-        said.append(
-            f"The same limits bind from {each.number} {low} ({each.ends[0]}) to {high} {unit} ({each.ends[1]})."
-        )
-    return said
+    sentences = []
+    for validity in result.holds:
+        unit = result.scene.shown_in(result.kinds[validity.number])
+        low, high = (f"{end / factor(unit):.7g}" for end in validity.range)
+        first, last = validity.ends
+        sentences.append(f"The same limits bind from {validity.number} {low} ({first}) to {high} {unit} ({last}).")
+    return sentences

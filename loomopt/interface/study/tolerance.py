@@ -48,7 +48,7 @@ class ToleranceStudy(StudyResult[ToleranceResult]):
     def tables(self) -> list[str | TextTable]:
         """Spreads, yields, worst cases, and what to tighten first."""
         result, plan = self.result, self.result.plan
-        numbers = ", ".join(each.number for each in plan.tolerances.values())
+        numbers = ", ".join(tolerance.number for tolerance in plan.tolerances.values())
         head = f"{plan.scene.name}, limits of {plan.target}: {result.samples} machines, {numbers} as they are made"
         lost = f"{result.bad} of them do not assemble or lack a figure" if result.bad else "all of them assemble"
         worst: list[str | TextTable] = [_worst(result)] if result.worst else []
@@ -59,11 +59,16 @@ class ToleranceStudy(StudyResult[ToleranceResult]):
         """How each figure spreads that judges machines or is sought."""
         plan = self.result.plan
         names = dict.fromkeys(
-            [*(each.name for each in plan.criteria), *(each.figure for each in plan.program.objectives)]
+            [
+                *(criterion.name for criterion in plan.criteria),
+                *(objective.figure for objective in plan.program.objectives),
+            ]
         )
         spreads = ((name, self.result.figures.get(name)) for name in names)
         shown = [
-            _histogram(self.result, name, each) for name, each in spreads if each and each.sigma and each.sigma_linear
+            _histogram(self.result, name, spread)
+            for name, spread in spreads
+            if spread and spread.sigma and spread.sigma_linear
         ]
         title = f"{plan.scene.name}: {self.result.samples} machines as they are made"
         return Charts(title, shown, missing="no figure that judges machines spreads")
@@ -106,12 +111,13 @@ def run_tolerance(
 def _spreads(result: ToleranceResult, si: bool = False) -> list[Column]:
     units, figures = Words(result.plan.scene), result.figures
     shown = [units.si(name) if si else units.unit(name) for name in figures]
-    pairs = [(each, factor(unit)) for each, unit in zip(figures.values(), shown, strict=True)]
+    pairs = [(spread, factor(unit)) for spread, unit in zip(figures.values(), shown, strict=True)]
     nominal, linear, sigma = (
-        [getattr(each, part) / size for each, size in pairs] for part in ("nominal", "sigma_linear", "sigma")
+        [getattr(spread, part) / size for spread, size in pairs] for part in ("nominal", "sigma_linear", "sigma")
     )
     centres = [
-        written(0.0 if abs(each.nominal) <= SHOWN_AS_ZERO * each.sigma else each.nominal / size) for each, size in pairs
+        written(0.0 if abs(spread.nominal) <= SHOWN_AS_ZERO * spread.sigma else spread.nominal / size)
+        for spread, size in pairs
     ]
     columns = [
         words("figure", list(figures)),
@@ -120,15 +126,15 @@ def _spreads(result: ToleranceResult, si: bool = False) -> list[Column]:
         Column("sigma_linear", linear, "sigma\nlinear", [_size(value) for value in linear]),
         Column("sigma", sigma, "sigma\nsampled", [_size(value) for value in sigma]),
         Column("", (), "unit", ["" if unit == "1" else unit for unit in shown], right=False),
-        Column("", (), "shares", [_shares(each) for each in figures.values()], right=False),
+        Column("", (), "shares", [_shares(spread) for spread in figures.values()], right=False),
     ]
     for place, side in enumerate(("min", "max")) if result.worst else ():
         worst = [result.worst.get(name) for name in figures]
-        ends = [(each.min, each.max)[place] if each else None for each in worst]
+        ends = [(bounds.min, bounds.max)[place] if bounds else None for bounds in worst]
         values = [math.nan if end is None else end / size for end, (_, size) in zip(ends, pairs, strict=True)]
         columns.append(Column(f"worst {side}", values))
-    shared = dict.fromkeys(number for each in figures.values() for number in each.shares)
-    columns += [Column(f"share {n}", [each.shares.get(n, math.nan) for each in figures.values()]) for n in shared]
+    shared = dict.fromkeys(number for spread in figures.values() for number in spread.shares)
+    columns += [Column(f"share {n}", [spread.shares.get(n, math.nan) for spread in figures.values()]) for n in shared]
     return columns
 
 
@@ -136,16 +142,16 @@ def _size(value: float) -> str:
     return "0" if value == 0.0 else f"{value:.4g}"
 
 
-def _shares(each: Spread) -> str:
-    told = sorted(each.shares.items(), key=lambda pair: -pair[1])[:MOST_TOLD]
-    text = ", ".join(f"{name} {100 * share:.3g} %" for name, share in told if share >= LEAST_SHARE)
-    return f"{text} (a corner)" if each.corner and text else text
+def _shares(spread: Spread) -> str:
+    largest = sorted(spread.shares.items(), key=lambda pair: -pair[1])[:MOST_TOLD]
+    text = ", ".join(f"{name} {100 * share:.3g} %" for name, share in largest if share >= LEAST_SHARE)
+    return f"{text} (a corner)" if spread.corner and text else text
 
 
 def _yields(result: ToleranceResult) -> TextTable:
     names = ["all together" if name == ALL else name for name in result.yields]
-    shares = [f"{100 * each.value:.4g}" for each in result.yields.values()]
-    errors = [f"{100 * each.se:.2g}" for each in result.yields.values()]
+    shares = [f"{100 * share.value:.4g}" for share in result.yields.values()]
+    errors = [f"{100 * share.se:.2g}" for share in result.yields.values()]
     columns = [
         words("", names, "machines that hold"),
         Column("", (), "%", shares),
@@ -156,7 +162,10 @@ def _yields(result: ToleranceResult) -> TextTable:
 
 def _histogram(result: ToleranceResult, name: str, spread: Spread) -> Chart:
     """How one figure spreads; what no machine may have is shaded."""
-    units, judged = Words(result.plan.scene), next((each for each in result.plan.criteria if each.name == name), None)
+    units, judged = (
+        Words(result.plan.scene),
+        next((criterion for criterion in result.plan.criteria if criterion.name == name), None),
+    )
     unit = units.unit(name)
     size = factor(unit)
     edges = (spread.nominal + REACH * spread.sigma_linear * np.linspace(-1, 1, BINS + 1)) / size
@@ -180,21 +189,21 @@ def _histogram(result: ToleranceResult, name: str, spread: Spread) -> Chart:
 def _worst(result: ToleranceResult) -> TextTable:
     """Worst cases: the least and the most of each figure within the tolerances, and whether it is proven."""
     words, lines = Words(result.plan.scene), []
-    for name, each in result.worst.items():
+    for name, bounds in result.worst.items():
         unit = words.unit(name)
         size = factor(unit)
-        sides = zip((each.min, each.max), each.farthest, (-1.0, 1.0), ("or less", "or more"), strict=True)
+        sides = zip((bounds.min, bounds.max), bounds.farthest, (-1.0, 1.0), ("or less", "or more"), strict=True)
         shown = [_end(end, beyond, size, sign, more) for end, beyond, sign, more in sides]
-        lines.append((name, *shown, "" if unit == "1" else unit, "proven" if each.proven else each.why))
+        lines.append((name, *shown, "" if unit == "1" else unit, "proven" if bounds.proven else bounds.why))
     heads = ("within all tolerances", "at least", "at most", "unit", "")
     return TextTable("", heads, tuple(lines), (1, 2), first=(0, 1, 2, 4, 3), more="--json")
 
 
-def _end(end: float | None, found: float, size: float, sign: float, more: str) -> str:
+def _end(end: float | None, value: float, size: float, sign: float, more: str) -> str:
     """A proven end, outward of itself; of one that is undecided the farthest machine."""
     if end is not None:
         return _outward(end / size, sign)
-    return f"{found / size:.{DIGITS}g} {more}" if math.isfinite(found) else ""
+    return f"{value / size:.{DIGITS}g} {more}" if math.isfinite(value) else ""
 
 
 DIGITS = 7
@@ -211,10 +220,12 @@ def _outward(value: float, sign: float) -> str:
 
 def _advice(result: ToleranceResult) -> list[str]:
     first = [f"{name} ({100 * share:.3g} %)" for name, share in result.tighten[:MOST_TOLD] if share >= LEAST_SHARE]
-    lost = any(result.yields[each.name].value < 1.0 for each in result.plan.criteria)
+    lost = any(result.yields[criterion.name].value < 1.0 for criterion in result.plan.criteria)
     of = "what is lost" if lost else "what is sought spreads by; no machine that was drawn is lost"
-    said = [f"Tighten first: {', '.join(first)} of {of}."] if first else []
+    sentences = [f"Tighten first: {', '.join(first)} of {of}."] if first else []
     names = result.plan.goals_without_band
     if names:
-        said.append(f"No machine is judged by {', '.join(names)}, an equality or a goal: [accept] gives it a band.")
-    return said
+        sentences.append(
+            f"No machine is judged by {', '.join(names)}, an equality or a goal: [accept] gives it a band."
+        )
+    return sentences

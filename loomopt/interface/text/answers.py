@@ -56,28 +56,30 @@ def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
     return parts
 
 
-def evaluation(found: Evaluated, scene: Scene, before: Evaluated | None) -> list[str | TextTable]:
+def evaluation(evaluated: Evaluated, scene: Scene, before: Evaluated | None) -> list[str | TextTable]:
     """Parts of an evaluated design; before: today's machine, where the design is another."""
-    broken = ", ".join(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
-    rounded = ", ".join(limit.name for limit in found.limits if limit.rounding)
-    held = f"NOT admissible: {broken}" if broken else "all limits held"
+    broken = ", ".join(limit.name for limit in evaluated.limits if not limit.ok and not limit.rounding)
+    rounded = ", ".join(limit.name for limit in evaluated.limits if limit.rounding)
+    verdict = f"NOT admissible: {broken}" if broken else "all limits held"
     if rounded:
-        held += f"{';' if broken else ','} but for the rounding of the digits given: {rounded}"
-    table = comparison(found, scene, before, "design" if before else "today")
-    return [f"{found.problem}: {held}", table, *lists(found, scene)]
+        verdict += f"{';' if broken else ','} but for the rounding of the digits given: {rounded}"
+    table = comparison(evaluated, scene, before, "design" if before else "today")
+    return [f"{evaluated.problem}: {verdict}", table, *lists(evaluated, scene)]
 
 
-def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading: str) -> TextTable:
+def comparison(evaluated: Evaluated, scene: Scene, before: Evaluated | None, heading: str) -> TextTable:
     """Design and figures beside today's machine and the limits; what binds and what is reached is marked."""
-    table = [row for row in rows(found, scene, before) if not (found.members and _of_member(row["name"], found))]
+    table = [
+        row for row in rows(evaluated, scene, before) if not (evaluated.members and _of_member(row["name"], evaluated))
+    ]
     words = Words(scene)
     apart = {
         limit.name: f", {words.shown(limit.name, limit.backed_off, 4)} apart"
-        for limit in found.limits
+        for limit in evaluated.limits
         if limit.backed_off
     }
     marked = [name for name in ("binds", "reached") if any(row[name] for row in table)]
-    missed = {limit.name: "exceeded by rounding" if limit.rounding else "not held" for limit in found.limits}
+    missed = {limit.name: "exceeded by rounding" if limit.rounding else "not held" for limit in evaluated.limits}
     lines = []
     for row in table:
         today = [] if before is None else ["" if row["today"] is None else f"{row['today']:.6g}"]
@@ -87,72 +89,74 @@ def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading
         lines.append((row["name"], *today, f"{row['design']:.6g}", unit, limit, *(row[name] for name in marked)))
     shown = {row["name"] for row in table}
     pads, sizes = [""] * len(marked), largest(table)
-    for each in found.limits:
+    for entry in evaluated.limits:
         # Of the margins that every design keeps, and that no scene can set, only those that are not held are told.
-        if each.name not in shown and (not each.ok or each.name not in scene.schema.margins):
-            unit = words.unit(each.name)
+        if entry.name not in shown and (not entry.ok or entry.name not in scene.schema.margins):
+            unit = words.unit(entry.name)
             size = factor(unit)
-            low, high = (None if end is None else end / size for end in (each.min, each.max))
-            told = joined(_limit(low, high) + ("" if each.ok else f"  <- {missed[each.name]}"))
-            told += apart.get(each.name, "")
-            value = each.value / size
+            low, high = (None if end is None else end / size for end in (entry.min, entry.max))
+            range_text = joined(_limit(low, high) + ("" if entry.ok else f"  <- {missed[entry.name]}"))
+            range_text += apart.get(entry.name, "")
+            value = entry.value / size
             value = 0.0 if abs(value) <= SHOWN_AS_ZERO * sizes.get(unit, 0.0) else value
-            cells = (f"{value:.6g}", "" if unit == "1" else unit, told, *pads)
-            lines.append((each.name, *([""] if before else []), *cells))
+            cells = (f"{value:.6g}", "" if unit == "1" else unit, range_text, *pads)
+            lines.append((entry.name, *([""] if before else []), *cells))
     first = ("", "today") if before else ("",)
     count = len(first)
     right = tuple(range(1, count + 1))
-    asked = (0, *range(count, count + 3 + len(marked)))
-    return TextTable("", (*first, heading, "unit", "limits", *marked), tuple(lines), right, first=asked, more="--json")
+    columns_shown = (0, *range(count, count + 3 + len(marked)))
+    return TextTable(
+        "", (*first, heading, "unit", "limits", *marked), tuple(lines), right, first=columns_shown, more="--json"
+    )
 
 
-def _of_member(name: str, found: Evaluated) -> bool:
+def _of_member(name: str, evaluated: Evaluated) -> bool:
     """Say whether a name is that of one member's figure, which is told beside the member."""
-    own = [each for each in found.figures if isinstance(each, Alias)]
-    return name in own or name.removesuffix("_t") in own
+    aliases = [figure for figure in evaluated.figures if isinstance(figure, Alias)]
+    return name in aliases or name.removesuffix("_t") in aliases
 
 
-def lists(found: Evaluated, scene: Scene) -> list[str]:
+def lists(evaluated: Evaluated, scene: Scene) -> list[str]:
     """Return one line for each part of a design that is a list of numbers."""
-    told = registry.of(scene).views.lists
+    formats = registry.of(scene).views.lists
     return [
-        f"{name}: {told[name].format(count=len(values))}, {min(values):.6g} ... {max(values):.6g}; all in design"
-        for name, values in found.design.items()
-        if name in told and values
+        f"{name}: {formats[name].format(count=len(values))}, {min(values):.6g} ... {max(values):.6g}; all in design"
+        for name, values in evaluated.design.items()
+        if name in formats and values
     ]
 
 
-def members(found: Solution, scene: Scene) -> TextTable:
+def members(solution: Solution, scene: Scene) -> TextTable:
     """Return what each member of a family changes, and what it reaches of what is sought."""
-    words, levels = Words(scene), found.certificate.levels if found.certificate else ()
-    own = [name for name in found.members[0].design if name not in found.design]
+    words, levels = Words(scene), solution.certificate.levels if solution.certificate else ()
+    variables = [name for name in solution.members[0].design if name not in solution.design]
     # A sum of what members reach is named after their figure.
     sought = {word.strip("|") for level in levels for word in level.objective.split()}
-    names = [*own, *(name for name in found.members[0].figures if name in sought)]
+    names = [*variables, *(name for name in solution.members[0].figures if name in sought)]
     sizes = {name: factor(words.unit(name)) for name in names}
-    values = [{name: {**each.design, **each.figures}[name] or 0.0 for name in names} for each in found.members]
+    values = [{name: {**member.design, **member.figures}[name] or 0.0 for name in names} for member in solution.members]
     least = {
-        name: SHOWN_AS_ZERO * max(abs(each[other]) for each in values for other in names if sizes[other] == sizes[name])
+        name: SHOWN_AS_ZERO * max(abs(row[other]) for row in values for other in names if sizes[other] == sizes[name])
         for name in names
     }
     lines = []
-    for place, (member, each) in enumerate(zip(found.members, values, strict=True)):
-        cells = [f"{each[name] / sizes[name] if abs(each[name]) > least[name] else 0.0:.6g}" for name in names]
-        missed = ", ".join(name for name, met in member.reached.items() if not met)
+    for place, (member, row) in enumerate(zip(solution.members, values, strict=True)):
+        cells = [f"{row[name] / sizes[name] if abs(row[name]) > least[name] else 0.0:.6g}" for name in names]
+        missed = ", ".join(name for name, reached in member.reached.items() if not reached)
         lines.append((str(place + 1), joined(changed(member)), *cells, f"{missed} not" if missed else ""))
     units = ["" if words.unit(name) == "1" else f" [{words.unit(name)}]" for name in names]
     head = ("member", "change", *(f"{name}{unit}" for name, unit in zip(names, units, strict=True)), "reached")
     return TextTable("Each member by itself", head, tuple(lines), right=tuple(range(2, 2 + len(names))))
 
 
-def retyped(found: Evaluated, scene: Scene) -> str:
+def retyped(evaluated: Evaluated, scene: Scene) -> str:
     """A design to type again, with the digits it takes to be the same: a JSON object, text with units."""
-    words, told = Words(scene), []
-    for name, value in found.design.items():
+    words, texts = Words(scene), []
+    for name, value in evaluated.design.items():
         if name not in scene.schema.lists:
             text, unit = shortest_text(value, words.unit(name), words.kind(name)), words.unit(name)
-            told.append(joined(f'"{name}": {text}' if unit == "1" else f'"{name}": "{text}"'))
-    return f"to retype: {{{', '.join(told)}}}"
+            texts.append(joined(f'"{name}": {text}' if unit == "1" else f'"{name}": "{text}"'))
+    return f"to retype: {{{', '.join(texts)}}}"
 
 
 def _limit(low: float | None, high: float | None) -> str:
@@ -170,7 +174,7 @@ def relaxation(answer: Solution) -> TextTable:
     for remedy in remedies(answer.relaxation):
         label = "this alone" if remedy[0].alone else "all of these" if len(remedy) > 1 else "this"
         heads = [f"or {label}" if lines else label, *([""] * (len(remedy) - 1))]
-        lines += [(head, joined(each.text)) for head, each in zip(heads, remedy, strict=True)]
+        lines += [(head, joined(step.text)) for head, step in zip(heads, remedy, strict=True)]
     return TextTable("The least relaxation that helps", ("loosen", "limit"), tuple(lines))
 
 
@@ -185,17 +189,20 @@ def binding(answer: Solution) -> str | TextTable:
 
 def certificate(answer: Solution) -> list[str]:
     """Certificate in one line, and in a second one what chose among equally good designs."""
-    found = answer.certificate
-    assert found is not None
-    if not found.passed:
-        return ["Certificate NOT passed: " + "; ".join(found.reasons)]
-    worst = max((level.stationarity for level in found.levels), default=0.0)
-    limits, cycle = (f"{value:.0e}" if value > 0 else "0" for value in (found.feasibility, found.violation))
-    unique = "unique" if found.unique else "not unique"
-    if not found.prices_unique:
-        unique = "prices not unique" if found.unique else "neither design nor prices unique"
+    record = answer.certificate
+    assert record is not None
+    if not record.passed:
+        return ["Certificate NOT passed: " + "; ".join(record.reasons)]
+    worst = max((level.stationarity for level in record.levels), default=0.0)
+    limits, cycle = (f"{value:.0e}" if value > 0 else "0" for value in (record.feasibility, record.violation))
+    unique = "unique" if record.unique else "not unique"
+    if not record.prices_unique:
+        unique = "prices not unique" if record.unique else "neither design nor prices unique"
     line = f"Certificate passed: limits {limits}, stationarity {worst:.0e}, whole cycle {cycle}; {unique}"
-    return [line, *([f"Chosen among equals: {'; '.join(found.choices)}"] if found.choices else [])]
+    return [
+        line,
+        *([f"Chosen among equals: {'; '.join(record.choices)}"] if record.choices else []),
+    ]
 
 
 COMPARED = re.compile("[<>=]")
@@ -203,23 +210,23 @@ COMPARED = re.compile("[<>=]")
 BEYOND = {-1: "below", 1: "above"}
 
 
-def everywhere(found: GlobalBound, scene: Scene) -> str:
+def everywhere(bound: GlobalBound, scene: Scene) -> str:
     """Return what is proven of all admissible designs, in one line."""
     words = Words(scene)
-    said: list[str] = []
-    kept: list[str] = []
-    for level in found.levels:
+    sentences: list[str] = []
+    remarks: list[str] = []
+    for level in bound.levels:
         name = f"|{level.objective}|" if level.sense == "least magnitude" else level.objective
         side = 1 if level.sense == "most" else -1
-        among = f"of those with {' and '.join(kept)}, none" if kept else "no admissible design in these bounds"
+        among = f"of those with {' and '.join(remarks)}, none" if remarks else "no admissible design in these bounds"
         if level.bound == 0.0 and level.proven:
-            said.append(f"{name} is 0, less than which there is none")
+            sentences.append(f"{name} is 0, less than which there is none")
         elif math.isfinite(level.bound):
-            said.append(f"{among} has {name} {BEYOND[side]} {words.outward(level.objective, level.bound, side)}")
-        kept.append(f"{name} at most {words.shown(level.objective, level.band, 2)} {BEYOND[-side]} the best")
-    head = f"Proven best, gap {100 * found.gap:.2g} %" if found.proven else f"NOT proven best: {found.why}"
-    cost = f" ({found.boxes} boxes, {found.seconds:.1f} s)" if found.boxes else ""
-    return f"{head}{': ' if said else ''}{'; '.join(said)}{cost}"
+            sentences.append(f"{among} has {name} {BEYOND[side]} {words.outward(level.objective, level.bound, side)}")
+        remarks.append(f"{name} at most {words.shown(level.objective, level.band, 2)} {BEYOND[-side]} the best")
+    head = f"Proven best, gap {100 * bound.gap:.2g} %" if bound.proven else f"NOT proven best: {bound.why}"
+    cost = f" ({bound.boxes} boxes, {bound.seconds:.1f} s)" if bound.boxes else ""
+    return f"{head}{': ' if sentences else ''}{'; '.join(sentences)}{cost}"
 
 
 def starts(answer: Solution, scene: Scene) -> str:
@@ -236,25 +243,25 @@ def starts(answer: Solution, scene: Scene) -> str:
     return text + (f". Other optima: {'; '.join(others)}" if others else "")
 
 
-def proven(found: "Proofs") -> list[str]:
+def proven(proofs: "Proofs") -> list[str]:
     """Return what was proven, and what was not, in a few lines."""
     groups = {"limit": "limits", "assembly": "assembly", "peak": "peaks as claimed"}
     shown = {
-        said: [joined(proof.said) for proof in found.proofs if proof.kind == kind and proof.status == "proven"]
-        for kind, said in groups.items()
+        label: [joined(proof.said) for proof in proofs.proofs if proof.kind == kind and proof.status == "proven"]
+        for kind, label in groups.items()
     }
-    missed = [joined(f"{proof.text} ({proof.status})") for proof in found.proofs if proof.status != "proven"]
-    boxes = sum(proof.boxes for proof in found.proofs)
+    missed = [joined(f"{proof.text} ({proof.status})") for proof in proofs.proofs if proof.status != "proven"]
+    boxes = sum(proof.boxes for proof in proofs.proofs)
     head = f"Proven at every crank angle, up to {SLACK:.0e} of each quantity's largest magnitude, in {boxes} boxes:"
-    lines = [f"    {said}: {', '.join(texts)}" for said, texts in shown.items() if texts]
-    told = ["\n".join([head, *lines])] * bool(lines) + ([f"NOT proven: {', '.join(missed)}"] if missed else [])
-    return told + [f"Not covered: {text}." for text in found.uncovered]
+    lines = [f"    {kind}: {', '.join(texts)}" for kind, texts in shown.items() if texts]
+    summary = ["\n".join([head, *lines])] * bool(lines) + ([f"NOT proven: {', '.join(missed)}"] if missed else [])
+    return summary + [f"Not covered: {text}." for text in proofs.uncovered]
 
 
-def proofs(found: "Proofs") -> list[str | TextTable]:
+def proofs(proofs: "Proofs") -> list[str | TextTable]:
     """Parts of a proof: a sentence, and what was shown of each limit."""
-    words, angle, lines = Words(found.scene), found.scene.shown_in("angle"), []
-    for proof in found.proofs:
+    words, angle, lines = Words(proofs.scene), proofs.scene.shown_in("angle"), []
+    for proof in proofs.proofs:
         unit = words.unit(proof.name)
         sizes = (f"{proof.margin / factor(unit) + 0.0:.3g}", f"{proof.slack / factor(unit):.1g}")
         place = "" if proof.angle is None else f"{proof.angle / factor(angle):.4f}"
@@ -265,8 +272,8 @@ def proofs(found: "Proofs") -> list[str | TextTable]:
     open_ = [
         f"{joined(proof.said)} is left open from crank angle {proof.open / factor(angle):.4g} {angle} on, "
         f"after {proof.boxes} boxes."
-        for proof in found.proofs
+        for proof in proofs.proofs
         if proof.open is not None
     ]
-    uncovered = (f"Not covered: {text}." for text in found.uncovered)
-    return [f"{found.problem}, {found.target}: {found.said}", table, *open_, *uncovered]
+    uncovered = (f"Not covered: {text}." for text in proofs.uncovered)
+    return [f"{proofs.problem}, {proofs.target}: {proofs.said}", table, *open_, *uncovered]

@@ -99,12 +99,12 @@ def _tables(scene: Scene) -> dict[str, list[Symbol]]:
         "Operation": _numbers(scene, schema.operation),
         "Mechanism; what [bounds] frees of it is the design": _numbers(scene, schema.mechanism),
         "Values of effects": [
-            each
+            entry
             for effect in dict.fromkeys([*schema.effects.values(), *scene.active])
-            for each in _numbers(scene, effect.table, f"{effect.name}.")
+            for entry in _numbers(scene, effect.table, f"{effect.name}.")
         ],
         "Columns of the curves": list(columns(scene)),
-        "Figures": [each for figure in schema.figures.values() for each in _figure(figure, scene, words)],
+        "Figures": [entry for figure in schema.figures.values() for entry in _figure(figure, scene, words)],
     }
 
 
@@ -117,42 +117,44 @@ def _figure(figure: Figure, scene: Scene, words: Words) -> Iterator[Symbol]:
 
 def _grid(title: str, symbols: list[Symbol], drawn: frozenset[str]) -> TextTable:
     lines = tuple(
-        (each.name, "" if each.unit == "1" else each.unit, each.text, DRAWN if each.name in drawn else "")
-        for each in symbols
+        (symbol.name, "" if symbol.unit == "1" else symbol.unit, symbol.text, DRAWN if symbol.name in drawn else "")
+        for symbol in symbols
     )
     return TextTable(title, ("symbol", "unit", "what it is", "in the sketch"), lines)
 
 
 def _numbers(scene: Scene, model: type[BaseModel], path: str = "") -> list[Symbol]:
     """Keys of a table with their units and descriptions; a word or a list has no unit."""
-    found = []
+    numbers = []
     for name, field in model.model_fields.items():
         inner = table_inside(model, name)
         if inner:
-            found += _numbers(scene, inner, f"{path}{name}.")
+            numbers += _numbers(scene, inner, f"{path}{name}.")
             continue
         quantity = quantity_of(model, name)
         unit = scene.shown_in(quantity.kind) if quantity else "1"
-        found.append(Symbol(path + name, unit, field.description or ""))
-    return found
+        numbers.append(Symbol(path + name, unit, field.description or ""))
+    return numbers
 
 
 def columns(scene: Scene) -> Iterator[Symbol]:
     """Yield the columns of the curves of today's machine, SI."""
     job, model = registry.of(scene), registry.of(scene).model(scene)
-    said = {getattr(load, "symbol", "") or load.name: load.summary for load in model.loads if isinstance(load, Load)}
+    descriptions = {
+        getattr(load, "symbol", "") or load.name: load.summary for load in model.loads if isinstance(load, Load)
+    }
     for check in scene.active:
         if isinstance(check, Check):
-            said |= {name: f"at each angle; its peak is the figure {name}" for name in check.over_cycle}
-            said |= {
+            descriptions |= {name: f"at each angle; its peak is the figure {name}" for name in check.over_cycle}
+            descriptions |= {
                 f"{name}_{axis}": f"{name} along {axis} of the mechanism's axes"
                 for name in check.vectors
                 for axis in COMPONENTS
             }
-    said |= SHARED
+    descriptions |= SHARED
     for column in job.curves(scene, job.today(scene), steps=4):
         name, unit = split(column)
-        yield Symbol(name, unit, said.get(name) or _called(job.views, name, unit) or _derivative(name))
+        yield Symbol(name, unit, descriptions.get(name) or _called(job.views, name, unit) or _derivative(name))
 
 
 def _called(views: JobViews, name: str, unit: str) -> str:
@@ -195,14 +197,20 @@ def printed(scene: Scene) -> list[str | TextTable]:
     Of a scene that is not packaged, whose machine no source prints, it is what the scene itself says.
     """
     if not registry.is_packaged(scene):
-        said = f"source: {scene.source}" if scene.source else "source: not given"
-        return [f"{scene.name}: a scene of one's own; no printed figures are known of its machine", said]
+        origin = f"source: {scene.source}" if scene.source else "source: not given"
+        return [f"{scene.name}: a scene of one's own; no printed figures are known of its machine", origin]
     source = read(scene.job)
     lines = tuple(
-        (each.key, each.printed or "not printed", each.computed, "" if each.unit == "-" else each.unit, each.verdict)
-        for each in source.figures
+        (
+            figure.key,
+            figure.printed or "not printed",
+            figure.computed,
+            "" if figure.unit == "-" else figure.unit,
+            figure.verdict,
+        )
+        for figure in source.figures
     )
-    why = tuple((each.key, each.item, each.inputs, each.remark) for each in source.figures)
+    why = tuple((figure.key, figure.item, figure.inputs, figure.remark) for figure in source.figures)
     return [
         source.citation,
         "The source's own machines, in its units, whatever this scene has otherwise. The suite computes every one of "

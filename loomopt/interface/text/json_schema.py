@@ -60,10 +60,10 @@ def scene(schema: SceneSchema) -> Json:
         tables |= {**NAMED_BY_SCENE, "targets": _own_targets(schema)}
     tables |= {name: described() for name, described in schema.tables.items()}
     whole = _closed(tables, [name for name, table in tables.items() if table.get("required")])
-    rules = [_given(each) for each in schema.needs]
+    rules = [_given(need) for need in schema.needs]
     rules += [_given(key, effect) for effect in schema.effects.values() for key in effect.needs]
-    found: Json = {"$schema": DIALECT, "title": f"A loomopt scene: {schema.title}", **whole}
-    return _hoisted(found | ({"allOf": rules} if rules else {}))
+    document: Json = {"$schema": DIALECT, "title": f"A loomopt scene: {schema.title}", **whole}
+    return _hoisted(document | ({"allOf": rules} if rules else {}))
 
 
 def display(schema: SceneSchema) -> Json:
@@ -72,31 +72,31 @@ def display(schema: SceneSchema) -> Json:
 
 
 def _unit(kind: str) -> Json:
-    said = f'a unit of {kind} such as "{DISPLAY_UNIT[kind]}"'
+    description = f'a unit of {kind} such as "{DISPLAY_UNIT[kind]}"'
     known = {"type": "string", "not": {"pattern": rf"^[ \t]*(?:{foreign(kind)})[ \t]*$"}}
-    return {"description": said, **told(known, said)}
+    return {"description": description, **told(known, description)}
 
 
 def _problem(schema: SceneSchema) -> Json:
-    found = _model(Problem)
-    found["properties"] |= {"job": {"const": schema.name}}
-    name = found["properties"]["name"]
+    table = _model(Problem)
+    table["properties"] |= {"job": {"const": schema.name}}
+    name = table["properties"]["name"]
     del name["type"]
     name |= told({"type": "string", "pattern": _NAME}, "a name of letters, digits, - and _, as of a file")
-    return found
+    return table
 
 
 def _effects(schema: SceneSchema) -> Json:
-    found = {}
+    tables = {}
     for effect in schema.effects.values():
-        own = _model(effect.table, effect.summary) | _either(effect)
-        found[effect.name] = {"type": "object", "additionalProperties": own} if effect.many else own
-    return _closed(found)
+        table = _model(effect.table, effect.summary) | _either(effect)
+        tables[effect.name] = {"type": "object", "additionalProperties": table} if effect.many else table
+    return _closed(tables)
 
 
 def _bounds(schema: SceneSchema) -> Json:
     """Return [bounds]: every number by its name, as a range or as one value."""
-    return _by_number(schema, lambda each: _bound(_quantity(each)))
+    return _by_number(schema, lambda quantity: _bound(_quantity(quantity)))
 
 
 def _by_number(schema: SceneSchema, made: Callable[[Quantity], Json]) -> Json:
@@ -109,10 +109,10 @@ def _by_number(schema: SceneSchema, made: Callable[[Quantity], Json]) -> Json:
                 kinds.setdefault(name, []).append(quantity)
     for name, kind in schema.variables.items():
         kinds[name] = kinds.get(name, [Quantity(kind)])[:1]
-    found = _closed({name: _any([made(each) for each in of]) for name, of in kinds.items()})
+    table = _closed({name: _any([made(quantity) for quantity in of]) for name, of in kinds.items()})
     if len(effects) < len(schema.effects):  # instances are named by the scene
-        found["additionalProperties"] = {"type": "object"}
-    return found
+        table["additionalProperties"] = {"type": "object"}
+    return table
 
 
 def _bound(value: Json) -> Json:
@@ -151,7 +151,7 @@ def _tolerance(quantity: Quantity) -> Json:
 def _accept(schema: SceneSchema) -> Json:
     """Return [accept]: half the band around an equality or a goal by which machines are judged, by figure."""
     figures = schema.figures.values()
-    return _closed({each.name: _quantity(Quantity(each.kind, above=0)) for each in figures})
+    return _closed({figure.name: _quantity(Quantity(figure.kind, above=0)) for figure in figures})
 
 
 def _stock(quantity: Quantity) -> Json:
@@ -162,8 +162,10 @@ def _limits(schema: SceneSchema) -> Json:
     """Return [limits]: every figure that may be limited, on the sides on which it may be."""
     figures = [figure for figure in schema.figures.values() if figure.sides]
     sides = {figure.name: dict.fromkeys(figure.sides, _quantity(Quantity(figure.kind))) for figure in figures}
-    said = {figure.name: figure.text for figure in figures}
-    return _closed({name: _closed(of) | {"minProperties": 1, "description": said[name]} for name, of in sides.items()})
+    descriptions = {figure.name: figure.text for figure in figures}
+    return _closed(
+        {name: _closed(of) | {"minProperties": 1, "description": descriptions[name]} for name, of in sides.items()}
+    )
 
 
 def _either(effect: Effect) -> Json:
@@ -200,19 +202,19 @@ def _given(key: str, effect: Effect | None = None) -> Json:
 
 def _own_targets(schema: SceneSchema) -> Json:
     """Return [targets] where the scene names them: each by the models that targets of the job have."""
-    own = _any([_model(target.own) for name, target in schema.targets.items() if name != FAMILY])
+    models = _any([_model(target.own) for name, target in schema.targets.items() if name != FAMILY])
     family = {FAMILY: _model(schema.targets[FAMILY].own)} if FAMILY in schema.targets else {}
-    return {"type": "object", "properties": family, "additionalProperties": own}
+    return {"type": "object", "properties": family, "additionalProperties": models}
 
 
 def _closed(properties: Mapping[str, Json], required: list[str] | None = None) -> Json:
     """A table that holds nothing else."""
-    found: Json = {"type": "object", "additionalProperties": False, "properties": dict(properties)}
-    return found | ({"required": required} if required else {})
+    table: Json = {"type": "object", "additionalProperties": False, "properties": dict(properties)}
+    return table | ({"required": required} if required else {})
 
 
 def _any(schemas: list[Json]) -> Json:
-    different = [each for place, each in enumerate(schemas) if each not in schemas[:place]]
+    different = [option for place, option in enumerate(schemas) if option not in schemas[:place]]
     return different[0] if len(different) == 1 else {"anyOf": different}
 
 
@@ -222,8 +224,8 @@ def _quantity(quantity: Quantity) -> Json:
 
 def _model(model: type[Table], summary: str = "") -> Json:
     """A table by its model; summary: what it is, in the words of its job."""
-    found = _without_null(model.model_json_schema())
-    return found | ({"description": summary} if summary else {})
+    table = _without_null(model.model_json_schema())
+    return table | ({"description": summary} if summary else {})
 
 
 def _each(part: Json, change: Callable[[Json], Json]) -> Json:
@@ -231,7 +233,7 @@ def _each(part: Json, change: Callable[[Json], Json]) -> Json:
 
     def inner(value: object) -> object:
         if isinstance(value, list):
-            return [inner(each) for each in value]
+            return [inner(item) for item in value]
         return change(value) if isinstance(value, dict) else value
 
     return {key: inner(value) for key, value in part.items()}
@@ -239,11 +241,11 @@ def _each(part: Json, change: Callable[[Json], Json]) -> Json:
 
 def _without_null(part: Json) -> Json:
     """A part of a schema without null, which no scene can say: a key is there or it is not."""
-    found = _each({key: value for key, value in part.items() if key != "default" or value is not None}, _without_null)
-    if "anyOf" in found:
-        rest = [each for each in found.pop("anyOf") if each != {"type": "null"}]
-        found = {**rest[0], **found} if len(rest) == 1 else {**found, "anyOf": rest}
-    return found
+    reduced = _each({key: value for key, value in part.items() if key != "default" or value is not None}, _without_null)
+    if "anyOf" in reduced:
+        rest = [option for option in reduced.pop("anyOf") if option != {"type": "null"}]
+        reduced = {**rest[0], **reduced} if len(rest) == 1 else {**reduced, "anyOf": rest}
+    return reduced
 
 
 def _hoisted(whole: Json) -> Json:
@@ -255,15 +257,20 @@ def _hoisted(whole: Json) -> Json:
 
     def hoist(part: Json) -> Json:
         if "$defs" in part:  # models inside a model: references name them at the root
-            kinds.update({name: hoist(each) for name, each in part["$defs"].items()})
+            kinds.update({name: hoist(definition) for name, definition in part["$defs"].items()})
             part = {key: value for key, value in part.items() if key != "$defs"}
         if QUANTITY_PATTERN not in part:
             return _each(part, hoist)
-        own: Json = {key: part[key] for key in ("description",) if key in part}
+        description: Json = {key: part[key] for key in ("description",) if key in part}
         name = re.sub(r"\W+", "_", part[QUANTITY_PATTERN])
         kinds.setdefault(
-            name, {key: value for key, value in part.items() if key not in (QUANTITY_PATTERN, "title", "default", *own)}
+            name,
+            {
+                key: value
+                for key, value in part.items()
+                if key not in (QUANTITY_PATTERN, "title", "default", *description)
+            },
         )
-        return {"$ref": f"#/$defs/{name}", **own}
+        return {"$ref": f"#/$defs/{name}", **description}
 
     return {**hoist(whole), "$defs": kinds}

@@ -80,21 +80,21 @@ def narrowed(grid: TextTable, columns: int) -> tuple[TextTable, str]:
     """A table with as many of its columns as fit without cutting a word, and which are not among them; or ""."""
     least = _least(grid, columns)
     rank = [*grid.first, *(place for place in range(len(least)) if place not in grid.first)]
-    kept = {place for place in rank if place not in grid.units}
-    while len(kept) > 1 and _total(least[place] for place in _with_units(grid, kept)) > columns:
-        kept.remove(max(kept, key=rank.index))
-    places = _with_units(grid, kept)
+    shown = {place for place in rank if place not in grid.units}
+    while len(shown) > 1 and _total(least[place] for place in _with_units(grid, shown)) > columns:
+        shown.remove(max(shown, key=rank.index))
+    places = _with_units(grid, shown)
     if len(places) == len(least):
         return grid, ""
     gone = [place for place in range(len(least)) if place not in places and place not in grid.units]
     names = [(grid.names or grid.columns)[place] for place in gone]
-    told = ", ".join(joined(" ".join(name.split())) for name in names if name.strip())
+    dropped = ", ".join(joined(" ".join(name.split())) for name in names if name.strip())
     there = ", ".join(
         [f"a terminal of {_enough(grid, columns)} columns or a pipe (| cat)", *([grid.more] if grid.more else [])]
     )
     taken = [tuple(row[place] for place in places) for row in (grid.columns, *grid.lines)]
     right = tuple(place for place, old in enumerate(places) if old in grid.right)
-    return TextTable(grid.title, taken[0], tuple(taken[1:]), right), f"Not shown here: {told}. All columns: {there}."
+    return TextTable(grid.title, taken[0], tuple(taken[1:]), right), f"Not shown here: {dropped}. All columns: {there}."
 
 
 def _enough(grid: TextTable, columns: int) -> int:
@@ -102,9 +102,9 @@ def _enough(grid: TextTable, columns: int) -> int:
     return next(wide for wide in itertools.count(columns + 1) if _total(_least(grid, wide)) <= wide)
 
 
-def _with_units(grid: TextTable, kept: Collection[int]) -> list[int]:
+def _with_units(grid: TextTable, shown: Collection[int]) -> list[int]:
     """Places of columns with those of their units, from the left."""
-    return [p for p in range(len(grid.columns)) if (p - 1 if p in grid.units else p) in kept]
+    return [p for p in range(len(grid.columns)) if (p - 1 if p in grid.units else p) in shown]
 
 
 def _least(grid: TextTable, columns: int) -> list[int]:
@@ -157,11 +157,11 @@ def _wrapped(parts: Sequence[str | TextTable], columns: int) -> str:
                 console.print(_paragraph(line), crop=False)
         else:
             for line in part.split("\n"):
-                told, called = _called(line, columns)
-                for own in told:
-                    console.print(_paragraph(own), crop=False)
-                for own in called:
-                    console.print(Text(own), crop=False, no_wrap=True, overflow="ignore")
+                sentences, called = _called(line, columns)
+                for sentence in sentences:
+                    console.print(_paragraph(sentence), crop=False)
+                for sentence in called:
+                    console.print(Text(sentence), crop=False, no_wrap=True, overflow="ignore")
     return str(console.file.getvalue())  # type: ignore[attr-defined]
 
 
@@ -172,7 +172,7 @@ def _called(line: str, columns: int) -> tuple[list[str], list[str]]:
     """
     if OPTION not in line or len(line) <= columns:
         return [line], []
-    told, _, text = line.rpartition(" ")
+    lead, _, text = line.rpartition(" ")
     first, *options = text.split(OPTION)
     lines = [first]
     for place, option in enumerate(options, 1):
@@ -182,7 +182,7 @@ def _called(line: str, columns: int) -> tuple[list[str], list[str]]:
         else:
             lines[-1] += CONTINUED
             lines.append(INDENT + option)
-    return [told] if told else [], lines
+    return [lead] if lead else [], lines
 
 
 def _paragraph(line: str) -> Any:

@@ -45,12 +45,12 @@ class Sketch:
         return f"<Sketch {self.drawing.title}>"
 
 
-def sketch(scene: Scene, design: Design, said: outputs.DrawnSubject | None = None) -> Sketch:
-    """A design's mechanism in the positions that matter; said: what the design is, for the title.
+def sketch(scene: Scene, design: Design, subject: outputs.DrawnSubject | None = None) -> Sketch:
+    """A design's mechanism in the positions that matter; subject: the design in words, for the title.
 
     Raises BadInput where the scene cannot be drawn.
     """
-    return Sketch(outputs.drawing(scene, design, said))
+    return Sketch(outputs.drawing(scene, design, subject))
 
 
 def html(thing: object) -> str:
@@ -70,9 +70,9 @@ def html(thing: object) -> str:
     raise TypeError(f"a {type(thing).__name__} is not shown")
 
 
-def _drawn(scene: Scene, design: Design, said: outputs.DrawnSubject | None = None) -> str:
+def _drawn(scene: Scene, design: Design, subject: outputs.DrawnSubject | None = None) -> str:
     """Mechanism as SVG where the scene gives what a drawing needs, else ""."""
-    return "" if registry.of(scene).views.missing(scene) else sketch(scene, design, said)._repr_svg_()
+    return "" if registry.of(scene).views.missing(scene) else sketch(scene, design, subject)._repr_svg_()
 
 
 def _on_page(size: re.Match[str]) -> str:
@@ -84,8 +84,8 @@ def _on_page(size: re.Match[str]) -> str:
 
 def page(parts: Sequence[str | TextTable], drawn: str = "") -> str:
     """Paragraphs and tables, then a drawing."""
-    told = (table(part) if isinstance(part, TextTable) else f"<p>{_escaped(part)}</p>" for part in parts)
-    return f"<div>{''.join(told)}{drawn}</div>"
+    blocks = (table(part) if isinstance(part, TextTable) else f"<p>{_escaped(part)}</p>" for part in parts)
+    return f"<div>{''.join(blocks)}{drawn}</div>"
 
 
 def table(grid: TextTable) -> str:

@@ -78,11 +78,11 @@ def _family(scene: Scene) -> list[str | TextTable]:
     if FAMILY not in scene.schema.targets:
         return []
     table, members = family.table(scene), family.members(scene)
-    changes = [", ".join(f"{key} = {value}" for key, value in each.items()) for each in family.changes(scene)]
+    changes = [", ".join(f"{key} = {value}" for key, value in change.items()) for change in family.changes(scene)]
     lines = tuple((str(place + 1), changes[place]) for place in range(len(members)))
-    own = f"; each has its own {', '.join(table.own)}" if table.own else ""
-    said = f"A family of target {family.of_target(scene)}: the least {table.combine} of its members{own}"
-    return [said, TextTable("Members of the family", ("member", "what it changes"), lines)]
+    free_variables = f"; each has its own {', '.join(table.own)}" if table.own else ""
+    sentence = f"A family of target {family.of_target(scene)}: the least {table.combine} of its members{free_variables}"
+    return [sentence, TextTable("Members of the family", ("member", "what it changes"), lines)]
 
 
 def listed(values: str | Sequence[float]) -> str:
@@ -95,8 +95,8 @@ def _values(scene: Scene) -> Iterator[tuple[str, str, float | str | Sequence[flo
     for table in ("operation", "mechanism"):
         for name, value in given(scene.tables[table]).items():
             if isinstance(value, tuple) and value and isinstance(value[0], Table):
-                for k, each in enumerate(value, 1):
-                    yield from ((f"{table}.{name}.{k}.{key}", key, one) for key, one in given(each).items())
+                for k, number in enumerate(value, 1):
+                    yield from ((f"{table}.{name}.{k}.{key}", key, one) for key, one in given(number).items())
             else:
                 yield f"{table}.{name}", name, value
     for effect in scene.active:
@@ -205,11 +205,19 @@ def forces(scene: Scene, frame: "pd.DataFrame", design: Mapping[str, float]) -> 
     from loomopt.interface.forces import CUBIC, ROLLER, found
 
     lines, force, angle = [], scene.shown_in("force"), scene.shown_in("angle")
-    for name, each in found(scene, frame, design).items():
-        means = (f"{each.mean(power) / factor(force):.6g}" for power in (1.0, CUBIC, ROLLER))
-        turning = " and ".join(each.headings)
-        lines.append((name, turning, f"{each.peak / factor(force):.6g}", f"{each.at / factor(angle):.6g}", *means))
+    for name, turned_force in found(scene, frame, design).items():
+        means = (f"{turned_force.mean(power) / factor(force):.6g}" for power in (1.0, CUBIC, ROLLER))
+        turning = " and ".join(turned_force.headings)
+        lines.append(
+            (
+                name,
+                turning,
+                f"{turned_force.peak / factor(force):.6g}",
+                f"{turned_force.at / factor(angle):.6g}",
+                *means,
+            )
+        )
     sizes = f"peak\n{force}", f"at\n{angle}", f"mean\n{force}", f"p = 3\n{force}", f"p = 10/3\n{force}"
     heads = "force", "turning\nparts", *sizes
-    said = f"{scene.name}: forces over the turn; p: mean of their powers, for the life of ball and of roller bearings"
-    return [said, TextTable("", heads, tuple(lines), tuple(range(2, 7)))]
+    title = f"{scene.name}: forces over the turn; p: mean of their powers, for the life of ball and of roller bearings"
+    return [title, TextTable("", heads, tuple(lines), tuple(range(2, 7)))]
