@@ -1,4 +1,4 @@
-"""The torque budget of a design in its scene: what is computed, what to know beside it, and where there is none."""
+"""Torque budget of a design in its scene, with remarks, and the errors where a scene has none."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,46 +24,46 @@ MOTOR_UNITS = {
     "energy_swing": "J",
     "flywheel": "kg*m^2",
 }
-"""SI units of what a row says of an effect, and of the motor."""
+"""SI units of the columns of a row, and of the motor's quantities."""
 
 
 @dataclass(frozen=True, repr=False)
 class BudgetResult:
-    """Where the crank torque of a design comes from, and what it asks of motor and flywheel; SI and rad.
+    """Shares of the effects in the crank torque of a design, and size of motor and flywheel; SI and rad.
 
-    remarks: what to know beside it; undefined: what of the motor is not known, and why.
+    remarks: sentences on effects without a share. undefined: reasons for quantities of the motor that are None.
     """
 
     scene: Scene
-    found: TorqueBudget
+    torque: TorqueBudget
     remarks: tuple[str, ...]
     undefined: Mapping[str, str]
 
     @property
     def rows(self) -> tuple[TorqueShare, ...]:
-        """Each effect's share of the crank torque, in the order of the job."""
-        return self.found.rows
+        """Shares of the effects in the crank torque, in the order of the job."""
+        return self.torque.rows
 
     @property
     def total(self) -> TorqueShare:
-        """The crank torque itself."""
-        return self.found.total
+        """Total crank torque."""
+        return self.torque.total
 
     @property
     def motor(self) -> MotorSize:
-        """What the crank asks of a motor."""
-        return self.found.motor
+        """Size of the motor."""
+        return self.torque.motor
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the object that `--json` prints."""
-        found = self.found
+        """The object that `budget --json` prints."""
+        torque = self.torque
         return {
             "problem": self.scene.name,
-            "rows": [row._asdict() for row in found.rows],
-            "total": {name: value for name, value in found.total._asdict().items() if name != "effect"},
-            "motor": found.motor._asdict(),
-            "angle": found.angle,
-            "fluctuation": found.fluctuation,
+            "rows": [row._asdict() for row in torque.rows],
+            "total": {name: value for name, value in torque.total._asdict().items() if name != "effect"},
+            "motor": torque.motor._asdict(),
+            "angle": torque.angle,
+            "fluctuation": torque.fluctuation,
             "undefined": dict(self.undefined),
             "remarks": list(self.remarks),
             "units": {**UNITS, **MOTOR_UNITS, "angle": "rad", "fluctuation": "1"},
@@ -72,7 +72,11 @@ class BudgetResult:
 
 @working()
 def compute(scene: Scene, design: designs.Design, fluctuation: float | None = None) -> BudgetResult:
-    """Return the torque budget of a design, checked (SI; what it does not name is today's). Raises BadInput."""
+    """Torque budget of a design.
+
+    design: SI, today's values where it names none. fluctuation: allowed relative fluctuation of the speed. Raises
+    BadInput.
+    """
     allowed = "more than 0, at most 1"
     if fluctuation is not None:
         remedy = "Give 0.02, or leave it out"
@@ -82,42 +86,39 @@ def compute(scene: Scene, design: designs.Design, fluctuation: float | None = No
     job = registry.of(scene)
     sampler = job.sampler(scene, {**job.today(scene), **designs.flat(design)})
     if not sampler.model.loads:
-        remedy = f"Put one on: {', '.join(name for name, each in scene.schema.effects.items() if _acts(each))}"
-        problem = "no effect acts on the crank: there is no torque to share out"
+        names = [name for name, effect in scene.schema.effects.items() if isinstance(effect, Load | State)]
+        remedy = f"Put one on: {', '.join(names)}"
+        problem = "no effect acts on the crank, so there is no torque"
         raise refusal(problem, scene.origin, "effects", remedy=remedy)
     for load in sampler.model.loads:
         if isinstance(load, Load) and load.known_in(sampler.model.words_of(load.name)):
-            problem = f"effect {load.name} is known in part of the turn only: a budget is of the whole turn"
+            problem = f"effect {load.name} is defined in a part of the turn only, but a budget needs the whole turn"
             remedy = f"Take it off (--without {load.name}), or choose other values"
             raise refusal(problem, scene.origin, f"effects.{load.name}", remedy=remedy)
-    found = budget.budget(sampler, fluctuation)
-    return BudgetResult(scene, found, tuple(_remarks(scene, sampler.model.loads)), _undefined(found))
+    torque = budget.budget(sampler, fluctuation)
+    return BudgetResult(scene, torque, tuple(_remarks(scene, sampler.model.loads)), _undefined(torque))
 
 
-def _acts(effect: object) -> bool:
-    return isinstance(effect, Load | State)
-
-
-def _undefined(found: TorqueBudget) -> dict[str, str]:
-    """Return why what of the motor is None is not known."""
+def _undefined(torque: TorqueBudget) -> dict[str, str]:
+    """Reasons for the motor's quantities that are None."""
     why = "operation.speed is not given"
-    missing = {name: why for name, value in found.motor._asdict().items() if value is None}
-    if "flywheel" in missing and found.motor.mean_power is not None:
-        missing["flywheel"] = "no fluctuation is asked for, such as 0.02"
+    missing = {name: why for name, value in torque.motor._asdict().items() if value is None}
+    if "flywheel" in missing and torque.motor.mean_power is not None:
+        missing["flywheel"] = "no fluctuation is given, such as 0.02"
     return missing
 
 
 def _remarks(scene: Scene, loads: "tuple[balance.Acting, ...]") -> list[str]:
-    """Return what to know of effects that are on and have no line of their own, or are not followed."""
-    found = []
+    """Sentences on effects that are on and have no share, or are not included."""
+    remarks = []
     for state in (load for load in loads if isinstance(load, State)):
         carried = [load.name for load in loads if load.name in state.carries]
         if carried:
-            own = "whose share is what it takes in between" if state.moved else "whose share they are"
-            found.append(f"{' and '.join(carried)} reach the crank through {state.name}, {own}")
+            part = "whose share is the difference" if state.moved else "whose share contains them"
+            remarks.append(f"{' and '.join(carried)} reach the crank through {state.name}, {part}")
     for effect in scene.active:
         if isinstance(effect, Event):
-            found.append(f"{effect.name} is not followed: the output is taken to stay on its mechanism")
+            remarks.append(f"{effect.name} is not included: the output is assumed to stay on its mechanism")
         if isinstance(effect, Speed):
-            found.append(f"what {effect.name}'s flywheel takes in and gives back is no share: it is the motor's too")
-    return found
+            remarks.append(f"the flywheel of {effect.name} has no share: its torque is part of the motor's")
+    return remarks

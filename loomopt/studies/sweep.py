@@ -1,4 +1,4 @@
-"""Solve a scene for every combination of some of its numbers: a row each."""
+"""Sweep: solve a scene for every combination of values of some of its numbers, one row per combination."""
 
 import contextlib
 import functools
@@ -34,53 +34,55 @@ from loomopt.studies.run import rows
 from loomopt.studies.run.rows import Change, Findings, Multiplier, Row, Side, StudyTask, enough_together
 
 COARSE, MOST_COARSE = 8, 4
-"""Steps of each axis between two points that are searched from scratch, a power of two, and how many such steps an axis
-has at most: of a longer one each is twice, four times ... as many."""
+"""Steps of an axis between two points that are searched from scratch, a power of two; and the most such intervals of an
+axis: those of a longer axis are twice, four times ... as long."""
 
 
 @dataclass(frozen=True)
 class Lattice:
-    """Points by number, the last axis fastest; ranks: of each axis' values, by size."""
+    """Points of a sweep by number, the last axis fastest; ranks: of every axis' values, by size."""
 
     ranks: tuple[tuple[int, ...], ...]
 
     @property
     def size(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return math.prod(map(len, self.ranks))
 
     def places(self, point: int) -> tuple[int, ...]:
-        """Return which value of each axis a point has, counted from 0."""
+        """Index of a point on every axis."""
         return tuple(int(k) for k in np.unravel_index(point, [len(ranks) for ranks in self.ranks]))
 
     @functools.cached_property
     def points(self) -> "np.ndarray[tuple[int, int], np.dtype[np.int64]]":
-        """Rank on each axis of every point."""
+        """Rank on every axis of every point, (points, axes)."""
         return np.array(list(itertools.product(*self.ranks)), dtype=np.int64).reshape(self.size, len(self.ranks))
 
     @functools.cached_property
     def rounds(self) -> list[list[int]]:
-        """The points of each round that has any, in order."""
+        """Points of every round, in order, without empty rounds."""
         finest = np.zeros(self.size, dtype=int)
-        last = max(map(_halvings, map(len, self.ranks)), default=0)
+        last = max(map(_count_halvings, map(len, self.ranks)), default=0)
         for axis, ranks in enumerate(self.ranks):
             rounds = np.array([_round(rank, len(ranks), last) for rank in range(len(ranks))])
             finest = np.maximum(finest, rounds[self.points[:, axis]])
-        found = [np.flatnonzero(finest == each).tolist() for each in range(1 + last)]
-        return [points for points in found if points]
+        points_of_rounds = [np.flatnonzero(finest == number).tolist() for number in range(1 + last)]
+        return [points for points in points_of_rounds if points]
 
     def neighbours(self, point: int, usable: Sequence[int]) -> list[int]:
-        """Return the nearest of usable points (in rising order; the lower of two), and its mirror image if usable."""
-        own, known = self.points[point], self.points[list(usable)]
-        away = known - own
+        """The nearest usable point (`usable` in rising order, the lower one of two), and its mirror image if usable."""
+        away = self.points[list(usable)] - self.points[point]
         place = int(np.argmin((away**2).sum(axis=1)))
         mirrored = np.flatnonzero((away == -away[place]).all(axis=1))
         return [usable[place], *(usable[k] for k in mirrored[:1] if k != place)]
 
-    def across(self, point: int, parent: int, usable: Sequence[int]) -> int | None:
-        """Return the mirror image of a point's parent, along one axis the nearest beyond it; None of none usable."""
-        own, known = self.points[point], self.points[list(usable)]
-        away, step = known - own, self.points[parent] - own
+    def mirror(self, point: int, parent: int, usable: Sequence[int]) -> int | None:
+        """Mirror image of a point's parent; None where it is not usable.
+
+        Along one axis it may be the nearest usable point beyond.
+        """
+        here, known = self.points[point], self.points[list(usable)]
+        away, step = known - here, self.points[parent] - here
         mirrored = np.flatnonzero((away == -step).all(axis=1))
         if len(mirrored) or len(self.ranks) > 1:
             return usable[mirrored[0]] if len(mirrored) and step.any() else None
@@ -88,8 +90,8 @@ class Lattice:
         return usable[beyond[np.argmin(np.abs(away[beyond, 0]))]] if len(beyond) else None
 
 
-def _halvings(count: int) -> int:
-    """Return how often steps between points of an axis of so many values are halved that are searched from scratch."""
+def _count_halvings(count: int) -> int:
+    """Number of halvings of the intervals between points of an axis that are searched from scratch."""
     step = COARSE
     while count - 1 > MOST_COARSE * step:
         step *= 2
@@ -97,23 +99,23 @@ def _halvings(count: int) -> int:
 
 
 def _round(rank: int, count: int, last: int) -> int:
-    """Return the round, of 0 to last, in which a rank of an axis of so many values is first met."""
-    if rank % 2 ** _halvings(count) == 0 or rank == count - 1:
+    """Round, from 0 to `last`, in which a rank of an axis of `count` values is solved."""
+    if rank % 2 ** _count_halvings(count) == 0 or rank == count - 1:
         return 0
     return last - int(math.log2(rank & -rank))
 
 
-SCENES, KEPT = "scenes of a sweep", 32
-"""What a session calls them, and how many it keeps: as many as are solved together."""
+SCENES, MOST_CACHED = "scenes of a sweep", 32
+"""Key of a sweep's scenes in a session, and how many are cached: as many as are solved together."""
 PLAN = 5
-"""Raised when the plan or what a row holds changes: rows of another plan are other rows."""
+"""Version of the plan and of the contents of a row: rows of different versions are different."""
 Over = Mapping[str, str | Sequence[str | float]]
 """Dotted key of a scene → "LO:HI:STEP UNIT", or its values as a scene would give them."""
 
 
 @dataclass(frozen=True)
 class SweptNumber:
-    """A number to be swept: its key, its values as a scene gives them, and in SI; kind: of quantity."""
+    """A number of a sweep: its key, its values as texts of a scene and in SI; kind: kind of quantity."""
 
     key: str
     texts: tuple[str | float, ...]
@@ -122,17 +124,17 @@ class SweptNumber:
 
     @property
     def ranks(self) -> tuple[int, ...]:
-        """The place of each value by size."""
+        """Rank of every value by size."""
         order = sorted(range(len(self.values)), key=lambda k: (self.values[k], k))
         return tuple(order.index(k) for k in range(len(self.values)))
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """The plan of a sweep: small, and it pickles.
+    """Plan of a sweep; it pickles.
 
-    scene: with the first value of every axis; target: by name; cold: whether every point is solved from scratch, as
-    where each local optimum is the best there is; accuracy, seed: of every solve.
+    scene: with the first value of every axis. target: its name. cold: whether every point is solved from scratch, where
+    every local optimum is global. accuracy, seed: of every solve.
     """
 
     scene: Scene
@@ -151,20 +153,20 @@ class Sweep:
 
     @property
     def shown(self) -> list[str]:
-        """The figures that the target is about, in its order."""
+        """Figures of the target's objectives, in its order."""
         program = registry.of_target(self.scene, self.target).program(self.scene, self.target)
-        return list(dict.fromkeys(each.figure for each in program.objectives))
+        return list(dict.fromkeys(objective.figure for objective in program.objectives))
 
     @property
     def conditions(self) -> dict[str, object]:
-        """What is asked of every row, for people."""
+        """Settings of the sweep as texts, for tables."""
         ends = ((axis.key, axis.texts[0], axis.texts[-1], len(axis.texts)) for axis in self.axes)
         over = "; ".join(f"{key} = {first} ... {last}, {count} values" for key, first, last, count in ends)
         return {"over": over, "accuracy": self.accuracy, "seed": self.seed}
 
     @property
     def settings(self) -> dict[str, object]:
-        """What its rows depend on, as JSON data."""
+        """All that its rows depend on, as JSON data."""
         over = [[axis.key, list(axis.values)] for axis in self.axes]
         return {
             "study": f"{self.name} {PLAN}",
@@ -181,28 +183,28 @@ class Sweep:
 
     @functools.cached_property
     def key(self) -> str:
-        """A hash of all that its rows depend on."""
+        """Hash of all that its rows depend on."""
         import hashlib
 
         return hashlib.sha256(json.dumps(self.settings, sort_keys=True).encode()).hexdigest()[:32]
 
     @property
     def kinds(self) -> dict[str, str]:
-        """Key of each axis → kind of quantity."""
+        """Kind of quantity by key of the axis."""
         return {axis.key: axis.kind for axis in self.axes}
 
     @property
     def size(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return self.lattice.size
 
     @functools.cached_property
     def lattice(self) -> Lattice:
-        """Its points."""
+        """Lattice of its points."""
         return Lattice(tuple(axis.ranks for axis in self.axes))
 
     def batch(self, rows: Sequence[Row]) -> list[StudyTask]:
-        """Return the tasks of the next round, from all rows of earlier ones."""
+        """Tasks of the next round, from all rows of earlier rounds."""
         rounds = [list(range(self.size))] if self.cold else self.lattice.rounds
         done = list(itertools.accumulate(map(len, rounds), initial=0)).index(len(rows))
         known = {row.point: row for row in rows if row.warm}
@@ -211,19 +213,20 @@ class Sweep:
         return enough_together(list(tasks))
 
     def _task(self, point: int, usable: Sequence[int], known: Mapping[int, Row]) -> StudyTask:
+        """Task of a point, with starts at usable neighbours."""
         places = zip(self.axes, self.lattice.places(point), strict=True)
         parent, *beyond = self.lattice.neighbours(point, usable) if usable else [None]
-        ask = {"beyond": [dict(known[other].warm) for other in beyond if other is not None]}
+        starts = {"beyond": [dict(known[mirror].warm) for mirror in beyond if mirror is not None]}
         place = {axis.key: axis.values[k] for axis, k in places}
-        across = None if parent is None else self.lattice.across(point, parent, usable)
+        across = None if parent is None else self.lattice.mirror(point, parent, usable)
         if any(known[k].warm.get("basins", 1) > 1 for k in (parent, across) if k is not None):
-            # Where a search ends in several optima, another of them may be best here.
+            # With several optima at a neighbour, a different one may be best here.
             return StudyTask(point, None, place, {"beyond": []})
-        beside = [] if parent is None or across is None else self._beside(place, known[parent], known[across])
-        return StudyTask(point, parent, place, ask, beside=beside)
+        beside = [] if parent is None or across is None else self._optima_between(place, known[parent], known[across])
+        return StudyTask(point, parent, place, starts, beside=beside)
 
-    def _beside(self, place: Mapping[str, float], parent: Row, across: Row) -> list[object]:
-        """Return the optima of two rows, and how far a place lies from the first to the second; nothing without one."""
+    def _optima_between(self, place: Mapping[str, float], parent: Row, across: Row) -> list[object]:
+        """Optima of two rows, and the share of the way from the first to the second; empty without an optimum."""
         optima = [row.warm.get("optimum") for row in (parent, across)]
         key = next((k for k, value in parent.place.items() if value != across.place[k]), None)
         if key is None or not all(optima):
@@ -231,74 +234,74 @@ class Sweep:
         return [*optima, (place[key] - parent.place[key]) / (across.place[key] - parent.place[key])]
 
     def scene_at(self, point: int) -> Scene:
-        """Return the scene of a point. Raises BadInput for a combination that is none."""
+        """Scene of a point. Raises BadInput for an invalid combination."""
         places = zip(self.axes, self.lattice.places(point), strict=True)
-        asked = {axis.key: axis.texts[k] for axis, k in places}
-        return current().kept(SCENES, KEPT, (self.key, point), lambda: self.scene.update(asked))
+        changes = {axis.key: axis.texts[k] for axis, k in places}
+        return current().kept(SCENES, MOST_CACHED, (self.key, point), lambda: self.scene.update(changes))
 
     def solve(self, task: StudyTask, parent: Row | None) -> Solution:
-        """Return the answer of a task. Raises BadInput for a combination that is no scene."""
-        (search,) = self._between([task])
+        """Answer of a task. Raises BadInput for an invalid combination."""
+        (search,) = self._search_between([task])
         answer = neighbour_answer.told(self.scene_at(task.point), self.target, search) if search else None
-        return answer if answer and answer.status == "optimal" else self._alone(task, parent)
+        return answer if answer and answer.status == "optimal" else self._solve_alone(task, parent)
 
-    def _alone(self, task: StudyTask, parent: Row | None) -> Solution:
-        """Return the answer of a task by a solve of its own."""
+    def _solve_alone(self, task: StudyTask, parent: Row | None) -> Solution:
+        """Answer of a task by a solve of its scene."""
         scene = self.scene_at(task.point)
         program = registry.of_target(scene, self.target).program(scene, self.target)
         starts = [parent.warm if parent else {}, *task.ask["beyond"]]
         near: list[Point] = [point for data in starts if (point := rows.read(data, program))]
         return engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed, near=near)
 
-    def _between(self, tasks: Sequence[StudyTask]) -> list[Search | None]:
-        """Return the searches between two neighbours' optima; None of a task that must be solved alone."""
-        found: list[Search | None] = [None] * len(tasks)
-        begun = [(k, each) for k, task in enumerate(tasks) if task.beside and (each := self._begun(task))]
-        for (k, _), search in zip(begun, neighbour_newton.solve_between([each for _, each in begun]), strict=True):
-            found[k] = search
-        return found
+    def _search_between(self, tasks: Sequence[StudyTask]) -> list[Search | None]:
+        """Searches between the optima of two neighbours; None for a task that must be solved alone."""
+        searches: list[Search | None] = [None] * len(tasks)
+        starts = [(k, start) for k, task in enumerate(tasks) if task.beside and (start := self._start_between(task))]
+        for (k, _), search in zip(starts, neighbour_newton.solve_between([start for _, start in starts]), strict=True):
+            searches[k] = search
+        return searches
 
-    def _begun(self, task: StudyTask) -> neighbour_newton.NeighbourTask | None:
-        """Return a task between its neighbours' optima; None where it is no scene, which it tells by itself."""
+    def _start_between(self, task: StudyTask) -> neighbour_newton.NeighbourTask | None:
+        """Start of a search between two neighbours' optima; None for an invalid combination."""
         with contextlib.suppress(BadInput):
             return neighbour_answer.begun(self.scene_at(task.point), self.target, self.accuracy, task.beside)
         return None
 
     def place(self, row: Row) -> Mapping[str, float]:
-        """Return the numbers that are swept, SI, at a row."""
+        """Values of the swept numbers, SI, at a row."""
         return row.place
 
     def sought(self, row: Row) -> Mapping[str, float]:
-        """Return nothing: the target says what is sought."""
+        """Empty: the target has the objectives."""
         return {}
 
     def row_json(self, row: Row) -> dict[str, object]:
-        """Return what `--json` prints of a row."""
+        """The part of `--json` of a row."""
         return row.row_json()
 
     def read(self, rows: Sequence[Row]) -> Findings:
-        """Return rows in the order of their points; of a sweep over one number what changes along it, and its gaps."""
+        """Rows in the order of the points; of a sweep of one number also its changes and gaps."""
         line = sorted(rows, key=lambda row: (*row.place.values(), row.point)) if len(self.axes) == 1 else []
-        return Findings(tuple(rows), "", tuple(_changes(line)), tuple(_gaps(line)))
+        return Findings(tuple(rows), "", tuple(_find_changes(line)), tuple(_find_gaps(line)))
 
     def solved(self, task: StudyTask, parent: Row | None) -> Row:
-        """Return the row of a task. Raises BadInput for a combination that is no scene."""
+        """Row of a task. Raises BadInput for an invalid combination."""
         return self.solved_together([task])[0] or self.solved_alone(task, parent)
 
     def solved_together(self, tasks: Sequence[StudyTask]) -> list[Row | None]:
-        """Return the rows of tasks between two neighbours' optima, whoever stands beside them; None of the others."""
-        began = time.perf_counter()
-        pairs = zip(tasks, self._between(tasks), strict=True)
-        found = [self._row_between(task, search) if search else None for task, search in pairs]
-        shared = (time.perf_counter() - began) / max(1, sum(map(bool, found)))
-        return [replace(row, seconds=shared) if row else None for row in found]
+        """Rows of tasks between two neighbours' optima, independent of the batch; None for the others."""
+        start = time.perf_counter()
+        pairs = zip(tasks, self._search_between(tasks), strict=True)
+        rows = [self._row_between(task, search) if search else None for task, search in pairs]
+        mean = (time.perf_counter() - start) / max(1, sum(map(bool, rows)))
+        return [replace(row, seconds=mean) if row else None for row in rows]
 
     def solved_alone(self, task: StudyTask, parent: Row | None) -> Row:
-        """Return the row of a task by a solve of its own. Raises BadInput for a combination that is no scene."""
-        return self._row(task, self._alone(task, parent))
+        """Row of a task by a solve of its scene. Raises BadInput for an invalid combination."""
+        return self._row(task, self._solve_alone(task, parent))
 
     def _row_between(self, task: StudyTask, search: Search) -> Row | None:
-        """Return the row of a search that ended between two neighbours; None where it must be solved alone."""
+        """Row of a search between two neighbours; None where the point must be solved alone."""
         best, program = search.best, search.program
         here = neighbour_answer.evaluated(self.scene_at(task.point), search)
         if best is None or here is None:
@@ -313,22 +316,22 @@ class Sweep:
             design=designs.flat(here.design),
             figures={name: _finite(value) for name, value in here.figures.items()},
             multipliers={
-                Multiplier(each[0].objective.figure, Side(each[0].limit.name, SIDES[each[0].side])): worth_of(each)
-                for each in best.certificate.binding_groups
+                Multiplier(group[0].objective.figure, Side(group[0].limit.name, SIDES[group[0].side])): worth_of(group)
+                for group in best.certificate.binding_groups
             },
             reached=here.reached,
             certified=True,
-            warm=_warm(best.point, program, optimum),
+            warm=_warm_data(best.point, program, optimum),
         )
 
     def _row(self, task: StudyTask, answer: Solution) -> Row:
-        """Return the row of an answer."""
+        """Row of an answer."""
         scene = self.scene_at(task.point)
         passed = answer.certificate is not None and answer.certificate.passed
         warm: dict[str, object] = {}
         if passed and not self.cold:
             program = registry.of_target(scene, self.target).program(scene, self.target)
-            warm = _warm(answer.point, program, neighbour_answer.optimum(scene, program, answer))
+            warm = _warm_data(answer.point, program, neighbour_answer.optimum(scene, program, answer))
             warm |= {"basins": len(answer.optima)} if len(answer.optima) > 1 else {}
         return Row(
             point=task.point,
@@ -346,39 +349,39 @@ class Sweep:
         )
 
 
-def _warm(point: Point, program: Program, optimum: neighbour_newton.Optimum | None) -> dict[str, object]:
-    """Return what a neighbour can start from."""
+def _warm_data(point: Point, program: Program, optimum: neighbour_newton.Optimum | None) -> dict[str, object]:
+    """Data from which a neighbour can start."""
     return {**rows.written(point, program), **({"optimum": optimum.as_dict()} if optimum else {})}
 
 
 def multipliers(answer: Solution) -> dict[Multiplier, float]:
-    """Return what each limit that binds costs, SI."""
+    """Price of every binding limit, SI, by figure and side."""
     return {
-        Multiplier(figure, Side(each.limit, each.side)): worth
-        for each in answer.binding
-        for figure, worth in each.worth.items()
+        Multiplier(figure, Side(price.limit, price.side)): worth
+        for price in answer.binding
+        for figure, worth in price.worth.items()
     }
 
 
-def _changes(line: Sequence[Row]) -> Iterator[Change]:
-    """Yield where the active set changes along rows over one number."""
+def _find_changes(line: Sequence[Row]) -> Iterator[Change]:
+    """Yield the changes of the active set along rows of one number."""
     for row, after in itertools.pairwise(line):
-        before, now = ({multiplier.side for multiplier in each.multipliers} for each in (row, after))
+        before, now = ({multiplier.side for multiplier in end.multipliers} for end in (row, after))
         if row.certified and after.certified and before != now:
             ends = (next(iter(row.place.values())), next(iter(after.place.values())))
             yield Change(ends, "active set", tuple(map(Side, sorted({side.limit for side in before ^ now}))))
 
 
-def _gaps(line: Sequence[Row]) -> Iterator[tuple[float, float]]:
-    """Yield the stretches of one number, SI, where no admissible design exists."""
-    for empty, alike in itertools.groupby(line, key=lambda row: row.status == "infeasible"):
-        if empty:
-            values = [next(iter(row.place.values())) for row in alike]
+def _find_gaps(line: Sequence[Row]) -> Iterator[tuple[float, float]]:
+    """Yield the intervals of one number, SI, without an admissible design."""
+    for infeasible, group in itertools.groupby(line, key=lambda row: row.status == "infeasible"):
+        if infeasible:
+            values = [next(iter(row.place.values())) for row in group]
             yield values[0], values[-1]
 
 
 def reason(answer: Solution) -> str:
-    """Return why an answer is not optimal: what clashes, else what came in the way."""
+    """Reason why an answer is not optimal: the limits that clash, or the message of the solve."""
     if not answer.clash:
         return answer.message
     clash = f"limits that clash: {', '.join(answer.clash)}"
@@ -386,17 +389,21 @@ def reason(answer: Solution) -> str:
 
 
 def _finite(value: float | None) -> float | None:
+    """The value, or None where it is not finite."""
     return value if value is not None and math.isfinite(value) else None
 
 
 def plan_sweep(
     scene: Scene, over: Over, target: str | None = None, *, accuracy: float = ACCURACY, seed: int = 0
 ) -> Sweep:
-    """Return the plan of a sweep, every value of which has been checked by itself. Raises BadInput."""
+    """Plan of a sweep, with every value checked.
+
+    over: dotted key of the scene → "LO:HI:STEP UNIT", or a list of values. Raises BadInput.
+    """
     name = target_name(scene, target, families=True)
     check_numbers(accuracy, None, seed)
-    named = 'Name a number and its values: {"operation.speed": "300:600:50 rpm"}'
-    over = arguments.table(over, "over", "key of the scene → its values", named)
+    example = 'Name a number and its values: {"operation.speed": "300:600:50 rpm"}'
+    over = arguments.table(over, "over", "key of the scene → its values", example)
     if not over:
         remedy = 'Name a number and its values: --over "operation.speed=300:600:50 rpm"'
         raise refusal("there is nothing to sweep over", scene.origin, "over", remedy=remedy)
@@ -404,7 +411,7 @@ def plan_sweep(
     listed = {current_key(key, former): _values(given, key) for key, given in over.items()}
     for key, texts in listed.items():
         if not texts:
-            raise refusal("there is no value to sweep over", scene.origin, key, remedy="Give one at least")
+            raise refusal("there is no value to sweep over", scene.origin, key, remedy="Give at least one value")
     if math.prod(map(len, listed.values())) > numbers.MOST_VALUES:
         remedy = "Sweep over fewer values at a time"
         raise refusal(f"these are more than {numbers.MOST_VALUES} combinations", scene.origin, "over", remedy=remedy)
@@ -418,7 +425,7 @@ def plan_sweep(
 
 
 def _values(given: str | Sequence[str | float], key: str) -> Sequence[str | float]:
-    """Return the values of a number that is swept, as a scene would give them. Raises BadInput."""
+    """Values of a swept number as texts or numbers of a scene. Raises BadInput."""
     if isinstance(given, str):
         return numbers.range_values(given, key)
     remedy = f'Write "{numbers.EXAMPLE}", or the values in a list'
@@ -428,7 +435,7 @@ def _values(given: str | Sequence[str | float], key: str) -> Sequence[str | floa
 def _axis(
     base: Scene, key: str, texts: Sequence[str | float], ends: Sequence[Mapping[str, str | float]]
 ) -> SweptNumber:
-    """Return an axis, each of whose values makes a scene with the first or the last values of the others.
+    """Axis of a sweep; every value must give a scene together with the first or the last values of the other axes.
 
     Raises BadInput.
     """

@@ -38,7 +38,7 @@ def test_json_has_the_shares_their_sum_and_the_motor(capsys):
 def test_what_is_not_known_is_null_with_its_reason(capsys):
     found = json.loads(told(capsys, "beatup", "--json")[1])
     assert found["motor"]["flywheel"] is None
-    assert found["undefined"]["flywheel"] == "no fluctuation is asked for, such as 0.02"
+    assert found["undefined"]["flywheel"] == "no fluctuation is given, such as 0.02"
     document = {**lo.load("shedding-static").without_effect("warp_tension").document}
     document["operation"] = {key: value for key, value in document["operation"].items() if key != "speed"}
     still = lo.budget(lo.scene({**document, "targets": {}}))

@@ -34,7 +34,7 @@ def test_own_scenes_are_read_without_a_scan(name, scans):
     registry.of(scene)
     registry.template(scene.job)
     registry.results(scene)
-    check.named([name])
+    check.check_names([name])
     for name, effect in scene.schema.effects.items():
         if name in scene.document.get("available", {}):
             scene.with_effect(*effect.beside, name)
@@ -88,7 +88,7 @@ def test_what_scenes_look_jobs_up_in_pickles_as_itself():
 def test_every_own_scene_is_kept_in_results_of_its_own():
     for name in packaged.problems():
         scene = registry.load(name)
-        assert (registry.results(scene) / f"{name}.{check.served(scene)[0]}.csv").is_file()
+        assert (registry.results(scene) / f"{name}.{check.available_targets(scene)[0]}.csv").is_file()
 
 
 def test_a_job_whose_schema_is_anothers_is_refused(monkeypatch):

@@ -83,10 +83,10 @@ def test_the_shares_add_up_to_the_crank_torque_everywhere(name):
     job = registry.of(scene)
     sampler = job.sampler(scene, job.today(scene))
     assert largest == pytest.approx(sampler.peak("peak_torque"), rel=1e-12)
-    curves = np.sum(list(found.found.curves.values()), axis=0)
+    curves = np.sum(list(found.torque.curves.values()), axis=0)
     table = lo.simulate(scene)
     torque = next(column for column in table if column in ("Md [N*m]", "cam_torque [N*m]", "crank_torque [N*m]"))
-    beside = np.interp(table["phi [rad]"], found.found.phi, curves)
+    beside = np.interp(table["phi [rad]"], found.torque.phi, curves)
     apart = np.abs(table[torque] - beside)
     assert np.median(apart) <= 1e-12 * largest
     assert np.mean(apart <= 1e-9 * largest) > 0.98, "but for both sides of corners"
@@ -140,7 +140,7 @@ def test_a_flywheel_keeps_the_fluctuation_it_is_sized_for():
 def test_a_design_has_a_budget_of_its_own():
     answer = lo.solve("beatup")
     own, given = answer.budget(), lo.budget("beatup", answer)
-    assert own.found == given.found
+    assert own.torque == given.torque
     assert own.total.at_peak == pytest.approx(-88.68941349, rel=1e-9)
     assert rows(own)["resistance"].energy == pytest.approx(0.09003420291, rel=1e-9)
 
@@ -148,14 +148,14 @@ def test_a_design_has_a_budget_of_its_own():
 def test_of_two_peaks_that_mirror_each_other_the_first_counts():
     found = lo.budget(shed())
     assert found.total.at_peak > 0.0
-    assert found.found.angle < math.pi
+    assert found.torque.angle < math.pi
 
 
 @pytest.mark.parametrize(
     ("scene", "said"),
     [
         (lambda: lo.load("rapier"), "no effect acts on the crank"),
-        (lambda: lo.load("shedding-static"), "effect warp_tension is known in part of the turn only"),
+        (lambda: lo.load("shedding-static"), "effect warp_tension is defined in a part of the turn only"),
     ],
 )
 def test_where_there_is_nothing_to_share_out_that_is_said(scene, said):
@@ -173,7 +173,7 @@ def test_what_carries_others_says_so():
     found = lo.budget(SCENES["beat-up, elastic shaft"]())
     inertia, resistance, shaft = found.rows
     assert (inertia.effect, resistance.effect, shaft.effect) == ("inertia", "resistance", "shaft_torsion")
-    said = "inertia and resistance reach the crank through shaft_torsion, whose share is what it takes in between"
+    said = "inertia and resistance reach the crank through shaft_torsion, whose share is the difference"
     assert found.remarks == (said,)
     # What swings gives back all that it takes; the shaft keeps what its damping takes, c z'^2 of each turn.
     assert inertia.energy == 0.0

@@ -21,7 +21,7 @@ from loomopt.jobs.registry import load, scene
 from loomopt.scenes import packaged
 from loomopt.scenes.scene import Scene, build
 from loomopt.scenes.tables import Bound, LimitRange
-from loomopt.studies.check import served
+from loomopt.studies.check import available_targets
 
 BEATUP = load("beatup")
 TEMPLATE = registry.template("beatup")
@@ -71,7 +71,7 @@ def test_packaged_scenes_are_complete(name):
     assert found.name == name
     assert found.title
     assert found.source
-    for target in served(found):
+    for target in available_targets(found):
         assert found.targets[target].model_dump()["expected"] is not None
     offered = set(found.document.get("available", {})) if found.schema.tables else set(found.schema.effects)
     for effect in {name for name in offered if not found.schema.effects[name].many} - set(found.effects):

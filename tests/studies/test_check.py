@@ -1,4 +1,4 @@
-"""The check against the reference results: it reproduces, and names every kind of difference."""
+"""Check against the reference results: they are reproduced, and every kind of difference is named."""
 
 import re
 import shutil
@@ -16,18 +16,18 @@ from loomopt.studies import check as study
 NAME = "beatup-light"
 BALANCE = f"{NAME}.balance.csv"
 FRONTS = [("beatup", "peak_torque", "m4e"), ("rapier", "peak_acceleration", "dwell"), ("shedding", "K1", "X0")]
-"""Scene and axes of the front that stands for each job."""
+"""Scene and axes of the front that represents every job."""
 
 
 @pytest.fixture
 def copy(tmp_path):
-    """Return a copy of the reference results."""
+    """Copy of the reference results."""
     return shutil.copytree(packaged.results_path(), tmp_path / "results")
 
 
 @pytest.fixture(scope="module", autouse=True)
-def solved():
-    """Solve each scene and target once for the whole file: what is tested is the comparison."""
+def cached_answers():
+    """Solve every scene and target once for the whole file, since only the comparison is tested."""
     genuine, answers = engine.solve, {}
 
     def once(scene, target):
@@ -41,12 +41,12 @@ def solved():
 
 
 def differences(folder, target="balance"):
-    """Return what differs for one scene and target from a folder of references."""
-    found = next(outcome for outcome in study.check([NAME], folder) if outcome.target == target)
-    return list(found.differences)
+    """Differences of one scene and target from a folder of references."""
+    outcome = next(outcome for outcome in study.check([NAME], folder) if outcome.target == target)
+    return list(outcome.differences)
 
 
-def edited(path, change):
+def edit(path, change):
     """Rewrite a reference: change(columns, values) returns new ones."""
     lines = path.read_text().splitlines()
     head = [line for line in lines if line.startswith("#")]
@@ -55,8 +55,8 @@ def edited(path, change):
     path.write_text("\n".join([*head, ",".join(columns), ",".join(values)]) + "\n")
 
 
-def valued(name, new):
-    """Return an edit that replaces a column's value: new(old) in text."""
+def replace_value(name, new):
+    """Edit that replaces a column's value by new(value), both as texts."""
 
     def change(columns, values):
         place = next(k for k, column in enumerate(columns) if column.split(" [")[0] == name)
@@ -65,7 +65,7 @@ def valued(name, new):
     return change
 
 
-def scaled(by):
+def scale_value(by):
     return lambda value: repr(float(value) * (1 + by))
 
 
@@ -76,20 +76,20 @@ def test_all_packaged_results_are_reproduced(capsys, monkeypatch):
     out, err = capsys.readouterr()
     assert err == ""
     for name in packaged.problems():
-        for target in study.served(load(name)):
+        for target in study.available_targets(load(name)):
             line = next(line for line in out.splitlines() if line.split()[:2] == [name, target])
             assert line.endswith("reproduces")
     for name, first, second in FRONTS:
         assert re.search(rf"^{name} +{first} against {second} +optimal +reproduces$", out, re.MULTILINE)
 
 
-def test_targets_that_need_what_a_scene_lacks_are_left_out():
-    assert study.served(load("shedding-static")) == ["stiffness", "force"]
-    assert study.served(load("shedding")) == ["stiffness", "law", "force", "speed"]
+def test_targets_without_their_input_are_left_out():
+    assert study.available_targets(load("shedding-static")) == ["stiffness", "force"]
+    assert study.available_targets(load("shedding")) == ["stiffness", "law", "force", "speed"]
 
 
 def test_every_packaged_scene_and_target_has_a_reference_with_provenance():
-    wanted = {f"{name}.{target}.csv" for name in packaged.problems() for target in study.served(load(name))}
+    wanted = {f"{name}.{target}.csv" for name in packaged.problems() for target in study.available_targets(load(name))}
     wanted |= {f"{name}.{first}-against-{second}.csv" for name, first, second in FRONTS}
     assert {path.name for path in packaged.results_path().iterdir()} == wanted
     for path in packaged.results_path().iterdir():
@@ -101,9 +101,9 @@ def test_every_packaged_scene_and_target_has_a_reference_with_provenance():
 @pytest.mark.parametrize(
     ("name", "new", "named"),
     [
-        ("M3_fdc", scaled(1e-6), "M3_fdc [N*m]"),
-        ("peak_torque", scaled(-1e-6), "peak_torque [N*m]"),
-        ("l2", scaled(1e-4), "l2 [m]"),
+        ("M3_fdc", scale_value(1e-6), "M3_fdc [N*m]"),
+        ("peak_torque", scale_value(-1e-6), "peak_torque [N*m]"),
+        ("l2", scale_value(1e-4), "l2 [m]"),
         ("mu_min", lambda value: "nan", "mu_min [rad]"),
         ("status", lambda value: "infeasible", "status: optimal, reference infeasible"),
         ("binding", lambda value: value.replace("l1 min", "l1 max"), "binding"),
@@ -111,22 +111,21 @@ def test_every_packaged_scene_and_target_has_a_reference_with_provenance():
     ],
 )
 def test_a_tampered_number_is_named(copy, name, new, named):
-    edited(copy / BALANCE, valued(name, new))
-    found = differences(copy)
-    assert len(found) == 1
-    assert named in found[0]
+    edit(copy / BALANCE, replace_value(name, new))
+    (difference,) = differences(copy)
+    assert named in difference
 
 
 def test_a_difference_below_the_tolerance_is_none(copy):
-    edited(copy / BALANCE, valued("peak_torque", scaled(1e-10)))
-    edited(copy / BALANCE, valued("l2", scaled(1e-9)))
+    edit(copy / BALANCE, replace_value("peak_torque", scale_value(1e-10)))
+    edit(copy / BALANCE, replace_value("l2", scale_value(1e-9)))
     assert differences(copy) == []
 
 
 def test_a_missing_table_or_column_and_a_new_column_are_named(copy):
-    edited(copy / BALANCE, lambda columns, values: (columns[1:], values[1:]))
+    edit(copy / BALANCE, lambda columns, values: (columns[1:], values[1:]))
     assert differences(copy) == ["column status is new"]
-    edited(copy / BALANCE, lambda columns, values: (["status", "old [1]", *columns], ["optimal", "1", *values]))
+    edit(copy / BALANCE, lambda columns, values: (["status", "old [1]", *columns], ["optimal", "1", *values]))
     assert differences(copy) == ["column old [1] is gone"]
     (copy / BALANCE).unlink()
     assert differences(copy) == [f"no reference table {BALANCE}"]
@@ -136,12 +135,12 @@ def test_an_infeasible_target_is_compared_by_what_would_help(copy):
     path = copy / f"{NAME}.retrofit.csv"
     assert differences(copy, "retrofit") == []
     column = next(text for text in path.read_text().split(",") if text.startswith("needed "))
-    edited(path, valued(column.split(" [")[0], scaled(1e-3)))
-    assert [column in found for found in differences(copy, "retrofit")] == [True]
+    edit(path, replace_value(column.split(" [")[0], scale_value(1e-3)))
+    assert [column in difference for difference in differences(copy, "retrofit")] == [True]
 
 
 def test_the_command_names_a_difference_and_exits_1(copy, capsys, monkeypatch):
-    edited(copy / BALANCE, valued("peak_torque", scaled(1e-5)))
+    edit(copy / BALANCE, replace_value("peak_torque", scale_value(1e-5)))
     monkeypatch.setattr(registry, "results", lambda scene: copy)
     assert run(["check", NAME]) == 1
     out, err = capsys.readouterr()
@@ -150,7 +149,7 @@ def test_the_command_names_a_difference_and_exits_1(copy, capsys, monkeypatch):
     assert "1 of 4 differ" in err
 
 
-def test_a_check_that_is_stopped_shows_what_was_finished(capsys, monkeypatch):
+def test_an_interrupted_check_shows_the_finished_outcomes(capsys, monkeypatch):
     genuine, calls = engine.solve, []
 
     def stopped(*arguments):
@@ -173,7 +172,7 @@ def test_an_unknown_name_is_refused_before_anything_is_solved(monkeypatch):
         next(iter(study.check([NAME, "nonsense"])))
 
 
-def test_written_references_are_reproduced_and_whole(tmp_path):
-    written = study.write(tmp_path, [NAME])
-    assert sorted(written) == sorted(tmp_path.iterdir())
+def test_references_that_write_makes_are_complete_and_reproduced(tmp_path):
+    paths = study.write(tmp_path, [NAME])
+    assert sorted(paths) == sorted(tmp_path.iterdir())
     assert differences(tmp_path) == []

@@ -1,4 +1,4 @@
-"""Points between two neighbours' optima: the same rows alone, in any company and by any number of workers."""
+"""Points between two neighbours' optima: the same rows alone, in any batch and with any number of workers."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ def front():
 
 
 def last_round(study):
-    """Return the first batch of a study that is solved together, and all rows before it."""
+    """First batch of a study that is solved together, and all rows before it by point."""
     rows: list[Row] = []
     while batch := study.batch(rows):
         known = {row.point: row for row in rows}
@@ -35,8 +35,8 @@ def last_round(study):
     raise AssertionError("nothing is solved together")
 
 
-def asked(row):
-    """Return where a row was asked, but for rounding; of an end its number."""
+def place_key(row):
+    """Place of a row without its rounding; of an end its number."""
     return tuple(f"{value:.9g}" for value in row.place.values()) or row.point
 
 
@@ -65,18 +65,18 @@ def test_rows_are_the_same_bits_in_batches_of_any_size(study, count):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("study", [resistances(33), front()], ids=["sweep", "front"])
-def test_rows_are_the_same_bits_from_one_worker_and_from_two_and_those_of_solves_alone(study, monkeypatch):
+def test_rows_are_the_same_bits_from_one_worker_and_from_two_and_of_separate_solves(study, monkeypatch):
     together = run.run(study)
     assert digest(run.run(study, run.workers(2))) == digest(together)
-    monkeypatch.setattr(neighbour_newton, "solve_between", lambda asked: [None] * len(asked))
-    # Which of two gaps of one width is halved last hangs on rounding.
-    known = {asked(row): row for row in together}
-    pairs = [(row, known[asked(row)]) for row in run.run(study) if asked(row) in known]
+    monkeypatch.setattr(neighbour_newton, "solve_between", lambda starts: [None] * len(starts))
+    # Rounding decides which of two equal gaps is halved last.
+    known = {place_key(row): row for row in together}
+    pairs = [(row, known[place_key(row)]) for row in run.run(study) if place_key(row) in known]
     assert len(pairs) >= len(together) - 3
-    for row, other in pairs:
+    for row, separate in pairs:
         for name, value in row.design.items():
-            assert other.design[name] == pytest.approx(value, rel=CLOSE, abs=CLOSE), (row.place, name)
-        assert other.multipliers.keys() == row.multipliers.keys()
+            assert separate.design[name] == pytest.approx(value, rel=CLOSE, abs=CLOSE), (row.place, name)
+        assert separate.multipliers.keys() == row.multipliers.keys()
 
 
 def test_few_tasks_are_solved_alone():
@@ -86,13 +86,13 @@ def test_few_tasks_are_solved_alone():
 
 
 @pytest.mark.slow
-def test_what_is_no_scene_costs_the_others_nothing():
-    """A task whose scene cannot be made is left to tell so by itself."""
+def test_an_invalid_scene_does_not_change_the_other_rows():
+    """A task with an invalid scene is left to its solve, which reports the error."""
     study = resistances(49)
     batch, _ = last_round(study)
     tasks = [task for task in batch if task.beside][:3]
-    lost = replace(tasks[1], beside=[{**tasks[1].beside[0], "x": {"l1": 0.03}}, *tasks[1].beside[1:]])
-    first, none, last = study.solved_together([tasks[0], lost, tasks[2]])
+    invalid = replace(tasks[1], beside=[{**tasks[1].beside[0], "x": {"l1": 0.03}}, *tasks[1].beside[1:]])
+    first, none, last = study.solved_together([tasks[0], invalid, tasks[2]])
     assert none is None
     assert [untimed(row) for row in (first, last)] == [
         untimed(row) for row in study.solved_together([tasks[0], tasks[2]])

@@ -1,4 +1,4 @@
-"""Sweeps: a row per combination, the same bits from one process, from several, from a cluster, and after a kill."""
+"""Sweeps: one row per combination, with the same bits from one process, several, a cluster, and after a kill."""
 
 import os
 import signal
@@ -46,23 +46,23 @@ def serial():
 
 @pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 7])
 def test_every_point_is_certified_and_as_good_as_a_search_from_scratch(serial, every):
-    """Against a sweep of every seventh point all solved cold, and of all of them."""
+    """Compared with a sweep from scratch, of every seventh point and of all points."""
     assert all(row.certified for row in serial.rows)
     assert sum(row.parent is None for row in serial.rows) == 4
     rows = serial.rows[::every]
     over = {"operation.M0": [f"{row.place['operation.M0']!r} N*m" for row in rows]}
     cold = run.run(replace(sweep.plan_sweep(lo.load("beatup"), over), cold=True))
     assert all(row.parent is None for row in cold)
-    for row, other in zip(rows, cold, strict=True):
-        assert row.place == other.place
+    for row, scratch in zip(rows, cold, strict=True):
+        assert row.place == scratch.place
         for figure in ("M3_fdc", "peak_torque"):
-            assert abs(row.figures[figure]) <= abs(other.figures[figure]) + 1e-7
+            assert abs(row.figures[figure]) <= abs(scratch.figures[figure]) + 1e-7
 
 
 def test_torques_of_the_closed_form(serial):
     for row in serial.rows:
-        asked = row.place["operation.M0"]
-        expected = max(0.0, 676.981102 - asked, asked - 871.503394)
+        moment = row.place["operation.M0"]
+        expected = max(0.0, 676.981102 - moment, moment - 871.503394)
         assert abs(row.figures["M3_fdc"]) == pytest.approx(expected, abs=1e-5)
 
 
@@ -74,13 +74,13 @@ def test_killed_at_twelve_rows_and_resumed_by_two_processes_it_has_the_same_dige
     done = subprocess.run([sys.executable, script, store], env=os.environ | folder, capture_output=True, timeout=120)
     assert done.returncode == -signal.SIGKILL
     with Store(store) as opened:
-        kept = opened.rows(serial.study.key)
-    assert len(kept) == 12
+        stored = opened.rows(serial.study.key)
+    assert len(stored) == 12
     with pytest.raises(BadInput, match="12 of the 21 points"):
         lo.sweep("beatup", OVER, store=store)
     again = lo.sweep("beatup", OVER, store=store, resume=True, workers=2)
     assert again.digest == serial.digest
-    assert {row.point: row.seconds for row in kept}.items() <= {row.point: row.seconds for row in again.rows}.items()
+    assert {row.point: row.seconds for row in stored}.items() <= {row.point: row.seconds for row in again.rows}.items()
 
 
 @pytest.mark.slow
@@ -97,9 +97,9 @@ def test_a_dask_cluster_of_which_a_worker_is_killed_has_the_same_digest(serial):
         n_workers=2, threads_per_worker=2, processes=True, dashboard_address=None, silence_logs=50
     )
     with cluster, distributed.Client(cluster) as client:
-        found = lo.sweep("beatup", OVER, executor=client.get_executor(retries=3), on_row=kill)
+        result = lo.sweep("beatup", OVER, executor=client.get_executor(retries=3), on_row=kill)
     assert killed
-    assert found.digest == serial.digest
+    assert result.digest == serial.digest
 
 
 def test_threads_of_one_process_solve_one_at_a_time(serial):
@@ -107,7 +107,7 @@ def test_threads_of_one_process_solve_one_at_a_time(serial):
         assert lo.sweep("beatup", OVER, executor=threads).digest == serial.digest
 
 
-def test_a_row_gives_its_whole_answer_again(serial):
+def test_a_row_reproduces_its_whole_answer(serial):
     for point in (0, 3):
         answer, row = serial.answer(point), serial.rows[point]
         assert isinstance(answer, lo.Answer)
@@ -118,7 +118,7 @@ def test_a_row_gives_its_whole_answer_again(serial):
         serial.answer(21)
 
 
-def test_the_table_is_in_the_scenes_units_or_in_si_and_says_once_where_it_comes_from(serial):
+def test_the_table_is_in_units_of_the_scene_or_in_si_and_has_provenance(serial):
     table, si = serial.table(), serial.table(si=True)
     assert list(table.columns[:4]) == ["operation.M0 [N*m]", "status", "certified", "l1 [mm]"]
     assert list(table.columns[-4:]) == ["M3_fdc reached", "parent", "time [s]", "reason"]
@@ -135,13 +135,13 @@ def test_the_table_is_in_the_scenes_units_or_in_si_and_says_once_where_it_comes_
     assert repr(serial) == "<StudyTable sweep of beatup, balance: 21 of 21 points, 21 certified>"
 
 
-def test_a_row_that_misses_its_goal_is_nowhere_called_optimal_alone(serial):
+def test_a_row_that_misses_its_goal_is_never_called_just_optimal(serial):
     missed = [row for row in serial.rows if abs(row.figures["M3_fdc"]) > 1.0]
     assert [row.place["operation.M0"] for row in missed] == [600, 615, 630, 645, 660, 675, 885, 900]
     table = serial.table()
     for row in serial.rows:
-        said = "optimal but M3_fdc not reached" if row in missed else "optimal"
-        assert table.loc[row.point, "status"] == row.outcome == said
+        outcome = "optimal but M3_fdc not reached" if row in missed else "optimal"
+        assert table.loc[row.point, "status"] == row.outcome == outcome
         assert row.status == "optimal"
     heading, grid, *_ = study_table.tables(serial.study, serial.solved)
     assert isinstance(grid, TextTable)
@@ -154,7 +154,7 @@ def test_a_row_that_misses_its_goal_is_nowhere_called_optimal_alone(serial):
     assert outputs.what(answer.result).shortfall == "M3_fdc not reached"
 
 
-def test_changes_along_a_sweep_name_the_limits_that_come_and_go(serial):
+def test_changes_along_a_sweep_name_the_limits_that_become_active_or_inactive(serial):
     data = serial.as_dict()
     assert list(data) == ["problem", "target", "rows", "units", "changes", "gaps", "provenance"]
     first = data["changes"][0]
@@ -166,14 +166,14 @@ def test_changes_along_a_sweep_name_the_limits_that_come_and_go(serial):
 
 def test_two_numbers_make_every_combination_and_clashes_stay_rows_with_their_reason():
     over = {"limits.swing.min": ["23 deg", "23.2 deg"], "limits.swing.max": ["23.1 deg", "23.4 deg"]}
-    found = lo.sweep("beatup", over, target="torque")
-    assert [tuple(row.place.values()) for row in found.rows] == [
+    result = lo.sweep("beatup", over, target="torque")
+    assert [tuple(row.place.values()) for row in result.rows] == [
         (low, high) for low in map(swing_min, (23, 23.2)) for high in map(swing_min, (23.1, 23.4))
     ]
-    assert [row.status for row in found.rows] == ["optimal", "optimal", "failed", "optimal"]
-    assert "min is more than max" in found.rows[2].reason
-    assert found.as_dict()["changes"] == []
-    assert found.table()["reason"].isna().tolist() == [True, True, False, True]
+    assert [row.status for row in result.rows] == ["optimal", "optimal", "failed", "optimal"]
+    assert "min is more than max" in result.rows[2].reason
+    assert result.as_dict()["changes"] == []
+    assert result.table()["reason"].isna().tolist() == [True, True, False, True]
 
 
 def swing_min(degrees):
@@ -187,26 +187,26 @@ def test_an_inch_machine_is_shown_in_inches():
     assert {"l1 [in]", "m4e [lb]", "peak_torque [lbf*in]"} <= set(table.columns)
 
 
-def test_where_every_local_optimum_is_the_best_nothing_starts_warm():
-    found = lo.sweep("shedding", {"operation.speed": "200:400:50 rpm"})
-    assert found.study.settings["cold"] is True
-    assert [row.parent for row in found.rows] == [None] * 5
-    assert found.rows[4].figures["K1"] == pytest.approx(46819.099799, rel=1e-9)
+def test_with_only_global_optima_no_point_starts_warm():
+    result = lo.sweep("shedding", {"operation.speed": "200:400:50 rpm"})
+    assert result.study.settings["cold"] is True
+    assert [row.parent for row in result.rows] == [None] * 5
+    assert result.rows[4].figures["K1"] == pytest.approx(46819.099799, rel=1e-9)
 
 
-def test_the_key_follows_what_rows_depend_on_and_nothing_else(tmp_path):
+def test_the_key_depends_on_what_rows_depend_on(tmp_path):
     scene = lo.load("beatup")
     first = sweep.plan_sweep(scene, OVER)
     same = sweep.plan_sweep(scene.set("problem.title", "another"), {"operation.M0": "600:900:15 N*m"})
     assert same.key == first.key
-    others = [
+    changed = [
         sweep.plan_sweep(scene.set("operation.speed", "601 rpm"), OVER),
         sweep.plan_sweep(scene, {"operation.M0": "600:900:20 N*m"}),
         sweep.plan_sweep(scene, OVER, "torque"),
         sweep.plan_sweep(scene, OVER, accuracy=1e-9),
         sweep.plan_sweep(scene, OVER, seed=1),
     ]
-    assert len({first.key, *(other.key for other in others)}) == 6
+    assert len({first.key, *(plan.key for plan in changed)}) == 6
 
 
 def test_the_key_follows_the_contents_of_a_table_that_the_scene_names(tmp_path):
@@ -237,7 +237,7 @@ def test_bad_input_is_refused_before_anything_is_solved(over, words):
         sweep.plan_sweep(lo.load("beatup"), over)
 
 
-def test_a_store_and_a_number_of_workers_are_asked_for_properly(tmp_path):
+def test_resume_needs_a_store_and_workers_exclude_an_executor(tmp_path):
     with pytest.raises(BadInput, match="nothing to resume from"):
         lo.sweep("beatup", OVER, resume=True)
     with ThreadPoolExecutor(1) as threads, pytest.raises(BadInput, match="an executor and a number of workers"):
@@ -245,7 +245,7 @@ def test_a_store_and_a_number_of_workers_are_asked_for_properly(tmp_path):
 
 
 def test_rows_do_not_grow_with_the_number_of_points(serial):
-    """Nothing is kept of a solve but its row: a few kilobytes."""
+    """Only the row of a solve stays in memory: a few kilobytes."""
     import json
 
     assert max(len(json.dumps(row.as_dict())) for row in serial.rows) < 6000

@@ -1,4 +1,4 @@
-"""Sweeps with each effect on, alone and together: every row is what a solve of its own gives."""
+"""Sweeps with every effect on, one by one and together: every row agrees with a separate solve."""
 
 import functools
 import math
@@ -24,17 +24,17 @@ MACHINES: dict[str, tuple[str | Path, dict[str, str]]] = {
         {"operation.speed": "560:620:3 rpm", "effects.resistance.torque": "700:800:5 N*m"},
     ),
 }
-"""The scene of each job, and two numbers to sweep over, 21 values of each."""
+"""Scene of every job, and two numbers to sweep over, 21 values each."""
 
 
 @functools.cache
 def machine(job):
-    """Return the scene of a job with the effects that take no values in [available]."""
+    """Scene of a job, with the effects that have no values in [available]."""
     scene = lo.load(MACHINES[job][0])
     bare = [
         name
-        for name, said in study.effects_without_values(scene, study.known_effects(scene)).items()
-        if "no values to set" in said
+        for name, advice in study.effects_without_values(scene, study.known_effects(scene)).items()
+        if "no values to set" in advice
     ]
     for name in bare:
         scene = scene.with_effect(name).without_effect(name)
@@ -42,13 +42,13 @@ def machine(job):
 
 
 def choices(job):
-    """Return what is put on: each effect with what it needs, and all that combine together."""
+    """Effects to put on, by name: every effect with those that it needs, and all that combine."""
     scene = machine(job)
     known = study.known_effects(scene)
-    alone = {e.name: (*(b for b in e.beside if b not in scene.effects), e.name) for e in known}
-    found = {name: own for name, own in alone.items() if name not in scene.effects}
+    single = {e.name: (*(b for b in e.beside if b not in scene.effects), e.name) for e in known}
+    single = {name: effects for name, effects in single.items() if name not in scene.effects}
     together = study.combine_effects(known, uncoiled.scene(scene) if job == "shedding" else scene).effects
-    return found | {ALL: tuple(e.name for e in together if e.name not in scene.effects and not isinstance(e, Speed))}
+    return single | {ALL: tuple(e.name for e in together if e.name not in scene.effects and not isinstance(e, Speed))}
 
 
 CASES = [pytest.param(job, name, id=f"{job}-{name}") for job in MACHINES for name in choices(job)]
@@ -56,54 +56,54 @@ QUICK = [("shedding", "joint_forces"), ("linkage", "mass.rod")]
 
 
 def rows_that_differ(scene, over, target=None):
-    """Return the rows of a sweep that are not what a solve of their own gives, each with what differs."""
-    found = lo.sweep(scene, over, target=target)
-    assert len(found.rows) == found.study.size
-    return {row.point: said for row in found.rows if (said := differences(row, found.study))}
+    """Differences of every row of a sweep from a separate solve, by point, without equal rows."""
+    result = lo.sweep(scene, over, target=target)
+    assert len(result.rows) == result.study.size
+    return {row.point: texts for row in result.rows if (texts := differences(row, result.study))}
 
 
 def differences(row, plan):
-    """Return what of a row a solve of its own gives otherwise."""
+    """Differences of a row from a separate solve."""
     answer = lo.solve(plan.scene_at(row.point), plan.target)
     if row.status != answer.status:
         return [f"{row.status} ({row.reason}), and not {answer.status} ({answer.message})"]
-    said = []
+    texts = []
     passed = answer.certificate is not None and answer.certificate.passed
     if row.certified != passed:
-        said.append(f"certified: {row.certified}, and not {passed}")
-    if (binds := set(row.multipliers)) != (own := set(sweep.multipliers(answer.result))):
-        said.append(f"what binds: {binds ^ own}")
+        texts.append(f"certified: {row.certified}, and not {passed}")
+    if (binds := set(row.multipliers)) != (active := set(sweep.multipliers(answer.result))):
+        texts.append(f"what binds: {binds ^ active}")
     if row.figures.keys() != answer.figures.keys():
-        return [*said, f"figures: {row.figures.keys() ^ answer.figures.keys()}"]
+        return [*texts, f"figures: {row.figures.keys() ^ answer.figures.keys()}"]
     for name, value in answer.figures.items():
-        if not alike(row.figures[name], value, 1e-6 if name in plan.shown else 1e-5):
-            said.append(f"{name}: {row.figures[name]}, and not {value}")
-    return said
+        if not agree(row.figures[name], value, 1e-6 if name in plan.shown else 1e-5):
+            texts.append(f"{name}: {row.figures[name]}, and not {value}")
+    return texts
 
 
-def alike(one, other, share):
-    """Say whether two figures agree; those that are sought do to the accuracy of a solve, others to its root."""
-    if one is None or other is None or not math.isfinite(other):
-        return (one is None) == (other is None or not math.isfinite(other))
-    return abs(one - other) <= share * max(1.0, abs(other))
+def agree(value, reference, share):
+    """Whether two figures agree; share: the accuracy of a solve for objectives, its root for other figures."""
+    if value is None or reference is None or not math.isfinite(reference):
+        return (value is None) == (reference is None or not math.isfinite(reference))
+    return abs(value - reference) <= share * max(1.0, abs(reference))
 
 
 @pytest.mark.slow
 def test_torques_with_joint_forces_on_are_those_without_them():
-    """A figure that reads mass and radius of the counterweight, where the solve knows their product alone."""
+    """A figure reads mass and radius of the counterweight, while the solve uses only their product."""
     over = {"operation.M0": "720:760:10 N*m"}
     scene = lo.load("beatup")
-    bare, found = lo.sweep(scene, over), lo.sweep(scene.with_effect("joint_forces"), over)
-    assert [row.status for row in found.rows] == ["optimal"] * 5
-    for row, other in zip(found.rows, bare.rows, strict=True):
-        assert row.parent == other.parent
-        assert all(row.figures[name] == value for name, value in other.figures.items() if value is not None)
+    bare, forced = lo.sweep(scene, over), lo.sweep(scene.with_effect("joint_forces"), over)
+    assert [row.status for row in forced.rows] == ["optimal"] * 5
+    for row, reference in zip(forced.rows, bare.rows, strict=True):
+        assert row.parent == reference.parent
+        assert all(row.figures[name] == value for name, value in reference.figures.items() if value is not None)
         assert row.figures["force_A"] > 0.0
 
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("job", "name"), QUICK)
-def test_five_rows_with_an_effect_on_are_what_solves_give(job, name):
+def test_five_rows_with_an_effect_on_agree_with_solves(job, name):
     key, values = next(iter(MACHINES[job][1].items()))
     span, unit = values.split(" ")
     first, last, step = map(float, span.split(":"))
@@ -114,7 +114,7 @@ def test_five_rows_with_an_effect_on_are_what_solves_give(job, name):
 @pytest.mark.few(0, slow=8)
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize(("job", "name"), CASES)
-def test_every_row_with_an_effect_on_is_what_a_solve_gives(job, name, axis):
+def test_every_row_with_an_effect_on_agrees_with_a_solve(job, name, axis):
     key = list(MACHINES[job][1])[axis]
     scene, over = machine(job).with_effect(*choices(job)[name]), {key: MACHINES[job][1][key]}
     if name == "speed_fluctuation":

@@ -49,14 +49,14 @@ class Budget(StudyResult[BudgetResult]):
         """A line per effect, their sum, the motor, and remarks."""
         result, scene = self.result, self.result.scene
         peak = scene.show(_rounded(result.total.at_peak, result.total.peak), "torque")
-        first = f"{scene.name}: the crank torque is largest, {peak}, at {scene.show(result.found.angle, 'angle')}"
+        first = f"{scene.name}: the crank torque is largest, {peak}, at {scene.show(result.torque.angle, 'angle')}"
         motor = tuple((label, _motor(result, name)) for name, (label, _) in MOTOR.items())
         shares = text_table(_columns(result), first=(0, 1, 5))
         return [first, shares, TextTable("Motor", ("", ""), motor), *(f"Remark: {text}." for text in result.remarks)]
 
     def charts(self) -> Charts:
         """Each effect's share over the turn, and their sum."""
-        scene, record = self.result.scene, self.result.found
+        scene, record = self.result.scene, self.result.torque
         unit, shown = scene.shown_in("torque"), scene.shown_in("angle")
         size, angle = factor(unit), factor(shown)
         rows = thinned(np.degrees(record.phi))
@@ -118,4 +118,4 @@ def _motor(result: BudgetResult, name: str) -> str:
     if value is None:
         return f"not known: {result.undefined[name]}"
     text = scene.show(value, MOTOR[name][1])
-    return f"{text} for a fluctuation of {result.found.fluctuation:g}" if name == "flywheel" else text
+    return f"{text} for a fluctuation of {result.torque.fluctuation:g}" if name == "flywheel" else text

@@ -246,7 +246,9 @@ class Subject:
     def __init__(self, scene: Scene) -> None:
         self.scene, self.job = scene, registry.of(scene)
         self.studied: Studied = self.job.studied(scene)
-        self.targets = [StudiedTarget(scene, name) for name in self.studied.targets if name in check.served(scene)]
+        self.targets = [
+            StudiedTarget(scene, name) for name in self.studied.targets if name in check.available_targets(scene)
+        ]
 
     @functools.cached_property
     def sampler(self) -> Sampler:

@@ -67,7 +67,7 @@ def test_each_study_has_a_chart_of_its_numbers(studies):
     left, right, first, last, bottom, top, least, most = map(float, shares.get("data-ends").split())
     peak = points[np.argmax(np.abs(least + (bottom - points[:, 1]) / (bottom - top) * (most - least)))]
     at = first + (peak[0] - left) / (right - left) * (last - first)
-    assert at == pytest.approx(np.degrees(found.found.angle), abs=2.0)
+    assert at == pytest.approx(np.degrees(found.torque.angle), abs=2.0)
     told = [each.get("aria-label") for each in drawn(pages["tolerance"])]
     assert told == [
         f"machines [%] over {name}"

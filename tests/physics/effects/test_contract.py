@@ -17,7 +17,7 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Check, Demand, Inputs
 from loomopt.physics.schema import Figure
-from loomopt.studies.check import served
+from loomopt.studies.check import available_targets
 
 UNIT = {"beatup": "N*m", "rapier": "N", "shedding": "N"}
 """Of the output's force."""
@@ -238,7 +238,7 @@ def test_numbers_of_an_effect_are_chosen_the_least_made_so_and_what_nothing_read
     changes = {"effects.made_up_plate": dict(made_up.PLATE.examples[0])}
     changes |= {f"bounds.{name}": {"min": low, "max": high} for name, (low, high) in ranges.items()}
     scene = lo.load(job).update(changes)
-    for target in served(scene):
+    for target in available_targets(scene):
         answer = lo.solve(scene, target, starts=1)
         assert (answer.status, answer.certificate.passed) == ("optimal", True), target
         assert answer.design["spare"] == pytest.approx(0.007, rel=1e-9), target
@@ -250,8 +250,8 @@ def test_numbers_of_an_effect_are_chosen_the_least_made_so_and_what_nothing_read
 @every_job
 def test_every_target_still_certifies_with_made_up_effects_on(job):
     scene = scene_of(job)
-    assert served(scene) == list(scene.schema.targets)
-    for target in served(scene)[1:]:
+    assert available_targets(scene) == list(scene.schema.targets)
+    for target in available_targets(scene)[1:]:
         answer = lo.solve(scene, target, starts=1)
         assert (answer.status, answer.certificate.passed) == ("optimal", True), target
 

@@ -14,10 +14,15 @@ import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.scenes.packaged import problems
 from loomopt.solving.certificate import taylor_bounds
-from loomopt.studies.check import served
+from loomopt.studies.check import available_targets
 
 PAIRS = [
-    *((name, target) for name in problems() for target in served(lo.load(name)) if lo.load(name).job in JOBS),
+    *(
+        (name, target)
+        for name in problems()
+        for target in available_targets(lo.load(name))
+        if lo.load(name).job in JOBS
+    ),
     *(("path-18", "path"), ("knuckle-press", "torque"), ("shaper", "torque"), ("sixbar-sley", "balance")),
 ]
 each_pair = pytest.mark.parametrize(("name", "target"), slow.after(len(PAIRS) - 2, PAIRS))

@@ -41,7 +41,7 @@ def shedding():
 
 
 def differences(folder, trade):
-    return [text for _, found in check.checked_front(trade, check.read_reference(folder / NAME)) for text in found]
+    return [text for _, found in check.check_front(trade, check.read_reference(folder / NAME)) for text in found]
 
 
 def edited(folder, line, column, new):
@@ -75,7 +75,7 @@ def test_a_front_stands_for_the_scene_that_is_named_after_its_job():
 
 
 def test_five_designs_are_solved_again_and_nothing_differs(shedding, copy):
-    found = list(check.checked_front(shedding, check.read_reference(copy / NAME)))
+    found = list(check.check_front(shedding, check.read_reference(copy / NAME)))
     assert found == [("optimal", [])] * 5
 
 
