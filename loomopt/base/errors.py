@@ -32,6 +32,10 @@ def clean(text: str, longest: int = 1000) -> str:
     return kept + ending
 
 
+class FormerNameWarning(FutureWarning):
+    """A figure is called by its former name."""
+
+
 class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch it by this name)
     """Input that cannot be worked with, as one plain message.
 

@@ -2,7 +2,8 @@
 
 import functools
 from collections.abc import Callable, ItemsView, Iterable, Iterator, Mapping, Sequence
-from typing import Any, NoReturn, TypeVar, overload
+from dataclasses import dataclass
+from typing import Any, Generic, NoReturn, TypeVar, overload
 
 
 class Frozen(dict[str, Any]):
@@ -106,3 +107,22 @@ class Shown:
 def show_by(html: Callable[[Shown], str]) -> None:
     """Set the function that shows records as HTML."""
     _SHOWN_BY[:] = [html]
+
+
+Record = TypeVar("Record", covariant=True)
+
+
+@dataclass(frozen=True, repr=False)
+class RecordHolder(Generic[Record]):
+    """Holder of a record that a computation returned."""
+
+    result: Record
+
+    def __getattr__(self, name: str) -> Any:
+        """Attribute of the record."""
+        if name == "result" or name.startswith("__"):  # while it is being unpickled there is no record yet
+            raise AttributeError(name)
+        return getattr(self.result, name)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *(name for name in dir(self.result) if not name.startswith("_"))})

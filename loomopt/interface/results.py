@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 from loomopt.base import arguments, records
 from loomopt.base.arguments import renamed
 from loomopt.base.records import lazy
-from loomopt.interface.record_holder import RecordHolder
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
-from loomopt.scenes import designs, family
+from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report, solution
 from loomopt.solving.options import check_numbers, target_name
@@ -31,7 +30,7 @@ PICTURE = arguments.PICTURE
 
 
 @dataclass(frozen=True, repr=False)
-class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
+class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
     """A given design in its scene: its figures and limits, SI and rad; nothing was optimised.
 
     target: whose limits it was judged by.
@@ -48,6 +47,8 @@ class Evaluation(RecordHolder[solution.Evaluated], records.Shown):
     @lazy
     def members(self) -> "tuple[Evaluation, ...]":
         """Of a family each machine by itself."""
+        from loomopt.scenes import family
+
         return tuple(_judged(member, self.scene, family.of_target(self.scene)) for member in self.result.members)
 
     def as_dict(self) -> dict[str, Any]:

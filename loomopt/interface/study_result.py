@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 from loomopt.base import arguments
 from loomopt.base.errors import refusal
 from loomopt.base.files import atomically, suffix
+from loomopt.base.records import Record, RecordHolder
 from loomopt.interface.files import outputs
 from loomopt.interface.progress import cell_progress
-from loomopt.interface.record_holder import Record, RecordHolder
 from loomopt.picture.chart import Charts
 from loomopt.picture.shapes import Drawing
 from loomopt.picture.table import TextTable

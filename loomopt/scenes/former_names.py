@@ -4,14 +4,10 @@ import warnings
 from collections.abc import Mapping
 from typing import Any
 
-from loomopt.base.errors import refusal
+from loomopt.base.errors import FormerNameWarning, refusal
 
 TABLES = ("limits", "accept")
 """Tables of a scene whose keys are figures."""
-
-
-class FormerNameWarning(FutureWarning):
-    """A figure is called by its former name."""
 
 
 def current(name: str, former: Mapping[str, str]) -> str:

@@ -15,8 +15,8 @@ WORDS = {"annotated_types", "loomopt", "pydantic", "pydantic_core", "typer", "ty
 HELPERS = {"annotated_doc", "click", "shellingham", "typing_inspection"}
 """What Typer and pydantic bring themselves, by version."""
 SOLVER = {"casadi", "mpmath", "gmpy2"}
-MODULES, OWN = 520, 125
-"""Most modules that any command imports, and most of this package's."""
+MODULES = 520
+"""Most modules that any command imports."""
 LISTED = """import json, sys
 from loomopt.interface.cli.app import run
 code = max(run(words) for words in json.loads(sys.argv[1]))
@@ -66,7 +66,6 @@ def test_a_command_imports_only_what_it_uses(arguments, status, more):
     assert code == status
     assert packages(modules) <= WORDS | HELPERS | {"numpy"} | more
     assert len(modules) <= MODULES
-    assert len([name for name in modules if name.split(".")[0] == "loomopt"]) <= OWN
 
 
 @pytest.mark.parametrize("arguments", [("--version",), ("--help",), ("solve", "--help"), ("slove",)])
@@ -74,7 +73,6 @@ def test_what_reads_no_scene_imports_nothing_but_words(arguments):
     _, modules = imported(*arguments)
     assert packages(modules) <= WORDS | HELPERS
     assert len(modules) <= 290
-    assert len([name for name in modules if name.split(".")[0] == "loomopt"]) <= 13  # four of them files of commands
 
 
 def test_the_list_reads_heads_of_scenes_and_computes_nothing():
@@ -126,7 +124,6 @@ def test_solving_the_beatup_imports_no_module_of_another_job_no_study_and_no_pic
     )
     own = {module for module in modules if module.startswith("loomopt")}
     assert not {module for module in own if any(word in module for word in foreign)}
-    assert len(own) <= OWN
 
 
 @pytest.mark.parametrize(("given", "expected"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])

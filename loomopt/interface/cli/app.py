@@ -30,7 +30,6 @@ from loomopt.interface.cli.shell import (
     remark,
     worded,
 )
-from loomopt.picture.table import TextTable
 
 HEADER = Path("include", "coin-or", "IpoptConfig.h")
 """Where IPOPT says its version: beside CasADi's library in its wheel, below the prefix where both were built apart."""
@@ -204,6 +203,8 @@ def check(
     finally:
         if outcomes:
             lines = tuple((o.problem, o.target, o.status, "; ".join(o.differences) or "reproduces") for o in outcomes)
+            from loomopt.picture.table import TextTable
+
             layout.show(TextTable("", ("problem", "target", "status", "against the reference"), lines))
     differ = [outcome for outcome in outcomes if outcome.differences]
     if differ:

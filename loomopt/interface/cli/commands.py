@@ -17,16 +17,16 @@ from loomopt.interface.cli.options import (
     SceneOptions,
 )
 from loomopt.interface.cli.shell import DIFFERS, call_progress, read_number, read_request, remark
-from loomopt.picture.table import TextTable
 
 if TYPE_CHECKING:
     from loomopt.interface.results import Evaluation
+    from loomopt.picture.table import TextTable
     from loomopt.scenes.designs import Design as DesignGiven
     from loomopt.scenes.scene import Scene
 
 
 def tell(
-    as_json: bool, document: Callable[[], Mapping[str, object]], parts: Callable[[], Sequence[str | TextTable]]
+    as_json: bool, document: Callable[[], Mapping[str, object]], parts: "Callable[[], Sequence[str | TextTable]]"
 ) -> None:
     """Print what was found as one JSON object, or its parts."""
     if as_json:
@@ -73,6 +73,7 @@ def list_problems(as_json: Json = False) -> None:
         print(outputs.json_text({"problems": [head._asdict() for head in heads]}))
     else:
         from loomopt.interface.text import layout
+        from loomopt.picture.table import TextTable
 
         lines = [
             row

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO, TypeVar
 
-from loomopt.base.errors import BadInput, clean
-from loomopt.scenes.former_names import FormerNameWarning
+from loomopt.base.errors import BadInput, FormerNameWarning, clean
 
 if TYPE_CHECKING:
     from loomopt.interface.progress import Progress

@@ -14,7 +14,6 @@ from loomopt.model.limits import CycleLimit, Limit
 from loomopt.model.program import Alias, shortfall
 from loomopt.physics.effects.kinds import label
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
-from loomopt.scenes import family
 from loomopt.scenes.document import copied
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import FAMILY
@@ -314,6 +313,8 @@ def demand_single(found: Evaluated, what: str) -> None:
 
 def _member_dict(member: Evaluated, whole: Scene | None) -> dict[str, Any]:
     """A member of a family as JSON data, with what it changes of the scene; whole: the scene of the family."""
+    from loomopt.scenes import family
+
     target = family.of_target(whole) if whole else ""
     told = {key: value for key, value in member.as_dict(target).items() if key not in ("problem", "effects", "units")}
     return {"change": dict(member.change), **told}

@@ -6,10 +6,9 @@ import warnings
 import pytest
 from support.linkage_scenes import FOUR_BAR, changed, four_bar
 
-from loomopt.base.errors import BadInput
+from loomopt.base.errors import BadInput, FormerNameWarning
 from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
-from loomopt.scenes.former_names import FormerNameWarning
 from loomopt.studies.front import front
 from loomopt.studies.sweep import plan_sweep
 
