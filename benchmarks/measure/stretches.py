@@ -68,7 +68,7 @@ def timed(planned: Callable[[], SceneStudy], together: bool) -> tuple[tuple[Row,
     began = time.process_time()
     if together:
         return run.run(planned()), time.process_time() - began
-    alone = mock.patch.object(neighbour_newton, "solved", lambda asked: [None] * len(asked))
+    alone = mock.patch.object(neighbour_newton, "solve_between", lambda tasks: [None] * len(tasks))
     with alone, mock.patch.object(sweep, "MOST_COARSE", 10**6):
         # What a study has planned it keeps: with other points from scratch it is another one.
         return run.run(planned()), time.process_time() - began

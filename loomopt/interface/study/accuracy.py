@@ -14,7 +14,7 @@ from loomopt.scenes.scene import Scene
 from loomopt.studies.accuracy import accuracy
 from loomopt.studies.accuracy.accuracy import AccuracyResult, in_time
 from loomopt.studies.accuracy.readings import NUMBERS
-from loomopt.studies.accuracy.subject import LadderRow, grouped, setting_text
+from loomopt.studies.accuracy.subject import LadderRow, group_rows, setting_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,7 +37,7 @@ class AccuracyStudy(StudyResult[AccuracyResult]):
     def tables(self) -> list[str | TextTable]:
         """Rows, the measured orders, the advice."""
         result = self.result
-        rows = [row for ladder in grouped(result.rows).values() for row in ladder]
+        rows = [row for ladder in group_rows(result.rows).values() for row in ladder]
         named = dict.fromkeys([*result.orders, *result.knees])
         orders = [f"{result.orders[name]:.2f}" if name in result.orders else "" for name in named]
         knees = [setting_text(result.knees[name]) if name in result.knees else "" for name in named]
@@ -57,7 +57,7 @@ class AccuracyStudy(StudyResult[AccuracyResult]):
     def charts(self) -> Charts:
         """Error of each method over time, or over its setting, a chart for each quantity."""
         ladders: dict[str, list[list[LadderRow]]] = {}
-        for rows in grouped(self.result.rows).values():
+        for rows in group_rows(self.result.rows).values():
             known = [row for row in rows if row.error is not None and row.seconds]
             if known:
                 ladders.setdefault(known[0].quantity, []).append(known)

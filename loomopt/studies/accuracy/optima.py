@@ -18,12 +18,12 @@ from loomopt.studies.accuracy.subject import Ladder, LadderReference, Rung, Sett
 
 EXCHANGE, UNIFORM, TOLERANCE, HESSIAN = "exchange", "uniform points", "IPOPT tolerance", "Hessian"
 CLAIM = "claimed peak"
-"""Whole-cycle rows as the solver states them, against the same rows true over the whole cycle."""
+"""Reading: error of whole-cycle rows as the solver evaluates them."""
 
 
 @dataclass(frozen=True)
 class Amount:
-    """Settings of the solve ladders; fewer for a quick study."""
+    """Settings of the solve ladders; a quick study has fewer."""
 
     accuracies: tuple[float, ...]
     points: tuple[int, ...]
@@ -53,14 +53,14 @@ def ladders(subject: Subject, amount: Amount) -> Iterator[Ladder]:
 
 
 def _reference(target: StudiedTarget, quantity: str) -> LadderReference | None:
-    """Return what a reading of a solve is compared with."""
+    """Reference of a reading of a solve."""
     if quantity == target.quantity(CLAIM):
         return LadderReference(0.0, size=1.0)
     return target.reference("design" if quantity == target.quantity("design") else target.figure)
 
 
 def _exchange(target: StudiedTarget, accuracies: Sequence[float]) -> Ladder:
-    """Return what a designer gets by `solve --accuracy`: refined points, Newton's last steps, the certificate."""
+    """Ladder of `solve --accuracy`: refined points, last Newton steps, certificate."""
 
     def read(setting: float, answer: Solution) -> Rung:
         if answer.status != "optimal":
@@ -69,14 +69,14 @@ def _exchange(target: StudiedTarget, accuracies: Sequence[float]) -> Ladder:
         sampler = Sampler(target.program.model, {**target.program.parameters, **x}, Settings(setting).sample_count)
         values = {
             target.quantity(target.figure): answer.figures[target.figure],
-            target.quantity("design"): target.placed(x),
-            target.quantity(CLAIM): _unrefined(target, sampler),
+            target.quantity("design"): target.scale_variables(x),
+            target.quantity(CLAIM): _peak_error(target, sampler),
         }
         return Rung(values, answer.status)
 
     return Ladder(
         EXCHANGE,
-        tuple(target.quantity(what) for what in (target.figure, CLAIM, "design")),
+        tuple(target.quantity(reading) for reading in (target.figure, CLAIM, "design")),
         tuple(accuracies),
         lambda setting: engine.solve(target.scene, target.name, accuracy=setting),
         read,
@@ -86,8 +86,8 @@ def _exchange(target: StudiedTarget, accuracies: Sequence[float]) -> Ladder:
     )
 
 
-def _unrefined(target: StudiedTarget, sampler: Sampler) -> float:
-    """Return by how much refined peaks, as a certificate reads them, miss those of 40 digits, in natural sizes."""
+def _peak_error(target: StudiedTarget, sampler: Sampler) -> float:
+    """Largest error of refined peaks, as a certificate reads them, against 40 digits, in scales."""
     program, worst = target.program, 0.0
     rows = {row: o.scale for o in program.objectives for row in o.quantities}
     rows |= {limit.row: limit.scale for limit in program.cycle_limits.values()}
@@ -96,8 +96,8 @@ def _unrefined(target: StudiedTarget, sampler: Sampler) -> float:
     return worst
 
 
-def _solved(target: StudiedTarget, settings: Settings) -> Point:
-    """Return the first point that one of the job's own starts leads to; the first failure where none does."""
+def _solve_from_starts(target: StudiedTarget, settings: Settings) -> Point:
+    """First usable point from the job's starts; the first failure where no start leads to one."""
     first = None
     for start in exchange.starts(target.program, len(target.program.starts)):
         point = exchange.solve(target.program, start, settings)
@@ -113,26 +113,26 @@ def _solves(
     target: StudiedTarget,
     method: str,
     settings: tuple[Setting, ...],
-    asked: Callable[[Any], Settings],
+    make_settings: Callable[[Any], Settings],
     step: Callable[[Any], float] | None,
     claims: bool = False,
 ) -> Ladder:
-    """Return a ladder of bare solves, without the Newton steps that end one otherwise."""
-    figure, design, claim = (target.quantity(what) for what in (target.figure, "design", CLAIM))
+    """Ladder of solves without the final Newton steps; make_settings: settings of the solver at one of the ladder's."""
+    figure, design, claim = (target.quantity(reading) for reading in (target.figure, "design", CLAIM))
 
     def read(setting: Any, point: Point) -> Rung:
         status = f"{point.status}, {point.iterations} iterations"
         if not point.usable:
             return Rung({}, status)
-        values: dict[str, Any] = {figure: target.merit(point.x), design: target.placed(point.x)}
-        return Rung(values | ({claim: _excess(target, point, asked(setting))} if claims else {}), status)
+        values: dict[str, Any] = {figure: target.merit(point.x), design: target.scale_variables(point.x)}
+        return Rung(values | ({claim: _excess(target, point, make_settings(setting))} if claims else {}), status)
 
     quantities = (figure, claim, design) if claims else (figure, design)
     return Ladder(
         method,
         quantities,
         settings,
-        lambda setting: _solved(target, asked(setting)),
+        lambda setting: _solve_from_starts(target, make_settings(setting)),
         read,
         functools.partial(_reference, target),
         step,
@@ -140,54 +140,55 @@ def _solves(
 
 
 def _excess(target: StudiedTarget, point: Point, settings: Settings) -> float:
-    """Return by how much true whole-cycle rows exceed what the solver holds for true at its points."""
+    """Largest excess of whole-cycle rows over their values at the solver's points, in scales."""
     calls = Calls(target.program, settings)
     sampler = calls.sampler(point.x)
     if sampler is None:
         return math.nan
-    found = zip(calls.families, calls.peaks(sampler), strict=True)
-    return max((calls.excess(family, e, point.extra) for family, of in found for e in of), default=0.0)
+    peaks = zip(calls.families, calls.peaks(sampler), strict=True)
+    excesses = (calls.excess(family, extreme, point.extra) for family, extremes in peaks for extreme in extremes)
+    return max(excesses, default=0.0)
 
 
 def _uniform(target: StudiedTarget, points: Sequence[int]) -> Ladder:
-    """Return solves on equal points of the turn: what is between them is not seen."""
+    """Ladder of solves on equal points of the turn: values between the points are not seen."""
 
-    def asked(count: int) -> Settings:
+    def make_settings(count: int) -> Settings:
         return Settings(uniform=count, polish=False)
 
-    return _solves(target, UNIFORM, tuple(points), asked, lambda count: 1 / count, claims=True)
+    return _solves(target, UNIFORM, tuple(points), make_settings, lambda count: 1 / count, claims=True)
 
 
 def _tolerance(target: StudiedTarget, tolerances: Sequence[float]) -> Ladder:
-    """Return solves to ever smaller tolerances of IPOPT."""
+    """Ladder of solves at smaller and smaller tolerances of IPOPT."""
 
-    def asked(tolerance: float) -> Settings:
+    def make_settings(tolerance: float) -> Settings:
         return Settings(tolerance=tolerance, polish=False)
 
-    return _solves(target, TOLERANCE, tuple(tolerances), asked, float)
+    return _solves(target, TOLERANCE, tuple(tolerances), make_settings, float)
 
 
 def _hessian(target: StudiedTarget) -> Ladder:
-    """Return solves with second derivatives, and with IPOPT's own guesses of them."""
+    """Ladder of solves with exact second derivatives, and with IPOPT's approximations."""
 
-    def asked(hessian: str) -> Settings:
+    def make_settings(hessian: str) -> Settings:
         return Settings(hessian=hessian, polish=False)
 
-    return _solves(target, HESSIAN, ("limited-memory", "exact"), asked, None)
+    return _solves(target, HESSIAN, ("limited-memory", "exact"), make_settings, None)
 
 
 def _family(target: StudiedTarget, family: LawFamily, counts: Sequence[int]) -> Ladder:
-    """Return optima over finer and finer sets of designs, against the limit that they tend to."""
+    """Ladder of optima over finer and finer families of designs, compared with their limit."""
     quantity = target.quantity(target.figure)
 
     def run(count: int) -> tuple[StudiedTarget, Point]:
-        own = StudiedTarget(target.scene.set(family.key, count), target.name)
-        return own, _solved(own, Settings())
+        member = StudiedTarget(target.scene.set(family.key, count), target.name)
+        return member, _solve_from_starts(member, Settings())
 
     def read(count: int, result: tuple[StudiedTarget, Point]) -> Rung:
-        own, point = result
+        member, point = result
         status = f"{point.status}, {point.iterations} iterations"
-        return Rung({quantity: own.merit(point.x)} if point.usable else {}, status)
+        return Rung({quantity: member.merit(point.x)} if point.usable else {}, status)
 
     @functools.cache
     def reference(_: str) -> LadderReference | None:

@@ -1,4 +1,4 @@
-"""Ladders of one given design: points of the turn, ways to a derivative, number systems. Nothing is solved."""
+"""Ladders of one given design, without any solve: points of the turn, kinds of derivatives, number systems."""
 
 import functools
 from collections.abc import Callable, Iterator, Sequence
@@ -21,8 +21,8 @@ SAMPLED, REFINED = "sampled points", "refined points"
 CLOSED, AUTOMATIC, DIFFERENCES, NUMBERS = "closed form", "automatic differentiation", "finite differences", "numbers"
 SAMPLES = (36, 72, 144, 360, 720, 3600, 36000, 100000)
 REFINED_FROM = (90, 180, 360, 720, 1440)
-ALIKE = 1e-2
-"""Peaks within this share of the highest are as high."""
+SAME_HEIGHT = 1e-2
+"""Relative difference within which peaks are equal."""
 STEPS = tuple(10.0**-k for k in range(1, 10))
 SYSTEMS = ("float64", "NumPy", "mpmath 40")
 
@@ -39,55 +39,55 @@ def ladders(subject: Subject) -> Iterator[Ladder]:
 
 
 def _sampled(subject: Subject) -> Ladder:
-    """Return largest values on equal points that miss the peak by as much as such points can: half a step.
+    """Ladder of largest values on equal points that miss the peak by half a step, the most that equal points can.
 
-    Of equal peaks, as a symmetric motion has, only one is looked at: the points would meet the others by chance.
+    Of equal peaks, as in a symmetric motion, only one is used, since the points could meet the others by chance.
     """
     sampler = subject.sampler
     windows = {figure: _window(sampler, *read) for figure, read in subject.peaks.items()}
 
     def run(count: int) -> dict[str, float]:
-        found = {}
+        figures = {}
         away = np.mod(TURN * (np.arange(count, dtype=np.float64) + 0.5) / count + np.pi, TURN) - np.pi
         for figure, (name, signed) in subject.peaks.items():
             centre, half = windows[figure]
             values = sampler.at(name, *sampler.cycle.located(centre + away))
             heights = values if signed else sampler.heights(name, values)
-            found[figure] = float(np.max(heights[np.abs(away) <= half], initial=-np.inf))
-        return found
+            figures[figure] = float(np.max(heights[np.abs(away) <= half], initial=-np.inf))
+        return figures
 
-    return _today(subject, SAMPLED, tuple(subject.peaks), SAMPLES, run, lambda count: 1 / count)
+    return _today_ladder(subject, SAMPLED, tuple(subject.peaks), SAMPLES, run, lambda count: 1 / count)
 
 
 def _window(sampler: Sampler, name: str, signed: bool) -> tuple[float, float]:
-    """Return a peak's crank angle, rad, and half the way to the nearest one that is as high."""
+    """Crank angle of a peak, rad, and half the distance to the nearest equal one."""
     heights = {sampler.angle(e): e.value if signed else e.height for e in sampler.extremes(name)}
     centre = max(heights, key=lambda angle: heights[angle])
-    alike = [angle for angle, height in heights.items() if height >= (1 - ALIKE) * heights[centre]]
-    ways = [abs((angle - centre + np.pi) % TURN - np.pi) for angle in alike if angle != centre]
+    equal = [angle for angle, height in heights.items() if height >= (1 - SAME_HEIGHT) * heights[centre]]
+    ways = [abs((angle - centre + np.pi) % TURN - np.pi) for angle in equal if angle != centre]
     return centre, min((way / 2 for way in ways if way > SAME_ANGLE), default=np.pi)
 
 
 def _refined(subject: Subject) -> Ladder:
-    """Return peaks refined between points, as every figure is read."""
+    """Ladder of peaks refined between points, as figures are read."""
     sampler = subject.sampler
 
     def run(count: int) -> dict[str, float]:
         fresh = Sampler(sampler.model, sampler.values, count)
-        found = {}
+        figures = {}
         for figure, (name, signed) in subject.peaks.items():
             extremes = fresh.extremes(name)
-            found[figure] = max(e.value if signed else e.height for e in extremes)
-        return found
+            figures[figure] = max(e.value if signed else e.height for e in extremes)
+        return figures
 
-    return _today(subject, REFINED, tuple(subject.peaks), REFINED_FROM, run, lambda count: 1 / count)
+    return _today_ladder(subject, REFINED, tuple(subject.peaks), REFINED_FROM, run, lambda count: 1 / count)
 
 
 def _crossing(subject: Subject, crossing: Crossing) -> Ladder:
-    """Return a crossing read off equal points, which begin where the true one lies half a step from one."""
+    """Ladder of a crossing read from equal points, with the true crossing half a step from the nearest one."""
     sampler, figure = subject.sampler, crossing.figure
     level = float(sampler.given.values[crossing.level])
-    true = _crossed(subject, crossing)
+    true = _crossing_angle(subject, crossing)
 
     def run(count: int) -> dict[str, float]:
         step = TURN / count
@@ -100,12 +100,12 @@ def _crossing(subject: Subject, crossing: Crossing) -> Ladder:
     def reference(quantity: str) -> LadderReference:
         return LadderReference(true)
 
-    ladder = _today(subject, SAMPLED, (figure,), SAMPLES, run, lambda count: 1 / count)
+    ladder = _today_ladder(subject, SAMPLED, (figure,), SAMPLES, run, lambda count: 1 / count)
     return Ladder(ladder.method, (figure,), SAMPLES, run, ladder.read, reference, ladder.step)
 
 
-def _crossed(subject: Subject, crossing: Crossing) -> Number:
-    """Return the crank angle, rad, of a crossing in many digits, by Newton's method."""
+def _crossing_angle(subject: Subject, crossing: Crossing) -> Number:
+    """Crank angle of a crossing, rad, in many digits, by Newton's method."""
     near = subject.job.figures(subject.scene, subject.job.today(subject.scene))[crossing.figure] or 0.0
     exact, cycle = subject.exact, subject.sampler.cycle
     switch, step = cycle.switch(cycle.place(near)[0]), reference_digits.tiny(exact.maths, REFERENCE_SLOPE)
@@ -117,7 +117,7 @@ def _crossed(subject: Subject, crossing: Crossing) -> Number:
     return angle
 
 
-def _today(
+def _today_ladder(
     subject: Subject,
     method: str,
     quantities: tuple[str, ...],
@@ -125,24 +125,28 @@ def _today(
     run: Callable[[Any], dict[str, Any]],
     step: Callable[[Any], float] | None = None,
 ) -> Ladder:
-    """Return a ladder whose runs give the readings of today's machine themselves."""
+    """Ladder whose runs return the readings of today's machine."""
     reference = functools.cache(subject.reference)
-    return Ladder(method, quantities, tuple(settings), run, lambda _, found: Rung(found), reference, step)
+    return Ladder(method, quantities, tuple(settings), run, lambda _, values: Rung(values), reference, step)
 
 
 def _derivatives(subject: Subject) -> Iterator[Ladder]:
-    """Yield three ways to the second derivative of the displacement, from the displacement or in closed form."""
+    """Yield ladders of the second derivative of the displacement: closed form, automatic, differences."""
     name, model, given = subject.studied.motion, subject.sampler.model, subject.sampler.given
     pieces, angles = subject.positions
     cycle = subject.sampler.cycle
 
-    def displaced(moved: Floats) -> Floats:
+    def displacement(moved: Floats) -> Floats:
         subject.sampler.session.positions += POSITIONS
-        return _each(subject.output(systems.numpy(), given, Node(moved, cycle.switch(pieces))).q, moved)
+        return _value_per_angle(subject.output(systems.numpy(), given, Node(moved, cycle.switch(pieces))).q, moved)
 
     def closed(_: str) -> dict[str, Any]:
         subject.sampler.session.positions += POSITIONS
-        return {name: _each(subject.output(systems.numpy(), given, Node(angles, cycle.switch(pieces))).q2, angles)}
+        return {
+            name: _value_per_angle(
+                subject.output(systems.numpy(), given, Node(angles, cycle.switch(pieces))).q2, angles
+            )
+        }
 
     def formula(system: Maths, phi: Number, places: Sequence[Number]) -> Number:
         symbols = model.given(system, {**subject.sampler.values, **subject.sampler.hints})
@@ -152,26 +156,26 @@ def _derivatives(subject: Subject) -> Iterator[Ladder]:
     def automatic() -> Callable[[Floats, Floats], Floats]:
         return expressions.second_derivative(formula, len(cycle.names))
 
-    def differentiated(_: str) -> dict[str, Any]:
+    def differentiate(_: str) -> dict[str, Any]:
         subject.sampler.session.positions += POSITIONS
         return {name: automatic()(angles, cycle.switches[pieces].T)}
 
     def differences(step: float) -> dict[str, Any]:
-        low, mid, high = (displaced(angles + k * step) for k in (-1, 0, 1))
+        low, mid, high = (displacement(angles + k * step) for k in (-1, 0, 1))
         return {name: (high - 2 * mid + low) / step**2}
 
-    yield _today(subject, CLOSED, (name,), ("NumPy",), closed)
-    yield _today(subject, AUTOMATIC, (name,), ("CasADi",), differentiated)
-    yield _today(subject, DIFFERENCES, (name,), STEPS, differences, float)
+    yield _today_ladder(subject, CLOSED, (name,), ("NumPy",), closed)
+    yield _today_ladder(subject, AUTOMATIC, (name,), ("CasADi",), differentiate)
+    yield _today_ladder(subject, DIFFERENCES, (name,), STEPS, differences, float)
 
 
-def _each(values: Number, angles: Floats) -> Floats:
-    """Return one value per angle: a formula may give a number."""
+def _value_per_angle(values: Number, angles: Floats) -> Floats:
+    """Values broadcast to the angles: a formula may return one number."""
     return np.broadcast_to(np.asarray(values, dtype=float), angles.shape)
 
 
 def _numbers(subject: Subject) -> Ladder:
-    """Return closed forms in float64, one by one and at once, and in 40 digits, against 60."""
+    """Ladder of closed forms in float64, one by one and as arrays, and in 40 digits, compared with 60."""
     name, sampler = subject.studied.motion, subject.sampler
     known = tuple(figure for figure in subject.studied.static if figure in sampler.static)
     pieces, angles = subject.positions
@@ -183,6 +187,6 @@ def _numbers(subject: Subject) -> Ladder:
         if system != "NumPy":
             return {name: subject.motion(exact.maths, exact.given), **single}
         node = Node(angles, sampler.cycle.switch(pieces))
-        return {name: _each(subject.output(systems.numpy(), exact.given, node).q2, angles), **single}
+        return {name: _value_per_angle(subject.output(systems.numpy(), exact.given, node).q2, angles), **single}
 
-    return _today(subject, NUMBERS, (name, *known), SYSTEMS, run)
+    return _today_ladder(subject, NUMBERS, (name, *known), SYSTEMS, run)

@@ -1,4 +1,4 @@
-"""What an accuracy study studies: one scene, its targets, and the references of everything a designer reads of it."""
+"""Subject of an accuracy study: a scene, its targets, the references of its quantities, and ladders of methods."""
 
 import functools
 import itertools
@@ -31,24 +31,23 @@ from loomopt.studies import check
 from loomopt.studies.accuracy import reference_digits
 from loomopt.studies.accuracy.reference_digits import CLOSED_DIGITS, REFERENCE_DIGITS
 
-TIGHTER, NO_ORDER, STILL, ONE_ORDER, LEAST_ORDER = 100.0, 100 * 2.0**-52, 2.0, 1.25, 0.25
-"""Work-precision rows: how many times better a reference is known than the error it judges; errors that are rounding;
-factor of the least error within which errors have stopped falling; factor of the middle slope within which slopes are
-one order; the least order that is convergence. Orders 1, 2 and 4 of made-up errors are told to 1 %
-(test_accuracy_ladders)."""
+TIGHTER, NO_ORDER, FLOOR_FACTOR, ONE_ORDER, LEAST_ORDER = 100.0, 100 * 2.0**-52, 2.0, 1.25, 0.25
+"""How many times more accurate a reference must be than the error; errors below NO_ORDER are rounding; factor of the
+least error within which errors no longer fall; factor of the median slope within which slopes are one order; least
+order of convergence. Orders 1, 2 and 4 of artificial errors are measured to 1 % (test_accuracy_ladders)."""
 
 Setting = float | int | str
 EPSILON = float(np.finfo(float).eps)
 BUDGET = 0.3
-"""Seconds after which a run is not repeated once more."""
+"""Seconds after which a run is not repeated again."""
 FAILURES = (ArithmeticError, ValueError, RuntimeError, BadInput, np.linalg.LinAlgError)
 
 
 @dataclass(frozen=True)
 class LadderReference:
-    """What a quantity truly is: a number or an array of any number system.
+    """Reference value of a quantity: a number or an array of any number system.
 
-    uncertainty: of the value, relative to `size`; size: what errors are relative to, the value itself without one.
+    uncertainty: of the value, relative to `size`. size: to which errors are relative, the value where it is 0.
     """
 
     value: Number
@@ -56,15 +55,15 @@ class LadderReference:
     size: float = 0.0
 
     def error(self, value: Number) -> float:
-        """Return the largest relative error of a value."""
-        pairs = list(zip(_each(value), _each(self.value), strict=True))
+        """Largest relative error of a value."""
+        pairs = list(zip(_list_numbers(value), _list_numbers(self.value), strict=True))
         size = self.size or max(abs(true) for _, true in pairs)
-        worst = max(abs(found - true) for found, true in pairs)
+        worst = max(abs(computed - true) for computed, true in pairs)
         return float(worst / size) if size else float(worst)
 
 
-def _each(value: Number) -> list[Number]:
-    """Return the numbers of a value; Python's own where they are NumPy's, so that every number system takes them."""
+def _list_numbers(value: Number) -> list[Number]:
+    """Numbers of a value; those of NumPy become Python's, which every number system accepts."""
     if isinstance(value, np.ndarray):
         return list(value.astype(float).ravel().tolist())
     return list(value) if isinstance(value, list | tuple) else [value]
@@ -72,7 +71,7 @@ def _each(value: Number) -> list[Number]:
 
 @dataclass(frozen=True)
 class Rung:
-    """What a run gave: quantity → value (none where it failed), and how it ended in the method's own words."""
+    """Result of a run: values by quantity, empty where it failed, and the status that the method reports."""
 
     values: Mapping[str, Any]
     status: str = "done"
@@ -80,12 +79,11 @@ class Rung:
 
 @dataclass(frozen=True)
 class Ladder:
-    """One method.
+    """One method at several settings.
 
-    settings: coarse to fine. run(setting): what is timed. read(setting, result): the values it gave, not timed.
-    reference(quantity): what they are compared with, None where there is none tight enough. step(setting): what the
-    error may be a power of; None for settings that are no sizes. counted(result): positions that a run looked at, all
-    that it did without it.
+    settings: coarse to fine. run(setting): is timed. read(setting, result): values of the run, not timed.
+    reference(quantity): reference value, None without an accurate one. step(setting): step of which the error may be a
+    power, None for settings without a step. count(result): number of positions evaluated; without it all of the run.
     """
 
     method: str
@@ -95,15 +93,15 @@ class Ladder:
     read: Callable[[Any, Any], Rung]
     reference: Callable[[str], LadderReference | None]
     step: Callable[[Any], float] | None = None
-    counted: Callable[[Any], int] | None = None
+    count: Callable[[Any], int] | None = None
 
 
 @dataclass(frozen=True)
 class LadderRow:
     """One quantity by one method at one setting.
 
-    error: relative, None where there is none to tell; seconds: least of the repeats after a warm-up; evaluations:
-    positions of the mechanism that a run looked at.
+    error: relative, None where it is unknown. seconds: least of the repeats after a warm-up. evaluations: number of
+    positions of the mechanism evaluated in a run.
     """
 
     quantity: str
@@ -115,8 +113,8 @@ class LadderRow:
     status: str
 
 
-def climbed(ladder: Ladder, repeats: int, on_run: Callable[[str], None] | None = None) -> Iterator[LadderRow]:
-    """Yield a ladder's rows, setting by setting; a run that fails is a row too."""
+def climb(ladder: Ladder, repeats: int, on_run: Callable[[str], None] | None = None) -> Iterator[LadderRow]:
+    """Yield the rows of a ladder, setting by setting; a failed run is a row too."""
     for setting in ladder.settings:
         if on_run:
             on_run(f"{ladder.method} {setting_text(setting)}")
@@ -132,76 +130,77 @@ def climbed(ladder: Ladder, repeats: int, on_run: Callable[[str], None] | None =
                 yield LadderRow(quantity, ladder.method, setting, None, None, spent, f"failed: {words}")
             continue
         for quantity in ladder.quantities:
-            error_, status = _judged(ladder, quantity, outcome)
-            yield LadderRow(quantity, ladder.method, setting, error_, seconds, evaluations, status)
+            relative, status = _find_error(ladder, quantity, outcome)
+            yield LadderRow(quantity, ladder.method, setting, relative, seconds, evaluations, status)
 
 
 def _cost(ladder: Ladder, setting: Setting, repeats: int) -> tuple[float, int]:
-    """Return the least time of the repeats, which end where they have taken long enough, and a run's evaluations."""
+    """Least time of the repeats, which end after `BUDGET`, and number of positions evaluated in a run."""
     least, spent, evaluations = math.inf, 0.0, 0
     for _ in range(repeats):
-        before, began = current().positions, time.perf_counter()
+        before, start = current().positions, time.perf_counter()
         result = ladder.run(setting)
-        took, evaluations = time.perf_counter() - began, current().positions - before
-        evaluations = ladder.counted(result) if ladder.counted else evaluations
-        least, spent = min(least, took), spent + took
+        seconds, evaluations = time.perf_counter() - start, current().positions - before
+        evaluations = ladder.count(result) if ladder.count else evaluations
+        least, spent = min(least, seconds), spent + seconds
         if spent > BUDGET:
             break
     return least, evaluations
 
 
-def _judged(ladder: Ladder, quantity: str, outcome: Rung) -> tuple[float | None, str]:
-    """Return a quantity's error, None where it cannot be told, and the status that says why."""
+def _find_error(ladder: Ladder, quantity: str, outcome: Rung) -> tuple[float | None, str]:
+    """Error of a quantity, None where it is unknown, and the status with the reason."""
     if quantity not in outcome.values:
         return None, outcome.status
     reference = ladder.reference(quantity)
     if reference is None:
-        return None, f"{outcome.status}; no reference that is {TIGHTER:g} times tighter"
+        return None, f"{outcome.status}; no reference that is {TIGHTER:g} times more accurate"
     error = reference.error(outcome.values[quantity])
     if not math.isfinite(error):
         return None, f"{outcome.status}; no number"
     if 0.0 < error < TIGHTER * reference.uncertainty:
-        return None, f"{outcome.status}; nearer than the reference can tell"
+        return None, f"{outcome.status}; the error is below the accuracy of the reference"
     return error, outcome.status
 
 
 def setting_text(setting: Setting) -> str:
-    """Return a setting as a person writes it."""
+    """Text of a setting."""
     if isinstance(setting, str | int):
         return str(setting)
     return f"{setting:.0e}".replace("e-0", "e-").replace("e+00", "")
 
 
-def grouped(rows: Sequence[LadderRow]) -> dict[str, list[LadderRow]]:
-    """Return the rows of each ladder and quantity, "quantity, method" → rows from coarse to fine."""
-    found: dict[str, list[LadderRow]] = {}
+def group_rows(rows: Sequence[LadderRow]) -> dict[str, list[LadderRow]]:
+    """Rows by "quantity, method", from coarse to fine."""
+    groups: dict[str, list[LadderRow]] = {}
     for row in rows:
-        found.setdefault(f"{row.quantity}, {row.method}", []).append(row)
-    return found
+        groups.setdefault(f"{row.quantity}, {row.method}", []).append(row)
+    return groups
 
 
 def order(rows: Sequence[LadderRow], step: Callable[[Any], float]) -> float | None:
-    """Return the measured order of a ladder's rows: the middle one of all slopes, log error over log step.
+    """Measured order of a ladder's rows: median of all slopes, log error over log step.
 
-    Read from the longest run of at least three rows where errors fall alike from row to row and are no rounding, of
-    equally long ones the one where they fall most alike; None where that is less than half of the rows to the knee.
+    It is read from the longest run of at least three rows with errors that fall at one rate and are above rounding; of
+    equally long runs, from the one with the most equal slopes. None where that is less than half of the rows to the
+    knee.
     """
-    best, found, last = (0, 0.0), None, knee(rows)
+    best, measured, last = (0, 0.0), None, knee(rows)
     before = [row.setting for row in rows].index(last) + 1 if last is not None else 0
     least = max(3, math.ceil(before / 2))
-    for falling in _falling(rows, step):
+    for falling in _falling_stretches(rows, step):
         for begin, end in itertools.combinations(range(len(falling) + 1), 2):
             if end - begin < least:
                 continue
             slopes = _slopes(itertools.pairwise(falling[begin:end]))
             rank = end - begin, -max(slopes) / max(min(slopes), LEAST_ORDER)
-            if _alike(slopes) and rank > best:
-                best, found = rank, statistics.median(_slopes(itertools.combinations(falling[begin:end], 2)))
-    return found
+            if _is_one_order(slopes) and rank > best:
+                best, measured = rank, statistics.median(_slopes(itertools.combinations(falling[begin:end], 2)))
+    return measured
 
 
-def _falling(rows: Sequence[LadderRow], step: Callable[[Any], float]) -> list[list[tuple[float, float]]]:
-    """Return the stretches (log step, log error) on which errors above rounding fall from row to row."""
+def _falling_stretches(rows: Sequence[LadderRow], step: Callable[[Any], float]) -> list[list[tuple[float, float]]]:
+    """Stretches (log step, log error) on which errors above rounding fall from row to row."""
     stretches: list[list[tuple[float, float]]] = [[]]
     for row in rows:
         point = None
@@ -215,33 +214,34 @@ def _falling(rows: Sequence[LadderRow], step: Callable[[Any], float]) -> list[li
 
 
 def _slopes(pairs: Iterable[tuple[tuple[float, float], tuple[float, float]]]) -> list[float]:
+    """Slopes between pairs of points (log step, log error)."""
     return [(after[1] - before[1]) / (after[0] - before[0]) for before, after in pairs]
 
 
-def _alike(slopes: Sequence[float]) -> bool:
-    """Say whether errors fall by one power of the step, and one that counts."""
+def _is_one_order(slopes: Sequence[float]) -> bool:
+    """Whether errors fall by one power of the step, and by at least the least order."""
     middle = statistics.median(slopes)
     return min(slopes) >= max(middle / ONE_ORDER, LEAST_ORDER) and max(slopes) <= ONE_ORDER * middle
 
 
 def knee(rows: Sequence[LadderRow]) -> Setting | None:
-    """Return the first setting from which on the error has stopped falling; None without two errors."""
+    """First setting from which the error no longer falls; None without two errors."""
     known = [row for row in rows if row.error is not None]
     if len(known) < 2:
         return None
     least = min(row.error for row in known if row.error is not None)
-    return next(row.setting for row in known if row.error is not None and row.error <= STILL * least)
+    return next(row.setting for row in known if row.error is not None and row.error <= FLOOR_FACTOR * least)
 
 
 REFERENCE_ACCURACY = 1e-11
-"""Accuracy of the answers that references start from: the finest that can be asked."""
+"""Accuracy of the answers from which references start: the finest that solve accepts."""
 
 POSITIONS = 24
-"""Crank angles, evenly over the turn, at which closed forms are compared."""
+"""Number of equally spaced crank angles at which closed forms are compared."""
 
 
 class Subject:
-    """A scene under study."""
+    """Scene of an accuracy study."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.job = scene, registry.of(scene)
@@ -252,39 +252,39 @@ class Subject:
 
     @functools.cached_property
     def sampler(self) -> Sampler:
-        """Today's machine."""
+        """Sampler of today's machine."""
         return self.job.sampler(self.scene, self.job.today(self.scene))
 
     @functools.cached_property
     def peaks(self) -> dict[str, tuple[str, bool]]:
-        """Peaks that today's machine has."""
+        """Peaks of today's machine that are not 0: figure → its quantity, and whether it has a sign."""
         return {figure: read for figure, read in self.studied.peaks.items() if self.sampler.peak(read[0]) > 0.0}
 
     @functools.cached_property
     def positions(self) -> tuple[Pieces, Floats]:
-        """Pieces and crank angles, rad, of the positions that are compared."""
+        """Pieces and crank angles, rad, (positions,), at which closed forms are compared."""
         cycle = self.sampler.cycle
         pieces, u = cycle.located(TURN * (np.arange(POSITIONS) + 0.5) / POSITIONS)
         return pieces, cycle.angles(pieces, u)
 
     def output(self, system: Maths, given: Given, node: Node) -> Motion:
-        """Return the output's motion of today's machine at a position, in any number system."""
+        """Motion of the output of today's machine at a position, in any number system."""
         motion: Motion = self.sampler.model.instant(system, given, node).pose
         return motion
 
     def motion(self, system: Maths, given: Given) -> list[Number]:
-        """Return the second derivative of the displacement at every position, one by one."""
+        """Second derivative of the displacement at every position, one by one."""
         places = zip(*self.positions, strict=True)
         nodes = [Node(system.number(float(angle)), self.sampler.cycle.switch(int(k))) for k, angle in places]
         return [self.output(system, given, node).q2 for node in nodes]
 
     @functools.cached_property
     def exact(self) -> Reading:
-        """Today's machine in more digits than any method has."""
+        """Today's machine in more digits than any method uses."""
         return reference_digits.precise(self.sampler, CLOSED_DIGITS)
 
     def reference(self, quantity: str) -> LadderReference | None:
-        """Return what a reading of today's machine truly is, in 40 digits; closed forms in 60."""
+        """Reference of a quantity of today's machine, in 40 digits; of closed forms in 60. None without one."""
         if quantity == self.studied.motion:
             exact = self.exact
             return LadderReference(self.motion(exact.maths, exact.given))
@@ -297,63 +297,63 @@ class Subject:
 
 @dataclass(frozen=True)
 class StudiedTarget:
-    """A target of a scene with the optimum in many digits."""
+    """A target of a scene with its optimum in many digits."""
 
     scene: Scene
     name: str
 
     @property
     def job(self) -> Job:
-        """The job at work."""
+        """Job of the scene."""
         return registry.of(self.scene)
 
     @functools.cached_property
     def program(self) -> Program:
-        """The task as data."""
+        """Design task of the target."""
         return self.job.program(self.scene, self.name)
 
     @property
     def figure(self) -> str:
-        """The figure of the last objective, which the earlier ones leave room for."""
+        """Figure of the last objective."""
         return self.program.objectives[-1].figure
 
-    def quantity(self, what: str) -> str:
-        """Return how a reading of the optimum is called in the rows."""
-        return f"{self.name} {what}"
+    def quantity(self, reading: str) -> str:
+        """Name of a reading of the optimum in the rows."""
+        return f"{self.name} {reading}"
 
     def variables(self, answer: Solution) -> dict[str, float]:
-        """Return an answer's NLP variables, SI."""
-        named = {self.scene.full(name): value for name, value in designs.flat(answer.design).items()}
-        found = self.job.values(self.program, named)
-        return {v.name: found[v.name] for v in self.program.variables}
+        """Variables of the task, SI, at an answer."""
+        design = {self.scene.full(name): value for name, value in designs.flat(answer.design).items()}
+        values = self.job.values(self.program, design)
+        return {v.name: values[v.name] for v in self.program.variables}
 
     @functools.cached_property
     def answer(self) -> Solution:
-        """The closest answer there is."""
+        """Answer at the finest accuracy."""
         return engine.solve(self.scene, self.name, accuracy=REFERENCE_ACCURACY)
 
     @functools.cached_property
     def optimum(self) -> reference_digits.Optimum | None:
-        """The optimum in 40 digits; None without a certified answer, or of several rows that are no peaks."""
-        known = all(len(o.rows) == 1 for o in self.program.objectives)
-        if self.answer.status != "optimal" or not known:
+        """The optimum in 40 digits; None without a certified answer, or with an objective of several rows."""
+        has_single_rows = all(len(o.rows) == 1 for o in self.program.objectives)
+        if self.answer.status != "optimal" or not has_single_rows:
             return None
         return reference_digits.optimum(self.program, self.answer.point, self.variables(self.answer))
 
-    def reference(self, what: str) -> LadderReference | None:
-        """Return the true optimum's figure, or its design in natural sizes; None where it is not unique."""
-        found, moves = self.optimum, len(self.program.moves)
-        if found is None or (what == "design" and found.flat > moves):
+    def reference(self, reading: str) -> LadderReference | None:
+        """Reference of the optimum's figure, or of its design in scales; None where it is not unique."""
+        optimum, moves = self.optimum, len(self.program.moves)
+        if optimum is None or (reading == "design" and optimum.flat > moves):
             return None
-        if what == "design":
-            return LadderReference(self.placed(found.x), found.design_uncertainty, 1.0)
-        objective, value = self.program.objectives[-1], found.objectives[-1]
+        if reading == "design":
+            return LadderReference(self.scale_variables(optimum.x), optimum.design_uncertainty, 1.0)
+        objective, value = self.program.objectives[-1], optimum.objectives[-1]
         if objective.power != 1:
             value = value ** (1 / systems.mpmath(REFERENCE_DIGITS).number(objective.power))
-        return LadderReference(value, found.uncertainty, 0.0 if value else objective.scale)
+        return LadderReference(value, optimum.uncertainty, 0.0 if value else objective.scale)
 
-    def placed(self, x: Mapping[str, Number]) -> list[Number]:
-        """Return variables in natural sizes, apart from the moves that leave every figure unchanged."""
+    def scale_variables(self, x: Mapping[str, Number]) -> list[Number]:
+        """Variables in scales, without the moves that leave every figure unchanged."""
         number = systems.mpmath(REFERENCE_DIGITS).number
         scaled = {v.name: number(x[v.name]) / number(v.scale) for v in self.program.variables}
         for move in self.program.moves:
@@ -365,7 +365,7 @@ class StudiedTarget:
         return list(scaled.values())
 
     def merit(self, x: Mapping[str, float]) -> float:
-        """Return the figure of the last objective at variables (SI), true over the whole cycle."""
+        """Figure of the last objective, SI, at variables (SI), over the whole cycle."""
         sampler = Sampler(self.program.model, {**self.program.parameters, **x})
         objective = self.program.objectives[-1]
         value = objective.merit(sampler)

@@ -1,4 +1,4 @@
-"""Amounts of work with which the work-precision study is tried."""
+"""Settings of the accuracy study for tests."""
 
 from loomopt.studies.accuracy import optima
 

@@ -1,4 +1,4 @@
-"""The work-precision study of the packaged scenes: orders, errors down each ladder, the advice, the table."""
+"""Accuracy study of the packaged scenes: orders, errors of every ladder, the advice, the table."""
 
 import itertools
 import json
@@ -12,7 +12,7 @@ import loomopt as lo
 from loomopt.interface.study.accuracy import AccuracyStudy
 from loomopt.jobs.shedding.job import JOB
 from loomopt.studies.accuracy import accuracy, optima
-from loomopt.studies.accuracy.subject import NO_ORDER, grouped
+from loomopt.studies.accuracy.subject import NO_ORDER, group_rows
 
 pytestmark = pytest.mark.slow
 
@@ -32,7 +32,7 @@ def few(subject, full):
     yield from optima.ladders(subject, SMALL)
 
 
-def studied(name, ladders=None):
+def run_study(name, ladders=None):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(accuracy, "QUICK_REPEATS", 1)
         return accuracy.study(lo.load(name), ladders=ladders or (few, accuracy.LADDERS[1]))
@@ -40,16 +40,16 @@ def studied(name, ladders=None):
 
 @pytest.fixture(scope="module")
 def studies():
-    return {name: studied(name) for name in JOBS}
+    return {name: run_study(name) for name in JOBS}
 
 
 @pytest.fixture(scope="module")
 def ladders(studies):
-    """Return each job's rows by "quantity, method"."""
-    return {name: grouped(study.rows) for name, study in studies.items()}
+    """Rows of every job by "quantity, method"."""
+    return {name: group_rows(study.rows) for name, study in studies.items()}
 
 
-def test_no_text_of_the_figure_runs_into_anything(studies):
+def test_no_text_of_the_figure_overlaps(studies):
     for study in studies.values():
         figure = AccuracyStudy(study).plot()
         assert figure.axes
@@ -69,9 +69,9 @@ def errors(rows):
 )
 def test_equal_points_find_a_smooth_peak_with_order_two(studies, ladders, name, quantity):
     assert 1.95 <= studies[name].orders[f"{quantity}, sampled points"] <= 2.05
-    found = errors(ladders[name][f"{quantity}, sampled points"])
-    assert all(after < before for before, after in itertools.pairwise(found))
-    assert found[-1] > 1e-10  # 100000 points are still 1000 times further off than refined ones
+    measured = errors(ladders[name][f"{quantity}, sampled points"])
+    assert all(after < before for before, after in itertools.pairwise(measured))
+    assert measured[-1] > 1e-10  # 100000 points are still 1000 times further off than refined ones
 
 
 def test_a_dwell_read_off_equal_points_has_order_one(studies):
@@ -82,14 +82,14 @@ def test_a_dwell_read_off_equal_points_has_order_one(studies):
 def test_finite_differences_have_order_two_until_rounding_takes_over(studies, ladders, name, motion):
     key = f"{motion}, finite differences"
     assert 1.9 <= studies[name].orders[key] <= 2.1
-    found = errors(ladders[name][key])
-    lowest = found.index(min(found))
-    assert all(after < before for before, after in itertools.pairwise(found[: lowest + 1]))
-    assert all(after > before for before, after in itertools.pairwise(found[lowest:]))
+    measured = errors(ladders[name][key])
+    lowest = measured.index(min(measured))
+    assert all(after < before for before, after in itertools.pairwise(measured[: lowest + 1]))
+    assert all(after > before for before, after in itertools.pairwise(measured[lowest:]))
     assert 1e-4 <= studies[name].knees[key] <= 1e-3
-    for other in ("closed form", "automatic differentiation"):
-        (row,) = ladders[name][f"{motion}, {other}"]
-        assert row.error < 1e-13 < 1e-3 * min(found)
+    for method in ("closed form", "automatic differentiation"):
+        (row,) = ladders[name][f"{motion}, {method}"]
+        assert row.error < 1e-13 < 1e-3 * min(measured)
 
 
 def test_a_free_law_tends_to_the_limit_law_with_order_one(studies, ladders):
@@ -108,7 +108,7 @@ def test_a_free_law_tends_to_the_limit_law_with_order_one(studies, ladders):
 
 
 @pytest.mark.parametrize("name", JOBS)
-def test_the_exchange_keeps_every_accuracy_it_is_asked(ladders, name):
+def test_the_exchange_reaches_every_requested_accuracy(ladders, name):
     for key, rows in ladders[name].items():
         if key.endswith(", exchange") and "design" not in key:
             assert all(row.status == "optimal" and row.error <= 1e-11 for row in rows)
@@ -120,23 +120,23 @@ def test_the_exchange_keeps_every_accuracy_it_is_asked(ladders, name):
 @pytest.mark.parametrize(
     "key", ["balance peak_torque", "stroke-dwell peak_acceleration", "stiffness K1", "law K1", "law design"]
 )
-def test_tolerances_of_the_solver_bring_the_error_down(ladders, key):
-    rows = next(own[f"{key}, IPOPT tolerance"] for own in ladders.values() if f"{key}, IPOPT tolerance" in own)
+def test_smaller_tolerances_of_the_solver_reduce_the_error(ladders, key):
+    rows = next(job[f"{key}, IPOPT tolerance"] for job in ladders.values() if f"{key}, IPOPT tolerance" in job)
     first, middle, last = errors(rows)
     assert first > middle > last
     assert last < 1e-5 * first
 
 
 @pytest.mark.parametrize("key", ["balance peak_torque", "stiffness K1", "law K1", "stroke-dwell peak_acceleration"])
-def test_guessed_second_derivatives_reach_the_same_optimum_and_tell_their_iterations(ladders, key):
-    rows = next(own[f"{key}, Hessian"] for own in ladders.values() if f"{key}, Hessian" in own)
+def test_approximate_second_derivatives_reach_the_same_optimum_and_report_iterations(ladders, key):
+    rows = next(job[f"{key}, Hessian"] for job in ladders.values() if f"{key}, Hessian" in job)
     assert [row.setting for row in rows] == ["limited-memory", "exact"]
     assert all(row.error < 1e-8 and "iterations" in row.status for row in rows)
 
 
 def test_refined_peaks_are_right_to_rounding_from_any_number_of_points(ladders):
-    for own in ladders.values():
-        for key, rows in own.items():
+    for job in ladders.values():
+        for key, rows in job.items():
             if key.endswith("refined points"):
                 assert max(errors(rows)) < 1e-13
 
@@ -168,34 +168,34 @@ def test_many_digits_leave_float64_far_behind(ladders):
         assert many.error < 1e-35
 
 
-# What the study says
+# Advice and table
 
 
 @pytest.mark.parametrize("name", JOBS)
-def test_the_advice_says_what_the_rows_of_the_exchange_do(studies, name):
+def test_the_advice_agrees_with_the_rows_of_the_exchange(studies, name):
     data = json.loads(json.dumps(studies[name].as_dict()))
     exchange = [row for row in data["rows"] if row["method"] == "exchange"]
-    own = [row for row in exchange if row["quantity"] == exchange[0]["quantity"]]
-    spent = {row["setting"]: row["evaluations"] for row in own}
+    first = [row for row in exchange if row["quantity"] == exchange[0]["quantity"]]
+    spent = {row["setting"]: row["evaluations"] for row in first}
     usual, finest = spent[1e-6] / spent[1e-3], spent[1e-11] / spent[1e-3]
-    settled = [row["error"] for row in own]
-    while len(settled) > 1 and settled[0] > 2 * min(row["error"] for row in own):
-        settled = settled[1:]
-    lost = math.ceil(math.log10(max(*settled, 2.0**-52)))
+    errors_at_rest = [row["error"] for row in first]
+    while len(errors_at_rest) > 1 and errors_at_rest[0] > 2 * min(row["error"] for row in first):
+        errors_at_rest = errors_at_rest[1:]
+    floor = math.ceil(math.log10(max(*errors_at_rest, 2.0**-52)))
     assert data["advice"] == (
-        f"1e-6 costs {usual:.2g}x of 1e-3 and 1e-11 costs {finest:.2g}x here; below 1e{lost} rounding takes over."
+        f"1e-6 costs {usual:.2g}x of 1e-3 and 1e-11 costs {finest:.2g}x here; below 1e{floor} rounding takes over."
     )
     assert 1.0 < usual < finest
 
 
-def test_everything_but_seconds_is_the_same_again(studies):
-    again = studied("beatup")
+def test_a_repeated_study_differs_only_in_seconds(studies):
+    again = run_study("beatup")
 
-    def still(study):
+    def without_seconds(study):
         data = study.as_dict()
         return data | {"rows": [{k: v for k, v in row.items() if k != "seconds"} for row in data["rows"]]}
 
-    assert still(again) == still(studies["beatup"])
+    assert without_seconds(again) == without_seconds(studies["beatup"])
     assert again.knees == studies["beatup"].knees
 
 

@@ -1,4 +1,4 @@
-"""The work-precision study from the command line: what it prints and writes, refused input, a study stopped."""
+"""The accuracy study from the command line: output and files, refused input, an interrupted study."""
 
 import json
 
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def quick(monkeypatch):
-    """Let the command study with few settings."""
+    """Command with few settings."""
     monkeypatch.setattr(accuracy, "QUICK_REPEATS", 1)
     monkeypatch.setattr(optima, "QUICK", SMALL)
     monkeypatch.setattr(readings, "SAMPLES", (36, 72, 144))
@@ -49,7 +49,7 @@ def test_the_command_prints_rows_orders_and_advice_and_writes_figure_and_table(q
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (["accuracy", "betup"], "betup"),
         (["accuracy", "beatup", "--out", "f.dxf"], ".csv"),
@@ -57,15 +57,15 @@ def test_the_command_prints_rows_orders_and_advice_and_writes_figure_and_table(q
         (["accuracy", "beatup", "--set", "mechanism.l1=90 mm"], "l1"),
     ],
 )
-def test_bad_input_is_refused_before_anything_is_solved(capsys, monkeypatch, arguments, said):
+def test_bad_input_is_refused_before_anything_is_solved(capsys, monkeypatch, arguments, message):
     monkeypatch.setattr(optima, "ladders", pytest.fail)
     assert run(arguments) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    assert said in err
+    assert message in err
 
 
-def test_a_study_that_is_stopped_shows_what_was_finished(capsys, monkeypatch):
+def test_an_interrupted_study_shows_the_finished_rows(capsys, monkeypatch):
     genuine = accuracy.climbs
 
     def stopped(scene, full, on_run):
