@@ -164,16 +164,18 @@ class Task(abc.ABC):
 
         One without room, or one that is not there yet, stands at the most that is asked.
         """
-        found = {v.name: v for v in self.bounded}
-        for name, each in self.demanded.items():
-            least, held = max(value for _, value in each), self._asked_of(name)
-            room = held.lower < held.upper
-            if room and least > held.upper:
-                remedy = f"Correct the limit, or the bounds of {held.called}."
-                raise BadInput(f"{held.called} cannot be as large", key=f"limits.{each[0][0]}.min", remedy=remedy)
-            upper, around = (held.upper, held.range) if room else (least, (least, least))
-            found[name] = held._replace(lower=max(least, held.lower) if room else least, upper=upper, range=around)
-        return tuple(found.values())
+        variables = {v.name: v for v in self.bounded}
+        for name, pairs in self.demanded.items():
+            least, variable = max(value for _, value in pairs), self._asked_of(name)
+            room = variable.lower < variable.upper
+            if room and least > variable.upper:
+                remedy = f"Correct the limit, or the bounds of {variable.called}."
+                raise BadInput(f"{variable.called} cannot be as large", key=f"limits.{pairs[0][0]}.min", remedy=remedy)
+            upper, around = (variable.upper, variable.range) if room else (least, (least, least))
+            variables[name] = variable._replace(
+                lower=max(least, variable.lower) if room else least, upper=upper, range=around
+            )
+        return tuple(variables.values())
 
     def _asked_of(self, name: str) -> Variable:
         """Variable that limits ask something of; one that is not there yet stands at the most of it."""
@@ -191,22 +193,26 @@ class Task(abc.ABC):
 
     def bounds(self) -> list[Limit]:
         """Scene's bounds of variables as limits."""
-        return [each for v in self.bounded if v.called in self.scene.bounds for each in bound_limits(v)]
+        return [limit for v in self.bounded if v.called in self.scene.bounds for limit in bound_limits(v)]
 
     def floors(self) -> Iterator[Limit]:
         """Yield what limits ask of variables, the most first; a row that stood twice would have no price."""
-        for name, each in self.demanded.items():
-            held = self._asked_of(name)
-            binding = [(by, value) for by, value in each if held.lower == held.upper or value > held.lower]
-            told = set[str | float]()
-            for by, value in sorted(binding, key=lambda said: -said[1]):
-                if not told & {by, value}:
-                    yield BoundLimit(by, -1, name, value, held.scale)
-                told |= {by, value}
+        for name, pairs in self.demanded.items():
+            variable = self._asked_of(name)
+            binding = [(by, value) for by, value in pairs if variable.lower == variable.upper or value > variable.lower]
+            seen = set[str | float]()
+            for by, value in sorted(binding, key=lambda pair: -pair[1]):
+                if not seen & {by, value}:
+                    yield BoundLimit(by, -1, name, value, variable.scale)
+                seen |= {by, value}
 
     def figures(self) -> list[Limit]:
         """Scene's limits on figures, row by row."""
-        return [each for name, limit in self.scene.limits.items() for each in self.figure(name, limit.min, limit.max)]
+        return [
+            row_limit
+            for name, limit in self.scene.limits.items()
+            for row_limit in self.figure(name, limit.min, limit.max)
+        ]
 
     def figure(self, name: str, low: float | None, high: float | None) -> list[Limit]:
         """Limits on one figure; the least of several rows is limited in each of them."""
@@ -223,14 +229,14 @@ class Task(abc.ABC):
 
         What a table asks for may give way; what the nature of the thing demands may not.
         """
-        found = []
+        limits = []
         for check in self.model.checks:
-            for each in check.demands:
-                value = each.value if isinstance(each.value, float) else self.known[owned(check, each.value)]
-                firm = each.row in self.scene.schema.margins or not isinstance(each.value, str)
-                size = self.margin_size(each.row) or abs(value) or 1.0
-                found.append(self.row_limit(each.row, each.sign, each.row, value, size, not firm))
-        return found
+            for demand in check.demands:
+                value = demand.value if isinstance(demand.value, float) else self.known[owned(check, demand.value)]
+                firm = demand.row in self.scene.schema.margins or not isinstance(demand.value, str)
+                size = self.margin_size(demand.row) or abs(value) or 1.0
+                limits.append(self.row_limit(demand.row, demand.sign, demand.row, value, size, not firm))
+        return limits
 
     def margin_size(self, row: str) -> float:
         """Scale of a row of a check; 0 where the mechanism gives none and the demanded value is the scale."""
@@ -257,20 +263,20 @@ class Task(abc.ABC):
     def held(self) -> tuple[Objective, ...]:
         """Levels of the target that come before the axes: those before its last one that are no axes."""
         added = self.least() if self.target else ()
-        own = [level for level in self.objectives() if level not in added] if self.target else []
-        return tuple(level for level in own[:-1] if level.figure not in self.traded)
+        levels = [level for level in self.objectives() if level not in added] if self.target else []
+        return tuple(level for level in levels[:-1] if level.figure not in self.traded)
 
     def least(self) -> tuple[Objective, ...]:
         """Levels after a target's own: what effects want least, rows of checks and free numbers of any."""
-        found = []
+        levels = []
         for effect in self.sampler.model.effects:
             if isinstance(effect, Check) and effect.least in effect.rows:
-                found.append(Value(effect.least, effect.least, abs(self.sampler.static[effect.least]) or 1.0))
+                levels.append(Value(effect.least, effect.least, abs(self.sampler.static[effect.least]) or 1.0))
             elif effect.least:
                 row = owned(effect, effect.least)
                 free = (v for v in self.bounded if v.name == row and v.lower < v.upper)
-                found += [Value(v.called, row, v.scale) for v in free]
-        return tuple(found)
+                levels += [Value(v.called, row, v.scale) for v in free]
+        return tuple(levels)
 
     def starts(self) -> tuple[dict[str, float], ...]:
         """Job's own starts: today's machine."""
@@ -328,8 +334,8 @@ class Task(abc.ABC):
     def figure_size(self, name: str) -> float:
         """Natural size of a figure: today's value of it, or of the first row that it is read from."""
         row, axis = self.read_from.get(name, (name,))[0], self.scene.schema.own_axes.get(name)
-        told = self.model.has_row(row) or self.model.has_quantity(row)
-        read = axis.rows[0] if axis and axis.rows and not told else row
+        in_model = self.model.has_row(row) or self.model.has_quantity(row)
+        read = axis.rows[0] if axis and axis.rows and not in_model else row
         return size_read(self.sampler, read, self.scene.schema.figures)
 
     def size(self, axis: str) -> float:
@@ -350,13 +356,13 @@ def size_read(today: Sampler, name: str, figures: Mapping[str, Figure]) -> float
     motor = drive.motor(today.model.effects)
     if motor and name in motor.rows:
         return 1.0
-    found = abs(today.peak(name) if today.model.has_quantity(name) else today.single(name))
-    if found < TINY and name in figures:
+    size = abs(today.peak(name) if today.model.has_quantity(name) else today.single(name))
+    if size < TINY and name in figures:
         kind = figures[name].kind
-        alike = [each for each in figures if figures[each].kind == kind and today.model.has_quantity(each)]
+        alike = [figure for figure in figures if figures[figure].kind == kind and today.model.has_quantity(figure)]
         largest = max(map(today.peak, alike), default=0.0)
-        found = largest if found <= SHOWN_AS_ZERO * largest else found
-    return found if found > NOTHING else 1.0
+        size = largest if size <= SHOWN_AS_ZERO * largest else size
+    return size if size > NOTHING else 1.0
 
 
 def bound_limits(variable: Variable, relaxable_from: bool = True) -> list[Limit]:
@@ -494,7 +500,7 @@ class Job(abc.ABC):
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Sentence on an optimum of the target."""
 
-    def say_together(self, members: "Sequence[tuple[Scene, Numbers, Figures]]", own: frozenset[str]) -> str:
+    def say_together(self, members: "Sequence[tuple[Scene, Numbers, Figures]]", member_numbers: frozenset[str]) -> str:
         """Sentences on why members of a family cannot all reach their goal, "" where physics says nothing.
 
         members: the scene, design and figures of each, SI; own: numbers of a design of which each has its own.
@@ -523,8 +529,8 @@ class Job(abc.ABC):
     @property
     def views(self) -> JobViews:
         """The job's own pictures, equations and remarks: VIEWS of its views.py, imported when it is first asked for."""
-        found: JobViews = importlib.import_module(f"{self.package}.views").VIEWS
-        return found
+        views: JobViews = importlib.import_module(f"{self.package}.views").VIEWS
+        return views
 
     @property
     def resources(self) -> "Traversable":
@@ -557,12 +563,12 @@ class Job(abc.ABC):
 
     def sampler(self, scene: Scene, design: Numbers) -> Sampler:
         """Design ready to be sampled, at the speed that the scene gives its crank. Raises BadInput."""
-        found = sampled(self.model(scene, design), self.numbers_of(scene, design))
-        if drive.motor(found.model.effects) is None:
-            return found
+        sampler = sampled(self.model(scene, design), self.numbers_of(scene, design))
+        if drive.motor(sampler.model.effects) is None:
+            return sampler
         from loomopt.model.crank_motion import turned
 
-        return turned(found, scene)
+        return turned(sampler, scene)
 
     def curves(
         self, scene: Scene, design: Numbers, steps: int = STEPS, also: Sequence[float] = ()
@@ -596,35 +602,37 @@ class Job(abc.ABC):
         sampled = self.sampler(scene, design)
         late = self.over_cycle(sampled.model)
         known = [*self.at_once, *(name for name, quantity in late.items() if sampled.knows(quantity))]
-        found = self.figures_of(scene, sampled, known)
+        figures = self.figures_of(scene, sampled, known)
 
         @working()
         def later(names: Sequence[str]) -> Figures:
             read = self.figures_of(scene, self.sampler(scene, design), names)
             return {name: _own(read[name]) for name in names}
 
-        told = {name: _own(value) for name, value in found.items()}
-        return Awaited(found, {k: v for k, v in told.items() if v is not None or k in known or k not in late}, later)
+        values = {name: _own(value) for name, value in figures.items()}
+        return Awaited(
+            figures, {k: v for k, v in values.items() if v is not None or k in known or k not in late}, later
+        )
 
     def figures_of(
-        self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
+        self, scene: Scene, sampled: "Sampler | Machines", names: Container[str] = EVERY
     ) -> dict[str, Number]:
         """Every figure of a machine, or of many at once, SI; None for one whose numbers the scene does not have.
 
         asked: which of those `over_cycle`, every one without it; the others are None or there too. What a motion of its
         own tells is not among those of many (`machines.at_once`).
         """
-        found = alone(scene, sampled, asked)
-        peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in asked}
+        figures = alone(scene, sampled, names)
+        peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in names}
         sampled.search(tuple(peaks.values()))
-        return found | {name: sampled.peak(quantity) for name, quantity in peaks.items()}
+        return figures | {name: sampled.peak(quantity) for name, quantity in peaks.items()}
 
     def over_cycle(self, model: JobModel) -> Mapping[str, str]:
         """Figures that are read over the cycle: the quantity of an extreme, "" for what is none."""
         means = [name for mean in model.integrals for name in (mean.name, mean.root)]
         return {**dict.fromkeys((*means, *model.worked), ""), **self.peaks(model)}
 
-    def traded(self, scene: Scene, target: str | None, asked: "Requested") -> "tuple[Program, tuple[Traded, ...]]":
+    def traded(self, scene: Scene, target: str | None, requests: "Requested") -> "tuple[Program, tuple[Traded, ...]]":
         """Task whose levels are axes, after what a target holds (None: nothing), and the axes.
 
         Raises BadInput.
@@ -632,11 +640,11 @@ class Job(abc.ABC):
         from loomopt.model import axes
 
         bounded = [name for name, bound in scene.bounds.items() if bound.free and bound.min < bound.max]
-        known = axes.requested_of(scene.schema.axes, bounded, asked, scene.origin)
+        known = axes.requested_of(scene.schema.axes, bounded, requests, scene.origin)
         if target:
             self.demand(scene, target)
-        task = self.task(scene, target or "", tuple(asked))
-        return axes.with_axes(task.program(), known, asked, scene.full, task.size)
+        task = self.task(scene, target or "", tuple(requests))
+        return axes.with_axes(task.program(), known, requests, scene.full, task.size)
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
         """NLP's variables of a design."""
@@ -678,33 +686,33 @@ class Job(abc.ABC):
 
         Sizes of the scene's own [stock] take the place of those that a check knows.
         """
-        found: dict[str, Sequence[float]] = {}
+        choices: dict[str, Sequence[float]] = {}
         stock: Mapping[str, Sequence[float]] = {}
         if scene.document.get("stock"):
             from loomopt.scenes.numbers import sizes
 
             stock = sizes(scene).stock
-        for check, own in _checks(scene):
-            for key, sold in check.sold(own).items():
+        for check, table in _checks(scene):
+            for key, sold in check.sold(table).items():
                 bound = scene.bounds.get(label(check, key))
                 if bound is not None and bound.free and bound.min < bound.max:
-                    found[label(check, key)] = stock.get(label(check, key), sold)
-        return found
+                    choices[label(check, key)] = stock.get(label(check, key), sold)
+        return choices
 
     def explain(self, scene: Scene, clash: Collection[str]) -> str:
         """Physical reason why the limits `clash` conflict; "" where there is none to give."""
         known = self.numbers(scene)
         limited = numbers.bounds(scene, known)
-        told = [check.explain(known, limited, own, clash, scene.show) for check, own in _checks(scene)]
-        return " ".join(text for text in told if text)
+        sentences = [check.explain(known, limited, table, clash, scene.show) for check, table in _checks(scene)]
+        return " ".join(text for text in sentences if text)
 
 
-def alone(scene: Scene, sampled: "Sampler | Machines", asked: Container[str]) -> dict[str, Number]:
+def alone(scene: Scene, sampled: "Sampler | Machines", names: Container[str]) -> dict[str, Number]:
     """Figures that are rows of the model, and its means that are demanded; None for every other."""
-    found: dict[str, Number] = {name: sampled.static.get(name) for name in scene.schema.figures}
+    figures: dict[str, Number] = {name: sampled.static.get(name) for name in scene.schema.figures}
     means = [name for mean in sampled.model.integrals for name in (mean.name, mean.root)]
-    found |= {name: sampled.single(name) for name in means if name in found and name in asked}
-    return found | {name: power(sampled, work) for name, work in sampled.model.worked.items() if name in asked}
+    figures |= {name: sampled.single(name) for name in means if name in figures and name in names}
+    return figures | {name: power(sampled, work) for name, work in sampled.model.worked.items() if name in names}
 
 
 def power(sampled: "Sampler | Machines", work: str) -> Number:
@@ -724,13 +732,13 @@ def _own(value: Number) -> float | None:
 def _checks(scene: Scene) -> list[tuple[Check[Any], Any]]:
     """Checks that are on, each with the values of its table."""
     on = zip(scene.active, scene.effects.values(), strict=True)
-    return [(effect, own) for effect, own in on if isinstance(effect, Check)]
+    return [(effect, table) for effect, table in on if isinstance(effect, Check)]
 
 
 def demand(scene: Scene, target: str) -> None:
     """Raise BadInput where the scene lacks a number or an effect that its target needs."""
-    asked = scene.schema.targets[target]
-    for name in asked.needs:
+    entry = scene.schema.targets[target]
+    for name in entry.needs:
         if name not in scene.operation:
             raise BadInput(
                 f"target {target} needs {name}",
@@ -738,7 +746,7 @@ def demand(scene: Scene, target: str) -> None:
                 key=f"operation.{name}",
                 remedy=f"Give operation.{name}, or choose another target.",
             )
-    for name in asked.needs_effects:
+    for name in entry.needs_effects:
         if name not in scene.effects:
             raise BadInput(
                 f"target {target} needs the effect {name}",

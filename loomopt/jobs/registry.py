@@ -56,17 +56,17 @@ def _loaded(point: "EntryPoint", what: str, kind: type, name: str) -> Any:
     """Object of an entry point. Raises BadInput with its distribution where loading fails or the type is another."""
     BROUGHT[point.module] = f"{what} {point.name} of {_distribution(point)}"
     try:
-        found = point.load()
+        thing = point.load()
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # SystemExit too, which would end the process without a word
-        told = f"{type(error).__name__}: {error}"
-        raise _useless(point, what, "cannot be imported: " + " ".join(told.split())) from error
-    if not isinstance(found, kind):
+        text = f"{type(error).__name__}: {error}"
+        raise _useless(point, what, "cannot be imported: " + " ".join(text.split())) from error
+    if not isinstance(thing, kind):
         raise _useless(point, what, f"is no {kind.__name__.lower()}")
-    if getattr(found, "name", "") != name:
-        raise _useless(point, what, f"calls itself {getattr(found, 'name', 'nothing')}")
-    return found
+    if getattr(thing, "name", "") != name:
+        raise _useless(point, what, f"calls itself {getattr(thing, 'name', 'nothing')}")
+    return thing
 
 
 def _useless(point: "EntryPoint", what: str, why: str) -> BadInput:
@@ -88,8 +88,8 @@ def find(name: str) -> Job:
     point = _single(JOBS, name, "job")
     if point is None:
         raise unknown("job", name, names(), "", "")
-    found: Job = _loaded(point, "job", Job, name)
-    return found
+    external_job: Job = _loaded(point, "job", Job, name)
+    return external_job
 
 
 def of(scene: Scene) -> Job:
@@ -157,9 +157,9 @@ def _brought(schema: SceneSchema, name: str) -> Effect | None:
         return None
     effect: Effect = _loaded(point, "effect", Effect, name)
     taken = {*schema.variables, *schema.figures, *schema.margins}
-    for told in (*(figure.name for figure in effect.figures), *effect.margins):
-        if told in taken:
-            raise _useless(point, "effect", f"brings {told}, which there is already")
+    for new_name in (*(figure.name for figure in effect.figures), *effect.margins):
+        if new_name in taken:
+            raise _useless(point, "effect", f"brings {new_name}, which there is already")
     return effect
 
 
@@ -168,7 +168,7 @@ REGISTERED = _Registered()
 
 def brought() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
     """Files of other distributions' scenes by name, and what is wrong with their jobs."""
-    found: dict[str, Path] = {}
+    paths: dict[str, Path] = {}
     faults: list[BadInput] = []
     for point in {point.name: point for point in entry_points(JOBS)}.values():
         try:
@@ -178,23 +178,23 @@ def brought() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
         except BadInput as error:
             faults.append(error)
             continue
-        twice = sorted(files.keys() & found.keys())
-        faults += [BadInput(f"scene {n} stands in {found[n]} too", file=str(files[n]), key=n) for n in twice]
-        found = files | found
-    return found, tuple(faults)
+        twice = sorted(files.keys() & paths.keys())
+        faults += [BadInput(f"scene {n} stands in {paths[n]} too", file=str(files[n]), key=n) for n in twice]
+        paths = files | paths
+    return paths, tuple(faults)
 
 
 def heads(names: Iterable[str]) -> tuple[list[packaged.Head], list[BadInput]]:
     """Heads of scenes that are read whole, and the errors of those that cannot be read."""
-    found, faults = [], []
+    heads, faults = [], []
     for name in names:
         try:
             scene = load(name)
         except BadInput as error:
             faults.append(error)
         else:
-            found.append(packaged.Head(name, scene.title, scene.job, tuple(scene.schema.targets), scene.source))
-    return found, faults
+            heads.append(packaged.Head(name, scene.title, scene.job, tuple(scene.schema.targets), scene.source))
+    return heads, faults
 
 
 def problems() -> dict[str, Path]:
@@ -242,13 +242,13 @@ def load(name_or_path: str | os.PathLike[str]) -> Scene:
         if answer_path(name_or_path):
             return answered(path)[0]
         return _read(path, path.name if path.stem == given else given)
-    own = packaged.problems()
-    if given in own:
-        return _read(own[given], own[given].name)
+    files = packaged.problems()
+    if given in files:
+        return _read(files[given], files[given].name)
     others, faults = brought()
     if given in others:
         return _read(others[given], str(others[given]))
-    raise packaged.unknown_problem(given, own | others, faults)
+    raise packaged.unknown_problem(given, files | others, faults)
 
 
 def answer_path(given: object) -> Path | None:

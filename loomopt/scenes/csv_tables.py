@@ -84,8 +84,8 @@ class Record(NamedTuple):
 
     def as_dict(self) -> dict[str, object]:
         """JSON data; without the keys of smoothing where the table is not smoothed."""
-        told = {name: value for name, value in self._asdict().items() if value is not None and name != "said"}
-        return told | {"precision": dict(self.precision), "misfit": dict(self.misfit)}
+        fields = {name: value for name, value in self._asdict().items() if value is not None and name != "said"}
+        return fields | {"precision": dict(self.precision), "misfit": dict(self.misfit)}
 
 
 class Table(NamedTuple):
@@ -113,12 +113,12 @@ class Table(NamedTuple):
     def said(self) -> str:
         """How it was read, in words: "angle to ±0.5 deg, s to ±0.0005 mm"."""
         halves = {name: self.precision[name] / factor(unit) for name, unit in self.units.items()}
-        told = (f"{name} to \u00b1{half:.2g} {self.units[name]}" for name, half in halves.items() if half)
-        return "; ".join((f"read {', '.join(told)}", *self.remarks))
+        accuracies = (f"{name} to \u00b1{half:.2g} {self.units[name]}" for name, half in halves.items() if half)
+        return "; ".join((f"read {', '.join(accuracies)}", *self.remarks))
 
-    def record(self, key: str, misfit: Mapping[str, float | None], said: str) -> Record:
+    def record(self, key: str, misfit: Mapping[str, float | None], use: str) -> Record:
         """Remarks on the table; key: under which the scene names it; said: a sentence on its use."""
-        text = f"{key} {self.file}: {said}; {self.said}"
+        text = f"{key} {self.file}: {use}; {self.said}"
         return Record(key, self.file, len(self.lines), self.precision, misfit, text)
 
 
@@ -164,8 +164,8 @@ def measured(path: Path, kinds: Mapping[str, str]) -> Table:
         allowed = ", ".join(f"{name} [{DISPLAY_UNIT[kinds[name]]}]" for name in names)
         remedy = "Name its columns as the curves are named"
         raise refusal("the table has no column of the curves", given, allowed=allowed, remedy=remedy)
-    asked = {name: kinds[name] for name in (angle, *there)}
-    return _table(tables, given, asked, fewest=1, twice=True, gaps=True)
+    columns = {name: kinds[name] for name in (angle, *there)}
+    return _table(tables, given, columns, fewest=1, twice=True, gaps=True)
 
 
 def header(kinds: Mapping[str, str]) -> str:
@@ -175,10 +175,10 @@ def header(kinds: Mapping[str, str]) -> str:
 
 def _named(scene: Scene, given: str, key: str) -> bytes:
     """Bytes of a file that a scene names, or that came with it. Raises BadInput."""
-    held = scene.paths.text(key)
+    text = scene.paths.text(key)
     reads(scene, given)
-    if held is not None:
-        return held.encode()
+    if text is not None:
+        return text.encode()
     return _bytes(scene.paths.located(given, key, scene.origin), given, scene.origin, key)
 
 
@@ -210,43 +210,46 @@ def _table(
     gaps: bool = False,
 ) -> Table:
     """Table that a file's cells make, with the separator that gives most of the columns."""
-    cells = max(tables, key=lambda each: len(_there(each, kinds)))
+    cells = max(tables, key=lambda candidate: len(_there(candidate, kinds)))
     if not cells.rows:
         raise refusal("the table is empty", origin, allowed=header(kinds), remedy="Give a header and rows")
     head, rows = _headed(cells, kinds)
-    found, units = _found(head, rows, kinds, origin)
+    columns, units = _found(head, rows, kinds, origin)
     rows = rows[units:]
     for row in rows:
         _check_length(row, head, cells.separator, origin)
-    if found[0].kind == "angle" and not twice:
-        rows = _once(rows, found)
+    if columns[0].kind == "angle" and not twice:
+        rows = _once(rows, columns)
     if not fewest <= len(rows) <= MOST_ROWS:
         problem = f"the table has {len(rows)} rows below its header"
         raise refusal(problem, origin, allowed=f"{fewest} to {MOST_ROWS}", remedy="Give more, or fewer")
-    decimal, remarks = _decimal_sign(rows, found, cells.separator, origin)
-    texts = {column: [_plain(row.cell(column.place), decimal) for row in rows] for column in found}
+    decimal, remarks = _decimal_sign(rows, columns, cells.separator, origin)
+    texts = {column: [_plain(row.cell(column.place), decimal) for row in rows] for column in columns}
     values = {
         column.name: tuple(
-            _number(text, row, column, origin, gaps and column is not found[0])
+            _number(text, row, column, origin, gaps and column is not columns[0])
             for text, row in zip(texts[column], rows, strict=True)
         )
-        for column in found
+        for column in columns
     }
-    for column in found:
+    for column in columns:
         if all(map(math.isnan, values[column.name])):
             raise refusal(f"column {column.called} is empty", origin, remedy="Fill it, or take it out")
     halves = {
-        column.name: tuple(half * column.unit for half in _precision(column, texts[column], digits)) for column in found
+        column.name: tuple(half * column.unit for half in _precision(column, texts[column], digits))
+        for column in columns
     }
     marked = {name: _marked(head, rows, name, origin) for name in marks}
     lines = tuple(row.line for row in rows)
-    first = found[0]
+    first = columns[0]
     if first.kind == "angle":
         _check_angles(first, values[first.name], rows, twice, origin)
         if values[first.name][0] > values[first.name][-1] and _falls(values[first.name]):
-            values, halves, marked = ({n: each[::-1] for n, each in of.items()} for of in (values, halves, marked))
+            values, halves, marked = (
+                {name: column[::-1] for name, column in group.items()} for group in (values, halves, marked)
+            )
             lines = lines[::-1]
-    written = {column.name: column.text for column in found}
+    written = {column.name: column.text for column in columns}
     return Table(origin, values, halves, marked, lines, written, remarks)
 
 
@@ -257,9 +260,9 @@ def _heading(cell: str) -> tuple[str, str | None]:
     """Name in a heading, and the unit where one stands behind it."""
     plain = " ".join(cell.split())
     for pattern in _HEADINGS:
-        found = pattern.fullmatch(plain)
-        if found:
-            return found[1], found[2].strip()
+        match = pattern.fullmatch(plain)
+        if match:
+            return match[1], match[2].strip()
     return plain, None
 
 
@@ -267,10 +270,10 @@ def _places(row: Row, name: str) -> list[int]:
     """Places of a column in a heading: under its name, else whatever its case, else under another name."""
     headings = [_heading(cell)[0] for cell in row.cells]
     for called in (name, *ALIASES.get(name, ())):
-        found = [place for place, each in enumerate(headings) if each == called]
-        found = found or [place for place, each in enumerate(headings) if each.casefold() == called.casefold()]
-        if found:
-            return found
+        places = [place for place, heading in enumerate(headings) if heading == called]
+        places = places or [place for place, heading in enumerate(headings) if heading.casefold() == called.casefold()]
+        if places:
+            return places
     return []
 
 
@@ -286,14 +289,14 @@ def _headed(cells: Cells, kinds: Mapping[str, str]) -> tuple[Row, Sequence[Row]]
     candidates += [(row, cells.rows) for row in cells.remarks]
     if not candidates:
         return Row(1, ()), ()
-    return max(candidates, key=lambda each: sum(bool(_places(each[0], name)) for name in kinds))
+    return max(candidates, key=lambda candidate: sum(bool(_places(candidate[0], name)) for name in kinds))
 
 
 def _found(head: Row, rows: Sequence[Row], kinds: Mapping[str, str], origin: str) -> tuple[list[_Column], int]:
     """Columns that a heading names, and how many rows of units stand below it, 0 or 1. Raises BadInput."""
     places = {name: _places(head, name) for name in kinds}
     below = 0
-    found = []
+    columns = []
     for name, kind in kinds.items():
         there = places[name]
         if len(there) > 1:
@@ -315,8 +318,8 @@ def _found(head: Row, rows: Sequence[Row], kinds: Mapping[str, str], origin: str
             problem = f"{where}: the unit is missing, so column {name} has none"
             remedy = f'Write "{name} [{DISPLAY_UNIT[kind]}]", or the units in a row of their own below'
             raise refusal(problem, origin, allowed=usual, remedy=remedy)
-        found.append(_Column(name, called, kind, there[0], *_size(unit, kind, where, usual, origin)))
-    return found, below
+        columns.append(_Column(name, called, kind, there[0], *_size(unit, kind, where, usual, origin)))
+    return columns, below
 
 
 def _cell(text: str) -> str:
@@ -356,7 +359,7 @@ def _check_length(row: Row, head: Row, separator: str, origin: str) -> None:
 
 
 def _decimal_sign(
-    rows: Sequence[Row], found: Sequence[_Column], separator: str, origin: str
+    rows: Sequence[Row], columns: Sequence[_Column], separator: str, origin: str
 ) -> tuple[str, tuple[str, ...]]:
     """Decimal sign of the columns that are read, and remarks on it. Raises BadInput where it may be both.
 
@@ -366,18 +369,18 @@ def _decimal_sign(
     unsure: dict[str, str] = {}
     grouped = False
     for row in rows:
-        for column in found:
+        for column in columns:
             text = _bare(row.cell(column.place))
             signs = [sign for sign in text if sign in (POINT, COMMA)]
             if not signs or not _NUMBER.fullmatch(text):
                 continue
             where = f"{_cell(text)} (line {row.line}, column {column.called})"
-            other = COMMA if signs[-1] == POINT else POINT
+            other_sign = COMMA if signs[-1] == POINT else POINT
             if len(set(signs)) == 2:
                 proof.setdefault(signs[-1], where)
                 grouped = True
             elif len(signs) > 1:
-                proof.setdefault(other, where)
+                proof.setdefault(other_sign, where)
                 grouped = True
             elif _MAYBE_GROUP.fullmatch(text):
                 unsure.setdefault(signs[0], where)
@@ -390,9 +393,9 @@ def _decimal_sign(
         raise refusal(problem, origin, remedy=remedy)
     if signs:
         (sign,) = signs
-        other = COMMA if sign == POINT else POINT
-        if other in unsure and not grouped:
-            problem = f"it may be a decimal sign or part thousands: {unsure[other]}, beside {proof[sign]}"
+        other_sign = COMMA if sign == POINT else POINT
+        if other_sign in unsure and not grouped:
+            problem = f"it may be a decimal sign or part thousands: {unsure[other_sign]}, beside {proof[sign]}"
             raise refusal(problem, origin, remedy=remedy)
         return sign, ()
     if len(unsure) == 2:
@@ -416,9 +419,9 @@ def _bare(text: str) -> str:
 
 def _plain(text: str, decimal: str) -> str:
     """A number's text with a decimal point, and without what groups thousands."""
-    other = COMMA if decimal == POINT else POINT
+    group_sign = COMMA if decimal == POINT else POINT
     whole, sign, rest = _bare(text).partition(decimal)
-    whole = whole.replace(other, "") if _GROUPS[other].fullmatch(whole) else whole
+    whole = whole.replace(group_sign, "") if _GROUPS[group_sign].fullmatch(whole) else whole
     return f"{whole}{sign and POINT}{rest}"
 
 
@@ -447,8 +450,8 @@ def _precision(column: _Column, texts: Sequence[str], digits: int | None) -> lis
     """Half a unit of the last digit of each number of a column, in its own unit; 0 of whole degrees."""
     if column.kind != "angle":
         return _halves(texts, digits)
-    found = _halves(texts, None)
-    return [0.0] * len(texts) if column.text == "deg" and min(found) == WHOLE else found
+    halves = _halves(texts, None)
+    return [0.0] * len(texts) if column.text == "deg" and min(halves) == WHOLE else halves
 
 
 def _halves(texts: Sequence[str], digits: int | None) -> list[float]:
@@ -460,9 +463,9 @@ def _halves(texts: Sequence[str], digits: int | None) -> list[float]:
     if digits is not None:
         return [0.5 * 10.0**-digits] * len(texts)
     parts = [_DIGITS.fullmatch(text) for text in texts]
-    powers = [int(each[3] or 0) if each else 0 for each in parts]
-    decimals = [len(each[2]) - power if each else 0 for each, power in zip(parts, powers, strict=True)]
-    counts = [len((each[1] + each[2]).lstrip("0")) if each else 0 for each in parts]
+    powers = [int(part[3] or 0) if part else 0 for part in parts]
+    decimals = [len(part[2]) - power if part else 0 for part, power in zip(parts, powers, strict=True)]
+    counts = [len((part[1] + part[2]).lstrip("0")) if part else 0 for part in parts]
     plain = [k for k, power in enumerate(powers) if not power and counts[k]]
     most, longest = max((decimals[k] for k in plain), default=0), max(counts, default=0)
     short = sum(decimals[k] < most for k in plain)
@@ -492,13 +495,13 @@ def _marked(head: Row, rows: Sequence[Row], name: str, origin: str) -> tuple[flo
 # Angles.
 
 
-def _once(rows: Sequence[Row], found: Sequence[_Column]) -> list[Row]:
+def _once(rows: Sequence[Row], columns: Sequence[_Column]) -> list[Row]:
     """Rows without those that repeat the one before them in every column that is read."""
-    kept: list[Row] = []
+    distinct: list[Row] = []
     for row in rows:
-        if not kept or any(row.cell(column.place) != kept[-1].cell(column.place) for column in found):
-            kept.append(row)
-    return kept
+        if not distinct or any(row.cell(column.place) != distinct[-1].cell(column.place) for column in columns):
+            distinct.append(row)
+    return distinct
 
 
 def _falls(angles: Sequence[float]) -> bool:

@@ -194,6 +194,8 @@ def _limits(model: type[BaseModel], names: list[str]) -> str:
     field = model.model_fields.get(names[0]) if len(names) == 1 else None
     if field is None:
         return ""
-    limits = ((word, getattr(each, name, None)) for name, word in _LIMITS.items() for each in field.metadata)
+    limits = (
+        (word, getattr(constraint, name, None)) for name, word in _LIMITS.items() for constraint in field.metadata
+    )
     words = [f"{word} {limit}" for word, limit in limits if limit is not None]
     return ", ".join([*(["a whole number"] if field.annotation is int else []), *words])

@@ -55,7 +55,7 @@ def loaded(path: Path) -> object:
         raw = _piped() if str(path) == PIPE else _filed(path)
         if len(raw) > LARGEST_FILE:
             raise refusal("the file is too large for a design", origin, allowed="up to 1 MB", remedy=_GIVE_FILE)
-        found: object = json.loads(raw.decode("utf-8-sig"), object_pairs_hook=lambda pairs: _once(pairs, origin))
+        contents: object = json.loads(raw.decode("utf-8-sig"), object_pairs_hook=lambda pairs: _once(pairs, origin))
     except OSError as error:
         reason = error.strerror or str(error)
         raise refusal(f"the design cannot be read: {reason}", origin, remedy="Check the path") from None
@@ -63,7 +63,7 @@ def loaded(path: Path) -> object:
         raise
     except (ValueError, RecursionError):
         raise refusal("the file is not JSON", origin, remedy=_GIVE_FILE) from None
-    return found
+    return contents
 
 
 def _filed(path: Path) -> bytes:
@@ -88,31 +88,31 @@ def _piped() -> bytes:
 
 def _once(pairs: Sequence[tuple[str, object]], origin: str) -> dict[str, object]:
     """Entries of a JSON object. Raises BadInput where a name comes twice."""
-    found: dict[str, object] = {}
+    entries: dict[str, object] = {}
     for name, value in pairs:
-        if name in found:
+        if name in entries:
             raise refusal("a name comes twice in one object", origin, name, remedy="Take out all but one")
-        found[name] = value
-    return found
+        entries[name] = value
+    return entries
 
 
 def packed(design: Mapping[str, float], names: Iterable[str]) -> dict[str, float | Sequence[float]]:
     """A design with NAME_0, NAME_1 ... of each named list as one tuple."""
-    found: dict[str, float | Sequence[float]] = dict(design)
+    numbers: dict[str, float | Sequence[float]] = dict(design)
     for name in names:
         members = {k: key for key in design if (k := _place(key, name)) is not None}
         if members:
-            found = {key: value for key, value in found.items() if key not in members.values()}
-            found[name] = tuple(design[members[k]] for k in sorted(members))
-    return found
+            numbers = {key: value for key, value in numbers.items() if key not in members.values()}
+            numbers[name] = tuple(design[members[k]] for k in sorted(members))
+    return numbers
 
 
 def flat(design: Design) -> dict[str, float]:
     """A design with each list's numbers under names of their own, NAME_0, NAME_1 ..."""
-    found: dict[str, float] = {}
+    numbers: dict[str, float] = {}
     for name, value in design.items():
-        found |= {name: value} if isinstance(value, float | int) else {f"{name}_{k}": v for k, v in enumerate(value)}
-    return found
+        numbers |= {name: value} if isinstance(value, float | int) else {f"{name}_{k}": v for k, v in enumerate(value)}
+    return numbers
 
 
 def in_list(key: str, lists: Collection[str]) -> bool:
@@ -199,7 +199,7 @@ def _other_unit(cursor: Cursor, scene: Scene, kind: str, value: float) -> BadInp
 
 def _listed(design: Cursor, lists: Mapping[str, Quantity]) -> dict[str, object]:
     """Numbers of a design's lists, each under a name of its own. Raises BadInput."""
-    found: dict[str, object] = {}
+    numbers: dict[str, object] = {}
     given = design.table()
     for name in lists:
         place, values = design.at(name), given.get(name, [])
@@ -208,19 +208,19 @@ def _listed(design: Cursor, lists: Mapping[str, Quantity]) -> dict[str, object]:
             raise place.fault("it is not such a list", allowed=allowed, remedy=_GIVE)
         if values and any(_place(str(key), name) is not None for key in given):
             raise place.fault(f"{name} is given as a list and by number", remedy=_GIVE)
-        found |= {f"{name}_{k}": value for k, value in enumerate(values)}
-    return found
+        numbers |= {f"{name}_{k}": value for k, value in enumerate(values)}
+    return numbers
 
 
 def _numbers(scene: Scene) -> dict[str, Quantity]:
     """Quantity of each number of a scene that a design may hold."""
-    found: dict[str, Quantity | None] = {}
+    quantities: dict[str, Quantity | None] = {}
     for model in (scene.schema.mechanism, scene.schema.operation):
-        found |= quantities_of(model)
+        quantities |= quantities_of(model)
     for effect in scene.active:
-        found |= {label(effect, key): quantity_of(effect.table, key) for key in effect.table.model_fields}
-    first = {name: found[name] for name in scene.schema.variables}
-    return {name: quantity for name, quantity in {**first, **found}.items() if quantity}
+        quantities |= {label(effect, key): quantity_of(effect.table, key) for key in effect.table.model_fields}
+    first = {name: quantities[name] for name in scene.schema.variables}
+    return {name: quantity for name, quantity in {**first, **quantities}.items() if quantity}
 
 
 def _fits(quantity: Quantity, value: float) -> bool:
@@ -254,19 +254,19 @@ def read_given(path: Path) -> DesignGiven:
     data, origin = loaded(path), named(path)
     if not isinstance(data, dict) or "design" not in data:
         return DesignGiven(data)
-    target, status, own = data.get("target"), data.get("status"), data.get("scene")
+    target, status, answer_scene = data.get("target"), data.get("status"), data.get("scene")
     if target is not None and not isinstance(target, str):
         raise refusal("the target is no name", origin, "target", target, remedy="Correct it or take it out")
     status = status if isinstance(status, str) else None
-    if own is None:
+    if answer_scene is None:
         return DesignGiven(data["design"], Call(target=target), target, status)
-    document = own.get("document") if isinstance(own, Mapping) else None
+    document = answer_scene.get("document") if isinstance(answer_scene, Mapping) else None
     if not isinstance(document, Mapping):
         remedy = "Give the answer as it was printed, or its design object alone"
         key = "scene.document"
         raise refusal("the answer's scene has no tables", origin, key, allowed="a scene's tables", remedy=remedy)
-    call = _call(own["call"], origin) if "call" in own else Call(target=target)
-    files = own.get("files", {})
+    call = _call(answer_scene["call"], origin) if "call" in answer_scene else Call(target=target)
+    files = answer_scene.get("files", {})
     if not isinstance(files, Mapping) or not all(isinstance(text, str) for text in files.values()):
         raise refusal(
             "the answer's files are no texts", origin, "scene.files", remedy="Give the answer as it was printed"
@@ -274,17 +274,17 @@ def read_given(path: Path) -> DesignGiven:
     return DesignGiven(data["design"], call, target, status, document, Frozen(files))
 
 
-def _call(told: object, origin: str) -> Call:
+def _call(raw: object, origin: str) -> Call:
     """Changes by the call of an answer. Raises BadInput."""
-    entries: Mapping[str, Any] = told if isinstance(told, Mapping) else {"": told}
+    entries: Mapping[str, Any] = raw if isinstance(raw, Mapping) else {"": raw}
     names = [entries.get(name, []) for name in ("with", "without", "free")]
     values, target = entries.get("set", {}), entries.get("target")
-    listed = all(isinstance(each, list) and all(isinstance(name, str) for name in each) for each in names)
+    listed = all(isinstance(entry, list) and all(isinstance(name, str) for name in entry) for entry in names)
     if "" in entries or not listed or not isinstance(values, Mapping) or not isinstance(target, str | None):
         remedy = "Give the answer as it was printed, or its design object alone"
         allowed = "set: keys and values; with, without, free: names; target: a name"
         raise refusal("it does not say what a call changes", origin, "scene.call", allowed=allowed, remedy=remedy)
-    on, off, free = (tuple(each) for each in names)
+    on, off, free = (tuple(entry) for entry in names)
     return Call(copied(values, origin), on, off, free, target)
 
 
@@ -300,9 +300,9 @@ def read_answer(path: Path, jobs: Jobs) -> tuple[Scene, DesignGiven]:
         return build(given.document, jobs, origin, Paths(path.absolute().parent, texts=given.files), call), given
     except BadInput as error:
         faults = Faults()
-        for each in error.faults:
-            told = {"allowed": each.allowed, "remedy": each.remedy}
-            faults.add(refusal(each.problem, origin, f"scene.document.{each.key}", **told, grade=each.grade))
+        for fault in error.faults:
+            advice = {"allowed": fault.allowed, "remedy": fault.remedy}
+            faults.add(refusal(fault.problem, origin, f"scene.document.{fault.key}", **advice, grade=fault.grade))
         raise faults.told() from None
 
 
@@ -330,9 +330,9 @@ def resumed(given: DesignGiven, scene: Scene, later: Call, origin: str) -> Scene
 def check_job(job: object, scene: Scene, origin: str) -> None:
     """Raise BadInput for an answer of another job than a scene's."""
     if job != scene.job:
-        told = clean(job, 80) if isinstance(job, str) else shown(job)
+        name = clean(job, 80) if isinstance(job, str) else shown(job)
         remedy = "Give an answer of this job, or the scene that the answer was found for"
-        raise refusal(f"the answer is one of job {told}, the scene one of {scene.job}", origin, remedy=remedy)
+        raise refusal(f"the answer is one of job {name}, the scene one of {scene.job}", origin, remedy=remedy)
 
 
 def scene_changes(scene: Scene, given: DesignGiven, origin: str, besides: Call) -> list[str]:
@@ -343,41 +343,43 @@ def scene_changes(scene: Scene, given: DesignGiven, origin: str, besides: Call) 
     if given.document is None:
         return []
     here, there = _on(scene.document, scene), _on(given.document, scene)
-    told = [f"{name} on" for name in here if name not in (*there, *besides.on)]
-    told += [f"{name} off" for name in there if name not in (*here, *besides.off)]
+    changes = [f"{name} on" for name in here if name not in (*there, *besides.on)]
+    changes += [f"{name} off" for name in there if name not in (*here, *besides.off)]
     after, before = dict(document_values(scene.document)), dict(document_values(given.document))
     for key in dict.fromkeys([*before, *after]):
         if before.get(key) == after.get(key) or _is_of(besides, key):
             continue
         was = f" ({clean(origin, 80)}: {_text(before[key])})" if key in before else ""
-        told.append(f"{key} = {_text(after[key])}{was}" if key in after else f"{key} left out{was}")
+        changes.append(f"{key} = {_text(after[key])}{was}" if key in after else f"{key} left out{was}")
     if given.files:
         from loomopt.scenes.numbers import tables
 
         now = {key: text for key, text in tables(scene).items() if not _is_of(besides, key)}
-        told += [f"{key} with other rows" for key, text in given.files.items() if now.get(key, text) != text]
-    return _shortened(told)
+        changes += [f"{key} with other rows" for key, text in given.files.items() if now.get(key, text) != text]
+    return _shortened(changes)
 
 
-def _shortened(told: Sequence[str]) -> list[str]:
-    short = [clean(each, LONGEST_TOLD) for each in told[:MOST_TOLD]]
-    return short if len(told) <= MOST_TOLD else [*short, f"and {len(told) - MOST_TOLD} more"]
+def _shortened(sentences: Sequence[str]) -> list[str]:
+    short = [clean(sentence, LONGEST_TOLD) for sentence in sentences[:MOST_TOLD]]
+    return short if len(sentences) <= MOST_TOLD else [*short, f"and {len(sentences) - MOST_TOLD} more"]
 
 
 def _is_of(call: Call, key: str) -> bool:
     """Whether a call has set a key, or a table in which it stands, or has freed its bound."""
-    return any(f"{key}.".startswith(f"{each}.") for each in (*call.set, *(f"bounds.{name}.free" for name in call.free)))
+    return any(
+        f"{key}.".startswith(f"{prefix}.") for prefix in (*call.set, *(f"bounds.{name}.free" for name in call.free))
+    )
 
 
 def _on(document: Mapping[str, Any], scene: Scene) -> list[str]:
     """Effects that raw tables have on; every instance by its name."""
-    found: list[str] = []
+    names: list[str] = []
     table = document.get("effects")
-    for name, own in table.items() if isinstance(table, Mapping) else ():
+    for name, entry in table.items() if isinstance(table, Mapping) else ():
         effect = scene.schema.effects.get(name)
-        many = effect is not None and effect.many and isinstance(own, Mapping)
-        found += [f"{name}.{each}" for each in own] if many else [str(name)]
-    return found
+        many = effect is not None and effect.many and isinstance(entry, Mapping)
+        names += [f"{name}.{instance}" for instance in entry] if many else [str(name)]
+    return names
 
 
 def remark(scene: Scene, given: DesignGiven, later: Call, changes: Sequence[str], origin: str) -> str:
@@ -385,13 +387,13 @@ def remark(scene: Scene, given: DesignGiven, later: Call, changes: Sequence[str]
 
     later: what this call changes, which is not told; changes: what `scene_changes` tells.
     """
-    kept = given.call.then(later).said
-    brought = [text for text in given.call.said if text in kept]
-    told = [f"{origin} brings what its call changed: {', '.join(_shortened(brought))}"] if brought else []
-    told += (
+    current = given.call.then(later).said
+    lasting = [text for text in given.call.said if text in current]
+    sentences = [f"{origin} brings what its call changed: {', '.join(_shortened(lasting))}"] if lasting else []
+    sentences += (
         [f"{scene.origin} counts where {origin} was found in another scene: {', '.join(changes)}"] if changes else []
     )
-    return "; ".join(told)
+    return "; ".join(sentences)
 
 
 def _text(value: object) -> str:
@@ -402,8 +404,8 @@ def document_values(document: Mapping[str, Any]) -> Iterator[tuple[str, object]]
     """Yield what decides an answer, and how it is shown, by dotted key; values of effects that are on or off alike."""
     if (name := looked_up(document, ("problem", "name"))) is not None:
         yield "problem.name", name
-    own = ("operation", "mechanism", "available", "effects", "bounds", "limits", "display", "targets")
-    for table in (*own, *(name for name in document if name not in ("problem", *own))):
+    tables = ("operation", "mechanism", "available", "effects", "bounds", "limits", "display", "targets")
+    for table in (*tables, *(name for name in document if name not in ("problem", *tables))):
         whole = "effects" if table == "available" else table
         for parts, value in _leaves(document.get(table, {})):
             if table != "targets" or "expected" not in parts:

@@ -26,15 +26,15 @@ _PRESSURES = {"lbf": "psi"}
 
 def read(cursor: Cursor) -> dict[str, str]:
     """Table [display]: kind of quantity → its unit."""
-    found: dict[str, str] = {}
+    units: dict[str, str] = {}
     with cursor.faults:
         given = cursor.entries()
         for key, place in given.items():
             with cursor.faults:
                 if key not in KINDS:
                     raise place.unknown("kind of quantity", key, KINDS, given=given)
-                found[KINDS[key]] = _unit(place, KINDS[key])
-    return found
+                units[KINDS[key]] = _unit(place, KINDS[key])
+    return units
 
 
 def _unit(cursor: Cursor, kind: str) -> str:
@@ -89,8 +89,8 @@ def _written(
         (("operation",), schema.operation),
     ]
     tables += [(("effects", *effect.path), effect.table) for effect in active]
-    for path, own in tables:
-        for key, quantity in quantities_of(own).items():
+    for path, model in tables:
+        for key, quantity in quantities_of(model).items():
             text = looked_up(document, (*path, *key.split(".")))
             if isinstance(text, str):
                 yield quantity.kind, unit_of(text)
@@ -99,29 +99,29 @@ def _written(
     yield from ((schema.figures[name].kind, limit.unit) for name, limit in limits.items())
 
 
-def _completed(own: Mapping[str, str]) -> dict[str, str]:
+def _completed(given: Mapping[str, str]) -> dict[str, str]:
     """A unit for every kind: the given one, else one composed of the scene's, else the usual one.
 
     The SI's own composed units (N*m, N/m, 1/m) stay wherever lengths, masses and forces are decimal multiples of its
     units.
     """
-    inches = any(own.get(kind) in _OF_INCHES for kind in _INCHES)
-    bases = {kind: own.get(kind) or (_INCHES[kind] if inches else DISPLAY_UNIT[kind]) for kind in _INCHES}
+    inches = any(given.get(kind) in _OF_INCHES for kind in _INCHES)
+    bases = {kind: given.get(kind) or (_INCHES[kind] if inches else DISPLAY_UNIT[kind]) for kind in _INCHES}
     letters = {letter: bases[kind] for letter, kind in _BASES.items()}
-    found = {**bases, **own}
+    units = {**bases, **given}
     torque = SI_UNIT["torque"]
     for kind, si in SI_UNIT.items():
-        if kind in found:
+        if kind in units:
             continue
         if kind == "pressure":
-            found[kind] = _pressure(bases)
+            units[kind] = _pressure(bases)
         elif kind == "energy":
-            found[kind] = si if _is_decimal(found["torque"]) else found["torque"]
+            units[kind] = si if _is_decimal(units["torque"]) else units["torque"]
         elif kind != "torque" and si.startswith(torque):
-            found[kind] = si.replace(torque, found["torque"], 1)
+            units[kind] = si.replace(torque, units["torque"], 1)
         else:
-            found[kind] = _composed(si, letters) or DISPLAY_UNIT[kind]
-    return {kind: found[kind] for kind in SI_UNIT}
+            units[kind] = _composed(si, letters) or DISPLAY_UNIT[kind]
+    return {kind: units[kind] for kind in SI_UNIT}
 
 
 def _composed(si: str, letters: Mapping[str, str]) -> str:

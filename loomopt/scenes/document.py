@@ -49,10 +49,10 @@ def read_list_or_table(text: str) -> list[Any] | dict[str, Any] | None:
     if text[:1] not in ("[", "{") or "\n" in text or _DEEP_KEY.search(text):
         return None
     try:
-        found: list[Any] | dict[str, Any] = tomllib.loads(f"value = {text}")["value"]
+        value: list[Any] | dict[str, Any] = tomllib.loads(f"value = {text}")["value"]
     except (ValueError, RecursionError):
         return None
-    return found
+    return value
 
 
 def _read_text(path: Path, origin: str) -> str:
@@ -110,8 +110,8 @@ def _copied_value(value: object, origin: str, path: tuple[str, ...]) -> object:
     if isinstance(value, Mapping):
         return copied(value, origin, path)
     if isinstance(value, list | tuple):
-        found = [_copied_value(each, origin, (*path, str(k))) for k, each in enumerate(value, 1)]
-        return found if isinstance(value, list) else tuple(found)
+        items = [_copied_value(item, origin, (*path, str(k))) for k, item in enumerate(value, 1)]
+        return items if isinstance(value, list) else tuple(items)
     if isinstance(value, int) and value.bit_length() > _LONGEST_NUMBER:
         raise refusal(
             "it is a whole number of thousands of digits", origin, ".".join(path), remedy="Correct the number"
@@ -190,8 +190,8 @@ class Paths:
 
     def set_by_caller(self, keys: Iterable[str]) -> "Paths":
         """The same paths with more keys that the caller has set."""
-        own = self.own | {_on(key) for key in keys}
-        return Paths(self.folder, own, self.texts)
+        caller_keys = self.own | {_on(key) for key in keys}
+        return Paths(self.folder, caller_keys, self.texts)
 
     def text(self, key: str) -> str | None:
         """Text of a file that came with the scene; None where it did not, or the caller names another."""
@@ -217,7 +217,7 @@ class Paths:
         return path
 
     def _is_own(self, key: str) -> bool:
-        return any(key == own or key.startswith(f"{own}.") for own in self.own)
+        return any(key == prefix or key.startswith(f"{prefix}.") for prefix in self.own)
 
 
 def _on(key: str) -> str:

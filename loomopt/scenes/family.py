@@ -35,15 +35,15 @@ TARGET = Target(FAMILY, "one machine for several sets of numbers: the least wors
 
 def table(scene: Scene) -> FamilyTarget:
     """Table of a scene's family."""
-    found = scene.targets[FAMILY]
-    assert isinstance(found, FamilyTarget)
-    return found
+    target = scene.targets[FAMILY]
+    assert isinstance(target, FamilyTarget)
+    return target
 
 
 def of_target(scene: Scene) -> str:
     """Target that each member has. Raises BadInput for one that the job does not have."""
     name = table(scene).of or scene.schema.default_target
-    known = [each for each in scene.schema.targets if each != FAMILY]
+    known = [target for target in scene.schema.targets if target != FAMILY]
     if name not in known:
         raise unknown("target", name, known, scene.origin, f"targets.{FAMILY}.of")
     return name
@@ -56,7 +56,7 @@ def changes(scene: Scene) -> tuple[dict[str, Any], ...]:
 
 def members(scene: Scene) -> tuple[Scene, ...]:
     """Scene of each member. Raises BadInput that names the member and the key."""
-    return kept(scene, FAMILY, lambda: tuple(_member(scene, k, each) for k, each in enumerate(changes(scene))))
+    return kept(scene, FAMILY, lambda: tuple(_member(scene, k, change) for k, change in enumerate(changes(scene))))
 
 
 def member_name(name: str, member: int) -> str:
@@ -76,39 +76,39 @@ def called(scene: Scene) -> Mapping[str, str]:
     names = (*scene.schema.figures, *scene.schema.variables, *scene.bounds)
     count = len(table(scene).members)
 
-    def found() -> dict[str, str]:
-        own = {member_name(name, k): name for name in names for k in range(count)}
+    def names_of_members() -> dict[str, str]:
+        member_names = {member_name(name, k): name for name in names for k in range(count)}
         kinds = ((True, 1), (False, 1), (False, 2), (False, -1))
-        return own | {sum_name(name, *kind): name for name in names for kind in kinds}
+        return member_names | {sum_name(name, *kind): name for name in names for kind in kinds}
 
-    return kept(scene, "family names", found)
+    return kept(scene, "family names", names_of_members)
 
 
 def _members(scene: Scene) -> list[dict[str, Any]]:
-    found, key = table(scene).members, f"targets.{FAMILY}.members"
-    if not found:
+    members, key = table(scene).members, f"targets.{FAMILY}.members"
+    if not members:
         raise refusal("a family needs members", scene.origin, key, remedy='Write members = [{ M0 = "600 N*m" }, ...]')
-    if len(found) > MOST_MEMBERS:
+    if len(members) > MOST_MEMBERS:
         raise refusal(
-            "a family of so many", scene.origin, key, str(len(found)), f"1 to {MOST_MEMBERS}", "Take some out"
+            "a family of so many", scene.origin, key, str(len(members)), f"1 to {MOST_MEMBERS}", "Take some out"
         )
-    return found
+    return members
 
 
 def _changes(scene: Scene, place: int) -> dict[str, Any]:
     at, given = f"targets.{FAMILY}.members[{place + 1}]", _members(scene)[place]
     if not given:
         raise refusal("a member that changes nothing", scene.origin, at, remedy='Write { M0 = "600 N*m" }')
-    found: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
     free = {f"{p.table}.{p.key}" for p in places(scene) if (bound := scene.bounds.get(p.label)) and bound.free}
     for key, value in _flat(scene, at, given):
-        if key in found:
+        if key in changes:
             raise refusal("it is changed twice", scene.origin, f"{at}.{key}", remedy="Take one of them out")
         if key in free:
             problem, remedy = "it is free, so that the family chooses it", "Change its bounds, or take it out"
             raise refusal(problem, scene.origin, f"{at}.{key}", remedy=remedy)
-        found[key] = value
-    return found
+        changes[key] = value
+    return changes
 
 
 def _flat(scene: Scene, at: str, given: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -118,14 +118,14 @@ def _flat(scene: Scene, at: str, given: Mapping[str, Any]) -> Iterator[tuple[str
         if name in TABLES or "." in name:
             yield from _leaves(name, value)
             continue
-        found = [f"{p.table}.{p.key}" for p in numbers if name in (p.key, p.label) and p.given]
-        if len(found) != 1:
+        keys = [f"{p.table}.{p.key}" for p in numbers if name in (p.key, p.label) and p.given]
+        if len(keys) != 1:
             known = sorted({p.label for p in numbers if p.given})
-            if not found:
+            if not keys:
                 raise unknown("number", name, known, scene.origin, f"{at}.{name}")
-            problem, remedy = f"{name} may mean {', '.join(found)}", f"Write one of them in place of {name}"
+            problem, remedy = f"{name} may mean {', '.join(keys)}", f"Write one of them in place of {name}"
             raise refusal(problem, scene.origin, f"{at}.{name}", remedy=remedy)
-        yield found[0], value
+        yield keys[0], value
 
 
 def _leaves(key: str, value: object) -> Iterator[tuple[str, Any]]:
@@ -139,8 +139,8 @@ def _leaves(key: str, value: object) -> Iterator[tuple[str, Any]]:
 
 def _alone(scene: Scene) -> Scene:
     """Scene without its family."""
-    own = {key: value for key, value in scene.call.set.items() if not f"{key}.".startswith(f"targets.{FAMILY}.")}
-    call = replace(scene.call, set=Frozen(own), target=None)
+    settings = {key: value for key, value in scene.call.set.items() if not f"{key}.".startswith(f"targets.{FAMILY}.")}
+    call = replace(scene.call, set=Frozen(settings), target=None)
     return build(removed(scene.document, ("targets", FAMILY)), scene.jobs, scene.origin, scene.paths, call)
 
 

@@ -36,45 +36,47 @@ def current_document(document: Mapping[str, Any], former: Mapping[str, str], ori
 
     Raises BadInput where a figure stands under both names.
     """
-    found = {name: _keys(document[name], former, origin, name) for name in TABLES if name in document}
+    tables = {name: _keys(document[name], former, origin, name) for name in TABLES if name in document}
     if isinstance(targets := document.get("targets"), Mapping):
-        found["targets"] = {name: _target(own, former, origin, f"targets.{name}") for name, own in targets.items()}
-    changed = {name: table for name, table in found.items() if table != document[name]}
+        tables["targets"] = {
+            name: _target(target, former, origin, f"targets.{name}") for name, target in targets.items()
+        }
+    changed = {name: table for name, table in tables.items() if table != document[name]}
     return {**document, **changed} if changed else document
 
 
-def _target(own: object, former: Mapping[str, str], origin: str, path: str) -> object:
-    if not isinstance(own, Mapping):
-        return own
-    found = dict(own)
+def _target(table: object, former: Mapping[str, str], origin: str, path: str) -> object:
+    if not isinstance(table, Mapping):
+        return table
+    new_table = dict(table)
     for key in ("least", "most"):
-        names = own.get(key)
+        names = table.get(key)
         if isinstance(names, list | tuple):
-            found[key] = [current(name, former) if isinstance(name, str) else name for name in names]
-            found[key] = tuple(found[key]) if isinstance(names, tuple) else found[key]
-    if "expected" in own:
-        found["expected"] = _keys(own["expected"], former, origin, f"{path}.expected")
-    return found
+            new_table[key] = [current(name, former) if isinstance(name, str) else name for name in names]
+            new_table[key] = tuple(new_table[key]) if isinstance(names, tuple) else new_table[key]
+    if "expected" in table:
+        new_table["expected"] = _keys(table["expected"], former, origin, f"{path}.expected")
+    return new_table
 
 
 def _keys(table: object, former: Mapping[str, str], origin: str, path: str) -> object:
     """Table with today's names as keys; a former one may be parted at its dot, as TOML parts it."""
     if not isinstance(table, Mapping):
         return table
-    found: dict[str, Any] = {}
+    new_table: dict[str, Any] = {}
     for name, value in table.items():
         parts = value if isinstance(value, Mapping) else {}
         moved = {key: f"{name}.{key}" for key in parts if f"{name}.{key}" in former}
         if name in former:
             moved, parts, name = {"": name}, {"": value}, ""
-        rest = {key: each for key, each in parts.items() if key not in moved}
+        rest = {key: entry for key, entry in parts.items() if key not in moved}
         if rest or not moved:
-            found[name] = rest if moved else value
+            new_table[name] = rest if moved else value
         for key, full in moved.items():
             now = former[full]
             head, _, tail = now.partition(".")
             if now in table or (isinstance(table.get(head), Mapping) and tail in table[head]):
                 problem = f"{full} is the former name of {now}; both are given"
                 raise refusal(problem, origin, f"{path}.{full}", remedy="Give one")
-            found[current(full, former)] = parts[key]
-    return found
+            new_table[current(full, former)] = parts[key]
+    return new_table

@@ -83,10 +83,10 @@ _CLASS = re.compile(r"([A-Za-z]{1,2})([0-9]{1,2})")
 
 def parted(name: str) -> tuple[str, int] | None:
     """Letter and grade of a tolerance class, None where it is none of the tables."""
-    found = _CLASS.fullmatch(name)
-    if found is None or found[1] not in LETTERS:
+    match = _CLASS.fullmatch(name)
+    if match is None or match[1] not in LETTERS:
         return None
-    letter, grade = found[1], int(found[2])
+    letter, grade = match[1], int(match[2])
     most = 8 if letter.lower() in ("k", "m", "n") else MOST_GRADE
     return (letter, grade) if LEAST_GRADE <= grade <= most else None
 
@@ -96,10 +96,10 @@ def deviations(name: str, nominal: float) -> tuple[float, float]:
 
     name: such as "H7"; nominal: size, m. Raises ValueError for what `parted` does not know.
     """
-    found = parted(name)
-    if found is None:
+    parts = parted(name)
+    if parts is None:
         raise ValueError(f"{name} is no tolerance class of the tables")
-    letter, grade = found
+    letter, grade = parts
     size = abs(nominal) * 1e3 - AS_WRITTEN
     if not 0.0 < size <= LARGEST:
         return math.nan, math.nan

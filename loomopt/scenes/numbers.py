@@ -36,23 +36,23 @@ def _quantities(scene: Scene) -> Iterator[tuple[str, Quantity]]:
     """Yield the dotted key of every number that a scene may hold, with what it may be."""
     schema, labels = scene.schema, {name: Quantity(kind) for name, kind in scene.schema.variables.items()}
     for table, model in (("operation", schema.operation), ("mechanism", schema.mechanism)):
-        for key, found in _fields(model):
-            yield f"{table}.{key}", found
-            labels.setdefault(key, found)
+        for key, quantity in _fields(model):
+            yield f"{table}.{key}", quantity
+            labels.setdefault(key, quantity)
         for key, value in scene.tables[table]:
             if isinstance(value, tuple) and value and isinstance(value[0], Table):
-                for k, each in enumerate(value, 1):
-                    for name, found in _fields(type(each)):
-                        if getattr(each, name) is not None:
-                            yield f"{table}.{key}.{k}.{name}", found
+                for k, item in enumerate(value, 1):
+                    for name, quantity in _fields(type(item)):
+                        if getattr(item, name) is not None:
+                            yield f"{table}.{key}.{k}.{name}", quantity
     for effect in scene.active:
-        for key, found in _fields(effect.table):
-            yield ".".join(("effects", *effect.path, key)), found
+        for key, quantity in _fields(effect.table):
+            yield ".".join(("effects", *effect.path, key)), quantity
             if getattr(scene.effects[effect.name], key) is not None:
-                labels.setdefault(label(effect, key), found)
+                labels.setdefault(label(effect, key), quantity)
     for name, target in schema.targets.items():
-        for key, found in _fields(target.own):
-            yield f"targets.{name}.{key}", found
+        for key, quantity in _fields(target.own):
+            yield f"targets.{name}.{key}", quantity
     for name in scene.bounds:
         for place in (f"bounds.{name}", f"bounds.{name}.min", f"bounds.{name}.max"):
             yield place, labels[name]
@@ -64,9 +64,9 @@ def _quantities(scene: Scene) -> Iterator[tuple[str, Quantity]]:
 
 def _fields(model: type[Table]) -> Iterator[tuple[str, Quantity]]:
     for key in model.model_fields:
-        found = quantity_of(model, key)
-        if found:
-            yield key, found
+        quantity = quantity_of(model, key)
+        if quantity:
+            yield key, quantity
 
 
 def files(scene: Scene) -> dict[str, str]:
@@ -78,24 +78,24 @@ def files(scene: Scene) -> dict[str, str]:
 
 def tables(scene: Scene) -> dict[str, str]:
     """Every table in a file that a scene names as CSV text, by the dotted key of its name; no huge one's."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for key, raw in _contents(scene, table_cells.ENDINGS):
         with contextlib.suppress(BadInput):
             text = table_cells.text(raw, key)
-            found |= {key: text} if len(text) <= LARGEST_TABLE else {}
-    return found
+            texts |= {key: text} if len(text) <= LARGEST_TABLE else {}
+    return texts
 
 
 def _contents(scene: Scene, endings: tuple[str, ...] = ("",)) -> Iterator[tuple[str, bytes]]:
     """Yield what stands in every file that a scene names, or that came with it, by the dotted key of its name."""
-    for key, text in _texts({name: own for name, own in scene.document.items() if name not in WITHOUT_FILES}):
+    for key, text in _texts({name: value for name, value in scene.document.items() if name not in WITHOUT_FILES}):
         if not text.lower().endswith(endings):
             continue
         with contextlib.suppress(BadInput, OSError, ValueError):  # what can be no file's name is none
-            held = scene.paths.text(key)
-            path = None if held is not None else scene.paths.located(text, key, scene.origin)
-            if held is not None:
-                yield key, held.encode()
+            content = scene.paths.text(key)
+            path = None if content is not None else scene.paths.located(text, key, scene.origin)
+            if content is not None:
+                yield key, content.encode()
             elif path and path.is_file():
                 yield key, path.read_bytes()
 
@@ -123,9 +123,9 @@ def range_values(text: str, key: str) -> list[str]:
 
     Where the steps do not meet HI the last one is shorter. Raises BadInput.
     """
-    found = _RANGE.fullmatch(text.strip())
-    numbers = [number for number in (found.groups()[:3] if found else ()) if plain_number(number) is not None]
-    if found is None or len(numbers) < 3:
+    match = _RANGE.fullmatch(text.strip())
+    numbers = [number for number in (match.groups()[:3] if match else ()) if plain_number(number) is not None]
+    if match is None or len(numbers) < 3:
         raise _refused("it is no range of numbers", key, text)
     low, high, step = map(Decimal, numbers)
     if step <= 0 or high < low:
@@ -135,16 +135,16 @@ def range_values(text: str, key: str) -> list[str]:
             raise _refused(f"the range has more than {MOST_VALUES} values", key, text, "Write a larger step")
         steps = [low + k * step for k in range(int((high - low) / step) + 1)]
         steps += [high] if steps[-1] < high else []
-        told = [f"{value.normalize():f}" for value in steps]
-    return [f"{number} {found[4]}" if found[4] else number for number in told]
+        texts = [f"{value.normalize():f}" for value in steps]
+    return [f"{number} {match[4]}" if match[4] else number for number in texts]
 
 
 def range_ends(text: str, key: str) -> tuple[str, str]:
     """LO and HI of "LO:HI UNIT", each as text with the unit. Raises BadInput."""
-    found = _ENDS.fullmatch(text.strip())
-    if found is None or None in map(plain_number, found.groups()[:2]):
+    match = _ENDS.fullmatch(text.strip())
+    if match is None or None in map(plain_number, match.groups()[:2]):
         raise _refused("it is no range of numbers", key, text, allowed="LO:HI UNIT, such as 0:5 kg")
-    low, high = (f"{number} {found[3]}" if found[3] else number for number in found.groups()[:2])
+    low, high = (f"{number} {match[3]}" if match[3] else number for number in match.groups()[:2])
     return low, high
 
 
@@ -157,6 +157,6 @@ def sizes(scene: Scene) -> "Sizes":
     from loomopt.scenes import sizes as ordered
 
     tables = cursor(scene)
-    found = ordered.read(tables, scene.schema, places(scene))
+    size_tables = ordered.read(tables, scene.schema, places(scene))
     tables.faults.tell()
-    return found
+    return size_tables

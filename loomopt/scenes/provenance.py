@@ -28,9 +28,9 @@ def provenance(scene: Scene, **more: object) -> dict[str, str]:
     import datetime
 
     today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
-    told = {name: str(value) for name, value in more.items()}
+    details = {name: str(value) for name, value in more.items()}
     effects = ", ".join(scene.effects) or "none"
-    return {"scene": scene.name, "scene_hash": scene.hash, "effects": effects, **told, **versions(), "date": today}
+    return {"scene": scene.name, "scene_hash": scene.hash, "effects": effects, **details, **versions(), "date": today}
 
 
 def csv(frame: "pd.DataFrame") -> str:

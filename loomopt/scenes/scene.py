@@ -78,9 +78,9 @@ class Call:
     @property
     def said(self) -> list[str]:
         """What it changes, in words."""
-        told = [*(f"{name} on" for name in self.on), *(f"{name} off" for name in self.off)]
-        told += [f"{key} = {value if isinstance(value, str) else shown(value)}" for key, value in self.set.items()]
-        return told + [f"{name} free" for name in self.free]
+        changes = [*(f"{name} on" for name in self.on), *(f"{name} off" for name in self.off)]
+        changes += [f"{key} = {value if isinstance(value, str) else shown(value)}" for key, value in self.set.items()]
+        return changes + [f"{name} free" for name in self.free]
 
     def then(self, later: "Call") -> "Call":
         """Call that has the same result as this one followed by a later one."""
@@ -97,12 +97,12 @@ class Call:
 
     def sets(self, key: str) -> bool:
         """Whether it sets a dotted key, or one inside it."""
-        return any(f"{each}.".startswith(f"{key}.") for each in self.set)
+        return any(f"{name}.".startswith(f"{key}.") for name in self.set)
 
     def as_dict(self) -> dict[str, Any]:
         """JSON data."""
-        told = {"with": list(self.on), "without": list(self.off), "free": list(self.free), "target": self.target}
-        return {"set": copied(self.set, ""), **told}
+        switches = {"with": list(self.on), "without": list(self.off), "free": list(self.free), "target": self.target}
+        return {"set": copied(self.set, ""), **switches}
 
 
 def _once(*names: str) -> tuple[str, ...]:
@@ -171,7 +171,7 @@ class Scene(Shown):
 
     def table(self, model: type[_Own]) -> _Own:
         """Table [operation], [mechanism] or that of a target, by its model."""
-        return next(each for each in (*self.tables.values(), *self.targets.values()) if isinstance(each, model))
+        return next(table for table in (*self.tables.values(), *self.targets.values()) if isinstance(table, model))
 
     def full(self, name: str) -> str:
         """Full name of a number by what a designer calls it; any other name is one already.
@@ -182,8 +182,8 @@ class Scene(Shown):
         if name in self.mechanism or name in self.operation:
             return name
         tables = [(effect, self.effects[effect.name]) for effect in self.active]
-        called = [(e, key, own) for e, own in tables for key in e.table.model_fields if label(e, key) == name]
-        called.sort(key=lambda found: getattr(found[2], found[1]) is None)
+        called = [(e, key, table) for e, table in tables for key in e.table.model_fields if label(e, key) == name]
+        called.sort(key=lambda entry: getattr(entry[2], entry[1]) is None)
         return owned(*called[0][:2]) if called else name
 
     def given(self, key: str) -> str | None:
@@ -235,20 +235,20 @@ class Scene(Shown):
     def change(self, values: Mapping[str, object], on: Iterable[str] = (), off: Iterable[str] = ()) -> "Scene":
         """Scene with keys set, then effects put on, then effects taken off: only the outcome has to hold."""
         values = arguments.table(values, "values", "key of the scene → its value", 'Write {"operation.M0": "800 N*m"}')
-        on, off = (arguments.names(each, "effects", ", ".join(self.schema.effects), _NAMES) for each in (on, off))
+        on, off = (arguments.names(names, "effects", ", ".join(self.schema.effects), _NAMES) for names in (on, off))
         changed = self.called(Call(values, tuple(on), tuple(off)), values)
         return self if changed.document is self.document else changed
 
-    def called(self, call: Call, own: Iterable[str] = ()) -> "Scene":
+    def called(self, call: Call, caller_keys: Iterable[str] = ()) -> "Scene":
         """Scene with what a call changes; own: keys whose paths are the caller's, not the scene's."""
         keys = {key: former_names.current_key(key, self.schema.former_names) for key in call.set}
         values = Frozen({keys[key]: value for key, value in copied(call.set, self.origin).items()})
         document = self._off(self._on(self._set(values), call.on), call.off)
-        told = self.call.then(replace(call, set=values, free=()))
+        new_call = self.call.then(replace(call, set=values, free=()))
         if document is not self.document:
-            changed = _built(document, self.jobs, self.origin, self.paths.set_by_caller(own), told, self)
+            changed = _built(document, self.jobs, self.origin, self.paths.set_by_caller(caller_keys), new_call, self)
         else:
-            changed = self if told == self.call else replace(self, call=told)
+            changed = self if new_call == self.call else replace(self, call=new_call)
         return changed.free(call.free) if call.free else changed
 
     def _set(self, values: Mapping[str, object]) -> Mapping[str, Any]:
@@ -264,16 +264,16 @@ class Scene(Shown):
     ) -> Mapping[str, Any]:
         parts = self._path(key)
         effect = self.schema.effects.get(parts[1]) if parts[0] == "effects" and len(parts) > 1 else None
-        own = parts[: 3 if effect and effect.many else 2]
-        inside = looked_up(document, own)
-        if parts[0] == "effects" and len(parts) > len(own) and inside is None:
-            document = _put_on(document, *own[1:])
+        table_path = parts[: 3 if effect and effect.many else 2]
+        inside = looked_up(document, table_path)
+        if parts[0] == "effects" and len(parts) > len(table_path) and inside is None:
+            document = _put_on(document, *table_path[1:])
         if parts[0] == "bounds" and len(parts) > 2 and not isinstance(inside, Mapping):
-            document = replaced(document, own, {}, self.origin, key)
+            document = replaced(document, table_path, {}, self.origin, key)
         document = replaced(document, parts, value, self.origin, key)
-        for other in _stood_for(effect, parts[len(own) :]):
+        for rival_key in _stood_for(effect, parts[len(table_path) :]):
             # A curve takes the place of numbers, and they that of a curve, but for what is set in the same call.
-            place = [*own, other]
+            place = [*table_path, rival_key]
             if looked_up(document, place) is not None and ".".join(place) not in values:
                 document = removed(document, place)
         return document
@@ -303,10 +303,10 @@ class Scene(Shown):
 
     def _off(self, document: Mapping[str, Any], names: Iterable[str]) -> Mapping[str, Any]:
         for name, parts in [(name, self._effect_path(name)) for name in names]:
-            own = looked_up(document, ("effects", *parts))
-            if own is not None:
+            values = looked_up(document, ("effects", *parts))
+            if values is not None:
                 document = removed(document, ("effects", *parts))
-                document = replaced(document, ("available", *parts), own, self.origin, f"available.{name}")
+                document = replaced(document, ("available", *parts), values, self.origin, f"available.{name}")
         return document
 
     def free(self, names: Iterable[str] | str) -> "Scene":
@@ -315,23 +315,23 @@ class Scene(Shown):
         named = arguments.names(single, "names", "names of bounds", 'Write ["J4"]')
         ranges = [name for name, bound in self.bounds.items() if bound.min < bound.max]
         groups = {group: [n for n in of if n in ranges] for group, of in self.schema.groups.items()}
-        asked = [each for name in named for each in groups.get(name) or [name]]
-        for name in asked:
+        free_names = [member for name in named for member in groups.get(name) or [name]]
+        for name in free_names:
             if name not in ranges:
                 single = [bound for bound in ranges if not self.bounds[bound].free]
-                held = ", ".join(dict.fromkeys([*(group for group, of in groups.items() if of), *single]))
-                allowed = held or "nothing: no bound has free = false"
+                choices = ", ".join(dict.fromkeys([*(group for group, of in groups.items() if of), *single]))
+                allowed = choices or "nothing: no bound has free = false"
                 near = nearest(name, [*ranges, *(group for group, of in groups.items() if of)], least=SAME)
                 remedy = f'Perhaps "{near}" is meant' if near else "Give it min and max in [bounds]"
                 raise refusal(f"{name} cannot be freed", self.origin, f"bounds.{name}", allowed=allowed, remedy=remedy)
-        document = self._set({f"bounds.{name}.free": True for name in asked})
+        document = self._set({f"bounds.{name}.free": True for name in free_names})
         return build(document, self.jobs, self.origin, self.paths, self.call.then(Call(free=tuple(named))))
 
     def without_limit(self, name: str, sides: Iterable[str]) -> "Scene":
         """Scene without these sides, "min" and "max", of a limit that it has."""
         place = "limits", *former_names.current(name, self.schema.former_names).split(".")
-        own = looked_up(self.document, place)
-        left = set(own) - set(sides) if isinstance(own, Mapping) else set()
+        limit = looked_up(self.document, place)
+        left = set(limit) - set(sides) if isinstance(limit, Mapping) else set()
         document: Mapping[str, Any] = self.document
         for gone in [(*place, side) for side in sides] if left else [place]:
             document = removed(document, gone)
@@ -352,12 +352,12 @@ class Scene(Shown):
             "operation": self.tables["operation"].model_dump(exclude_none=True),
             "mechanism": self.tables["mechanism"].model_dump(exclude_none=True),
             "effects": {
-                effect.name: own.model_dump(exclude_none=True)
-                for effect, own in zip(self.active, self.effects.values(), strict=True)
+                effect.name: table.model_dump(exclude_none=True)
+                for effect, table in zip(self.active, self.effects.values(), strict=True)
             },
             "bounds": {name: (bound.min, bound.max, bound.free) for name, bound in self.bounds.items()},
             "limits": {name: (limit.min, limit.max) for name, limit in self.limits.items()},
-            "targets": {name: _deciding(own) for name, own in self.targets.items()},
+            "targets": {name: _deciding(table) for name, table in self.targets.items()},
             **{name: self.document.get(name, {}) for name in self.schema.tables},
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
@@ -383,7 +383,7 @@ class Scene(Shown):
             "bounds": {*schema.variables, *self.bounds},
         }
         sides = {figure.name: figure.sides for figure in schema.figures.values()}
-        near = nearest(name, [*(each for names in known.values() for each in names), *sides], least=SAME)
+        near = nearest(name, [*(key for names in known.values() for key in names), *sides], least=SAME)
         keys = [f"{table}.{near}" for table, names in known.items() if near in names]
         return keys or [f"limits.{near}.{side}" for side in sides.get(near, ())]
 
@@ -411,16 +411,16 @@ def _stood_for(effect: Effect | None, key: list[str]) -> tuple[str, ...]:
     return curve.instead if key[0] == curve.key else (curve.key,) if key[0] in curve.instead else ()
 
 
-def _deciding(own: Table) -> dict[str, Any]:
+def _deciding(table: Table) -> dict[str, Any]:
     """Values of a target's table that decide an answer; an indifference and digits only where they are given."""
-    return own.model_dump(exclude={"expected"} | ({"indifference", "digits"} - own.model_fields_set))
+    return table.model_dump(exclude={"expected"} | ({"indifference", "digits"} - table.model_fields_set))
 
 
 def _put_on(document: Mapping[str, Any], *effect: str) -> Mapping[str, Any]:
     """Move an effect's table from [available] to [effects]."""
-    own = looked_up(document, ("available", *effect))
-    on = replaced(document, ("effects", *effect), {} if own is None else own, "", f"effects.{'.'.join(effect)}")
-    return on if own is None else removed(on, ("available", *effect))
+    table = looked_up(document, ("available", *effect))
+    on = replaced(document, ("effects", *effect), {} if table is None else table, "", f"effects.{'.'.join(effect)}")
+    return on if table is None else removed(on, ("available", *effect))
 
 
 def build(
@@ -493,7 +493,7 @@ def _built(
         operation=_numbers(tables["operation"]),
         mechanism=_numbers(tables["mechanism"]),
         tables=tables,
-        effects={effect.name: own for effect, own in active.items()},
+        effects={effect.name: table for effect, table in active.items()},
         active=tuple(active),
         bounds=last.bounds
         if last and stays("bounds", "effects", "available") and _keys(tables) == _keys(last.tables)
@@ -535,15 +535,17 @@ def _meant(original: Mapping[str, Any], known: Collection[str]) -> dict[str, Any
 
 def _judged(scene: Scene, faults: Faults) -> bool:
     """Whether today's machine can be checked: its only wrong numbers are those that it does not need."""
-    own = scene.tables["mechanism"]
-    wrong = [name for name, value in own if value != value]
+    mechanism = scene.tables["mechanism"]
+    wrong = [name for name, value in mechanism if value != value]
     optional = [
-        name for name in wrong if quantity_of(type(own), name) and not type(own).model_fields[name].is_required()
+        name
+        for name in wrong
+        if quantity_of(type(mechanism), name) and not type(mechanism).model_fields[name].is_required()
     ]
     lacking = [
         key
         for key, others in scene.schema.instead.items()
-        if getattr(own, key) is None and not {*others} <= scene.mechanism.keys()
+        if getattr(mechanism, key) is None and not {*others} <= scene.mechanism.keys()
     ]
     return wrong == optional and not lacking and not faults.within("operation", "effects", "targets")
 
@@ -555,29 +557,31 @@ def given(table: Table) -> dict[str, Any]:
 
 def _keys(tables: Mapping[str, Table]) -> list[str]:
     """Keys of tables that are given or defaulted, those of tables inside them too."""
-    found = []
-    for name, own in tables.items():
-        inner = {key: value for key, value in own if isinstance(value, Table)}
-        found += [f"{name}.{key}" for key in (*given(own), *_keys(inner))]
-    return found
+    keys = []
+    for name, table in tables.items():
+        inner = {key: value for key, value in table if isinstance(value, Table)}
+        keys += [f"{name}.{key}" for key in (*given(table), *_keys(inner))]
+    return keys
 
 
 def _numbers(table: Table) -> dict[str, float]:
     """Numbers of a table that are given or defaulted; of a table inside it as "table.key"."""
-    found = {name: value for name, value in table if isinstance(value, float) and not math.isnan(value)}
+    numbers = {name: value for name, value in table if isinstance(value, float) and not math.isnan(value)}
     for name, inner in table:
-        found |= {f"{name}.{key}": value for key, value in _numbers(inner).items()} if isinstance(inner, Table) else {}
-    return found
+        numbers |= (
+            {f"{name}.{key}": value for key, value in _numbers(inner).items()} if isinstance(inner, Table) else {}
+        )
+    return numbers
 
 
 def kept(scene: Scene, key: Hashable, make: Callable[[], _Made]) -> _Made:
     """Object made from a scene and stored with it by a key: once, unless files are read for the scene."""
     if key in scene._kept:
         return cast(_Made, scene._kept[key])
-    found = make()
+    value = make()
     if not scene._files:
-        scene._kept[key] = found
-    return found
+        scene._kept[key] = value
+    return value
 
 
 def reads(scene: Scene, file: str) -> None:

@@ -49,15 +49,15 @@ def _stock(cursor: Cursor, quantity: Quantity) -> tuple[float, ...]:
 
 def named(given: Mapping[str, object], bounded: Collection[str]) -> dict[str, object]:
     """Steps of a call by number, a pattern such as "l*" as all bounded numbers that fit. Raises BadInput."""
-    found: dict[str, object] = {}
+    steps: dict[str, object] = {}
     for name, step in given.items():
         fitting = fnmatch.filter(bounded, name)
         if not fitting:
             near = nearest(name, bounded)
             remedy = f'Perhaps "{near}" is meant' if near else "Name a number of [bounds]"
             raise refusal(f"{name} is no number that is free", "", "round", name, ", ".join(bounded), remedy)
-        found |= dict.fromkeys(fitting, step)
-    return found
+        steps |= dict.fromkeys(fitting, step)
+    return steps
 
 
 def multiples(step: float, low: float, high: float) -> tuple[float, ...]:

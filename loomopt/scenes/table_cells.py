@@ -56,13 +56,13 @@ def read(raw: bytes, origin: str) -> Iterator[Cells]:
     """
     if len(raw) > LARGEST_FILE:
         raise refusal("the table is too large", origin, allowed="up to 1 MB", remedy="Thin it out")
-    found = text(raw, origin)
-    lines = found.split("\n")
+    content = text(raw, origin)
+    lines = content.split("\n")
     first = next((k for k, line in enumerate(lines) if line.strip()), 0)
-    told = _SEPARATOR_LINE.fullmatch(lines[first].strip("\r\n ")) if lines else None
-    if told:
+    match = _SEPARATOR_LINE.fullmatch(lines[first].strip("\r\n ")) if lines else None
+    if match:
         lines[first] = ""
-    likely = [told[1]] if told else [sign for sign in SEPARATORS if any(sign in line for line in lines)] or [","]
+    likely = [match[1]] if match else [sign for sign in SEPARATORS if any(sign in line for line in lines)] or [","]
     tables = [cells for sign in likely if (cells := _parted(lines, sign)) is not None]
     if not tables:
         remedy = "Write short cells, and close every quotation mark on its own line"
@@ -101,26 +101,26 @@ def _parted(lines: Sequence[str], separator: str) -> Cells | None:
     """Cells of lines; None where quotation marks do not fit the separator."""
     numbers: list[int] = []
 
-    def kept() -> Iterator[str]:
+    def data_lines() -> Iterator[str]:
         for number, line in enumerate(lines, 1):
             if line.strip() and not line.lstrip().startswith("#"):
                 numbers.append(number)
                 yield line + "\n"
 
     try:
-        rows = [_row(numbers[-1], cells) for cells in csv.reader(kept(), delimiter=separator, strict=True)]
+        rows = [_row(numbers[-1], cells) for cells in csv.reader(data_lines(), delimiter=separator, strict=True)]
         remarks = [(k, line.lstrip()[1:].strip()) for k, line in enumerate(lines, 1) if line.lstrip().startswith("#")]
-        told = tuple(_row(k, next(csv.reader([line], delimiter=separator), [])) for k, line in remarks[:20])
+        remark_rows = tuple(_row(k, next(csv.reader([line], delimiter=separator), [])) for k, line in remarks[:20])
     except (csv.Error, ValueError):
         return None
-    return Cells(tuple(row for row in rows if row.cells), separator, told)
+    return Cells(tuple(row for row in rows if row.cells), separator, remark_rows)
 
 
 def _row(line: int, cells: Iterable[str]) -> Row:
-    found = [cell.strip(BLANKS) for cell in cells]
-    while found and not found[-1]:
-        found.pop()
-    return Row(line, tuple(found))
+    values = [cell.strip(BLANKS) for cell in cells]
+    while values and not values[-1]:
+        values.pop()
+    return Row(line, tuple(values))
 
 
 def _written(rows: Iterable[Sequence[object]]) -> str:
@@ -146,9 +146,9 @@ def _sheet(raw: bytes, origin: str) -> list[Sequence[object]]:
             book = load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
             for sheet in book.worksheets:
                 rows = itertools.islice(sheet.iter_rows(max_col=MOST_COLUMNS, values_only=True), MOST_ROWS)
-                found: list[Sequence[object]] = [[_value(cell) for cell in row] for row in rows]
-                if any(cell is not None for row in found for cell in row):
-                    return found
+                values: list[Sequence[object]] = [[_value(cell) for cell in row] for row in rows]
+                if any(cell is not None for row in values for cell in row):
+                    return values
     except BadInput:
         raise
     except (zipfile.BadZipFile, KeyError, ValueError, OSError, TypeError, AttributeError, EOFError) as error:

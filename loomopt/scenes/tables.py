@@ -70,20 +70,20 @@ class SceneSchema:
     def axes(self) -> dict[str, Axis]:
         """What can be traded: variables, and every figure that can be limited; a job's own axes say it their way."""
         ends: dict[str, tuple[Sense, ...]] = {"min": ("most",), "max": ("least",)}
-        found = {name: Axis(name, kind) for name, kind in self.variables.items()}
+        axes = {name: Axis(name, kind) for name, kind in self.variables.items()}
         for figure in self.figures.values():
             senses = tuple(sense for side in figure.sides for sense in ends[side])
-            if senses and figure.name not in found:
-                found[figure.name] = Axis(figure.name, figure.kind, senses=senses[::-1])
-        return {**found, **self.own_axes}
+            if senses and figure.name not in axes:
+                axes[figure.name] = Axis(figure.name, figure.kind, senses=senses[::-1])
+        return {**axes, **self.own_axes}
 
     @property
     def margins(self) -> dict[str, str]:
         """Margins of the job, then those of its effects."""
-        found = dict(self.own_margins)
+        margins = dict(self.own_margins)
         for effect in self.effects.values():
-            found |= effect.margins
-        return found
+            margins |= effect.margins
+        return margins
 
 
 FAMILY = "family"
@@ -221,7 +221,7 @@ def check_needs(
     """Add a mistake for every number that an active effect or the job lacks, and for effects that cannot be on."""
     faults = scene.faults
     needs = [(key, f"job {schema.name}") for key in schema.needs]
-    needs += [(key, f"effect {effect.name}") for effect, own in active.items() for key in needed(effect, own)]
+    needs += [(key, f"effect {effect.name}") for effect, table in active.items() for key in needed(effect, table)]
     first = dict(reversed(needs))
     for key in dict.fromkeys(key for key, _ in needs):
         path, name = key.split(".")
@@ -237,29 +237,29 @@ def check_needs(
         elif given:
             problem = f"{key} and {', '.join(given)} say the same twice"
             faults.add(place.at(key).fault(problem, remedy=f"Take {key} out, or {', '.join(given)}"))
-    for effect, own in active.items():
-        _check_model(scene.at("effects").at(effect.name), effect, own)
+    for effect, table in active.items():
+        _check_model(scene.at("effects").at(effect.name), effect, table)
     if any(effect.beside or effect.clashes for effect in active):
         _check_together(scene.at("effects"), active)
-    for effect, own in active.items():
-        if any(value != value for _, value in own):  # where it is known depends on a value that cannot be read
+    for effect, table in active.items():
+        if any(value != value for _, value in table):  # where it is known depends on a value that cannot be read
             continue
-        words = {key: value for key, value in own if isinstance(value, str)}
+        words = {key: value for key, value in table if isinstance(value, str)}
         if isinstance(effect, Load) and effect.known_in(words) and not schema.partly_known:
             problem = f"effect {effect.name} is known in part of the cycle only, which job {schema.name} cannot judge"
             remedy = "Take it off, or choose other values"
             faults.add(scene.at("effects").at(effect.name).fault(problem, remedy=remedy))
 
 
-def _check_model(cursor: Cursor, effect: Effect, own: Table) -> None:
+def _check_model(cursor: Cursor, effect: Effect, table: Table) -> None:
     """Add a mistake where an effect lacks a number of its model, or has one of another model."""
-    model = model_of(effect, own)
+    model = model_of(effect, table)
     for key in model.keys:
-        if getattr(own, key) is None:
+        if getattr(table, key) is None:
             cursor.faults.add(cursor.missing(effect.table, key))
-    for word, other in effect.models.items():
-        for key in set(other.keys) - {*model.keys, *model.may}:
-            if getattr(own, key) is not None:
+    for word, other_model in effect.models.items():
+        for key in set(other_model.keys) - {*model.keys, *model.may}:
+            if getattr(table, key) is not None:
                 remedy = f'Write model = "{word}", or take {key} out'
                 cursor.faults.add(cursor.at(key).fault(f"{key} is of model {word}", remedy=remedy))
 
@@ -287,17 +287,17 @@ def places(
             yield place._replace(label=label(effect, place.key), waits=waits)
 
 
-def _places(path: str, model: type[Table], own: Table | None) -> Iterator[Place]:
+def _places(path: str, model: type[Table], table: Table | None) -> Iterator[Place]:
     for key, quantity in quantities_of(model).items():
-        yield Place(path, key, key, quantity, own is not None and value_of(own, key) is not None)
+        yield Place(path, key, key, quantity, table is not None and value_of(table, key) is not None)
 
 
-def value_of(own: Table, key: str) -> object:
+def value_of(table: Table, key: str) -> object:
     """A value of a table; of one inside it by "table.key"; None where it is not given."""
-    found: object = own
+    value: object = table
     for name in key.split("."):
-        found = getattr(found, name, None)
-    return found
+        value = getattr(value, name, None)
+    return value
 
 
 def flat(raw: Mapping[str, Any], known: Iterable[str]) -> dict[str, Any]:
@@ -306,17 +306,17 @@ def flat(raw: Mapping[str, Any], known: Iterable[str]) -> dict[str, Any]:
     Beside what is of a label itself may stand what is of longer ones: mass.max, and mass.rod.mass.max. A key beside
     known ones that begin alike is one too: of rod.m a slip is rod.n, not rod.
     """
-    names, found = set(known), dict[str, Any]()
+    names, entries = set(known), dict[str, Any]()
     begun = {name[:place] for name in names if "." in name for place, sign in enumerate(name) if sign == "."}
     for name, value in raw.items():
-        for called, each in _parted(name, value, names, begun):
-            found[called] = _together(found.get(called), each)
-    return found
+        for called, entry in _parted(name, value, names, begun):
+            entries[called] = _together(entries.get(called), entry)
+    return entries
 
 
-def _together(one: object, other: object) -> object:
+def _together(first: object, second: object) -> object:
     """Union of two entries of one label where both are tables, else the later one."""
-    return {**one, **other} if isinstance(one, Mapping) and isinstance(other, Mapping) else other
+    return {**first, **second} if isinstance(first, Mapping) and isinstance(second, Mapping) else second
 
 
 def _parted(name: str, value: object, known: Collection[str], begun: Collection[str]) -> Iterator[tuple[str, Any]]:
@@ -329,9 +329,9 @@ def _parted(name: str, value: object, known: Collection[str], begun: Collection[
         return
     slips = value.keys() - _ENDS if name not in known and name in begun else ()
     inner = [key for key in value if key in slips or f"{name}.{key}" in known or f"{name}.{key}" in begun]
-    own = {key: each for key, each in value.items() if key not in inner}
-    if own or not inner:
-        yield name, own
+    rest = {key: entry for key, entry in value.items() if key not in inner}
+    if rest or not inner:
+        yield name, rest
     for key in inner:
         yield from _parted(f"{name}.{key}", value[key], known, begun)
 
@@ -442,7 +442,7 @@ def limits(cursor: Cursor, schema: SceneSchema, active: Collection[Effect]) -> d
     read = {}
     for name in (name for name in inner if name in limitable):
         with faults:
-            givers = [other for other, effect in schema.effects.items() if name in _told_by(effect)]
+            givers = [giver for giver, effect in schema.effects.items() if name in _told_by(effect)]
             if givers and not on.intersection(givers):
                 off = (
                     f"effect {givers[0]} is off: it" if len(givers) == 1 else f"effects {' and '.join(givers)} are off:"

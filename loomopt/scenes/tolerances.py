@@ -46,14 +46,14 @@ class Tolerance(NamedTuple):
             size = abs(nominal) if self.share else 1.0
             return -self.below * size, self.above * size
         if iso_fits.parted(self.standard):
-            found = iso_fits.deviations(self.standard, nominal)
+            deviations = iso_fits.deviations(self.standard, nominal)
         else:
             half = tolerance_classes.plus_minus(self.standard, nominal)
-            found = -half, half
-        if math.isnan(found[0]):
+            deviations = -half, half
+        if math.isnan(deviations[0]):
             problem = f"{self.standard} says nothing of {1e3 * nominal:g} mm"
             raise refusal(problem, "", f"tolerances.{self.number}", remedy="Give plus_minus instead")
-        return found
+        return deviations
 
     def plus_minus(self, nominal: float) -> float:
         """Half width of the band, SI. Raises BadInput where a class tells none."""
@@ -75,7 +75,7 @@ def read(cursor: Cursor, schema: SceneSchema, known: Sequence[Place]) -> tuple[T
 
     The tolerance of a number of an effect that is off is checked and left out.
     """
-    found = []
+    tolerances = []
     with cursor.faults:
         labels = [*schema.variables, *(place.label for place in known)]
         for place in labelled(cursor, labels).values():
@@ -83,21 +83,21 @@ def read(cursor: Cursor, schema: SceneSchema, known: Sequence[Place]) -> tuple[T
                 quantity, counts = number_or_waiting(place, schema, known, "number with a tolerance")
                 tolerance = _tolerance(place, quantity)
                 if counts:
-                    found.append(tolerance)
-    return tuple(found)
+                    tolerances.append(tolerance)
+    return tuple(tolerances)
 
 
 def bands(cursor: Cursor, schema: SceneSchema) -> dict[str, float]:
     """Table [accept]: half the band around an equality or a goal by which machines are judged, SI, by figure."""
-    found: dict[str, float] = {}
+    bands: dict[str, float] = {}
     with cursor.faults:
         inner = labelled(cursor, schema.figures)
         for name, place in inner.items():
             with cursor.faults:
                 if name not in schema.figures:
                     raise place.unknown("figure", name, schema.figures, given=inner)
-                found[name] = place.number(Quantity(schema.figures[name].kind, above=0))
-    return found
+                bands[name] = place.number(Quantity(schema.figures[name].kind, above=0))
+    return bands
 
 
 def _tolerance(cursor: Cursor, quantity: Quantity) -> Tolerance:

@@ -44,10 +44,10 @@ class CrankRockerDrawing:
             REAR: {"B": a.towards(at.beta_r, -sides.l1), "C": a.towards(at.beta_r, sides.l2 - sides.l1)},
         }
         for event, psi in ((FRONT, at.psi_front), (REAR, at.psi_rear)):
-            for name, own in self.masses.items():
-                side = -own.radius if name == COUNTERWEIGHT else own.radius
+            for name, mass in self.masses.items():
+                side = -mass.radius if name == COUNTERWEIGHT else mass.radius
                 joints[event][name] = d.towards(psi + self.offset, side)
-        apart = [at for at, own in self.masses.items() if at != REED or self.offset or not 0 < own.radius < sides.l3]
+        apart = [at for at, mass in self.masses.items() if at != REED or self.offset or not 0 < mass.radius < sides.l3]
         path = Arc("paths", d, sides.l3, at.psi_front, at.psi_rear)
         links = (("A", "D"), ("B", "A"), ("B", "C"), ("D", "C"), *(("D", name) for name in apart))
         return Skeleton({"A": a, "D": d}, joints, links, (("A", sides.l1),), (path,), masses=self.masses)
@@ -79,7 +79,7 @@ def of(design: Mapping[str, float]) -> CrankRockerDrawing:
         raise BadInput(f"the linkage cannot be drawn: {fault}", key=", ".join(LENGTHS), remedy="Correct them")
     lengths = crank_rocker.Lengths(*metres)
     masses = {at: Mass(*(design.get(name, 0.0) for name in names)) for at, names in MASSES.items()}
-    there = {at: own for at, own in masses.items() if own.mass and own.radius}
+    there = {at: mass for at, mass in masses.items() if mass.mass and mass.radius}
     return CrankRockerDrawing(lengths, crank_rocker.DeadCentres(FLOAT, lengths), there, design.get("offset", 0.0))
 
 
@@ -93,10 +93,10 @@ def linkage(
 
     forces: in its joints at some crank angles, each with its size as it is told.
     """
-    found = of(design)
-    strokes = [*found.skeleton.strokes(found.height), *_angles(found)]
-    labels, legend, measures = _labels(found, units), _legend(found, units), _measures(found)
-    sheet = Sheet(title, found.height, strokes, labels, legend, units, FRONT, measures)
+    drawing = of(design)
+    strokes = [*drawing.skeleton.strokes(drawing.height), *_angles(drawing)]
+    labels, legend, measures = _labels(drawing, units), _legend(drawing, units), _measures(drawing)
+    sheet = Sheet(title, drawing.height, strokes, labels, legend, units, FRONT, measures)
     return sheet.drawing(forces, functools.partial(motion, design))
 
 
@@ -107,40 +107,40 @@ def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:
 
 def motion(design: Mapping[str, float], angles: Floats) -> MechanismMotion:
     """Crank-rocker at crank angles, rad, its centres of mass with it. Raises BadInput."""
-    found = of(design)
-    pose, skeleton = crank_rocker.CrankRockerPose(systems.numpy(), found.lengths, angles), found.skeleton
+    drawing = of(design)
+    pose, skeleton = crank_rocker.CrankRockerPose(systems.numpy(), drawing.lengths, angles), drawing.skeleton
     rod, at = pose.dyad.link1, {"B": np.column_stack(pose.crank)}
     at["C"] = at["B"] + np.column_stack(rod)
-    turned = pose.psi + found.offset
-    for name, own in found.masses.items():
-        side = -own.radius if name == COUNTERWEIGHT else own.radius
+    turned = pose.psi + drawing.offset
+    for name, mass in drawing.masses.items():
+        side = -mass.radius if name == COUNTERWEIGHT else mass.radius
         at[name] = np.asarray(skeleton.pivots["D"]) + side * np.column_stack([np.cos(turned), np.sin(turned)])
     return MechanismMotion(angles, skeleton.pivots, at, skeleton.links, skeleton.guides)
 
 
-def _measures(found: CrankRockerDrawing) -> tuple[Measure, ...]:
+def _measures(drawing: CrankRockerDrawing) -> tuple[Measure, ...]:
     """Lengths of crank, rod, rocker and frame, at front dead centre."""
-    at = found.skeleton.at(FRONT)
+    at = drawing.skeleton.at(FRONT)
     ends = (("A", "B"), ("B", "C"), ("D", "C"), ("A", "D"))
-    return tuple(Measure(name, at[one], at[other]) for name, (one, other) in zip(LENGTHS, ends, strict=True))
+    return tuple(Measure(name, at[begin], at[end]) for name, (begin, end) in zip(LENGTHS, ends, strict=True))
 
 
-def _angles(found: CrankRockerDrawing) -> list[Primitive]:
+def _angles(drawing: CrankRockerDrawing) -> list[Primitive]:
     """Draw β at A, the swing at D, and the arrow toward the fell."""
-    skeleton, centres, h, (beta, swing) = found.skeleton, found.centres, found.height, found.radii
+    skeleton, centres, h, (beta, swing) = drawing.skeleton, drawing.centres, drawing.height, drawing.radii
     return [
         *angle_between(skeleton.pivots["A"], beta, 0.0, centres.beta, h),
         *angle_between(skeleton.pivots["D"], swing, centres.psi_rear, centres.psi_front, h, both=True),
-        *pointer(skeleton.joints[FRONT]["C"], found.toward_fell, h),
+        *pointer(skeleton.joints[FRONT]["C"], drawing.toward_fell, h),
     ]
 
 
-def _labels(found: CrankRockerDrawing, units: Units) -> list[Label]:
+def _labels(drawing: CrankRockerDrawing, units: Units) -> list[Label]:
     """Name joints, links with lengths, angles in degrees, masses; joints first: they must stand closest."""
-    sides, centres, (beta, swing) = found.lengths, found.centres, found.radii
-    at, line, quarter, fell = found.skeleton.at(FRONT), centres.beta, math.pi / 2, found.toward_fell
+    sides, centres, (beta, swing) = drawing.lengths, drawing.centres, drawing.radii
+    at, line, quarter, fell = drawing.skeleton.at(FRONT), centres.beta, math.pi / 2, drawing.toward_fell
     a, b, c, d = (at[name] for name in "ABCD")
-    rear, turns = found.skeleton.joints[REAR], (centres.psi_front, centres.psi_rear)
+    rear, turns = drawing.skeleton.joints[REAR], (centres.psi_front, centres.psi_rear)
     names = {name: f"{name} = {units.size(getattr(sides, name))}" for name in LENGTHS}
     return [
         Label("frame", a, math.pi, "A"),
@@ -150,11 +150,11 @@ def _labels(found: CrankRockerDrawing, units: Units) -> list[Label]:
         Label(REAR, rear["B"], line + math.pi, "B'"),
         Label(REAR, rear["C"], line - quarter, "C'"),
         *(
-            Label("masses", at[name], 0.0, f"{name}  {_mass_text(name, own, units)}")
-            for name, own in found.masses.items()
+            Label("masses", at[name], 0.0, f"{name}  {_mass_text(name, mass, units)}")
+            for name, mass in drawing.masses.items()
         ),
-        *(Label("masses", rear[name], -quarter, f"{name}'") for name in found.masses),
-        Label("notes", c.towards(fell, POINTER * found.height), fell, "fell"),
+        *(Label("masses", rear[name], -quarter, f"{name}'") for name in drawing.masses),
+        Label("notes", c.towards(fell, POINTER * drawing.height), fell, "fell"),
         around("dimensions", d, swing, *turns, f"swing = {math.degrees(centres.swing):.2f}°"),
         around("dimensions", a, beta, 0.0, line, f"β = {math.degrees(line):.2f}°"),
         along(FRONT, a, b, line + quarter, names["l1"]),
@@ -164,18 +164,18 @@ def _labels(found: CrankRockerDrawing, units: Units) -> list[Label]:
     ]
 
 
-def _mass_text(name: str, own: Mass, units: Units) -> str:
+def _mass_text(name: str, centre: Mass, units: Units) -> str:
     """Text of a centre's mass and radius."""
     mass, radius = MASSES[name]
-    return f"{mass} = {show(own.mass, units.mass)}, {radius} = {units.size(own.radius)}"
+    return f"{mass} = {show(centre.mass, units.mass)}, {radius} = {units.size(centre.radius)}"
 
 
-def _legend(found: CrankRockerDrawing, units: Units) -> tuple[tuple[str, str], ...]:
+def _legend(drawing: CrankRockerDrawing, units: Units) -> tuple[tuple[str, str], ...]:
     """Lines below a drawing, each with its layer."""
-    centres = found.centres
+    centres = drawing.centres
     theta, rear = math.degrees(centres.theta), 180 + math.degrees(centres.beta_r)
-    said = {REED: "G  centre of mass of the reed system", COUNTERWEIGHT: "E  counterweight, opposite the reed"}
-    masses = "; ".join(said[name] for name in found.masses)
+    texts = {REED: "G  centre of mass of the reed system", COUNTERWEIGHT: "E  counterweight, opposite the reed"}
+    masses = "; ".join(texts[name] for name in drawing.masses)
     return (
         (FRONT, f"A B C  {FRONT}, crank at {math.degrees(centres.beta):.2f}°"),
         (REAR, f"A B' C'  {REAR}, crank at {rear:.2f}°"),

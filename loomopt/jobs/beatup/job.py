@@ -105,12 +105,12 @@ class Beatup(Job):
 
         Where m4e = 0 the radius says nothing, unless it is asked for, and r4e = 0 would hide how s = m4e r4e² can grow.
         """
-        found = {**design, "s": design["m4e"] * design["r4e"] ** 2}
-        asked = {row for objective in program.objectives for row in objective.rows}
-        asked |= {limit.row for limit in program.row_limits}
-        if design["m4e"] == 0.0 and asked.isdisjoint({"change", "r4e", opposite("r4e")}):
-            found |= {v.name: v.upper for v in program.variables if v.name == "r4e"}
-        return {v.name: found[v.name] for v in program.variables}
+        numbers = {**design, "s": design["m4e"] * design["r4e"] ** 2}
+        rows = {row for objective in program.objectives for row in objective.rows}
+        rows |= {limit.row for limit in program.row_limits}
+        if design["m4e"] == 0.0 and rows.isdisjoint({"change", "r4e", opposite("r4e")}):
+            numbers |= {v.name: v.upper for v in program.variables if v.name == "r4e"}
+        return {v.name: numbers[v.name] for v in program.variables}
 
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
         """NLP variables with a negligible counterweight taken for none, so that mass or radius can settle."""
@@ -123,15 +123,15 @@ class Beatup(Job):
         return {**x, "s": min(masses) * radius.lower**2, "r4e": radius.lower}
 
     def figures_of(
-        self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
+        self, scene: Scene, sampled: "Sampler | Machines", names: Container[str] = EVERY
     ) -> dict[str, Number]:
         """Every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
-        found, limited = base.alone(scene, sampled, asked), self.task(scene).limited
-        found["mu_min"] = np.minimum(sampled.static["mu_near"], sampled.static["mu_far"])
+        figures, limited = base.alone(scene, sampled, names), self.task(scene).limited
+        figures["mu_min"] = np.minimum(sampled.static["mu_near"], sampled.static["mu_far"])
         signs = dict.fromkeys(sampled.model.quantities, 1) | dict.fromkeys(sampled.model.least, -1)
-        called = [name for name in signs if name in asked]
+        called = [name for name in signs if name in names]
         sampled.search(called)
-        found |= {name: signs[name] * sampled.peak(name) for name in called}
+        figures |= {name: signs[name] * sampled.peak(name) for name in called}
         weights = scene.table(RetrofitTarget).weights
         widths = {name: limited[name][1] - limited[name][0] for name in VARIABLES}
         changes = [
@@ -139,8 +139,8 @@ class Beatup(Job):
             for name, old in self.today(scene).items()
             if widths.get(name, 0.0) > 0.0
         ]
-        found["change"] = sum(changes)
-        return found
+        figures["change"] = sum(changes)
+        return figures
 
     def peaks(self, model: JobModel) -> dict[str, str]:
         """Figures that are extremes over the cycle."""
@@ -148,21 +148,21 @@ class Beatup(Job):
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
         """How each figure is read over a box of numbers: the transmission angle at both dead centres."""
-        found = super().in_boxes(scene, model) | {"mu_min": InBox(("mu_near", "mu_far"))}
-        return found | {name: InBox(quantity=name, sign=-1.0) for name in model.least}
+        boxes = super().in_boxes(scene, model) | {"mu_min": InBox(("mu_near", "mu_far"))}
+        return boxes | {name: InBox(quantity=name, sign=-1.0) for name in model.least}
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Sentence on an optimum of the target; figures in SI."""
 
-        def told(name: str) -> str:
+        def text(name: str) -> str:
             return scene.show(figures[name] or 0.0, "torque")
 
-        front = told("M3_fdc")
+        front = text("M3_fdc")
         jumps = any(FRONT in effect.reads for effect in scene.active)
         where = "just before front dead centre" if jumps else "at front dead centre"
         if target == "pulse":
-            return f"The least reed torque over the pulse is {told('pulse_rms')} rms ({front} {where})."
-        peak_text = f"the least peak crank torque over the whole cycle is {told('peak_torque')}"
+            return f"The least reed torque over the pulse is {text('pulse_rms')} rms ({front} {where})."
+        peak_text = f"the least peak crank torque over the whole cycle is {text('peak_torque')}"
         if target == "balance" and BALANCE.reached(figures):
             return f"Balanced: the reed torque {where} is zero, and then {peak_text}."
         if target == "balance":
@@ -172,15 +172,15 @@ class Beatup(Job):
             return f"With the reed torque at {front} {where}, {peak_text}."
         return f"Balanced with the least change from today's machine; {peak_text.replace('least ', '')}."
 
-    def say_together(self, members: Sequence[tuple[Scene, Numbers, Figures]], own: frozenset[str]) -> str:
+    def say_together(self, members: Sequence[tuple[Scene, Numbers, Figures]], member_numbers: frozenset[str]) -> str:
         """Sentence on the M0/ω² that one ψ'' balances with the counterweights, and on those that it cannot.
 
         M3 = M0 − J ψ'' ω² there, so that a member balances for J = (M0/ω²)/ψ''; said where nothing else acts.
         """
-        if not own.isdisjoint(LENGTHS):
+        if not member_numbers.isdisjoint(LENGTHS):
             return ""
-        found = [balanced_by(scene, design, figures, own) for scene, design, figures in members]
-        bands = [band for band in found if band is not None]
+        candidates = [balanced_by(scene, design, figures, member_numbers) for scene, design, figures in members]
+        bands = [band for band in candidates if band is not None]
         if len(bands) < len(members):
             return ""
         return served(bands, members[0][0])

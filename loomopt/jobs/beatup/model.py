@@ -64,9 +64,9 @@ class FourBar(NamedTuple):
 
 def linked(given: Given) -> FourBar:
     """Quantities that all poses of a machine share."""
-    found = given.linkage
-    assert isinstance(found, FourBar)
-    return found
+    linkage = given.linkage
+    assert isinstance(linkage, FourBar)
+    return linkage
 
 
 @dataclass(frozen=True)
@@ -111,14 +111,14 @@ class CrankRocker:
     @lazy
     def groups(self) -> Mapping[str, Group]:
         """The dyad of rod and rocker: it comes nearest to folding and stretching at φ = 0 and π."""
-        found = four_bar(
+        group = four_bar(
             ("l1", "l2", "l3", "l4"),
             1,
             lambda values: 0,
             ("B to D < l2 + l3", "B to D > |l2 - l3|"),
             _obliquity,
         )
-        return {"": Group(found.quantities, found.closes, found.rows, found.margins, (0.0, math.pi))}
+        return {"": Group(group.quantities, group.closes, group.rows, group.margins, (0.0, math.pi))}
 
     def linkage(self, maths: Maths, values: Values) -> FourBar:
         """Lengths and dead centres."""
@@ -128,8 +128,8 @@ class CrankRocker:
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """s = m4e r4e², kg·m², and both dead centres, rad."""
         values, centres = given.values, linked(given).centres
-        found = {"beta": centres.beta, "beta_r": centres.beta_r}
-        return found if "s" in values else found | {"s": values["m4e"] * values["r4e"] ** 2}
+        angles = {"beta": centres.beta, "beta_r": centres.beta_r}
+        return angles if "s" in values else angles | {"s": values["m4e"] * values["r4e"] ** 2}
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
         """No values: every event has a formula."""

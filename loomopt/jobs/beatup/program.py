@@ -47,13 +47,13 @@ def counterweight_room(known: Mapping[str, float], bounds: Mapping[str, Ends], i
     known: today's m4e, r4e and l4; inertia: of the reed or of what holds the resistance, kg·m²; 0 where there is none
     to compare with, and the bounds stay as they are.
     """
-    found, ample = {name: bounds[name] for name in COUNTERWEIGHT}, AMPLE * inertia
-    if found["m4e"][1] * found["r4e"][1] ** 2 > ample > 0.0:
-        low, high = found["r4e"]
-        found["r4e"] = low, min(high, max(low, known["r4e"], LONG * known["l4"]))
-        low, high = found["m4e"]
-        found["m4e"] = low, min(high, max(low, known["m4e"], ample / found["r4e"][1] ** 2))
-    return found
+    room, ample = {name: bounds[name] for name in COUNTERWEIGHT}, AMPLE * inertia
+    if room["m4e"][1] * room["r4e"][1] ** 2 > ample > 0.0:
+        low, high = room["r4e"]
+        room["r4e"] = low, min(high, max(low, known["r4e"], LONG * known["l4"]))
+        low, high = room["m4e"]
+        room["m4e"] = low, min(high, max(low, known["m4e"], ample / room["r4e"][1] ** 2))
+    return room
 
 
 USED = {"s": 0.4, "m4e": 0.5, "r4e": 0.9}
@@ -67,7 +67,7 @@ MASKED = 1e-3
 
 def resisted(scene: Scene) -> Where:
     """Pieces of the cycle in which the cloth resists; of a curve those where it is not 0 all over."""
-    curve = next((found for (name, _), found in curves(scene).items() if name == RESISTED[0]), None)
+    curve = next((pulse for (name, _), pulse in curves(scene).items() if name == RESISTED[0]), None)
     return RESISTED if curve is None else (RESISTED[0], curve.acting)
 
 
@@ -77,13 +77,15 @@ def model(scene: Scene, known: Numbers, design: Numbers | None = None, changes: 
     known: the scene's numbers; design: what is not today's; changes: whether the change from today is read.
     """
     changing = tuple(VARIABLES) if changes else ()
-    found = beatup.model(scene.active, words(scene), frozenset(known), resisted(scene), changing)
-    if not found.states:
-        return found
+    physics = beatup.model(scene.active, words(scene), frozenset(known), resisted(scene), changing)
+    if not physics.states:
+        return physics
     try:
-        return with_words_fixed(found, {**known, **{scene.full(name): value for name, value in (design or {}).items()}})
+        return with_words_fixed(
+            physics, {**known, **{scene.full(name): value for name, value in (design or {}).items()}}
+        )
     except UnsteadyError as error:
-        names = ", ".join(f"effects.{state.name}" for state in found.states)
+        names = ", ".join(f"effects.{state.name}" for state in physics.states)
         raise BadInput(error.problem, file=scene.origin, key=names, remedy=f"{error.remedy}.") from None
 
 
@@ -116,10 +118,10 @@ class BeatupTask(Task):
     @lazy
     def direct(self) -> bool:
         """Whether m4e and r4e matter apart from s = m4e r4e², or leave no room for s."""
-        asked = {*self.scene.limits, *self.traded}
-        read = self.changes or bool(asked & {"r4", *COUNTERWEIGHT})
+        names = {*self.scene.limits, *self.traded}
+        read = self.changes or bool(names & {"r4", *COUNTERWEIGHT})
         for effect in self.scene.active:
-            judged = isinstance(effect, Check) and (effect.demands or asked & {*effect.over_cycle, *effect.rows})
+            judged = isinstance(effect, Check) and (effect.demands or names & {*effect.over_cycle, *effect.rows})
             reads = {*effect.reads, *model_of(effect, self.scene.effects[effect.name]).reads}
             read = read or bool(reads & set(COUNTERWEIGHT) and (isinstance(effect, Load) or judged))
         fixed = all(self.limited[name][0] == self.limited[name][1] for name in COUNTERWEIGHT)
@@ -130,9 +132,13 @@ class BeatupTask(Task):
     @lazy
     def bounded(self) -> tuple[Variable, ...]:
         """The lengths, every bounded number, and the counterweight: by mass and radius, or by s and radius."""
-        ends = {name: found for name, found in self.limited.items() if self.direct or name != "m4e"}
-        own = tuple(self.variable(name, found) for name, found in ends.items())
-        return own if self.direct else (*own, Variable("s", -math.inf, math.inf, self.inertia, (0.0, self.most)))
+        ends = {name: pair for name, pair in self.limited.items() if self.direct or name != "m4e"}
+        variables = tuple(self.variable(name, pair) for name, pair in ends.items())
+        return (
+            variables
+            if self.direct
+            else (*variables, Variable("s", -math.inf, math.inf, self.inertia, (0.0, self.most)))
+        )
 
     def scale(self, name: str, ends: Ends) -> float:
         """Size of a variable: its kind's, or its own largest value that is of use."""
@@ -147,25 +153,25 @@ class BeatupTask(Task):
     def parameters(self) -> dict[str, float]:
         """Every known number that is no variable; m4e follows from s where that is one."""
         taken = {variable.name for variable in self.variables} | {"m4e"}
-        found = {name: value for name, value in self.known.items() if name not in taken}
+        values = {name: value for name, value in self.known.items() if name not in taken}
         if not self.changes:
-            return found
+            return values
         # Today's values, bound widths and weights of the retrofit's norm; a fixed variable weighs nothing.
         weights = self.scene.table(RetrofitTarget).weights
         for name in VARIABLES:
             width = self.limited[name][1] - self.limited[name][0]
-            found |= {today(name): self.known[name], f"width.{name}": width or 1.0}
-            found[f"weight.{name}"] = weights.get(name, 1.0) if width else 0.0
-        return found
+            values |= {today(name): self.known[name], f"width.{name}": width or 1.0}
+            values[f"weight.{name}"] = weights.get(name, 1.0) if width else 0.0
+        return values
 
     # Limits.
 
     def bounds(self) -> list[Limit]:
         """Bounds of variables; the mass's as limits on s against r4e² where that is a variable."""
-        found = [each for v in self.variables if v.called in self.scene.bounds for each in bound_limits(v, False)]
+        limits = [limit for v in self.variables if v.called in self.scene.bounds for limit in bound_limits(v, False)]
         if self.direct:
-            return found
-        return found + [
+            return limits
+        return limits + [
             RatioLimit("m4e", sign, "s", value, self.inertia, "r4e_square", relaxable=sign >= 0 or value > 0.0)
             for sign, value in ends(*self.limited["m4e"])
         ]
@@ -190,13 +196,13 @@ class BeatupTask(Task):
     def objectives(self) -> tuple[Objective, ...]:
         """Target's levels in order."""
         peak = Peak(TORQUE, TORQUE, self.peak)
-        own = {
+        levels = {
             "balance": (Magnitude("M3_fdc", "M3_fdc", self.torque), peak),
             "torque": (peak,),
             "pulse": (Value("pulse_rms", "pulse_mean_square", self.mean_square, power=2),),
             "retrofit": (Value("change", "change", 1.0),),
         }
-        return *own[self.target], *self.least()
+        return *levels[self.target], *self.least()
 
     def starts(self) -> tuple[dict[str, float], ...]:
         """Today's machine moved just inside its bounds, with a good part of the counterweight in use.
@@ -225,8 +231,8 @@ class BeatupTask(Task):
             ),
         }
         room = [name for name in COUNTERWEIGHT if name in names and self.limited[name][0] < self.limited[name][1]]
-        own = [self.move("counterweight", name, wishes[name]) for name in room]
-        return [*own, self.scale_move("scale", LENGTHS), *self.axis_moves()]
+        moves = [self.move("counterweight", name, wishes[name]) for name in room]
+        return [*moves, self.scale_move("scale", LENGTHS), *self.axis_moves()]
 
     def added(self) -> Added | None:
         """Counterweight: by its mass, or by s, which is least where that is at the largest radius."""
@@ -254,7 +260,7 @@ class BeatupTask(Task):
     @lazy
     def resistance(self) -> float:
         """The cloth's, N·m."""
-        curve = next((found for (name, _), found in curves(self.scene).items() if name == RESISTED[0]), None)
+        curve = next((pulse for (name, _), pulse in curves(self.scene).items() if name == RESISTED[0]), None)
         if curve is not None:
             return curve.largest
         return self.known.get("M0", 0.0) if RESISTED[0] in self.scene.effects else 0.0
@@ -336,7 +342,7 @@ class Band(NamedTuple):
 
 
 def balanced_by(
-    scene: Scene, design: Mapping[str, float], figures: Mapping[str, float | None], own: Collection[str]
+    scene: Scene, design: Mapping[str, float], figures: Mapping[str, float | None], member_numbers: Collection[str]
 ) -> Band | None:
     """Balance that a member needs; None where more acts at front dead centre than the cloth and the reed's inertia."""
     front, alpha, inertia = (figures.get(name) for name in ("M3_fdc", "alpha_fdc", "J4"))
@@ -349,7 +355,7 @@ def balanced_by(
     ends = {name: (design[name], design[name]) for name in COUNTERWEIGHT}
     for name in COUNTERWEIGHT:
         bound = scene.bounds.get(name)
-        if bound is not None and bound.free and (name in own or "m4e" in own):
+        if bound is not None and bound.free and (name in member_numbers or "m4e" in member_numbers):
             ends[name] = bound.min, bound.max
     least, most = (ends["m4e"][k] * ends["r4e"][k] ** 2 for k in range(2))
     return Band(resistance / speed**2, bare + least, bare + most, alpha / speed**2)
@@ -362,11 +368,11 @@ def served(bands: Sequence[Band], scene: Scene) -> str:
     if all(b.least * (1 - SHOWN_AS_ZERO) <= j <= b.most * (1 + SHOWN_AS_ZERO) for b, j in pairs):
         return ""
     needed, allowed = max(b.kappa / b.most for b in bands), min(b.kappa / b.least for b in bands)
-    said = f"At front dead centre M3 = M0 - J psi'' speed^2, and this design's psi'' is {bands[0].bend:.6g}."
-    said += _ratio(bands, scene) if len({(b.least, b.most) for b in bands}) == 1 else ""
+    text = f"At front dead centre M3 = M0 - J psi'' speed^2, and this design's psi'' is {bands[0].bend:.6g}."
+    text += _ratio(bands, scene) if len({(b.least, b.most) for b in bands}) == 1 else ""
     if needed > allowed:
-        return f"{said} All would need one of {needed:.6g} or more, and of {allowed:.6g} or less: no linkage has it."
-    return f"{said} All would need one from {needed:.6g} to {allowed:.6g}."
+        return f"{text} All would need one of {needed:.6g} or more, and of {allowed:.6g} or less: no linkage has it."
+    return f"{text} All would need one from {needed:.6g} to {allowed:.6g}."
 
 
 def _ratio(bands: Sequence[Band], scene: Scene) -> str:

@@ -142,19 +142,19 @@ class BeatupViews(JobViews):
         """Both dead centres, rad, and where the cloth begins and ceases to resist."""
         sampler = registry.of(scene).sampler(scene, design)
         model, given = sampler.model, sampler.given
-        found: dict[str, float | Span] = {name: float(model.event(FLOAT, given, name)) % TURN for name in (FRONT, REAR)}
+        marks: dict[str, float | Span] = {name: float(model.event(FLOAT, given, name)) % TURN for name in (FRONT, REAR)}
         for pulse in model.integrals:
-            found["pulse"] = Span(*sampler.cycle.stretch(pulse.where))
-        return found | {name.replace("_", " "): tops(sampler, [name])[0] % TURN for name in model.least}
+            marks["pulse"] = Span(*sampler.cycle.stretch(pulse.where))
+        return marks | {name.replace("_", " "): tops(sampler, [name])[0] % TURN for name in model.least}
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
         """Remarks: on curves, checks, a reed that twists away while it beats up."""
-        found = super().remarks(scene, design) if any(isinstance(e, Check) for e in scene.active) else told(scene)
+        remarks = super().remarks(scene, design) if any(isinstance(e, Check) for e in scene.active) else told(scene)
         if not any(isinstance(effect, State) for effect in scene.active):
-            return found
+            return remarks
         from loomopt.picture.panels import twisted
 
-        return (*found, *twisted(scene, registry.of(scene).sampler(scene, design)))
+        return (*remarks, *twisted(scene, registry.of(scene).sampler(scene, design)))
 
     def words(self) -> "Mapping[str, Curve]":
         """Names of the curves."""
@@ -175,8 +175,8 @@ class BeatupViews(JobViews):
 
 def _numbers(scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
     """All numbers of a design, with the offset of the reed's centre of mass where an effect has one."""
-    found = registry.of(scene).numbers_of(scene, design)
-    return found | {"offset": found.get(scene.full("offset"), 0.0)}
+    numbers = registry.of(scene).numbers_of(scene, design)
+    return numbers | {"offset": numbers.get(scene.full("offset"), 0.0)}
 
 
 VIEWS = BeatupViews()

@@ -44,8 +44,8 @@ class LinkageDrawing:
     @property
     def events(self) -> dict[str, float]:
         """Crank angles, rad, at which it is drawn, by layer; without events at the start and half a turn later."""
-        found = self.linkage.events(FLOAT, self.sampler.given)
-        drawn = dict(itertools.islice(found.items(), MOST)) or {"start": 0.0, "half a turn": math.pi}
+        angles = self.linkage.events(FLOAT, self.sampler.given)
+        drawn = dict(itertools.islice(angles.items(), MOST)) or {"start": 0.0, "half a turn": math.pi}
         return {f"{name} event" if name in TAKEN else name: float(angle) for name, angle in drawn.items()}
 
     def joints(self, phi: float) -> dict[str, Point]:
@@ -56,12 +56,12 @@ class LinkageDrawing:
     @property
     def lines(self) -> tuple[tuple[str, str], ...]:
         """Pairs of joints that a line joins: a bar, or each side of a plate."""
-        found: list[tuple[str, str]] = []
+        pairs: list[tuple[str, str]] = []
         for name, joints in self.linkage.chain.bodies.items():
             if name != "frame":
                 closed = (*joints, joints[0]) if len(joints) > 2 else joints
-                found += itertools.pairwise(closed)
-        return tuple(found)
+                pairs += itertools.pairwise(closed)
+        return tuple(pairs)
 
     @property
     def circles(self) -> tuple[tuple[str, float], ...]:
@@ -98,28 +98,32 @@ class LinkageDrawing:
 
 
 def _path(joint: Joint, phi: Floats) -> Line:
-    x, y = (np.broadcast_to(np.asarray(each, dtype=np.float64), phi.shape) for each in joint.place)
+    x, y = (np.broadcast_to(np.asarray(coordinate, dtype=np.float64), phi.shape) for coordinate in joint.place)
     return Line("paths", tuple(Point(float(a), float(b)) for a, b in zip(x, y, strict=True)), closed=True)
 
 
 def motion(sampler: Sampler, angles: Floats) -> MechanismMotion:
     """Linkage at crank angles, (n,) rad: the lines and circles of its drawing."""
-    found = LinkageDrawing(sampler)
-    fixed, at = found.linkage.chain.pivots, found.linkage.at(systems.numpy(), sampler.given, angles).joints
+    drawing = LinkageDrawing(sampler)
+    fixed, at = drawing.linkage.chain.pivots, drawing.linkage.at(systems.numpy(), sampler.given, angles).joints
     moving = {
-        name: np.column_stack([np.broadcast_to(np.asarray(each, dtype=np.float64), angles.shape) for each in own.place])
-        for name, own in at.joints.items()
+        name: np.column_stack(
+            [np.broadcast_to(np.asarray(coordinate, dtype=np.float64), angles.shape) for coordinate in joint.place]
+        )
+        for name, joint in at.joints.items()
         if name not in fixed
     }
     pivots = {name: Point(*map(float, at.joints[name].place)) for name in fixed}
-    return MechanismMotion(angles, pivots, moving, found.lines, found.circles)
+    return MechanismMotion(angles, pivots, moving, drawing.lines, drawing.circles)
 
 
 def forces(sampler: Sampler) -> list[ForceArrow]:
     """Forces that a design tells in its joints: just before its first event, and at their peaks."""
     linked = linkage_of(sampler.model).chain
     pins = {part.name: part.word("pin") for part in linked.parts}
-    places = {name: joint if joint != own else pins[own] for (joint, own), name in chain_forces.names(linked).items()}
+    places = {
+        name: joint if joint != link else pins[link] for (joint, link), name in chain_forces.names(linked).items()
+    }
     return force_arrows.told(sampler, event_of(sampler), places)
 
 
@@ -132,9 +136,13 @@ def linkage(
     sampler: Sampler, title: str, units: Units = METRIC, forces: Mapping[ForceArrow, str] | None = None
 ) -> Drawing:
     """Design at its events, at full scale; forces: in its joints, each with its size as it is told."""
-    found = LinkageDrawing(sampler)
-    skeleton, height = found.skeleton, found.height
-    labels, legend, event = _labels(found, skeleton, units), _legend(found, skeleton, units), "".join(event_of(sampler))
+    drawing = LinkageDrawing(sampler)
+    skeleton, height = drawing.skeleton, drawing.height
+    labels, legend, event = (
+        _labels(drawing, skeleton, units),
+        _legend(drawing, skeleton, units),
+        "".join(event_of(sampler)),
+    )
     sheet = Sheet(title, height, skeleton.strokes(height), labels, legend, units, event)
     return sheet.drawing(forces, functools.partial(motion, sampler))
 
@@ -144,19 +152,19 @@ def joints_csv(sampler: Sampler, units: Units = METRIC) -> str:
     return LinkageDrawing(sampler).skeleton.csv(units)
 
 
-def _labels(found: LinkageDrawing, skeleton: Skeleton, units: Units) -> list[Label]:
+def _labels(drawing: LinkageDrawing, skeleton: Skeleton, units: Units) -> list[Label]:
     """Name the joints, and the links with their lengths, at the first event."""
     first = next(iter(skeleton.joints))
     at = skeleton.at(first)
     labels = [Label("frame" if name in skeleton.pivots else first, at[name], math.pi / 4, name) for name in at]
-    bars = [(name, at[a], at[b]) for name, a, b in found.linkage.chain.bars]
+    bars = [(name, at[a], at[b]) for name, a, b in drawing.linkage.chain.bars]
     return labels + [along(first, a, b, math.pi / 2, f"{name} = {units.size(math.dist(a, b))}") for name, a, b in bars]
 
 
-def _legend(found: LinkageDrawing, skeleton: Skeleton, units: Units) -> tuple[tuple[str, str], ...]:
+def _legend(drawing: LinkageDrawing, skeleton: Skeleton, units: Units) -> tuple[tuple[str, str], ...]:
     """Lines below the drawing, each with its layer."""
     rows = []
-    for event, angle in found.events.items():
+    for event, angle in drawing.events.items():
         names = " ".join(name + skeleton.primes[event] for name in next(iter(skeleton.joints.values())))
         rows.append((event, f"{names}  {event}, crank at {math.degrees(angle) % 360:.2f}°"))
     return (*rows, ("notes", units.said))

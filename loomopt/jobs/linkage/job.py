@@ -48,13 +48,13 @@ class LinkageJob(Job):
         return model(scene)
 
     def figures_of(
-        self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
+        self, scene: Scene, sampled: "Sampler | Machines", names: Container[str] = EVERY
     ) -> dict[str, Number]:
         """Every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
-        peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in asked}
+        peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in names}
         sampled.search(tuple(peaks.values()))
-        found = base.alone(scene, sampled, asked)
-        return found | {name: self.read(name, sampled.peak(quantity)) for name, quantity in peaks.items()}
+        figures = base.alone(scene, sampled, names)
+        return figures | {name: self.read(name, sampled.peak(quantity)) for name, quantity in peaks.items()}
 
     def read(self, name: str, peak: Number) -> Number:
         """Figure of a quantity's largest value, SI."""
@@ -64,32 +64,32 @@ class LinkageJob(Job):
 
     def peaks(self, model: JobModel) -> dict[str, str]:
         """Figures that are extremes over the cycle."""
-        found = {name: name for name in model.quantities}
-        found |= {name: name for name in model.signed}
-        return found | {f"mu.{part}": f"{part}.{OBLIQUITY}" for part in linkage_of(model).oblique}
+        peaks = {name: name for name in model.quantities}
+        peaks |= {name: name for name in model.signed}
+        return peaks | {f"mu.{part}": f"{part}.{OBLIQUITY}" for part in linkage_of(model).oblique}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
         """How each figure is read over a box of numbers."""
-        told = {name: (self.read(name, 0.0), self.read(name, 1.0)) for name in self.peaks(model)}
+        ends = {name: (self.read(name, 0.0), self.read(name, 1.0)) for name in self.peaks(model)}
         peaks = {
-            name: InBox(quantity=of, sign=told[name][1] - told[name][0], offset=told[name][0])
+            name: InBox(quantity=of, sign=ends[name][1] - ends[name][0], offset=ends[name][0])
             for name, of in self.peaks(model).items()
         }
         return super().in_boxes(scene, model) | peaks
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Sentence on an optimum; figures in SI."""
-        kinds, told, task = scene.schema.figures, [], LinkageTask(scene, target)
+        kinds, clauses, task = scene.schema.figures, [], LinkageTask(scene, target)
         for name, sense in task.levels:
             value = figures.get(name)
             if name in kinds and value is not None:
                 made_zero = abs(value) <= FEASIBLE * task.figure_size(name)
                 text = scene.show(0.0 if made_zero else value, kinds[name].kind, 9)
-                told.append(f"the {sense} {name} is {text}")
+                clauses.append(f"the {sense} {name} is {text}")
             elif name not in kinds:
-                told.append(f"the {sense} {name} is sought")
-        said = ", then ".join(told)
-        return f"{said[:1].upper()}{said[1:]}."
+                clauses.append(f"the {sense} {name} is sought")
+        sentence = ", then ".join(clauses)
+        return f"{sentence[:1].upper()}{sentence[1:]}."
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Output with three derivatives, the transmission angles, the terms, force and torque."""
@@ -114,19 +114,19 @@ class LinkageJob(Job):
 
     def tables(self, scene: Scene, target: str) -> tuple[Record, ...]:
         """Remarks on the tables that are read, that of a path too."""
-        asked = scenes.path_target(scene, target)
-        if asked is None:
+        path_name = scenes.path_target(scene, target)
+        if path_name is None:
             return super().tables(scene, target)
-        read = scenes.read_path(scene, asked)
+        read = scenes.read_path(scene, path_name)
         count = len(read.lines)
         angles = read.columns.get("phi", tuple(TURN * k / count for k in range(count)))
         misfit = {name: periodic_cubic.misfit(angles, read.columns[name]) for name in ("x", "y")}
-        return (*super().tables(scene, target), read.record(f"targets.{asked}.table", misfit, "the path to follow"))
+        return (*super().tables(scene, target), read.record(f"targets.{path_name}.table", misfit, "the path to follow"))
 
     def studied(self, scene: Scene) -> Studied:
         """Quantities that studies show."""
-        found = super().studied(scene)
-        return found._replace(peaks={name: (name, False) for name in self.model(scene).quantities})
+        quantities = super().studied(scene)
+        return quantities._replace(peaks={name: (name, False) for name in self.model(scene).quantities})
 
 
 def _order(order: int) -> Formula:

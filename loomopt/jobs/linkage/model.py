@@ -203,11 +203,11 @@ class LinkageMotion(Motion):
     @property
     def direction(self) -> Vector:
         """The output link's direction, of any length, as seen from the link it counts against."""
-        found = self.joints.vector(self.output.name)
+        vector = self.joints.vector(self.output.name)
         if not self.output.against:
-            return found
+            return vector
         seen = self.joints.vector(self.output.against)
-        return Vector(dot(seen, found), cross(seen, found))
+        return Vector(dot(seen, vector), cross(seen, vector))
 
     def travelled(self, given: Values, event: str) -> Number:
         """q − q at an event, rad or m; given: with the output's places there."""
@@ -219,14 +219,14 @@ class LinkageMotion(Motion):
         """Output or a derivative of it with respect to φ."""
         out, at = self.output, self.joints
         if out.measure == "angle":
-            found = self._angle() if order == 0 else self._rate(order)
+            value = self._angle() if order == 0 else self._rate(order)
         elif out.measure == "slide":
-            found = at.slides[out.name].at(order)
+            value = at.slides[out.name].at(order)
         else:
             vector = at.joints[out.name].at(order)
-            found = 0 if vector is None else getattr(vector, out.measure)
-        found = found if self.factor is None else self.factor * found
-        return found if out.sign > 0 else -found
+            value = 0 if vector is None else getattr(vector, out.measure)
+        value = value if self.factor is None else self.factor * value
+        return value if out.sign > 0 else -value
 
     def _angle(self) -> Number:
         maths, seen = self.joints.maths, self.direction
@@ -236,11 +236,11 @@ class LinkageMotion(Motion):
         return self.zero + maths.atan2(cross(zero, seen), dot(zero, seen))
 
     def _rate(self, order: int) -> Number:
-        own = self.joints.links[self.output.name].rates(order)
-        other = self.joints.links[self.output.against].rates(order) if self.output.against else None
-        if own is None or other is None:
-            return -other if other is not None else 0 if own is None else own
-        return own - other
+        rate = self.joints.links[self.output.name].rates(order)
+        reference_rate = self.joints.links[self.output.against].rates(order) if self.output.against else None
+        if rate is None or reference_rate is None:
+            return -reference_rate if reference_rate is not None else 0 if rate is None else rate
+        return rate - reference_rate
 
     def since(self, there: "LinkageMotion") -> Number:
         """How far the output is from its place in another pose; of an angle as one atan2."""
@@ -251,9 +251,9 @@ class LinkageMotion(Motion):
     def _turned(self, since: Vector) -> Number:
         """Change of the output since it had another direction."""
         seen = self.direction
-        found = self.joints.maths.atan2(cross(since, seen), dot(since, seen))
-        found = found if self.factor is None else self.factor * found
-        return found if self.output.sign > 0 else -found
+        change = self.joints.maths.atan2(cross(since, seen), dot(since, seen))
+        change = change if self.factor is None else self.factor * change
+        return change if self.output.sign > 0 else -change
 
     @lazy
     def q(self) -> Number:
@@ -336,15 +336,15 @@ class Linkage(Kinematics):
     @lazy
     def groups(self) -> Mapping[str, Group]:
         """The parts that must close at every crank angle, by their names."""
-        found = {}
+        groups = {}
         for part in self.chain.parts:
             closes = chain.closes(part)
             quantities: dict[str, Any] = {name: functools.partial(_span, part.name, name) for name in closes.values()}
             if chain.has_transmission_angle(part):
                 quantities[OBLIQUITY] = functools.partial(_obliquity, part.name)
             if quantities:
-                found[f"{part.name}."] = Group(quantities, closes)
-        return found
+                groups[f"{part.name}."] = Group(quantities, closes)
+        return groups
 
     @lazy
     def arcs(self) -> tuple[Arcs, ...]:
@@ -364,8 +364,8 @@ class Linkage(Kinematics):
         """Node at crank angles, rad, of a design in floats, with the cams' stretches there."""
         if not self.chain.cams:
             return Node(phi, {})
-        found = self.chain.switch(given.values, np.atleast_1d(np.asarray(phi, dtype=np.float64)))
-        return Node(phi, found if np.ndim(phi) else {name: float(each[0]) for name, each in found.items()})
+        switch = self.chain.switch(given.values, np.atleast_1d(np.asarray(phi, dtype=np.float64)))
+        return Node(phi, switch if np.ndim(phi) else {name: float(value[0]) for name, value in switch.items()})
 
     @lazy
     def oblique(self) -> tuple[str, ...]:
@@ -374,23 +374,23 @@ class Linkage(Kinematics):
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """Crank angle of each event, rad."""
-        found: dict[str, Number] = {}
+        values: dict[str, Number] = {}
         for place in self.places:
             if place.angle is not None:
-                found[place.value] = number(maths, given.values, place.angle)
+                values[place.value] = number(maths, given.values, place.angle)
             elif place.hint in given.values:
-                here = given._replace(values={**given.values, **found})
-                found[place.value] = self._followed(maths, here, place)
-        found |= self._nearest(maths, given)
+                here = given._replace(values={**given.values, **values})
+                values[place.value] = self._followed(maths, here, place)
+        values |= self._nearest(maths, given)
         if OUTPUT_PLACES in called:
             for place in self.places:
-                if place.value in found or place.value in given.values:
-                    found |= self._placed(maths, given._replace(values={**given.values, **found}), place)
-        return found
+                if place.value in values or place.value in given.values:
+                    values |= self._placed(maths, given._replace(values={**given.values, **values}), place)
+        return values
 
     def _nearest(self, maths: Maths, given: Given) -> dict[str, Number]:
         """Crank angles, rad, at which a point without timing is nearest to the places of its path."""
-        path, found = self.path, dict[str, Number]()
+        path, angles = self.path, dict[str, Number]()
         for k, name in enumerate(path.times if path else ()):
             if path and hint_of(name) in given.values:
                 place = maths.number(path.x[k]), maths.number(path.y[k])
@@ -401,8 +401,8 @@ class Linkage(Kinematics):
                     pose = self.pose(maths, given, self._there(given, name, phi))
                     return nearest_rates(pose.joints.joints[point], place)
 
-                found[name] = turning_points.followed(rates, given.values[hint_of(name)])
-        return found
+                angles[name] = turning_points.followed(rates, given.values[hint_of(name)])
+        return angles
 
     def _placed(self, maths: Maths, given: Given, place: Place) -> dict[str, Number]:
         """Position of the output at an event, by name."""
@@ -443,35 +443,35 @@ class Linkage(Kinematics):
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
         """Crank angles of the events, rad, from a scan of the whole turn. Raises UnfoundError."""
-        found = self._times(given)
-        angles = {name: found[hint_of(name)] for name in self.path.times} if self.path else {}
+        hints = self._times(given)
+        angles = {name: hints[hint_of(name)] for name in self.path.times} if self.path else {}
         if all(place.angle is not None for place in self.places) and not self.chain.cams:
-            return found
+            return hints
         turns = self.turns(given) if any(place.angle is None for place in self.places) else ()
         for place in self.places:
             if place.angle is not None:
                 angles[place.name] = float(number(FLOAT, given.values, place.angle))
                 continue
             if not place.extreme:
-                angles[place.name] = found[place.hint] = self._crossing(given, place, angles[place.beside])
+                angles[place.name] = hints[place.hint] = self._crossing(given, place, angles[place.beside])
                 continue
             turn = chosen(turns, place)
-            angles[place.name] = found[place.hint] = turn.angle
+            angles[place.name] = hints[place.hint] = turn.angle
             if self.chain.cams:
                 corner, turns_beyond = end_of_rest(turn, place), 0
                 if corner is not None:
-                    own = float(self._corners(FLOAT, given)[corner.place])
-                    turns_beyond = round((turn.angle - own) / TURN)
-                    angles[place.name] = own + TURN * turns_beyond
-                found[place.corner] = 0.0 if corner is None else corner.place + 1.0
-                found[place.turned] = float(turns_beyond)
+                    corner_angle = float(self._corners(FLOAT, given)[corner.place])
+                    turns_beyond = round((turn.angle - corner_angle) / TURN)
+                    angles[place.name] = corner_angle + TURN * turns_beyond
+                hints[place.corner] = 0.0 if corner is None else corner.place + 1.0
+                hints[place.turned] = float(turns_beyond)
         high, low = extremes(self.places)
         if high and low:
-            found[SWEPT] = 0.0 if angles[low] > angles[high] else TURN
+            hints[SWEPT] = 0.0 if angles[low] > angles[high] else TURN
         if not self.chain.cams:
-            return found
+            return hints
         beside = {name: self._at(given, angle).switch for name, angle in angles.items()}
-        return found | {f"{cam} at {name}": value for name, each in beside.items() for cam, value in each.items()}
+        return hints | {f"{cam} at {name}": value for name, switch in beside.items() for cam, value in switch.items()}
 
     def _times(self, given: Given) -> dict[str, float]:
         """Near which crank angles, rad, a point without timing is nearest to the places of its path."""
@@ -479,7 +479,7 @@ class Linkage(Kinematics):
         if path is None or path.phi:
             return {}
         angles: Floats = np.linspace(0.0, TURN, SCAN, endpoint=False)
-        x, y = (np.asarray(each)[:, None] for each in (path.x, path.y))
+        x, y = (np.asarray(coordinate)[:, None] for coordinate in (path.x, path.y))
         with np.errstate(all="ignore"):
             at = self.at(systems.numpy(), given, angles).joints.joints[path.point].place
             phi = angles[np.argmin((at.x - x) ** 2 + (at.y - y) ** 2, axis=1)]
@@ -503,7 +503,7 @@ class Linkage(Kinematics):
         largest = float(np.max(np.abs(bends))) or 1.0
         still = np.abs(slopes) <= STILL * np.max(np.abs(slopes))
         moving = np.flatnonzero(~still)
-        found = []
+        turns = []
         for k, after in zip(moving, np.roll(moving, -1), strict=True):
             if (slopes[k] > 0) == (slopes[after] > 0):
                 continue
@@ -511,15 +511,15 @@ class Linkage(Kinematics):
             between = (np.arange(k + 1, after) if after > k else np.r_[k + 1 : len(still), 0:after]).tolist()
             rest = [corners[node] for node in (between[:1] + between[-1:]) if node in corners]
             if len(rest) == 2:
-                at = Node(rest[0].angle, {name: float(each[between[0]]) for name, each in nodes.switch.items()})
+                at = Node(rest[0].angle, {name: float(values[between[0]]) for name, values in nodes.switch.items()})
                 here = self.pose(FLOAT, given, at)
-                found.append(Turn(rest[0].angle, extreme, float(here.q), abs(float(here.q2)) / largest, tuple(rest)))
+                turns.append(Turn(rest[0].angle, extreme, float(here.q), abs(float(here.q2)) / largest, tuple(rest)))
                 continue
             ends = float(nodes.phi[k]), float(nodes.phi[after]) + (TURN if after < k else 0.0)
             angle = self._settled(given, ends, (float(slopes[k]), float(slopes[after])))
             here = self.at(FLOAT, given, angle)
-            found.append(Turn(angle, extreme, float(here.q), abs(float(here.q2)) / largest))
-        return tuple(found)
+            turns.append(Turn(angle, extreme, float(here.q), abs(float(here.q2)) / largest))
+        return tuple(turns)
 
     def turn(self, given: Given, place: Place) -> Turn:
         """Turn of the output that an extreme means. Raises UnfoundError."""
@@ -531,8 +531,8 @@ class Linkage(Kinematics):
         for cam in self.chain.cams:
             pieces = len(LAWS[cam.word("law")].breaks) + 1
             if place < 2 * (pieces + 1):
-                motion, own = ("rise", place) if place <= pieces else ("return", place - pieces - 1)
-                does = {0: "begins", pieces: "ends"}.get(own, "goes over into its next piece")
+                motion, piece = ("rise", place) if place <= pieces else ("return", place - pieces - 1)
+                does = {0: "begins", pieces: "ends"}.get(piece, "goes over into its next piece")
                 return f"the {motion} of {cam.name} {does}"
             place -= 2 * (pieces + 1)
         raise ValueError(f"the cams have no corner {corner.place}")
@@ -551,12 +551,12 @@ class Linkage(Kinematics):
             end = float(begins[k + 1]) if k + 1 < len(begins) else float(begins[0]) + TURN
             if end - begin <= SAME_ANGLE:
                 continue
-            own = np.linspace(begin, end, max(math.ceil(SCAN * (end - begin) / TURN), FEWEST_NODES))
+            samples = np.linspace(begin, end, max(math.ceil(SCAN * (end - begin) / TURN), FEWEST_NODES))
             after = places[(k + 1) % len(places)][1]
-            corners |= {count: Corner(places[k][1], float(begin)), count + len(own) - 1: Corner(after, end)}
-            angles.append(own)
-            middles.append(np.full(len(own), (begin + end) / 2))
-            count += len(own)
+            corners |= {count: Corner(places[k][1], float(begin)), count + len(samples) - 1: Corner(after, end)}
+            angles.append(samples)
+            middles.append(np.full(len(samples), (begin + end) / 2))
+            count += len(samples)
         switch = self.chain.switch(given.values, np.concatenate(middles))
         return Node(np.concatenate(angles), switch), corners
 
@@ -626,30 +626,30 @@ class Linkage(Kinematics):
         self, turns: Sequence[Turn], swept: float, maths: Maths, given: Given, at: Sequence[Number]
     ) -> list[tuple[str, Number]]:
         """Expressions that are positive where a scan finds the same events as for the design with those turns."""
-        found: list[tuple[str, Number]] = []
+        conditions: list[tuple[str, Number]] = []
         for place in (place for place in self.places if place.extreme):
             extreme = chosen(tuple(turns), place)
             mine = next(k for k, turn in enumerate(turns) if (turn.extreme, turn.q) == (extreme.extreme, extreme.q))
             others = [k for k, turn in enumerate(turns) if turn.extreme == place.extreme and k != mine]
-            said = f"another extreme of the output is {place.name}"
+            text = f"another extreme of the output is {place.name}"
             if place.near is None:
                 angle = chosen(tuple(turns), place).angle
                 moved = at[mine] + (angle - turns[mine].angle)
                 beyond = f"{place.name} passes crank angle 0"
-                found += [(beyond, moved - 0.0), (beyond, TURN - moved)]
+                conditions += [(beyond, moved - 0.0), (beyond, TURN - moved)]
                 sign = 1 if place.extreme == "max" else -1
                 q = [self.pose(maths, given, Node(at[k], {})).q for k in (mine, *others)]
-                found += [(said, sign * (q[0] - other)) for other in q[1:]]
+                conditions += [(text, sign * (q[0] - alternative)) for alternative in q[1:]]
                 continue
             away = [_away(at[k], turns[k].angle, place.near) for k in (mine, *others)]
-            found += [(said, other - away[0]) for other in away[1:]]
-            found.append((f"{place.name} passes half a turn from near", math.pi - away[0]))
+            conditions += [(text, alternative - away[0]) for alternative in away[1:]]
+            conditions.append((f"{place.name} passes half a turn from near", math.pi - away[0]))
         high, low = extremes(self.places)
         if high and low:
             later = given.values[event_value(low)] - given.values[event_value(high)]
             sign = 1 if swept == 0.0 else -1
-            found.append((f"{low} and {high} follow in the other order", sign * later))
-        return found
+            conditions.append((f"{low} and {high} follow in the other order", sign * later))
+        return conditions
 
     def pose(self, maths: Maths, given: Given, node: Node) -> LinkageMotion:
         """Pose at crank angles φ, rad."""
@@ -683,22 +683,22 @@ SWEPT = "turn of sweep"
 
 def chosen(turns: tuple[Turn, ...], place: Place) -> Turn:
     """Turn of the output that an extreme means, its angle within half a turn of `near`. Raises."""
-    own = [turn for turn in turns if turn.extreme == place.extreme]
-    if not own:
+    candidates = [turn for turn in turns if turn.extreme == place.extreme]
+    if not candidates:
         raise UnfoundError(place.name, "the output never turns back")
     if place.near is None:
         sign = 1 if place.extreme == "max" else -1
-        found = max(own, key=lambda turn: sign * turn.q)
+        choice = max(candidates, key=lambda turn: sign * turn.q)
     else:
         near = place.near
-        found = min(own, key=lambda turn: turn.away(near))
-    corner = end_of_rest(found, place)
-    if corner is None and found.bend < FLAT:
+        choice = min(candidates, key=lambda turn: turn.away(near))
+    corner = end_of_rest(choice, place)
+    if corner is None and choice.bend < FLAT:
         raise UnfoundError(place.name, f"at event {place.name} the output only touches a standstill")
-    angle = found.angle if corner is None else corner.angle
+    angle = choice.angle if corner is None else corner.angle
     if place.near is None:
-        return found._replace(angle=(angle + SAME_ANGLE) % TURN - SAME_ANGLE)
-    return found._replace(angle=place.near + apart(angle, place.near))
+        return choice._replace(angle=(angle + SAME_ANGLE) % TURN - SAME_ANGLE)
+    return choice._replace(angle=place.near + apart(angle, place.near))
 
 
 def end_of_rest(turn: Turn, place: Place) -> Corner | None:
@@ -727,9 +727,9 @@ def _away(at: Number, angle: float, near: float) -> Number:
     return off if nearest >= 0 else -off
 
 
-def apart(angle: float, other: float) -> float:
+def apart(angle: float, reference: float) -> float:
     """Angle from another, rad, within half a turn."""
-    return (angle - other + math.pi) % TURN - math.pi
+    return (angle - reference + math.pi) % TURN - math.pi
 
 
 def extremes(places: tuple[Place, ...]) -> tuple[str, str]:
@@ -784,8 +784,8 @@ class Reach(NamedTuple):
 
     def value(self, at: Instant) -> Number:
         """Coordinate, m, or its opposite where the least counts."""
-        found = getattr(at.pose.joints.joints[self.joint].place, self.axis)
-        return found if self.sign > 0 else -found
+        coordinate = getattr(at.pose.joints.joints[self.joint].place, self.axis)
+        return coordinate if self.sign > 0 else -coordinate
 
 
 def _travelled(window: Window, at: Instant) -> Number:
@@ -808,11 +808,11 @@ def _missed(path: Path, at: Instant) -> Number:
 
 def _nearest(path: Path, at: Instant) -> Number:
     """Mean square of the distances at crank angles of the design's own, m²."""
-    found = 0
+    total = 0
     for name, x, y in zip(path.times, path.x, path.y, strict=True):
         pose = _linkage(at).at_place(at.maths, at.given, name)
-        found = found + _square(pose.joints.joints[path.point].place, at.maths.number(x), at.maths.number(y))
-    return found / len(path.x)
+        total = total + _square(pose.joints.joints[path.point].place, at.maths.number(x), at.maths.number(y))
+    return total / len(path.x)
 
 
 def _root(path: Path, at: Instant) -> Number:

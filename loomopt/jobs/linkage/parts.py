@@ -176,11 +176,13 @@ class Numbers:
             self.uses[name] = kind, text
             return
         known, words = self.uses[name]
-        one, other = known.__metadata__[0], kind.__metadata__[0]
-        if one.kind != other.kind:
-            problem = f"{name} is used as two kinds of quantity: {one.kind} ({words}) and {other.kind} ({text})"
+        first, second = known.__metadata__[0], kind.__metadata__[0]
+        if first.kind != second.kind:
+            problem = f"{name} is used as two kinds of quantity: {first.kind} ({words}) and {second.kind} ({text})"
             raise cursor.fault(problem, remedy="Give each a number of its own")
-        narrower = kind if (other.least, other.above, -other.below) > (one.least, one.above, -one.below) else known
+        narrower = (
+            kind if (second.least, second.above, -second.below) > (first.least, first.above, -first.below) else known
+        )
         self.uses[name] = narrower, f"{words}; {text}"
 
 
@@ -266,8 +268,8 @@ def number_schema(number: Number) -> Json:
     """JSON Schema of a number of the linkage: a quantity, or the name of a number of [mechanism]."""
     quantity = number.kind.__metadata__[0].schema()
     name: Json = {"type": "string", "pattern": r"^[ \t]*-?[ \t]*[^\s\d+.-]"}
-    said = re.sub(r" (?:of|from|between|and) (?:\{\w*\})+| \{\w*\}", "", number.text)
-    return {"if": name, "else": quantity, "description": f"{said}: a number of [mechanism], or a quantity"}
+    words = re.sub(r" (?:of|from|between|and) (?:\{\w*\})+| \{\w*\}", "", number.text)
+    return {"if": name, "else": quantity, "description": f"{words}: a number of [mechanism], or a quantity"}
 
 
 def _name_schema() -> Json:
@@ -303,13 +305,13 @@ _SORTS: Mapping[str, Sort] = {
 
 def keys_schema(known: Keys, kind: str = "") -> Json:
     """JSON Schema of a table that holds these keys and no others; kind: of a part."""
-    found = {
-        key: number_schema(each) if isinstance(each, Number) else _SORTS[each.sort].schema()
-        for key, each in known.items()
+    schemas = {
+        key: number_schema(entry) if isinstance(entry, Number) else _SORTS[entry.sort].schema()
+        for key, entry in known.items()
     }
-    own: Json = {"kind": {"const": kind}, **found} if kind else found
-    needed = [key for key in own if key == "kind" or known[key].needed]
-    return {"type": "object", "properties": own, "required": needed, "additionalProperties": False}
+    properties: Json = {"kind": {"const": kind}, **schemas} if kind else schemas
+    needed = [key for key in properties if key == "kind" or known[key].needed]
+    return {"type": "object", "properties": properties, "required": needed, "additionalProperties": False}
 
 
 def schema() -> Json:
@@ -449,8 +451,8 @@ def _name_faults(cursor: Cursor, parts: Sequence[Part]) -> Iterator[BadInput]:
     placed: dict[str, tuple[str, str]] = {}
     for part in parts:
         place = cursor.at(part.name)
-        for sort, own in (("joint", chain.joints_of(part)), ("link", chain.links_of(part))):
-            for name in own:
+        for sort, new_names in (("joint", chain.joints_of(part)), ("link", chain.links_of(part))):
+            for name in new_names:
                 if name in placed:
                     yield _twice(place, name, sort, part, *placed[name])
                 else:
@@ -464,8 +466,8 @@ def _name_faults(cursor: Cursor, parts: Sequence[Part]) -> Iterator[BadInput]:
                     continue
                 where = place.at(_key_of(part, name))
                 if name in others or name == FRAME_NAME:
-                    other = "the frame" if name == FRAME_NAME else f"a {'link' if sort == 'joint' else 'joint'}"
-                    problem = f"{name} is {other}, and a {sort} is wanted"
+                    description = "the frame" if name == FRAME_NAME else f"a {'link' if sort == 'joint' else 'joint'}"
+                    problem = f"{name} is {description}, and a {sort} is wanted"
                     yield where.fault(problem, allowed=", ".join(known), remedy=f"Name a {sort}")
                 else:
                     yield where.unknown(sort, name, known, f"Add a part that places {name}")
@@ -489,7 +491,7 @@ def _twice(cursor: Cursor, name: str, sort: str, part: Part, first: str, before:
 def _key_of(part: Part, name: str) -> str:
     if name in part.names("joins"):
         return "joins"
-    keys = (key for key, each in KEYS[part.kind].items() if isinstance(each, Word) and part.word(key) == name)
+    keys = (key for key, entry in KEYS[part.kind].items() if isinstance(entry, Word) and part.word(key) == name)
     return next(keys, "kind")
 
 
@@ -531,11 +533,11 @@ def demand_used(linked: Chain, document: Mapping[str, Any]) -> None:
     A part is read where another hangs on it or where a table beside [parts] says its name, or that of a joint or link
     of it. A point is drawn with its path, so it may stand for that alone.
     """
-    said = {word for name, own in document.items() if name not in SAYS_NOTHING for word in _said(own)}
+    words = {word for name, table in document.items() if name not in SAYS_NOTHING for word in _words(table)}
     table, wanted = Cursor(linked, "parts", Faults()), set[str]()
     for part in reversed(linked.parts):
-        own = {part.name, *chain.provides(part)}
-        if part.kind == "point" or own & (said | wanted):
+        provided = {part.name, *chain.provides(part)}
+        if part.kind == "point" or provided & (words | wanted):
             wanted.update(chain.wants(part))
             continue
         problem = f"nothing reads the part {part.name}: no other part hangs on it, and no table names it"
@@ -543,15 +545,15 @@ def demand_used(linked: Chain, document: Mapping[str, Any]) -> None:
     table.faults.tell()
 
 
-def _said(raw: object) -> Iterator[str]:
+def _words(raw: object) -> Iterator[str]:
     """Yield every word of a table's keys and texts."""
     if isinstance(raw, Mapping):
         for key, value in raw.items():
-            yield from _said(key)
-            yield from _said(value)
+            yield from _words(key)
+            yield from _words(value)
     elif isinstance(raw, list | tuple):
         for value in raw:
-            yield from _said(value)
+            yield from _words(value)
     elif isinstance(raw, str):
         yield from re.findall(r"\w+", raw)
 

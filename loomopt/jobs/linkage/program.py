@@ -64,21 +64,21 @@ class LinkageTask(Task):
     @lazy
     def model(self) -> JobModel:
         """The same with the opposites of numbers of which the most is sought."""
-        found = self.plain_model
+        model = self.plain_model
         for name, sense in self.levels:
             full = self.scene.full(name)
             if sense == "most" and not self._is_figure(name):
-                found = opposing(found, (full,))
-            elif sense == "most" and found.has_row(name):
-                found = opposing(found, (name,))
-        return found
+                model = opposing(model, (full,))
+            elif sense == "most" and model.has_row(name):
+                model = opposing(model, (name,))
+        return model
 
     @property
     def table(self) -> TargetTable:
         """The target's own table."""
-        found = self.scene.targets[self.target]
-        assert isinstance(found, TargetTable)
-        return found
+        table = self.scene.targets[self.target]
+        assert isinstance(table, TargetTable)
+        return table
 
     @property
     def levels(self) -> tuple[tuple[str, str], ...]:
@@ -141,10 +141,10 @@ class LinkageTask(Task):
     def margins(self) -> list[Limit]:
         """Rows by which every part closes over the whole turn; a limit on its transmission angle does so too."""
         return [
-            CycleLimit(said, 1, prefix + row, 1.0, 1.0, relaxable=False)
+            CycleLimit(text, 1, prefix + row, 1.0, 1.0, relaxable=False)
             for prefix, group in self.model.kinematics.groups.items()
             if f"mu.{prefix[:-1]}" not in self.scene.limits
-            for said, row in group.closes.items()
+            for text, row in group.closes.items()
         ]
 
     # Levels, starts and moves.
@@ -221,6 +221,6 @@ class LinkageTask(Task):
 
     def _extent(self) -> float:
         """Size of the path, m."""
-        found = linkage_of(self.plain_model).path
-        assert isinstance(found, Path)
-        return float(max(np.ptp(found.x), np.ptp(found.y))) or self.length
+        curve = linkage_of(self.plain_model).path
+        assert isinstance(curve, Path)
+        return float(max(np.ptp(curve.x), np.ptp(curve.y))) or self.length

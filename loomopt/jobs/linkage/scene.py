@@ -106,10 +106,10 @@ WINDOW_KEYS: parts.Keys = {
 
 def _output_schema() -> Json:
     """JSON Schema of [output]."""
-    one: Json = {"oneOf": [{"required": [form]} for form in FORMS]}
-    found = parts.keys_schema(OUTPUT_KEYS)
+    one_form: Json = {"oneOf": [{"required": [form]} for form in FORMS]}
+    table_schema = parts.keys_schema(OUTPUT_KEYS)
     scale = [parts.number_schema(Number(kind, SCALE)) for kind in (PositiveNumber, PositiveLength)]
-    return found | one | {"properties": found["properties"] | {"scale": {"anyOf": scale}}}
+    return table_schema | one_form | {"properties": table_schema["properties"] | {"scale": {"anyOf": scale}}}
 
 
 def _events_schema() -> Json:
@@ -121,8 +121,8 @@ def _events_schema() -> Json:
 
 def _windows_schema() -> Json:
     """JSON Schema of [windows]."""
-    own = parts.keys_schema(WINDOW_KEYS)
-    return {"type": "object", "propertyNames": parts.NAME_SCHEMA, "additionalProperties": own}
+    window_schema = parts.keys_schema(WINDOW_KEYS)
+    return {"type": "object", "propertyNames": parts.NAME_SCHEMA, "additionalProperties": window_schema}
 
 
 TABLES: Mapping[str, tuple[str, Callable[[], Json]]] = {
@@ -202,7 +202,7 @@ def _scale(raw: object, form: str, names: Mapping[str, object]) -> tuple[Any, bo
 
 
 def _places(cursor: Cursor, numbers: Numbers, output: Output) -> tuple[Place, ...]:
-    found: dict[str, Place] = {}
+    places: dict[str, Place] = {}
     travel = Number(PositiveLength if output.slides else parts.PositiveAngle, TRAVEL, True)
     forms = {**EVENT_KEYS, "travel": {**EVENT_KEYS["travel"], "travel": travel}}
     for name, place in cursor.entries().items():
@@ -214,12 +214,12 @@ def _places(cursor: Cursor, numbers: Numbers, output: Output) -> tuple[Place, ..
             raise place.fault(problem, remedy='Such as { extreme = "max", near = "60 deg" }')
         read = parts.entries(place, forms[given[0]], numbers, name=name)
         if given[0] == "travel":
-            found[name] = _travel(place, name, read, found)
+            places[name] = _travel(place, name, read, places)
         else:
             extreme = read.words.get("extreme", "")
             rest, near = read.words.get("rest", ""), read.words.get("near")
-            found[name] = Place(name, extreme, near, angle=read.numbers.get("angle"), rest=rest)
-    return tuple(found.values())
+            places[name] = Place(name, extreme, near, angle=read.numbers.get("angle"), rest=rest)
+    return tuple(places.values())
 
 
 def _travel(cursor: Cursor, name: str, read: parts.Entries, known: Known) -> Place:
@@ -235,14 +235,14 @@ def _travel(cursor: Cursor, name: str, read: parts.Entries, known: Known) -> Pla
 
 
 def _windows(cursor: Cursor, numbers: Numbers, places: Sequence[Place]) -> tuple[Window, ...]:
-    known, found = [place.name for place in places], []
+    known, windows = [place.name for place in places], []
     for name, place in cursor.entries().items():
         place.table()
         parts.check_name(place, name)
         read = parts.entries(place, WINDOW_KEYS, numbers, "a window", name)
         after, level = (_one_of(place.at(word), known, "event") for word in ("after", "level"))
-        found.append(Window(name, after, read.numbers["begins"], read.numbers["ends"], level))
-    return tuple(found)
+        windows.append(Window(name, after, read.numbers["begins"], read.numbers["ends"], level))
+    return tuple(windows)
 
 
 @functools.lru_cache(maxsize=64)
@@ -276,8 +276,8 @@ def reaches(document: Mapping[str, Any], linked: Chain) -> tuple[Reach, ...]:
     limits = document.get("limits", {})
     named = list(limits) if isinstance(limits, Mapping) else []
     for name in REACHES:
-        own = limits.get(name) if isinstance(limits, Mapping) else None
-        named += [f"{name}.{joint}" for joint in own] if isinstance(own, Mapping) else []
+        joint_limits = limits.get(name) if isinstance(limits, Mapping) else None
+        named += [f"{name}.{joint}" for joint in joint_limits] if isinstance(joint_limits, Mapping) else []
     named += _sought(document, "least", "most")
     joints = parts.kinds_of(linked)[0]
     possible = {
@@ -293,39 +293,39 @@ def figures(known: Reading, document: Mapping[str, Any]) -> dict[str, Figure]:
     linkage, slides = known.linkage, known.linkage.output.slides
     travel, load = ("length", "force") if slides else ("angle", "torque")
     rates = ("travel velocity", "travel acceleration", "travel jerk") if slides else ("number",) * 3
-    found = [*drive.FIGURES, Figure(RMS_TORQUE, "torque", "rms crank torque over the cycle", sides=("max",))]
+    figure_list = [*drive.FIGURES, Figure(RMS_TORQUE, "torque", "rms crank torque over the cycle", sides=("max",))]
     for name, event in linkage.loads.items():
-        found.append(Figure(name, load, f"{load} at the output at {event}"))
-        found.append(Figure(f"angle.{event}", "angle", f"crank angle of {event}"))
+        figure_list.append(Figure(name, load, f"{load} at the output at {event}"))
+        figure_list.append(Figure(f"angle.{event}", "angle", f"crank angle of {event}"))
     high, low = extremes(linkage.places)
     if high and low:
-        found.append(Figure("swing", travel, f"{'stroke' if slides else 'swing'} of the output, {low} to {high}"))
-        found.append(Figure("sweep", "angle", f"crank angle from {high} to {low}"))
+        figure_list.append(Figure("swing", travel, f"{'stroke' if slides else 'swing'} of the output, {low} to {high}"))
+        figure_list.append(Figure("sweep", "angle", f"crank angle from {high} to {low}"))
     for name, kind, text in zip(("velocity", "acceleration", "jerk"), rates, ("q'", "q''", "q'''"), strict=True):
-        found.append(Figure(f"peak_{name}", kind, f"peak |{text}| of the output", sides=("max",)))
-    found += [Figure(f"mu.{n}", "angle", f"least transmission angle of {n}", ("min",)) for n in linkage.oblique]
+        figure_list.append(Figure(f"peak_{name}", kind, f"peak |{text}| of the output", sides=("max",)))
+    figure_list += [Figure(f"mu.{n}", "angle", f"least transmission angle of {n}", ("min",)) for n in linkage.oblique]
     for window in known.windows:
         text = f"largest travel from {window.level} over window {window.name}"
-        found.append(Figure(f"travel.{window.name}", travel, text, sides=("max",)))
+        figure_list.append(Figure(f"travel.{window.name}", travel, text, sides=("max",)))
     for reach in reaches(document, linkage.chain):
         side, text = ("max", "largest") if reach.sign > 0 else ("min", "least")
-        found.append(Figure(reach.name, "length", f"{text} {reach.axis} of {reach.joint}", sides=(side,)))
+        figure_list.append(Figure(reach.name, "length", f"{text} {reach.axis} of {reach.joint}", sides=(side,)))
     if _pathed(document):
-        found.append(Figure(PATH, "length", "rms distance of the point from its path", sides=("max",)))
-    return {figure.name: figure for figure in found}
+        figure_list.append(Figure(PATH, "length", "rms distance of the point from its path", sides=("max",)))
+    return {figure.name: figure for figure in figure_list}
 
 
 def _pathed(document: Mapping[str, Any]) -> bool:
     targets = document.get("targets", {})
     return isinstance(targets, Mapping) and any(
-        isinstance(own, Mapping) and own.get("point") is not None for own in targets.values()
+        isinstance(table, Mapping) and table.get("point") is not None for table in targets.values()
     )
 
 
 def axes(known: Reading, document: Mapping[str, Any]) -> dict[str, Axis]:
     """Axes that are read otherwise than under their own name."""
     load = "force" if known.linkage.output.slides else "torque"
-    found = [
+    axis_list = [
         Axis(RMS_TORQUE, "torque", (TORQUE_SQUARE,), senses=("least",), power=2),
         *(
             Axis(f"mu.{part}", "angle", (f"{part}.{OBLIQUITY}",), "peak", ("most",), -1, math.pi / 2)
@@ -338,11 +338,11 @@ def axes(known: Reading, document: Mapping[str, Any]) -> dict[str, Axis]:
         *(Axis(name, load, form="magnitude", senses=("least",)) for name in known.linkage.loads),
     ]
     if _pathed(document):
-        found.append(Axis(PATH, "length", ("path_mean_square",), senses=("least",), power=2))
+        axis_list.append(Axis(PATH, "length", ("path_mean_square",), senses=("least",), power=2))
     # A number of which a target seeks the most is worth its most where it is traded, too.
     most = dict.fromkeys(name for name in _sought(document, "most") if name in known.numbers)
-    found += [Axis(name, _kind(known, name), senses=("most", "least")) for name in most]
-    return {axis.name: axis for axis in found}
+    axis_list += [Axis(name, _kind(known, name), senses=("most", "least")) for name in most]
+    return {axis.name: axis for axis in axis_list}
 
 
 def _kind(known: Reading, name: str) -> str:
@@ -353,24 +353,24 @@ def _kind(known: Reading, name: str) -> str:
 def _sought(document: Mapping[str, Any], *ends: str) -> Iterator[str]:
     """Yield the figures and numbers of which targets seek the least, or the most."""
     targets = document.get("targets", {})
-    for own in targets.values() if isinstance(targets, Mapping) else ():
+    for table in targets.values() if isinstance(targets, Mapping) else ():
         for end in ends:
-            each = own.get(end, []) if isinstance(own, Mapping) else []
-            yield from (name for name in each if isinstance(name, str)) if isinstance(each, list | tuple) else ()
+            names = table.get(end, []) if isinstance(table, Mapping) else []
+            yield from (name for name in names if isinstance(name, str)) if isinstance(names, list | tuple) else ()
 
 
 def targets(document: Mapping[str, Any]) -> dict[str, Target]:
     """Targets of the scene, in its order."""
-    table, found = Cursor(document.get("targets", {}), "targets", Faults()), {}
+    table, targets = Cursor(document.get("targets", {}), "targets", Faults()), {}
     for name, place in table.entries(table.table() or DEFAULT).items():
-        own, said = place.table(), []
-        if own.get("point") is not None:
-            said.append(f"{own['point']} on its path")
+        entry, goals = place.table(), []
+        if entry.get("point") is not None:
+            goals.append(f"{entry['point']} on its path")
         for key in ("least", "most"):
-            each = own.get(key, ())
-            said += [f"{key} {figure}" for figure in each] if isinstance(each, list | tuple) else []
-        found[name] = Target(name, ", then ".join(said) or "nothing", TargetTable)
-    return found
+            names = entry.get(key, ())
+            goals += [f"{key} {figure}" for figure in names] if isinstance(names, list | tuple) else []
+        targets[name] = Target(name, ", then ".join(goals) or "nothing", TargetTable)
+    return targets
 
 
 # The scene as a whole.
@@ -394,9 +394,9 @@ def schema(document: Mapping[str, Any]) -> SceneSchema:
 def _schema(text: str) -> SceneSchema:
     document = json.loads(text)
     known = reading(document)
-    fields = {name: (kind, Field(description=said)) for name, (kind, said) in known.numbers.items()}
+    fields = {name: (kind, Field(description=words)) for name, (kind, words) in known.numbers.items()}
     mechanism = create_model("Mechanism", __base__=Table, __module__=__name__, **fields)  # type: ignore[call-overload]
-    own = targets(document)
+    scene_targets = targets(document)
     effects = kinds.of("loomopt.physics.effects.linkage", "SLIDING" if known.linkage.output.slides else "EFFECT")
     return SceneSchema(
         name="linkage",
@@ -406,10 +406,10 @@ def _schema(text: str) -> SceneSchema:
         effects={name: _fitted(effect, known.linkage) for name, effect in effects.items()},
         variables={name: _kind(known, name) for name in known.numbers},
         own_figures=figures(known, document),
-        targets=own,
-        default_target=next(iter(own)),
+        targets=scene_targets,
+        default_target=next(iter(scene_targets)),
         fault=functools.partial(fault, known.linkage),
-        own_margins={said: "number" for group in known.linkage.groups.values() for said in group.closes},
+        own_margins={text: "number" for group in known.linkage.groups.values() for text in group.closes},
         own_axes=axes(known, document),
         tables={name: functools.partial(_table_schema, name) for name in TABLES},
         former_names=former_names(known.linkage),
@@ -431,16 +431,16 @@ def path(scene: Scene, target: str) -> Path | None:
     name = path_target(scene, target)
     if name is None:
         return None
-    found = read_path(scene, name).columns
+    columns = read_path(scene, name).columns
     table = scene.targets[name]
     assert isinstance(table, TargetTable)
-    return Path(str(table.point), found.get("phi", ()), found["x"], found["y"])
+    return Path(str(table.point), columns.get("phi", ()), columns["x"], columns["y"])
 
 
 def path_target(scene: Scene, target: str) -> str | None:
     """Target whose path is read for a target: its own, else the first that has one; None where none has."""
-    own = [name for name, table in scene.targets.items() if isinstance(table, TargetTable) and table.point]
-    return target if target in own else next(iter(own), None)
+    names = [name for name, table in scene.targets.items() if isinstance(table, TargetTable) and table.point]
+    return target if target in names else next(iter(names), None)
 
 
 def read_path(scene: Scene, name: str) -> csv_tables.Table:
@@ -492,9 +492,9 @@ def fault(linkage: Linkage, design: Mapping[str, float], shown: ShowValue = usua
 def check(scene: Scene) -> None:
     """Raise BadInput where today's linkage does not turn all round, or a name means nothing in it."""
     known, faults = reading(scene.document), Faults()
-    for each in (_check_names, _check_effects, _check_targets, _check_windows):
+    for check_part in (_check_names, _check_effects, _check_targets, _check_windows):
         with faults:
-            each(scene, known)
+            check_part(scene, known)
     with faults:
         parts.demand_used(known.linkage.chain, scene.document)
     if faults.found:
@@ -513,9 +513,9 @@ def _check_names(scene: Scene, known: Reading) -> None:
     taken |= dict.fromkeys(("omega", "omega_dot", "phi", "instance"), "a symbol of the equations")
     taken |= {
         kinds.label(effect, key): f"a number of effect {effect.name}"
-        for effect, own in zip(scene.active, scene.effects.values(), strict=True)
+        for effect, table in zip(scene.active, scene.effects.values(), strict=True)
         for key in effect.table.model_fields
-        if getattr(own, key) is not None
+        if getattr(table, key) is not None
     }
     mechanism = cursor(scene).at("mechanism")
     for name in known.numbers:
@@ -526,13 +526,13 @@ def _check_effects(scene: Scene, known: Reading) -> None:
     """Raise BadInput for a link, joint or event that an effect names and the scene does not have."""
     linked, events = known.linkage.chain, [place.name for place in known.linkage.places]
     faults = Faults()
-    for effect, own in zip(scene.active, scene.effects.values(), strict=True):
+    for effect, table in zip(scene.active, scene.effects.values(), strict=True):
         path = ".".join(("effects", *effect.path))
         bodies = {"mass": (*linked.links, *linked.joints), "load": linked.joints}.get(effect.kind)
         if bodies is not None and effect.instance not in bodies:
             sort = "joint" if effect.kind == "load" else "link or joint"
             faults.add(unknown(sort, effect.instance, bodies, scene.origin, path))
-        for key, value in own.model_dump().items():
+        for key, value in table.model_dump().items():
             if not isinstance(value, str) or key == "table":
                 continue
             joined = effect.kind == "spring"
@@ -541,17 +541,17 @@ def _check_effects(scene: Scene, known: Reading) -> None:
                 sort = "joint" if joined else "event"
                 faults.add(unknown(sort, value, places, scene.origin, f"{path}.{key}", "Add it, or correct the name"))
         with faults:
-            _check_sense(effect, own.model_dump(), path, scene.origin)
-        if effect.name == "inertia" and getattr(own, "m", None) is not None and not known.linkage.output.carrier:
+            _check_sense(effect, table.model_dump(), path, scene.origin)
+        if effect.name == "inertia" and getattr(table, "m", None) is not None and not known.linkage.output.carrier:
             problem = f"{path}.m needs a link of the output that turns about a fixed axis and counts from the frame"
             remedy = f"Take m out, and give the link's mass in [effects.mass.{known.linkage.output.name}]"
             faults.add(refusal(problem, scene.origin, f"{path}.m", remedy=remedy))
     faults.tell()
 
 
-def _check_sense(effect: kinds.Effect, own: Mapping[str, Any], path: str, origin: str) -> None:
+def _check_sense(effect: kinds.Effect, values: Mapping[str, Any], path: str, origin: str) -> None:
     """Raise BadInput for keys of a table that mean nothing together."""
-    given = {key for key, value in own.items() if value is not None}
+    given = {key for key, value in values.items() if value is not None}
     if effect.kind == "load":
         if given.isdisjoint(("x", "y", "table")) or ("table" in given and not given.isdisjoint(("x", "y", "begins"))):
             remedy = "Give x and y, with begins and ends or without, or a table"
@@ -560,8 +560,8 @@ def _check_sense(effect: kinds.Effect, own: Mapping[str, Any], path: str, origin
             raise refusal("a load begins at an event and ends at another", origin, path, remedy="Give both, or none")
         if "at" in given and "table" not in given:
             raise refusal("at is of a table", origin, f"{path}.at", remedy="Take it out")
-    if {"begins", "ends"} <= given and own["begins"] == own["ends"]:
-        raise refusal("it begins where it ends", origin, f"{path}.ends", own["ends"], remedy="Name another")
+    if {"begins", "ends"} <= given and values["begins"] == values["ends"]:
+        raise refusal("it begins where it ends", origin, f"{path}.ends", values["ends"], remedy="Name another")
 
 
 def _check_targets(scene: Scene, known: Reading) -> None:
@@ -580,9 +580,9 @@ def _check_targets(scene: Scene, known: Reading) -> None:
             if figure not in (*axes_, *bounded):
                 faults.add(unknown("figure or bounded number", figure, [*axes_, *bounded], scene.origin, path_))
             elif axis and sense not in axis.senses:
-                other = "least" if sense == "most" else "most"
-                problem = f"of {figure} the {other} can be sought, not the {sense}"
-                faults.add(refusal(problem, scene.origin, path_, remedy=f"Write {other}, or seek another figure"))
+                opposite = "least" if sense == "most" else "most"
+                problem = f"of {figure} the {opposite} can be sought, not the {sense}"
+                faults.add(refusal(problem, scene.origin, path_, remedy=f"Write {opposite}, or seek another figure"))
         if len(dict.fromkeys(table.sought)) < len(table.sought):
             faults.add(refusal("a figure is sought twice", scene.origin, key, remedy="Take one out"))
         with faults:
@@ -595,9 +595,9 @@ def _check_windows(scene: Scene, known: Reading) -> None:
     for window in known.windows:
         ends = [scene.mechanism[ref.name] if ref.name else ref.value for ref in (window.begins, window.ends)]
         if not 0.0 < ends[1] - ends[0] < 2 * math.pi:
-            told = " to ".join(scene.show(end, "angle") for end in ends)
+            span = " to ".join(scene.show(end, "angle") for end in ends)
             remedy = "Let it end after it begins, within a turn"
-            raise refusal(f"the window goes from {told}", scene.origin, f"windows.{window.name}.ends", remedy=remedy)
+            raise refusal(f"the window goes from {span}", scene.origin, f"windows.{window.name}.ends", remedy=remedy)
 
 
 def _check_output(scene: Scene, linkage: Linkage) -> None:
@@ -647,8 +647,8 @@ def _check_events(scene: Scene, linkage: Linkage) -> None:
 
 def _check_extreme(scene: Scene, turns: Sequence[Turn], place: Place) -> None:
     """Raise BadInput for an extreme that is another, or that a small change of the design would exchange."""
-    key, found = f"events.{place.name}", chosen(tuple(turns), place)
-    own = [turn for turn in turns if turn.extreme == place.extreme]
+    key, choice = f"events.{place.name}", chosen(tuple(turns), place)
+    candidates = [turn for turn in turns if turn.extreme == place.extreme]
     word = "highest" if place.extreme == "max" else "lowest"
 
     def at(few: Sequence[Turn]) -> str:
@@ -656,12 +656,13 @@ def _check_extreme(scene: Scene, turns: Sequence[Turn], place: Place) -> None:
 
     if place.near is None:
         swing = max(turn.q for turn in turns) - min(turn.q for turn in turns)
-        alike = [turn for turn in own if abs(turn.q - found.q) <= LEVEL * swing]
+        alike = [turn for turn in candidates if abs(turn.q - choice.q) <= LEVEL * swing]
         if len(alike) > 1:
             problem = f"the output is {word}, within {LEVEL:.1%} of its swing, at {at(alike)}: {place.name} may be any"
             raise refusal(problem, scene.origin, key, remedy='Say which: near = "60 deg"')
         return
-    other = [turn.away(place.near) for turn in turns if turn.extreme != place.extreme]
-    if min(other) < min(turn.away(place.near) for turn in own):
-        problem = f"near {scene.show(place.near, 'angle')} the output has no {place.extreme}: it is {word} at {at(own)}"
+    distances = [turn.away(place.near) for turn in turns if turn.extreme != place.extreme]
+    if min(distances) < min(turn.away(place.near) for turn in candidates):
+        where = scene.show(place.near, "angle")
+        problem = f"near {where} the output has no {place.extreme}: it is {word} at {at(candidates)}"
         raise refusal(problem, scene.origin, f"{key}.near", remedy="Correct near, or name the other extreme")

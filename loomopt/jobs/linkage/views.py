@@ -76,7 +76,7 @@ class _SymbolicParts:
         sp = sympy()
         pairs = [(sp.sympify(left), sp.sympify(right)) for left, right in sides]
         symbols = {free for pair in pairs for side in pair for free in side.free_symbols}
-        known = [each for name, each in self.angles.items() if name not in unknown and each.symbol in symbols]
+        known = [angle for name, angle in self.angles.items() if name not in unknown and angle.symbol in symbols]
         self.found += loop(pairs, symbol("phi"), [self.angles[name] for name in unknown], known, f"{part.name}: ")
 
 
@@ -197,12 +197,12 @@ class SymbolicPose(LinkageMotion):
 def _output(out: Output, written: _SymbolicParts) -> Expression:
     """Equation of the output."""
     if out.measure in ("x", "y"):
-        found = getattr(written.pose.joints[out.name].place, out.measure)
+        expression = getattr(written.pose.joints[out.name].place, out.measure)
     else:
-        found = symbol(written.angle(out.name)) - (symbol(written.angle(out.against)) if out.against else 0)
+        expression = symbol(written.angle(out.name)) - (symbol(written.angle(out.against)) if out.against else 0)
     if out.scale is not None:
-        found = (symbol(out.scale.name) if out.scale.name else _exact(out.scale.value)) * found
-    return found if out.sign > 0 else -found
+        expression = (symbol(out.scale.name) if out.scale.name else _exact(out.scale.value)) * expression
+    return expression if out.sign > 0 else -expression
 
 
 def equations(model: JobModel) -> tuple[Equation, ...]:
@@ -213,13 +213,15 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
     linkage = linkage_of(model)
     out, written = linkage.output, symbolic(linkage.chain, model.known)
     at = SymbolicPose(written.pose, out, symbol("omega"))
-    own_symbols = {f"{each.name}.{key}": _own(each, key) for each in model.effects for key in each.table.model_fields}
-    numbers = Symbols({name: own for name, own in own_symbols.items() if name in model.known})
+    effect_symbols = {
+        f"{effect.name}.{key}": _own(effect, key) for effect in model.effects for key in effect.table.model_fields
+    }
+    numbers = Symbols({name: index_symbol for name, index_symbol in effect_symbols.items() if name in model.known})
     numbers |= {event_value(place.name): symbol(f"phi_{place.name}") for place in linkage.places}
-    known = Given(numbers, {each.name: _own_values(model, each) for each in model.effects})
+    known = Given(numbers, {effect.name: _own_values(model, effect) for effect in model.effects})
     letter = "F" if out.slides else "M"
-    found = (*written.found, equation("output", symbol("q"), _output(out, written)))
-    return (*found, *effect_equations.forces(model, at, known, "Q", letter))
+    kinematics = (*written.found, equation("output", symbol("q"), _output(out, written)))
+    return (*kinematics, *effect_equations.forces(model, at, known, "Q", letter))
 
 
 def _own(effect: Effect, key: str) -> Expression:
@@ -268,13 +270,13 @@ class LinkageViews(JobViews):
         """Crank angles of the events, rad, and where the windows lie."""
         sampler = registry.of(scene).sampler(scene, design)
         model, given = sampler.model, sampler.given
-        found: dict[str, float | Span] = {
+        marks: dict[str, float | Span] = {
             name: float(angle) % TURN for name, angle in model.kinematics.events(FLOAT, given).items()
         }
         for arc in model.arcs:
             begin, end = (float(angle) for angle in arc.corners(FLOAT, given))
-            found[arc.name.removeprefix("window ")] = Span(begin % TURN, begin % TURN + end - begin)
-        return found
+            marks[arc.name.removeprefix("window ")] = Span(begin % TURN, begin % TURN + end - begin)
+        return marks
 
     def words(self) -> "Mapping[str, Curve]":
         """Names of the curves."""
@@ -291,9 +293,9 @@ class LinkageViews(JobViews):
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
         """Remarks: on the curves, and on events that lie elsewhere than today's."""
-        found = (*told(scene), *_without_place(scene))
+        remarks = (*told(scene), *_without_place(scene))
         moved = self._moved(scene, design)
-        return (*found, *self._rests(scene, design), *((moved,) if moved else ()))
+        return (*remarks, *self._rests(scene, design), *((moved,) if moved else ()))
 
     def _rests(self, scene: Scene, design: Mapping[str, float]) -> Iterator[str]:
         """Yield for each event at which the output rests which end of the rest it is."""
@@ -315,7 +317,7 @@ class LinkageViews(JobViews):
         linkage = linkage_of(here.model)
         if not any(place.extreme for place in linkage.places):
             return ""
-        turns, before = (len(linkage.turns(each.given)) for each in (here, today))
+        turns, before = (len(linkage.turns(sampler.given)) for sampler in (here, today))
         if turns == before:
             return ""
         where = ", ".join(
@@ -329,7 +331,7 @@ class LinkageViews(JobViews):
 def _without_place(scene: Scene) -> Iterator[str]:
     """Remark on the output's mass that the joint forces, or the weight, do not include."""
     out, effects = reading(scene.document).linkage.output, scene.effects
-    tellers = " and ".join(each.of_masses for each in scene.active if each.of_masses)
+    tellers = " and ".join(effect.of_masses for effect in scene.active if effect.of_masses)
     for name in ("inertia", "counterweight"):
         if not tellers or name not in effects:
             continue

@@ -121,10 +121,10 @@ def linkage(
 
     forces: in its joints at some crank angles, each with its size as it is told.
     """
-    found = of(design)
-    strokes = [*found.skeleton.strokes(found.height), *_angles(found)]
-    labels, legend, measures = [*_joints(found), *_labels(found, units)], _legend(found, units), _measures(found)
-    sheet = Sheet(title, found.height, strokes, labels, legend, units, FRONT, measures)
+    drive = of(design)
+    strokes = [*drive.skeleton.strokes(drive.height), *_angles(drive)]
+    labels, legend, measures = [*_joints(drive), *_labels(drive, units)], _legend(drive, units), _measures(drive)
+    sheet = Sheet(title, drive.height, strokes, labels, legend, units, FRONT, measures)
     return sheet.drawing(forces, functools.partial(motion, design))
 
 
@@ -135,65 +135,65 @@ def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:
 
 def motion(design: Mapping[str, float], angles: Floats) -> MechanismMotion:
     """Drive at crank angles, rad. Raises BadInput."""
-    found = of(design)
-    at, skeleton = found.turn(angles).joints, found.skeleton
+    drive = of(design)
+    at, skeleton = drive.turn(angles).joints, drive.skeleton
     moving = {name: np.column_stack(np.broadcast_arrays(*at[name])) for name in MOVING}
     return MechanismMotion(angles, skeleton.pivots, moving, LINKS, skeleton.guides)
 
 
-def _measures(found: Drive) -> tuple[Measure, ...]:
+def _measures(drive: Drive) -> tuple[Measure, ...]:
     """Lengths of the links and of the frame, at front dead centre."""
-    at = found.skeleton.at(FRONT)
+    at = drive.skeleton.at(FRONT)
     ends = [("l71", ("A0", "B0")), *zip(("l1", "l2", "l3", "l3p", "l4", "l5", "l6"), LINKS, strict=True)]
-    return tuple(Measure(name, at[one], at[other]) for name, (one, other) in ends)
+    return tuple(Measure(name, at[begin], at[end]) for name, (begin, end) in ends)
 
 
-def _angles(found: Drive) -> list[Primitive]:
+def _angles(drive: Drive) -> list[Primitive]:
     """Draw α and the swing at B0, φ63 at the hand-over's B2, both cranks' sense, and the arrow toward the fell."""
-    d, h, at, start = found.dimensions, found.height, found.skeleton.at(FRONT), found.turned
-    front, rear = found.poses[FRONT].phi3, found.poses[REAR].phi3
-    (alpha, swing, phi63), b2 = found.radii, found.skeleton.joints[OVER]["B2"]
+    d, h, at, start = drive.dimensions, drive.height, drive.skeleton.at(FRONT), drive.turned
+    front, rear = drive.poses[FRONT].phi3, drive.poses[REAR].phi3
+    (alpha, swing, phi63), b2 = drive.radii, drive.skeleton.joints[OVER]["B2"]
     strokes: list[Primitive] = [
         Line("dimensions", (b2, b2.towards(start, d.l6))),
         *angle_between(at["B0"], alpha, front, front + d.alpha, h),
         *angle_between(at["B0"], swing, rear, front, h),
-        *angle_between(b2, phi63, start, start + found.phi63, h),
+        *angle_between(b2, phi63, start, start + drive.phi63, h),
     ]
-    side = found.sley.stand.frame_angle + math.pi
+    side = drive.sley.stand.frame_angle + math.pi
     for pivot, radius, sense in (("A0", d.l1, 1), ("C0", d.l4, -1)):
         tip = at[pivot].towards(side, radius)
         strokes.append(arrow("notes", tip, side + sense * math.pi / 2, min(h, 0.4 * radius)))
     return [*strokes, *pointer(at["B1"], front + math.pi / 2, h)]
 
 
-def _labels(found: Drive, units: Units) -> list[Label]:
+def _labels(drive: Drive, units: Units) -> list[Label]:
     """Name links with lengths, angles in degrees, and the fell."""
-    d, at, up = found.dimensions, found.skeleton.at(FRONT), math.pi / 2
-    front, rear = found.poses[FRONT].phi3, found.poses[REAR].phi3
-    (alpha, swing, phi63), b2 = found.radii, found.skeleton.joints[OVER]["B2"]
-    start = found.turned
+    d, at, up = drive.dimensions, drive.skeleton.at(FRONT), math.pi / 2
+    front, rear = drive.poses[FRONT].phi3, drive.poses[REAR].phi3
+    (alpha, swing, phi63), b2 = drive.radii, drive.skeleton.joints[OVER]["B2"]
+    start = drive.turned
     sides = {"l1": up, "l2": up, "l3": math.pi, "l3p": math.pi, "l4": -0.5, "l5": up, "l6": math.pi}
-    labels = [Label("notes", at["B1"].towards(front + up, POINTER * found.height), front + up, "fell")]
-    for (name, side), (one, other) in zip(sides.items(), LINKS, strict=True):
-        labels.append(along(FRONT, at[one], at[other], side, f"{name} = {units.size(getattr(d, name))}"))
+    labels = [Label("notes", at["B1"].towards(front + up, POINTER * drive.height), front + up, "fell")]
+    for (name, side), (begin, end) in zip(sides.items(), LINKS, strict=True):
+        labels.append(along(FRONT, at[begin], at[end], side, f"{name} = {units.size(getattr(d, name))}"))
     return [
         *labels,
         along("frame", at["B0"], at["A0"], -up / 2, f"l71 = {units.size(d.l71)}"),
         around("dimensions", at["B0"], alpha, front, front + d.alpha, f"α = {math.degrees(d.alpha):.2f}°"),
         around("dimensions", at["B0"], swing, rear, front, f"swing = {math.degrees(front - rear):.2f}°"),
-        around("dimensions", b2, phi63, start, start + found.phi63, f"φ63 max = {math.degrees(found.phi63):.2f}°"),
+        around("dimensions", b2, phi63, start, start + drive.phi63, f"φ63 max = {math.degrees(drive.phi63):.2f}°"),
     ]
 
 
-def _joints(found: Drive) -> list[Label]:
+def _joints(drive: Drive) -> list[Label]:
     """Name the joints; those that stand closer together than texts are high share one label."""
-    skeleton, pivots = found.skeleton, {"A0": 0.0, "B0": math.pi, "C0": 0.0}
+    skeleton, pivots = drive.skeleton, {"A0": 0.0, "B0": math.pi, "C0": 0.0}
     labels = [Label("frame", skeleton.pivots[name], side, name) for name, side in pivots.items()]
     sides = {"A": math.pi / 4, "B1": math.pi / 2, "B2": math.pi, "C": -math.pi / 2, "D": math.pi}
     for name, side in sides.items():
         groups: list[list[str]] = []
         for event, joints in skeleton.joints.items():
-            near = [g for g in groups if math.dist(joints[name], skeleton.joints[g[0]][name]) < found.height]
+            near = [g for g in groups if math.dist(joints[name], skeleton.joints[g[0]][name]) < drive.height]
             near[0].append(event) if near else groups.append([event])
         for group in groups:
             text = ", ".join(f"{name}{skeleton.primes[event]}" for event in group)
@@ -202,14 +202,14 @@ def _joints(found: Drive) -> list[Label]:
     return labels
 
 
-def _legend(found: Drive, units: Units) -> tuple[tuple[str, str], ...]:
+def _legend(drive: Drive, units: Units) -> tuple[tuple[str, str], ...]:
     """Lines below the drawing, each with its layer."""
-    d, c0 = found.dimensions, found.skeleton.pivots["C0"]
+    d, c0 = drive.dimensions, drive.skeleton.pivots["C0"]
     rows = [
-        (at, f"A{prime} B1{prime} C{prime} D{prime}  {at}, crank at {math.degrees(found.phi1[at]):.2f}°")
-        for at, prime in found.skeleton.primes.items()
+        (at, f"A{prime} B1{prime} C{prime} D{prime}  {at}, crank at {math.degrees(drive.phi1[at]):.2f}°")
+        for at, prime in drive.skeleton.primes.items()
     ]
-    stroke, wheel = units.size(d.travel * found.phi63), units.size(d.wheel)
+    stroke, wheel = units.size(d.travel * drive.phi63), units.size(d.wheel)
     stands = f"C0 at ({units.size(c0.x)}, {units.size(c0.y)}) from B0, C0 C at {math.degrees(d.phi40):.2f}° in front"
     return (
         *rows,

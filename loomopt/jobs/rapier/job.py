@@ -78,33 +78,37 @@ class Rapier(Job):
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
         """Design, SI, of NLP variables: the drive's own, and every other number that is freed."""
         fixed = {limit.row for limit in program.bound_limits.values() if limit.sign == 0} - set(STROKE)
-        own = {v.name for v in program.variables if v.lower < v.upper or v.name in fixed} - {"phi_stroke", "dwell"}
+        free_names = {v.name for v in program.variables if v.lower < v.upper or v.name in fixed} - {
+            "phi_stroke",
+            "dwell",
+        }
         values = {**program.parameters, **x}
         return {
-            name: values[name] for name in (*VARIABLES, *(name for name in x if name in own and name not in VARIABLES))
+            name: values[name]
+            for name in (*VARIABLES, *(name for name in x if name in free_names and name not in VARIABLES))
         }
 
     def figures_of(
-        self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
+        self, scene: Scene, sampled: "Sampler | Machines", names: Container[str] = EVERY
     ) -> dict[str, Number]:
         """Every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
-        peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in asked and name != "stroke"}
+        peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in names and name != "stroke"}
         sampled.search(("S", *peaks.values()))
         reading = read(sampled) if isinstance(sampled, Sampler) else read_many(sampled)
-        found, static = base.alone(scene, sampled, asked), sampled.static
-        found |= {"stroke": reading.stroke, "phi_stroke": reading.phi_stroke}
+        figures, static = base.alone(scene, sampled, names), sampled.static
+        figures |= {"stroke": reading.stroke, "phi_stroke": reading.phi_stroke}
         if "s_dwell" in scene.operation:
-            found |= {"dwell_after": reading.dwell_after, "dwell_before": reading.dwell_before}
-            found["dwell"] = np.minimum(reading.dwell_after, reading.dwell_before)
-        found |= {name: sampled.peak(of) for name, of in peaks.items()}
-        if "mu_min" in asked:
-            found["mu_min"] = math.pi / 2 - found["mu_min"]
-        found["sley_mu_min"] = np.minimum(static["sley_mu_near"], static["sley_mu_far"])
-        if "rms_jerk" in asked:
-            found["rms_jerk"] = np.sqrt(sampled.mean(jerk_mean()))
-        if "match_rms" in asked and scene.table(MatchTarget).table is not None:
-            found["match_rms"] = np.sqrt(sampled.mean(match_mean(*match_table(scene))))
-        return found
+            figures |= {"dwell_after": reading.dwell_after, "dwell_before": reading.dwell_before}
+            figures["dwell"] = np.minimum(reading.dwell_after, reading.dwell_before)
+        figures |= {name: sampled.peak(of) for name, of in peaks.items()}
+        if "mu_min" in names:
+            figures["mu_min"] = math.pi / 2 - figures["mu_min"]
+        figures["sley_mu_min"] = np.minimum(static["sley_mu_near"], static["sley_mu_far"])
+        if "rms_jerk" in names:
+            figures["rms_jerk"] = np.sqrt(sampled.mean(jerk_mean()))
+        if "match_rms" in names and scene.table(MatchTarget).table is not None:
+            figures["match_rms"] = np.sqrt(sampled.mean(match_mean(*match_table(scene))))
+        return figures
 
     def over_cycle(self, model: JobModel) -> dict[str, str]:
         """Figures that are read over the cycle, with their quantities."""
@@ -116,26 +120,26 @@ class Rapier(Job):
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
         """How each figure is read over a box of numbers: dwells end where the head leaves s_dwell."""
-        found = super().in_boxes(scene, model)
-        found |= {"stroke": InBox(quantity="S", largest=True), "sley_mu_min": InBox(("sley_mu_near", "sley_mu_far"))}
-        found["mu_min"] = InBox(quantity="obliquity", sign=-1.0, offset=math.pi / 2)
+        boxes = super().in_boxes(scene, model)
+        boxes |= {"stroke": InBox(quantity="S", largest=True), "sley_mu_min": InBox(("sley_mu_near", "sley_mu_far"))}
+        boxes["mu_min"] = InBox(quantity="obliquity", sign=-1.0, offset=math.pi / 2)
         sides = {"dwell_after": 1, "dwell_before": -1} if "s_dwell" in scene.operation else {}
-        return found | {name: InBox(quantity="dwell_travel", leaves=side) for name, side in sides.items()}
+        return boxes | {name: InBox(quantity="dwell_travel", leaves=side) for name, side in sides.items()}
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Sentence on an optimum of the target; figures in SI."""
 
-        def told(name: str, digits: int = 9) -> str:
+        def text(name: str, digits: int = 9) -> str:
             return scene.show(figures.get(name) or 0.0, FIGURES[name].kind, digits)
 
         if target == "match":
-            return f"The head travel comes within {told('match_rms', 6)} rms of the table."
-        kept = f"stroke {told('stroke')} and {told('dwell', 4)} of dwell"
+            return f"The head travel comes within {text('match_rms', 6)} rms of the table."
+        stroke_and_dwell = f"stroke {text('stroke')} and {text('dwell', 4)} of dwell"
         if target == "stroke-dwell":
-            return f"With {kept}, the least peak head acceleration is {told('peak_acceleration')}."
+            return f"With {stroke_and_dwell}, the least peak head acceleration is {text('peak_acceleration')}."
         if target == "smooth":
-            return f"With {kept}, the least rms head jerk is {told('rms_jerk')}."
-        return f"With stroke {told('stroke')}, the largest dwell on both sides is {told('dwell')}."
+            return f"With {stroke_and_dwell}, the least rms head jerk is {text('rms_jerk')}."
+        return f"With stroke {text('stroke')}, the largest dwell on both sides is {text('dwell')}."
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """S with three derivatives, φ3, φ6, φ63, the folded transmission angle, terms, tape force and torque."""
@@ -170,8 +174,8 @@ class Rapier(Job):
         """Crank angles at which the head leaves its dwells."""
         if "s_dwell" not in scene.operation:
             return {}
-        found = {name: (Crossing(name, "S", "s_dwell", int(side)),) for name, side in SIDES.items()}
-        return found | {"dwell": tuple(each for (each,) in found.values())}
+        crossings = {name: (Crossing(name, "S", "s_dwell", int(side)),) for name, side in SIDES.items()}
+        return crossings | {"dwell": tuple(crossing for (crossing,) in crossings.values())}
 
 
 JOB = Rapier()

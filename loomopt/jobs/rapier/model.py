@@ -110,9 +110,9 @@ class DriveLinkage(NamedTuple):
 
 def linked(given: Given) -> DriveLinkage:
     """Quantities that all poses of a machine share."""
-    found = given.linkage
-    assert isinstance(found, DriveLinkage)
-    return found
+    linkage = given.linkage
+    assert isinstance(linkage, DriveLinkage)
+    return linkage
 
 
 @dataclass(frozen=True)
@@ -142,20 +142,20 @@ class RapierDrive:
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """Sley's stand, the driving link's direction at front dead centre, and the turns if called in."""
         values, centres = given.values, linked(given).centres
-        found = {"beta": centres.beta, "frame_angle": values["phi30"] - centres.psi_front}
-        stand = rapier_drive.Stand(found["beta"], found["frame_angle"])
+        quantities = {"beta": centres.beta, "frame_angle": values["phi30"] - centres.psi_front}
+        stand = rapier_drive.Stand(quantities["beta"], quantities["frame_angle"])
         front = rapier_drive.RapierPose(maths, linked(given).dimensions, stand, 0).relative
-        found |= {"front_x": front.x, "front_y": front.y}
-        given = given._replace(values={**values, **found})
+        quantities |= {"front_x": front.x, "front_y": front.y}
+        given = given._replace(values={**values, **quantities})
         if STROKE in called:
             farthest = values["phi_stroke"] if "phi_stroke" in values else values.get(HAND_OVER, 0)
-            found[STROKE] = self.pose(maths, given, Node(farthest, {})).q2
+            quantities[STROKE] = self.pose(maths, given, Node(farthest, {})).q2
         if TURNS in called:
             hints = [values[name] for name in itertools.takewhile(values.__contains__, map(_turn, itertools.count()))]
-            found[TURNS] = tuple(
+            quantities[TURNS] = tuple(
                 turning_points.followed(lambda phi: self._rates(maths, given, phi), hint) for hint in hints
             )
-        return found
+        return quantities
 
     def _rates(self, maths: Maths, given: Given, phi: Number) -> tuple[Number, Number, Number]:
         pose = self.pose(maths, given, Node(phi, {}))
@@ -179,11 +179,11 @@ class RapierDrive:
             return self.pose(systems.numpy(), given, Node(phi, {})).q1
 
         turns = turning_points.turns(slope)
-        found = {_turn(k): angle for k, angle in enumerate(turns)} if TURNS in called else {}
+        hints = {_turn(k): angle for k, angle in enumerate(turns)} if TURNS in called else {}
         if STROKE in called and "phi_stroke" not in given.values:
             travels = {angle: float(self.pose(systems.FLOAT, given, Node(angle, {})).q) for angle in turns}
-            found[HAND_OVER] = max(travels, key=travels.__getitem__, default=0.0)
-        return found
+            hints[HAND_OVER] = max(travels, key=travels.__getitem__, default=0.0)
+        return hints
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> HeadPose:
         """Pose at front dead centre, where φ1 counts from."""
@@ -212,8 +212,8 @@ def dwells(arcs: tuple[tuple[float, str], ...]) -> Arcs:
     """Dwells' stretches; arcs: side, and the name of the value that is the dwell there."""
 
     def ends(maths: Maths, given: Given) -> tuple[Number, ...]:
-        found = tuple(given.values[name] if side == AFTER else -given.values[name] for side, name in arcs)
-        return (*found, 0) if found else ()
+        angles = tuple(given.values[name] if side == AFTER else -given.values[name] for side, name in arcs)
+        return (*angles, 0) if angles else ()
 
     return Arcs(DWELL, ends, functools.partial(_arc, tuple(side for side, _ in arcs)), arcs)
 
@@ -324,10 +324,10 @@ class TravelReading:
 
 def read(sampler: Sampler) -> TravelReading:
     """Stroke and dwells of a sampled drive. Raises ValueError where it does not turn all round."""
-    found = sampler.extremes("S")
-    if not found or not all(math.isfinite(extreme.value) for extreme in found):
+    turns = sampler.extremes("S")
+    if not turns or not all(math.isfinite(extreme.value) for extreme in turns):
         raise ValueError("the drive does not assemble all round")
-    outward = max(found, key=lambda extreme: extreme.value)
+    outward = max(turns, key=lambda extreme: extreme.value)
     stroke, phi = 0.0, 0.0
     if outward.value > 0.0:
         phi = settled_turn(sampler, ("S_1", "peak_acceleration"), sampler.angle(outward))
@@ -335,7 +335,7 @@ def read(sampler: Sampler) -> TravelReading:
     room = sampler.given.values.get("s_dwell")
     if room is None:
         return TravelReading(stroke, phi % TURN, math.nan, math.nan)
-    extremes = [sampler.angle(extreme) for extreme in found]
+    extremes = [sampler.angle(extreme) for extreme in turns]
     after, before = (_dwell(sampler, extremes, float(room), side) for side in (1, -1))
     return TravelReading(stroke, phi % TURN, after, before)
 

@@ -71,8 +71,8 @@ def dwell_arcs(sought: Collection[str], dwelt: Collection[str]) -> tuple[tuple[f
 def hand_over(model: JobModel, values: Numbers) -> Numbers:
     """Angle of the stroke and the least dwell; raises ValueError where the drive does not turn."""
     reading = read(sampled(model, values))
-    found = {"phi_stroke": reading.phi_stroke}
-    return found | ({"dwell": min(reading.dwell_after, reading.dwell_before, math.pi)} if "s_dwell" in values else {})
+    numbers = {"phi_stroke": reading.phi_stroke}
+    return numbers | ({"dwell": min(reading.dwell_after, reading.dwell_before, math.pi)} if "s_dwell" in values else {})
 
 
 @final
@@ -110,11 +110,11 @@ class RapierTask(Task):
                 problem, remedy = "the lesser of both dwells is sought, on one angle for both sides", f"Limit {DWELL}."
                 raise refusal(problem, self.scene.origin, f"limits.{name}", remedy=remedy)
             return {DWELL: [(DWELL, least[DWELL])]} if least else {}
-        kept = [name for name in self.kept if name not in self.free]
-        found = {n: [(n, self.scene.operation[n])] if n in kept else [] for n in REQUIRED if n in SIDES}
-        for name, each in found.items():
-            each += [(by, least[by]) for by in (name, DWELL) if by in least]
-        return {name: each for name, each in found.items() if each}
+        names = [name for name in self.kept if name not in self.free]
+        demands = {n: [(n, self.scene.operation[n])] if n in names else [] for n in REQUIRED if n in SIDES}
+        for name, pairs in demands.items():
+            pairs += [(by, least[by]) for by in (name, DWELL) if by in least]
+        return {name: pairs for name, pairs in demands.items() if pairs}
 
     @property
     def dwelt(self) -> Collection[str]:
@@ -163,10 +163,10 @@ class RapierTask(Task):
     @lazy
     def bounded(self) -> tuple[Variable, ...]:
         """What the scene frees, what the target keeps, the hand-over, and what is sought as a number of its own."""
-        found = [self.variable(name, ends) for name, ends in self.free.items()]
-        found += [self.operated(name, (self.known[name],) * 2) for name in self.kept if name not in self.free]
-        found.append(Variable("phi_stroke", *TURN, 1.0, TURN))
-        return *found, *(self.loose(name) for name in self.sought if name in LOOSE and name not in self.free)
+        variables = [self.variable(name, ends) for name, ends in self.free.items()]
+        variables += [self.operated(name, (self.known[name],) * 2) for name in self.kept if name not in self.free]
+        variables.append(Variable("phi_stroke", *TURN, 1.0, TURN))
+        return *variables, *(self.loose(name) for name in self.sought if name in LOOSE and name not in self.free)
 
     def scale(self, name: str, ends: Ends) -> float:
         """Size of a variable: angles 1 rad, lengths the largest they may be."""
@@ -193,30 +193,32 @@ class RapierTask(Task):
 
     def limits(self) -> list[Limit]:
         """All limits; a figure whose limit a variable's bounds imply has none."""
-        figures = [each for each in self.figures() if not self.implied(each)]
-        required = [each for each in self.required() if each.name not in self.demanded]
+        figures = [limit for limit in self.figures() if not self.implied(limit)]
+        required = [limit for limit in self.required() if limit.name not in self.demanded]
         return [*self.bounds(), *required, *self.floors(), *self.meant(), *self.margins(), *figures, *self.demands()]
 
     def bounds(self) -> list[Limit]:
         """Bounds of what the scene frees."""
-        return [each for v in self.bounded if v.name in self.free for each in bound_limits(v)]
+        return [limit for v in self.bounded if v.name in self.free for limit in bound_limits(v)]
 
     def required(self) -> list[Limit]:
         """Limits on the figures that the target keeps, on the side on which a designer could give way."""
         known = self.known
-        kept = [name for name in self.kept if name not in self.free]
-        return [BoundLimit(n, REQUIRED[n], n, known[n], self.operated_size(n)) for n in kept]
+        names = [name for name in self.kept if name not in self.free]
+        return [BoundLimit(n, REQUIRED[n], n, known[n], self.operated_size(n)) for n in names]
 
     def wanted(self) -> list[Limit]:
         """Limits on figures that are goals of the target, from the bounds and from the figures it keeps."""
-        return [each for each in (*self.bounds(), *self.required()) if each.name in self.kept and each.name in FIGURES]
+        return [
+            limit for limit in (*self.bounds(), *self.required()) if limit.name in self.kept and limit.name in FIGURES
+        ]
 
     def implied(self, limit: Limit) -> bool:
         """Whether the bounds of the variable of a limit's name imply the limit."""
-        own = next((v for v in self.variables if v.name == limit.name), None)
-        if own is None:
+        variable = next((v for v in self.variables if v.name == limit.name), None)
+        if variable is None:
             return False
-        return (limit.sign > 0 or own.lower >= limit.value) and (limit.sign < 0 or own.upper <= limit.value)
+        return (limit.sign > 0 or variable.lower >= limit.value) and (limit.sign < 0 or variable.upper <= limit.value)
 
     def meant(self) -> list[Limit]:
         """Limits that define stroke and dwells: the head rests at its stroke, and stays within s_dwell on the arcs.
@@ -229,23 +231,23 @@ class RapierTask(Task):
         if "stroke" in reached:
             size, rows = self.known["stroke"], rows | {"stroke is reached": "stroke_short"}
         firm = {"relaxable": False, "hidden": True}
-        found: list[Limit] = [DesignLimit(name, 0, row, 0.0, size, **firm) for name, row in rows.items()]
+        limits: list[Limit] = [DesignLimit(name, 0, row, 0.0, size, **firm) for name, row in rows.items()]
         if "stroke" not in reached and "phi_stroke" in {*self.sought, *self.scene.limits}:
             least = self.known.get("s_dwell", S_DWELL * self.reading.stroke)
-            found.append(DesignLimit("head turns back at phi_stroke", 1, "turning", 0.0, size, **firm))
-            found.append(DesignLimit("phi_stroke lies outside the dwells", -1, "reach", least, size, **firm))
+            limits.append(DesignLimit("head turns back at phi_stroke", 1, "turning", 0.0, size, **firm))
+            limits.append(DesignLimit("phi_stroke lies outside the dwells", -1, "reach", least, size, **firm))
         for side, name in dwell_arcs(self.sought, self.dwelt):
             if name in reached or name == DWELL:
                 text = f"head within s_dwell {'after' if side == AFTER else 'before'} front dead centre"
                 where = (DWELL, side)
-                found.append(CycleLimit(text, 1, "dwell_travel", 1.0, 1.0, where=where, **firm))
-        return found
+                limits.append(CycleLimit(text, 1, "dwell_travel", 1.0, 1.0, where=where, **firm))
+        return limits
 
     def margins(self) -> list[Limit]:
         """Margins by which every dyad closes over the whole turn; the sley's where it may change."""
-        found = [self.row_limit(name, 1, row, 1.0, 1.0, relaxable=False) for name, row in CLOSES.items()]
+        limits = [self.row_limit(name, 1, row, 1.0, 1.0, relaxable=False) for name, row in CLOSES.items()]
         rows = SLEY_MARGINS if set(SLEY) & set(self.free) else ()
-        return found + [self.row_limit(row, -1, row, 0.0, self.known["l71"], relaxable=False) for row in rows]
+        return limits + [self.row_limit(row, -1, row, 0.0, self.known["l71"], relaxable=False) for row in rows]
 
     def figure(self, name: str, low: float | None, high: float | None) -> list[Limit]:
         """Limits on one figure, row by row; a dwell is a variable's."""
@@ -272,13 +274,13 @@ class RapierTask(Task):
     def objectives(self) -> tuple[Objective, ...]:
         """Target's levels in order."""
         peak, stroke = self.sampler.peak("peak_acceleration") or 1.0, self.reading.stroke or 1.0
-        own = {
+        levels = {
             "stroke-dwell": Peak("peak_acceleration", "peak_acceleration", peak),
             "dwell": Value("dwell", "dwell_rest", 1.0),
             "smooth": Value("rms_jerk", "jerk_mean_square", peak**2, power=2),
             "match": Value("match_rms", "match_mean_square", stroke**2, power=2),
         }
-        return own[self.target], *self.least()
+        return levels[self.target], *self.least()
 
     def starts(self) -> tuple[dict[str, float], ...]:
         """Today's drive moved just inside its bounds, and the paper's own construction where it closes."""
@@ -298,8 +300,8 @@ class RapierTask(Task):
     def figure_size(self, name: str) -> float:
         """Size of a figure, of a mean its square's."""
         peak, stroke = self.sampler.peak("peak_acceleration") or 1.0, self.reading.stroke or 1.0
-        own = {"rms_jerk": peak**2, "match_rms": stroke**2, "mu_min": 1.0, "sley_mu_min": 1.0}
-        return own.get(name) or size_read(self.sampler, name, self.scene.schema.figures)
+        sizes = {"rms_jerk": peak**2, "match_rms": stroke**2, "mu_min": 1.0, "sley_mu_min": 1.0}
+        return sizes.get(name) or size_read(self.sampler, name, self.scene.schema.figures)
 
 
 def constructed(known: Numbers) -> dict[str, float] | None:
@@ -314,5 +316,5 @@ def constructed(known: Numbers) -> dict[str, float] | None:
         )
     except (ValueError, ZeroDivisionError):
         return None
-    found = {"C0x": layout.C0x, "C0y": layout.C0y, "l5": layout.reach - dimensions.l4, "phi40": layout.phi40}
-    return None if rapier_drive.fault_of({**known, **found}) else found
+    values = {"C0x": layout.C0x, "C0y": layout.C0y, "l5": layout.reach - dimensions.l4, "phi40": layout.phi40}
+    return None if rapier_drive.fault_of({**known, **values}) else values

@@ -129,8 +129,8 @@ TARGETS = {
 
 def match_table(scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Crank angles, rad, and head travels, m, of `targets.match.table`. Raises BadInput."""
-    found = read_match(scene).columns
-    return found["phi1"], found["S"]
+    columns = read_match(scene).columns
+    return columns["phi1"], columns["S"]
 
 
 def read_match(scene: Scene) -> csv_tables.Table:

@@ -160,10 +160,10 @@ class RapierViews(JobViews):
         """Sley's dead centres, rad, the hand-over and the dwell."""
         sampler = registry.of(scene).sampler(scene, design)
         events, reading = sampler.model.kinematics.events(FLOAT, sampler.given), read(sampler)
-        found = {name: float(angle) % TURN for name, angle in events.items()} | {"hand-over": reading.phi_stroke}
+        marks = {name: float(angle) % TURN for name, angle in events.items()} | {"hand-over": reading.phi_stroke}
         if "s_dwell" not in scene.operation:
-            return found
-        return {**found, "dwell": Span(TURN - reading.dwell_before, reading.dwell_after)}
+            return marks
+        return {**marks, "dwell": Span(TURN - reading.dwell_before, reading.dwell_after)}
 
     def words(self) -> "Mapping[str, Curve]":
         """Names of the curves."""

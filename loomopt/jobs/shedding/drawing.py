@@ -93,8 +93,8 @@ def _deviation(
 ) -> Floats:
     """How far the curves lie from the straight lines that join the ends of each interval."""
     u = left[:, None] * (1 - INSIDE) + right[:, None] * INSIDE
-    found = curves(np.repeat(pieces, len(INSIDE)), u.ravel())
-    return np.asarray(np.max([_off_chord(points.reshape(*u.shape, 2)) for points in found], axis=0))
+    curve_points = curves(np.repeat(pieces, len(INSIDE)), u.ravel())
+    return np.asarray(np.max([_off_chord(points.reshape(*u.shape, 2)) for points in curve_points], axis=0))
 
 
 def _off_chord(points: Floats) -> Floats:
@@ -259,17 +259,17 @@ def cam(scene: Scene, design: Mapping[str, float]) -> CamDrawing:
     return CamDrawing(job.sampler(scene, design))
 
 
-def allowed(found: CamDrawing) -> float:
+def allowed(cam: CamDrawing) -> float:
     """How far a cam's curves may lie from the straight lines that are drawn for them, m."""
-    return max(CURVE_CLOSE, CURVE_NARROW * float(found.follower.arm + found.follower.centre_distance))
+    return max(CURVE_CLOSE, CURVE_NARROW * float(cam.follower.arm + cam.follower.centre_distance))
 
 
-def traced(found: CamDrawing) -> Stations:
+def traced(cam: CamDrawing) -> Stations:
     """Stations once round, the last before the first again, that straight lines join as closely as `allowed`.
 
     That holds for the profile and for the roller centre's curve. Corners of the law are stations.
     """
-    return found.stations(*traced_nodes(found.curves, found.sampler.cycle.starts, allowed(found)))
+    return cam.stations(*traced_nodes(cam.curves, cam.sampler.cycle.starts, allowed(cam)))
 
 
 @dataclass(frozen=True)
@@ -310,33 +310,33 @@ class Picture:
         )
 
 
-def picture(found: CamDrawing, least: float) -> Picture:
+def picture(cam: CamDrawing, least: float) -> Picture:
     """Arm in both dwells and at the cam angle of least cam force, rad."""
-    near, far = frame(found.sampler.model).ends(found.sampler.given.values)
-    return Picture(found, {NEAR: near, FAR: far, LEAST: least})
+    near, far = frame(cam.sampler.model).ends(cam.sampler.given.values)
+    return Picture(cam, {NEAR: near, FAR: far, LEAST: least})
 
 
 OUTLINE = 180
 """Points of the cam in a moving picture."""
 
 
-def motion(found: CamDrawing, angles: Floats) -> MechanismMotion:
+def motion(cam: CamDrawing, angles: Floats) -> MechanismMotion:
     """Cam turning at cam angles, rad, under its arm, and the frame with its spring beside it.
 
     An output that leaves the cam is shown on it.
     """
-    drawn = picture(found, 0.0)
-    at, a, h = found.at(angles), float(found.follower.centre_distance), drawn.height
+    drawn = picture(cam, 0.0)
+    at, a, h = cam.at(angles), float(cam.follower.centre_distance), drawn.height
     moving = {"C": _turned(at.pitch, angles), "T": _turned(at.profile, angles)}
     frame_at, X = drawn.spring.top, np.asarray(at.X)
     for name, side in (("H", -COIL * h), ("H'", BAR * h), ("S", 0.0)):
         moving[name] = np.column_stack([np.full(len(X), frame_at.x + side), frame_at.y - X])
-    outline = found.at(np.asarray(TURN / OUTLINE * np.arange(OUTLINE), dtype=np.float64)).profile
+    outline = cam.at(np.asarray(TURN / OUTLINE * np.arange(OUTLINE), dtype=np.float64)).profile
     pivots = {"A": ORIGIN, "B": Point(0.0, a), "K": drawn.spring.hung}
-    rings = (("C", float(found.follower.roller_radius)),)
-    cam = Turning("A", _points(outline), np.asarray(angles))
+    rings = (("C", float(cam.follower.roller_radius)),)
+    turning = Turning("A", _points(outline), np.asarray(angles))
     unnamed = frozenset(("H", "H'", "S", "T", "K"))
-    return MechanismMotion(angles, pivots, moving, (("B", "C"), ("H", "H'")), rings, (cam,), (("K", "S"),), unnamed)
+    return MechanismMotion(angles, pivots, moving, (("B", "C"), ("H", "H'")), rings, (turning,), (("K", "S"),), unnamed)
 
 
 def _turned(points: Floats, angles: Floats) -> Floats:
@@ -345,9 +345,9 @@ def _turned(points: Floats, angles: Floats) -> Floats:
     return np.column_stack([points[:, 0] * cos - points[:, 1] * sin, points[:, 0] * sin + points[:, 1] * cos])
 
 
-def linkage(scene: Scene, found: CamDrawing, figures: Figures) -> Drawing:
+def linkage(scene: Scene, cam: CamDrawing, figures: Figures) -> Drawing:
     """Design's cam with its follower in both dwells and at the least cam force, at full scale."""
-    drawn, units = picture(found, figures["contact_angle"] or 0.0), drawn_units(scene)
+    drawn, units = picture(cam, figures["contact_angle"] or 0.0), drawn_units(scene)
     strokes = [*drawn.skeleton.strokes(drawn.height), *_frame(drawn), *drawn.spring.strokes()]
     labels, legend = _labels(drawn, units), _legend(scene, drawn, figures, units)
     forces = sized(scene, _forces(drawn)) if tells_forces(scene) else {}
@@ -366,19 +366,19 @@ PINS = {"cam_shaft_force": "A", "lever_pivot_force": "B", "roller_force": "C"}
 
 def _forces(drawn: Picture) -> list[ForceArrow]:
     """Forces on the lever and in the cam's bearings in the drawing's axes, which turn with the cam."""
-    sampler, found = drawn.cam.sampler, []
+    sampler, arrows = drawn.cam.sampler, []
     for name in (name for name in PINS if name in sampler.model.told):
         pushed = sampler.pushed(name)
         nodes = [(top.piece, top.u, "") for top in sampler.extremes(name) if top.height == pushed][:1]
-        nodes.append((*(each[0] for each in sampler.cycle.located(np.array([drawn.theta[LEAST]]))), LEAST))
+        nodes.append((*(part[0] for part in sampler.cycle.located(np.array([drawn.theta[LEAST]]))), LEAST))
         for piece, u, event in nodes:
             node = np.array([piece]), np.array([u])
             force, x, y = sampler.together(("cam_force", f"{name}_x", f"{name}_y"), *node).values()
             theta = sampler.cycle.angles(*node)
             if settled(float(force[0]), sampler.peak("cam_force")) > 0.0:
                 ((x, y),) = _turned(np.column_stack((x, y)), -theta)
-                found.append(ForceArrow(PINS[name], float(theta[0]) % TURN, float(x), float(y), event))
-    return found
+                arrows.append(ForceArrow(PINS[name], float(theta[0]) % TURN, float(x), float(y), event))
+    return arrows
 
 
 def _stood(drawn: Picture, theta: Floats) -> MechanismMotion:
@@ -393,14 +393,14 @@ def _points(curve: Floats) -> tuple[Point, ...]:
 
 def _frame(drawn: Picture) -> list[Primitive]:
     """Draw the arm's pivot, where segments begin, and how the cam turns."""
-    found, h, shaft = drawn.cam, drawn.height, drawn.skeleton.pivots["A"]
+    cam, h, shaft = drawn.cam, drawn.height, drawn.skeleton.pivots["A"]
     pivots = {name: at["B"] for name, at in drawn.skeleton.joints.items()}
-    begins = np.array([begin for begin, end in found.segments.values() if end > begin])
-    begin, end, radius = math.radians(60), math.radians(150), 0.3 * found.follower.base_radius
+    begins = np.array([begin for begin, end in cam.segments.values() if end > begin])
+    begin, end, radius = math.radians(60), math.radians(150), 0.3 * cam.follower.base_radius
     return [
         *fixed_pivot(pivots.pop(NEAR), h),
         *(Circle(name, pivot, JOINT * h) for name, pivot in pivots.items()),
-        *(Line("dimensions", (shaft, point)) for point in _points(found.at(begins).pitch)),
+        *(Line("dimensions", (shaft, point)) for point in _points(cam.at(begins).pitch)),
         Arc("notes", shaft, radius, begin, end),
         arrow("notes", shaft.towards(end, radius), end + math.pi / 2, 0.8 * h),
     ]
@@ -408,20 +408,20 @@ def _frame(drawn: Picture) -> list[Primitive]:
 
 def _labels(drawn: Picture, units: Units) -> list[Label]:
     """Name shaft, joints, sizes and the cam's segments in degrees; joints first: they must stand closest."""
-    found, shaft, near = drawn.cam, drawn.skeleton.pivots["A"], drawn.skeleton.joints[NEAR]
+    cam, shaft, near = drawn.cam, drawn.skeleton.pivots["A"], drawn.skeleton.joints[NEAR]
     labels = [Label("frame", shaft, -math.pi / 4, "A")]
     for name, theta in drawn.theta.items():
         at, mark = drawn.skeleton.joints[name], drawn.skeleton.primes[name]
         labels += [Label(name, at[joint], math.pi / 2 - theta, f"{joint}{mark}") for joint in "BC"]
-    labels.append(along(NEAR, near["B"], near["C"], math.pi, f"arm = {units.size(found.follower.arm)}"))
+    labels.append(along(NEAR, near["B"], near["C"], math.pi, f"arm = {units.size(cam.follower.arm)}"))
     rings = {"roller_radius": (NEAR, near["C"], math.pi)}
     rings |= {name: ("paths", shaft, math.radians(225)) for name in ("base_radius", "centre_distance")}
     for name, (layer, centre, side) in rings.items():
-        radius, half = getattr(found.follower, name), math.pi / 2
+        radius, half = getattr(cam.follower, name), math.pi / 2
         labels.append(around(layer, centre, radius, side - half, side + half, f"{name} = {units.size(radius)}"))
-    for name, (begin, end) in found.segments.items():
+    for name, (begin, end) in cam.segments.items():
         if end > begin:
-            middle, *also = _points(found.at(begin + (end - begin) * np.array([0.5, 0.35, 0.65, 0.2, 0.8])).pitch)
+            middle, *also = _points(cam.at(begin + (end - begin) * np.array([0.5, 0.35, 0.65, 0.2, 0.8])).pitch)
             outward = math.atan2(middle.y, middle.x)
             labels.append(Label("dimensions", middle, outward, f"{name} {math.degrees(end - begin):.6g}°", tuple(also)))
     return [*labels, *drawn.spring.labels(units)]
@@ -437,19 +437,19 @@ def settled(least: float, most: float) -> float:
 
 def _legend(scene: Scene, drawn: Picture, figures: Figures, units: Units) -> tuple[tuple[str, str], ...]:
     """Lines below the drawing, each with its layer."""
-    size, found = {name: value or 0.0 for name, value in figures.items()}, drawn.cam
-    force, within = settled(size["contact_min"], size["contact_max"]), units.within(CURVE_PROMISED * allowed(found))
-    said = OPEN | {LEAST: show(force, units.force)}
+    size, cam = {name: value or 0.0 for name, value in figures.items()}, drawn.cam
+    force, within = settled(size["contact_min"], size["contact_max"]), units.within(CURVE_PROMISED * allowed(cam))
+    texts = OPEN | {LEAST: show(force, units.force)}
     rows = [
-        (name, f"B{mark} C{mark}  {name}, {said[name]}: cam at {math.degrees(drawn.theta[name]):.2f}°")
+        (name, f"B{mark} C{mark}  {name}, {texts[name]}: cam at {math.degrees(drawn.theta[name]):.2f}°")
         for name, mark in drawn.skeleton.primes.items()
     ]
-    swing, closest = math.degrees(found.follower.arm_swing), size["curvature_max"]
+    swing, closest = math.degrees(cam.follower.arm_swing), size["curvature_max"]
     bent = f"; pitch curve's least convex radius {units.size(1 / closest, 4)}" if closest > 0.0 else ""
-    cut = [(PROFILE, "UNDERCUT: the roller cuts its own profile away")] if found.undercut else []
+    cut = [(PROFILE, "UNDERCUT: the roller cuts its own profile away")] if cam.undercut else []
     return (
         *rows,
-        ("notes", f"law {_law(scene, found)}; arm swings {swing:.6g}° for {units.size(size['travel'])} of travel"),
+        ("notes", f"law {_law(scene, cam)}; arm swings {swing:.6g}° for {units.size(size['travel'])} of travel"),
         ("notes", f"pressure angle at most {math.degrees(size['pressure_angle_max']):.2f}°{bent}"),
         *cut,
         *drawn.spring.legend(units),
@@ -458,18 +458,18 @@ def _legend(scene: Scene, drawn: Picture, figures: Figures, units: Units) -> tup
     )
 
 
-def _law(scene: Scene, found: CamDrawing) -> str:
+def _law(scene: Scene, cam: CamDrawing) -> str:
     """Name of the law the cam really has."""
-    cam = frame(found.sampler.model)
-    if isinstance(cam, CamProgram):
-        own = [each.law or scene.table(HealdFrame).law for each in scene.table(HealdFrame).segments or ()]
-        laws = [law for law, move in zip(own, cam.moves, strict=True) if move.law]
+    mechanism = frame(cam.sampler.model)
+    if isinstance(mechanism, CamProgram):
+        names = [segment.law or scene.table(HealdFrame).law for segment in scene.table(HealdFrame).segments or ()]
+        laws = [law for law, move in zip(names, mechanism.moves, strict=True) if move.law]
         return ", ".join(dict.fromkeys(laws))
-    law = cam.law
+    law = mechanism.law
     return f"spline of {law.intervals} intervals" if isinstance(law, Spline) else scene.table(HealdFrame).law
 
 
-def joints_csv(scene: Scene, found: CamDrawing) -> str:
+def joints_csv(scene: Scene, cam: CamDrawing) -> str:
     """Profile as CSV: cam angle, X, both curves in the cam's frame, pressure angle, curvature.
 
     Digits round-trip. Rows stand every half degree and at every corner of the law, from 0 to 360 deg; where the
@@ -477,27 +477,27 @@ def joints_csv(scene: Scene, found: CamDrawing) -> str:
     """
     import pandas as pd
 
-    nodes, units = _rows(found), drawn_units(scene)
-    at, unit, size = found.stations(*nodes), units.length, factor(units.length)
+    nodes, units = _rows(cam), drawn_units(scene)
+    at, unit, size = cam.stations(*nodes), units.length, factor(units.length)
     columns = {"theta [deg]": np.round(np.degrees(at.theta), DIGITS), f"X [{unit}]": at.X / size}
     for name, curve in (("pitch", at.pitch / size), ("profile", at.profile / size)):
         columns |= {f"{name}_{axis} [{unit}]": curve[:, k] for k, axis in enumerate("xy")}
     columns["pressure_angle [deg]"] = np.degrees(at.contact.pressure_angle)
     columns[f"curvature [1/{unit}]"] = at.contact.curvature * size
-    notes = {name: show(getattr(found.follower, name), unit, 9) for name in SIZES}
-    notes |= {"arm_swing": show(found.follower.arm_swing, "deg", 9), **found.spring().notes(units)}
+    notes = {name: show(getattr(cam.follower, name), unit, 9) for name in SIZES}
+    notes |= {"arm_swing": show(cam.follower.arm_swing, "deg", 9), **cam.spring().notes(units)}
     notes["frame"] = "cam shaft at (0, 0), pivot at (0, centre_distance) at theta = 0; the cam turns anticlockwise"
     notes["curvature_of"] = "the pitch curve (roller centre), positive where convex"
-    within = units.within(CURVE_PROMISED * deviation(found.curves, *nodes))
+    within = units.within(CURVE_PROMISED * deviation(cam.curves, *nodes))
     notes["chord_tolerance"] = f"{within}: no curve is farther from straight lines that join the rows"
     table = pd.DataFrame(columns)
-    table.attrs.update(provenance.provenance(scene, law=_law(scene, found), **notes))
+    table.attrs.update(provenance.provenance(scene, law=_law(scene, cam), **notes))
     return provenance.csv(table)
 
 
-def _rows(found: CamDrawing) -> tuple[Pieces, Floats]:
+def _rows(cam: CamDrawing) -> tuple[Pieces, Floats]:
     """Table's nodes: every half degree and both sides of every corner, one where they are alike."""
-    cycle = found.sampler.cycle
+    cycle = cam.sampler.cycle
     there = np.flatnonzero(np.diff(cycle.starts) > 0.0)
     pieces, u = [], []
     for piece in there:
@@ -506,9 +506,9 @@ def _rows(found: CamDrawing) -> tuple[Pieces, Floats]:
         places = np.concatenate([[0.0], (inner - begin) / (end - begin), [1.0]])
         pieces.append(np.full(len(places), piece))
         u.append(places)
-    at = found.stations(np.concatenate(pieces), np.concatenate(u))
+    at = cam.stations(np.concatenate(pieces), np.concatenate(u))
     bent = np.asarray(at.contact.curvature)
     again = np.diff(at.theta) < math.radians(SAME)
     alike = np.abs(np.diff(bent)) <= SAME * np.max(np.abs(bent))
-    kept = np.concatenate([[True], ~(again & alike)])
-    return np.concatenate(pieces)[kept], np.concatenate(u)[kept]
+    mask = np.concatenate([[True], ~(again & alike)])
+    return np.concatenate(pieces)[mask], np.concatenate(u)[mask]

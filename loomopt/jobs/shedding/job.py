@@ -93,7 +93,7 @@ class Shedding(Job):
         """Raise BadInput when the cam does not close, its law is none, or the follower cannot work."""
         check_motion(scene)
         several = scene.table(HealdFrame).segments
-        angles = [each.angle for each in several] if several else [scene.mechanism[name] for name in SEGMENTS]
+        angles = [piece.angle for piece in several] if several else [scene.mechanism[name] for name in SEGMENTS]
         total = math.fsum(angles)
         for name in () if several else ("rise", "return"):
             if not scene.mechanism[name] >= NARROWEST:
@@ -116,8 +116,8 @@ class Shedding(Job):
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Frame with the effects the scene calls for, and a design's own law where it has one."""
-        own = knots(design or {})
-        return model(scene, Spline(len(own) - 1) if own else None)
+        knot_values = knots(design or {})
+        return model(scene, Spline(len(knot_values) - 1) if knot_values else None)
 
     def demand(self, scene: Scene, target: str) -> None:
         """Raise BadInput where a target speaks of what the scene does not have, or today's frame cannot be followed."""
@@ -129,12 +129,12 @@ class Shedding(Job):
             demand_moving(scene, "choose another target")
         if target != "law":
             refuse_unclear(scene, self._reads_accelerations(scene))
-        own = scene.table(LawTarget)
+        table = scene.table(LawTarget)
         fewest, most = cam_spline.FEWEST, cam_spline.MOST
-        if target == "law" and (not fewest <= own.intervals <= most or (own.symmetric and own.intervals % 2)):
+        if target == "law" and (not fewest <= table.intervals <= most or (table.symmetric and table.intervals % 2)):
             problem, key = "a law cannot have so many intervals", "targets.law.intervals"
             allowed = f"{fewest} to {most}, an even number for a symmetric law"
-            raise refusal(problem, scene.origin, key, own.intervals, allowed, "Write intervals = 16.")
+            raise refusal(problem, scene.origin, key, table.intervals, allowed, "Write intervals = 16.")
         self.parted(scene, self.sampler(scene, self.today(scene)))
 
     def _reads_accelerations(self, scene: Scene) -> bool:
@@ -164,22 +164,22 @@ class Shedding(Job):
         fixed = {limit.row for limit in program.bound_limits.values() if limit.sign == 0}
         chosen = [v.name for v in program.variables if v.name in fixed or _chosen(v, values[v.name])]
         free = [name for name in chosen if name not in {*VARIABLES, *knots, CONTACT_SPEED}]
-        found = {name: values[name] for name in (*VARIABLES, *free)}
-        if set(SEGMENTS) & set(found):
-            found["near_dwell"] = 2 * math.pi - sum(values[name] for name in SEGMENTS[:3])
+        numbers = {name: values[name] for name in (*VARIABLES, *free)}
+        if set(SEGMENTS) & set(numbers):
+            numbers["near_dwell"] = 2 * math.pi - sum(values[name] for name in SEGMENTS[:3])
         if isinstance(law, Spline) and knots & {v.name for v in program.variables}:
-            found |= named_knots(map(float, law.accelerations(values)))
-        return found
+            numbers |= named_knots(map(float, law.accelerations(values)))
+        return numbers
 
     def adopted(self, scene: Scene, design: Mapping[str, Any], target: str) -> tuple[Scene, str]:
         """Scene with a design's own cam law, and the target whose limits it keeps.
 
         Of target law the law is then given: what remains is contact, and the bound on its acceleration.
         """
-        own = knots(design)
+        coefficients = knots(design)
         changes: dict[str, object] = {}
-        if own:
-            changes = {"mechanism.law": "spline", "mechanism.law_coefficients": list(map(float, own))}
+        if coefficients:
+            changes = {"mechanism.law": "spline", "mechanism.law_coefficients": list(map(float, coefficients))}
         if target == "law" and "law_acceleration" not in scene.limits:
             changes["limits.law_acceleration.max"] = scene.table(LawTarget).acceleration
         changed = scene.update(changes) if changes else scene
@@ -187,25 +187,25 @@ class Shedding(Job):
 
     def figures(self, scene: Scene, design: Numbers) -> Figures:
         """Every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
-        found, parted = super().figures(scene, design), self.parted(scene, self.sampler(scene, design))
-        return {**found, **parted.figures} if parted else found
+        figures, parted = super().figures(scene, design), self.parted(scene, self.sampler(scene, design))
+        return {**figures, **parted.figures} if parted else figures
 
     def figures_of(
-        self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
+        self, scene: Scene, sampled: "Sampler | Machines", names: Container[str] = EVERY
     ) -> dict[str, Number]:
         """Every figure of a machine, or of many, but those of a frame that parts; None without its numbers."""
-        found = base.alone(scene, sampled, asked)
-        peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in asked}
+        figures = base.alone(scene, sampled, names)
+        peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in names}
         sampled.search(("lift", *peaks.values()))
         for name, quantity in peaks.items():
-            found[name] = sampled.peak(quantity) * (-1 if quantity in ("concavity", "lift") else 1)
+            figures[name] = sampled.peak(quantity) * (-1 if quantity in ("concavity", "lift") else 1)
         if isinstance(sampled, Sampler):
-            found |= {name: sampled.pushed(name) for name in peaks if name in sampled.model.pushes}
-            found["contact_min"], found["contact_angle"] = _least(sampled.extremes("lift"), sampled)
-            return found | ({CONTACT_SPEED: contact_speed(scene, sampled)} if CONTACT_SPEED in asked else {})
+            figures |= {name: sampled.pushed(name) for name in peaks if name in sampled.model.pushes}
+            figures["contact_min"], figures["contact_angle"] = _least(sampled.extremes("lift"), sampled)
+            return figures | ({CONTACT_SPEED: contact_speed(scene, sampled)} if CONTACT_SPEED in names else {})
         lowest = sampled.tops("lift")
-        found |= {"contact_min": -lowest.value, "contact_angle": sampled.angles(lowest) % (2 * math.pi)}
-        return found | ({CONTACT_SPEED: contact_speeds(sampled)} if CONTACT_SPEED in asked else {})
+        figures |= {"contact_min": -lowest.value, "contact_angle": sampled.angles(lowest) % (2 * math.pi)}
+        return figures | ({CONTACT_SPEED: contact_speeds(sampled)} if CONTACT_SPEED in names else {})
 
     def over_cycle(self, model: JobModel) -> dict[str, str]:
         """Figures that are read over the cycle, with their quantities."""
@@ -213,9 +213,9 @@ class Shedding(Job):
 
     def peaks(self, model: JobModel) -> dict[str, str]:
         """Figures that are extremes over the cycle, with their quantities."""
-        found = {name: quantity for name, quantity in CYCLE.items() if model.has_quantity(quantity)}
-        told = [name for check in model.checks for name in check.over_cycle if model.has_quantity(name)]
-        return found | {name: name for name in told}
+        peaks = {name: quantity for name, quantity in CYCLE.items() if model.has_quantity(quantity)}
+        check_names = [name for check in model.checks for name in check.over_cycle if model.has_quantity(name)]
+        return peaks | {name: name for name in check_names}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
         """How each figure is read over a box of numbers: the least cam force and curvature are opposites."""
@@ -225,18 +225,18 @@ class Shedding(Job):
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Sentence on an optimum of the target and on today's spring; figures in SI."""
         dwells = judged(self.model(scene))
-        kept = f"keeps the roller on the cam {f'in {dwells}' if dwells else 'all round'}"
+        clause = f"keeps the roller on the cam {f'in {dwells}' if dwells else 'all round'}"
         if target == "speed":
-            return f"Today's spring {kept} up to {scene.show(figures['speed'] or 0.0, 'angular speed', 9)}."
+            return f"Today's spring {clause} up to {scene.show(figures['speed'] or 0.0, 'angular speed', 9)}."
         stiffness = scene.show(figures["K1"] or 0.0, "stiffness", 9)
-        said = f"The least return spring that {kept} has {stiffness}."
+        text = f"The least return spring that {clause} has {stiffness}."
         if target == "law":
-            said = f"With the cam law chosen too, the least return spring that {kept} has {stiffness}."
+            text = f"With the cam law chosen too, the least return spring that {clause} has {stiffness}."
         if target == "force":
             force = scene.show(figures["contact_max"] or 0.0, "force")
             peak = f"peak cam force{f' in {dwells}' if dwells else ''} is {force}"
-            said = f"The least {peak}, with a return spring of {stiffness}.{MOVES if dwells else ''}"
-        return f"{said} {_today(scene, self.sampler(scene, self.today(scene)))}".strip()
+            text = f"The least {peak}, with a return spring of {stiffness}.{MOVES if dwells else ''}"
+        return f"{text} {_today(scene, self.sampler(scene, self.today(scene)))}".strip()
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """X with three derivatives, s'', the terms, N, the cam torque, pressure angle and curvatures."""
@@ -298,11 +298,11 @@ def _chosen(variable: Variable, value: float) -> bool:
     return variable.lower < variable.upper or abs(value - variable.lower) > GAVE_WAY * variable.scale
 
 
-def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
+def _least(extremes: list[Extreme], sampled: Sampler) -> tuple[float, float]:
     """Least cam force, N, and the first cam angle where it is reached, rad."""
-    highest = max(extreme.height for extreme in found)
-    size = max(abs(extreme.value) for extreme in found)
-    alike = [extreme for extreme in found if extreme.height >= highest - SAME * size]
+    highest = max(extreme.height for extreme in extremes)
+    size = max(abs(extreme.value) for extreme in extremes)
+    alike = [extreme for extreme in extremes if extreme.height >= highest - SAME * size]
     return -highest, min(sampled.angle(extreme) % (2 * math.pi) for extreme in alike)
 
 
@@ -334,7 +334,7 @@ def _frame(scene: Scene, model: JobModel, numbers: Numbers) -> cam_limit.Symmetr
     force = _force(model, numbers)
     middle, inertia = force(RISE, 0.5, 0.5, 0.0, 0.0), force(RISE, 0.5, 0.5, 0.0, 1.0)
     limit = scene.limits.get(LIMIT)
-    found = cam_limit.SymmetricFrame(
+    symmetric_frame = cam_limit.SymmetricFrame(
         most=number(limit.max if limit and limit.max else scene.table(LawTarget).acceleration),
         travel=number(known["travel"]),
         preload=number(scene.bounds["X0"].max if "X0" in scene.bounds else known["X0"]),
@@ -343,12 +343,12 @@ def _frame(scene: Scene, model: JobModel, numbers: Numbers) -> cam_limit.Symmetr
         after=force(RISE, 1.0, 1.0, 0.0, 0.0) - middle,
         inertia=inertia - middle,
     )
-    size = abs(middle) + abs(found.before) + abs(found.after) + abs(found.inertia)
+    size = abs(middle) + abs(symmetric_frame.before) + abs(symmetric_frame.after) + abs(symmetric_frame.inertia)
     for segment, s, u, slope, bend in PROBES:
-        pull = (found.before if s < 0.5 else found.after) * (2 * s - 1)
-        if abs(force(segment, s, u, slope, bend) - (middle + pull + found.inertia * bend)) > ALIKE * size:
+        pull = (symmetric_frame.before if s < 0.5 else symmetric_frame.after) * (2 * s - 1)
+        if abs(force(segment, s, u, slope, bend) - (middle + pull + symmetric_frame.inertia * bend)) > ALIKE * size:
             return None
-    return found if found.inertia > 0 else None
+    return symmetric_frame if symmetric_frame.inertia > 0 else None
 
 
 def _force(model: JobModel, numbers: Numbers) -> Force:

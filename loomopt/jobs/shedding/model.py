@@ -192,12 +192,12 @@ class CamFrame:
         far = values["rise"]
         turning = far + values["far_dwell"]
         near = turning + values["return"]
-        found = {"begin.far": far, "begin.return": turning, "begin.near": near, "near_dwell": 2 * maths.pi - near}
+        begins = {"begin.far": far, "begin.return": turning, "begin.near": near, "near_dwell": 2 * maths.pi - near}
         knots = self.law.prepared(maths, values)
         if HALF_OPEN in called:
-            read = {**knots, **values, **found}
-            found[HALF_OPEN] = mirrored(read, [self._middle(maths, read)])
-        return {**found, **knots}
+            read = {**knots, **values, **begins}
+            begins[HALF_OPEN] = mirrored(read, [self._middle(maths, read)])
+        return {**begins, **knots}
 
     def _middle(self, maths: Maths, values: Values) -> Number:
         """U where s = 1/2; of a law that is not symmetric it moves with the law, from a hint."""
@@ -338,12 +338,12 @@ class CamProgram(CamFrame):
     @lazy
     def stretches(self) -> tuple[tuple[int, int], ...]:
         """The segment, and the piece of its law, of each stretch between corners in order."""
-        found = []
+        stretches = []
         for k, move in enumerate(self.moves):
             count = len(move.law.breaks) + 1 if move.law else 1
             pieces = range(count) if move.rises else reversed(range(count))
-            found += [(k, piece) for piece in pieces]
-        return tuple(found)
+            stretches += [(k, piece) for piece in pieces]
+        return tuple(stretches)
 
     @lazy
     def arcs(self) -> tuple[Arcs, ...]:
@@ -351,28 +351,28 @@ class CamProgram(CamFrame):
         return (Arcs(SEGMENT, self._begins, interval_at),)
 
     def _begins(self, maths: Maths, given: Given) -> tuple[Number, ...]:
-        values, found = given.values, []
+        values, angles = given.values, []
         for k, move in enumerate(self.moves):
             begin, whole = values[f"begin.{k + 1}"], values[width(k)]
-            found.append(begin)
+            angles.append(begin)
             shares = move.law.breaks if move.law else ()
             turned = shares if move.rises else tuple(1 - share for share in reversed(shares))
-            found += [begin + whole * share.numerator / share.denominator for share in turned]
-        return tuple(found)
+            angles += [begin + whole * share.numerator / share.denominator for share in turned]
+        return tuple(angles)
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """Angles where segments begin, rad, and what their laws are made of."""
         values, angle = given.values, 0
-        found: dict[str, Number] = {}
+        numbers: dict[str, Number] = {}
         for k, move in enumerate(self.moves):
-            found[f"begin.{k + 1}"] = angle
+            numbers[f"begin.{k + 1}"] = angle
             angle = angle + values[width(k)]
-            found |= move.law.prepared(maths, values) if move.law else {}
+            numbers |= move.law.prepared(maths, values) if move.law else {}
         if HALF_OPEN in called:
             # Of one move down and one up, each of a law that is symmetric.
             down, up = (next(k for k, move in enumerate(self.moves) if move.kind == kind) for kind in (RISE, RETURN))
-            found[HALF_OPEN] = tuple(found[f"begin.{k + 1}"] + values[width(k)] / 2 for k in (down, up))
-        return found
+            numbers[HALF_OPEN] = tuple(numbers[f"begin.{k + 1}"] + values[width(k)] / 2 for k in (down, up))
+        return numbers
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
         """No values: every event has a formula."""
@@ -405,21 +405,24 @@ class CamProgram(CamFrame):
         speeds = values.get("speed"), values.get("omega_dot")
         kind, worst = chosen([move.kind for move in self.moves]), node.switch.get("worst", LEAST)
         law = self._law(maths, given, place, u)
-        found = (maths, theta, values["travel"], kind, u, rate, law, worst, *speeds)
-        return ProgramMotion(*found, low=chosen(lows), span=chosen(spans))
+        arguments = (maths, theta, values["travel"], kind, u, rate, law, worst, *speeds)
+        return ProgramMotion(*arguments, low=chosen(lows), span=chosen(spans))
 
     def _law(self, maths: Maths, given: Given, place: Number, u: Number) -> LawDerivatives:
         """Law that holds, of all that there are."""
         laws = list(dict.fromkeys(move.law for move in self.moves if move.law))
         which = [laws.index(move.law) if move.law else 0 for move in self.moves]
-        found = []
+        values = []
         for number, law in enumerate(laws):
             piece = maths.choose(place, [piece if which[k] == number else 0 for k, piece in self.stretches])
-            found.append(law.at(maths, given.values, u, piece))
-        if len(found) == 1:
-            return found[0]
+            values.append(law.at(maths, given.values, u, piece))
+        if len(values) == 1:
+            return values[0]
         return LawDerivatives(
-            *(maths.choose(place, [column[which[k]] for k, _ in self.stretches]) for column in zip(*found, strict=True))
+            *(
+                maths.choose(place, [column[which[k]] for k, _ in self.stretches])
+                for column in zip(*values, strict=True)
+            )
         )
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FrameMotion:
@@ -438,8 +441,8 @@ def follower(values: Values) -> Follower:
 
 def contact(at: Instant) -> Contact:
     """Roller and cam at an instant."""
-    found: Contact = at.pose.contact(follower(at.values))
-    return found
+    geometry: Contact = at.pose.contact(follower(at.values))
+    return geometry
 
 
 def moving(at: Instant, value: Number) -> Number:
@@ -494,15 +497,15 @@ def law_rows(law: CamLaw) -> dict[str, DesignRow]:
     """Rows a spline law must keep: its end, its slope there and at the inner knots, ±s'' at these."""
     if not isinstance(law, Spline):
         return {}
-    n, found = law.intervals, {}
+    n = law.intervals
 
     def reads(name: str, sign: int = 1) -> DesignRow:
         return DesignRow(lambda at: at.values[name] if sign > 0 else -at.values[name])
 
-    found = {"law_end": reads(law.knot("s", n)), "law_end_slope": reads(law.knot("v", n))}
-    found |= {f"law_slope_{k}": reads(law.knot("v", k)) for k in range(1, n)}
-    found |= {f"law_push_{k}": reads(law.knot("a", k)) for k in range(1, n)}
-    return found | {f"law_pull_{k}": reads(law.knot("a", k), -1) for k in range(1, n)}
+    rows = {"law_end": reads(law.knot("s", n)), "law_end_slope": reads(law.knot("v", n))}
+    rows |= {f"law_slope_{k}": reads(law.knot("v", k)) for k in range(1, n)}
+    rows |= {f"law_push_{k}": reads(law.knot("a", k)) for k in range(1, n)}
+    return rows | {f"law_pull_{k}": reads(law.knot("a", k), -1) for k in range(1, n)}
 
 
 @functools.lru_cache(maxsize=64)
@@ -532,7 +535,7 @@ def model(
     )
 
 
-def frame(found: JobModel) -> CamFrame:
+def frame(model: JobModel) -> CamFrame:
     """Motion of a shedding model."""
-    assert isinstance(found.kinematics, CamFrame)
-    return found.kinematics
+    assert isinstance(model.kinematics, CamFrame)
+    return model.kinematics

@@ -55,12 +55,12 @@ def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most:
     with the refined largest value. 0 where the bound is broken at rest. slack, SI: an excess that counts as none, at
     rest and up to the mechanism's own speed: what a solve leaves of a bound that is met exactly.
     """
-    own = float(values["speed"])
+    nominal = float(values["speed"])
     at_rest = sampled(model, {**values, "speed": 0.0})
-    speed = _reached(at_rest, own, name, most, slack)
-    if not (slack > 0.0 and speed < own and sampled(model, values).peak(name) <= most + slack):
+    speed = _reached(at_rest, nominal, name, most, slack)
+    if not (slack > 0.0 and speed < nominal and sampled(model, values).peak(name) <= most + slack):
         return speed
-    return own if own <= _reached(at_rest, own, name, most + slack, slack) else speed
+    return nominal if nominal <= _reached(at_rest, nominal, name, most + slack, slack) else speed
 
 
 def followed(
@@ -89,9 +89,9 @@ def _at_speeds(at_rest: Sampler, name: str, nodes: Node, speeds: Sequence[float]
     """(speeds, nodes): a quantity at each of several speeds, rad/s."""
     values = {**at_rest.values, **at_rest.hints, "speed": np.array(speeds)[:, None]}
     given = at_rest.model.given(numpy(), values)
-    (found,) = Quantities(at_rest.model, (numpy(), numpy()), given)((name,), nodes)
-    at_rest.session.positions += found.size
-    return np.broadcast_to(found, (len(speeds), len(nodes.phi)))
+    (quantity,) = Quantities(at_rest.model, (numpy(), numpy()), given)((name,), nodes)
+    at_rest.session.positions += quantity.size
+    return np.broadcast_to(quantity, (len(speeds), len(nodes.phi)))
 
 
 def _first_roots(square: Floats, linear: Floats, spare: Floats, rounding: float) -> Floats:
@@ -183,14 +183,16 @@ def contact_speeds(machines: "Machines") -> Floats | None:
     """
     if not races(machines.model):
         return None
-    own, least = machines.values["speed"], machines.values["N_min"]
+    nominal, least = machines.values["speed"], machines.values["N_min"]
     slack = ACCURACY * np.abs(machines.static["spring_force_max"])
-    runs = [machines.at_numbers(speed=share * own) for share in (0.0, 1.0, -1.0)]
-    reached = own / _inverse_shares(machines, runs, least - 0.0 * slack)
-    held = (reached < own) & (machines.peak(LIFT) <= slack - least)
-    if not held.any():
+    runs = [machines.at_numbers(speed=share * nominal) for share in (0.0, 1.0, -1.0)]
+    reached = nominal / _inverse_shares(machines, runs, least - 0.0 * slack)
+    in_contact = (reached < nominal) & (machines.peak(LIFT) <= slack - least)
+    if not in_contact.any():
         return np.asarray(reached)
-    return np.asarray(np.where(held & (own <= own / _inverse_shares(machines, runs, least - slack)), own, reached))
+    return np.asarray(
+        np.where(in_contact & (nominal <= nominal / _inverse_shares(machines, runs, least - slack)), nominal, reached)
+    )
 
 
 def _inverse_shares(machines: "Machines", runs: "Sequence[Machines]", least: Floats) -> Floats:
@@ -266,8 +268,8 @@ class SheddingTask(Task):
     @lazy
     def law(self) -> Spline | None:
         """The free cam law of target law."""
-        own = self.scene.table(LawTarget)
-        return Spline(own.intervals, own.symmetric) if self.target == "law" else None
+        table = self.scene.table(LawTarget)
+        return Spline(table.intervals, table.symmetric) if self.target == "law" else None
 
     @lazy
     def known(self) -> dict[str, float]:
@@ -317,8 +319,8 @@ class SheddingTask(Task):
         """The speed that today's spring survives, rad/s; 0 where no speed is sought."""
         if not (self.sped or self.lasting):
             return 0.0
-        found = survived(sampled(model(self.scene), scene_numbers(self.scene)), self.scene.operation["N_min"])
-        return found if 0.0 < found < math.inf else self.known["speed"]
+        speed = survived(sampled(model(self.scene), scene_numbers(self.scene)), self.scene.operation["N_min"])
+        return speed if 0.0 < speed < math.inf else self.known["speed"]
 
     @lazy
     def kept(self) -> list[str]:
@@ -334,8 +336,8 @@ class SheddingTask(Task):
 
     def decides(self, check: Check[Any]) -> bool:
         """Whether a check affects the program: it demands something, or is minimised, limited or sought."""
-        asked = {*self.scene.limits, *self.traded}
-        return bool(check.demands or check.least or check.axes or asked & {*check.over_cycle, *check.rows})
+        names = {*self.scene.limits, *self.traded}
+        return bool(check.demands or check.least or check.axes or names & {*check.over_cycle, *check.rows})
 
     # Variables.
 
@@ -344,7 +346,7 @@ class SheddingTask(Task):
         """What the target may choose, and what it keeps as variables without room, which gives it a price."""
         scene, known = self.scene, self.known
         free = {scene.full(name) for name, bound in scene.bounds.items() if bound.free} - {"near_dwell"}
-        ends = {name: found for name, found in self.limited.items() if name in free}
+        ends = {name: pair for name, pair in self.limited.items() if name in free}
         ends["X0"] = self.limited["X0"]
         ends["K1"] = self.limited["K1"] if "K1" in scene.bounds else (0.0, math.inf)
         if self.target == "speed":
@@ -359,7 +361,7 @@ class SheddingTask(Task):
             ends.setdefault(name, (known[name], known[name]))
         most, knots = self.most_acceleration, self.law.names if self.law else ()
         return (
-            *(self.variable(name, found) for name, found in ends.items()),
+            *(self.variable(name, pair) for name, pair in ends.items()),
             *(Variable(name, -math.inf, math.inf, most, (-most, most), "law") for name in knots),
         )
 
@@ -385,33 +387,36 @@ class SheddingTask(Task):
 
     def limits(self) -> list[Limit]:
         """All limits in order."""
-        own = [*self.bounds(), *self.floors(), *self.contact(), *self.angles()]
-        return [*own, *self.figures(), *self.demands(), *self.law_limits()]
+        limits = [*self.bounds(), *self.floors(), *self.contact(), *self.angles()]
+        return [*limits, *self.figures(), *self.demands(), *self.law_limits()]
 
     def bounds(self) -> list[Limit]:
         """Bounds of variables as limits; a requirement gives way on one side only."""
-        found: list[Limit] = []
+        limits: list[Limit] = []
         knots = set(self.law.names) if self.law else set()
         for v in (v for v in self.bounded if v.name not in knots):
             if v.lower == v.upper:
                 sign = -1 if v.name in self.kept else 1 if self.target == "speed" and v.name in VARIABLES else 0
                 bounded = v.called in self.scene.bounds or sign
-                found += [BoundLimit(v.called, sign, v.name, v.lower, v.scale)] if bounded else []
+                limits += [BoundLimit(v.called, sign, v.name, v.lower, v.scale)] if bounded else []
                 continue
-            own = v.name not in SPEEDS or v.name in self.limited
-            found += [replace(each, relaxable=own and each.value > 0.0, hidden=not own) for each in bound_limits(v)]
-        return found
+            from_scene = v.name not in SPEEDS or v.name in self.limited
+            limits += [
+                replace(limit, relaxable=from_scene and limit.value > 0.0, hidden=not from_scene)
+                for limit in bound_limits(v)
+            ]
+        return limits
 
     def contact(self) -> list[Limit]:
         """Limit that is the job: contact where the warp's pull is known, up to a speed that is traded."""
         least, size = self.known["N_min"], self.sizes.force
         row = FASTEST if self.lasting and not self.sped else LIFT
-        found = self.row_limit("N_min", -1, row, least, size, relaxable=least > 0.0)
-        raced = [replace(found, row=other, hidden=True) for other in self.raced if other != row]
+        limit = self.row_limit("N_min", -1, row, least, size, relaxable=least > 0.0)
+        raced = [replace(limit, row=other_row, hidden=True) for other_row in self.raced if other_row != row]
         if least > 0.0:
             # What is asked beyond contact may give way; contact itself may not.
-            return [found, replace(found, name="contact", value=0.0, relaxable=False, hidden=True), *raced]
-        return [found, *raced]
+            return [limit, replace(limit, name="contact", value=0.0, relaxable=False, hidden=True), *raced]
+        return [limit, *raced]
 
     def angles(self) -> list[Limit]:
         """Limit on the near dwell, which takes the rest of the turn, where another angle is free."""
@@ -450,8 +455,8 @@ class SheddingTask(Task):
     def most_acceleration(self) -> float:
         """The largest |s''| a free law may have."""
         limit = self.scene.limits.get("law_acceleration")
-        own = limit.max if limit else None
-        return float(self.scene.table(LawTarget).acceleration if own is None else own)
+        bound = limit.max if limit else None
+        return float(self.scene.table(LawTarget).acceleration if bound is None else bound)
 
     def law_limits(self) -> list[Limit]:
         """Limits that make a free law a cam law: it reaches 1 at rest, never falls, and keeps its peak s''."""
@@ -462,12 +467,12 @@ class SheddingTask(Task):
         knots = range(1, law.intervals // 2 + 1 if law.mirrored else law.intervals)
         firm = [("law_end", 0, 1.0), *([] if law.mirrored else [("law_end_slope", 0, 0.0)])]
         firm += [(f"law_slope_{k}", -1, 0.0) for k in knots]
-        found = [
+        limits = [
             self.row_limit(row, sign, row, value, 1.0, relaxable=False) for row, sign, value in firm if row in rows
         ]
         peaks = [f"law_{side}_{k}" for side in ("push", "pull") for k in knots]
         return [
-            *(replace(each, hidden=True) for each in found),
+            *(replace(limit, hidden=True) for limit in limits),
             *(self.row_limit("law_acceleration", 1, row, most, most) for row in peaks if row in rows),
         ]
 
@@ -487,7 +492,7 @@ class SheddingTask(Task):
 
     def starts(self) -> tuple[dict[str, float], ...]:
         """Today's spring moved inside its bounds, stiff enough for contact; for the force, a short one too."""
-        found, room = [], START_ROOM
+        starts, room = [], START_ROOM
         for preload in (1.0 - room, room) if self.target == "force" else (1.0 - room,):
             start = self.inside(self.known)
             for v in self.variables:
@@ -498,8 +503,8 @@ class SheddingTask(Task):
             stiff = SPARE * self.sizes.stiffness_for(self.known["N_min"], start["X0"])
             low, high = next((v.lower, v.upper) for v in self.variables if v.name == "K1")
             start["K1"] = min(max(stiff, low), high)
-            found.append(start)
-        return tuple(found)
+            starts.append(start)
+        return tuple(starts)
 
     def moves(self) -> list[Move]:
         """Variables that may not change anything: a preload that is not needed, and those that checks name."""
@@ -527,8 +532,8 @@ class SheddingTask(Task):
         free = {v.name for v in self.variables if v.lower < v.upper} - set(self.law.names if self.law else ())
         spring = free <= {"K1", "X0"} and (not self.law or set(self.scene.limits) <= {"law_acceleration"})
         traded = self.traded and set(self.traded) <= LINEAR and free <= {"K1", "X0", *SPEEDS}
-        told = spring or bool(traded) or free == {"speed"}
-        linear = not any(map(self.decides, self.checks)) and told and (spring or drive.POWER not in self.scene.limits)
+        unique = spring or bool(traded) or free == {"speed"}
+        linear = not any(map(self.decides, self.checks)) and unique and (spring or drive.POWER not in self.scene.limits)
         return ONE_OPTIMUM if linear else ""
 
     # Natural sizes.

@@ -183,21 +183,23 @@ def check_motion(scene: Scene) -> None:
     segments = scene.table(HealdFrame).segments
     if segments is None:
         return
-    told = [each.to for each in segments if each.to is not None]
-    if not told or max(told) == min(told):
+    levels = [segment.to for segment in segments if segment.to is not None]
+    if not levels or max(levels) == min(levels):
         remedy = 'Write moves with the height at their end, such as { angle = "90 deg", to = "45 mm" }'
         raise refusal("the segments move nothing", scene.origin, "mechanism.segments", remedy=remedy)
-    if min(told) != 0.0:
-        problem = f"the lowest height is {scene.show(min(told), 'length')}, and X counts from the lowest"
+    if min(levels) != 0.0:
+        problem = f"the lowest height is {scene.show(min(levels), 'length')}, and X counts from the lowest"
         raise refusal(problem, scene.origin, "mechanism.segments", remedy='Let a move end at to = "0 mm"')
-    before = told[-1]
-    for k, each in enumerate(segments, 1):
-        if each.law and (each.to is None or each.to == before):
+    before = levels[-1]
+    for k, segment in enumerate(segments, 1):
+        if segment.law and (segment.to is None or segment.to == before):
             problem = f"segment {k} is a dwell, which has no law"
             raise refusal(problem, scene.origin, f"mechanism.segments.{k}.law", remedy="Take it out, or give a height")
-        before = before if each.to is None else each.to
+        before = before if segment.to is None else segment.to
     known = curves(scene)
-    loads = [each.name for each in scene.active if HALF_OPEN in each.reads and (each.name, "table") not in known]
+    loads = [
+        effect.name for effect in scene.active if HALF_OPEN in effect.reads and (effect.name, "table") not in known
+    ]
     for name in loads:
         if not _opens_once(scene):
             problem = f"{name} is told for one move from the lowest X to the highest and one back, of symmetric laws"
@@ -213,45 +215,45 @@ def check_motion(scene: Scene) -> None:
 
 def _opens_once(scene: Scene) -> bool:
     """Whether the segments move down once and up once, by symmetric laws without a break in the middle."""
-    own = [move for move in moves(scene) if move.law]
-    symmetric = all(move.law and move.law.symmetric and Fraction(1, 2) not in move.law.breaks for move in own)
-    return symmetric and sorted(move.rises for move in own) == [False, True]
+    travels = [move for move in moves(scene) if move.law]
+    symmetric = all(move.law and move.law.symmetric and Fraction(1, 2) not in move.law.breaks for move in travels)
+    return symmetric and sorted(move.rises for move in travels) == [False, True]
 
 
 def moves(scene: Scene) -> tuple[Segment, ...]:
     """Segments of a motion in several; none of a motion in four. Raises BadInput."""
-    own = scene.table(HealdFrame)
-    if own.segments is None:
+    frame_table = scene.table(HealdFrame)
+    if frame_table.segments is None:
         return ()
-    found, before = [], heights(scene)[-1]
-    for each, end in zip(own.segments, heights(scene), strict=True):
+    segments, before = [], heights(scene)[-1]
+    for segment, end in zip(frame_table.segments, heights(scene), strict=True):
         still = end == before
-        found.append(
-            Segment(None) if still else Segment(NamedLaw(each.law) if each.law else chosen(scene), end > before)
+        segments.append(
+            Segment(None) if still else Segment(NamedLaw(segment.law) if segment.law else chosen(scene), end > before)
         )
         before = end
-    return tuple(found)
+    return tuple(segments)
 
 
 def heights(scene: Scene) -> list[float]:
     """X, m, at the end of each segment of a motion in several."""
-    own = scene.table(HealdFrame).segments or ()
-    told = [each.to for each in own if each.to is not None]
-    before, found = told[-1], []
-    for each in own:
-        before = before if each.to is None else each.to
-        found.append(before)
-    return found
+    segments = scene.table(HealdFrame).segments or ()
+    levels = [segment.to for segment in segments if segment.to is not None]
+    before, ends = levels[-1], []
+    for segment in segments:
+        before = before if segment.to is None else segment.to
+        ends.append(before)
+    return ends
 
 
 def program_numbers(scene: Scene) -> dict[str, float]:
     """Angles, rad, heights and travel, m, of a motion in several segments by name; {} of one in four."""
-    own = scene.table(HealdFrame).segments
-    if own is None:
+    segments = scene.table(HealdFrame).segments
+    if segments is None:
         return {}
     ends = heights(scene)
-    found = {width(k): each.angle for k, each in enumerate(own)}
-    return found | {height(k): end for k, end in enumerate(ends)} | {"travel": max(ends)}
+    numbers = {width(k): segment.angle for k, segment in enumerate(segments)}
+    return numbers | {height(k): end for k, end in enumerate(ends)} | {"travel": max(ends)}
 
 
 def chosen(scene: Scene) -> CamLaw:
@@ -265,13 +267,13 @@ def chosen(scene: Scene) -> CamLaw:
 def check_known(scene: Scene, there: Collection[Where], called: str) -> None:
     """Raise BadInput where a load is known on pieces of the cycle only, and none of them is there; called: these."""
     for effect in (effect for effect in scene.active if isinstance(effect, Load)):
-        own = {key: word for name, key, word in words(scene) if name == effect.name}
-        places = effect.known_in(own)
+        effect_words = {key: word for name, key, word in words(scene) if name == effect.name}
+        places = effect.known_in(effect_words)
         if places and not set(places) & set(there):
             raise BadInput(
                 f"{effect.name} is known in the {called} only, and there are none",
                 file=scene.origin,
-                key=", ".join(f"effects.{effect.name}.{key}" for key in own),
+                key=", ".join(f"effects.{effect.name}.{key}" for key in effect_words),
                 allowed=f"another word, or {called} in which it is known",
                 remedy="Correct it.",
             )
@@ -293,11 +295,11 @@ def check_law(scene: Scene) -> None:
 
 
 def _coefficients(scene: Scene) -> tuple[float, ...]:
-    found = scene.table(HealdFrame).law_coefficients
-    if found is None:
+    coefficients = scene.table(HealdFrame).law_coefficients
+    if coefficients is None:
         remedy = "Give s'' at evenly spaced knots, as target law finds them"
         raise refusal("law spline needs its coefficients", scene.origin, "mechanism.law_coefficients", remedy=remedy)
-    return tuple(found)
+    return tuple(coefficients)
 
 
 UNCLEAR = 0.1
@@ -321,36 +323,36 @@ class LawRead(NamedTuple):
 
     def record(self, scene: Scene) -> csv_tables.Record:
         """Remarks: the change by smoothing, and the accuracy of s''."""
-        found = self.law.found
-        change, misfit = found.change * self.travel, found.misfit * self.travel
+        table = self.law.found
+        change, misfit = table.change * self.travel, table.misfit * self.travel
         moved = f"smoothed by {scene.show(change, 'length', 2)} at most" if change else "not smoothed"
-        said = f"a cubic through {len(found.u)} points, {moved}"
-        said += f", s'' jumps at {len(found.jumps)} points" if found.jumps else ""
-        said += f", {len(found.dwells)} dwells" if found.dwells else ""
-        said += (
+        text = f"a cubic through {len(table.u)} points, {moved}"
+        text += f", s'' jumps at {len(table.jumps)} points" if table.jumps else ""
+        text += f", {len(table.dwells)} dwells" if table.dwells else ""
+        text += (
             f"; left out one at a time, points lie {scene.show(misfit, 'length', 3)} rms off the curve of the others"
         )
-        said += f"; s'' is uncertain by {100 * found.uncertainty:.2g} % of its peak"
-        record = self.read.record(LAW_TABLE, {"s": misfit}, said)
-        return record._replace(change=change, uncertainty=found.uncertainty)
+        text += f"; s'' is uncertain by {100 * table.uncertainty:.2g} % of its peak"
+        record = self.read.record(LAW_TABLE, {"s": misfit}, text)
+        return record._replace(change=change, uncertainty=table.uncertainty)
 
     def needed(self) -> str:
         """Digits, or the spacing, with which its s'' would be clear enough."""
         unit = factor(self.read.units["s"])
         size = 2 * max(self.half) * self.travel / unit
         decimals = max(0, round(-math.log10(size))) if size else 15
-        u, found = self.law.u, self.law.found
+        u, table = self.law.u, self.law.found
         helps = []
         for more in FINER:
             s = [round(at * self.travel / unit, decimals + more) * unit / self.travel for at in self.law.s]
-            half = tuple(each / 10.0**more for each in self.half)
+            half = tuple(value / 10.0**more for value in self.half)
             if len(s) == len(half) and smooth_rise.through(u, tuple(s), half).uncertainty <= UNCLEAR:
                 helps.append(f"s to {decimals + more} decimals of {self.read.units['s']} instead of {decimals}")
                 break
         whole = self.read.columns["angle"][-1] / factor(self.read.units["angle"])
         for times in CLOSER:
             closer = tuple(a + (b - a) * k / times for a, b in itertools.pairwise(u) for k in range(times)) + u[-1:]
-            curve = smooth_rise.values(found, closer)
+            curve = smooth_rise.values(table, closer)
             s = [round(at * self.travel / unit, decimals) * unit / self.travel for at in curve]
             if smooth_rise.through(closer, tuple(s), (max(self.half),) * len(s)).uncertainty <= UNCLEAR:
                 helps.append(f"a row every {whole / (len(closer) - 1):.3g} {self.read.units['angle']}")
@@ -362,12 +364,12 @@ def refuse_unclear(scene: Scene, reads_accelerations: bool) -> None:
     """Raise BadInput where the digits of the law's table cannot tell the accelerations that are read."""
     if scene.table(HealdFrame).law != "table" or not reads_accelerations:
         return
-    found = read_law(scene)
-    if found.law.found.uncertainty > UNCLEAR:
-        share = 100 * found.law.found.uncertainty
+    reading = read_law(scene)
+    if reading.law.found.uncertainty > UNCLEAR:
+        share = 100 * reading.law.found.uncertainty
         problem = f"the table cannot tell accelerations: s'' is uncertain by {share:.2g} % of its peak"
-        remedy = f"Give {found.needed()}; or digits, where zeros were cut off"
-        raise refusal(problem, found.read.file, LAW_TABLE, allowed=f"up to {100 * UNCLEAR:g} %", remedy=remedy)
+        remedy = f"Give {reading.needed()}; or digits, where zeros were cut off"
+        raise refusal(problem, reading.read.file, LAW_TABLE, allowed=f"up to {100 * UNCLEAR:g} %", remedy=remedy)
 
 
 def read_law(scene: Scene) -> LawRead:
@@ -385,8 +387,8 @@ def read_law(scene: Scene) -> LawRead:
     places, loose = _even(angles, read.halves["angle"])
     slopes = [abs(b - a) / max(d - c, 1e-12) for a, b, c, d in _steps(heights, angles)]
     half = [
-        (own + slope * width * angles[-1]) / heights[-1]
-        for own, slope, width in zip(read.halves["s"], slopes, loose, strict=True)
+        (half_digit + slope * width * angles[-1]) / heights[-1]
+        for half_digit, slope, width in zip(read.halves["s"], slopes, loose, strict=True)
     ]
     try:
         return LawRead(cam_spline.tabulated(places, [s / heights[-1] for s in heights], half), read, tuple(half))

@@ -83,15 +83,15 @@ class Unwritten:
         return LawDerivatives(*(symbol(name) for name in (*PRIMES, "s'''")))
 
 
-def law(found: CamLaw) -> list[Equation]:
+def law(cam_law: CamLaw) -> list[Equation]:
     """S(u) and its first two derivatives as the law has them: by pieces of u, or what it is made of."""
-    if isinstance(found, Spline):
-        return _spline(found)
-    if isinstance(found, Tabulated):
-        return _table(found.table)
-    assert isinstance(found, NamedLaw)
-    u, ends = symbol("u"), [Fraction(0), *found.breaks, Fraction(1)]
-    pieces = [found.at(systems.sympy(), {}, u, k) for k in range(len(ends) - 1)]
+    if isinstance(cam_law, Spline):
+        return _spline(cam_law)
+    if isinstance(cam_law, Tabulated):
+        return _table(cam_law.table)
+    assert isinstance(cam_law, NamedLaw)
+    u, ends = symbol("u"), [Fraction(0), *cam_law.breaks, Fraction(1)]
+    pieces = [cam_law.at(systems.sympy(), {}, u, k) for k in range(len(ends) - 1)]
     sp = sympy()
     bounds = list(itertools.pairwise(sp.Rational(end.numerator, end.denominator) for end in ends))
     written = []
@@ -99,7 +99,7 @@ def law(found: CamLaw) -> list[Equation]:
         formulas = [
             (expanded(piece[order], u), (low, u, high)) for piece, (low, high) in zip(pieces, bounds, strict=True)
         ]
-        written.append(cases(f"cam law {found.name}", symbol(name), formulas))
+        written.append(cases(f"cam law {cam_law.name}", symbol(name), formulas))
     return written
 
 
@@ -110,11 +110,11 @@ def expanded(formula: Expression, u: Expression) -> Expression:
 
     sp = sympy()
     rest = sp.sin(sp.pi * (1 - u) / 2)
-    found = sp.expand(TR8(sp.expand(sp.sympify(formula).subs(rest, sp.cos(sp.pi * u / 2)))))
-    waves = found.atoms(sp.sin, sp.cos)
-    if waves and not sp.Poly(found, *waves).is_linear:
-        found = sp.expand(sp.expand(found.rewrite(sp.exp)).rewrite(sp.cos))
-    return sp.collect(found, [*sorted(found.atoms(sp.sin, sp.cos), key=str), u], sp.factor)
+    expression = sp.expand(TR8(sp.expand(sp.sympify(formula).subs(rest, sp.cos(sp.pi * u / 2)))))
+    waves = expression.atoms(sp.sin, sp.cos)
+    if waves and not sp.Poly(expression, *waves).is_linear:
+        expression = sp.expand(sp.expand(expression.rewrite(sp.exp)).rewrite(sp.cos))
+    return sp.collect(expression, [*sorted(expression.atoms(sp.sin, sp.cos), key=str), u], sp.factor)
 
 
 def _knots(letter: str, count: int) -> tuple[Expression, ...]:
@@ -122,9 +122,9 @@ def _knots(letter: str, count: int) -> tuple[Expression, ...]:
     return symbol(f"{letter}_k"), *[symbol(f"{letter}_(k+1)")] * (count - 1)
 
 
-def _spline(found: Spline) -> list[Equation]:
+def _spline(spline: Spline) -> list[Equation]:
     """Write the spline on the interval between knots k and k + 1, t counted from knot k."""
-    n = found.intervals
+    n = spline.intervals
     made = cam_spline.SplineData(*(_knots(letter, n + 1) for letter in "sva"))
     t, u = symbol("t"), symbol("u")
     at = made.at(systems.sympy(), t, 0)
@@ -137,16 +137,16 @@ def _spline(found: Spline) -> list[Equation]:
     ]
 
 
-def _table(found: cam_spline.LawTable) -> list[Equation]:
+def _table(table: cam_spline.LawTable) -> list[Equation]:
     """Sentence on the law through a table: a cubic between each point and the next."""
-    points = len(found.u)
-    said = f"the C2 cubic through the table's {points} points (u, s), s' = 0 at both ends"
+    points = len(table.u)
+    text = f"the C2 cubic through the table's {points} points (u, s), s' = 0 at both ends"
     u, k = symbol("u"), symbol("u_k")
     t, jerk = symbol("t"), symbol("j_k")
     s, v, a = (symbol(f"{letter}_k") for letter in "sva")
     kind = f"cam law table, k = 0 ... {points - 2}"
     return [
-        Equation("cam law table", f"s(u): {said}", rf"s(u):\ \text{{{said}}}", ((f"s(u): {said}",),)),
+        Equation("cam law table", f"s(u): {text}", rf"s(u):\ \text{{{text}}}", ((f"s(u): {text}",),)),
         equation(kind, t, u - k),
         equation(kind, symbol("s"), s + v * t + a * t**2 / 2 + jerk * t**3 / 6),
     ]
@@ -205,15 +205,17 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
     known, cam = _given(model), frame(model)
     if isinstance(cam, CamProgram):
         laws = dict.fromkeys(move.law for move in cam.moves if move.law)
-        moved = [*(each for one in laws for each in law(one)), *program(cam, known)]
+        moved = [*(formula for cam_law in laws for formula in law(cam_law)), *program(cam, known)]
     else:
         moved = [*law(cam.law), *motion(cam, known)]
-    found = [*moved, *_forces(model, known)]
+    equation_list = [*moved, *_forces(model, known)]
     if model.has_quantity("curvature"):
-        found += follower()
+        equation_list += follower()
     pose = _pose(model, cam.segments[0], LEAST)
-    found += [each for check in model.checks for each in effect_equations.check_equations(check, pose, known)]
-    return (*found, *effect_equations.joint_equations(model, pose, known, symbol("N"), "N"))
+    equation_list += [
+        formula for check in model.checks for formula in effect_equations.check_equations(check, pose, known)
+    ]
+    return (*equation_list, *effect_equations.joint_equations(model, pose, known, symbol("N"), "N"))
 
 
 def _given(model: JobModel) -> Given:
@@ -245,15 +247,15 @@ def _pose(model: JobModel, segment: int, worst: int) -> FrameSymbols:
 def _forces(model: JobModel, known: Given) -> list[Equation]:
     """Write each term, their balance, the torque on the cam, and contact."""
     segments = frame(model).segments
-    found = [_term(model, segments, load, known) for load in model.loads]
+    equations = [_term(model, segments, load, known) for load in model.loads]
     pose = _pose(model, segments[0], LEAST)
-    found += sums(model.loads, pose, symbol("N"), "N", torque=("cam torque", "cam_torque"))
-    found += effect_equations.crank_motion(model, pose, known, "cam_torque")
+    equations += sums(model.loads, pose, symbol("N"), "N", torque=("cam torque", "cam_torque"))
+    equations += effect_equations.crank_motion(model, pose, known, "cam_torque")
     judged = [WHERE[s] for s in segments if (SEGMENT, float(s)) in model.known_in]
     where = " and ".join(judged) if judged else "for every theta"
-    found.append(relation("contact", symbol("N"), ">=", symbol("N_min"), where))
+    equations.append(relation("contact", symbol("N"), ">=", symbol("N_min"), where))
     moves = _pose(model, RISE, LEAST), _pose(model, RETURN, LEAST)
-    return found + effect_equations.event_equations(model, moves, known, "N")
+    return equations + effect_equations.event_equations(model, moves, known, "N")
 
 
 def _term(model: JobModel, segments: Sequence[int], load: Acting, known: Given) -> Equation:
@@ -399,8 +401,8 @@ class SheddingViews(JobViews):
         """Cam with its follower in both dwells and at the least cam force, full scale. Raises BadInput."""
         from loomopt.jobs.shedding import drawing
 
-        found = drawing.cam(scene, design)
-        return drawing.linkage(scene, found, registry.of(scene).figures(scene, design))
+        cam = drawing.cam(scene, design)
+        return drawing.linkage(scene, cam, registry.of(scene).figures(scene, design))
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
         """Profile as CSV. Raises BadInput."""
@@ -431,17 +433,17 @@ class SheddingViews(JobViews):
         values = job.sampler(scene, design).given.values
         spans = frame(job.model(scene)).spans(values)
         dwells = {name: Span(begin, end % TURN) for name, (begin, end) in spans.items() if "dwell" in name}
-        found: dict[str, float | Span] = {**dwells}
+        angles: dict[str, float | Span] = {**dwells}
         parted = job.parted(scene, job.sampler(scene, design))
         if parted is None or not parted.course.parted:
             angle = job.figures(scene, design)["contact_angle"]
-            found["least cam force"] = math.nan if angle is None else angle
+            angles["least cam force"] = math.nan if angle is None else angle
         if parted is None:
-            return found
+            return angles
 
         from loomopt.picture.parted import marks
 
-        return marks(parted, found)
+        return marks(parted, angles)
 
     def words(self) -> Mapping[str, Curve]:
         """Names of the curves."""
@@ -467,12 +469,12 @@ class SheddingViews(JobViews):
         levels = {"N [N]": {"contact is lost below N_min =": (values["N_min"],)}}
         if "roller_radius" in values:
             levels["curvature [1/m]"] = {"undercut above 1/roller_radius =": (1 / values["roller_radius"],)}
-        found = super().panels(scene, design, columns)
+        panels = super().panels(scene, design, columns)
         # The law's own acceleration has the frame's shape: it says more only where it is limited. There is no torque in
         # the dwells, and where forces are known in them alone, none is known.
         partly = bool(registry.of(scene).model(scene).known_in)
         left = {"s_2 [1]": "law_acceleration" not in scene.limits, "cam_torque [N*m]": partly, POWER: partly}
-        shown = [panel for panel in found if not left.get(panel.columns[0])]
+        shown = [panel for panel in panels if not left.get(panel.columns[0])]
         shown = [panel._replace(levels={**panel.levels, **levels.get(panel.columns[0], {})}) for panel in shown]
         if "X_cam [m]" not in columns:
             return tuple(shown)
@@ -511,10 +513,10 @@ def _floating(scene: Scene, sampler: Sampler) -> Iterator[str]:
         return
     spans = near_zero(sampler, "lift", FLOATS * abs(sampler.static["spring_force_max"]), NARROW)
     if spans:
-        told = " and ".join(f"from {scene.show(a, 'angle', 4)} to {scene.show(b, 'angle', 4)}" for a, b in spans)
+        text = " and ".join(f"from {scene.show(a, 'angle', 4)} to {scene.show(b, 'angle', 4)}" for a, b in spans)
         whole = scene.show(sum(end - begin for begin, end in spans), "angle", 3)
         yield (
-            f"N_min is 0, and the cam force is less than {100 * FLOATS:g} % of the spring's largest force {told}: the "
+            f"N_min is 0, and the cam force is less than {100 * FLOATS:g} % of the spring's largest force {text}: the "
             f"roller floats for {whole} of the turn. What helps: an N_min above 0"
         )
 
@@ -522,10 +524,10 @@ def _floating(scene: Scene, sampler: Sampler) -> Iterator[str]:
 def _undercut(scene: Scene, design: Mapping[str, float]) -> Iterator[str]:
     from loomopt.jobs.shedding import drawing
 
-    found = drawing.cam(scene, design)
-    if found.undercut:
-        roller, radius = found.follower.roller_radius, 1 / found.undercut.value
-        angle, most = scene.show(found.sampler.angle(found.undercut), "angle", 5), scene.show(radius, "length", 4)
+    cam = drawing.cam(scene, design)
+    if cam.undercut:
+        roller, radius = cam.follower.roller_radius, 1 / cam.undercut.value
+        angle, most = scene.show(cam.sampler.angle(cam.undercut), "angle", 5), scene.show(radius, "length", 4)
         yield (
             f"the cam is undercut at {angle}: the roller's centre turns there with a radius of {most}, "
             f"{scene.show(roller - radius, 'length', 3)} less than roller_radius = {scene.show(roller, 'length')}, so "
@@ -550,11 +552,13 @@ def _partly(sampler: Sampler) -> Iterator[str]:
 
 def _others(load: Load[Any], words: Mapping[str, str]) -> str:
     """Words of a load's table with which it is known all over the cycle."""
-    found = []
+    clauses = []
     for key, word in words.items():
-        said = [each for each in get_args(load.table.model_fields[key].annotation) if each != word]
-        found.append(f"{key} = " + " or ".join(f'"{each}"' for each in said if not load.known_in({**words, key: each})))
-    return " and ".join(found)
+        choices = [choice for choice in get_args(load.table.model_fields[key].annotation) if choice != word]
+        clauses.append(
+            f"{key} = " + " or ".join(f'"{choice}"' for choice in choices if not load.known_in({**words, key: choice}))
+        )
+    return " and ".join(clauses)
 
 
 def _acting(sampler: Sampler) -> list[str]:
