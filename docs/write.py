@@ -77,7 +77,7 @@ def sketches() -> dict[str, str]:
     for name in registry.own_names():
         scene = registry.load(SHOWN.get(name, name))
         found[f"sketch-{name}.svg"] = svg.render(
-            outputs.drawing(scene, glossary.sketched(scene), outputs.DrawnSubject("sketch"))
+            outputs.drawing(scene, glossary.sketch_design(scene), outputs.DrawnSubject("sketch"))
         )
     return found
 

@@ -75,8 +75,8 @@ def load(name_or_path: str | os.PathLike[str]) -> Loaded:
 
     An answer comes as the `Evaluation` of its design, computed anew. Raises BadInput.
     """
-    loaded, design = _opened(name_or_path)
-    return loaded if design is None else results.evaluated(loaded, design, None)
+    loaded, design = _open(name_or_path)
+    return loaded if design is None else results.evaluate_design(loaded, design, None)
 
 
 @renamed(near="warm_start", everywhere="global_proof", yield_="min_yield", steps="round_to")
@@ -178,7 +178,7 @@ def solve(
             check_global_proof(proof)
             last = functools.partial(once, prove=prove, global_proof=proof)
             solution = backoff.solved(request, once, last, on_text)
-    return results.solved(solution, loaded, loaded.call.target if target is None else target)
+    return results.to_answer(solution, loaded, loaded.call.target if target is None else target)
 
 
 def evaluate(scene: Given, design: Design | Evaluation | None = None, target: str | None = None) -> Evaluation:
@@ -188,7 +188,7 @@ def evaluate(scene: Given, design: Design | Evaluation | None = None, target: st
     the design alone is taken. target: whose limits, the answer's own or the job's default without one.
     """
     loaded, given = _request(scene, design)
-    return results.evaluated(loaded, given, target)
+    return results.evaluate_design(loaded, given, target)
 
 
 def prove(
@@ -431,10 +431,10 @@ def compare(*answers: "Evaluation | str", scene: Given | None = None) -> "Compar
 
 def _scene(given: Given) -> Scene:
     """A scene that is given as itself, by its name or by its path; of an answer its own. Raises BadInput."""
-    return _opened(given)[0]
+    return _open(given)[0]
 
 
-def _opened(given: Given) -> tuple[Scene, dict[str, float] | None]:
+def _open(given: Given) -> tuple[Scene, dict[str, float] | None]:
     """A scene; of an answer its own, which knows its target, and its design, checked. Raises BadInput."""
     from loomopt.scenes import designs
 
@@ -455,7 +455,7 @@ def _request(scene: Given, design: Design | Evaluation | None) -> tuple[Scene, d
     """
     from loomopt.scenes import designs
 
-    loaded, stored_design = _opened(scene)
+    loaded, stored_design = _open(scene)
     if isinstance(design, Evaluation):
         designs.check_job(design.scene.job, loaded, "<answer>")
         design = design.design

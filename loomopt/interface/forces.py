@@ -63,7 +63,7 @@ class TurnedForce(NamedTuple):
         return self.x * cosine + self.y * sine, self.y * cosine - self.x * sine
 
 
-def found(scene: Scene, curves: "pd.DataFrame", design: Mapping[str, float] = TODAY) -> Mapping[str, TurnedForce]:
+def from_curves(scene: Scene, curves: "pd.DataFrame", design: Mapping[str, float] = TODAY) -> Mapping[str, TurnedForce]:
     """Forces, by name, of which a design's curves (SI) have both components. Raises BadInput without any."""
     columns = {split(str(column)): column for column in curves}
     known = {name: curves[column].to_numpy() for (name, unit), column in columns.items() if unit == "N"}

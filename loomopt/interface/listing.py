@@ -32,12 +32,12 @@ def problems() -> tuple[tuple[Head, ...], list[BadInput]]:
 def new(name: str, path: str | os.PathLike[str]) -> Path:
     """Write the commented scene of a job, or a copy of a packaged problem that is called otherwise than its job.
 
-    As of `template` and of `copied`. Raises BadInput.
+    As of `template` and of `copy_scene`. Raises BadInput.
     """
     from loomopt.jobs import registry
 
     is_packaged = name in packaged.problems() and (name not in registry.own_names() or Path(path).suffix.lower() == ZIP)
-    return copied(name, Path(path)) if is_packaged else template(name, Path(path))
+    return copy_scene(name, Path(path)) if is_packaged else template(name, Path(path))
 
 
 def template(job: str, path: Path) -> Path:
@@ -50,7 +50,7 @@ def template(job: str, path: Path) -> Path:
     return path
 
 
-def copied(name: str, path: Path) -> Path:
+def copy_scene(name: str, path: Path) -> Path:
     """Write a packaged scene to a file that is not there yet; to one that ends in .zip all scenes of its job.
 
     What they name goes with them. Raises BadInput.
@@ -60,7 +60,7 @@ def copied(name: str, path: Path) -> Path:
         raise packaged.unknown_problem(name, known)
     ending = suffix(path, (SCENE, ZIP))
     if ending == SCENE:
-        beside = {path.with_name(file): text for file, text in _named(known[name]).items()}
+        beside = {path.with_name(file): text for file, text in _named_files(known[name]).items()}
         contents = {path: known[name].read_text(encoding="utf-8"), **beside}
         for source in contents:
             _check_new(source)
@@ -69,11 +69,11 @@ def copied(name: str, path: Path) -> Path:
     _check_new(path)
     job = packaged.head(known[name]).job
     scenes = [scene for scene in known.values() if packaged.head(scene).job == job]
-    atomically(path, functools.partial(_zipped, scenes))
+    atomically(path, functools.partial(_write_zip, scenes))
     return path
 
 
-def _named(scene: Path) -> dict[str, str]:
+def _named_files(scene: Path) -> dict[str, str]:
     """Files that a packaged scene names, by name, with what stands in them. Raises BadInput."""
     from loomopt.jobs import registry
     from loomopt.scenes.numbers import tables
@@ -91,11 +91,11 @@ def _put(text: str, place: Path) -> None:
     place.write_text(text, encoding="utf-8")
 
 
-def _zipped(scenes: Sequence[Path], place: Path) -> None:
+def _write_zip(scenes: Sequence[Path], place: Path) -> None:
     """Write scenes, and the files that they name, into a zip."""
     contents = {scene.name: scene.read_text(encoding="utf-8") for scene in scenes}
     for scene in scenes:
-        contents |= _named(scene)
+        contents |= _named_files(scene)
     with zipfile.ZipFile(place, "w") as archive:
         for name, text in contents.items():
             archive.writestr(zipfile.ZipInfo(name, STAMP), text, zipfile.ZIP_DEFLATED)

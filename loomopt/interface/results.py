@@ -49,7 +49,7 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         """Of a family each machine by itself."""
         from loomopt.scenes import family
 
-        return tuple(_judged(member, self.scene, family.of_target(self.scene)) for member in self.result.members)
+        return tuple(_to_evaluation(member, self.scene, family.of_target(self.scene)) for member in self.result.members)
 
     def as_dict(self) -> dict[str, Any]:
         """Object that `--json` prints."""
@@ -97,7 +97,7 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         from loomopt.interface.figures import forces as figures
 
         place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
-        drawn: Figure = figures.plot(self.scene, forces.found(self.scene, self.simulate(), self.design), place)
+        drawn: Figure = figures.plot(self.scene, forces.from_curves(self.scene, self.simulate(), self.design), place)
         return drawn
 
     def draw(self) -> "Sketch":
@@ -106,7 +106,7 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         from loomopt.interface.files import outputs
         from loomopt.interface.text import notebook
 
-        return notebook.sketch(self.scene, self.design, outputs.what(self.result))
+        return notebook.sketch(self.scene, self.design, outputs.describe_design(self.result))
 
     def export(self, path: str | os.PathLike[str]) -> Path:
         """Write linkage or cam for the workshop, as `loomopt export` does; return the file. Raises BadInput.
@@ -117,7 +117,7 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         from loomopt.interface.files import outputs
 
         place = Path(arguments.path(path, "path", "a path that ends in .dxf, .svg, .csv or .xlsx", "Name a file"))
-        outputs.linkage(place, self.scene, self.design, outputs.what(self.result))
+        outputs.linkage(place, self.scene, self.design, outputs.describe_design(self.result))
         return place
 
     def report(self, path: str | os.PathLike[str], *results: object) -> Path:
@@ -142,15 +142,15 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         from loomopt.interface.report import animation
 
         place = None if path is None else Path(arguments.path(path, "path", *animation.FILE))
-        return animation.animated(self.scene, self.design, place, outputs.what(self.result))
+        return animation.animate(self.scene, self.design, place, outputs.describe_design(self.result))
 
     def evaluate(self) -> "Evaluation":
         """Figures and limits of the design in its own scene, judged by the limits of its own target."""
         solution.demand_single(self.result, "figures to evaluate")
         design = designs.checked(self.design, self.scene)
         if self.terms:
-            return _judged(self.terms.evaluation(design), self.scene, self.target)
-        return evaluated(self.scene, design, self.target)
+            return _to_evaluation(self.terms.evaluation(design), self.scene, self.target)
+        return evaluate_design(self.scene, design, self.target)
 
     @renamed(beside="measured")
     def simulate(
@@ -216,7 +216,7 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
     def __str__(self) -> str:
         from loomopt.interface.text import answers, layout
 
-        before = None if self._is_today else evaluated(self.scene, None, self.target or None)
+        before = None if self._is_today else evaluate_design(self.scene, None, self.target or None)
         return layout.render(
             answers.evaluation(self.result, self.scene, before.result if before else None), layout.width()
         )
@@ -240,7 +240,7 @@ class Answer(Evaluation):
     @lazy
     def before(self) -> Evaluation | None:
         """Today's machine, evaluated when it is first read."""
-        return _judged(self.result.before, self.scene, self.target) if self.result.before else None
+        return _to_evaluation(self.result.before, self.scene, self.target) if self.result.before else None
 
     def __str__(self) -> str:
         from loomopt.interface.text import answers, layout
@@ -278,15 +278,15 @@ def _html(thing: records.Shown) -> str:
 records.show_by(_html)
 
 
-def evaluated(scene: Scene, design: Mapping[str, float] | None, target: str | None) -> Evaluation:
+def evaluate_design(scene: Scene, design: Mapping[str, float] | None, target: str | None) -> Evaluation:
     """Figures and limits of a design, checked, SI; today's without one. Raises BadInput."""
-    return _judged(report.evaluate(scene, design, target), scene, target_name(scene, target))
+    return _to_evaluation(report.evaluate(scene, design, target), scene, target_name(scene, target))
 
 
-def solved(record: solution.Solution, scene: Scene, target: str | None = None) -> Answer:
+def to_answer(record: solution.Solution, scene: Scene, target: str | None = None) -> Answer:
     """What a solve says as an object to work with; target: as the call named it."""
     return Answer(dataclasses.replace(record, scene=scene, asked=target), record.target)
 
 
-def _judged(evaluated: solution.Evaluated, scene: Scene, target: str) -> Evaluation:
+def _to_evaluation(evaluated: solution.Evaluated, scene: Scene, target: str) -> Evaluation:
     return Evaluation(evaluated if evaluated.scene else dataclasses.replace(evaluated, scene=scene), target)

@@ -14,9 +14,9 @@ from loomopt.base.errors import refusal
 from loomopt.base.quantities import read
 from loomopt.base.units import SI_UNIT, QuantityError, factor, show
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
-from loomopt.picture.chart import COLOURS, Axis, Chart, Charts, Series, fitted
+from loomopt.picture.chart import COLOURS, Axis, Chart, Charts, Series, fit_axis
 from loomopt.picture.shapes import Floats
-from loomopt.picture.table import TextTable, joined
+from loomopt.picture.table import TextTable, unbroken
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words, grouped
 from loomopt.studies.run.rows import Change, Findings, Multiplier, Row, SceneStudy, counted
@@ -77,12 +77,12 @@ def columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> dict[st
         taken = {column.name for columns in parts.values() for column in columns}
         taken |= {"change"} if part == "figures" else set()
         names = dict.fromkeys(name for row in numbers for name in row if name not in taken)
-        parts[part] = _filled(
+        parts[part] = _nonempty(
             NumberColumn(name, units.of(name), factor(units.of(name)), tuple(row.get(name) for row in numbers))
             for name in names
         )
     multipliers = dict.fromkeys(multiplier for row in rows for multiplier in row.multipliers)
-    parts["multipliers"] = _filled(
+    parts["multipliers"] = _nonempty(
         NumberColumn(price.text, *units.price(price), tuple(row.multipliers.get(price) for row in rows))
         for price in multipliers
     )
@@ -178,7 +178,7 @@ def _place_example(study: SceneStudy, rows: Sequence[Row]) -> str:
     return f'"{value:.6g}{"" if column.unit == "1" else f" {column.unit}"}"'
 
 
-def _filled(columns: Iterable[NumberColumn]) -> list[NumberColumn]:
+def _nonempty(columns: Iterable[NumberColumn]) -> list[NumberColumn]:
     return [column for column in columns if any(value is not None for value in column.values)]
 
 
@@ -187,12 +187,12 @@ def _without_rounding(parts: dict[str, list[NumberColumn]]) -> dict[str, list[Nu
     for column in itertools.chain(*parts.values()):
         sizes[column.unit] = max(sizes.get(column.unit, 0.0), *(abs(value or 0.0) for value in column.values))
     return {
-        part: [_cleaned(column, sizes[column.unit]) for column in columns_of_part]
+        part: [_clean(column, sizes[column.unit]) for column in columns_of_part]
         for part, columns_of_part in parts.items()
     }
 
 
-def _cleaned(column: NumberColumn, largest: float) -> NumberColumn:
+def _clean(column: NumberColumn, largest: float) -> NumberColumn:
     tiny = SHOWN_AS_ZERO * largest
     return column._replace(values=tuple(v if v is None or abs(v) > tiny else 0.0 for v in column.values))
 
@@ -304,12 +304,12 @@ def change_sentence(study: SceneStudy, change: Change, si: bool) -> str:
     """A change as a sentence."""
     key = next(iter(study.kinds))
     unit = ColumnUnits(study, si).of(key)
-    limits = [joined(side.text) for side in change.limits]
-    low, high = (joined(show(value, unit)) for value in change.between)
+    limits = [unbroken(side.text) for side in change.limits]
+    low, high = (unbroken(show(value, unit)) for value in change.between)
     if change.at is None:
-        return f"{joined(key)} from {low} to {high}: what binds changes, {', '.join(limits)}"
-    where = f"{low} to {high}" if change.kind == "jump" else joined(show(change.at, unit))
-    return f"{joined(key)} {where}: {', '.join([KINDS[change.kind], *limits])}"
+        return f"{unbroken(key)} from {low} to {high}: what binds changes, {', '.join(limits)}"
+    where = f"{low} to {high}" if change.kind == "jump" else unbroken(show(change.at, unit))
+    return f"{unbroken(key)} {where}: {', '.join([KINDS[change.kind], *limits])}"
 
 
 LINES = 7
@@ -346,7 +346,7 @@ def _chart(panel: NumberColumn, places: Sequence[NumberColumn], findings: Findin
     dots = list[tuple[float, float, str]]()
     for place, (values, point_row) in enumerate(sorted(lines.items())[::step]):
         kind = f"c{place % COLOURS}"
-        label = ", ".join(valued(column, point_row[0]) for column, _ in zip(others, values, strict=True))
+        label = ", ".join(value_text(column, point_row[0]) for column, _ in zip(others, values, strict=True))
         series += [
             Series(*_broken(x[point_row], y[point_row], gaps), kind, label),
             Series(x[point_row], y[point_row], kind, points=True),
@@ -375,7 +375,7 @@ def _axis(values: Floats, name: str = "") -> Axis:
     """Axis that shows all values; of one or two alone that are all at one place, numbered where they are."""
     known = sorted({round(value, 12) for value in values[np.isfinite(values)].tolist()})
     if len(known) != 1:
-        return fitted([values], name=name)
+        return fit_axis([values], name=name)
     room = 0.1 * abs(known[0]) or 1.0
     return Axis(known[0] - room, known[0] + room, known, name)
 
@@ -388,6 +388,6 @@ def _broken(x: Floats, y: Floats, gaps: Sequence[tuple[float, float]]) -> tuple[
     return np.insert(x, list(inner), list(inner.values())), np.insert(y, list(inner), np.nan)
 
 
-def valued(column: NumberColumn, at: int, digits: int = 6) -> str:
+def value_text(column: NumberColumn, at: int, digits: int = 6) -> str:
     """A number of a row with its name and its unit."""
     return f"{column.name} {column.shown[at] or 0.0:.{digits}g}{'' if column.unit == '1' else ' ' + column.unit}"

@@ -150,7 +150,7 @@ EVALUATED = 14
 """Significant digits of what is computed of a given design: two less than float64 has."""
 
 
-def filed(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
+def to_file(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
     """Curves, SI, as a file has them: in the units of the scene's tables, in digits that mean something."""
     from loomopt.model.curves import split
 
@@ -217,7 +217,7 @@ def curves(
         columns, error = curves.sparse_curves(job.sampler(scene, designs.flat(design)), rows, accuracy)
         more |= {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
     if given:
-        more |= {"measured": str(measured), **_put_beside(columns, angles, given), **_told(table)}
+        more |= {"measured": str(measured), **_add_measured(columns, angles, given), **_measurement_notes(table)}
     frame = pd.DataFrame(columns)
     frame.attrs.update(provenance(scene, **more))
     return frame
@@ -236,7 +236,7 @@ def _kinds(columns: "Mapping[str, Floats]") -> dict[str, str]:
     return {name: kinds[unit] for name, unit in named if unit in kinds}
 
 
-def _put_beside(
+def _add_measured(
     columns: "dict[str, Floats]", angles: Sequence[float], measured: Mapping[str, Sequence[float]]
 ) -> dict[str, float]:
     """Add what was measured to curves, in the rows at its angles, rad; return the rms difference of each, SI."""
@@ -257,7 +257,7 @@ def _put_beside(
     return measured_values
 
 
-def _told(table: csv_tables.Table) -> dict[str, object]:
+def _measurement_notes(table: csv_tables.Table) -> dict[str, object]:
     """Precision of measured columns, SI, and how what can be read in two ways was read."""
     precision = {f"precision_{name}": size for name, size in table.precision.items() if size}
     return precision | ({"read": "; ".join(table.remarks)} if table.remarks else {})

@@ -98,7 +98,7 @@ class Chart:
     @lazy
     def y(self) -> Axis:
         """The vertical axis."""
-        return self.upright or fitted([curve.y for curve in self.series], self.levels)
+        return self.upright or fit_axis([curve.y for curve in self.series], self.levels)
 
     @property
     def caption(self) -> str:
@@ -156,7 +156,7 @@ class Charts:
     missing: str = ""
 
 
-def fitted(values: Sequence[Floats], levels: Iterable[float] = (), name: str = "") -> Axis:
+def fit_axis(values: Sequence[Floats], levels: Iterable[float] = (), name: str = "") -> Axis:
     """Axis that shows all values, and levels no farther off than they reach."""
     some = np.concatenate([*values, [math.nan]])
     some = some[np.isfinite(some)]
@@ -213,7 +213,7 @@ def number(value: float, others: Sequence[float]) -> str:
     return f"{rounded:.9g}".replace("-", "−")
 
 
-def thinned(angles: Floats) -> NDArray[np.bool_]:
+def thin_rows(angles: Floats) -> NDArray[np.bool_]:
     """Whether a curve is drawn through each of its rows at angles, deg: every 2 degrees, at corners, at both ends."""
     near = np.abs(angles / EVERY - np.round(angles / EVERY)) < 1e-9
     half = np.abs(2 * angles - np.round(2 * angles)) < 1e-7
@@ -223,6 +223,6 @@ def thinned(angles: Floats) -> NDArray[np.bool_]:
     return np.asarray(needed)
 
 
-def headed(title: str, unit: str) -> str:
+def heading(title: str, unit: str) -> str:
     """Title with its unit, where it has one."""
     return title if unit == "1" else f"{title} [{unit}]"

@@ -76,7 +76,7 @@ def forces(
 ) -> list[Equation]:
     """Write each term, their balance and the crank torque, the crank's motion, then what checks read and demand."""
     at = turning(pose, model)
-    equations = [item for load in model.loads for item in _written(model, load, at, inputs, letter)]
+    equations = [item for load in model.loads for item in _load_equations(model, load, at, inputs, letter)]
     within = dict[str, Expression]()
     for load in model.loads:
         value = balance.inside(systems.sympy(), load, at, inputs)
@@ -116,7 +116,7 @@ def crank_motion(model: JobModel, pose: Motion, inputs: Given, torque: str) -> l
     ]
 
 
-def _written(model: JobModel, load: Acting, pose: Motion, inputs: Given, letter: str) -> Iterator[Equation]:
+def _load_equations(model: JobModel, load: Acting, pose: Motion, inputs: Given, letter: str) -> Iterator[Equation]:
     """Yield a load's term, after the equation of motion of a state."""
     if isinstance(load, State):
         carried_loads = [item for item in model.loads if isinstance(item, Load) and item.name in load.carries]
@@ -141,7 +141,7 @@ def term(load: Acting, pose: Motion, inputs: Given, letter: str) -> Equation:
     """Write a load's term, with where each of its formulas holds."""
     name = symbol(f"{letter}_{load.name}")
     if isinstance(load, Load) and load.tabulated and load.tabulated.key in inputs.own[load.name]:
-        return _tabulated(load, name, inputs)
+        return _table_equation(load, name, inputs)
     if isinstance(load, Load) and load.told:
         rows: list[Case] = [(force(load, pose, inputs, switch), where) for switch, where in load.told.items()]
         alike = len({formula for formula, _ in rows}) == 1
@@ -158,7 +158,7 @@ def term(load: Acting, pose: Motion, inputs: Given, letter: str) -> Equation:
     return Equation(load.name, f"{text(name)} = {', '.join(parts)}, else {text(last)}", written, form)
 
 
-def _tabulated(load: Load[Any], name: Expression, inputs: Given) -> Equation:
+def _table_equation(load: Load[Any], name: Expression, inputs: Given) -> Equation:
     """Say what a load's curve is: of each interval only its own numbers differ."""
     assert load.tabulated is not None
     curve = inputs.own[load.name][load.tabulated.key]
@@ -199,7 +199,7 @@ def check_equations(check: Check[Any], pose: Motion, inputs: Given) -> list[Equa
     """Write each figure and row of an effect that takes no part in the balance, and what it must keep."""
     at = inputs.inputs(systems.sympy(), check, pose)
     values = {name: read(at) for name, read in (*check.quantities.items(), *check.rows.items())}
-    return [item for name, value in values.items() for item in _kept(check, name, value)]
+    return [item for name, value in values.items() for item in _demand_equations(check, name, value)]
 
 
 class WrittenLoading(NamedTuple):
@@ -264,7 +264,7 @@ def _between(joints: Number, name: str) -> Iterator[tuple[str, Expression]]:
         joints.__dict__[name] = type(joint)(type(joint.force)(x, y), moment)
 
 
-def _kept(check: Check[Any], name: str, value: Expression) -> list[Equation]:
+def _demand_equations(check: Check[Any], name: str, value: Expression) -> list[Equation]:
     """Write one figure of a check and what it must keep; a margin, whose name is a phrase, by its demand alone."""
     sp = sympy()
     value = sp.sympify(value).replace(sp.Abs, lambda positive: positive)

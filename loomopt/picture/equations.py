@@ -107,12 +107,12 @@ def sums(
     torque: what the crank's torque is called, and its symbol; within: what output loads take inside the drive besides.
     """
     system, equations = systems.sympy(), []
-    shown = [_shown(load, symbol(f"{letter}_{load.name}")) for load in loads]
+    shown = [_with_symbol(load, symbol(f"{letter}_{load.name}")) for load in loads]
     output, gone = [load for load in shown if load.acts == "output"], balance.carried(loads)
     given = balance.Given({}, {load.name: {} for load in loads})
     if output:
         equations.append(equation("balance", total, balance.output_force(system, shown, pose, given, {})))
-    summed = [_shown(load, total) for load in [item for item in output if item.name not in gone][:1]]
+    summed = [_with_symbol(load, total) for load in [item for item in output if item.name not in gone][:1]]
     summed += [load for load in shown if load.acts == "drive"]
     if summed:
         name, sign = torque
@@ -122,7 +122,7 @@ def sums(
     return equations
 
 
-def _shown(load: Acting, value: Expression) -> Acting:
+def _with_symbol(load: Acting, value: Expression) -> Acting:
     """A load whose force is one symbol, and which no state needs to answer."""
     if isinstance(load, Load):
         return dataclasses.replace(load, force=lambda *_: value, response=None, upon=None, inside=None)
@@ -151,10 +151,10 @@ def relation(name: str, left: Expression, sign: str, right: Expression, where: s
     """Return what a number must keep: sign is "=", "<=" or ">="; where: words that follow."""
     sentence = f"{text(left)} {sign} {text(right)}{f' {where}' if where else ''}"
     form = (left, sign, right, *([where] if where else []))
-    return Equation(name, sentence, functools.partial(_related, left, sign, right, where), (form,))
+    return Equation(name, sentence, functools.partial(_relation_text, left, sign, right, where), (form,))
 
 
-def _related(left: Expression, sign: str, right: Expression, where: str) -> str:
+def _relation_text(left: Expression, sign: str, right: Expression, where: str) -> str:
     written = {"=": "=", "<=": r"\le", ">=": r"\ge"}[sign]
     tail = rf"\quad \text{{{where}}}" if where else ""
     return f"{latex(left)} {written} {latex(right)}{tail}"
@@ -170,10 +170,10 @@ def cases(name: str, left: Expression, rows: Sequence[Case]) -> Equation:
         return equation(name, left, rows[0][0])
     written = ", ".join(f"{_said(value, text)} {_where(when, text)}" for value, when in rows)
     sentence = f"{text(left)} = {written}"
-    return Equation(name, sentence, functools.partial(_parted, left, rows), ((left, "="), *rows))
+    return Equation(name, sentence, functools.partial(_case_text, left, rows), ((left, "="), *rows))
 
 
-def _parted(left: Expression, rows: Sequence[Case]) -> str:
+def _case_text(left: Expression, rows: Sequence[Case]) -> str:
     lines = r" \\ ".join(f"{_said(value, latex)} & {_where(when, latex)}" for value, when in rows)
     return rf"{latex(left)} = \begin{{cases}} {lines} \end{{cases}}"
 

@@ -51,7 +51,7 @@ class ForceArrow(NamedTuple):
         return math.hypot(self.x, self.y)
 
 
-def told(sampler: Sampler, events: Sequence[str], places: Mapping[str, str] = NOWHERE) -> list[ForceArrow]:
+def joint_forces(sampler: Sampler, events: Sequence[str], places: Mapping[str, str] = NOWHERE) -> list[ForceArrow]:
     """Forces in all joints that a design tells by components: just before each event, and at their peaks.
 
     places: the joints of forces that are not called after them.
@@ -102,7 +102,7 @@ class Sheet(NamedTuple):
         strokes, labels, legend = [*self.strokes], [*self.labels], [*self.legend]
         if forces:
             joints = motion(np.array([force.angle for force in forces]))
-            arrows, sizes = drawn(tuple(forces), joints, forces, self.height)
+            arrows, sizes = draw(tuple(forces), joints, forces, self.height)
             strokes, labels = strokes + arrows, labels + sizes
             when = f"just before {self.event} and " if self.event else ""
             legend.append((LAYER, f"F  forces in the joints, {when}at their peaks"))
@@ -110,7 +110,7 @@ class Sheet(NamedTuple):
         return Drawing(self.title, self.height, (*strokes, *texts), tuple(legend), self.units.length, self.measures)
 
 
-def drawn(
+def draw(
     forces: Sequence[ForceArrow], motion: "MechanismMotion", sizes: Mapping[ForceArrow, str], height: float
 ) -> tuple[list[Primitive], list[Label]]:
     """Arrows, as long as forces are large, and their labels; a joint at a peak stands as an open circle.

@@ -33,7 +33,7 @@ def tells_forces(scene: "Scene") -> bool:
     return any(isinstance(effect, Check) and effect.joints for effect in scene.active)
 
 
-def sized(scene: "Scene", forces: "Iterable[ForceArrow]") -> "dict[ForceArrow, str]":
+def force_sizes(scene: "Scene", forces: "Iterable[ForceArrow]") -> "dict[ForceArrow, str]":
     """Forces, each with its size in the scene's unit."""
     return {force: scene.show(force.size, "force", 4) for force in forces}
 
@@ -69,9 +69,9 @@ class JobViews(abc.ABC):
 
     def panels(self, scene: "Scene", design: Numbers, columns: Sequence[str]) -> "tuple[Panel, ...]":
         """Return what a figure of the curves shows: all columns in the words of `words`, unless a job knows better."""
-        from loomopt.picture.panels import arranged
+        from loomopt.picture.panels import arrange
 
-        return arranged(scene, design, columns, self.words())
+        return arrange(scene, design, columns, self.words())
 
     def words(self) -> "Mapping[str, Curve]":
         """Return what is known of the columns of the curves, by name."""

@@ -68,7 +68,7 @@ class Panel(NamedTuple):
     @property
     def labels(self) -> tuple[str, ...]:
         """What each column is called."""
-        return self.names or tuple(_called(column, Curve()) for column in self.columns)
+        return self.names or tuple(_column_title(column, Curve()) for column in self.columns)
 
     @property
     def title(self) -> str:
@@ -82,7 +82,7 @@ def in_units(scene: Scene, panel: Panel) -> Panel:
     return panel._replace(unit=scene.shown_in(kind) if kind else panel.si)
 
 
-def arranged(
+def arrange(
     scene: Scene, design: Mapping[str, float], columns: Sequence[str], words: Mapping[str, Curve]
 ) -> tuple[Panel, ...]:
     """Panels of all columns, limits as levels; effects share theirs, and a motion is shown per second.
@@ -93,25 +93,25 @@ def arranged(
     speed = design.get("speed", scene.operation.get("speed", 1.0))
     curves = {split(POWER)[0]: Curve(peak=PEAK_POWER)} | _of_effects(scene) | dict(words)
     panels: dict[str, Panel] = {}
-    for name, (shown, scale) in _timed(known, float(speed)).items():
+    for name, (shown, scale) in _time_columns(known, float(speed)).items():
         curve = curves.get(shown, curves.get(name, Curve()))
         if curve.shown:
             levels = dict(_levels(curve, scene.limits, 1.0 if shown in curves else scale))
             marked = (*(extreme for extreme in EXTREMES if getattr(curve, extreme)), *curve.at)
-            called, kind = _called(known[shown], curve), _KIND.get(split(known[shown])[1], "curve")
+            called, kind = _column_title(known[shown], curve), _KIND.get(split(known[shown])[1], "curve")
             title = f"{kind}s {curve.panel}" if curve.panel else called
             alone = Panel((known[shown],), title, (called,), marked, Frozen(levels), curve.wide)
-            panels[title] = _joined(panels[title], alone) if title in panels else alone
+            panels[title] = _join(panels[title], alone) if title in panels else alone
     return tuple(panels.values())
 
 
-def _called(column: str, curve: Curve) -> str:
+def _column_title(column: str, curve: Curve) -> str:
     """A column's name in words with its symbol: "crank torque Md"; in its own words without any."""
     symbol = split(column)[0]
     return f"{curve.name} {symbol}" if curve.name else symbol.replace("_", " ")
 
 
-def _joined(panel: Panel, other: Panel) -> Panel:
+def _join(panel: Panel, other: Panel) -> Panel:
     return panel._replace(columns=(*panel.columns, *other.columns), names=(*panel.names, *other.names))
 
 
@@ -135,7 +135,7 @@ def _of_effects(scene: Scene) -> dict[str, Curve]:
     return curves
 
 
-def _timed(known: Collection[str], speed: float) -> dict[str, tuple[str, float]]:
+def _time_columns(known: Collection[str], speed: float) -> dict[str, tuple[str, float]]:
     """Name → (name of what is shown for it, its size over the first's): where there is one, the one by time."""
     orders = {f"{name}_{k}": (f"{name}_{'t' * k}", speed**k) for name in known for k in range(1, ORDERS + 1)}
     instead = {name: later for name, later in orders.items() if later[0] in known}
@@ -153,7 +153,7 @@ def _levels(curve: Curve, limits: Mapping[str, LimitRange], scale: float) -> Ite
             yield f"{figure} >=", (scale * limit.min,)
 
 
-def each(columns: Sequence[str]) -> tuple[Panel, ...]:
+def single_panels(columns: Sequence[str]) -> tuple[Panel, ...]:
     """A panel for every column that has a unit."""
     return tuple(Panel((name,)) for name in columns if COLUMN.fullmatch(name) and name != ANGLE)
 
@@ -164,7 +164,7 @@ TWIST_SAMPLES = 3600
 """Of one turn: a largest value is right to a few digits, as it is told."""
 
 
-def twisted(scene: Scene, sampler: Sampler) -> tuple[str, ...]:
+def twist_remarks(scene: Scene, sampler: Sampler) -> tuple[str, ...]:
     """Say where a state's coordinate exceeds a tenth of the output's travel while a load with corners acts on it."""
     model, names = sampler.model, []
     pieces, u = sampler.grid(TWIST_SAMPLES)

@@ -89,7 +89,7 @@ def _found(wish: LabelWish, strokes: Floats, taken: Sequence[LabelSpot], unit: f
                 way = _between(spot, unit)
                 has_leader = leader * unit < _gap(spot) < OUTSIDE * unit
                 if cost < least and not (has_leader and _meets(way, taken, unit)):
-                    cost += BEHIND if _crossed(way, strokes, unit) else 0.0
+                    cost += BEHIND if _crosses(way, strokes, unit) else 0.0
                     best, least = (spot, cost) if cost < least else (best, least)
     raise AssertionError("rings go on without end")
 
@@ -138,7 +138,7 @@ def _meets(way: Floats, taken: Sequence[LabelSpot], unit: float) -> bool:
     return any(np.any(_within(way, box.left - r, box.bottom - r, box.right + r, box.top + r)) for box in boxes)
 
 
-def _crossed(way: Floats, strokes: Floats, unit: float) -> bool:
+def _crosses(way: Floats, strokes: Floats, unit: float) -> bool:
     """Say whether a stroke crosses the way from a point to its box; those at the point itself do not count."""
     inner = way[np.hypot(*(way - way[0]).T) > 0.8 * unit]
     if not len(inner):
@@ -336,7 +336,7 @@ def plain(text: str) -> str:
     return "".join(character if character.isprintable() else " " for character in text)
 
 
-def scaled(drawing: Drawing, size: float) -> Drawing:
+def scale_drawing(drawing: Drawing, size: float) -> Drawing:
     """A drawing with every length times a size, such as 1000 for one whose unit is 1 mm."""
 
     def of(point: Point) -> Point:

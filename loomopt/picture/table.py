@@ -30,17 +30,17 @@ class TextTable:
     more: str = ""
 
 
-def joined(text: str) -> str:
+def unbroken(text: str) -> str:
     """Text that stays on one line, such as "l1 >= 30 mm"."""
     return text.replace(" ", JOINED)
 
 
 def call(text: str) -> str:
     """A call of the shell that, where it is too long for a line, goes on in the next as the shell reads it."""
-    return joined(text).replace(f"{JOINED}--", f"{OPTION}--")
+    return unbroken(text).replace(f"{JOINED}--", f"{OPTION}--")
 
 
-def spaced(text: str) -> str:
+def restore_spaces(text: str) -> str:
     """Text as it is printed."""
     return text.replace(JOINED, " ").replace(OPTION, " ")
 
@@ -84,6 +84,6 @@ def words(name: str, values: Sequence[str], head: str | None = None) -> Column:
     return Column(name, values, name if head is None else head, values, right=False)
 
 
-def written(value: float | None, digits: int = 6) -> str:
+def number_text(value: float | None, digits: int = 6) -> str:
     """Number as people read it; "" for none."""
     return "" if value is None or math.isnan(value) else f"{value:.{digits}g}"

@@ -6,7 +6,7 @@ import pytest
 
 from loomopt.interface.cli.app import run
 from loomopt.interface.text import layout
-from loomopt.picture.table import TextTable, spaced
+from loomopt.picture.table import TextTable, restore_spaces
 
 M0 = ("--over", "operation.M0=700:760:60 N*m", "--over", "operation.speed=500:600:100 rpm", "--with", "gravity")
 FRONT = ("shedding-static", "--minimise", "K1", "--against", "contact_max", "--points", "3")
@@ -75,16 +75,16 @@ def test_no_digit_is_cut_and_what_is_asked_for_is_there(printed, command, column
 def test_columns_that_have_gone_are_named_with_how_to_see_them(printed, command, columns):
     texts, parts = printed(command)
     for grid in (part for part in parts if isinstance(part, TextTable)):
-        shown, told = layout.narrowed(grid, columns)
+        shown, told = layout.narrow(grid, columns)
         missing = len(grid.columns) - len(shown.columns)
         assert bool(missing) == bool(told)
         if told:
             wide = int(re.search(r"a terminal of (\d+) columns", told)[1])
             assert wide > columns
-            assert layout.narrowed(grid, wide) == (grid, "")
-            assert layout.narrowed(grid, wide - 1)[1]
+            assert layout.narrow(grid, wide) == (grid, "")
+            assert layout.narrow(grid, wide - 1)[1]
             said = " ".join(texts[columns].split())
-            assert " ".join(spaced(told).split()) in said
+            assert " ".join(restore_spaces(told).split()) in said
     assert "Not shown here" not in texts[None]
 
 

@@ -55,10 +55,10 @@ def test_one_unit_and_what_differs(light, inches):
 def test_each_is_judged_in_its_own_scene_or_all_in_one(light):
     heavy = lo.evaluate("beatup-heavy", light)
     own = lo.compare(light, heavy)
-    assert own.designs[0].found.figures["M3_fdc"] != own.designs[1].found.figures["M3_fdc"]
+    assert own.designs[0].evaluation.figures["M3_fdc"] != own.designs[1].evaluation.figures["M3_fdc"]
     both = lo.compare(light, heavy, scene="beatup")
-    assert both.designs[0].found.figures == both.designs[1].found.figures
-    assert both.designs[0].found.figures == lo.evaluate("beatup", light).figures
+    assert both.designs[0].evaluation.figures == both.designs[1].evaluation.figures
+    assert both.designs[0].evaluation.figures == lo.evaluate("beatup", light).figures
 
 
 def test_limits_that_are_not_held_are_marked(light):

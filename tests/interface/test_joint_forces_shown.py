@@ -10,7 +10,7 @@ from support import overlaps
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface.cli import app
-from loomopt.interface.forces import TurnedForce, found
+from loomopt.interface.forces import TurnedForce, from_curves
 from loomopt.jobs import registry
 from loomopt.physics.effects.kinds import Check, Motion
 from loomopt.physics.schema import Figure, Table
@@ -44,7 +44,7 @@ def scene(monkeypatch):
 
 
 def test_peaks_and_means_are_those_of_the_closed_form(scene):
-    forces = found(scene, lo.simulate(scene))
+    forces = from_curves(scene, lo.simulate(scene))
     assert list(forces) == ["turns", "along"]
     for power in (1.0, 3.0, 10 / 3):
         assert forces["turns"].mean(power) == pytest.approx(100.0, rel=1e-12)
@@ -92,7 +92,7 @@ def test_each_force_is_shown_on_the_parts_that_it_is_between(name):
     own = lo.load(name).with_effect("joint_forces", *(["head_inertia"] if name == "rapier" else []))
     own = own.update(LEVER) if name == "shedding" else own
     evaluated = lo.evaluate(own)
-    forces = found(own, evaluated.simulate(), evaluated.design)
+    forces = from_curves(own, evaluated.simulate(), evaluated.design)
     for force, parts in OWN[name].items():
         assert list(forces[force].headings) == parts
         for part in parts:
@@ -113,7 +113,7 @@ def test_each_force_is_shown_on_the_parts_that_it_is_between(name):
 
 def test_a_two_force_member_carries_its_force_along_its_line():
     own = lo.load("beatup").with_effect("joint_forces")
-    x, y = found(own, lo.simulate(own))["force_C"].on("rod")
+    x, y = from_curves(own, lo.simulate(own))["force_C"].on("rod")
     assert np.max(np.abs(y)) < 1e-9 * np.max(np.abs(x))
 
 

@@ -68,7 +68,7 @@ def drawings(job):
 @pytest.mark.parametrize("name", NAMES)
 def test_drawings_of_packaged_scenes_are_clear_today_and_solved(name):
     scene, solved = lo.load(name), references.design(name)
-    found = outputs.what(lo.evaluate(scene, solved).result, scene.schema.default_target, "optimal")
+    found = outputs.describe_design(lo.evaluate(scene, solved).result, scene.schema.default_target, "optimal")
     for design, said in (({}, outputs.DrawnSubject("today's machine")), (solved, found)):
         assert clear.faults_of(outputs.drawing(scene, design, said)) == []
 

@@ -20,7 +20,7 @@ SCENE = lo.load("beatup").with_effect("joint_forces")
 
 def told(scene):
     job = registry.of(scene)
-    return force_arrows.told(job.sampler(scene, job.today(scene)), ("front dead centre",))
+    return force_arrows.joint_forces(job.sampler(scene, job.today(scene)), ("front dead centre",))
 
 
 def test_forces_are_told_at_front_dead_centre_and_at_their_peaks():

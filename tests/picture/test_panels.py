@@ -7,7 +7,7 @@ import pytest
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.model.curves import ANGLE, split
-from loomopt.picture.panels import BY_EFFECT, DRIVE, Curve, Panel, arranged, each, in_units
+from loomopt.picture.panels import BY_EFFECT, DRIVE, Curve, Panel, arrange, in_units, single_panels
 from loomopt.scenes import packaged
 
 SCENE = lo.load("beatup")
@@ -36,7 +36,7 @@ def test_each_column_stands_in_one_panel_with_others_of_its_unit(name):
 
 def test_what_is_known_by_time_is_shown_by_time_alone():
     columns = ("psi [rad]", "psi_1 [1]", "psi_2 [1]", "psi_t [rad/s]", "psi_tt [rad/s^2]", "x_1 [m/rad]")
-    panels = arranged(SCENE, {}, columns, {})
+    panels = arrange(SCENE, {}, columns, {})
     assert shown(panels) == ["psi [rad]", "psi_t [rad/s]", "psi_tt [rad/s^2]", "x_1 [m/rad]"]
 
 
@@ -55,7 +55,7 @@ def test_a_limit_is_a_level_on_both_sides_of_a_magnitude_only(figure, levels):
     scene = SCENE.update({"limits.peak_torque.max": "90 N*m"})
     figures: Any = {figure: "peak_torque"}
     words = {"Md": Curve("crank torque", **figures)}
-    (panel,) = arranged(scene, {}, ("Md [N*m]",), words)
+    (panel,) = arrange(scene, {}, ("Md [N*m]",), words)
     assert panel.levels == {"peak_torque <=": levels}
     assert panel.marked == (figure,)
     assert panel.title == "crank torque Md"
@@ -65,15 +65,15 @@ def test_a_limit_by_the_crank_angle_is_a_level_by_time_at_the_designs_own_speed(
     scene = SCENE.update({"limits.peak_torque.max": "90 N*m"})
     words = {"S_2": Curve("head", peak="peak_torque")}
     for design, speed in (({}, scene.operation["speed"]), ({"speed": 10.0}, 10.0)):
-        _, panel = arranged(scene, design, ("S [m]", "S_2 [m/rad^2]", "S_tt [m/s^2]"), words)
+        _, panel = arrange(scene, design, ("S [m]", "S_2 [m/rad^2]", "S_tt [m/s^2]"), words)
         assert panel.columns == ("S_tt [m/s^2]",)
         assert panel.levels == {"peak_torque <=": (90.0 * speed**2, -90.0 * speed**2)}
 
 
 def test_a_curve_that_is_not_shown_has_no_panel_and_a_table_as_it_stands_has_one_each():
     columns = (ANGLE, "a [N]", "b [N]", "words")
-    assert shown(arranged(SCENE, {}, columns, {"a": Curve(shown=False)})) == ["b [N]"]
-    assert each(columns) == (Panel(("a [N]",)), Panel(("b [N]",)))
+    assert shown(arrange(SCENE, {}, columns, {"a": Curve(shown=False)})) == ["b [N]"]
+    assert single_panels(columns) == (Panel(("a [N]",)), Panel(("b [N]",)))
 
 
 def test_a_panel_is_shown_in_the_readers_units_and_what_has_none_in_si():

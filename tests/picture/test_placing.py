@@ -126,10 +126,10 @@ def test_the_same_labels_stand_in_the_same_places_whatever_comes_after_them():
 def test_a_drawing_of_another_size_has_its_labels_in_the_same_places(size):
     """By powers of two, in which floats err alike."""
     wanted, strokes = crowded(2)
-    larger = shapes.scaled(Drawing("", 1.0, tuple(strokes)), size)
+    larger = shapes.scale_drawing(Drawing("", 1.0, tuple(strokes)), size)
     near = [label._replace(near=Point(size * label.near.x, size * label.near.y)) for label in wanted]
     found = place(near, larger.primitives, size)
-    once: Any = shapes.scaled(Drawing("", 1.0, tuple(place(wanted, strokes, 1.0))), size).primitives
+    once: Any = shapes.scale_drawing(Drawing("", 1.0, tuple(place(wanted, strokes, 1.0))), size).primitives
     for one, other in zip(found, once, strict=True):
         first, second = (np.array(each.points if isinstance(each, Line) else [each.at]) for each in (one, other))
         assert first == pytest.approx(second, rel=1e-12, abs=1e-12 * size)

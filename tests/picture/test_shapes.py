@@ -24,7 +24,7 @@ from loomopt.picture.shapes import (
     extent,
     marks,
     plain,
-    scaled,
+    scale_drawing,
     text_box,
 )
 
@@ -41,11 +41,11 @@ SHEET = Drawing("", 0.2, (*STROKES, TEXT))
 @given(st.integers(-8, 12))
 def test_scaling_by_a_power_of_two_scales_whatever_is_measured_to_the_last_bit(power):
     size = 2.0**power
-    larger = scaled(SHEET, size)
+    larger = scale_drawing(SHEET, size)
     assert list(extent(larger)) == [size * side for side in extent(SHEET)]
     for one, other in zip(SHEET.primitives, larger.primitives, strict=True):
         assert np.array_equal(marks(other, larger.height), size * marks(one, SHEET.height))
-    assert scaled(larger, 1 / size) == SHEET
+    assert scale_drawing(larger, 1 / size) == SHEET
 
 
 @pytest.mark.parametrize("stroke", STROKES, ids=lambda stroke: type(stroke).__name__)

@@ -151,7 +151,7 @@ def test_a_row_that_misses_its_goal_is_never_called_just_optimal(serial):
     answer = serial.answer(0)
     assert "optimal but M3_fdc not reached" in repr(answer)
     assert answer.to_frame()["outcome"].tolist() == ["optimal but M3_fdc not reached"]
-    assert outputs.what(answer.result).shortfall == "M3_fdc not reached"
+    assert outputs.describe_design(answer.result).shortfall == "M3_fdc not reached"
 
 
 def test_changes_along_a_sweep_name_the_limits_that_become_active_or_inactive(serial):

@@ -17,18 +17,18 @@ import typer
 from loomopt.base import __version__, interrupts
 from loomopt.base.errors import BadInput, blamed, clean
 from loomopt.interface.cli import commands, pages, studies
-from loomopt.interface.cli.commands import printed, remarked, tell
-from loomopt.interface.cli.options import NO_CHANGES, Decimal, Json, Problem, SceneOptions, Target, expanded
+from loomopt.interface.cli.commands import print_json, print_remarks, tell
+from loomopt.interface.cli.options import NO_CHANGES, Decimal, Json, Problem, SceneOptions, Target, expand
 from loomopt.interface.cli.shell import (
     DIFFERS,
     call_progress,
     former_names_as_remarks,
     mistake,
+    name_option,
     only,
     read_number,
     read_steps,
     remark,
-    worded,
 )
 
 HEADER = Path("include", "coin-or", "IpoptConfig.h")
@@ -132,9 +132,9 @@ def solve(
             remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer.result, scene, comma)))
         except BadInput as error:
             unwritten = error
-    remarked(scene, answer.design)
+    print_remarks(scene, answer.design)
     if as_json:
-        printed(answer)
+        print_json(answer)
     else:
         from loomopt.interface.text import answers, layout
 
@@ -260,7 +260,7 @@ def application(words: list[str]) -> typer.Typer:
     app.callback(invoke_without_command=True)(start)
     for name in set(words[:1]) & COMMANDS.keys() or COMMANDS:
         epilog = f"For example: {EXAMPLES[name]}" if name in EXAMPLES else None
-        app.command(name, epilog=epilog)(expanded(COMMANDS[name]))
+        app.command(name, epilog=epilog)(expand(COMMANDS[name]))
     return app
 
 
@@ -273,7 +273,7 @@ def run(arguments: list[str] | None = None) -> int:
     except typer.Exit as error:
         status = error.exit_code
     except BadInput as error:
-        remark("\n".join(f"loomopt: {line}" for line in str(worded(error)).split("\n")))
+        remark("\n".join(f"loomopt: {line}" for line in str(name_option(error)).split("\n")))
         return BAD_INPUT
     except CommandLineError as error:
         remark(f"loomopt: {mistake(error)}")

@@ -46,7 +46,7 @@ def write(paths: Sequence[Path] | None, one: Callable[[Path], object]) -> None:
         remark(f"Wrote {path}")
 
 
-def remarked(scene: "Scene", design: "DesignGiven") -> None:
+def print_remarks(scene: "Scene", design: "DesignGiven") -> None:
     """Say on stderr what a reader of a design's figures should know."""
     from loomopt.jobs import registry
     from loomopt.scenes import designs
@@ -55,7 +55,7 @@ def remarked(scene: "Scene", design: "DesignGiven") -> None:
         remark(f"Remark: {text}.")
 
 
-def printed(evaluation: "Evaluation") -> None:
+def print_json(evaluation: "Evaluation") -> None:
     """Print one JSON object."""
     from loomopt.interface.files import outputs
 
@@ -103,7 +103,7 @@ def new(
     if (file is None) == (start is None):
         remedy = "Write `loomopt new JOB FILE`, or `loomopt new --from NAME FILE`"
         raise refusal("it takes a job and a file, or a packaged problem and a file", "", "new", remedy=remedy)
-    path = listing.copied(start, Path(job)) if start is not None else listing.template(job, file or Path())
+    path = listing.copy_scene(start, Path(job)) if start is not None else listing.template(job, file or Path())
     zipped = path.suffix.lower() == listing.ZIP
     scene = f"{start}.toml" if zipped else path
     then = "unpack it, then " if zipped else ""
@@ -137,18 +137,20 @@ def show(
 
     scene, given, name, status = read_request(problem, design, None, changes.call)
     parts = (
-        outputs.what(api.evaluate(scene, given, name).result, name, status) if given and (figure or animate) else None
+        outputs.describe_design(api.evaluate(scene, given, name).result, name, status)
+        if given and (figure or animate)
+        else None
     )
     write(figure, lambda path: outputs.picture(path, scene, given, parts))
     if animate:
         from loomopt.interface.report import animation
 
         for path in animate:
-            animation.checked(path)
-        write(animate, lambda path: animation.animated(scene, given, path, parts))
+            animation.check_file(path)
+        write(animate, lambda path: animation.animate(scene, given, path, parts))
     shown: list[str | TextTable] = [*scenes.equations(scene)] if equations else []
     shown += glossary.parts(scene) if symbols else []
-    shown += glossary.printed(scene) if sources else []
+    shown += glossary.source_tables(scene) if sources else []
     if shown or not (figure or animate):
         layout.show(*(shown or scenes.parts(scene)))
 
@@ -165,9 +167,9 @@ def evaluate(
 
     scene, given, name, _ = read_request(problem, design, target, changes.call)
     evaluation = api.evaluate(scene, given, name)
-    remarked(scene, given)
+    print_remarks(scene, given)
     if as_json:
-        printed(evaluation)
+        print_json(evaluation)
         return
     from loomopt.interface.text import answers, layout
 
@@ -226,7 +228,7 @@ def simulate(
         check_numbers(relative, 1)
     force_parts = scenes.forces(scene, api.simulate(scene, given, name), given) if forces else ()
     compared = [scenes.beside(scene, api.simulate(scene, given, name, measured=beside))] if beside else []
-    subject = outputs.what(api.evaluate(scene, given, name).result, name, status) if given and out else None
+    subject = outputs.describe_design(api.evaluate(scene, given, name).result, name, status) if given and out else None
     for path in out or ():
         if forces and path.suffix.lower() in outputs.PICTURES:
             api.evaluate(scene, given, name).plot_forces(path)
@@ -239,7 +241,7 @@ def simulate(
         layout.show(*scenes.curves(scene, given, layout.width()), *compared)
     elif compared:
         layout.show(*compared)
-    remarked(scene, given)
+    print_remarks(scene, given)
 
 
 def budget(
@@ -262,7 +264,7 @@ def budget(
     scene, given, _, _ = read_request(problem, design, None, changes.call)
     irregularity = None if fluctuation is None else read_number("--fluctuation", fluctuation, float)
     result = compute(scene, given, irregularity)
-    remarked(scene, given)
+    print_remarks(scene, given)
     tell(as_json, result.as_dict, result.tables)
     write(figures, result.plot)
 
@@ -289,11 +291,11 @@ def export(
 
     comma = sheets.decimal_comma(decimal)
     scene, given, name, status = read_request(problem, design, target, changes.call)
-    subject = outputs.what(api.evaluate(scene, given, name).result, name, status) if given else None
+    subject = outputs.describe_design(api.evaluate(scene, given, name).result, name, status) if given else None
     how = outputs.workshop(dxf, arcs, only)
     outputs.check_workshop(out, how)
     write(out, lambda path: outputs.linkage(path, scene, given, subject, comma, how))
-    remarked(scene, given)
+    print_remarks(scene, given)
 
 
 FIRST: dict[str, Callable[..., None]] = {"list": list_problems, "new": new, "schema": schema, "show": show}

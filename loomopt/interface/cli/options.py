@@ -140,7 +140,7 @@ NO_CHANGES, ALONE, NO_STORE, NO_TABLE = SceneOptions(), ComputerOptions(), Store
 """Defaults of commands."""
 
 
-def expanded(command: Callable[..., None]) -> Callable[..., None]:
+def expand(command: Callable[..., None]) -> Callable[..., None]:
     """Command whose groups of options are parameters of their own, as Typer reads them."""
     known = inspect.signature(command).parameters.values()
     groups = {parameter.name: parameter.annotation for parameter in known if _is_group(parameter.annotation)}

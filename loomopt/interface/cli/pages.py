@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from loomopt.interface.cli.commands import remarked, tell, write
+from loomopt.interface.cli.commands import print_remarks, tell, write
 from loomopt.interface.cli.options import NO_CHANGES, NO_TABLE, Json, SceneOptions, TableOptions
 from loomopt.interface.cli.shell import call_progress, only, remark
 
@@ -103,18 +103,21 @@ def _checked_input(
         remedy = "Leave out --target, --set, --with, --without and --free, or evaluate the design in a scene of its own"
         raise refusal("it is judged as it was found", "", thing, remedy=remedy)
     if store:
-        tables = store_file.recalled(Path(thing))
+        tables = store_file.read_studies(Path(thing))
         return Input(lambda say: [document.of_study(table.study, table.solved) for table in tables])
     if answer:
-        stored = answer_file.recalled(answer)
-        _check_studies(stored.found.scene, stored.found.target or None, studies)
+        stored = answer_file.read_answer(answer)
+        evaluation = stored.evaluation
+        _check_studies(evaluation.scene, evaluation.target or None, studies)
         return Input(
-            lambda say: document.of_answer(stored.found, _beside(stored.found, studies, say), stored.doubts),
-            stored.found.scene,
+            lambda say: document.of_answer(
+                stored.evaluation, _run_studies(stored.evaluation, studies, say), stored.doubts
+            ),
+            stored.evaluation.scene,
         )
     scene = changes.scene(thing)
     _check_studies(scene, target, studies)
-    return Input(lambda say: _solved(scene, target, prove, studies, say), scene)
+    return Input(lambda say: _solve(scene, target, prove, studies, say), scene)
 
 
 def _check_studies(scene: "Scene", target: str | None, studies: Sequence[str]) -> None:
@@ -140,18 +143,18 @@ def _check_studies(scene: "Scene", target: str | None, studies: Sequence[str]) -
         effects.plan_effects(scene, name)
 
 
-def _solved(scene: "Scene", target: str | None, prove: bool, studies: Sequence[str], say: Say) -> "list[Chapter]":
+def _solve(scene: "Scene", target: str | None, prove: bool, studies: Sequence[str], say: Say) -> "list[Chapter]":
     """Chapters of a scene, which is solved."""
     from loomopt.interface import api
     from loomopt.interface.report import document
 
     say(f"solving {scene.name}")
     solved = api.solve(scene, target, prove=prove, on_step=say)
-    remarked(scene, solved.design)
-    return document.of_answer(solved, _beside(solved, studies, say))
+    print_remarks(scene, solved.design)
+    return document.of_answer(solved, _run_studies(solved, studies, say))
 
 
-def _beside(evaluation: "Evaluation", studies: Sequence[str], say: Say) -> list[object]:
+def _run_studies(evaluation: "Evaluation", studies: Sequence[str], say: Say) -> list[object]:
     """Return what studies find of a design in its scene, each as its own command does by default. Raises BadInput."""
     made = []
     for name in studies:
@@ -217,7 +220,8 @@ def compare(
     comma = files.comma
     outputs.check_files(figure or (), files.out or ())
     designs: list[Any] = [
-        answer if answer == comparison.TODAY else answer_file.recalled(_answer(answer)).found for answer in answers
+        answer if answer == comparison.TODAY else answer_file.read_answer(_answer(answer)).evaluation
+        for answer in answers
     ]
     scene = registry.load(within) if within else None
     names = ["" if answer == comparison.TODAY else Path(answer).stem for answer in answers]

@@ -168,7 +168,7 @@ def former_names_as_remarks() -> Iterator[None]:
         yield
 
 
-def worded(error: BadInput) -> BadInput:
+def name_option(error: BadInput) -> BadInput:
     """Error that names the option of an argument, as the command line calls it."""
     if error.key not in OPTIONS:
         return error

@@ -63,7 +63,7 @@ class RunOptions(Options):
             from loomopt.interface.report import animation
 
             for path in self.animate:
-                animation.checked(path)
+                animation.check_file(path)
         store = self.rows.store
         for path in (*(self.table.out or ()), *(self.figure or ()), *(self.animate or ())):
             if store and path.resolve() == store.resolve():
@@ -102,7 +102,7 @@ def sweep(
     from loomopt.studies.sweep import plan_sweep
 
     scene = changes.scene(problem)
-    ranges = _parted(over, "--over", "operation.M0=600:900:25 N*m", "KEY=LO:HI:STEP UNIT")
+    ranges = _split_items(over, "--over", "operation.M0=600:900:25 N*m", "KEY=LO:HI:STEP UNIT")
     raise typer.Exit(run(plan_sweep(scene, ranges, target), how))
 
 
@@ -134,7 +134,7 @@ def pareto(
 
     scene = changes.scene(problem)
     axes = _axes(minimise or [], maximise or [], against)
-    ranges = front.si(scene, _parted(bounds or [], "--range", "m4e=0:5 kg", "B=LO:HI UNIT"))
+    ranges = front.si(scene, _split_items(bounds or [], "--range", "m4e=0:5 kg", "B=LO:HI UNIT"))
     count = None if points is None else read_number("--points", points, int)
     whose = front.demanding(scene, target)
     study = front.trade(
@@ -159,7 +159,7 @@ def _axes(minimise: list[str], maximise: list[str], against: str) -> tuple[str, 
     return sought[0], against
 
 
-def _parted(items: list[str], option: str, example: str, form: str) -> dict[str, str]:
+def _split_items(items: list[str], option: str, example: str, form: str) -> dict[str, str]:
     """Key → what an option gives for it. Raises BadInput."""
     from loomopt.base.errors import refusal
 

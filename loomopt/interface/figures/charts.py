@@ -11,7 +11,7 @@ from loomopt.base.errors import BadInput
 from loomopt.interface.figures.figure import COLOURS, STYLES, Entry, below, frame, head, own_style, page, put
 from loomopt.picture.chart import Axis, Bars, Chart, Charts
 from loomopt.picture.shapes import Drawing, extent, plain
-from loomopt.picture.table import spaced
+from loomopt.picture.table import restore_spaces
 
 ONE_COLUMN = 5
 """Panels that stand one below the other; more stand in two columns."""
@@ -55,7 +55,7 @@ def draw(charts: Charts, drawings: Sequence[tuple[str, Drawing]] = ()) -> Any:
         raise BadInput(f"there is nothing to draw: {charts.missing}", remedy="Look at the reasons in the table")
     alone, columns = charts.shared and len(shown) == 1, 1 if len(shown) <= ONE_COLUMN else 2
     rows = math.ceil(len(shown) / columns)
-    notes = _numbered(charts.notes)
+    notes = _number_notes(charts.notes)
     heights = [max(_height(chart, charts, len(shown)) for chart in shown[row::rows]) for row in range(rows)]
     heights += [LINE * len(notes)] if notes else []
     width, high = WIDTH + (columns - 1) * MORE, sum(heights) + rows * ABOVE + FOOT
@@ -246,11 +246,11 @@ def _run(places: Sequence[float], apart: float) -> list[float]:
     return [middle - half + apart * k for k in range(len(places))]
 
 
-def _numbered(notes: Sequence[str]) -> list[str]:
+def _number_notes(notes: Sequence[str]) -> list[str]:
     """Lines of the list of notes, numbered, wrapped to the page."""
     lines: list[str] = []
     for number, note in enumerate(notes, 1):
-        first, *others = (plain(spaced(line)) for line in textwrap.wrap(note, LONGEST, break_long_words=False))
+        first, *others = (plain(restore_spaces(line)) for line in textwrap.wrap(note, LONGEST, break_long_words=False))
         lines += [f"{number}  {first}", *(f"     {line}" for line in others)]
     return lines
 

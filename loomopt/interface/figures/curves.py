@@ -14,7 +14,7 @@ from loomopt.interface.figures.figure import COLOURS, HEAD_SIZE, STYLES, Entry, 
 from loomopt.model.curves import ANGLE, split
 from loomopt.physics.cycle import Floats
 from loomopt.picture.job_views import Marks, Span
-from loomopt.picture.panels import Panel, each
+from loomopt.picture.panels import Panel, single_panels
 from loomopt.picture.shapes import plain
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class DrawnTurn(NamedTuple):
         """The angle after which the curves repeat, deg: a turn, or as many as the table covers."""
         return 360.0 * max(1, round(float(self.angles[-1] - self.angles[0]) / 360.0))
 
-    def told(self, angle: float) -> str:
+    def place_text(self, angle: float) -> str:
         """A crank angle, deg, as text."""
         return f"{angle:.2f} deg" if self.unit == "deg" else show(math.radians(angle), self.unit, 5)
 
@@ -82,10 +82,10 @@ def curves(
     """
     if path:
         files.suffix(path, figure.SUFFIXES)
-    panels = panels or each(tuple(frame.columns))
+    panels = panels or single_panels(tuple(frame.columns))
     if not panels or ANGLE not in frame:
         raise ValueError("a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`")
-    design, before = turned(frame, marks or {}, unit), turned(*today, unit) if today else None
+    design, before = drawn_turn(frame, marks or {}, unit), drawn_turn(*today, unit) if today else None
     with figure.own_style(title, *(marks or {}), *(text for panel in panels for text in (panel.title, *panel.labels))):
         page, cells = _grid(panels, title, f"{angle} phi [{unit}]")
         entries = [_panel(cell.axes, cell.panel, design, before) for cell in cells]
@@ -94,7 +94,7 @@ def curves(
         heads = []
         for cell, shown in zip(cells, entries, strict=True):
             names = _mark(cell.axes, design)
-            label = f"{cell.panel.title}{_bracketed(cell.panel)}"
+            label = f"{cell.panel.title}{_unit_text(cell.panel)}"
             heads.append(head(cell.axes, label, shown, names if cell.first else ()) / 72)
         page.finish(_height(cells, heads) + foot)
     if path:
@@ -102,7 +102,7 @@ def curves(
     return page
 
 
-def turned(frame: "pd.DataFrame", marks: Marks, unit: str) -> DrawnTurn:
+def drawn_turn(frame: "pd.DataFrame", marks: Marks, unit: str) -> DrawnTurn:
     """A table's curves with angles that never fall, closed where the table covers a turn but for its end."""
     angles = np.degrees(np.unwrap(frame[ANGLE].to_numpy(dtype=float)))
     closes = 350.0 < angles[-1] - angles[0] < 360.0 - SAME
@@ -157,7 +157,7 @@ def _both() -> list[Entry]:
     return [(design, "design"), (Line2D([], [], color=TODAY, linestyle=DASHED), "today, dashed")]
 
 
-def _bracketed(panel: Panel) -> str:
+def _unit_text(panel: Panel) -> str:
     """Unit a panel is shown in, in brackets; "" of a pure number."""
     unit = shown_unit(panel)
     return "" if unit == "1" else f" [{unit}]"
@@ -179,7 +179,7 @@ def _panel(axes: Any, panel: Panel, design: DrawnTurn, before: DrawnTurn | None)
         (line,) = axes.plot(design.angles, values, color=colour, linewidth=1.4, linestyle=style, label=plain(label))
         if label != panel.title:
             entries.append((line, label))
-        shown = column_measured(panel.columns[place])
+        shown = measured_column(panel.columns[place])
         if shown in design.columns:
             (dots,) = axes.plot(
                 design.angles, design.of(shown) / size, "o", color="black", markersize=3, fillstyle="none", zorder=2.2
@@ -199,7 +199,7 @@ def _panel(axes: Any, panel: Panel, design: DrawnTurn, before: DrawnTurn | None)
     return entries + _levels(axes, panel, size)
 
 
-def column_measured(column: str) -> str:
+def measured_column(column: str) -> str:
     """Column of what was measured beside a column of the curves."""
     name, unit = split(column)
     return f"{name}_measured [{unit}]"
@@ -249,7 +249,7 @@ def _points(axes: Any, panel: Panel, turn: DrawnTurn, colour: str, prefix: str) 
         if row is not None:
             angle, value = float(turn.angles[row]), float(values[row])
             value = 0.0 if abs(value) <= ROUNDING * float(np.nanmax(np.abs(values))) else value
-            where = f" at {turn.told(angle)}" if how in WORDS else ""
+            where = f" at {turn.place_text(angle)}" if how in WORDS else ""
             (dot,) = axes.plot(angle, value / factor(unit), "o", color=colour, markersize=4.0, zorder=3)
             entries.append((dot, f"{prefix}{WORDS.get(how, f'at {how}')} {show(value, unit)}{where}"))
     return entries

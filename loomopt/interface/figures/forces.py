@@ -44,13 +44,13 @@ def plot(scene: Scene, forces: Mapping[str, TurnedForce], path: Path | None = No
     """Figure; path: a file to write it to as well. Raises BadInput."""
     if path:
         suffix(path, outputs.PICTURES)
-    drawn = _drawn(scene, forces)
+    drawn = _draw(scene, forces)
     if path:
         atomically(path, functools.partial(save, drawn))
     return drawn
 
 
-def _drawn(scene: Scene, forces: Mapping[str, TurnedForce]) -> Any:
+def _draw(scene: Scene, forces: Mapping[str, TurnedForce]) -> Any:
     title = f"{scene.name}: forces over the turn, in the frame and on what turns"
     rows = math.ceil(len(forces) / ACROSS)
     high = WIDE + rows * (POLAR + HEAD) + AROUND
@@ -89,7 +89,7 @@ def _sizes(axes: Any, scene: Scene, forces: Mapping[str, TurnedForce]) -> list[E
     return entries
 
 
-def _said(force: TurnedForce) -> list[str]:
+def _heading_texts(force: TurnedForce) -> list[str]:
     """In what words each part stands that turns with a force."""
     return list(DRAWN)[-len(force.headings) :] if force.headings else []
 
@@ -99,7 +99,7 @@ def _polar(axes: Any, scene: Scene, force: TurnedForce) -> list[Entry]:
     size = factor(scene.shown_in("force"))
     entries: list[Entry] = []
     seen = [((force.x, force.y), "in the frame")]
-    seen += [(force.on(part), label) for part, label in zip(force.headings, _said(force), strict=True)]
+    seen += [(force.on(part), label) for part, label in zip(force.headings, _heading_texts(force), strict=True)]
     for (x, y), label in seen:
         colour, style = DRAWN[label]
         (line,) = axes.plot(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from loomopt.interface import study_table
 from loomopt.interface.files import outputs
-from loomopt.interface.study_table import NumberColumn, valued
+from loomopt.interface.study_table import NumberColumn, value_text
 from loomopt.jobs import registry
 from loomopt.picture.chart import Chart, Charts
 from loomopt.picture.shapes import Drawing, Text, plain
@@ -19,7 +19,9 @@ NAMED = 42
 """Characters of a line above a design."""
 
 
-def lettered(study: SceneStudy, findings: Findings, charts: Charts) -> tuple[Charts, Sequence[tuple[str, Drawing]]]:
+def letter_designs(
+    study: SceneStudy, findings: Findings, charts: Charts
+) -> tuple[Charts, Sequence[tuple[str, Drawing]]]:
     """Charts of a study with letters where three designs stand, and these designs with their headings."""
     certified = [row for row in findings.rows if row.certified]
     if not charts.charts:
@@ -31,7 +33,9 @@ def lettered(study: SceneStudy, findings: Findings, charts: Charts) -> tuple[Cha
     panels = [*columns["sought"], *study_table.shown_columns(study, findings.rows)]
     by_heading = {panel.heading: panel for panel in panels}
     marked = [
-        _marked(chart, first, by_heading[chart.title], spots) for chart in charts.charts if isinstance(chart, Chart)
+        _mark_designs(chart, first, by_heading[chart.title], spots)
+        for chart in charts.charts
+        if isinstance(chart, Chart)
     ]
     charts = replace(charts, charts=marked, title=study.heading)
     if len(findings.rows) == 1:  # why there is no front
@@ -54,7 +58,7 @@ def _middle(study: SceneStudy, rows: Sequence[Row]) -> Row:
     return min(reversed(list(zip(places, rows, strict=True))), key=lambda pair: abs(pair[0][0] - middle))[1]
 
 
-def _marked(chart: Chart, first: NumberColumn, panel: NumberColumn, spots: dict[str, int]) -> Chart:
+def _mark_designs(chart: Chart, first: NumberColumn, panel: NumberColumn, spots: dict[str, int]) -> Chart:
     """A chart with a ring around the points of letters, and these above it."""
     at = {letter: (first.shown[k] or 0.0, panel.shown[k]) for letter, k in spots.items()}
     rings = [(x, y, "chosen") for x, y in at.values() if y is not None]
@@ -64,7 +68,7 @@ def _marked(chart: Chart, first: NumberColumn, panel: NumberColumn, spots: dict[
 
 def _heading(letter: str, columns: Sequence[NumberColumn], row: Row, at: int) -> str:
     """Heading of a design: its letter, its place, what is sought there and what it misses, a line each."""
-    first, *others = (valued(column, at) for column in columns)
+    first, *others = (value_text(column, at) for column in columns)
     lines = (line for text in (f"{letter}: {first}", *others, row.shortfall) for line in textwrap.wrap(text, NAMED))
     return "\n".join(map(plain, lines))
 

@@ -31,26 +31,26 @@ NUMBER = re.compile(r"[-+]?[\d.]+(?:e[-+]?\d+)?")
 Read = TypeVar("Read")
 
 
-class Recalled(NamedTuple):
+class StoredAnswer(NamedTuple):
     """An answer of a file in its own scene; doubts: why its status is not to be believed, a sentence each."""
 
-    found: Evaluation
+    evaluation: Evaluation
     doubts: tuple[str, ...] = ()
 
 
-def recalled(path: Path) -> Recalled:
+def read_answer(path: Path) -> StoredAnswer:
     """Answer in a JSON file, judged in its own scene. Raises BadInput."""
     scene, handed = registry.answered(path)
-    evaluation = results.evaluated(scene, designs.checked(handed.design, scene, scene.origin), None)
+    evaluation = results.evaluate_design(scene, designs.checked(handed.design, scene, scene.origin), None)
     document = designs.loaded(path)
     if not isinstance(document, Mapping) or document.get("status") not in STATUSES:
-        return Recalled(evaluation)
+        return StoredAnswer(evaluation)
     try:
         answer = _answer(document, evaluation, scene)
     except (AttributeError, KeyError, TypeError, ValueError, ArithmeticError):
         remedy = "Give the answer as it was printed, or its design object alone"
         raise refusal("it is no answer as solve prints it", str(path), remedy=remedy) from None
-    return Recalled(answer, tuple(_doubts(document, answer)))
+    return StoredAnswer(answer, tuple(_doubts(document, answer)))
 
 
 def _answer(document: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> Answer:
@@ -61,7 +61,7 @@ def _answer(document: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -
         named = {str(limit["name"]) for limit in document["limits"]}
         limits = tuple(limit for limit in limits if limit.name in named)
     certificate = _certificate(document["certificate"]) if document.get("certificate") else None
-    bound = _everywhere(document["global"], document["figures"]) if document.get("global") else None
+    bound = _global_bound(document["global"], document["figures"]) if document.get("global") else None
     fields = {name: getattr(evaluation, name) for name in ("problem", "effects", "design", "figures", "units")}
     record = Solution(
         **fields,
@@ -135,7 +135,7 @@ def _certificate(record: Mapping[str, Any]) -> Certificate:
     )
 
 
-def _everywhere(record: Mapping[str, Any], figures: Mapping[str, Any]) -> GlobalBound:
+def _global_bound(record: Mapping[str, Any], figures: Mapping[str, Any]) -> GlobalBound:
     """Return what is proven of all designs; of which side of a bound the best is, the bound itself tells."""
     gap = math.inf if record["gap"] is None else float(record["gap"])
     levels = []

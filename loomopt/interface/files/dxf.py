@@ -26,7 +26,7 @@ from loomopt.picture.shapes import (
     extent,
     marks,
     plain,
-    scaled,
+    scale_drawing,
 )
 
 MEASURES, MEASURED, DECIMALS, AWAY = "measures", 94, 4, 6.0
@@ -65,7 +65,7 @@ def _document(drawing: Drawing, version: str) -> Any:
     ezdxf: Any = importlib.import_module("ezdxf")
 
     document = ezdxf.new(VERSIONS[version])
-    inches, drawing = drawing.unit == "in", scaled(sheet(drawing), 1 / factor(drawing.unit))
+    inches, drawing = drawing.unit == "in", scale_drawing(sheet(drawing), 1 / factor(drawing.unit))
     # R12 has no word for its unit.
     document.units = 0 if version == R12 else ezdxf.units.IN if inches else ezdxf.units.MM
     document.header["$MEASUREMENT"] = 0 if inches else 1
@@ -81,9 +81,9 @@ def _document(drawing: Drawing, version: str) -> Any:
     space = document.modelspace()
     for primitive in drawing.primitives:
         _append(space, primitive, drawing.height, version)
-    corners = [corner for primitive in drawing.primitives for corner in _reached(primitive, drawing.height)]
+    corners = [corner for primitive in drawing.primitives for corner in _reach(primitive, drawing.height)]
     if drawing.measures:
-        corners += _measured(document, space, drawing)
+        corners += _add_dimensions(document, space, drawing)
     least, most = (tuple(pick(axis) for axis in zip(*corners, strict=True)) for pick in (min, max))
     space.reset_extents((*least, 0.0), (*most, 0.0))
     for name in sorted(document.entitydb.dxf_types_in_use()):
@@ -91,7 +91,7 @@ def _document(drawing: Drawing, version: str) -> Any:
     return document
 
 
-def _measured(document: Any, space: Any, drawing: Drawing) -> list[tuple[float, float]]:
+def _add_dimensions(document: Any, space: Any, drawing: Drawing) -> list[tuple[float, float]]:
     """Add each measure as an aligned dimension that follows its points, on a layer of their own.
 
     Returns the ends of their lines.
@@ -130,7 +130,7 @@ def _band_text(band: tuple[float, float]) -> str:
     return " " + " ".join("0" if not end else f"{end:+.{DECIMALS}g}" for end in (high, low))
 
 
-def _reached(primitive: Primitive, text_height: float) -> list[tuple[float, float]]:
+def _reach(primitive: Primitive, text_height: float) -> list[tuple[float, float]]:
     """Points that bound a primitive along both axes."""
     match primitive:
         case Line(_, points, closed, bulges):

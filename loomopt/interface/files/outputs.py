@@ -107,14 +107,14 @@ def answer(folder: Path, solution: Solution, scene: Scene, comma: bool = False) 
     shown = tables.meaningful(tables.answer(solution, scene))
     contents = {
         "answer.json": document(solution) + "\n",
-        "table.csv": sheets.separated(provenance.csv(shown), comma),
+        "table.csv": sheets.to_decimal_comma(provenance.csv(shown), comma),
     }
     view = registry.of(scene).views
     if not solution.members:
-        curves = tables.filed(tables.curves(scene, solution.design, target=solution.target), scene)
-        contents["curves.csv"] = sheets.separated(provenance.csv(curves), comma)
+        curves = tables.to_file(tables.curves(scene, solution.design, target=solution.target), scene)
+        contents["curves.csv"] = sheets.to_decimal_comma(provenance.csv(curves), comma)
     if not solution.members and not view.missing(scene):
-        contents["linkage.svg"] = svg.render(drawing(scene, solution.design, what(solution)))
+        contents["linkage.svg"] = svg.render(drawing(scene, solution.design, describe_design(solution)))
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         _make(folder, made)
@@ -152,7 +152,7 @@ def answer_sheets(solution: Solution, scene: Scene) -> "dict[str, pd.DataFrame]"
     sheets = {"design": shown[is_design], "figures": shown[others], "limits": limits}
     if solution.members:
         return sheets
-    curves = tables.filed(tables.curves(scene, solution.design, target=solution.target), scene)
+    curves = tables.to_file(tables.curves(scene, solution.design, target=solution.target), scene)
     return sheets | {"curves": curves}
 
 
@@ -235,11 +235,11 @@ def curves(
     ending = suffix(path, CURVES)
     frame = tables.curves(scene, design, accuracy, target, measured)
     if ending in sheets.ENDINGS:
-        sheets.write(path, {"curves": tables.filed(frame, scene)}, comma)
+        sheets.write(path, {"curves": tables.to_file(frame, scene)}, comma)
     else:
         from loomopt.interface.figures import figure
 
-        drawn = plotted(frame, scene, flat(design), subject)
+        drawn = plot_curves(frame, scene, flat(design), subject)
         atomically(path, functools.partial(figure.save, drawn))
 
 
@@ -256,14 +256,14 @@ def plot(
     if path:
         suffix(path, PICTURES)
     frame = tables.curves(scene, evaluated.design, target=target, measured=measured)
-    drawn = plotted(frame, scene, flat(evaluated.design), what(evaluated))
+    drawn = plot_curves(frame, scene, flat(evaluated.design), describe_design(evaluated))
     if path:
         atomically(path, functools.partial(figure.save, drawn))
     return drawn
 
 
 @working()
-def plotted(
+def plot_curves(
     frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], design_subject: DrawnSubject | None = None
 ) -> "Figure":
     """Curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
@@ -287,7 +287,7 @@ def plotted(
     return drawn
 
 
-def what(evaluated: Evaluated, target: str | None = None, status: str | None = None) -> DrawnSubject:
+def describe_design(evaluated: Evaluated, target: str | None = None, status: str | None = None) -> DrawnSubject:
     """Say what the design of an evaluation or of an answer is.
 
     target, status: of the answer whose design was evaluated, where it was one's.
@@ -413,7 +413,7 @@ def only(drawn: "Drawing", layer: str) -> "Drawing":
     return replace(drawn, title="", legend=(), primitives=primitives, measures=())
 
 
-def rounded(drawn: "Drawing", tolerance: float) -> "Drawing":
+def with_arcs(drawn: "Drawing", tolerance: float) -> "Drawing":
     """A drawing whose closed curves are arcs of circles that touch each other, within a tolerance, m."""
     from loomopt.maths.arcs import closed_biarcs
     from loomopt.picture.shapes import Line, Point
@@ -443,7 +443,7 @@ def _dxf(path: Path, scene: Scene, design: Design, subject: DrawnSubject | None,
     measures = tuple(measure._replace(band=bands.get(measure.name, (0.0, 0.0))) for measure in drawn.measures)
     drawn = replace(drawn, measures=measures)
     drawn = only(drawn, how.only) if how.only else drawn
-    drawn = drawn if how.arcs is None else rounded(drawn, how.arcs)
+    drawn = drawn if how.arcs is None else with_arcs(drawn, how.arcs)
     atomically(path, functools.partial(dxf.write, drawn, version=how.version))
 
 

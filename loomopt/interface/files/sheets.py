@@ -41,7 +41,7 @@ def write(path: Path, sheets: Mapping[str, "pd.DataFrame"], comma: bool = False)
     """Write tables as the file's ending says: CSV and Parquet take the first one, a workbook all. Raises BadInput."""
     ending, first = suffix(path, ENDINGS), next(iter(sheets.values()))
     if ending == ".csv":
-        atomically(path, functools.partial(_put, separated(provenance.csv(first), comma)))
+        atomically(path, functools.partial(_put, to_decimal_comma(provenance.csv(first), comma)))
     elif ending == ".xlsx":
         rows = {name: _rows(frame) for name, frame in sheets.items()}
         workbook(path, rows, {str(name): str(value) for name, value in first.attrs.items()})
@@ -52,7 +52,7 @@ def write(path: Path, sheets: Mapping[str, "pd.DataFrame"], comma: bool = False)
 def write_text(path: Path, text: str, name: str, comma: bool = False) -> None:
     """Write a table that is CSV text already, as CSV or as a workbook of one sheet. Raises BadInput."""
     if suffix(path, ENDINGS[:2]) == ".csv":
-        atomically(path, functools.partial(_put, separated(text, comma)))
+        atomically(path, functools.partial(_put, to_decimal_comma(text, comma)))
         return
     head = [line[2:].partition(": ") for line in text.splitlines() if line.startswith("# ")]
     body = "".join(f"{line}\n" for line in text.splitlines() if not line.startswith("# "))
@@ -60,7 +60,7 @@ def write_text(path: Path, text: str, name: str, comma: bool = False) -> None:
     workbook(path, {name: rows}, {key: value for key, _, value in head})
 
 
-def separated(text: str, comma: bool) -> str:
+def to_decimal_comma(text: str, comma: bool) -> str:
     """CSV text with decimal commas and semicolons, where that is asked for; comment lines stay."""
     if not comma:
         return text

@@ -28,7 +28,7 @@ def is_store(path: Path) -> bool:
         return False
 
 
-def recalled(path: Path) -> list[StudyTable]:
+def read_studies(path: Path) -> list[StudyTable]:
     """Every study of a store with the rows that are there, in the order they were begun. Raises BadInput.
 
     Machines as they are made are no designs, and left out.

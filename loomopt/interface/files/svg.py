@@ -20,7 +20,7 @@ from loomopt.picture.shapes import (
     Text,
     extent,
     plain,
-    scaled,
+    scale_drawing,
 )
 
 NAMESPACE = "http://www.w3.org/2000/svg"
@@ -29,7 +29,7 @@ NAMESPACE = "http://www.w3.org/2000/svg"
 def render(drawing: Drawing) -> str:
     """Drawing as an SVG document: one user unit is 1 mm, its size in the drawing's own unit, y turned up."""
     size, unit = factor("mm") / factor(drawing.unit), drawing.unit
-    drawing = scaled(sheet(drawing), 1 / factor("mm"))
+    drawing = scale_drawing(sheet(drawing), 1 / factor("mm"))
     box = extent(drawing)
     width, height = box.right - box.left, box.top - box.bottom
     root = ElementTree.Element(

@@ -74,7 +74,7 @@ class MovingPicture:
         WRITERS[suffix(path, ENDINGS)](self, path)
 
 
-def checked(path: Path) -> None:
+def check_file(path: Path) -> None:
     """Raise BadInput, before anything is computed, where no moving picture can be written as this file."""
     if suffix(path, ENDINGS) == ".mp4" and not shutil.which("ffmpeg"):
         remedy = "Install ffmpeg, or end the name in .gif or .html"
@@ -85,7 +85,7 @@ def checked(path: Path) -> None:
 
 
 @working()
-def animated(
+def animate(
     scene: Scene, design: Design, path: Path | None = None, subject: outputs.DrawnSubject | None = None
 ) -> MovingPicture:
     """A design's mechanism as it moves, today's behind it. Raises BadInput.
@@ -93,7 +93,7 @@ def animated(
     path: a file to write it to as well; subject: the design in words, for the title.
     """
     if path:
-        checked(path)
+        check_file(path)
     job, full_design = registry.of(scene), flat(design)
     now, angles = job.today(scene), crank_angles()
     full = {**now, **full_design}
@@ -102,7 +102,7 @@ def animated(
         keys = ", ".join(job.views.missing(scene))
         problem = "the mechanism cannot be drawn" if keys else f"job {scene.job} does not say how its mechanism moves"
         raise refusal(problem, scene.origin, keys, remedy="Give these" if keys else "Draw it still: --figure F.svg")
-    ghost = None if full == now else machine.assembled(scene, now, angles)
+    ghost = None if full == now else machine.assemble(scene, now, angles)
     label = subject.text if subject else outputs.GIVEN if full_design and full != now else outputs.TODAY
     picture = MovingPicture(f"{scene.name}: {label}", job.views.angle, scene.shown_in("angle"), {label: moving}, ghost)
     if path:
@@ -111,12 +111,12 @@ def animated(
 
 
 @working()
-def morphed(study: SceneStudy, rows: Sequence[Row], path: Path | None = None) -> MovingPicture:
+def morph(study: SceneStudy, rows: Sequence[Row], path: Path | None = None) -> MovingPicture:
     """Certified designs among rows of a study as one moving picture. Raises BadInput."""
     from loomopt.interface.report.study import stages
 
     if path:
-        checked(path)
+        check_file(path)
     motions = stages(study, rows)
     if not motions:
         raise refusal("there is nothing to animate: no row is certified, or none can be drawn", "", "animate")
@@ -150,7 +150,7 @@ def _mp4(picture: MovingPicture, path: Path) -> None:
     """Have ffmpeg write what it is given frame by frame."""
     import subprocess
 
-    checked(path)
+    check_file(path)
     images = list(frames(picture))
     width, height = images[0].size
     size = f"{width}x{height}"
@@ -179,7 +179,7 @@ WRITERS: dict[str, Callable[[MovingPicture, Path], None]] = {".html": _page, ".g
 def frames(picture: MovingPicture) -> Iterator["Image"]:
     """Yield the frames of a turn; of several stages a turn each, one after the other."""
     motions = list(picture.stages.values())
-    frame = machine.framed([*motions, *([picture.ghost] if picture.ghost else [])])
+    frame = machine.frame_of([*motions, *([picture.ghost] if picture.ghost else [])])
     for label, motion in picture.stages.items():
         for pose in range(0, len(motion.angles), EVERY if len(motions) == 1 else 3 * EVERY):
             layers = [(picture.ghost, True), (motion, False)]

@@ -29,7 +29,7 @@ class Status(NamedTuple):
 
     level: str
     verdict: str
-    told: tuple[str, ...] = ()
+    sentences: tuple[str, ...] = ()
     exit: int = 0
 
 
@@ -40,7 +40,7 @@ class Subject:
     target: whose limits it was judged by; sought: what it answers.
     """
 
-    found: Evaluated
+    evaluated: Evaluated
     scene: Scene
     target: str = ""
     sought: str = ""
@@ -49,15 +49,15 @@ class Subject:
     @property
     def heading(self) -> str:
         """Problem and what is sought."""
-        return ", ".join(word for word in (self.found.problem, self.sought) if word)
+        return ", ".join(word for word in (self.evaluated.problem, self.sought) if word)
 
     @lazy
     def before(self) -> Evaluated | None:
         """Today's machine; None where the design is that."""
-        if isinstance(self.found, Solution):
-            return self.found.before
+        if isinstance(self.evaluated, Solution):
+            return self.evaluated.before
         now = registry.of(self.scene).today(self.scene)
-        is_now = flat(self.found.design).items() <= now.items()
+        is_now = flat(self.evaluated.design).items() <= now.items()
         return None if is_now else report.evaluate(self.scene, None, self.target or None)
 
 
@@ -75,7 +75,7 @@ VERDICTS = {
 
 def status(subject: Subject) -> Status:
     """Return what a design truly is, from what was checked, not from one word of its solver."""
-    evaluated = subject.found
+    evaluated = subject.evaluated
     broken = tuple(limit.name for limit in evaluated.limits if not limit.ok and not limit.rounding)
     violations = (f"Limits NOT held: {', '.join(broken)}.",) if broken else ()
     if subject.doubts:
@@ -97,10 +97,10 @@ def status(subject: Subject) -> Status:
     if evaluated.certificate is None or not evaluated.certificate.passed or broken:
         reasons = evaluated.certificate.reasons if evaluated.certificate else ("there is no certificate",)
         return Status("bad", "NOT CERTIFIED", (*(f"{reason}." for reason in reasons), *violations), NOT_CERTIFIED)
-    return _certified(evaluated, subject.scene)
+    return _certified_status(evaluated, subject.scene)
 
 
-def _certified(solution: Solution, scene: Scene) -> Status:
+def _certified_status(solution: Solution, scene: Scene) -> Status:
     """Return what a certified optimum is, and what of what was asked for is not proven."""
     opened, proofs = list[str](), list[str]()
     missed = solution.outcome.partition(" but ")[2]
@@ -110,7 +110,7 @@ def _certified(solution: Solution, scene: Scene) -> Status:
         opened.append("NOT PROVEN at every crank angle")
     if solution.global_bound:
         opened += [] if solution.global_bound.proven else ["NOT PROVEN best of all admissible designs"]
-        proofs.append(answers.everywhere(solution.global_bound, scene) + ".")
+        proofs.append(answers.global_summary(solution.global_bound, scene) + ".")
     else:
         proofs.append("No admissible design nearby is better; that none anywhere is was not asked (--global).")
     verdict_text = (
@@ -126,39 +126,39 @@ def _certified(solution: Solution, scene: Scene) -> Status:
 
 def parts(subject: Subject) -> list[Part]:
     """Parts of a design's page, in order; none that has nothing to say, of a family none of one machine."""
-    made = [make for make in PARTS if make not in ONE_MACHINE] if subject.found.members else PARTS
+    made = [make for make in PARTS if make not in ONE_MACHINE] if subject.evaluated.members else PARTS
     return [part for make in made for part in make(subject)]
 
 
 def members(family: Subject) -> list[tuple[str, Status, list[Part]]]:
     """Heading, the status and the parts of each member of a family: what the whole cannot show."""
     whole, chapters = status(family), list[tuple[str, Status, list[Part]]]()
-    for place, member in enumerate(family.found.members, 1):
+    for place, member in enumerate(family.evaluated.members, 1):
         assert member.scene is not None
         subject = Subject(member, member.scene, family_table.of_target(family.scene))
         broken = [limit.name for limit in member.limits if not limit.ok and not limit.rounding]
         verdict = f"Limits NOT held: {', '.join(broken)}" if broken else f"Member {place}: all limits held"
         member_status = Status("bad" if broken else whole.level, verdict, (f"Of the family: {whole.verdict}.",))
-        shown = [part for make in (_compared, *ONE_MACHINE) for part in make(subject)]
+        shown = [part for make in (_comparison, *ONE_MACHINE) for part in make(subject)]
         chapters.append((f"{family.heading}, member {place}: {changed(member)}", member_status, shown))
     return chapters
 
 
-def _compared(subject: Subject) -> Iterator[Part]:
-    evaluated, scene, before = subject.found, subject.scene, subject.before
+def _comparison(subject: Subject) -> Iterator[Part]:
+    evaluated, scene, before = subject.evaluated, subject.scene, subject.before
     heading = "nearest" if isinstance(evaluated, Solution) and evaluated.relaxation else "design" if before else "today"
     blocks: list[Block] = [answers.comparison(evaluated, scene, before, heading), *answers.lists(evaluated, scene)]
     yield Part("Today against the design" if before else "Today's machine", tuple(blocks))
 
 
 def _moving(subject: Subject) -> Iterator[Part]:
-    moving = machine.part(subject.scene, subject.found.design)
+    moving = machine.part(subject.scene, subject.evaluated.design)
     if moving:
         yield moving
 
 
 def _clash(subject: Subject) -> Iterator[Part]:
-    solution = subject.found
+    solution = subject.evaluated
     if isinstance(solution, Solution) and solution.relaxation:
         clash = (
             f"Limits that clash: {', '.join(solution.clash)}. The design below is the nearest one, and not admissible."
@@ -167,16 +167,16 @@ def _clash(subject: Subject) -> Iterator[Part]:
 
 
 def _binding(subject: Subject) -> Iterator[Part]:
-    if isinstance(subject.found, Solution) and subject.found.certificate:
+    if isinstance(subject.evaluated, Solution) and subject.evaluated.certificate:
         caption = "By how much the best gets better for each unit that a limit is loosened; solving again confirms it."
-        bound = answers.binding(subject.found)
+        bound = answers.binding(subject.evaluated)
         shown = (bound,) if isinstance(bound, str) else (caption, replace(bound, title=""))
         yield Part("What binds, and what it is worth", shown)
 
 
 def _certificate(subject: Subject) -> Iterator[Part]:
     """Say the certificate in words: what was asked of the design, what was found."""
-    certificate = subject.found.certificate if isinstance(subject.found, Solution) else None
+    certificate = subject.evaluated.certificate if isinstance(subject.evaluated, Solution) else None
     if certificate is None:
         return
     lines = [
@@ -215,29 +215,29 @@ def _certificate(subject: Subject) -> Iterator[Part]:
 
 
 def _proofs(subject: Subject) -> Iterator[Part]:
-    proofs = subject.found.proofs if isinstance(subject.found, Solution) else None
+    proofs = subject.evaluated.proofs if isinstance(subject.evaluated, Solution) else None
     if proofs:
         yield Part("Proof at every crank angle", tuple(answers.proofs(proofs)))
 
 
 def _curves(subject: Subject) -> Iterator[Part]:
-    yield turn.part(subject.scene, subject.found.design)
+    yield turn.part(subject.scene, subject.evaluated.design)
 
 
 def _forces(subject: Subject) -> Iterator[Part]:
     """Tell what each joint carries, where an effect that is on says so."""
-    scene, design = subject.scene, flat(subject.found.design)
+    scene, design = subject.scene, flat(subject.evaluated.design)
     if forces.tells(scene):
         yield Part("Forces in the joints", tuple(scenes.forces(scene, tables.curves(scene, design), design)))
 
 
 def _members(subject: Subject) -> Iterator[Part]:
-    if isinstance(subject.found, Solution) and subject.found.members:
-        yield Part("Each member by itself", (replace(answers.members(subject.found, subject.scene), title=""),))
+    if isinstance(subject.evaluated, Solution) and subject.evaluated.members:
+        yield Part("Each member by itself", (replace(answers.members(subject.evaluated, subject.scene), title=""),))
 
 
 def _remarks(subject: Subject) -> Iterator[Part]:
-    remarks = registry.of(subject.scene).views.remarks(subject.scene, flat(subject.found.design))
+    remarks = registry.of(subject.scene).views.remarks(subject.scene, flat(subject.evaluated.design))
     if remarks:
         yield Part("Remarks", tuple(f"{remark}." for remark in remarks))
 
@@ -247,7 +247,7 @@ def _sketch(subject: Subject) -> Iterator[Part]:
     from loomopt.interface.text import notebook
 
     if not registry.of(subject.scene).views.missing(subject.scene):
-        drawn = notebook.sketch(subject.scene, subject.found.design, outputs.what(subject.found))
+        drawn = notebook.sketch(subject.scene, subject.evaluated.design, outputs.describe_design(subject.evaluated))
         picture = drawn.on_page.replace(f' xmlns="{svg.NAMESPACE}"', "")  # which a page does not need
         yield Part("Dimensions", (Markup(f'<div class="sheet">{picture}</div>'),))
 
@@ -262,21 +262,21 @@ def _scene(subject: Subject) -> Iterator[Part]:
 
 
 def _search(subject: Subject) -> Iterator[Part]:
-    solution = subject.found
+    solution = subject.evaluated
     if isinstance(solution, Solution) and solution.time:
         time = solution.time
         sentences = [answers.starts(solution, subject.scene)] if solution.solver.get("starts", 1) > 1 else []
         sentences.append(
             f"IPOPT said {solution.solver.get('status', 'nothing')}; {time.get('total_s', 0.0):.3f} s in all."
         )
-        sentences.append(answers.retyped(solution, subject.scene))
+        sentences.append(answers.design_text(solution, subject.scene))
         yield Part("How it was found", tuple(sentences))
 
 
 PARTS: tuple[Callable[[Subject], Iterator[Part]], ...] = (
     _clash,
     _moving,
-    _compared,
+    _comparison,
     _members,
     _binding,
     _certificate,

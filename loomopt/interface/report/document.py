@@ -99,7 +99,7 @@ def _parts(thing: object) -> list[Part]:
 def part_of_study(plan: SceneStudy, solved: Sequence[Row]) -> list[Part]:
     """A study as parts of another chapter, its own status first."""
     status = study.status(plan, solved)
-    return [Part(f"{plan.name} of {plan.heading}", (status.verdict, *status.told)), *study.parts(plan, solved)]
+    return [Part(f"{plan.name} of {plan.heading}", (status.verdict, *status.sentences)), *study.parts(plan, solved)]
 
 
 def html(chapters: Sequence[Chapter]) -> str:

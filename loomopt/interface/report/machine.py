@@ -61,14 +61,14 @@ def part(scene: Scene, design: Design) -> Part | None:
     moving = job.views.motion(scene, full, angles)
     if moving is None:
         return None
-    ghost = None if full == now else assembled(scene, now, angles)
+    ghost = None if full == now else assemble(scene, now, angles)
     marks = {n: m for n, m in job.views.marks(scene, full).items() if not isinstance(m, Span) and math.isfinite(m)}
     first = round(next(iter(marks.values()), 0.0) / TURN * POSES) % POSES
     shown = widget([moving], ghost, job.views.angle, scene.shown_in("angle"), first)
     return Part("The mechanism through its turn", (Markup(shown),))
 
 
-def assembled(scene: Scene, design: Mapping[str, float], angles: Floats) -> MechanismMotion | None:
+def assemble(scene: Scene, design: Mapping[str, float], angles: Floats) -> MechanismMotion | None:
     """Today's mechanism; None where it does not assemble."""
     from loomopt.base.errors import BadInput
 
@@ -91,7 +91,7 @@ def widget(
     ghost: the machine behind it; angle, unit: what phi is and in which unit it is told; first: the pose that is shown
     at first, and that remains where no script runs; labels: one for each stage.
     """
-    frame = framed([*stages, *([ghost] if ghost else [])])
+    frame = frame_of([*stages, *([ghost] if ghost else [])])
     at_first = max(range(len(stages)), key=lambda k: len(stages[k].joints))  # some have parts that others have not
     both = ((ghost, "today"), (stages[at_first], "design"))
     layers = [_layer(layer, frame, kind, first) for layer, kind in both if layer]
@@ -100,7 +100,7 @@ def widget(
     poses = {"design": [_poses(stage, frame) for stage in stages]}
     poses |= {"today": [_poses(ghost, frame)]} if ghost else {}
     size = math.degrees(TURN / len(stages[0].angles)) if unit == "deg" else 0.0
-    turns = [] if size else [f"{value:.4g}" for value in _shown(stages[0].angles, unit)]
+    turns = [] if size else [f"{value:.4g}" for value in _shown_angles(stages[0].angles, unit)]
     data = {"unit": unit, "step": size, "angles": turns, "poses": poses, "told": list(labels)}
     packed = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
     second = (
@@ -123,13 +123,13 @@ def _slider(kind: str, count: int, at: int) -> str:
     return f'<input type="range" class="{kind}" min="0" max="{count - 1}" value="{at}">'
 
 
-def _shown(angles: Floats, unit: str) -> Floats:
+def _shown_angles(angles: Floats, unit: str) -> Floats:
     from loomopt.base.units import factor
 
     return np.asarray(angles / factor(unit))
 
 
-def framed(motions: Sequence[MechanismMotion]) -> Frame:
+def frame_of(motions: Sequence[MechanismMotion]) -> Frame:
     """Frame that takes all positions of all machines."""
     points = [np.asarray(list(motion.pivots.values()), dtype=float) for motion in motions]
     points += [at for motion in motions for at in motion.joints.values()]
@@ -181,20 +181,20 @@ def _layer(motion: MechanismMotion, frame: Frame, kind: str, pose: int) -> str:
     for one, other in motion.links:
         still = " frame" if one in motion.pivots and other in motion.pivots else ""
         ends = f'x1="{at[one][0]}" y1="{at[one][1]}" x2="{at[other][0]}" y2="{at[other][1]}"'
-        marks.append(f'<line class="link{still}" {_joined(one, other)} {ends}/>')
+        marks.append(f'<line class="link{still}" {_link_data(one, other)} {ends}/>')
     for one, other in motion.springs:
-        marks.append(f'<path class="return-spring" {_joined(one, other)} d="{_spring(at[one], at[other])}"/>')
+        marks.append(f'<path class="return-spring" {_link_data(one, other)} d="{_spring(at[one], at[other])}"/>')
     marks += [f'<path class="ground" data-at="{escape(name)}" d="{_ground(*at[name])}"/>' for name in motion.pivots]
     marks += [f'<circle class="joint" {_centre(name, at)} r="{JOINT}"/>' for name in at if name not in motion.unnamed]
     if kind == "design":
         marks += [
             f'<text data-at="{escape(name)}" x="{at[name][0] + 10}" y="{at[name][1] - 10}">{escape(name)}</text>'
-            for name in named(motion, frame)
+            for name in joint_names(motion, frame)
         ]
     return f'<g class="{kind}">{"".join(marks)}</g>'
 
 
-def named(motion: MechanismMotion, frame: Frame) -> list[str]:
+def joint_names(motion: MechanismMotion, frame: Frame) -> list[str]:
     """Joints whose names have room: no moving one that comes too near to a pivot or to one before it."""
     joints: list[str] = []
     for name in (*motion.pivots, *motion.joints):
@@ -216,7 +216,7 @@ def _piece(place: int, piece: Turning, at: Mapping[str, Floats], frame: Frame, p
     )
 
 
-def _joined(one: str, other: str) -> str:
+def _link_data(one: str, other: str) -> str:
     return f'data-a="{escape(one)}" data-b="{escape(other)}"'
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-from loomopt.picture.table import JOINED, TextTable, spaced
+from loomopt.picture.table import JOINED, TextTable, restore_spaces
 
 NUMBER = re.compile(r"[-+]?\d")
 """How a cell begins that stands to the right."""
@@ -34,7 +34,7 @@ class Part:
 
 def text(string: str) -> str:
     """Text escaped, with places in long names where a line may break, and none in what is joined."""
-    return escape(spaced(string.replace(JOINED, "\u00a0"))).replace("_", "_<wbr>")
+    return escape(restore_spaces(string.replace(JOINED, "\u00a0"))).replace("_", "_<wbr>")
 
 
 def part(shown: Part) -> str:
@@ -64,7 +64,7 @@ def table(grid: TextTable) -> str:
 
 
 def _row(line: Sequence[str], right: Sequence[int]) -> str:
-    marked = ' class="missed"' if any("<- " in spaced(cell) for cell in line) else ""
+    marked = ' class="missed"' if any("<- " in restore_spaces(cell) for cell in line) else ""
     cells = "".join(f"<td{_right(place in right)}>{_lines(cell)}</td>" for place, cell in enumerate(line))
     return f"<tr{marked}>{cells}</tr>"
 

@@ -33,8 +33,8 @@ def page(chapters: Sequence[Chapter]) -> str:
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         '<link rel="icon" href="data:,">'
-        f"<title>{escape(title)}</title><style>{_own('report.css')}</style></head>\n"
-        f"<body><main>{toc}{body}</main><footer><p>{text(made)}</p></footer><script>{_own('report.js')}</script></body></html>\n"
+        f"<title>{escape(title)}</title><style>{_asset('report.css')}</style></head>\n"
+        f"<body><main>{toc}{body}</main><footer><p>{text(made)}</p></footer><script>{_asset('report.js')}</script></body></html>\n"
     )
 
 
@@ -48,7 +48,7 @@ def _contents(chapters: Sequence[Chapter]) -> str:
 
 
 def _chapter(place: int, shown: Chapter) -> str:
-    sentences = "".join(f"<p>{text(sentence)}</p>" for sentence in shown.status.told)
+    sentences = "".join(f"<p>{text(sentence)}</p>" for sentence in shown.status.sentences)
     sub = "".join(f"<p>{text(line)}</p>" for line in (shown.title, shown.source) if line)
     return (
         f'<article id="c{place}"><header class="status {shown.status.level}">'
@@ -58,5 +58,5 @@ def _chapter(place: int, shown: Chapter) -> str:
 
 
 @functools.cache
-def _own(name: str) -> str:
+def _asset(name: str) -> str:
     return report_path(name).read_text(encoding="utf-8").strip()

@@ -78,7 +78,7 @@ def stages(study: SceneStudy, rows: Sequence[Row]) -> dict[str, MechanismMotion]
         motion = registry.of(scene).views.motion(scene, full, angles)
         if motion is None:
             return {}
-        motions[", ".join(study_table.valued(column, k, 5) for column in (*columns["place"], *columns["sought"]))] = (
-            motion
-        )
+        motions[
+            ", ".join(study_table.value_text(column, k, 5) for column in (*columns["place"], *columns["sought"]))
+        ] = motion
     return motions

@@ -8,12 +8,12 @@ import numpy as np
 
 from loomopt.base.units import factor, show
 from loomopt.interface import tables
-from loomopt.interface.figures.curves import ROUNDING, SAME, WORDS, DrawnTurn, marked_row, shown_unit, turned
+from loomopt.interface.figures.curves import ROUNDING, SAME, WORDS, DrawnTurn, drawn_turn, marked_row, shown_unit
 from loomopt.interface.report.charts import block
 from loomopt.interface.report.markup import Markup, Part, text
 from loomopt.jobs import registry
 from loomopt.model.session import working
-from loomopt.picture.chart import COLOURS, TICKS, Axis, Chart, Series, headed, thinned
+from loomopt.picture.chart import COLOURS, TICKS, Axis, Chart, Series, heading, thin_rows
 from loomopt.picture.job_views import Span
 from loomopt.picture.panels import Panel, in_units
 from loomopt.scenes.designs import Design, flat
@@ -41,7 +41,7 @@ def part(scene: Scene, design: Design) -> Part:
 
 
 def _turn(scene: Scene, full: Design, unit: str) -> DrawnTurn:
-    return turned(tables.curves(scene, full), registry.of(scene).views.marks(scene, flat(full)), unit)
+    return drawn_turn(tables.curves(scene, full), registry.of(scene).views.marks(scene, flat(full)), unit)
 
 
 def _key(shown: DrawnTurn, beside: bool) -> str:
@@ -49,10 +49,12 @@ def _key(shown: DrawnTurn, beside: bool) -> str:
     sentences = []
     for name, mark in shown.marks.items():
         if isinstance(mark, Span):
-            ends = f"{shown.told(math.degrees(mark.begin))} to {shown.told(math.degrees(mark.end))}"
+            ends = f"{shown.place_text(math.degrees(mark.begin))} to {shown.place_text(math.degrees(mark.end))}"
             sentences.append(f'<span class="k-span"><i></i>{text(f"{name} {ends}")}</span>')
         elif math.isfinite(mark):
-            sentences.append(f'<span class="k-place"><i></i>{text(f"{name} {shown.told(math.degrees(mark))}")}</span>')
+            sentences.append(
+                f'<span class="k-place"><i></i>{text(f"{name} {shown.place_text(math.degrees(mark))}")}</span>'
+            )
     sentences += ['<span class="k-today"><i></i>today, dashed</span>'] if beside else []
     return " ".join(sentences)
 
@@ -61,7 +63,7 @@ def chart(panel: Panel, shown: DrawnTurn, before: DrawnTurn | None) -> Chart:
     """A panel as a chart."""
     unit = shown_unit(panel)
     size, angle = factor(unit), math.degrees(factor(shown.unit))
-    sampled = _kept(panel, shown)
+    sampled = _drawn_rows(panel, shown)
     series = [
         Series(shown.angles[sampled] / angle, shown.of(column)[sampled] / size, f"c{place % COLOURS}", label)
         for place, (column, label) in enumerate(zip(panel.columns, panel.labels, strict=True))
@@ -69,7 +71,7 @@ def chart(panel: Panel, shown: DrawnTurn, before: DrawnTurn | None) -> Chart:
     key = [(curve.kind, curve.label) for curve in series if len(series) > 1 or curve.label != panel.title]
     ghosts = []
     if before:
-        old = _kept(panel, before)
+        old = _drawn_rows(panel, before)
         old = old[before.angles[old] <= shown.angles.max() + SAME]  # one that parts may repeat after several turns
         ghosts = [
             Series(
@@ -82,7 +84,7 @@ def chart(panel: Panel, shown: DrawnTurn, before: DrawnTurn | None) -> Chart:
         ]
     dots = []
     for turn, kind, word in ((shown, "c0", ""), (before, "ghost", "today: ")):
-        for place_mark in _marked(panel, turn, unit) if turn else ():
+        for place_mark in _marks(panel, turn, unit) if turn else ():
             dots.append((place_mark[0] / angle, place_mark[1], kind))
             key.append((f"dot {kind}", f"{word}{place_mark[2]}"))
     levels = [value / size for values in panel.levels.values() for value in values]
@@ -94,7 +96,7 @@ def chart(panel: Panel, shown: DrawnTurn, before: DrawnTurn | None) -> Chart:
     step = TICKS * whole / 360.0
     numbered = [step * k / angle for k in range(math.ceil(low / step), math.floor(high / step + 1e-9) + 1)]
     return Chart(
-        headed(panel.title, unit),
+        heading(panel.title, unit),
         Axis(low / angle, high / angle, numbered),
         [*ghosts, *series],
         levels,
@@ -106,9 +108,9 @@ def chart(panel: Panel, shown: DrawnTurn, before: DrawnTurn | None) -> Chart:
     )
 
 
-def _kept(panel: Panel, turn: DrawnTurn) -> "NDArray[np.intp]":
+def _drawn_rows(panel: Panel, turn: DrawnTurn) -> "NDArray[np.intp]":
     """Rows a curve is drawn through: every so many degrees, corners, the last, and what is marked."""
-    sampled = thinned(turn.angles)
+    sampled = thin_rows(turn.angles)
     for how in panel.marked:
         row = marked_row(turn.of(panel.columns[0]), turn, how)
         if row is not None:
@@ -116,7 +118,7 @@ def _kept(panel: Panel, turn: DrawnTurn) -> "NDArray[np.intp]":
     return np.flatnonzero(sampled)
 
 
-def _marked(panel: Panel, turn: DrawnTurn, unit: str) -> list[tuple[float, float, str]]:
+def _marks(panel: Panel, turn: DrawnTurn, unit: str) -> list[tuple[float, float, str]]:
     """Return what of a panel's first column is marked: angle, deg, value in the unit, and words."""
     values, marks = turn.of(panel.columns[0]), []
     for how in panel.marked:
@@ -124,7 +126,7 @@ def _marked(panel: Panel, turn: DrawnTurn, unit: str) -> list[tuple[float, float
         if row is not None:
             value = float(values[row])
             value = 0.0 if abs(value) <= ROUNDING * float(np.nanmax(np.abs(values))) else value
-            where = f" at {turn.told(float(turn.angles[row]))}" if how in WORDS else ""
+            where = f" at {turn.place_text(float(turn.angles[row]))}" if how in WORDS else ""
             label = f"{WORDS.get(how, f'at {how}')} {show(value, unit)}{where}"
             marks.append((float(turn.angles[row]), value / factor(unit), label))
     return marks

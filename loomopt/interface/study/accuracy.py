@@ -9,7 +9,7 @@ from loomopt.base import arguments
 from loomopt.interface.progress import cell_progress
 from loomopt.interface.study_result import StudyResult
 from loomopt.picture.chart import COLOURS, Chart, Charts, Series, decades
-from loomopt.picture.table import Column, TextTable, joined, text_table, words
+from loomopt.picture.table import Column, TextTable, text_table, unbroken, words
 from loomopt.scenes.scene import Scene
 from loomopt.studies.accuracy import accuracy
 from loomopt.studies.accuracy.accuracy import AccuracyResult, in_time
@@ -42,7 +42,7 @@ class AccuracyStudy(StudyResult[AccuracyResult]):
         orders = [f"{result.orders[name]:.2f}" if name in result.orders else "" for name in named]
         knees = [setting_text(result.knees[name]) if name in result.knees else "" for name in named]
         measured = [
-            words("", list(map(joined, named)), ""),
+            words("", list(map(unbroken, named)), ""),
             Column("", (), "order", orders),
             Column("", (), "knee", knees),
         ]
@@ -61,7 +61,7 @@ class AccuracyStudy(StudyResult[AccuracyResult]):
             known = [row for row in rows if row.error is not None and row.seconds]
             if known:
                 ladders.setdefault(known[0].quantity, []).append(known)
-        sized = {name: row_sets for name, row_sets in ladders.items() if any(_sized(rows) for rows in row_sets)}
+        sized = {name: row_sets for name, row_sets in ladders.items() if any(_has_sizes(rows) for rows in row_sets)}
         shown = [_chart(self.result, name, row_sets) for name, row_sets in sized.items()]
         return Charts(f"{self.result.problem}: what accuracy costs", shown, missing="no method has an error at sizes")
 
@@ -104,25 +104,25 @@ def _status(row: LadderRow) -> str:
     return "" if row.status in ("done", "optimal") else row.status.removeprefix("Solve_Succeeded, ")
 
 
-def _sized(rows: Sequence[LadderRow]) -> bool:
+def _has_sizes(rows: Sequence[LadderRow]) -> bool:
     return len(rows) > 1 and not isinstance(rows[0].setting, str)
 
 
 def _chart(result: AccuracyResult, quantity: str, ladders: Sequence[Sequence[LadderRow]]) -> Chart:
     """Errors of one quantity's methods, over the setting where all settings of a method cost alike."""
-    alike = any(_sized(rows) and len({row.evaluations for row in rows}) == 1 for rows in ladders)
+    alike = any(_has_sizes(rows) and len({row.evaluations for row in rows}) == 1 for rows in ladders)
     ladders = [rows for rows in ladders if rows[0].method != NUMBERS]
-    places = [[_place(row, alike) for row in rows if _sized(rows) or not alike] for rows in ladders]
+    places = [[_place(row, alike) for row in rows if _has_sizes(rows) or not alike] for rows in ladders]
     errors = [[max(row.error or 0.0, LEAST) for row in rows] for rows in ladders]
     across = decades([x for values in places for x in values], "step [rad]" if alike else "time of one run [s]")
     series, key = [], []
     for place, (rows, x, y) in enumerate(zip(ladders, places, errors, strict=True)):
         kind, name = f"c{place % COLOURS}", f"{quantity}, {rows[0].method}"
         order = f", order {result.orders[name]:.2f}" if name in result.orders else ""
-        if alike and not _sized(rows):  # a method without settings has one error at all of them
+        if alike and not _has_sizes(rows):  # a method without settings has one error at all of them
             series.append(Series(np.array([across.low, across.high]), np.array(2 * y[:1]), kind))
         else:
-            series += [Series(np.array(x), np.array(y), kind)] if _sized(rows) else []
+            series += [Series(np.array(x), np.array(y), kind)] if _has_sizes(rows) else []
             series.append(Series(np.array(x), np.array(y), kind, points=True))
         key.append((kind, f"{rows[0].method}{order}"))
     upright = decades([error for values in errors for error in values], "relative error")

@@ -10,8 +10,8 @@ from loomopt.base.units import factor
 from loomopt.interface.study_result import StudyResult
 from loomopt.physics.cycle import TURN
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
-from loomopt.picture.chart import COLOURS, TICKS, Axis, Chart, Charts, Series, headed, thinned
-from loomopt.picture.table import Column, TextTable, text_table, words, written
+from loomopt.picture.chart import COLOURS, TICKS, Axis, Chart, Charts, Series, heading, thin_rows
+from loomopt.picture.table import Column, TextTable, number_text, text_table, words
 from loomopt.scenes.designs import Design
 from loomopt.scenes.provenance import provenance
 from loomopt.scenes.scene import Scene
@@ -48,7 +48,7 @@ class Budget(StudyResult[BudgetResult]):
     def tables(self) -> list[str | TextTable]:
         """A line per effect, their sum, the motor, and remarks."""
         result, scene = self.result, self.result.scene
-        peak = scene.show(_rounded(result.total.at_peak, result.total.peak), "torque")
+        peak = scene.show(_round(result.total.at_peak, result.total.peak), "torque")
         first = f"{scene.name}: the crank torque is largest, {peak}, at {scene.show(result.torque.angle, 'angle')}"
         motor = tuple((label, _motor(result, name)) for name, (label, _) in MOTOR.items())
         shares = text_table(_columns(result), first=(0, 1, 5))
@@ -59,7 +59,7 @@ class Budget(StudyResult[BudgetResult]):
         scene, record = self.result.scene, self.result.torque
         unit, shown = scene.shown_in("torque"), scene.shown_in("angle")
         size, angle = factor(unit), factor(shown)
-        rows = thinned(np.degrees(record.phi))
+        rows = thin_rows(np.degrees(record.phi))
         phi = record.phi[rows] / angle
         shares = {name: curve[rows] / size for name, curve in record.curves.items()}
         total = Series(phi, np.sum(list(shares.values()), axis=0), "c0", "crank torque")
@@ -67,7 +67,7 @@ class Budget(StudyResult[BudgetResult]):
         step = math.radians(TICKS)
         numbered = [step * k / angle for k in range(round(TURN / step) + 1)]
         chart = Chart(
-            headed("torque", unit),
+            heading("torque", unit),
             Axis(float(phi.min()), float(phi.max()), numbered, f"crank angle phi [{shown}]"),
             [*series, total],
             dots=[(record.angle / angle, record.total.at_peak / size, "c0")],
@@ -98,18 +98,18 @@ def _columns(result: BudgetResult, si: bool = False) -> list[Column]:
     columns = [words("effect", [row.effect for row in rows])]
     for name, head in (("at_peak", "there"), ("rms", "rms"), ("peak", "largest")):
         values = [getattr(row, name) / size for row in rows]
-        cells = [written(_rounded(value, result.total.peak / size)) for value in values]
+        cells = [number_text(_round(value, result.total.peak / size)) for value in values]
         columns.append(Column(f"{name} [{torque}]", values, f"{head}\n{torque}", cells, called=head))
-    cells = ["" if math.isnan(share) else f"{_rounded(share, 100.0):.4g}" for share in shares]
+    cells = ["" if math.isnan(share) else f"{_round(share, 100.0):.4g}" for share in shares]
     columns.insert(2, Column("share [%]", shares, "of it\n%", cells, called="of it"))
     head = f"energy a turn\n{energy}"
     return [
         *columns,
-        Column(f"energy [{energy}]", energies, head, list(map(written, energies)), called="energy a turn"),
+        Column(f"energy [{energy}]", energies, head, list(map(number_text, energies)), called="energy a turn"),
     ]
 
 
-def _rounded(value: float, size: float) -> float:
+def _round(value: float, size: float) -> float:
     return 0.0 if abs(value) <= SHOWN_AS_ZERO * size else value
 
 

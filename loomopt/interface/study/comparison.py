@@ -11,16 +11,16 @@ from loomopt.base import arguments
 from loomopt.base.errors import refusal
 from loomopt.base.units import factor
 from loomopt.interface import results, tables
-from loomopt.interface.figures.curves import shown_unit, turned
+from loomopt.interface.figures.curves import drawn_turn, shown_unit
 from loomopt.interface.results import Evaluation
 from loomopt.interface.study_result import Presentation
 from loomopt.jobs import registry
 from loomopt.model.session import working
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
-from loomopt.picture.chart import COLOURS, TICKS, Axis, Chart, Charts, Series, headed
+from loomopt.picture.chart import COLOURS, TICKS, Axis, Chart, Charts, Series, heading
 from loomopt.picture.job_views import Marks
-from loomopt.picture.panels import each as each_alone
 from loomopt.picture.panels import in_units
+from loomopt.picture.panels import single_panels as each_alone
 from loomopt.picture.table import Column, TextTable, text_table, words
 from loomopt.scenes import designs
 from loomopt.scenes.designs import Design, flat
@@ -39,7 +39,7 @@ class Named(NamedTuple):
     """A design with what it is called beside others, judged in a scene."""
 
     name: str
-    found: Evaluation
+    evaluation: Evaluation
 
 
 class ComparedRow(NamedTuple):
@@ -51,7 +51,7 @@ class ComparedRow(NamedTuple):
     name: str
     unit: str
     values: tuple[float | None, ...]
-    held: tuple[bool | None, ...]
+    limits_ok: tuple[bool | None, ...]
     differs: bool
 
 
@@ -65,14 +65,17 @@ class Comparison(Presentation):
     @property
     def scene(self) -> Scene:
         """The scene whose units all are shown in: the first design's."""
-        return self.designs[0].found.scene
+        return self.designs[0].evaluation.scene
 
     @functools.cached_property
     def rows(self) -> tuple[ComparedRow, ...]:
         """Dimensions, then figures, then limits on what is neither."""
         words = Words(self.scene)
-        parts = [design.found.design for design in self.designs], [design.found.figures for design in self.designs]
-        limits = [{limit.name: limit for limit in design.found.limits} for design in self.designs]
+        parts = (
+            [design.evaluation.design for design in self.designs],
+            [design.evaluation.figures for design in self.designs],
+        )
+        limits = [{limit.name: limit for limit in design.evaluation.limits} for design in self.designs]
         rows, taken = [], set[str]()
         for numbers in parts:
             for name in dict.fromkeys(name for row in numbers for name in row):
@@ -86,7 +89,7 @@ class Comparison(Presentation):
         ):
             limit_row = [design_limits.get(name) for design_limits in limits]
             rows.append(_row(name, [limit.value if limit else None for limit in limit_row], limits, words))
-        return tuple(_cleaned(rows))
+        return tuple(_clean(rows))
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
         """Table of one row per number, a column per design, with whether they differ; si: in SI."""
@@ -104,7 +107,7 @@ class Comparison(Presentation):
         for place, design in enumerate(self.designs):
             values = [row.values[place] for row in rows]
             in_unit = [None if value is None else value * size for value, size in zip(values, sizes, strict=True)]
-            cells = [_cell(value, row.held[place]) for value, row in zip(values, rows, strict=True)]
+            cells = [_cell(value, row.limits_ok[place]) for value, row in zip(values, rows, strict=True)]
             columns.append(Column(design.name, in_unit, design.name, cells))
         names = ["" if row.unit == "1" else row.unit for row in rows]
         return [
@@ -116,11 +119,11 @@ class Comparison(Presentation):
 
     def charts(self) -> Charts:
         """Curves over the cycle of all designs laid over each other, a chart for each."""
-        return _overlaid([(design.name, design.found.scene, design.found.design) for design in self.designs])
+        return _overlaid([(design.name, design.evaluation.scene, design.evaluation.design) for design in self.designs])
 
     def as_dict(self) -> dict[str, object]:
         """Object that `compare --json` prints, SI."""
-        documents = [(design.name, design.found.as_dict()) for design in self.designs]
+        documents = [(design.name, design.evaluation.as_dict()) for design in self.designs]
         units = {name: unit for _, document in documents for name, unit in document["units"].items()}
         keys = ("problem", "design", "figures", "limits")
         entries = [{"name": name, **{key: document[key] for key in keys}} for name, document in documents]
@@ -130,9 +133,11 @@ class Comparison(Presentation):
         """Which limits each design holds, and all numbers side by side."""
         lines: list[str | TextTable] = []
         for design in self.designs:
-            broken = [limit.name for limit in design.found.limits if not limit.ok and not limit.rounding]
+            broken = [limit.name for limit in design.evaluation.limits if not limit.ok and not limit.rounding]
             verdict = f"NOT admissible (!): {', '.join(broken)}" if broken else "all limits held"
-            lines.append(f"{design.name}: {design.found.problem}, {design.found.sought or 'no target'}: {verdict}")
+            lines.append(
+                f"{design.name}: {design.evaluation.problem}, {design.evaluation.sought or 'no target'}: {verdict}"
+            )
         count = len(self.designs)
         return [*lines, text_table(self._columns(), (0, *range(1, count + 1), count + 1))]
 
@@ -159,7 +164,7 @@ def _row(
     return ComparedRow(name, unit, shown, satisfied, differs)
 
 
-def _cleaned(rows: Sequence[ComparedRow]) -> list[ComparedRow]:
+def _clean(rows: Sequence[ComparedRow]) -> list[ComparedRow]:
     """Rows in which what is only rounding beside the largest of its unit is 0, and does not differ."""
     sizes: dict[str, float] = {}
     for row in rows:
@@ -177,7 +182,7 @@ def _cell(value: float | None, satisfied: bool | None) -> str:
 
 
 def _broken(row: ComparedRow, designs: Sequence[Named]) -> list[str]:
-    return [design.name for design, satisfied in zip(designs, row.held, strict=True) if satisfied is False]
+    return [design.name for design, satisfied in zip(designs, row.limits_ok, strict=True) if satisfied is False]
 
 
 def compare(given_designs: Sequence[object], within: Scene | None = None, names: Sequence[str] = ()) -> Comparison:
@@ -199,12 +204,12 @@ def compare(given_designs: Sequence[object], within: Scene | None = None, names:
     for design in given_designs:
         if not isinstance(design, Evaluation):
             target = first.target if home.job == first.scene.job else None
-            judged.append(results.evaluated(home, None, target or None))
+            judged.append(results.evaluate_design(home, None, target or None))
             continue
         designs.check_job(design.scene.job, home, f"<{design.problem}>")
         judged.append(_within(design, within) if within else design)
     called = [
-        name or _called(design)
+        name or _design_name(design)
         for name, design in zip([*names, *[""] * len(given_designs)], given_designs, strict=False)
     ]
     counts, seen = Counter(called), Counter[str]()
@@ -218,10 +223,10 @@ def compare(given_designs: Sequence[object], within: Scene | None = None, names:
 def _within(evaluation: Evaluation, scene: Scene) -> Evaluation:
     """A design judged in another scene, by the same target where that has one of its name."""
     target = evaluation.target if evaluation.target in scene.schema.targets else None
-    return results.evaluated(scene, designs.checked(evaluation.design, scene), target)
+    return results.evaluate_design(scene, designs.checked(evaluation.design, scene), target)
 
 
-def _called(design: object) -> str:
+def _design_name(design: object) -> str:
     return f"{design.problem}, {design.sought}" if isinstance(design, Evaluation) else TODAY
 
 
@@ -231,7 +236,7 @@ def _overlaid(designs: Sequence[tuple[str, Scene, Design]]) -> Charts:
     scene, first = designs[0][1:]
     view, unit = registry.of(scene).views, scene.shown_in("angle")
     angle = math.degrees(factor(unit))
-    turns = [turned(tables.curves(home, design), _marks(home, design), unit) for _, home, design in designs]
+    turns = [drawn_turn(tables.curves(home, design), _marks(home, design), unit) for _, home, design in designs]
     columns = tuple(dict.fromkeys(column for turn in turns for column in turn.columns.columns))
     known = view.panels(scene, flat(first), tuple(turns[0].columns.columns))
     panels = [*known, *(panel for panel in each_alone(columns) if panel.columns[0] not in turns[0].columns)]
@@ -249,7 +254,7 @@ def _overlaid(designs: Sequence[tuple[str, Scene, Design]]) -> Charts:
                 for turn, (kind, name) in zip(turns, key, strict=True)
                 if column in turn.columns
             ]
-            shown.append(Chart(headed(label, shown_unit(panel)), axis, drawn, key=key, cursor=True))
+            shown.append(Chart(heading(label, shown_unit(panel)), axis, drawn, key=key, cursor=True))
     return Charts(f"{scene.name}: designs compared, curves over the cycle", shown, shared=True)
 
 

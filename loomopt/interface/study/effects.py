@@ -10,7 +10,7 @@ from loomopt.base.units import factor
 from loomopt.interface.study_result import StudyResult, row_hook, workers
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.chart import Bars, Charts, both_sides
-from loomopt.picture.table import Column, TextTable, call, text_table, words, written
+from loomopt.picture.table import Column, TextTable, call, number_text, text_table, words
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words
 from loomopt.studies.effects.effect_impact import LIMITS, EffectImpact
@@ -45,7 +45,7 @@ class EffectsStudy(StudyResult[EffectsResult]):
         """A line per effect, what may be left out, and what was not measured; timed: with the time of each solve."""
         result, reference = self.result, self.result.reference
         values = ", ".join(f"{name} {_reference_value(result, name)}" for name in reference.scales)
-        first = f"{result.scene.name}, {result.target}, with {listed(reference.effects) or 'no effect'} on: "
+        first = f"{result.scene.name}, {result.target}, with {list_text(reference.effects) or 'no effect'} on: "
         lines = [first + (values if reference.status == "optimal" else f"{reference.status}, {reference.why}")]
         sizes = ", ".join(f"{name} {Words(result.scene).shown(name, size)}" for name, size in reference.scales.items())
         lines += [f"Shares are of natural sizes: {sizes}"] if sizes else []
@@ -105,11 +105,11 @@ def _columns(result: EffectsResult, rows: Sequence[EffectImpact], timed: bool = 
     for name, scale in result.reference.scales.items():
         unit = units.si(name) if si else units.unit(name)
         size = scale / factor(unit)
-        shift = [_known(row.shift.get(name)) for row in rows]
-        regret = [_known(row.regret.get(name)) for row in rows]
+        shift = [_value_or_zero(row.shift.get(name)) for row in rows]
+        regret = [_value_or_zero(row.regret.get(name)) for row in rows]
         head = f"{name}\nshift" + ("" if unit == "1" else f"\n{unit}")
         sizes = [value * size for value in shift]
-        cells = ["0" if abs(value) <= SHOWN_AS_ZERO else written(value * size) for value in shift]
+        cells = ["0" if abs(value) <= SHOWN_AS_ZERO else number_text(value * size) for value in shift]
         columns += [
             Column(f"{name} shift [{unit}]", sizes, head, cells, called=f"{name} shift"),
             Column(f"{name} shift [%]", *_percent(shift, "\n\n%"), called=f"{name} shift %"),
@@ -117,11 +117,11 @@ def _columns(result: EffectsResult, rows: Sequence[EffectImpact], timed: bool = 
             Column(f"{name} regret [%]", *_percent(regret, "\nregret\n%"), called=f"{name} regret %"),
         ]
     nodes = ["" if row.nodes is None else str(row.nodes) for row in rows]
-    build, solve = [_known(row.build_s) for row in rows], [_known(row.solve_s) for row in rows]
+    build, solve = [_value_or_zero(row.build_s) for row in rows], [_value_or_zero(row.solve_s) for row in rows]
     going = ["" if row.effect == "nothing" else "yes" if row.may_go else "no" for row in rows]
     return [
         *columns,
-        Column("limits exceeded [%]", *_percent([_known(row.excess) for row in rows], "limits\nexceeded\n%")),
+        Column("limits exceeded [%]", *_percent([_value_or_zero(row.excess) for row in rows], "limits\nexceeded\n%")),
         Column("may go", [row.may_go for row in rows]),
         Column("takes away", [", ".join(row.missing_figures) for row in rows]),
         Column("changes", [", ".join(row.changed_figures) for row in rows]),
@@ -136,13 +136,13 @@ def _columns(result: EffectsResult, rows: Sequence[EffectImpact], timed: bool = 
     ]
 
 
-def _known(value: float | None) -> float:
+def _value_or_zero(value: float | None) -> float:
     return math.nan if value is None else value
 
 
 def _percent(shares: Sequence[float], head: str) -> tuple[list[float], str, list[str]]:
     """Shares in %, the heading of their column, and as people read them."""
-    cells = ["0" if abs(share) <= SHOWN_AS_ZERO else written(100 * share, 3) for share in shares]
+    cells = ["0" if abs(share) <= SHOWN_AS_ZERO else number_text(100 * share, 3) for share in shares]
     return [100 * share for share in shares], head, cells
 
 
@@ -198,7 +198,7 @@ def _number(share: float | None) -> str:
     return "0" if abs(share) <= SHOWN_AS_ZERO else f"{100 * share:+.3g} %"
 
 
-def listed(names: Sequence[str]) -> str:
+def list_text(names: Sequence[str]) -> str:
     """Names as a sentence has them."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
@@ -210,35 +210,37 @@ def verdict(result: EffectsResult) -> list[str]:
         return ["Not finished: what may be left out is not known."]
     if not result.reference.scales:
         return ["Without a design for the reference nothing can be measured."]
-    sentence = f"{listed(result.left_out)} may be left out" if result.left_out else "no effect may be left out"
+    sentence = f"{list_text(result.left_out)} may be left out" if result.left_out else "no effect may be left out"
     lines = [f"At {share}, {sentence}{': ' if solve else ''}{solve}"]
     if result.together and result.largest_omission:
         change = _change_text(result.together.largest_change)
         lines.append(f"Left out together, and what is found so judged with all on: {change}.")
         if len(result.left_out) > 1 and abs(result.largest_omission.value) > SHOWN_AS_ZERO:
             by, of, value = result.largest_omission.by, result.largest_omission.of, result.largest_omission.value
-            lines[-1] += f" Most comes from {result.largest_omission.effect}: {_moved(by, of, value)}."
-    lines += omitted(result)
+            lines[-1] += f" Most comes from {result.largest_omission.effect}: {_change(by, of, value)}."
+    lines += omission_sentences(result)
     alone = [row.effect for row in result.rows if row.may_go and row.effect not in result.left_out]
     if alone:
-        lines.append(f"By itself {listed(alone)} may go, but not together with what else is left out.")
+        lines.append(f"By itself {list_text(alone)} may go, but not together with what else is left out.")
     same = [row.effect for row in result.rows if _only_figures(row, result.tolerance)]
     if same:
-        lines.append(f"Without {listed(same)} as good a design is found, but its figures are wrong by more than that.")
+        lines.append(
+            f"Without {list_text(same)} as good a design is found, but its figures are wrong by more than that."
+        )
     if result.judged:
-        lines.append(f"Evaluate the design with {listed(result.judged)}, which solve does not take.")
+        lines.append(f"Evaluate the design with {list_text(result.judged)}, which solve does not take.")
     return lines
 
 
-def omitted(result: EffectsResult) -> list[str]:
+def omission_sentences(result: EffectsResult) -> list[str]:
     """Sentences on which figures are gone or others without what is left out, and which of them the target reads."""
     rows = [row for row in result.rows if row.effect in result.left_out]
     sentences, names = list[str](), dict[str, None]()
     for row in (*rows, *([result.together] if result.together and len(rows) > 1 else [])):
         single = row in rows
         missing, changed = row.missing_figures, row.changed_figures if single else ()
-        parts = [f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} gone"] if missing else []
-        parts += [f"{listed(changed)} {'changes' if len(changed) == 1 else 'change'}"] if changed else []
+        parts = [f"{list_text(missing)} {'is' if len(missing) == 1 else 'are'} gone"] if missing else []
+        parts += [f"{list_text(changed)} {'changes' if len(changed) == 1 else 'change'}"] if changed else []
         sentences += (
             [f"{f'without {row.effect}' if single else 'without them all'} {' and '.join(parts)}"] if parts else []
         )
@@ -246,16 +248,16 @@ def omitted(result: EffectsResult) -> list[str]:
     if not sentences:
         return []
     read = [name for name in names if name in result.reference.reads]
-    which = f"reads {listed(read)} of them" if read else "reads none of these figures"
+    which = f"reads {list_text(read)} of them" if read else "reads none of these figures"
     return [f"Of the other figures: {'; '.join(sentences)}. Target {result.target} {which}."]
 
 
 def _change_text(largest: tuple[str, str, float]) -> str:
     """The largest change in words."""
-    return f"at most {_moved(*largest)}" if abs(largest[2]) > SHOWN_AS_ZERO else "nothing changes"
+    return f"at most {_change(*largest)}" if abs(largest[2]) > SHOWN_AS_ZERO else "nothing changes"
 
 
-def _moved(by: str, of: str, value: float) -> str:
+def _change(by: str, of: str, value: float) -> str:
     """A change in words: by "shift" or "regret", of a figure or of the limits."""
     share = f"{100 * value:.3g} %"
     if of == LIMITS:

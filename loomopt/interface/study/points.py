@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from loomopt.base import arguments
 from loomopt.base.records import lazy
 from loomopt.interface import study_table
-from loomopt.interface.results import Answer, solved
+from loomopt.interface.results import Answer, to_answer
 from loomopt.interface.study_result import Presentation, check_resume, opened_store, row_hook, workers
 from loomopt.picture.chart import Charts
 from loomopt.picture.shapes import Drawing
@@ -81,13 +81,13 @@ class StudyTable(Presentation):
         """
         number = study_table.labelled_point(self.study, self.rows, self.solved, point)
         task, parent = next(work for work in run.tasks(self.study, self.solved) if work[0].point == number)
-        return solved(self.study.solve(task, parent), self.study.scene_at(number), self.study.target)
+        return to_answer(self.study.solve(task, parent), self.study.scene_at(number), self.study.target)
 
     def figure(self) -> tuple[Charts, Sequence[tuple[str, Drawing]]]:
         """Charts of its figure, and the designs at both ends and in the middle."""
         from loomopt.interface.figures import study
 
-        return study.lettered(self.study, self.findings, self.charts())
+        return study.letter_designs(self.study, self.findings, self.charts())
 
     def report(self, path: str | os.PathLike[str], *results: object) -> Path:
         """Write one self-contained page, which says first how many points are certified; return the file.
@@ -114,7 +114,7 @@ class StudyTable(Presentation):
         from loomopt.interface.report import animation
 
         place = None if path is None else Path(arguments.path(path, "path", *animation.FILE))
-        return animation.morphed(self.study, self.rows, place)
+        return animation.morph(self.study, self.rows, place)
 
     def as_dict(self) -> dict[str, object]:
         """Object that `--json` prints."""

@@ -8,7 +8,7 @@ from loomopt.base import arguments
 from loomopt.base.units import factor
 from loomopt.interface.progress import cell_progress
 from loomopt.interface.study_result import StudyResult
-from loomopt.picture.chart import Bars, Charts, headed
+from loomopt.picture.chart import Bars, Charts, heading
 from loomopt.picture.table import Column, TextTable, text_table, words
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words
@@ -41,7 +41,7 @@ class SensitivityStudy(StudyResult[SensitivityResult]):
         head = f"{result.scene.name}, {result.target}: how the optimum moves with each number"
         if result.refused:
             return [f"{head} cannot be told: {result.refused}"]
-        moves = [text_table(_columns(result, ordered(result, name), name), (0, 2, 3, 5)) for name in sought(result)]
+        moves = [text_table(_columns(result, sort_rows(result, name), name), (0, 2, 3, 5)) for name in sought(result)]
         return [head, *moves, _prices(result), *_valid(result)]
 
     def charts(self) -> Charts:
@@ -50,9 +50,9 @@ class SensitivityStudy(StudyResult[SensitivityResult]):
         shown = []
         for name in sought(result):
             unit = Words(result.scene).unit(name)
-            rows = ordered(result, name)[:MOST]
+            rows = sort_rows(result, name)[:MOST]
             bars = [(f"{row.number} {ARROWS[row.side]}".strip(), (effect(result, row) / factor(unit),)) for row in rows]
-            shown.append(Bars(f"{headed(name, unit)}, by one sigma of a number or by 1 %", bars))
+            shown.append(Bars(f"{heading(name, unit)}, by one sigma of a number or by 1 %", bars))
         title = f"{result.scene.name}, {result.target}: what moves the optimum, a number up by one sigma or 1 %"
         return Charts(title, shown, missing="no number moves what is sought")
 
@@ -85,7 +85,7 @@ def _under(unit: str) -> str:
     return f"({unit})" if "*" in unit or "/" in unit else unit
 
 
-def ordered(result: SensitivityResult, name: str) -> list[Row]:
+def sort_rows(result: SensitivityResult, name: str) -> list[Row]:
     """Derivatives of a figure that are not 0, the largest effect first."""
     rows = [row for row in result.rows if row.of == name and row.value]
     return sorted(rows, key=lambda row: -abs(effect(result, row)))

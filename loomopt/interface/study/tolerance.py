@@ -14,8 +14,8 @@ from loomopt.base.units import factor
 from loomopt.interface.progress import cell_progress
 from loomopt.interface.study_result import StudyResult, check_resume, opened_store, workers
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
-from loomopt.picture.chart import Axis, Chart, Charts, Series, headed, ticks
-from loomopt.picture.table import Column, TextTable, text_table, words, written
+from loomopt.picture.chart import Axis, Chart, Charts, Series, heading, ticks
+from loomopt.picture.table import Column, TextTable, number_text, text_table, words
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words
 from loomopt.studies.run import run
@@ -116,7 +116,7 @@ def _spreads(result: ToleranceResult, si: bool = False) -> list[Column]:
         [getattr(spread, part) / size for spread, size in pairs] for part in ("nominal", "sigma_linear", "sigma")
     )
     centres = [
-        written(0.0 if abs(spread.nominal) <= SHOWN_AS_ZERO * spread.sigma else spread.nominal / size)
+        number_text(0.0 if abs(spread.nominal) <= SHOWN_AS_ZERO * spread.sigma else spread.nominal / size)
         for spread, size in pairs
     ]
     columns = [
@@ -181,7 +181,7 @@ def _histogram(result: ToleranceResult, name: str, spread: Spread) -> Chart:
     nominal = 0.0 if abs(spread.nominal) <= SHOWN_AS_ZERO * spread.sigma else spread.nominal
     key = [("k-place", f"nominal {units.shown(name, nominal)}")]
     key += [("k-span", f"does not hold; {100 * result.yields[name].value:.4g} % hold")] if outside else []
-    axis = Axis(low, high, ticks(low, high, 4), headed(name, unit))
+    axis = Axis(low, high, ticks(low, high, 4), heading(name, unit))
     curve = Series(np.repeat(edges, 2), steps, "c0", filled=True)
     return Chart("machines [%]", axis, [curve], spans=outside, places=[nominal / size], key=key)
 

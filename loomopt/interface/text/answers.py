@@ -10,7 +10,7 @@ from loomopt.interface.tables import largest, rows
 from loomopt.jobs import registry
 from loomopt.model.program import Alias
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
-from loomopt.picture.table import TextTable, joined
+from loomopt.picture.table import TextTable, unbroken
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Evaluated, Solution, Words, changed, named, remedies
 from loomopt.solving.certificate.records import GlobalBound
@@ -29,7 +29,7 @@ def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
     parts: list[str | TextTable] = [f"{answer.problem}, {answer.sought}: {answer.outcome}"]
     explanation = answer.explanation
     if answer.relaxation:
-        clash = ", ".join(joined(limit) for limit in answer.clash)
+        clash = ", ".join(unbroken(limit) for limit in answer.clash)
         parts += [f"No admissible design exists near any start. Limits that clash: {clash}.", relaxation(answer)]
     elif answer.status == "optimal" and not answer.terms:
         parts += [] if answer.members else [registry.of(scene).say(scene, answer.target, answer.figures)]
@@ -41,11 +41,11 @@ def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
     parts += lists(answer, scene)
     parts += [members(answer, scene)] if answer.members else []
     if answer.certificate:
-        parts += [*([] if answer.members else [retyped(answer, scene)]), binding(answer)]
+        parts += [*([] if answer.members else [design_text(answer, scene)]), binding(answer)]
         parts += certificate(answer)
-    parts += proven(answer.proofs) if answer.proofs else []
+    parts += proof_summary(answer.proofs) if answer.proofs else []
     if answer.global_bound:
-        parts.append(everywhere(answer.global_bound, scene))
+        parts.append(global_summary(answer.global_bound, scene))
     if answer.solver.get("starts", 1) > 1:
         parts.append(starts(answer, scene))
     time = answer.time
@@ -83,7 +83,7 @@ def comparison(evaluated: Evaluated, scene: Scene, before: Evaluated | None, hea
     lines = []
     for row in table:
         today = [] if before is None else ["" if row["today"] is None else f"{row['today']:.6g}"]
-        limit = joined(_limit(row["min"], row["max"]) + ("" if row["ok"] else f"  <- {missed[row['name']]}"))
+        limit = unbroken(_limit(row["min"], row["max"]) + ("" if row["ok"] else f"  <- {missed[row['name']]}"))
         limit += apart.get(row["name"], "")
         unit = "" if row["unit"] == "1" else row["unit"]
         lines.append((row["name"], *today, f"{row['design']:.6g}", unit, limit, *(row[name] for name in marked)))
@@ -95,7 +95,7 @@ def comparison(evaluated: Evaluated, scene: Scene, before: Evaluated | None, hea
             unit = words.unit(entry.name)
             size = factor(unit)
             low, high = (None if end is None else end / size for end in (entry.min, entry.max))
-            range_text = joined(_limit(low, high) + ("" if entry.ok else f"  <- {missed[entry.name]}"))
+            range_text = unbroken(_limit(low, high) + ("" if entry.ok else f"  <- {missed[entry.name]}"))
             range_text += apart.get(entry.name, "")
             value = entry.value / size
             value = 0.0 if abs(value) <= SHOWN_AS_ZERO * sizes.get(unit, 0.0) else value
@@ -143,19 +143,19 @@ def members(solution: Solution, scene: Scene) -> TextTable:
     for place, (member, row) in enumerate(zip(solution.members, values, strict=True)):
         cells = [f"{row[name] / sizes[name] if abs(row[name]) > least[name] else 0.0:.6g}" for name in names]
         missed = ", ".join(name for name, reached in member.reached.items() if not reached)
-        lines.append((str(place + 1), joined(changed(member)), *cells, f"{missed} not" if missed else ""))
+        lines.append((str(place + 1), unbroken(changed(member)), *cells, f"{missed} not" if missed else ""))
     units = ["" if words.unit(name) == "1" else f" [{words.unit(name)}]" for name in names]
     head = ("member", "change", *(f"{name}{unit}" for name, unit in zip(names, units, strict=True)), "reached")
     return TextTable("Each member by itself", head, tuple(lines), right=tuple(range(2, 2 + len(names))))
 
 
-def retyped(evaluated: Evaluated, scene: Scene) -> str:
+def design_text(evaluated: Evaluated, scene: Scene) -> str:
     """A design to type again, with the digits it takes to be the same: a JSON object, text with units."""
     words, texts = Words(scene), []
     for name, value in evaluated.design.items():
         if name not in scene.schema.lists:
             text, unit = shortest_text(value, words.unit(name), words.kind(name)), words.unit(name)
-            texts.append(joined(f'"{name}": {text}' if unit == "1" else f'"{name}": "{text}"'))
+            texts.append(unbroken(f'"{name}": {text}' if unit == "1" else f'"{name}": "{text}"'))
     return f"to retype: {{{', '.join(texts)}}}"
 
 
@@ -174,7 +174,7 @@ def relaxation(answer: Solution) -> TextTable:
     for remedy in remedies(answer.relaxation):
         label = "this alone" if remedy[0].alone else "all of these" if len(remedy) > 1 else "this"
         heads = [f"or {label}" if lines else label, *([""] * (len(remedy) - 1))]
-        lines += [(head, joined(step.text)) for head, step in zip(heads, remedy, strict=True)]
+        lines += [(head, unbroken(step.text)) for head, step in zip(heads, remedy, strict=True)]
     return TextTable("The least relaxation that helps", ("loosen", "limit"), tuple(lines))
 
 
@@ -210,7 +210,7 @@ COMPARED = re.compile("[<>=]")
 BEYOND = {-1: "below", 1: "above"}
 
 
-def everywhere(bound: GlobalBound, scene: Scene) -> str:
+def global_summary(bound: GlobalBound, scene: Scene) -> str:
     """Return what is proven of all admissible designs, in one line."""
     words = Words(scene)
     sentences: list[str] = []
@@ -243,14 +243,14 @@ def starts(answer: Solution, scene: Scene) -> str:
     return text + (f". Other optima: {'; '.join(others)}" if others else "")
 
 
-def proven(proofs: "Proofs") -> list[str]:
+def proof_summary(proofs: "Proofs") -> list[str]:
     """Return what was proven, and what was not, in a few lines."""
     groups = {"limit": "limits", "assembly": "assembly", "peak": "peaks as claimed"}
     shown = {
-        label: [joined(proof.said) for proof in proofs.proofs if proof.kind == kind and proof.status == "proven"]
+        label: [unbroken(proof.said) for proof in proofs.proofs if proof.kind == kind and proof.status == "proven"]
         for kind, label in groups.items()
     }
-    missed = [joined(f"{proof.text} ({proof.status})") for proof in proofs.proofs if proof.status != "proven"]
+    missed = [unbroken(f"{proof.text} ({proof.status})") for proof in proofs.proofs if proof.status != "proven"]
     boxes = sum(proof.boxes for proof in proofs.proofs)
     head = f"Proven at every crank angle, up to {SLACK:.0e} of each quantity's largest magnitude, in {boxes} boxes:"
     lines = [f"    {kind}: {', '.join(texts)}" for kind, texts in shown.items() if texts]
@@ -265,12 +265,12 @@ def proofs(proofs: "Proofs") -> list[str | TextTable]:
         unit = words.unit(proof.name)
         sizes = (f"{proof.margin / factor(unit) + 0.0:.3g}", f"{proof.slack / factor(unit):.1g}")
         place = "" if proof.angle is None else f"{proof.angle / factor(angle):.4f}"
-        text = joined(proof.text) if COMPARED.search(proof.text) else proof.text
+        text = unbroken(proof.text) if COMPARED.search(proof.text) else proof.text
         lines.append((text, proof.status, *sizes, unit, str(proof.boxes), place))
     head = ("limit", "status", "margin", "up to", "unit", "boxes", f"fails at [{angle}]")
     table = TextTable("", head, tuple(lines), right=(2, 3, 5, 6), first=(0, 1, 2, 4, 6), more="--json")
     open_ = [
-        f"{joined(proof.said)} is left open from crank angle {proof.open / factor(angle):.4g} {angle} on, "
+        f"{unbroken(proof.said)} is left open from crank angle {proof.open / factor(angle):.4g} {angle} on, "
         f"after {proof.boxes} boxes."
         for proof in proofs.proofs
         if proof.open is not None

@@ -154,10 +154,10 @@ def columns(scene: Scene) -> Iterator[Symbol]:
     descriptions |= SHARED
     for column in job.curves(scene, job.today(scene), steps=4):
         name, unit = split(column)
-        yield Symbol(name, unit, descriptions.get(name) or _called(job.views, name, unit) or _derivative(name))
+        yield Symbol(name, unit, descriptions.get(name) or _column_name(job.views, name, unit) or _derivative(name))
 
 
-def _called(views: JobViews, name: str, unit: str) -> str:
+def _column_name(views: JobViews, name: str, unit: str) -> str:
     """Return what a job calls a column of its own; one of several of a kind by that kind too; "" where it does not."""
     curve = views.words().get(name)
     if not (curve and curve.name):
@@ -175,7 +175,7 @@ def _derivative(name: str) -> str:
     return ""
 
 
-def sketched(scene: Scene) -> dict[str, float]:
+def sketch_design(scene: Scene) -> dict[str, float]:
     """Design, SI, that a sketch shows: today's, and what is 0 today in the middle of its bounds."""
     bounds = {name: bound for name, bound in scene.bounds.items() if scene.mechanism.get(name) == 0.0}
     return {name: (bound.min + bound.max) / 2 for name, bound in bounds.items() if bound.max < math.inf}
@@ -186,12 +186,12 @@ def labels(scene: Scene) -> frozenset[str]:
     views = registry.of(scene).views
     if views.missing(scene):
         return frozenset()
-    texts = {part.text for part in views.linkage(scene, sketched(scene)).primitives if isinstance(part, Text)}
+    texts = {part.text for part in views.linkage(scene, sketch_design(scene)).primitives if isinstance(part, Text)}
     named = {name for text in texts for name in re.findall(r"(\w+) = ", text)}
     return frozenset(named | {name for name, letter in GREEK.items() if letter in named})
 
 
-def printed(scene: Scene) -> list[str | TextTable]:
+def source_tables(scene: Scene) -> list[str | TextTable]:
     """Tables of `loomopt show --sources`: what is printed, what is computed, the verdict and why.
 
     Of a scene that is not packaged, whose machine no source prints, it is what the scene itself says.

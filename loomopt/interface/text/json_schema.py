@@ -53,22 +53,24 @@ def scene(schema: SceneSchema) -> Json:
         "steps": lambda of: _by_number(of, lambda quantity: _quantity(Quantity(quantity.kind, above=0))),
         "stock": lambda of: _by_number(of, _stock),
         "display": display,
-        "targets": lambda of: _closed({name: _model(target.own, target.text) for name, target in of.targets.items()}),
+        "targets": lambda of: _closed_table(
+            {name: _model(target.own, target.text) for name, target in of.targets.items()}
+        ),
     }
     tables = {name: makers[name](schema) for name in TABLES}
     if schema.tables:  # numbers, figures and targets are then named by the scene
-        tables |= {**NAMED_BY_SCENE, "targets": _own_targets(schema)}
+        tables |= {**NAMED_BY_SCENE, "targets": _scene_targets(schema)}
     tables |= {name: described() for name, described in schema.tables.items()}
-    whole = _closed(tables, [name for name, table in tables.items() if table.get("required")])
+    whole = _closed_table(tables, [name for name, table in tables.items() if table.get("required")])
     rules = [_given(need) for need in schema.needs]
     rules += [_given(key, effect) for effect in schema.effects.values() for key in effect.needs]
     document: Json = {"$schema": DIALECT, "title": f"A loomopt scene: {schema.title}", **whole}
-    return _hoisted(document | ({"allOf": rules} if rules else {}))
+    return _hoist_quantities(document | ({"allOf": rules} if rules else {}))
 
 
 def display(schema: SceneSchema) -> Json:
     """Return [display]: the kinds of quantity, each with a unit."""
-    return _closed({key: _unit(kind) for key, kind in KINDS.items()})
+    return _closed_table({key: _unit(kind) for key, kind in KINDS.items()})
 
 
 def _unit(kind: str) -> Json:
@@ -91,7 +93,7 @@ def _effects(schema: SceneSchema) -> Json:
     for effect in schema.effects.values():
         table = _model(effect.table, effect.summary) | _either(effect)
         tables[effect.name] = {"type": "object", "additionalProperties": table} if effect.many else table
-    return _closed(tables)
+    return _closed_table(tables)
 
 
 def _bounds(schema: SceneSchema) -> Json:
@@ -109,7 +111,7 @@ def _by_number(schema: SceneSchema, made: Callable[[Quantity], Json]) -> Json:
                 kinds.setdefault(name, []).append(quantity)
     for name, kind in schema.variables.items():
         kinds[name] = kinds.get(name, [Quantity(kind)])[:1]
-    table = _closed({name: _any([made(quantity) for quantity in of]) for name, of in kinds.items()})
+    table = _closed_table({name: _any([made(quantity) for quantity in of]) for name, of in kinds.items()})
     if len(effects) < len(schema.effects):  # instances are named by the scene
         table["additionalProperties"] = {"type": "object"}
     return table
@@ -117,7 +119,7 @@ def _by_number(schema: SceneSchema, made: Callable[[Quantity], Json]) -> Json:
 
 def _bound(value: Json) -> Json:
     free = {"enum": [True, False, "true", "false"], "description": "false: held at today's value until it is freed"}
-    ends = _closed({"min": value, "max": value, "free": free}, ["min", "max"])
+    ends = _closed_table({"min": value, "max": value, "free": free}, ["min", "max"])
     return {"if": {"type": "object"}, "then": ends, "else": value}
 
 
@@ -145,13 +147,13 @@ def _tolerance(quantity: Quantity) -> Json:
     one: Json = {"oneOf": [{"required": [form]} for form in FORMS]}
     pairs = (("group", "correlation"), ("plus", "minus"))
     together = {"dependentRequired": {a: [b] for pair in pairs for a, b in (pair, pair[::-1])}}
-    return {"if": {"type": "object"}, "then": _closed(keys) | one | together, "else": half}
+    return {"if": {"type": "object"}, "then": _closed_table(keys) | one | together, "else": half}
 
 
 def _accept(schema: SceneSchema) -> Json:
     """Return [accept]: half the band around an equality or a goal by which machines are judged, by figure."""
     figures = schema.figures.values()
-    return _closed({figure.name: _quantity(Quantity(figure.kind, above=0)) for figure in figures})
+    return _closed_table({figure.name: _quantity(Quantity(figure.kind, above=0)) for figure in figures})
 
 
 def _stock(quantity: Quantity) -> Json:
@@ -163,8 +165,11 @@ def _limits(schema: SceneSchema) -> Json:
     figures = [figure for figure in schema.figures.values() if figure.sides]
     sides = {figure.name: dict.fromkeys(figure.sides, _quantity(Quantity(figure.kind))) for figure in figures}
     descriptions = {figure.name: figure.text for figure in figures}
-    return _closed(
-        {name: _closed(of) | {"minProperties": 1, "description": descriptions[name]} for name, of in sides.items()}
+    return _closed_table(
+        {
+            name: _closed_table(of) | {"minProperties": 1, "description": descriptions[name]}
+            for name, of in sides.items()
+        }
     )
 
 
@@ -200,14 +205,14 @@ def _given(key: str, effect: Effect | None = None) -> Json:
     return {"if": {"required": ["effects"], "properties": {"effects": on}}, "then": then}
 
 
-def _own_targets(schema: SceneSchema) -> Json:
+def _scene_targets(schema: SceneSchema) -> Json:
     """Return [targets] where the scene names them: each by the models that targets of the job have."""
     models = _any([_model(target.own) for name, target in schema.targets.items() if name != FAMILY])
     family = {FAMILY: _model(schema.targets[FAMILY].own)} if FAMILY in schema.targets else {}
     return {"type": "object", "properties": family, "additionalProperties": models}
 
 
-def _closed(properties: Mapping[str, Json], required: list[str] | None = None) -> Json:
+def _closed_table(properties: Mapping[str, Json], required: list[str] | None = None) -> Json:
     """A table that holds nothing else."""
     table: Json = {"type": "object", "additionalProperties": False, "properties": dict(properties)}
     return table | ({"required": required} if required else {})
@@ -248,7 +253,7 @@ def _without_null(part: Json) -> Json:
     return reduced
 
 
-def _hoisted(whole: Json) -> Json:
+def _hoist_quantities(whole: Json) -> Json:
     """A schema in which each kind of quantity stands once, under $defs; a place keeps its own description.
 
     Defaults are SI numbers inside, where a scene has text with a unit: they are not told.

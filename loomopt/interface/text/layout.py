@@ -10,7 +10,7 @@ from io import StringIO
 from itertools import zip_longest
 from typing import Any
 
-from loomopt.picture.table import JOINED, OPTION, TextTable, joined, spaced
+from loomopt.picture.table import JOINED, OPTION, TextTable, restore_spaces, unbroken
 
 GAP = "  "
 RULED = "    \n    \n -- \n    \n    \n    \n    \n    \n"
@@ -47,8 +47,8 @@ def render(parts: Sequence[str | TextTable], columns: int | None) -> str:
     if all(_fits(block, columns or UNWRAPPED) for block in blocks):
         text = "\n".join(line for block in blocks for line in block)
     else:
-        text = _wrapped(parts, columns or UNWRAPPED)
-    lines = [line.rstrip() for line in spaced(text).split("\n")]
+        text = _wrap(parts, columns or UNWRAPPED)
+    lines = [line.rstrip() for line in restore_spaces(text).split("\n")]
     return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)).strip("\n")
 
 
@@ -76,7 +76,7 @@ def _spread(grid: TextTable) -> list[str]:
     return ["", *([grid.title] if grid.title else []), *lines[:below], "-" * len(lines[0]), *lines[below:], ""]
 
 
-def narrowed(grid: TextTable, columns: int) -> tuple[TextTable, str]:
+def narrow(grid: TextTable, columns: int) -> tuple[TextTable, str]:
     """A table with as many of its columns as fit without cutting a word, and which are not among them; or ""."""
     least = _least(grid, columns)
     rank = [*grid.first, *(place for place in range(len(least)) if place not in grid.first)]
@@ -88,7 +88,7 @@ def narrowed(grid: TextTable, columns: int) -> tuple[TextTable, str]:
         return grid, ""
     gone = [place for place in range(len(least)) if place not in places and place not in grid.units]
     names = [(grid.names or grid.columns)[place] for place in gone]
-    dropped = ", ".join(joined(" ".join(name.split())) for name in names if name.strip())
+    dropped = ", ".join(unbroken(" ".join(name.split())) for name in names if name.strip())
     there = ", ".join(
         [f"a terminal of {_enough(grid, columns)} columns or a pipe (| cat)", *([grid.more] if grid.more else [])]
     )
@@ -141,7 +141,7 @@ def _widths(grid: TextTable, columns: int) -> list[int]:
     return widths
 
 
-def _wrapped(parts: Sequence[str | TextTable], columns: int) -> str:
+def _wrap(parts: Sequence[str | TextTable], columns: int) -> str:
     """Paragraphs and tables as Rich lays them out, wrapped where they are wider than `columns`."""
     from rich.console import Console
     from rich.text import Text
@@ -149,7 +149,7 @@ def _wrapped(parts: Sequence[str | TextTable], columns: int) -> str:
     console = Console(file=StringIO(), width=columns, color_system=None, highlight=False, markup=False)
     for part in parts:
         if isinstance(part, TextTable):
-            grid, gone = narrowed(part, columns)
+            grid, gone = narrow(part, columns)
             for line in ["", grid.title] if grid.title else [""]:  # a title may be wider than its table
                 console.print(_paragraph(line), crop=False)
             console.print(_table(grid, _widths(grid, columns)), crop=False)
@@ -157,7 +157,7 @@ def _wrapped(parts: Sequence[str | TextTable], columns: int) -> str:
                 console.print(_paragraph(line), crop=False)
         else:
             for line in part.split("\n"):
-                sentences, called = _called(line, columns)
+                sentences, called = _split_call(line, columns)
                 for sentence in sentences:
                     console.print(_paragraph(sentence), crop=False)
                 for sentence in called:
@@ -165,7 +165,7 @@ def _wrapped(parts: Sequence[str | TextTable], columns: int) -> str:
     return str(console.file.getvalue())  # type: ignore[attr-defined]
 
 
-def _called(line: str, columns: int) -> tuple[list[str], list[str]]:
+def _split_call(line: str, columns: int) -> tuple[list[str], list[str]]:
     """Return what stands before a call of the shell at a line's end that does not fit, and the lines of the call.
 
     An option with its value that is itself too long is left to the terminal, which breaks nothing that is copied.

@@ -9,7 +9,7 @@ from loomopt.interface.files import outputs, svg
 from loomopt.interface.text import answers, scenes
 from loomopt.jobs import registry
 from loomopt.picture.shapes import Drawing
-from loomopt.picture.table import TextTable, spaced
+from loomopt.picture.table import TextTable, restore_spaces
 from loomopt.scenes.designs import Design
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Evaluated, Proofs, Solution
@@ -60,17 +60,19 @@ def html(thing: object) -> str:
     """
     match thing:
         case Scene():
-            return page(scenes.parts(thing), _drawn(thing, {}))
+            return page(scenes.parts(thing), _draw(thing, {}))
         case Solution(scene=Scene() as scene):
-            return page(answers.solution(thing, scene), _drawn(scene, thing.design, outputs.what(thing)))
+            return page(answers.solution(thing, scene), _draw(scene, thing.design, outputs.describe_design(thing)))
         case Evaluated(scene=Scene() as scene):
-            return page(answers.evaluation(thing, scene, None), _drawn(scene, thing.design, outputs.what(thing)))
+            return page(
+                answers.evaluation(thing, scene, None), _draw(scene, thing.design, outputs.describe_design(thing))
+            )
         case Proofs():
             return page(answers.proofs(thing))
     raise TypeError(f"a {type(thing).__name__} is not shown")
 
 
-def _drawn(scene: Scene, design: Design, subject: outputs.DrawnSubject | None = None) -> str:
+def _draw(scene: Scene, design: Design, subject: outputs.DrawnSubject | None = None) -> str:
     """Mechanism as SVG where the scene gives what a drawing needs, else ""."""
     return "" if registry.of(scene).views.missing(scene) else sketch(scene, design, subject)._repr_svg_()
 
@@ -84,22 +86,22 @@ def _on_page(size: re.Match[str]) -> str:
 
 def page(parts: Sequence[str | TextTable], drawn: str = "") -> str:
     """Paragraphs and tables, then a drawing."""
-    blocks = (table(part) if isinstance(part, TextTable) else f"<p>{_escaped(part)}</p>" for part in parts)
+    blocks = (table(part) if isinstance(part, TextTable) else f"<p>{_escape(part)}</p>" for part in parts)
     return f"<div>{''.join(blocks)}{drawn}</div>"
 
 
 def table(grid: TextTable) -> str:
     """A table as HTML, numbers to the right."""
-    head = "".join(f"<th>{_escaped(heading)}</th>" for heading in grid.columns)
+    head = "".join(f"<th>{_escape(heading)}</th>" for heading in grid.columns)
     rows = ("".join(_cell(cell, place in grid.right) for place, cell in enumerate(line)) for line in grid.lines)
     body = "".join(f"<tr>{row}</tr>" for row in rows)
-    caption = f"<caption>{_escaped(grid.title)}</caption>" if grid.title else ""
+    caption = f"<caption>{_escape(grid.title)}</caption>" if grid.title else ""
     return f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def _cell(text: str, right: bool) -> str:
-    return f'<td style="text-align: {"right" if right else "left"}">{_escaped(text)}</td>'
+    return f'<td style="text-align: {"right" if right else "left"}">{_escape(text)}</td>'
 
 
-def _escaped(text: str) -> str:
-    return escape(spaced(text))
+def _escape(text: str) -> str:
+    return escape(restore_spaces(text))

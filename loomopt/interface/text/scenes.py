@@ -37,7 +37,7 @@ def parts(scene: Scene) -> list[str | TextTable]:
     for key, name, value in _values(scene):
         number = isinstance(value, int | float)
         unit = words.si(name) if number else "1"
-        size = f"{value:.9g}" if isinstance(value, int | float) else listed(value)
+        size = f"{value:.9g}" if isinstance(value, int | float) else list_text(value)
         lines.append((key, scene.given(key) or "(default)", size, "" if unit == "1" else unit))
     effects = tuple((effect.name, effect.summary) for effect in scene.active)
     off = [name for name in scene.schema.effects if name not in scene.effects]
@@ -85,7 +85,7 @@ def _family(scene: Scene) -> list[str | TextTable]:
     return [sentence, TextTable("Members of the family", ("member", "what it changes"), lines)]
 
 
-def listed(values: str | Sequence[float]) -> str:
+def list_text(values: str | Sequence[float]) -> str:
     """A list of numbers in a few words; "" for a word."""
     return "" if isinstance(values, str) else f"{len(values)} numbers, {min(values):.3g} ... {max(values):.3g}"
 
@@ -108,10 +108,10 @@ def _values(scene: Scene) -> Iterator[tuple[str, str, float | str | Sequence[flo
         for name, limit in getattr(scene, table).items():
             for end in ("min", "max"):
                 if (value := getattr(limit, end)) is not None:
-                    yield _ended(scene, f"{table}.{name}", end), name, value
+                    yield _range_text(scene, f"{table}.{name}", end), name, value
 
 
-def _ended(scene: Scene, key: str, end: str) -> str:
+def _range_text(scene: Scene, key: str, end: str) -> str:
     """Key of a limit's end; a limit given as one value has no ends."""
     return key if scene.given(key) else f"{key}.{end}"
 
@@ -202,10 +202,10 @@ def _curve(scene: Scene, name: str, values: Floats) -> tuple[str, list[str]]:
 
 def forces(scene: Scene, frame: "pd.DataFrame", design: Mapping[str, float]) -> list[str | TextTable]:
     """A line for each force of curves (SI): its peak, where that is, and the means that bearings go by."""
-    from loomopt.interface.forces import CUBIC, ROLLER, found
+    from loomopt.interface.forces import CUBIC, ROLLER, from_curves
 
     lines, force, angle = [], scene.shown_in("force"), scene.shown_in("angle")
-    for name, turned_force in found(scene, frame, design).items():
+    for name, turned_force in from_curves(scene, frame, design).items():
         means = (f"{turned_force.mean(power) / factor(force):.6g}" for power in (1.0, CUBIC, ROLLER))
         turning = " and ".join(turned_force.headings)
         lines.append(

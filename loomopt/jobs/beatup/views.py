@@ -19,7 +19,7 @@ from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.mechanisms.dyad import Dyad, Vector
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Equation, Expression, Symbols, equation, loop, moving, symbol, sympy
-from loomopt.picture.job_views import JobViews, Marks, Span, sized, tells_forces
+from loomopt.picture.job_views import JobViews, Marks, Span, force_sizes, tells_forces
 from loomopt.scenes.scene import Scene
 
 
@@ -117,7 +117,7 @@ class BeatupViews(JobViews):
             from loomopt.picture import force_arrows
 
             drawing.of(numbers)  # one that cannot be drawn says so first
-            forces = sized(scene, force_arrows.told(registry.of(scene).sampler(scene, design), (FRONT,)))
+            forces = force_sizes(scene, force_arrows.joint_forces(registry.of(scene).sampler(scene, design), (FRONT,)))
         return drawing.linkage(numbers, scene.name, drawn_units(scene), forces)
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
@@ -152,9 +152,9 @@ class BeatupViews(JobViews):
         remarks = super().remarks(scene, design) if any(isinstance(e, Check) for e in scene.active) else told(scene)
         if not any(isinstance(effect, State) for effect in scene.active):
             return remarks
-        from loomopt.picture.panels import twisted
+        from loomopt.picture.panels import twist_remarks
 
-        return (*remarks, *twisted(scene, registry.of(scene).sampler(scene, design)))
+        return (*remarks, *twist_remarks(scene, registry.of(scene).sampler(scene, design)))
 
     def words(self) -> "Mapping[str, Curve]":
         """Names of the curves."""

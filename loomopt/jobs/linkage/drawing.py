@@ -124,7 +124,7 @@ def forces(sampler: Sampler) -> list[ForceArrow]:
     places = {
         name: joint if joint != link else pins[link] for (joint, link), name in chain_forces.names(linked).items()
     }
-    return force_arrows.told(sampler, event_of(sampler), places)
+    return force_arrows.joint_forces(sampler, event_of(sampler), places)
 
 
 def event_of(sampler: Sampler) -> tuple[str, ...]:

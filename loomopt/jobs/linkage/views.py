@@ -28,7 +28,7 @@ from loomopt.physics.mechanisms.moving import Joint, Link, total
 from loomopt.physics.schema import Values
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Angle, Equation, Expression, Symbols, equation, loop, moving, symbol, sympy
-from loomopt.picture.job_views import JobViews, Marks, Span, sized, tells_forces
+from loomopt.picture.job_views import JobViews, Marks, Span, force_sizes, tells_forces
 from loomopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -246,7 +246,7 @@ class LinkageViews(JobViews):
         from loomopt.picture.shapes import drawn_units
 
         sampler = registry.of(scene).sampler(scene, design)
-        forces = sized(scene, drawing.forces(sampler)) if tells_forces(scene) else None
+        forces = force_sizes(scene, drawing.forces(sampler)) if tells_forces(scene) else None
         return drawing.linkage(sampler, scene.name, drawn_units(scene), forces)
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:

@@ -15,7 +15,7 @@ from loomopt.physics.mechanisms.dyad import Dyad
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley, Stand, polar
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Angle, Equation, Symbols, equation, loop, moving, symbol, sympy
-from loomopt.picture.job_views import JobViews, Marks, Span, sized, tells_forces
+from loomopt.picture.job_views import JobViews, Marks, Span, force_sizes, tells_forces
 from loomopt.scenes.scene import Scene
 
 
@@ -135,7 +135,9 @@ class RapierViews(JobViews):
             from loomopt.picture import force_arrows
 
             drawing.of(numbers)  # one that cannot be drawn says so first
-            forces = sized(scene, force_arrows.told(registry.of(scene).sampler(scene, design), (drawing.FRONT,)))
+            forces = force_sizes(
+                scene, force_arrows.joint_forces(registry.of(scene).sampler(scene, design), (drawing.FRONT,))
+            )
         return drawing.linkage(numbers, scene.name, drawn_units(scene), forces)
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:

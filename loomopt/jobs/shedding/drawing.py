@@ -35,7 +35,7 @@ from loomopt.picture.drawing import (
     spring,
 )
 from loomopt.picture.force_arrows import ForceArrow, Sheet
-from loomopt.picture.job_views import sized, tells_forces
+from loomopt.picture.job_views import force_sizes, tells_forces
 from loomopt.picture.motion import MechanismMotion, Turning
 from loomopt.picture.shapes import Arc, Circle, Drawing, Line, Measure, Point, Primitive, Units, drawn_units
 from loomopt.scenes import provenance
@@ -350,7 +350,7 @@ def linkage(scene: Scene, cam: CamDrawing, figures: Figures) -> Drawing:
     drawn, units = picture(cam, figures["contact_angle"] or 0.0), drawn_units(scene)
     strokes = [*drawn.skeleton.strokes(drawn.height), *_frame(drawn), *drawn.spring.strokes()]
     labels, legend = _labels(drawn, units), _legend(scene, drawn, figures, units)
-    forces = sized(scene, _forces(drawn)) if tells_forces(scene) else {}
+    forces = force_sizes(scene, _forces(drawn)) if tells_forces(scene) else {}
     near = drawn.skeleton.joints[NEAR]
     measures = (
         Measure("arm", near["B"], near["C"]),

@@ -49,7 +49,7 @@ def drawn(name, kind):
     scene = scene_of(name, kind)
     target = scene.schema.default_target
     design = references.design(name) if kind not in ("today", "inch") else {}
-    return outputs.plotted(
+    return outputs.plot_curves(
         tables.curves(scene, design), scene, design, outputs.DrawnSubject(f"design for {target}") if design else None
     )
 
@@ -113,7 +113,7 @@ def test_today_itself_has_no_second_curve():
     scene = lo.load("beatup")
     now = registry.of(scene).today(scene)
     for design in ({}, now):
-        figure = outputs.plotted(tables.curves(scene, design), scene, design)
+        figure = outputs.plot_curves(tables.curves(scene, design), scene, design)
         assert not figure.legends
         assert not [line for axes in figure.axes for line in curves_of(axes) if line.get_label().endswith("today")]
 
@@ -121,7 +121,7 @@ def test_today_itself_has_no_second_curve():
 def test_peaks_stand_where_the_figures_say_and_limits_are_levels():
     limits = {"peak_torque": "90 N*m", "peak_power": "5500 W", "M3_fdc": "20 N*m"}
     scene = lo.load("beatup").update({f"limits.{name}.max": value for name, value in limits.items()})
-    figures, panels = lo.evaluate(scene).figures, titled(outputs.plotted(tables.curves(scene, {}), scene, {}))
+    figures, panels = lo.evaluate(scene).figures, titled(outputs.plot_curves(tables.curves(scene, {}), scene, {}))
     assert said(panels["crank torque Md [N*m]"])[0].startswith(f"peak -{figures['peak_torque']:.6g} N*m at ")
     assert said(panels["motor power [W]"])[0].startswith(f"peak -{figures['peak_power']:.6g} W at ")
     assert said(panels["reed torque M3 [N*m]"])[0] == f"at front dead centre {figures['M3_fdc']:.6g} N*m"
@@ -138,7 +138,7 @@ def test_peaks_stand_where_the_figures_say_and_limits_are_levels():
 
 def test_a_limit_on_the_heads_acceleration_per_radian_stands_at_that_in_metres_per_second():
     scene = lo.load("rapier").set("limits.peak_acceleration.max", "0.8 m/rad^2")
-    axes = titled(outputs.plotted(tables.curves(scene, {}), scene, {}))["head acceleration S_tt [m/s^2]"]
+    axes = titled(outputs.plot_curves(tables.curves(scene, {}), scene, {}))["head acceleration S_tt [m/s^2]"]
     level = 0.8 * scene.operation["speed"] ** 2
     assert f"peak_acceleration <= {level:.6g} m/s^2" in said(axes)
     (scale,) = axes.child_axes
@@ -151,7 +151,7 @@ def test_a_limit_on_the_heads_acceleration_per_radian_stands_at_that_in_metres_p
 def test_a_scene_in_inches_is_drawn_in_its_own_units_with_the_same_curves(name):
     scene = inch.scene(name)
     design: dict[str, float] = {}
-    mine = outputs.plotted(tables.curves(scene, design), scene, design)
+    mine = outputs.plot_curves(tables.curves(scene, design), scene, design)
     plain = titled(drawn(name, "today"))
     by_name = {title.split(" [")[0]: (title, axes) for title, axes in plain.items()}
     for title, axes in titled(mine).items():
@@ -180,7 +180,7 @@ def test_without_a_speed_curves_are_per_radian():
     document = {table: dict(own) for table, own in lo.load("rapier").document.items()}
     del document["operation"]["speed"], document["targets"]
     scene = lo.scene(document)
-    panels = titled(outputs.plotted(tables.curves(scene, {}), scene, {}))
+    panels = titled(outputs.plot_curves(tables.curves(scene, {}), scene, {}))
     assert {"head speed S_1", "head acceleration S_2", "head jerk S_3"} <= {title.split(" [")[0] for title in panels}
     assert not any("/s" in title or title.startswith("motor power") for title in panels)
 
@@ -254,7 +254,7 @@ def test_a_table_without_curves_is_refused(tmp_path, frame):
 
 def test_crank_angles_are_in_the_unit_of_all_angles():
     scene = lo.load("beatup").set("display.angle", "rad")
-    figure = outputs.plotted(tables.curves(scene, {}), scene, {})
+    figure = outputs.plot_curves(tables.curves(scene, {}), scene, {})
     assert overlaps.found(figure) == []
     said = [text.get_text() for text in figure.findobj(Text) if text.get_text()]
     assert {text for text in said if "phi [" in text} == {"crank angle phi [rad]"}

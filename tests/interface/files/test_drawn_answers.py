@@ -73,8 +73,8 @@ def test_every_file_that_is_asked_for_is_written_or_a_second_one_refused(tmp_pat
 
 
 def test_todays_machine_is_called_so_wherever_it_is_evaluated():
-    assert outputs.what(lo.evaluate("beatup-light").result).text == "today's machine"
-    assert outputs.what(lo.evaluate("beatup-light", {"l1": 0.0305}).result).name.startswith("a given design")
+    assert outputs.describe_design(lo.evaluate("beatup-light").result).text == "today's machine"
+    assert outputs.describe_design(lo.evaluate("beatup-light", {"l1": 0.0305}).result).name.startswith("a given design")
 
 
 @pytest.mark.parametrize(
@@ -88,8 +88,10 @@ def test_todays_machine_is_called_so_wherever_it_is_evaluated():
 )
 def test_an_answer_says_what_its_design_is(nearest, status, said):
     held = dataclasses.replace(nearest.result, status=status, limits=())
-    assert outputs.what(held).text == said
+    assert outputs.describe_design(held).text == said
     broken = Finding("swing", 0.5, None, 0.4, ok=False)
-    assert outputs.what(dataclasses.replace(held, limits=(broken,))).text == f"{said}; limits not held: swing"
+    assert (
+        outputs.describe_design(dataclasses.replace(held, limits=(broken,))).text == f"{said}; limits not held: swing"
+    )
     rounding = broken._replace(rounding=True)
-    assert outputs.what(dataclasses.replace(held, limits=(rounding,))).text == said
+    assert outputs.describe_design(dataclasses.replace(held, limits=(rounding,))).text == said

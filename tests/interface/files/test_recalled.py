@@ -17,7 +17,7 @@ def answer():
 def recalled(told, folder):
     path = folder / "answer.json"
     path.write_text(json.dumps(told))
-    return answer_file.recalled(path)
+    return answer_file.read_answer(path)
 
 
 def test_an_answer_comes_back_as_it_was(answer, tmp_path):
@@ -61,7 +61,7 @@ STUDIES = {
 def test_a_store_gives_back_its_studies(name, tmp_path):
     made = STUDIES[name](tmp_path / "kept.db")
     assert store_file.is_store(tmp_path / "kept.db")
-    (found,) = store_file.recalled(tmp_path / "kept.db")
+    (found,) = store_file.read_studies(tmp_path / "kept.db")
     assert found.digest == made.digest
     assert found.study.key == made.study.key
     assert str(found.table()) == str(made.table())

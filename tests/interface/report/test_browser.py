@@ -67,7 +67,7 @@ def pages(tmp_path_factory):
     assert answer.status == "infeasible"
     answer.report(folder / "infeasible.html")
     lo.pareto("beatup", ("peak_torque", "m4e"), points=12, store=folder / "front.db")
-    (front,) = store_file.recalled(folder / "front.db")
+    (front,) = store_file.read_studies(folder / "front.db")
     document.write(folder / "front.html", [document.of_study(front.study, front.solved)])
     return {name: folder / f"{name}.html" for name in PAGES}
 

@@ -15,7 +15,7 @@ from loomopt.interface import api
 from loomopt.interface.text import answers, layout, scenes
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import kinds
-from loomopt.picture.table import TextTable, call, joined, spaced
+from loomopt.picture.table import TextTable, call, restore_spaces, unbroken
 from loomopt.solving.answer.solution import Sentences, Words
 
 SCENE = load("beatup-light")
@@ -89,7 +89,7 @@ def test_a_paragraph_fits_the_width_and_keeps_every_word(sentence, columns):
 
 def test_a_joined_phrase_is_never_broken():
     phrases = [f"l{k} >= {k}00 mm" for k in range(1, 9)]
-    lines = text("Limits: " + ", ".join(joined(phrase) for phrase in phrases), columns=40).splitlines()
+    lines = text("Limits: " + ", ".join(unbroken(phrase) for phrase in phrases), columns=40).splitlines()
     assert len(lines) > 2
     assert all(any(phrase in line for line in lines) for phrase in phrases)
 
@@ -251,12 +251,12 @@ def test_what_was_proven_is_told_in_a_few_lines_and_only_where_it_was_asked_for(
 def test_what_was_not_proven_is_told_beside_what_was(answer):
     found = api.prove(SCENE, {**answer.design, "l1": 0.02})
     assert not found.passed
-    shown = text(*answers.proven(found), columns=None)
+    shown = text(*answers.proof_summary(found), columns=None)
     missed = [proof for proof in found.proofs if proof.status != "proven"]
     assert shown.splitlines()[-1] == "NOT proven: " + ", ".join(f"{each.text} ({each.status})" for each in missed)
     assert all(each.text not in shown.splitlines()[1] for each in missed)
     none = dataclasses.replace(found, proofs=tuple(missed))
-    assert text(*answers.proven(none)).startswith("NOT proven: ")
+    assert text(*answers.proof_summary(none)).startswith("NOT proven: ")
 
 
 def test_the_proofs_stand_in_the_json_as_prove_prints_them():
@@ -286,4 +286,4 @@ def test_an_evaluation_shows_value_and_limit_of_what_is_no_figure():
     )
     line = next(line for line in grid.lines if line[0] == "N_min")
     assert line[1:3] == ("148.236", "N")
-    assert spaced(line[3]) == ">= 50"
+    assert restore_spaces(line[3]) == ">= 50"

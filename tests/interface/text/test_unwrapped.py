@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loomopt.interface.text import layout
-from loomopt.picture.table import JOINED, TextTable, spaced
+from loomopt.picture.table import JOINED, TextTable, restore_spaces
 
 LETTERS = st.text("ab  φ²·-≤˙1" + JOINED, max_size=9)
 CELLS = st.lists(LETTERS, min_size=1, max_size=2).map("\n".join)
@@ -24,7 +24,7 @@ def grids(draw):
 
 
 def by_rich(parts, columns):
-    text = spaced(layout._wrapped(parts, columns or layout.UNWRAPPED))
+    text = restore_spaces(layout._wrap(parts, columns or layout.UNWRAPPED))
     return re.sub(r"\n{3,}", "\n\n", "\n".join(line.rstrip() for line in text.split("\n"))).strip("\n")
 
 
@@ -39,7 +39,7 @@ PLAIN = (TextTable("Numbers", ("", "M3\nN·m"), (("l1", "2"), ("mu_min", "13")))
 
 @pytest.mark.parametrize("columns", [None, 11])
 def test_what_fits_needs_no_rich(columns, monkeypatch):
-    monkeypatch.setattr(layout, "_wrapped", None)
+    monkeypatch.setattr(layout, "_wrap", None)
     table = "Numbers\n        M3\n        N·m\n-----------\nl1      2\nmu_min  13"
     assert layout.render(PLAIN, columns) == f"{table}\n\nTime: 1 s"
 
@@ -60,7 +60,7 @@ def test_what_fits_needs_no_rich(columns, monkeypatch):
     ids=repr,
 )
 def test_what_does_not_fit_or_is_not_as_wide_as_long_is_left_to_rich(part, columns, monkeypatch):
-    monkeypatch.setattr(layout, "_wrapped", lambda parts, columns: f"{columns} columns")
+    monkeypatch.setattr(layout, "_wrap", lambda parts, columns: f"{columns} columns")
     assert layout.render([part], columns) == f"{columns or layout.UNWRAPPED} columns"
 
 

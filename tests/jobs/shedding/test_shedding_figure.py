@@ -23,7 +23,7 @@ FORCES["shedding-printed-travel"], FORCES["shedding-static"] = FORCES["shedding"
 
 def axes_of(scene, design):
     """Return the axes, by title, that `simulate --out` would save."""
-    drawn = outputs.plotted(tables.curves(scene, design), scene, design)
+    drawn = outputs.plot_curves(tables.curves(scene, design), scene, design)
     return {axes.get_title("left"): axes for axes in drawn.axes}
 
 

@@ -357,10 +357,10 @@ def test_figures_that_need_an_omitted_effect_are_named_even_if_the_target_reads_
 
 def test_figures_of_the_target_that_need_an_omitted_effect_are_named(kinematic):
     row = dataclasses.replace(kinematic.rows[0], missing_figures=("stroke", "tape_force"))
-    (sentence,) = effects_text.omitted(dataclasses.replace(kinematic.result, rows=(row,)))
+    (sentence,) = effects_text.omission_sentences(dataclasses.replace(kinematic.result, rows=(row,)))
     assert sentence.endswith("Target stroke-dwell reads stroke of them.")
     none = dataclasses.replace(row, missing_figures=(), changed_figures=())
-    assert effects_text.omitted(dataclasses.replace(kinematic.result, rows=(none,))) == []
+    assert effects_text.omission_sentences(dataclasses.replace(kinematic.result, rows=(none,))) == []
 
 
 def test_figures_of_an_effect_that_may_go_are_named_for_a_target_of_forces_too(beatup):

@@ -117,14 +117,14 @@ def test_an_answer_that_keeps_contact_up_to_a_speed_is_judged_and_proven_by_it()
     parent = trade.solved(trade.batch(())[0], None)
     ask = {"also": [], "held": parent.warm["held"], "wide": False}
     task = StudyTask(99, parent.point, {"contact_speed": 200 * RPM}, ask)
-    answer = results.solved(trade.solve(task, parent), trade.scene)
+    answer = results.to_answer(trade.solve(task, parent), trade.scene)
     limit = next(each for each in answer.limits if each.name == "contact_speed")
     assert limit.min == pytest.approx(200 * RPM)
     assert limit.value == pytest.approx(200 * RPM)
     assert answer.admissible
     assert answer.evaluate().limits == answer.limits
     assert answer.prove().passed
-    softer = results.solved(
+    softer = results.to_answer(
         replace(answer.result, design={**answer.design, "K1": 0.99 * answer.design["K1"]}), trade.scene
     ).evaluate()
     assert [each.name for each in softer.limits if not each.ok] == ["contact_speed"]

@@ -183,7 +183,7 @@ def test_limits_on_axes_are_told_as_limits_of_their_figures(problem, axes, more,
     rows = tuple(trade.solved(task, None) for task in trade.batch(()))
     task = trade.batch(rows)[0]
     parent = rows[task.parent]
-    row, answer = trade.solved(task, parent), results.solved(trade.solve(task, parent), trade.scene)
+    row, answer = trade.solved(task, parent), results.to_answer(trade.solve(task, parent), trade.scene)
     own = next(each for each in answer.limits if each.name == axes[1])
     assert getattr(own, side) == pytest.approx(row.place[axes[1]], rel=1e-14)
     assert own.value == pytest.approx(row.place[axes[1]], rel=1e-8)

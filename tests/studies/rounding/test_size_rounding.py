@@ -124,7 +124,7 @@ def test_sizes_are_no_limits_and_the_file_agrees_with_its_design(tmp_path):
     assert "m4e, r4e chosen so that M3_fdc is least" in found.message
     path = tmp_path / "rounded.json"
     path.write_text(json.dumps(found.as_dict()))
-    assert answer_file.recalled(path).doubts == ()
+    assert answer_file.read_answer(path).doubts == ()
 
 
 def test_without_a_limit_beside_the_sizes():

@@ -17,7 +17,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.interface.files.store_file import recalled
+from loomopt.interface.files.store_file import read_studies
 from loomopt.jobs import registry
 from loomopt.model.machines import BLOCK
 from loomopt.solving import engine
@@ -278,7 +278,7 @@ def test_a_store_keeps_scrambles_and_a_study_resumes_from_it(tmp_path):
     with pytest.raises(BadInput, match="nothing to resume from"):
         lo.tolerance(scene, samples=1600, worst=False, resume=True)
     with pytest.raises(BadInput, match="machines of a tolerance study, which are no designs"):
-        recalled(path)
+        read_studies(path)
 
 
 def test_a_bound_of_a_dependent_variable_is_no_criterion():
