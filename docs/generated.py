@@ -1,7 +1,7 @@
-"""What the site takes from the program: commands, scenes key by key, functions, equations; and notebooks that are run.
+"""Parts of the site that come from the program: commands, keys of scenes, functions, equations, and run notebooks.
 
 A line `<!-- generated KIND WORDS -->` of a page is replaced by the Markdown of `KINDS[KIND](WORDS)`
-when the page is read, so it follows the program by itself.
+when Sphinx reads the page, so that the site always agrees with the program.
 """
 
 import dataclasses
@@ -37,14 +37,14 @@ write = importlib.import_module("write")
 
 MARK = re.compile(r"^<!-- generated (\w+) ?(.*?) -->$", re.MULTILINE)
 WORKERS = 2
-"""Notebooks that are run at once: a kernel each."""
+"""Number of notebooks that run at once, one kernel per notebook."""
 
 
 # Commands
 
 
 def commands(words: str) -> str:
-    """Return every command with its options, as its help has them."""
+    """All commands with their options, from their help."""
     group = typer.main.get_command(application([]))
     return "\n".join(_command(name, command) for name, command in group.commands.items())
 
@@ -65,7 +65,7 @@ def _cell(text: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return text in which nothing is read as Markdown or HTML, but what stands in backquotes."""
+    """Text with Markdown and HTML escaped, except in backquotes."""
     parts = re.split(r"(`[^`]*`)", text)
     return "".join(part if part.startswith("`") else re.sub(r"([\\*_<>\[\]$#{}])", r"\\\1", part) for part in parts)
 
@@ -81,40 +81,40 @@ ACCEPT = "## [accept]\n\nA figure → half the band around an equality or a goal
 
 
 NEEDED = "needed"
-"""Beside the definitions of a schema: who needs which key."""
+"""Key among the definitions of a schema under which it is stored who needs which key."""
 
 
 def scene(job: str) -> str:
-    """Return the tables of a job's scenes, key by key, as the JSON Schema for editors has them."""
+    """Tables of a job's scenes, key by key, from the JSON Schema for editors."""
     schema = _scene(job).schema
-    own = bool(schema.tables)
-    full = json_schema.scene(dataclasses.replace(schema, tables={}) if own else schema)
+    free = bool(schema.tables)  # a job in which the scene chooses the names
+    full = json_schema.scene(dataclasses.replace(schema, tables={}) if free else schema)
     tables, known = full["properties"], full["$defs"] | {NEEDED: _needed(schema)}
-    parts = [OWN_NAMES.format(_listed(schema.tables))] if own else []
+    parts = [OWN_NAMES.format(_listed(schema.tables))] if free else []
     parts += [
         _table("problem", tables["problem"], known),
         _table("operation", tables["operation"], known),
-        "" if own else _table("mechanism", tables["mechanism"], known),
+        "" if free else _table("mechanism", tables["mechanism"], known),
         EFFECTS,
         *(_table(f"effects.{name}", table, known, 3) for name, table in tables["effects"]["properties"].items()),
-        _ranges("bounds", "What may change, and how far: a range, or one value.", tables["bounds"], known, not own),
-        _figures(schema.figures, own),
-        _ranges("tolerances", "How a number is made.", tables["tolerances"], known, not own),
+        _ranges("bounds", "What may change, and how far: a range, or one value.", tables["bounds"], known, not free),
+        _figures(schema.figures, free),
+        _ranges("tolerances", "How a number is made.", tables["tolerances"], known, not free),
         ACCEPT,
         _table("display", tables["display"], known),
-        *([] if own else [_targets(schema, tables["targets"], known)]),
+        *([] if free else [_targets(schema, tables["targets"], known)]),
     ]
     return "\n".join(parts)
 
 
 def _needed(schema: Any) -> dict[str, str]:
-    """Return the keys that the job, or some of its effects, cannot do without → who needs them."""
-    found = dict.fromkeys(schema.needs, "")
+    """Text that says who needs a key, by key that the job or some of its effects need."""
+    names = dict.fromkeys(schema.needs, "")
     for effect in schema.effects.values():
         for key in effect.needs:
-            if found.get(key) != "":
-                found[key] = ", ".join(filter(None, [found.get(key), effect.name]))
-    return {key: f"needed by {who}" if who else "" for key, who in found.items()}
+            if names.get(key) != "":
+                names[key] = ", ".join(filter(None, [names.get(key), effect.name]))
+    return {key: f"needed by {effects}" if effects else "" for key, effects in names.items()}
 
 
 def _scene(job: str) -> Scene:
@@ -126,9 +126,9 @@ def _listed(names: Any) -> str:
 
 
 def _table(name: str, table: Mapping[str, Any], known: Mapping[str, Any], level: int = 2) -> str:
-    """Return one table: its keys, what each is, and what may stand there."""
+    """One table: keys, their meaning, and their allowed values."""
     if "properties" not in table and isinstance(table.get("additionalProperties"), dict):
-        name, table = f"{name}.NAME", table["additionalProperties"]  # one for each of several things
+        name, table = f"{name}.NAME", table["additionalProperties"]  # a table of tables
     rows = list(_keys(table, known, of=f"{name}."))
     head = f"{'#' * level} [{name}]\n\n{_sentence(table.get('description', ''))}\n"
     if not rows:
@@ -144,21 +144,21 @@ def _sentence(text: str) -> str:
 def _keys(
     table: Mapping[str, Any], known: Mapping[str, Any], path: str = "", of: str = ""
 ) -> Iterator[tuple[str, str, str]]:
-    for key, own in table.get("properties", {}).items():
-        whole = {**known.get(own.get("$ref", "").rpartition("/")[2], {}), **own}
+    for key, value in table.get("properties", {}).items():
+        whole = {**known.get(value.get("$ref", "").rpartition("/")[2], {}), **value}
         if "properties" in whole:
             yield from _keys(whole, known, f"{path}{key}.")
             continue
         needed = "" if key in table.get("required", ()) else known[NEEDED].get(of + path + key, "optional")
-        if own.get("default"):
-            needed = f"default {own['default']!r}"
+        if value.get("default"):
+            needed = f"default {value['default']!r}"
         form = ", ".join(filter(None, [_form(whole, known), needed]))
-        said = whole.get("description", "")
-        yield f"{path}{key}", "" if said == _form(whole, known) else said, form
+        description = whole.get("description", "")
+        yield f"{path}{key}", "" if description == _form(whole, known) else description, form
 
 
 def _form(value: Mapping[str, Any], known: Mapping[str, Any]) -> str:
-    """Return in words what a value may be."""
+    """Text on the allowed values of a key."""
     if "else" in value and "const" in value["else"]:
         return str(value["else"]["const"])
     if "$ref" in value:
@@ -166,9 +166,10 @@ def _form(value: Mapping[str, Any], known: Mapping[str, Any]) -> str:
     if "const" in value:
         return f'"{value["const"]}"'
     if "enum" in value:
-        return " or ".join(f'"{each}"' for each in value["enum"])
+        return " or ".join(f'"{choice}"' for choice in value["enum"])
     for several in ("anyOf", "oneOf"):
-        forms = [_form(each, known) for each in value.get(several, ()) if "required" not in each and "not" not in each]
+        choices = [choice for choice in value.get(several, ()) if "required" not in choice and "not" not in choice]
+        forms = [_form(choice, known) for choice in choices]
         if forms := list(dict.fromkeys(filter(None, forms))):
             return ", or ".join(forms)
     words = {
@@ -189,24 +190,25 @@ def _form(value: Mapping[str, Any], known: Mapping[str, Any]) -> str:
 
 
 def _ranges(name: str, text: str, table: Mapping[str, Any], known: Mapping[str, Any], listed: bool) -> str:
-    """Return a table that has one form for every number."""
+    """Table with the same keys for every number."""
     first = next(iter(table["properties"].values()))
     rows = [
         f"| `{key}` | {_cell(_plain(what))} | {_cell(_plain(form.replace(', optional', '')))} |"
         for key, what, form in _keys(first.get("then", {}), known)
     ]
     names = f"Numbers: {_listed(table['properties'])}.\n" if listed else ""
-    said = f"## [{name}]\n\n{text} Of each number, as of `{next(iter(table['properties']))}`:\n\n"
-    return said + "| key | what it is | what stands there |\n| --- | --- | --- |\n" + "\n".join(rows) + f"\n\n{names}"
+    head = f"## [{name}]\n\n{text} Of each number, as of `{next(iter(table['properties']))}`:\n\n"
+    return head + "| key | what it is | what stands there |\n| --- | --- | --- |\n" + "\n".join(rows) + f"\n\n{names}"
 
 
-def _figures(figures: Mapping[str, Any], own: bool) -> str:
+def _figures(figures: Mapping[str, Any], free: bool) -> str:
+    """Table [limits]; free: whether the scene chooses the names."""
     lines = [
         f"| `{figure.name}` | {_cell(_plain(figure.text))} | {' '.join(f'`{side}`' for side in figure.sides)} |"
         for figure in figures.values()
         if figure.sides
     ]
-    more = " Here those of the packaged `sixbar-sley`." if own else ""
+    more = " Here those of the packaged `sixbar-sley`." if free else ""
     head = f'## [limits]\n\nFigures to keep, each with its unit: `swing = {{ min = "22.9 deg" }}`.{more}\n\n'
     return head + "| figure | what it is | ends |\n| --- | --- | --- |\n" + "\n".join(lines) + "\n"
 
@@ -222,20 +224,20 @@ def _targets(schema: Any, tables: Mapping[str, Any], known: Mapping[str, Any]) -
 
 
 def function(name: str) -> str:
-    """Return a public function's call and what it says of itself; of a class, its public names too."""
-    found = getattr(lo, name)
-    call = "" if inspect.isclass(found) else _call(found)
-    lines = [f"```text\nlo.{name}{call}\n```", "", _paragraphs(inspect.getdoc(found) or "")]
-    if inspect.isclass(found) and not issubclass(found, Exception):
+    """Call and docstring of a public function; for a class also its public names."""
+    public = getattr(lo, name)
+    call = "" if inspect.isclass(public) else _call(public)
+    lines = [f"```text\nlo.{name}{call}\n```", "", _paragraphs(inspect.getdoc(public) or "")]
+    if inspect.isclass(public) and not issubclass(public, Exception):
         lines += ["", "| name | what it is |", "| --- | --- |"]
-        lines += [f"| `{each}` | {_cell(_plain(text))} |" for each, text in _members(found)]
+        lines += [f"| `{member}` | {_cell(_plain(text))} |" for member, text in _members(public)]
     return "\n".join(lines) + "\n"
 
 
-def _call(found: Callable[..., Any]) -> str:
-    """Return the arguments of a function without their types."""
-    bare = [each.replace(annotation=inspect.Parameter.empty) for each in inspect.signature(found).parameters.values()]
-    return str(inspect.Signature(bare))
+def _call(function: Callable[..., Any]) -> str:
+    """Parameters of a function without their types."""
+    parameters = inspect.signature(function).parameters.values()
+    return str(inspect.Signature([p.replace(annotation=inspect.Parameter.empty) for p in parameters]))
 
 
 def _paragraphs(text: str) -> str:
@@ -243,7 +245,7 @@ def _paragraphs(text: str) -> str:
 
 
 def _section(part: str) -> str:
-    """Return a paragraph of a docstring; of a NumPy section its title and a list of its entries, examples as code."""
+    """Paragraph of a docstring; a NumPy section becomes a title with a list of its entries, examples become code."""
     title, *rest = part.split("\n")
     if not rest or not rest[0].startswith("---"):
         return _plain(" ".join(part.split("\n")))
@@ -258,49 +260,46 @@ def _section(part: str) -> str:
     return "\n".join([f"**{title}**", "", *(f"- {_plain(entry)}" for entry in entries)])
 
 
-def _members(found: type) -> Iterator[tuple[str, str]]:
-    """Yield the public methods and properties of a class, each with its first sentence."""
-    for name in dir(found):
-        member = inspect.getattr_static(found, name)
-        asked = isinstance(member, (property, functools.cached_property))
-        if not name.startswith("_") and (asked or inspect.isfunction(member)):
+def _members(public: type) -> Iterator[tuple[str, str]]:
+    """Yield the public methods and properties of a class, with the first sentence of their docstrings."""
+    for name in dir(public):
+        member = inspect.getattr_static(public, name)
+        is_property = isinstance(member, (property, functools.cached_property))
+        if not name.startswith("_") and (is_property or inspect.isfunction(member)):
             text = (inspect.getdoc(member) or "").partition("\n\n")[0].replace("\n", " ")
-            yield f"{name}{'' if asked else _own_call(member)}", text
-
-
-def _own_call(member: Callable[..., Any]) -> str:
-    return _call(member).replace("(self, ", "(").replace("(self)", "()")
+            call = "" if is_property else _call(member).replace("(self, ", "(").replace("(self)", "()")
+            yield f"{name}{call}", text
 
 
 # Equations
 
 
 def equations(words: str) -> str:
-    """Return equations of a scene by their names.
+    """Equations of a scene by their names.
 
-    words: PROBLEM [+EFFECT]…: NAMES, with "; " between names. Raises ValueError for a name that the scene has not.
+    words: PROBLEM [+EFFECT]…: NAMES, with "; " between names. Raises ValueError for an unknown name.
     """
     head, _, names = words.partition(": ")
-    every = _equations(head)
-    wanted = names.split("; ")
-    missing = [name for name in wanted if name not in {each.name for each in every}]
+    all_of_scene, wanted = _equations(head), names.split("; ")
+    known = {equation.name for equation in all_of_scene}
+    missing = [name for name in wanted if name not in known]
     if missing:
-        raise ValueError(f"{head} has no equation {missing[0]!r}: it has {sorted({each.name for each in every})}")
-    return _raw(mathml.page([each for each in every if each.name in wanted]))
+        raise ValueError(f"{head} has no equation {missing[0]!r}: it has {sorted(known)}")
+    return _raw(mathml.page([equation for equation in all_of_scene if equation.name in wanted]))
 
 
 def all_equations(problem: str) -> str:
-    """Return every equation of a scene."""
+    """All equations of a scene."""
     return _raw(mathml.page(_equations(problem)))
 
 
 @functools.cache
 def _equations(head: str) -> list[Equation]:
     problem, *on = head.split(" +")
-    found = registry.load(problem)
+    scene = registry.load(problem)
     for name in on:
-        found = found.with_effect(name)
-    return list(found.equations())
+        scene = scene.with_effect(name)
+    return list(scene.equations())
 
 
 def _raw(markup: str) -> str:
@@ -308,35 +307,37 @@ def _raw(markup: str) -> str:
 
 
 def effects(job: str) -> str:
-    """Return each effect of a job: what its file says of it, and its equation in a packaged scene."""
-    found, parts = _scene(job), []
-    for effect in found.schema.effects.values():
-        text = _module(effect)
-        own = _own_equations(found, effect.name)
-        parts.append(f"### {effect.name}\n\n{_told(text)}\n\n{_raw(mathml.page(own)) if own else ''}")
+    """Effects of a job: docstring of the module, and equation in a packaged scene."""
+    scene, parts = _scene(job), []
+    for effect in scene.schema.effects.values():
+        text = _docstring_markdown(_module_docstring(effect))
+        equations = _effect_equations(scene, effect.name)
+        parts.append(f"### {effect.name}\n\n{text}\n\n{_raw(mathml.page(equations)) if equations else ''}")
     return "\n".join(parts)
 
 
-def _own_equations(found: Scene, name: str) -> list[Equation]:
+def _effect_equations(scene: Scene, name: str) -> list[Equation]:
+    """Equations of one effect in a scene."""
     from loomopt.base.errors import BadInput
 
     try:
-        return [each for each in found.with_effect(name).equations() if each.name.partition(":")[0] == name]
-    except BadInput:  # one without values, or which does not combine
+        equations = scene.with_effect(name).equations()
+        return [equation for equation in equations if equation.name.partition(":")[0] == name]
+    except BadInput:  # an effect without values, or with a clash
         return []
 
 
-def _module(effect: Any) -> str:
-    """Return what the file of an effect says."""
-    for value in (getattr(effect, "force", None), effect.own, *getattr(effect, "quantities", {}).values()):
+def _module_docstring(effect: Any) -> str:
+    """Docstring of the module of an effect."""
+    for value in (getattr(effect, "force", None), effect.table, *getattr(effect, "quantities", {}).values()):
         place = getattr(value, "__module__", "")
         if ".effects." in place and place.rpartition(".")[2] == effect.name.partition(".")[0]:
             return inspect.getdoc(importlib.import_module(place)) or effect.summary
     return str(effect.summary)
 
 
-def _told(text: str) -> str:
-    """Return a docstring as Markdown: lines set in from the margin are shown as they stand."""
+def _docstring_markdown(text: str) -> str:
+    """A docstring as Markdown; indented lines become code."""
     parts = []
     for part in text.split("\n\n"):
         lines = part.split("\n")
@@ -352,14 +353,14 @@ def _told(text: str) -> str:
 
 
 def module(name: str) -> str:
-    """Return what a module says of itself."""
-    return _told(inspect.getdoc(importlib.import_module(name)) or "")
+    """Docstring of a module."""
+    return _docstring_markdown(inspect.getdoc(importlib.import_module(name)) or "")
 
 
 def notebooks(words: str) -> str:
-    """Return the notebooks as pages below this one, in the order in which its table has them."""
-    told = re.findall(r"\]\((\w+)\.ipynb\)", (run.FOLDER / "README.md").read_text(encoding="utf-8"))
-    return "\n".join(["```{toctree}", ":hidden:", *told, "```", ""])
+    """Notebooks as pages below this one, in the order of the table of their README."""
+    names = re.findall(r"\]\((\w+)\.ipynb\)", (run.FOLDER / "README.md").read_text(encoding="utf-8"))
+    return "\n".join(["```{toctree}", ":hidden:", *names, "```", ""])
 
 
 KINDS: dict[str, Callable[[str], str]] = {
@@ -374,8 +375,8 @@ KINDS: dict[str, Callable[[str], str]] = {
 }
 
 
-def expanded(text: str) -> str:
-    """Return a page with what is generated in it."""
+def expand(text: str) -> str:
+    """A page with its generated parts."""
     return MARK.sub(lambda match: KINDS[match[1]](match[2]), text)
 
 
@@ -387,7 +388,7 @@ def _read(app: Sphinx, name: str, source: list[str]) -> None:
     if path.suffix == ".ipynb":
         source[0] = nbformat.writes(run.kept(Path(path)))
     else:
-        source[0] = expanded(source[0])
+        source[0] = expand(source[0])
 
 
 def _run_all(app: Sphinx) -> None:
@@ -406,24 +407,25 @@ def _block(writer: Any, node: nodes.math_block) -> None:
 
 
 def _mathml(latex: str, as_block: bool = False) -> str:
-    """Return LaTeX as MathML; what docutils does not know is set in rows that it does."""
+    """LaTeX as MathML; environments that docutils does not know are replaced."""
     known = latex.replace("gathered", "aligned").replace(r"\\[4pt]", r"\\ ")
     return str(latex2mathml.tex2mathml(known, as_block=as_block))
 
 
 def _state() -> str:
-    """Return what pages depend on beside their own text."""
+    """Text of all that the pages depend on besides themselves."""
     return run.program() + "".join(path.read_text(encoding="utf-8") for path in (Path(__file__), Path(write.__file__)))
 
 
 def _without_empty_outputs(app: Sphinx, tree: nodes.document) -> None:
-    """Leave out what progress has left of itself: an empty line."""
-    for block in [each for each in tree.findall(nodes.literal_block) if not each.astext().strip()]:
+    """Remove the empty outputs that progress leaves in notebooks."""
+    empty = [block for block in tree.findall(nodes.literal_block) if not block.astext().strip()]
+    for block in empty:
         block.parent.remove(block)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Have Sphinx take part of its pages from the program."""
+    """Connect the generated parts with Sphinx."""
     app.add_config_value("program", _state(), "env")  # another program: all pages are read again
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
     app.connect("builder-inited", _run_all)

@@ -1,11 +1,11 @@
-"""Write what the documents take from the program: glossary, sketches, and the outputs and words of all pages.
+"""Write the parts of the documents that come from the program: glossary, sketches, and outputs and tables of pages.
 
     python docs/write.py            (or: make outputs)
 
-A page is carried out from top to bottom in a folder of its own. A block after "`NAME`:" is a file, after "Add to
-`NAME`:" its end; of ```console the command is run and its output compared, ```sh and ```python are run.
+A page is run from top to bottom in an empty folder. A block after "`NAME`:" is a file; a block after "Add to `NAME`:"
+is appended to it. The command of a ```console block is run and its output compared; ```sh and ```python blocks are run.
 
-The suite compares all of it with what stands there (tests/end_to_end/test_documents.py).
+The test suite compares the result with the files (tests/end_to_end/test_documents.py).
 """
 
 import contextlib
@@ -30,25 +30,25 @@ from loomopt.solving.answer.solution import Words
 DOCS = Path(__file__).parent
 GLOSSARY = DOCS / "reference" / "glossary.md"
 PAGES = (DOCS.parent / "README.md", *sorted(set(DOCS.rglob("*.md")) - {GLOSSARY}))
-"""What is written by hand, but for outputs and tables."""
+"""Pages that are written by hand, except outputs and tables."""
 WIDTH = "100"
 """Columns of the outputs that pages show."""
 BLOCK = re.compile(r"^```console\n\$ loomopt (.*)\n((?:.*\n)*?)```$", re.MULTILINE)
 STEP = re.compile(r"(?:^(Add to )?`([\w.-]+)`:\n\n)?^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 NOT_HERE = "# needs "
-"""Begins Python that is only compiled."""
+"""Start of a Python block that is only compiled."""
 TABLE = re.compile(r"(<!-- (symbols|effects) of (\S+) -->\n)(?:.*\n)*?(<!-- end -->)")
 SHOWN = {"linkage": "sixbar-sley"}
-"""Jobs without a packaged scene of their own name → the one that pages show."""
+"""Jobs without a packaged scene of the same name → the scene that pages show."""
 LEFT_OUT = "..."
 CHANGES = re.compile(
     r"(?<=limits )\S+(?=, stat)|(?<=stationarity )[^,]+|(?<=cycle )[^;]+|\(\d+$|\b\d+\.\d+ s\b|Time: .*"
 )
-"""What differs from run to run or from machine to machine: times, rounding, and how far a search came."""
+"""Texts that differ between runs or machines: times, rounding, and the progress of a search."""
 
 
 def glossary_text() -> str:
-    """Return docs/glossary.md."""
+    """Text of docs/reference/glossary.md."""
     parts = [
         "# Glossary\n",
         "Every symbol that a table shows. `loomopt show PROBLEM --symbols` prints it for any scene, in its own\n"
@@ -66,24 +66,24 @@ def glossary_text() -> str:
 
 
 def table(grid: TextTable) -> str:
-    """Return a table as Markdown."""
+    """A table as Markdown."""
     lines = [grid.columns, ("---",) * len(grid.columns), *grid.lines]
     return "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |\n" for line in lines)
 
 
 def sketches() -> dict[str, str]:
-    """Return the drawing of each job's packaged machine, by file name, as SVG."""
-    found = {}
+    """Drawings of the packaged machines as SVG, by file name."""
+    drawings = {}
     for name in registry.own_names():
         scene = registry.load(SHOWN.get(name, name))
-        found[f"sketch-{name}.svg"] = svg.render(
+        drawings[f"sketch-{name}.svg"] = svg.render(
             outputs.drawing(scene, glossary.sketch_design(scene), outputs.DrawnSubject("sketch"))
         )
-    return found
+    return drawings
 
 
 def output(words: str) -> list[str]:
-    """Return what a command prints, line by line; `> FILE` writes it there too."""
+    """Lines that a command prints; `> FILE` also writes them to a file."""
     printed = io.StringIO()
     command, _, file = words.partition(" > ")
     with contextlib.redirect_stdout(printed), mock.patch.dict(os.environ, COLUMNS=WIDTH):
@@ -95,8 +95,8 @@ def output(words: str) -> list[str]:
     return printed.getvalue().rstrip("\n").split("\n")
 
 
-def carried_out(text: str) -> Iterator[tuple[str, list[str]]]:
-    """Carry out a page in the folder at hand; yield each command whose output it tells, with what it prints now."""
+def run_page(text: str) -> Iterator[tuple[str, list[str]]]:
+    """Run a page in the current folder; yield every command with an output, and the lines that it prints now."""
     names: dict[str, object] = {"__name__": "page"}
     for more, file, kind, body in STEP.findall(text):
         if file:
@@ -114,67 +114,67 @@ def carried_out(text: str) -> Iterator[tuple[str, list[str]]]:
                 exec(code, names)
 
 
-def masked(line: str) -> str:
-    """Return a line without what differs from run to run."""
+def mask(line: str) -> str:
+    """A line without the texts that differ between runs."""
     return CHANGES.sub("#", line.rstrip())
 
 
-def holds(told: list[str], printed: list[str]) -> bool:
-    """Say whether lines of a page are those that a command prints; "..." stands for any."""
-    words = [r"(?:.*\n)*?" if line.strip() == LEFT_OUT else re.escape(masked(line)) + r"\n" for line in told]
-    return re.fullmatch("".join(words), "".join(f"{masked(line)}\n" for line in printed)) is not None
+def lines_agree(lines: list[str], printed: list[str]) -> bool:
+    """Whether lines of a page agree with those that a command prints; "..." stands for any lines."""
+    words = [r"(?:.*\n)*?" if line.strip() == LEFT_OUT else re.escape(mask(line)) + r"\n" for line in lines]
+    return re.fullmatch("".join(words), "".join(f"{mask(line)}\n" for line in printed)) is not None
 
 
-def updated(told: list[str], printed: list[str]) -> list[str]:
-    """Return lines of a page as a command prints them now: each by the word that it begins with."""
-    if holds(told, printed) or not told:
-        return told or printed
-    found, rest = [], iter(printed)
-    for line in told:
+def update_lines(lines: list[str], printed: list[str]) -> list[str]:
+    """Lines of a page with the current output; a line is matched by its first word."""
+    if lines_agree(lines, printed) or not lines:
+        return lines or printed
+    new_lines, rest = [], iter(printed)
+    for line in lines:
         if line.strip() == LEFT_OUT or not line.strip():
-            found.append(line)
+            new_lines.append(line)
         else:
-            found.append(next((now for now in rest if now.split()[:1] == line.split()[:1]), line))
-    return found
+            new_lines.append(next((now for now in rest if now.split()[:1] == line.split()[:1]), line))
+    return new_lines
 
 
 def symbols(name: str) -> str:
-    """Return the symbols of a scene's answer in words, as Markdown."""
+    """Symbols of a scene's answer with their meaning, as Markdown."""
     scene = registry.load(name)
-    said = {symbol.name: symbol.text for symbol in glossary.symbols(scene)}
+    meanings = {symbol.name: symbol.text for symbol in glossary.symbols(scene)}
     words = Words(scene)
     shown = [row["name"] for row in rows(api.evaluate(scene).result, scene)]
-    lines = tuple((f"`{each}`", words.unit(each).removeprefix("1"), said[each]) for each in shown)
+    lines = tuple((f"`{name}`", words.unit(name).removeprefix("1"), meanings[name]) for name in shown)
     return table(TextTable("", ("symbol", "unit", "what it is"), lines))
 
 
 def effects(name: str) -> str:
-    """Return the effects that scenes of a job may call for, as Markdown."""
+    """Effects of a job, as Markdown."""
     known = registry.load(SHOWN.get(name, name)).schema.effects.values()
-    lines = tuple((f"`{each.name}`", type(each).__name__.lower(), each.summary) for each in known)
+    lines = tuple((f"`{effect.name}`", type(effect).__name__.lower(), effect.summary) for effect in known)
     return table(TextTable("", ("effect", "kind", "what it is"), lines))
 
 
-def rewritten(match: re.Match[str]) -> str:
-    """Return a table between its marks as it is now."""
-    made = {"symbols": symbols, "effects": effects}[match[2]]
-    return f"{match[1]}{made(match[3])}{match[4]}"
+def rewrite_table(match: re.Match[str]) -> str:
+    """A table between its marks with its current contents."""
+    write = {"symbols": symbols, "effects": effects}[match[2]]
+    return f"{match[1]}{write(match[3])}{match[4]}"
 
 
 def page_text(text: str) -> str:
-    """Return a page with its outputs and tables as they are now."""
+    """A page with its current outputs and tables."""
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-        printed = iter(list(carried_out(text)) if BLOCK.search(text) else ())
+        printed = iter(list(run_page(text)) if BLOCK.search(text) else ())
 
     def block(match: re.Match[str]) -> str:
-        lines = updated(match[2].rstrip("\n").split("\n") if match[2] else [], next(printed)[1])
+        lines = update_lines(match[2].rstrip("\n").split("\n") if match[2] else [], next(printed)[1])
         return "```console\n$ loomopt " + match[1] + "\n" + "\n".join(lines) + "\n```"
 
-    return TABLE.sub(rewritten, BLOCK.sub(block, text))
+    return TABLE.sub(rewrite_table, BLOCK.sub(block, text))
 
 
 def documents() -> Iterator[tuple[Path, str]]:
-    """Yield each file with what should stand in it."""
+    """Yield every file with its current text."""
     yield GLOSSARY, glossary_text()
     for name, drawing in sketches().items():
         yield DOCS / name, drawing

@@ -45,10 +45,10 @@ def test_a_page_can_be_carried_out_and_its_outputs_are_what_commands_print(page,
     text = PAGES[page]
     monkeypatch.chdir(tmp_path)
     told = [(words, lines.rstrip("\n").split("\n")) for words, lines in write.BLOCK.findall(text)]
-    printed = list(write.carried_out(text))
+    printed = list(write.run_page(text))
     assert [words for words, _ in told] == [words for words, _ in printed]
     for (words, lines), (_, now) in zip(told, printed, strict=True):
-        assert write.holds(lines, now), "\n".join([f"make outputs writes it anew: {words}", *now])
+        assert write.lines_agree(lines, now), "\n".join([f"make outputs writes it anew: {words}", *now])
 
 
 COMMANDS = [
@@ -84,11 +84,11 @@ def test_nearly_all_commands_on_pages_are_run():
 
 def test_a_stale_output_is_found_and_written_anew():
     printed = ["beatup: optimal", "", "l1  31  30  mm", "peak  93.8  82.3  N*m", "Time: 0.7 s"]
-    assert write.holds(["beatup: optimal", "...", "peak  93.8  82.3  N*m", "Time: 0.5 s"], printed)
+    assert write.lines_agree(["beatup: optimal", "...", "peak  93.8  82.3  N*m", "Time: 0.5 s"], printed)
     stale = ["beatup: optimal", "...", "peak  93.8  82.4  N*m", "..."]
-    assert not write.holds(stale, printed)
-    assert not write.holds(["beatup: optimal", "peak  93.8  82.3  N*m", "..."], printed)
-    assert write.updated(stale, printed) == ["beatup: optimal", "...", "peak  93.8  82.3  N*m", "..."]
+    assert not write.lines_agree(stale, printed)
+    assert not write.lines_agree(["beatup: optimal", "peak  93.8  82.3  N*m", "..."], printed)
+    assert write.update_lines(stale, printed) == ["beatup: optimal", "...", "peak  93.8  82.3  N*m", "..."]
 
 
 def test_the_first_table_and_the_most_important_outputs_are_among_them():
@@ -98,7 +98,7 @@ def test_the_first_table_and_the_most_important_outputs_are_among_them():
 
 @pytest.mark.parametrize("match", TABLES, ids=[f"{match[2]} of {match[3]}" for match in TABLES])
 def test_a_table_between_marks_is_what_the_program_says(match):
-    assert match[0] == write.rewritten(match)
+    assert match[0] == write.rewrite_table(match)
 
 
 def test_the_effects_of_every_job_are_told():
