@@ -1,4 +1,4 @@
-"""What the benchmarks share: one thread, a fixed number of turns, ratios by their median and spread, tables."""
+"""Common parts of the benchmarks: one thread, a fixed number of turns, medians and spread of ratios, tables."""
 
 import importlib.util
 import json
@@ -13,44 +13,44 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB
 
 
 def one_thread() -> None:
-    """Start this script again with single-threaded linear algebra: on problems this small, threads only cost time."""
+    """Restart this script with single-threaded linear algebra: on small problems threads only cost time."""
     if any(os.environ.get(name) != "1" for name in THREADS):
         os.environ |= dict.fromkeys(THREADS, "1")
         os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
 
 
 def processor_time() -> None:
-    """Let every clock of this process, loomopt's own too, count the processor's time: other work then counts little."""
+    """Make every clock of this process, loomopt's too, count processor time, so that other work counts little."""
     time.perf_counter = time.process_time
 
 
 def seconds(call: Callable[[], Any]) -> float:
-    """Return how long one call takes."""
-    began = time.perf_counter()
+    """Time of one call, s."""
+    start = time.perf_counter()
     call()
-    return time.perf_counter() - began
+    return time.perf_counter() - start
 
 
 def turns(calls: Mapping[str, Callable[[], Any]], repeats: int) -> list[dict[str, float]]:
-    """Return what each call took in each turn, s; every turn runs all of them, so that noise hits all alike.
+    """Time of every call in every turn, s; a turn runs all calls, so that noise affects all alike.
 
-    How many turns there are is said beforehand: a benchmark that stops as soon as it likes what it sees flatters.
+    The number of turns is fixed in advance, since a benchmark that stops at a good result is biased.
     """
     return [{name: seconds(call) for name, call in calls.items()} for _ in range(repeats)]
 
 
-def medians(taken: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return the median time of each call, s."""
-    return {name: statistics.median(turn[name] for turn in taken) for name in taken[0]}
+def medians(times: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Median time of every call, s."""
+    return {name: statistics.median(turn[name] for turn in times) for name in times[0]}
 
 
 def spread(ratios: Sequence[float]) -> dict[str, float]:
-    """Return the median of the ratios of all turns, the lowest and the highest."""
+    """Median, lowest and highest of the ratios of all turns."""
     return {"median": statistics.median(ratios), "lowest": min(ratios), "highest": max(ratios)}
 
 
 def installed(module: str) -> bool:
-    """Say whether an optional peer can be imported."""
+    """Whether an optional peer can be imported."""
     return importlib.util.find_spec(module) is not None
 
 

@@ -55,7 +55,7 @@ FAILURES = ("beaten", "broken", "refuted", "uncertified: other")
 
 
 def better(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    """Say whether objectives are lower by more than 1e-6: the first, or where it is held the second."""
+    """Whether objectives are lower by more than 1e-6: the first, or where it is held the second."""
     for a, b in zip(one, other, strict=True):
         if a < b - BETTER:
             return True
@@ -65,12 +65,12 @@ def better(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
 
 
 def near(one: tuple[float, ...], other: tuple[float, ...], room: float = BETTER) -> bool:
-    """Say whether no objective is higher by more than `room`."""
+    """Whether no objective is higher by more than `room`."""
     return all(a <= b + room for a, b in zip(one, other, strict=True))
 
 
 def scene_of(job: str, seed: int, number: int) -> Any:
-    """Return scene `number` of a job and seed, with its question by hand."""
+    """Scene `number` of a job and seed, with its question by hand."""
     import numpy as np
 
     rng = np.random.default_rng([zlib.crc32(job.encode()), seed, number])
@@ -156,7 +156,7 @@ class Trial:
 
 
 def told(job: str, seed: int, number: int, trial: Trial) -> list[str]:
-    """Return a line for each failure, from which it can be made again."""
+    """Line for each failure, from which it can be made again."""
     task = trial.task
     known = getattr(task, "document", None)
     made = f"lo.scene({known!r})" if known else f"lo.load({task.base!r}).update({task.changes!r})"
@@ -197,21 +197,21 @@ def outcome(job: str, seed: int, number: int, compare: bool) -> Outcome:
     return Outcome(counted, told(job, seed, number, trial))
 
 
-def outcomes(asked: argparse.Namespace) -> Iterator[tuple[str, Outcome]]:
+def outcomes(options: argparse.Namespace) -> Iterator[tuple[str, Outcome]]:
     """Yield what becomes of each scene, with its job.
 
     In a process of its own: SciPy's SLSQP has ended it by a segmentation fault, once in some hundred scenes.
     """
-    jobs, began = asked.jobs.split(","), time.perf_counter()
-    numbers = [asked.only] if asked.only is not None else range(asked.count)
+    jobs, began = options.jobs.split(","), time.perf_counter()
+    numbers = [options.only] if options.only is not None else range(options.count)
     pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
     for number, job in itertools.product(numbers, jobs):
-        if time.perf_counter() - began > asked.seconds:
+        if time.perf_counter() - began > options.seconds:
             break
         try:
-            yield job, pool.submit(outcome, job, asked.seed, number, asked.compare).result()
+            yield job, pool.submit(outcome, job, options.seed, number, options.compare).result()
         except BrokenProcessPool:
-            print(f"lost (--jobs {job} --seed {asked.seed} --only {number}): its process died", file=sys.stderr)
+            print(f"lost (--jobs {job} --seed {options.seed} --only {number}): its process died", file=sys.stderr)
             yield job, Outcome(["lost"], [])
             pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
     pool.shutdown()
@@ -219,17 +219,17 @@ def outcomes(asked: argparse.Namespace) -> Iterator[tuple[str, Outcome]]:
 
 def main() -> None:
     harness.one_thread()
-    asked = parsed()
-    counts = {job: Counter[str]() for job in asked.jobs.split(",")}
+    options = parsed()
+    counts = {job: Counter[str]() for job in options.jobs.split(",")}
     failures = list[str]()
-    for job, found in outcomes(asked):
+    for job, found in outcomes(options):
         counts[job].update(found.counted)
         for line in found.lines:
             failures.append(line)
             print(line, file=sys.stderr, flush=True)
-    columns = [*COUNTED, *(["comparable", *(f"best by {name}" for name in CALLS)] if asked.compare else [])]
+    columns = [*COUNTED, *(["comparable", *(f"best by {name}" for name in CALLS)] if options.compare else [])]
     rows = [{"job": job, **{name: counts[job][name] for name in columns}} for job in counts]
-    harness.show(rows, asked.json, **({"failures": failures} if asked.json else {}))
+    harness.show(rows, options.json, **({"failures": failures} if options.json else {}))
     failed = any(of[kind] for of in counts.values() for kind in FAILURES)
     sys.exit(failed or any(of["lost"] > MOST_LOST * of["tried"] for of in counts.values()))
 

@@ -84,7 +84,7 @@ class Machine:
         return View(self._levels(z, design, beta, front, angles), np.hstack(firm), equal)
 
     def _levels(self, z, design, beta, front, angles):
-        """Return the target's objectives, in natural sizes."""
+        """Target's objectives, in natural sizes."""
         if self.target == "retrofit":
             return (self._change(self.designs(z))[:, None],)
         if self.target == "pulse":
@@ -123,7 +123,7 @@ class Machine:
         return map(self.design, attacked(self, seed, claimed, None if near is None else self.point(near)))
 
     def objectives(self, design):
-        """Return the target's true objectives, in natural sizes."""
+        """Target's true objectives, in natural sizes."""
         if self.target == "retrofit":
             return (float(self._change(np.array([design[name] for name in NAMES]))),)
         if self.target == "pulse":
@@ -132,14 +132,14 @@ class Machine:
         return (peak,) if self.target == "torque" else (abs(self.hand.static(design)["M3_fdc"]) / self.torque, peak)
 
     def stated(self, figures):
-        """Return the objectives that an answer states, in natural sizes."""
+        """Objectives that an answer states, in natural sizes."""
         if self.target in ("pulse", "retrofit"):
             return (figures["pulse_rms"] / self.torque if self.target == "pulse" else figures["change"],)
         peak = figures["peak_torque"] / self.peak
         return (peak,) if self.target == "torque" else (abs(figures["M3_fdc"]) / self.torque, peak)
 
     def excess(self, design):
-        """Return the largest violation, lengths and the counterweight relative to their bounds, angles in rad."""
+        """Largest violation, lengths and the counterweight relative to their bounds, angles in rad."""
         with np.errstate(all="ignore"):
             worst, front = self.hand.excess(design, 36), self.hand.static(design)["M3_fdc"]
             if not np.isfinite([worst, front, self.hand.peaks(design, 360)["peak_torque"]]).all():
@@ -150,7 +150,7 @@ class Machine:
 
 
 def drawn(rng):
-    """Return a random scene and target: bounds, limits, cloth, speed, some effects."""
+    """Random scene and target: bounds, limits, cloth, speed, some effects."""
     anchor, ends = TODAY, np.empty((4, 2))
     near = rng.random() < 0.6
     if near:

@@ -22,7 +22,7 @@ ROUNDING = 1e-14
 
 
 def vector(length, angle):
-    """Return a vector of a length and direction, as a complex number."""
+    """Vector of a length and direction, as a complex number."""
     return length * np.exp(1j * angle)
 
 
@@ -39,7 +39,7 @@ class Shape:
     guide: float = 0.0
 
     def moved(self, x, count):
-        """Return output, cosine of the drive's transmission angle and sine of the strut's obliquity, (designs, count).
+        """Output, cosine of the drive's transmission angle and sine of the strut's obliquity, (designs, count).
 
         x: designs, (designs, numbers) SI.
         """
@@ -63,7 +63,7 @@ class Shape:
 
 
 def rates(q):
-    """Return the first three derivatives of a periodic output, (designs, angles), with respect to the crank angle."""
+    """First three derivatives of a periodic output, (designs, angles), with respect to the crank angle."""
     k = 1j * np.fft.rfftfreq(q.shape[1], 1 / q.shape[1])
     k[-1] = 0.0
     series = np.fft.rfft(q, axis=1)
@@ -73,7 +73,7 @@ def rates(q):
 
 
 def peak(values):
-    """Return the largest magnitude of samples over a turn, by a parabola through the largest."""
+    """Largest magnitude of samples over a turn, by a parabola through the largest."""
     size = np.abs(values)
     at = int(size.argmax())
     low, mid, high = size[at - 1], size[at], size[(at + 1) % len(size)]
@@ -103,24 +103,24 @@ class Machine:
 
     @property
     def coarse(self):
-        """Return the crank angles looked at first."""
+        """Crank angles looked at first."""
         return (np.zeros(COARSE),)
 
     def sharper(self, z, angles):
-        """Return more crank angles."""
+        """More crank angles."""
         return (np.zeros(FINE),)
 
     def designs(self, z):
-        """Return designs, SI, of points."""
+        """Designs, SI, of points."""
         return self.lower + (self.upper - self.lower) * z
 
     def point(self, design):
-        """Return the point of a design by name."""
+        """Point of a design by name."""
         x = np.array([design[name] for name in self.shape.names])
         return np.clip((x - self.lower) / np.where(self.upper > self.lower, self.upper - self.lower, 1.0), 0.0, 1.0)
 
     def design(self, z):
-        """Return the design of a point by name, SI."""
+        """Design of a point by name, SI."""
         return dict(zip(self.shape.names, map(float, self.designs(z)), strict=True))
 
     def curves(self, q):
@@ -160,17 +160,17 @@ class Machine:
             return x, *(each[0] for each in self.shape.moved(x[None], EVEN))
 
     def objectives(self, design):
-        """Return the levels in natural sizes, today's."""
+        """Levels in natural sizes, today's."""
         _, q, *_ = self._at(design)
         pairs = zip(self.curves(q[None]), self._sizes(), strict=True)
         return tuple((peak(curve[0]) if curve.shape[1] > 1 else float(curve[0, 0])) / size for curve, size in pairs)
 
     def stated(self, figures):
-        """Return the levels that an answer states, in natural sizes."""
+        """Levels that an answer states, in natural sizes."""
         return tuple(figures[name] / size for name, size in zip(self.levels, self._sizes(), strict=True))
 
     def excess(self, design):
-        """Return the largest violation, in natural sizes; angles in rad."""
+        """Largest violation, in natural sizes; angles in rad."""
         x, q, cosine, sine = self._at(design)
         if not np.all(np.isfinite(q)):
             return np.inf
@@ -182,7 +182,7 @@ class Machine:
 
 
 def drawn(rng):
-    """Return a random scene around a machine that closes."""
+    """Random scene around a machine that closes."""
     while True:
         found = _drawn(rng)
         if found is not None:
@@ -216,7 +216,7 @@ def _drawn(rng):
 
 
 def _ambiguous(q):
-    """Say whether several maxima of an output are as good as equal: a scene would have to say which is meant."""
+    """Whether several maxima of an output are as good as equal: a scene would have to say which is meant."""
     tops = q[(q > np.roll(q, 1)) & (q >= np.roll(q, -1))]
     return np.sum(tops > q.max() - 0.02 * np.ptp(q)) > 1
 
@@ -287,6 +287,6 @@ def _machine(rng, shape, texts, units, today, swing, least):
 
 
 def _text(value, unit):
-    """Return a value as text with unit, to 1 um or 0.001 deg, and in SI as the text says."""
+    """Value as text with unit, to 1 um or 0.001 deg, and in SI as the text says."""
     digits = round(float(value) * 1e3, 3) if unit == "mm" else round(float(np.degrees(value)), 3)
     return f"{digits!r} {unit}", digits / 1e3 if unit == "mm" else float(np.radians(digits))

@@ -22,7 +22,7 @@ LONGEST = np.radians(175)
 
 
 def rounded(value, unit):
-    """Return a number as text with unit, to 0.1 mm or 0.01 deg, and its value in SI as the text says."""
+    """Number as text with unit, to 0.1 mm or 0.01 deg, and its value in SI as the text says."""
     digits = round(float(value) * 1e3, 1) if unit == "mm" else round(float(np.degrees(value)), 2)
     return f"{digits!r} {unit}", digits / 1e3 if unit == "mm" else float(np.radians(digits))
 
@@ -46,27 +46,27 @@ class Drive:
 
     @property
     def coarse(self):
-        """Return angles of peaks, shares of the dwells after and before, angles of obliquity."""
+        """Angles of peaks, shares of the dwells after and before, angles of obliquity."""
         even = np.linspace(0, 2 * np.pi, EVEN if self.target == "smooth" else COARSE, endpoint=False)
         share = np.linspace(0, 1, 9)
         return even, share, share, np.linspace(0, 2 * np.pi, COARSE, endpoint=False)
 
     def designs(self, z):
-        """Return designs, SI, of points."""
+        """Designs, SI, of points."""
         return self.lower + (self.upper - self.lower) * z[..., :8]
 
     def point(self, design):
-        """Return the point of a design, a mapping or an array."""
+        """Point of a design, a mapping or an array."""
         x = np.array([design[name] for name in plain.NAMES]) if not isinstance(design, np.ndarray) else design
         z = np.clip((x - self.lower) / np.where(self.upper > self.lower, self.upper - self.lower, 1.0), 0.0, 1.0)
         return np.append(z, self.dwell(x) / LONGEST) if self.target == "dwell" else z
 
     def design(self, z):
-        """Return the design of a point by name, SI."""
+        """Design of a point by name, SI."""
         return dict(zip(plain.NAMES, map(float, self.designs(z)), strict=True))
 
     def arcs(self, z):
-        """Return the required dwells after and before, rad."""
+        """Required dwells after and before, rad."""
         if self.target == "dwell":
             return z[..., 8] * LONGEST, z[..., 8] * LONGEST
         return np.full(z.shape[:-1], self.needs.after), np.full(z.shape[:-1], self.needs.before)
@@ -95,7 +95,7 @@ class Drive:
         return View((level,), firm, top)
 
     def _top(self, design, phi):
-        """Return each design's largest S near angles, one each: Newton steps."""
+        """Each design's largest S near angles, one each: Newton steps."""
         for _ in range(2):
             _, S_1, S_2, *_ = plain.curves(design, phi)
             phi = phi - np.where(S_2 < 0, np.clip(S_1 / np.where(S_2 < 0, S_2, -1.0), -0.1, 0.1), 0.0)
@@ -114,7 +114,7 @@ class Drive:
         return tuple(np.append(old, new) for old, new in zip(angles, kept, strict=True))
 
     def dwell(self, x):
-        """Return the shorter dwell, rad."""
+        """Shorter dwell, rad."""
         return min(plain.dwell(x, 1, self.needs.band), plain.dwell(x, -1, self.needs.band))
 
     def attack(self, seed, claimed, near=None):
@@ -125,7 +125,7 @@ class Drive:
         yield from map(self.design, attacked(self, seed, claimed, None if near is None else self.point(near)))
 
     def objectives(self, design):
-        """Return the target's true objective."""
+        """Target's true objective."""
         x = np.array([design[name] for name in plain.NAMES])
         if self.target == "dwell":
             return (-self.dwell(x),)
@@ -137,12 +137,12 @@ class Drive:
         return (float(plain.peak(x)),)
 
     def stated(self, figures):
-        """Return the objective that an answer states."""
+        """Objective that an answer states."""
         name = {"dwell": "dwell", "smooth": "rms_jerk"}.get(self.target, "peak_acceleration")
         return (-figures[name] if self.target == "dwell" else figures[name],)
 
     def excess(self, design):
-        """Return the largest violation, relative to each limit; angles in rad."""
+        """Largest violation, relative to each limit; angles in rad."""
         x = np.array([design[name] for name in plain.NAMES])
         with np.errstate(all="ignore"):
             needs = self.needs
@@ -152,7 +152,7 @@ class Drive:
 
 
 def drawn(rng):
-    """Return a random scene and target: bounds from narrow to wide, stroke and dwells of a drive in them or of none."""
+    """Random scene and target: bounds from narrow to wide, stroke and dwells of a drive in them or of none."""
     share = 10 ** rng.uniform(-1.3, 0, 8)
     width = share * plain.WIDTH
     centre = WIDE_LOWER + width / 2 + rng.random(8) * (WIDE_UPPER - WIDE_LOWER - width)
@@ -180,7 +180,7 @@ def drawn(rng):
 
 
 def _anchor(rng, ends, band):
-    """Return a random drive within bounds that closes, dwells and is not folded flat; None where none is found."""
+    """Random drive within bounds that closes, dwells and is not folded flat; None where none is found."""
     drives, phi = rng.uniform(*ends, (2000, 8)), np.linspace(0, 2 * np.pi, COARSE, endpoint=False)
     with np.errstate(all="ignore"):
         S, _, _, cosine, _ = plain.curves(drives.T[:, :, None], phi)

@@ -42,7 +42,7 @@ class Frame:
         self.stiffness_size = max(cam_force.softest(scene, scene.X0), 1.0)
 
     def _of(self, design):
-        """Return the plain scene of a design."""
+        """Plain scene of a design."""
         scene = replace(self.plain_scene, X0=design["X0"])
         if "law" in design:
             scene = replace(scene, law=tuple(design["law"]))
@@ -54,7 +54,7 @@ class Frame:
         return scene
 
     def point(self, design):
-        """Return the point of a design where angles are free."""
+        """Point of a design where angles are free."""
         if not self.moves:
             return np.zeros(0)
         values = [*(math.degrees(design[name]) for name in ANGLES[:3]), design["X0"]]
@@ -62,7 +62,7 @@ class Frame:
         return np.clip((values - ends[:, 0]) / np.ptp(ends, axis=1), 0, 1)
 
     def objectives(self, design):
-        """Return the target's true objective, in natural sizes."""
+        """Target's true objective, in natural sizes."""
         if self.target == "force":
             return (cam_force.extreme(self._of(design), design["K1"], 1)[0] / self.force_size,)
         if self.target == "speed":
@@ -70,7 +70,7 @@ class Frame:
         return (design["K1"] / self.stiffness_size,)
 
     def stated(self, figures):
-        """Return the objective that an answer states, in natural sizes."""
+        """Objective that an answer states, in natural sizes."""
         if self.target == "force":
             return (figures["contact_max"] / self.force_size,)
         if self.target == "speed":
@@ -78,7 +78,7 @@ class Frame:
         return (figures["K1"] / self.stiffness_size,)
 
     def excess(self, design):
-        """Return the largest violation, relative to the forces' and the bounds' sizes."""
+        """Largest violation, relative to the forces' and the bounds' sizes."""
         scene, K1, X0 = self._of(design), design["K1"], design["X0"]
         worst = (scene.N_min + cam_force.extreme(scene, K1, -1)[0]) / self.force_size
         if self.target == "speed":
@@ -126,7 +126,7 @@ class Frame:
         yield design(low)
 
     def _programme(self):
-        """Return the least of the linear programme in K1, P = K1 X0 and the peak, rows added where it breaks them."""
+        """Least of the linear programme in K1, P = K1 X0 and the peak, rows added where it breaks them."""
         scene, size, F = replace(self.plain_scene, X0=0.0), self.stiffness_size, self.force_size
         spots = [(stretch, u) for stretch in plain.stretches(scene) for u in map(float, stretch[3:5])]
         for _ in range(60):
@@ -204,7 +204,7 @@ class Angled:
 
 
 def drawn(rng):
-    """Return a random frame and question."""
+    """Random frame and question."""
 
     def some(most, share=0.5):
         return round(float(rng.uniform(0, most)), 2) if rng.random() < share else 0.0
@@ -233,7 +233,7 @@ def drawn(rng):
 
 
 def _framed(rng, question, scene, X0_max):
-    """Return the frame with bounds of the spring and of the angles."""
+    """Frame with bounds of the spring and of the angles."""
     frame = Frame(question, {}, scene, (0.0, 1e9), (0.0, X0_max))
     K1_max = frame.stiffness_size * (1e3 if rng.random() < 0.5 or question == "angles" else rng.uniform(0.9, 3.0))
     if question == "law":

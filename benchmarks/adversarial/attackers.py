@@ -51,7 +51,7 @@ class Task(Protocol):
 
 
 def viewed(task: Task, z: np.ndarray, angles: tuple[np.ndarray, ...]) -> View:
-    """Return the view with a number wherever a design does not close."""
+    """View with a number wherever a design does not close."""
     with np.errstate(all="ignore"):
         levels, firm, equal = task.view(z, angles)
     levels = tuple(np.nan_to_num(level, nan=WORST, posinf=WORST, neginf=WORST) for level in levels)
@@ -59,7 +59,7 @@ def viewed(task: Task, z: np.ndarray, angles: tuple[np.ndarray, ...]) -> View:
 
 
 def broken(view: View) -> np.ndarray:
-    """Return the largest violation of each design."""
+    """Largest violation of each design."""
     most = np.zeros(len(view.firm))
     for rows in (-view.firm, np.abs(view.equal)):
         most = np.maximum(most, rows.max(axis=1, initial=0.0))
@@ -84,14 +84,14 @@ class Rows:
     at: bytes = b""
 
     def values(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return rows no less than 0 and rows that are 0 at points (z, T)."""
+        """Rows no less than 0 and rows that are 0 at points (z, T)."""
         view = viewed(self.task, y[:, :-1], self.angles)
         above = y[:, -1:] - view.levels[self.level]
         before = [most - level for most, level in zip(self.held, view.levels, strict=False)]
         return np.hstack([above, view.firm, *before]), view.equal
 
     def part(self, kind: int) -> dict[str, object]:
-        """Return a constraint for SciPy: 0 the rows no less than 0, 1 those that are 0."""
+        """Constraint for SciPy: 0 the rows no less than 0, 1 those that are 0."""
 
         def fun(y):
             self.evaluate(y)
@@ -154,7 +154,7 @@ def solved(
 
 
 def inside(rows: Rows, y: np.ndarray) -> np.ndarray:
-    """Return z after a few least moves onto the limits it breaks, within the box."""
+    """Point z after a few least moves onto the limits it breaks, within the box."""
     for _ in range(6):
         rows.at = b""
         rows.evaluate(y)
@@ -174,7 +174,7 @@ def inside(rows: Rows, y: np.ndarray) -> np.ndarray:
 
 
 def screened(task: Task, seed: int, count: int = 2048, best: int = 5) -> list[np.ndarray]:
-    """Return the best of many Sobol points that lie apart."""
+    """Best of many Sobol points that lie apart."""
     z = qmc.Sobol(task.size, seed=seed).random(count)
     order, found = np.argsort(merit(task, z)), list[np.ndarray]()
     for k in order:

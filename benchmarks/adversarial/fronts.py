@@ -47,7 +47,7 @@ class Asked(NamedTuple):
 
 
 def linkage(number: int) -> tuple[Any, str]:
-    """Return a linkage whose numbers are drawn, the next draw where one does not close, and a target of it."""
+    """Linkage whose numbers are drawn, the next draw where one does not close, and a target of it."""
     import numpy as np
 
     import loomopt as lo
@@ -69,7 +69,7 @@ def linkage(number: int) -> tuple[Any, str]:
 
 
 def drawn(number: int, jobs: tuple[str, ...] = JOBS) -> Asked:
-    """Return the front of scene `number`; always the same one."""
+    """Front of scene `number`; always the same one."""
     import numpy as np
 
     import loomopt as lo

@@ -153,7 +153,7 @@ CELLS = (
 
 
 def quantity(draw: random.Random) -> str:
-    """Return text that may be a quantity."""
+    """Text that may be a quantity."""
     size = draw.choice((1.0, 1.0, 1e-3, 1e-12, 1e12))
     number = (
         draw.choice(NUMBERS)
@@ -164,7 +164,7 @@ def quantity(draw: random.Random) -> str:
 
 
 def junk(draw: random.Random, depth: int = 0) -> Any:
-    """Return a value that does not belong."""
+    """Value that does not belong."""
     plain: list[Callable[[], Any]] = [
         lambda: quantity(draw),
         lambda: draw.choice(WORDS),
@@ -179,13 +179,13 @@ def junk(draw: random.Random, depth: int = 0) -> Any:
 
 
 def paths(table: Mapping[str, Any], start: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
-    """Return the path of everything in nested tables."""
+    """Path of everything in nested tables."""
     inner = [path for name, value in table.items() if isinstance(value, dict) for path in paths(value, (*start, name))]
     return [(*start, name) for name in table] + inner
 
 
 def rescaled(draw: random.Random, value: object, mild: bool = False) -> str:
-    """Return a quantity of the same unit and of another size; mild: of nearly the same."""
+    """Quantity of the same unit and of another size; mild: of nearly the same."""
     number, _, unit = str(value).partition(" ")
     try:
         size = float(number) or 1.0
@@ -222,7 +222,7 @@ def spoil(draw: random.Random, table: dict[str, Any], names: Sequence[str] = ())
 
 
 def spoilt_text(draw: random.Random, text: str, parts: tuple[str, ...]) -> bytes:
-    """Return a text with a few parts cut out and others put in, some of them no text."""
+    """Text with a few parts cut out and others put in, some of them no text."""
     content = text.encode()
     for _ in range(draw.choice((0, 1, 1, 2, 3))):
         at = draw.randrange(len(content) + 1)
@@ -232,7 +232,7 @@ def spoilt_text(draw: random.Random, text: str, parts: tuple[str, ...]) -> bytes
 
 
 def toml(value: object) -> str:
-    """Return a value as TOML writes it in one line; what TOML cannot say is text."""
+    """Value as TOML writes it in one line; what TOML cannot say is text."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{_text(name)} = {toml(each)}" for name, each in value.items()) + "}"
     if isinstance(value, list | tuple):
@@ -245,7 +245,7 @@ def toml(value: object) -> str:
 
 
 def _text(text: str) -> str:
-    """Return text in quotes."""
+    """Text in quotes."""
     return json.dumps(text, ensure_ascii=False)
 
 
@@ -345,14 +345,14 @@ def files(draw: random.Random, folder: Path, sources: Mapping[str, Mapping[str, 
 
 
 def names(document: Mapping[str, Any]) -> list[str]:
-    """Return the words that a scene uses: its keys, and text that is no quantity."""
+    """Words that a scene uses: its keys, and text that is no quantity."""
     keys = {name for path in paths(document) for name in path}
     texts = [value for path in paths(document) if isinstance(value := _at(document, path), str)]
     return sorted({*keys, *(text for text in texts if text.isidentifier())})
 
 
 def _quantities(document: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """Return the paths of the numbers of a scene's mechanism, operation and effects that have a unit."""
+    """Paths of the numbers of a scene's mechanism, operation and effects that have a unit."""
     tables = [path for path in paths(document) if path[0] in ("mechanism", "operation", "effects")]
     return [path for path in tables if re.match(r"-?[0-9.]+ [^\W\d]", str(_at(document, path)))]
 

@@ -23,7 +23,7 @@ SAME = 1e-6
 
 
 def bounds(generator: random.Random, names: dict[str, tuple[int, int]], least: int, width: float) -> dict[str, Any]:
-    """Return narrow bounds, mm, of at least so many lengths, around a random centre."""
+    """Narrow bounds, mm, of at least so many lengths, around a random centre."""
     found = {}
     for name in generator.sample(sorted(names), generator.randint(least, len(names))):
         centre = generator.uniform(*names[name])
@@ -33,7 +33,7 @@ def bounds(generator: random.Random, names: dict[str, tuple[int, int]], least: i
 
 
 def drawn(generator: random.Random) -> tuple[str, str | None, dict[str, Any]]:
-    """Return a scene's name, its target and changes that leave it little room."""
+    """Scene's name, its target and changes that leave it little room."""
     job = generator.choice(["rapier", "rapier", "rapier", "beatup", "shedding"])
     if job == "rapier":
         changes = {

@@ -56,7 +56,7 @@ class Mutant:
         return f"{self.file}:{self.line}: {self.old} -> {self.new}"
 
     def applied(self, source: str) -> str:
-        """Return the source with the change; columns count bytes, as the syntax tree does."""
+        """Source with the change; columns count bytes, as the syntax tree does."""
         lines = source.splitlines(keepends=True)
         raw = lines[self.line - 1].encode()
         lines[self.line - 1] = (raw[: self.begin] + self.new.encode() + raw[self.end :]).decode()
@@ -96,19 +96,19 @@ def _numbers(value: float) -> tuple[str, ...]:
 
 
 def files() -> list[str]:
-    """Return the files that are changed, in order."""
+    """Files that are changed, in order."""
     found = [str(path.relative_to(TOP)) for room in ROOMS for path in sorted((TOP / "loomopt" / room).rglob("*.py"))]
     return [TOLERANCES, *(name for name in found if not name.endswith("__init__.py"))]
 
 
 def chosen(count: int, seed: int, only: str) -> list[Mutant]:
-    """Return a fixed random choice, spread over the files by how much there is to change in each."""
+    """Fixed random choice, spread over the files by how much there is to change in each."""
     every = [mutant for file in files() if only in file for mutant in mutants(file)]
     return sorted(random.Random(seed).sample(every, min(count, len(every))), key=str)
 
 
 def tests(mutant: Mutant) -> list[str]:
-    """Return the tests that mirror a mutant's file."""
+    """Tests that mirror a mutant's file."""
     if mutant.file == TOLERANCES:
         name = _assigned(mutant)
         readers = [
@@ -124,7 +124,7 @@ def tests(mutant: Mutant) -> list[str]:
 
 
 def _assigned(mutant: Mutant) -> str:
-    """Return the name of the tolerance that a mutant changes."""
+    """Name of the tolerance that a mutant changes."""
     for node in ast.parse((TOP / mutant.file).read_text(encoding="utf-8")).body:
         if isinstance(node, ast.Assign) and node.lineno <= mutant.line <= (node.end_lineno or node.lineno):
             targets = [n.id for n in ast.walk(node.targets[0]) if isinstance(n, ast.Name)]
@@ -135,13 +135,13 @@ def _assigned(mutant: Mutant) -> str:
 
 
 def noticed(mutant: Mutant) -> tuple[bool, str]:
-    """Say whether the tests notice a mutant, and in which words."""
+    """Whether the tests notice a mutant, and in which words."""
     mirrored = tests(mutant)
     return failed(mirrored, mutant) if mirrored else (False, "no test mirrors the file")
 
 
 def failed(mirrored: Sequence[str], mutant: Mutant | None = None) -> tuple[bool, str]:
-    """Say whether tests fail on a copy of the package with a mutant, or with none, and in which words."""
+    """Whether tests fail on a copy of the package with a mutant, or with none, and in which words."""
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(TOP / "loomopt", Path(folder) / "loomopt", ignore=shutil.ignore_patterns("__pycache__"))
         for beside in ("problems", "results", "docs", "benchmarks", "tests", "pyproject.toml"):
@@ -168,14 +168,14 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only", default="", help="a part of the names of the files to look at")
     parser.add_argument("--list", action="store_true", help="name the mutants and their tests, run nothing")
-    asked = parser.parse_args()
-    picked = chosen(asked.count, asked.seed, asked.only)
-    if asked.list:
+    options = parser.parse_args()
+    picked = chosen(options.count, options.seed, options.only)
+    if options.list:
         for mutant in picked:
             print(mutant, "|", " ".join(tests(mutant)) or "no test mirrors the file")
         return
     survivors = 0
-    with concurrent.futures.ThreadPoolExecutor(asked.workers) as pool:
+    with concurrent.futures.ThreadPoolExecutor(options.workers) as pool:
         alone = list(dict.fromkeys(test for mutant in picked for test in tests(mutant)))
         broken = [words for found, words in pool.map(lambda test: failed([test]), alone) if found]
         if broken:

@@ -61,7 +61,7 @@ def answers(name: str, count: int) -> dict[str, Any]:
 
 
 def memory(count: int) -> dict[str, float]:
-    """Return the largest memory, MB, after a tenth of `count` beat-up answers, and after all."""
+    """Largest memory, MB, after a tenth of `count` beat-up answers, and after all."""
     import loomopt as lo
 
     found, ahead = {}, scenes("beatup balance")
@@ -79,9 +79,9 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--memory", type=int, default=1000)
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
-    rows = [answers(name, max(1, asked.count // share)) for name, share in SHARE.items()]
-    harness.show(rows, asked.json, **(memory(asked.memory) if asked.memory else {}))
+    options = parser.parse_args()
+    rows = [answers(name, max(1, options.count // share)) for name, share in SHARE.items()]
+    harness.show(rows, options.json, **(memory(options.memory) if options.memory else {}))
 
 
 if __name__ == "__main__":

@@ -45,7 +45,7 @@ class Worker:
         self.process.stdin.flush()
 
     def receive(self) -> Any:
-        """Return the next answer."""
+        """Next answer."""
         assert self.process.stdout
         line = self.process.stdout.readline()
         if not line:
@@ -53,7 +53,7 @@ class Worker:
         return json.loads(line)
 
     def ask(self, question: Any) -> Any:
-        """Return the answer to a question."""
+        """Answer to a question."""
         self.send(question)
         return self.receive()
 
@@ -86,7 +86,7 @@ def serve(answer: Callable[[Any], Any]) -> None:
 
 
 def arguments(text: str) -> argparse.ArgumentParser:
-    """Return the parser of what both scripts are asked: the other checkout, and how to print."""
+    """Parser of what both scripts are asked: the other checkout, and how to print."""
     parser = argparse.ArgumentParser(description=text.splitlines()[0])
     parser.add_argument("other", type=Path, help="folder of the other checkout, such as a git worktree of a tag")
     parser.add_argument("--json", action="store_true")

@@ -97,17 +97,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cold", action="store_true")
     parser.add_argument("--points", type=int, default=POINTS)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     for case in CASES:
         began = time.process_time()
         trade = front.trade(
-            lo.load(case.problem), case.axes, case.target, maximise=case.most, ranges=case.ranges, points=asked.points
+            lo.load(case.problem), case.axes, case.target, maximise=case.most, ranges=case.ranges, points=options.points
         )
         rows = run.run(trade)
         spent = time.process_time() - began
         found = read_front(trade, rows)
         told(case, trade, found, spent)
-        if asked.cold:
+        if options.cold:
             searched(trade, found)
 
 
@@ -136,14 +136,14 @@ def told(case: Case, trade: trade.Trade, found: Findings, spent: float) -> None:
 
 
 def asked_at(trade: trade.Trade, found: Findings, value: float) -> Row:
-    """Return the row with the second axis at a value, solved from its nearest neighbour on the front."""
+    """Row with the second axis at a value, solved from its nearest neighbour on the front."""
     near = min((row for row in found.rows if row.certified), key=lambda row: abs(trade_value(trade, row) - value))
     ask = {"also": [], "held": near.warm["held"], "wide": False}
     return trade.solved(StudyTask(len(found.rows), near.point, {trade.axes[1]: value}, ask), near)
 
 
 def trade_value(trade: trade.Trade, row: Row) -> float:
-    """Return the second axis of a row."""
+    """Second axis of a row."""
     return plan.value(row, trade.axes[1])
 
 

@@ -25,7 +25,7 @@ DIGITS, EXACT = 40, 200
 
 
 def exact(phi):
-    """Return ψ, ψ', ψ'' by mpmath, a position at a time."""
+    """Ψ, ψ', ψ'' by mpmath, a position at a time."""
     m = systems.mpmath(DIGITS)
     lengths = Lengths(*map(m.number, LENGTHS))
     poses = [CrankRockerPose(m, lengths, m.number(float(angle))) for angle in phi]
@@ -33,21 +33,21 @@ def exact(phi):
 
 
 def symbolic():
-    """Return the same formula as a CasADi function of φ."""
+    """Same formula as a CasADi function of φ."""
     phi = ca.SX.sym("phi")
     pose = CrankRockerPose(systems.casadi(), Lengths(*LENGTHS), phi)
     return ca.Function("curves", [phi], [ca.vertcat(pose.psi, pose.psi_1, pose.psi_2)])
 
 
 def chunked(function, phi):
-    """Return a CasADi function mapped over chunks."""
+    """CasADi function mapped over chunks."""
     mapped = function.map(CHUNK)
     padded = np.resize(phi, -(-len(phi) // CHUNK) * CHUNK).reshape(-1, 1, CHUNK)
     return np.hstack([np.asarray(mapped(part)) for part in padded])[:, : len(phi)]
 
 
 def run(positions: int, repeats: int):
-    """Return the table's rows and the ratio that is promised, by its spread."""
+    """Table's rows and the ratio that is promised, by its spread."""
     phi = np.linspace(0.0, 2 * np.pi, positions, endpoint=False)
     few = phi[:: max(1, positions // EXACT)][:EXACT]
     lengths, function = Lengths(*LENGTHS), symbolic()
@@ -85,9 +85,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="a tenth of the positions")
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
-    rows, ratio = run(100_000 if asked.quick else 1_000_000, 15 if asked.quick else 9)
-    harness.show(rows, asked.json, loomopt_to_plain=ratio, promised=1.3)
+    options = parser.parse_args()
+    rows, ratio = run(100_000 if options.quick else 1_000_000, 15 if options.quick else 9)
+    harness.show(rows, options.json, loomopt_to_plain=ratio, promised=1.3)
 
 
 if __name__ == "__main__":

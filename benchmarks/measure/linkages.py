@@ -24,7 +24,7 @@ BEYOND = {"limits.mu.beat.min": "85 deg", "limits.mu.drive.min": "85 deg"}
 
 
 def six_bar() -> lo.Scene:
-    """Return the six-bar sley without its rest."""
+    """Six-bar sley without its rest."""
     document: dict[str, Any] = dict(lo.load("sixbar-sley").document)
     for table, key in REST.items():
         document[table] = {name: each for name, each in document[table].items() if name != key}
@@ -32,7 +32,7 @@ def six_bar() -> lo.Scene:
 
 
 def spent(action: Callable[[], object], repeats: int) -> float:
-    """Return the median of the CPU seconds that an action takes, each time in a session of its own."""
+    """Median of the CPU seconds that an action takes, each time in a session of its own."""
     found = []
     for _ in range(repeats):
         with working(Session()):
@@ -43,7 +43,7 @@ def spent(action: Callable[[], object], repeats: int) -> float:
 
 
 def measured(repeats: int) -> dict[str, float]:
-    """Return CPU seconds by what was done."""
+    """CPU seconds by what was done."""
     scene, beatup = six_bar(), lo.load("beatup")
     beyond = scene.update(BEYOND)
     started = lo.solve(scene, starts=1)
@@ -62,9 +62,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
-    found = measured(asked.repeats)
-    if asked.json:
+    options = parser.parse_args()
+    found = measured(options.repeats)
+    if options.json:
         print(json.dumps(found))
         return
     base = found["beat-up search"]

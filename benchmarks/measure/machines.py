@@ -85,7 +85,7 @@ class Task:
             self.read(block)
 
     def read(self, drawn: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the figures of machines."""
+        """Figures of machines."""
         like = sampled(self.model, self.known)
 
         def figures(machines: Any) -> Any:
@@ -94,13 +94,13 @@ class Task:
         return read_all(self.model, {**self.known, **drawn}, like, figures, self.alone)
 
     def alone(self, values: Mapping[str, float]) -> Mapping[str, Any]:
-        """Return the figures of one machine."""
+        """Figures of one machine."""
         own = {**self.design, **{name: float(values[name]) for name in self.spread}}
         return self.job.figures(self.scene, own)
 
 
 def measured(case: Case, machines: int, alone: int, repeats: int) -> dict[str, Any]:
-    """Return a row of the table."""
+    """Row of the table."""
     task = Task(case)
     few = next(task.drawn(alone))
     ones = [{name: value[k] for name, value in few.items()} for k in range(alone)]

@@ -51,7 +51,7 @@ RATIOS = "ratio of medians", "ratio of least", "lower quartile"
 
 @functools.cache
 def case(name: str) -> tuple[Any, str, Any]:
-    """Return a case's scene, its target, and its neighbour's answer."""
+    """Case's scene, its target, and its neighbour's answer."""
     import loomopt as lo
 
     job, target, key, value, *effects = CASES[name]
@@ -62,7 +62,7 @@ def case(name: str) -> tuple[Any, str, Any]:
 
 
 def work(name: str, what: str) -> Callable[[], Any]:
-    """Return one piece of work."""
+    """One piece of work."""
     import loomopt as lo
 
     scene, target, neighbour = case(name)
@@ -88,7 +88,7 @@ def work(name: str, what: str) -> Callable[[], Any]:
 
 
 def timed(question: tuple[str, str]) -> dict[str, float]:
-    """Return the milliseconds of processor time that a piece of work takes; of a solve, the certificate's too."""
+    """Milliseconds of processor time that a piece of work takes; of a solve, the certificate's too."""
     name, what = question
     call, often = work(name, what), OFTEN.get(what, 1)
     gc.collect()
@@ -136,14 +136,14 @@ def main() -> None:
     parser.add_argument("--only", default="", help="cases whose name starts so")
     parser.add_argument("--work", default=",".join(WORK), help="pieces of work, with commas between")
     parser.add_argument("--most", type=float, default=math.inf, help="largest ratio that passes")
-    asked = parser.parse_args()
-    wanted = [what for what in WORK if what in asked.work.split(",")]
-    questions = [(name, what) for name in CASES if name.startswith(asked.only) for what in wanted]
-    with checkouts.workers(__file__, asked.other) as pair:
-        found = [line for question in questions for line in rows(question[0], *times(pair, question, asked.repeats))]
+    options = parser.parse_args()
+    wanted = [what for what in WORK if what in options.work.split(",")]
+    questions = [(name, what) for name in CASES if name.startswith(options.only) for what in wanted]
+    with checkouts.workers(__file__, options.other) as pair:
+        found = [line for question in questions for line in rows(question[0], *times(pair, question, options.repeats))]
     worst = max(min(each[ratio] for ratio in RATIOS) for each in found)
-    harness.show(found, asked.json, worst=worst)
-    sys.exit(worst > asked.most)
+    harness.show(found, options.json, worst=worst)
+    sys.exit(worst > options.most)
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ Case = dict[str, Any]
 
 
 def case(name: str, target: str, *effects: str, free: str = "", options: Any = None, **changes: Any) -> Case:
-    """Return one case; a change's key is written with __ for the dot."""
+    """One case; a change's key is written with __ for the dot."""
     keys = {key.replace("__", "."): value for key, value in changes.items()}
     return {"scene": name, "target": target, "effects": effects, "free": free, "set": keys, "options": options or {}}
 
@@ -120,7 +120,7 @@ def sheddings() -> Iterator[Case]:
 
 
 def cases() -> list[Case]:
-    """Return every packaged scene and target, then the variations."""
+    """Every packaged scene and target, then the variations."""
     packaged = [case(name, target) for name, targets in SCENES.items() for target in targets]
     return [*packaged, *beatups(), *rapiers(), *sheddings()]
 
@@ -167,7 +167,7 @@ def answered(asked: Case) -> Case:
 
 
 def program_of(scene: Any, target: str) -> Any:
-    """Return the program of a target."""
+    """Program of a target."""
     from loomopt.jobs import registry
 
     return registry.of(scene).program(scene, target)
@@ -217,7 +217,7 @@ def gap(here: Case, there: Case) -> float:
 
 
 def farthest(here: Mapping[str, float | None], there: Mapping[str, float | None]) -> tuple[float, str]:
-    """Return the largest relative difference of two sets of figures, and of which; below 1e-3 as of 1e-3."""
+    """Largest relative difference of two sets of figures, and of which; below 1e-3 as of 1e-3."""
     shared = [(k, here.get(k), there.get(k)) for k in {*here, *there}]
     off = {k: abs(a - b) / max(abs(a), abs(b), 1e-3) for k, a, b in shared if a is not None and b is not None}
     worst = max(off, key=lambda k: off[k], default="")
@@ -229,10 +229,10 @@ def main() -> None:
     parser = checkouts.arguments(__doc__ or "")
     parser.add_argument("--only", default="", help="scenes whose name starts so")
     parser.add_argument("--figures", type=float, default=1e-8, help="tell of figures that differ by more")
-    asked = parser.parse_args()
-    wanted = [each for each in cases() if each["scene"].startswith(asked.only)]
+    options = parser.parse_args()
+    wanted = [each for each in cases() if each["scene"].startswith(options.only)]
     rows = []
-    with checkouts.workers(__file__, asked.other) as pair:
+    with checkouts.workers(__file__, options.other) as pair:
         for each in wanted:
             for worker in pair:
                 worker.send(each)
@@ -240,12 +240,14 @@ def main() -> None:
             told = list(differences(here, there))
             if here["status"] == there["status"] != "refused":
                 off, which = farthest(here["figures"], there["figures"])
-                told += [f"note: figure {which} differs by {off:.2g}"] if off > asked.figures else []
+                told += [f"note: figure {which} differs by {off:.2g}"] if off > options.figures else []
             rows += [{"case": name_of(each), "exception": text} for text in told]
             for text in told:
                 print(f"{name_of(each)}: {text}", file=sys.stderr)
     exceptions = [row for row in rows if not row["exception"].startswith("note")]
-    harness.show(rows or [{"case": "none", "exception": ""}], asked.json, cases=len(wanted), exceptions=len(exceptions))
+    harness.show(
+        rows or [{"case": "none", "exception": ""}], options.json, cases=len(wanted), exceptions=len(exceptions)
+    )
     sys.exit(bool(exceptions))
 
 

@@ -71,7 +71,7 @@ ROUNDS, QUICK = 21, 9
 
 
 def spent(code, words, cache):
-    """Return the processor's seconds of one process, and the line it says on stderr."""
+    """Processor's seconds of one process, and the line it says on stderr."""
     # A width that is asked for makes a command draw its tables with Rich: here its output is piped.
     environment = {name: value for name, value in os.environ.items() if name not in LEFT_OUT}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -87,7 +87,7 @@ def spent(code, words, cache):
 
 
 def one_round(cache, commands):
-    """Return the processor's milliseconds of each command, run once."""
+    """Processor's milliseconds of each command, run once."""
     found = {ALONE: spent(ALONE, (), cache)[0], FLOOR: spent(LIBRARIES, ("solve", "beatup"), cache)[0]}
     for words in commands:
         found[f"loomopt {words}"] = spent(MAIN, words.split(), cache)[0]
@@ -107,11 +107,11 @@ def main():
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as cache:
-        commands = FEW if asked.quick else COMMANDS
+        commands = FEW if options.quick else COMMANDS
         one_round(cache, commands)
-        rounds = [one_round(cache, commands) for _ in range(QUICK if asked.quick else ROUNDS)]
+        rounds = [one_round(cache, commands) for _ in range(QUICK if options.quick else ROUNDS)]
         counted = calls(cache)
     floor, rows = statistics.median(one[FLOOR] for one in rounds), []
     for name in rounds[0]:
@@ -125,7 +125,7 @@ def main():
                 "median beside their median": statistics.median(times) / floor,
             }
         )
-    harness.show(rows, asked.json, calls=[{"command": name, "calls": made} for name, made in counted.items()])
+    harness.show(rows, options.json, calls=[{"command": name, "calls": made} for name, made in counted.items()])
 
 
 if __name__ == "__main__":

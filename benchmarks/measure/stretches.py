@@ -21,23 +21,23 @@ from loomopt.studies.front.trade import Trade
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import Row, SceneStudy
 
-ALIKE = 1e-9
-"""Share of an axis by which two rows may be asked apart and be one."""
+SAME_PLACE = 1e-9
+"""Distance of two places, as a share of the axis, within which they are the same."""
 LEAST = 1e-9
-"""SI; what is smaller throughout a study is rounding of 0."""
+"""SI; a number below this in all rows is a rounding of 0."""
 
 
 class Case(NamedTuple):
-    """A study, planned anew each time; asked: certified rows a CPU second of the design; quick: whether it is short."""
+    """A study, made anew for every run; goal: certified rows a CPU second; quick: whether it is short."""
 
     name: str
-    asked: float
+    goal: float
     study: Callable[[], SceneStudy]
     quick: bool = False
 
 
 def front(problem: str, axes: tuple[str, str], most: str = "", target: str | None = None, points: int = 40) -> Trade:
-    """Return a front of two axes of a packaged machine; most: the axis of which the most is sought."""
+    """Front of two axes of a packaged machine; most: the axis that is maximised."""
     first: Sense
     second: Sense
     first, second = ("most" if axis == most else "least" for axis in axes)
@@ -45,13 +45,13 @@ def front(problem: str, axes: tuple[str, str], most: str = "", target: str | Non
 
 
 def resistances(count: int) -> sweep.Sweep:
-    """Return a sweep of the beat-up's resistance, 600 to 900 N·m."""
+    """Sweep of the beat-up's resistance, 600 to 900 N·m."""
     values = [f"{600 + 300 * k / (count - 1)!r} N*m" for k in range(count)]
     return sweep.plan_sweep(lo.load("beatup"), {"operation.M0": values})
 
 
 def cases() -> tuple[Case, ...]:
-    """Return all studies."""
+    """All studies."""
     mass = "peak_torque", "m4e"
     return (
         Case("sweep of 65 M0", 0.0, partial(resistances, 65), quick=True),
@@ -63,64 +63,66 @@ def cases() -> tuple[Case, ...]:
     )
 
 
-def timed(planned: Callable[[], SceneStudy], together: bool) -> tuple[tuple[Row, ...], float]:
-    """Return a study's rows, solved together or each alone and searched as often as before, and the CPU seconds."""
-    began = time.process_time()
+def run_timed(make_study: Callable[[], SceneStudy], together: bool) -> tuple[tuple[Row, ...], float]:
+    """Rows of a study, and CPU seconds; together: whether rows are solved in batches, or one by one as in a search."""
+    start = time.process_time()
     if together:
-        return run.run(planned()), time.process_time() - began
+        return run.run(make_study()), time.process_time() - start
     alone = mock.patch.object(neighbour_newton, "solve_between", lambda tasks: [None] * len(tasks))
     with alone, mock.patch.object(sweep, "MOST_COARSE", 10**6):
-        # What a study has planned it keeps: with other points from scratch it is another one.
-        return run.run(planned()), time.process_time() - began
+        # A study caches its plan, so that other points from scratch need a new study.
+        return run.run(make_study()), time.process_time() - start
 
 
-def paired(one: Sequence[Row], other: Sequence[Row]) -> list[tuple[Row, Row]]:
-    """Return the certified rows of both that were asked at the same place."""
-    known = [row for row in other if row.certified and row.place]
+def pair_rows(first: Sequence[Row], second: Sequence[Row]) -> list[tuple[Row, Row]]:
+    """Pairs of certified rows of both studies at the same place."""
+    known = [row for row in second if row.certified and row.place]
     wide = max((abs(value) for row in known for value in row.place.values()), default=1.0)
-    found = []
-    for row in one:
-        near = min(known, key=lambda each: distance(row.place, each.place)) if row.certified and row.place else None
-        if near and distance(row.place, near.place) <= ALIKE * wide:
-            found.append((row, near))
-    return found
+    pairs = []
+    for row in first:
+        if not (row.certified and row.place):
+            continue
+        near = min(known, key=lambda candidate: distance(row.place, candidate.place))
+        if distance(row.place, near.place) <= SAME_PLACE * wide:
+            pairs.append((row, near))
+    return pairs
 
 
-def distance(one: Mapping[str, float], other: Mapping[str, float]) -> float:
-    """Return how far apart two places are."""
-    return max(abs(one[name] - other[name]) for name in one)
+def distance(first: Mapping[str, float], second: Mapping[str, float]) -> float:
+    """Largest difference of two places."""
+    return max(abs(first[name] - second[name]) for name in first)
 
 
-def apart(pairs: Sequence[tuple[Row, Row]], part: str) -> float:
-    """Return the largest difference of one part of rows, in the largest size of each number of it."""
+def largest_difference(pairs: Sequence[tuple[Row, Row]], part: str) -> float:
+    """Largest difference of one part of rows, relative to the largest size of every number."""
     sizes: dict[object, float] = {}
     for _, row in pairs:
         for name, value in getattr(row, part).items():
             sizes[name] = max(sizes.get(name, LEAST), abs(value or 0.0))
-    found = [
+    differences = [
         abs((value or 0.0) - (getattr(row, part).get(name, 0.0) or 0.0)) / sizes.get(name, LEAST)
-        for own, row in pairs
-        for name, value in getattr(own, part).items()
+        for first, row in pairs
+        for name, value in getattr(first, part).items()
     ]
-    return max(found, default=0.0)
+    return max(differences, default=0.0)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Tell all studies."""
+    """Print the rates of all studies."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="the short ones alone")
     quick = parser.parse_args(arguments).quick
-    print("study                     rows  alone  together  asked   ratio  design  figures  prices")
+    print("study                     rows  alone  together   goal   ratio  design  figures  prices")
     for case in cases():
         if quick and not case.quick:
             continue
-        alone, before = timed(case.study, together=False)
-        rows, after = timed(case.study, together=True)
+        alone, before = run_timed(case.study, together=False)
+        rows, after = run_timed(case.study, together=True)
         rates = len(alone) / before, len(rows) / after
-        pairs = paired(rows, alone)
-        parts = "  ".join(f"{apart(pairs, part):7.0e}" for part in ("design", "figures", "multipliers"))
+        pairs = pair_rows(rows, alone)
+        parts = "  ".join(f"{largest_difference(pairs, part):7.0e}" for part in ("design", "figures", "multipliers"))
         print(
-            f"{case.name:24} {len(rows):5} {rates[0]:6.1f} {rates[1]:9.1f} {case.asked:6.0f} {rates[1] / rates[0]:7.2f}"
+            f"{case.name:24} {len(rows):5} {rates[0]:6.1f} {rates[1]:9.1f} {case.goal:6.0f} {rates[1] / rates[0]:7.2f}"
             f"  {parts}",
             flush=True,
         )

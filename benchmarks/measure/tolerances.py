@@ -94,7 +94,7 @@ def outcome(programs: list[tuple[Program, ...]]) -> Outcome:
 
 
 def bearers(name: str) -> list[Any]:
-    """Return the modules that have or read a number."""
+    """Modules that have or read a number."""
     return [m for key, m in list(sys.modules.items()) if key.startswith("loomopt") and hasattr(m, name)]
 
 
@@ -113,7 +113,7 @@ def changed(name: str, value: Any) -> Iterator[None]:
 
 
 def variations(name: str) -> tuple[Any, ...]:
-    """Return the values a number is given."""
+    """Values a number is given."""
     value = next(getattr(m, name) for m in bearers(name))
     if isinstance(value, int):
         return max(1, value // 2), 2 * value
@@ -159,12 +159,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="part of the names of the numbers to vary")
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     programs = list(tasks())
     usual = outcome(programs)
-    rows = [row("as they are", 0, usual, programs) | {"value": None}] if not asked.only else []
-    rows += [row(name, v, usual, programs) for name in NUMBERS if asked.only in name for v in variations(name)]
-    harness.show(rows, asked.json, solves=len(usual.objectives), **means(programs))
+    rows = [row("as they are", 0, usual, programs) | {"value": None}] if not options.only else []
+    rows += [row(name, v, usual, programs) for name in NUMBERS if options.only in name for v in variations(name)]
+    harness.show(rows, options.json, solves=len(usual.objectives), **means(programs))
 
 
 if __name__ == "__main__":

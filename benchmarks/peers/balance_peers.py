@@ -48,7 +48,7 @@ def scene(M0):
 
 
 def best_known(cloths):
-    """Return M0 → (M3, peak) from an exchange in plain NumPy, each from its neighbour's answer."""
+    """M0 → (M3, peak) from an exchange in plain NumPy, each from its neighbour's answer."""
     found, previous = {}, peers.slsqp(BEFORE)[0]
     for M0 in sorted(cloths):
         design = peers.reference(M0, previous)
@@ -61,7 +61,7 @@ def best_known(cloths):
 
 
 def judged(designs, best):
-    """Return the worst errors of designs, M0 → (design, claimed peak or None)."""
+    """Worst errors of designs, M0 → (design, claimed peak or None)."""
     worst = {"M3 off [N*m]": 0.0, "peak off": 0.0, "peak understated": None, "limits broken": 0.0}
     for M0, (design, claimed) in designs.items():
         if M0 not in best:
@@ -76,7 +76,7 @@ def judged(designs, best):
 
 
 def plain_design(design):
-    """Return loomopt's design as the plain physics takes it."""
+    """Loomopt's design as the plain physics takes it."""
     return np.array([design[name] for name in ("l1", "l2", "l3", "l4")] + [design["m4e"] * design["r4e"] ** 2])
 
 
@@ -164,7 +164,7 @@ def slsqp_sweep():
 
 
 def fast(best):
-    """Return the rows of loomopt and of SLSQP, and the spread of each ratio."""
+    """Rows of loomopt and of SLSQP, and the spread of each ratio."""
     own = Loomopt()
     runs: dict[str, list] = {"loomopt": [], "slsqp": [], "ipopt": []}
     own.calls()
@@ -207,7 +207,7 @@ def fast(best):
 
 
 def slow(best):
-    """Return the rows of the slow peers, each run once."""
+    """Rows of the slow peers, each run once."""
     began = time.perf_counter()
     unrolled = peers.unrolled()
     rows = [row("CasADi as first written, 360 points: build", 1, time.perf_counter() - began)]
@@ -241,12 +241,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="loomopt and SLSQP only")
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     warnings.simplefilter("ignore")
-    best = best_known(QUICK if asked.quick else {*KNOWN, *SWEEP})
+    best = best_known(QUICK if options.quick else {*KNOWN, *SWEEP})
     rows, ratios = fast(best)
-    rows += [] if asked.quick else slow(best)
-    harness.show(rows, asked.json, **ratios)
+    rows += [] if options.quick else slow(best)
+    harness.show(rows, options.json, **ratios)
 
 
 if __name__ == "__main__":

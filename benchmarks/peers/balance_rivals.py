@@ -24,7 +24,7 @@ OBJECTIVE = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, RHO])
 
 
 def angles(count=GRID):
-    """Return a uniform grid over the turn, rad."""
+    """Uniform grid over the turn, rad."""
     return np.linspace(0.0, 2 * np.pi, count, endpoint=False)
 
 
@@ -40,12 +40,12 @@ class Rows:
         self.M0, self.phi, self.at, self.evaluations = M0, phi, b"", 0
 
     def values(self, z):
-        """Return the rows."""
+        """Rows."""
         self._evaluate(z)
         return self._values
 
     def slopes(self, z):
-        """Return their derivatives."""
+        """Their derivatives."""
         self._evaluate(z)
         return self._slopes
 
@@ -67,12 +67,12 @@ class Rows:
 
 
 def design(z):
-    """Return the design, SI, of scaled variables."""
+    """Design, SI, of scaled variables."""
     return np.clip(z[:5] * SIZE, plain.LOWER, plain.UPPER)
 
 
 def slsqp(M0, start=START, phi=None, ftol=1e-6):
-    """Return SLSQP's answer z on a grid and how often the cycle was evaluated.
+    """SLSQP's answer z on a grid and how often the cycle was evaluated.
 
     At ftol = 1e-6 it finds the grid's own optimum to 3e-7; a tighter one costs time and gains nothing on a grid.
     """
@@ -90,7 +90,7 @@ def slsqp(M0, start=START, phi=None, ftol=1e-6):
 
 
 def reference(M0, start=START):
-    """Return the best-known optimum: SLSQP on a few crank angles, to which every peak it misses is added."""
+    """Best-known optimum: SLSQP on a few crank angles, to which every peak it misses is added."""
     beta = plain.front_angle(*design(start)[:4])
     phi = beta + np.linspace(-plain.PULSE / 2, plain.PULSE / 2, 25)
     phi = np.append(phi, angles(72))
@@ -106,7 +106,7 @@ def reference(M0, start=START):
 
 
 def trust_constr(M0):
-    """Return SciPy's interior-point answer on the grid, and how often the cycle was evaluated.
+    """SciPy's interior-point answer on the grid, and how often the cycle was evaluated.
 
     The rows' curvature is left out: with SciPy's own estimate of it (BFGS) it stops at an inadmissible design.
     """
@@ -125,7 +125,7 @@ def trust_constr(M0):
 
 
 def _population(x, M0, phi):
-    """Return objective and limits of many designs, scaled, one to a row."""
+    """Objective and limits of many designs, scaled, one to a row."""
     *lengths, s = (x * SIZE).T[:, :, None]
     peak = np.abs(plain.crank_torque(*lengths, s, M0, phi)).max(axis=1) / TORQUE
     front = np.abs(plain.front_torque(*lengths, s, M0)[:, 0]) / TORQUE
@@ -133,7 +133,7 @@ def _population(x, M0, phi):
 
 
 def evolution(M0, generations=400):
-    """Return the answer of SciPy's differential evolution on the grid."""
+    """Answer of SciPy's differential evolution on the grid."""
     phi = angles()
     found = differential_evolution(
         lambda x: _population(np.atleast_2d(x.T), M0, phi)[0],
@@ -150,7 +150,7 @@ def evolution(M0, generations=400):
 
 
 def genetic(M0, generations=200):
-    """Return the answer of pymoo's genetic algorithm on the grid."""
+    """Answer of pymoo's genetic algorithm on the grid."""
     from pymoo.algorithms.soo.nonconvex.ga import GA
     from pymoo.core.problem import Problem
     from pymoo.optimize import minimize as evolve
@@ -170,7 +170,7 @@ def genetic(M0, generations=200):
 
 
 def unrolled(points=GRID):
-    """Return IPOPT on the grid as first written in CasADi: ψ by atan2 and acos, ψ', ψ'' by AD, one row per angle."""
+    """IPOPT on the grid as first written in CasADi: ψ by atan2 and acos, ψ', ψ'' by AD, one row per angle."""
     z, M0, phi = ca.SX.sym("z", 7), ca.SX.sym("M0"), ca.SX.sym("phi")
     l1, l2, l3, l4, s = ca.vertsplit(z[:5] * SIZE)
     x, y = l1 * ca.cos(phi) - l4, l1 * ca.sin(phi)
@@ -191,7 +191,7 @@ def unrolled(points=GRID):
 
 
 def solve_unrolled(solver, M0):
-    """Return the answer of the unrolled NLP and its iterations."""
+    """Answer of the unrolled NLP and its iterations."""
     low, high = np.append(LOW, [0, 0]), np.append(HIGH, [np.inf, np.inf])
     found = solver(x0=START, p=M0, lbx=low, ubx=high, lbg=0.0)
     return np.asarray(found["x"]).ravel(), solver.stats()["iter_count"]

@@ -57,7 +57,7 @@ def evolved(rival: Rival, designs: int, seconds: float) -> tuple[np.ndarray, int
 
 
 def area(spots: Sequence[Spot], corner: Spot) -> float:
-    """Return the hypervolume of two least-is-best axes below a corner."""
+    """Hypervolume of two least-is-best axes below a corner."""
     total, height = 0.0, corner[0]
     for first, second in sorted(spots, key=lambda spot: spot[1]):
         if first < height and second < corner[1]:
@@ -67,7 +67,7 @@ def area(spots: Sequence[Spot], corner: Spot) -> float:
 
 
 def compared(rival: Rival, points: int) -> list[dict[str, object]]:
-    """Return a row for loomopt's front, one for the peer's, and one for the front asked at the peer's places too."""
+    """Row for loomopt's front, one for the peer's, and one for the front asked at the peer's places too."""
     began = time.process_time()
     trade = front.trade(lo.load(rival.problem), rival.axes, rival.target, points=points)
     found = read_front(trade, run.run(trade))
@@ -96,7 +96,7 @@ def _judged(rival: Rival, designs: Sequence[np.ndarray]) -> list[Spot]:
 
 
 def _asked(trade: trade.Trade, found: Findings, second: float) -> Row | None:
-    """Return the front's design at a place; None beside the front."""
+    """Front's design at a place; None beside the front."""
     paid = plan.values(found.rows, trade.axes[1])
     row = asked_at(trade, found, second) if min(paid) < second < max(paid) else None
     return row if row and row.certified else None
@@ -175,7 +175,7 @@ print(rows, before, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
 def memory(points: int) -> tuple[int, float, float]:
-    """Return of a front so many points long: rows, and the process' largest size before and after it, MB."""
+    """Of a front so many points long: rows, and the process' largest size before and after it, MB."""
     done = subprocess.run([sys.executable, "-c", MEMORY, str(points)], capture_output=True, text=True, check=True)
     rows, *sizes = map(int, done.stdout.split())
     unit = 1024.0**2 if sys.platform == "darwin" else 1024.0
@@ -192,14 +192,14 @@ def main() -> None:
     parser.add_argument("--only", choices=[rival.__name__ for rival in RIVALS])
     parser.add_argument("--quick", action="store_true", help="shedding alone, no workers, no memory")
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
-    if asked.quick:
-        harness.show(compared(shedding(), 6), asked.json)
+    options = parser.parse_args()
+    if options.quick:
+        harness.show(compared(shedding(), 6), options.json)
         return
-    wanted = [rival() for rival in RIVALS if asked.only in (None, rival.__name__)]
-    rows = [row for rival in wanted for row in compared(rival, asked.points)]
-    if asked.only:
-        harness.show(rows, asked.json)
+    wanted = [rival() for rival in RIVALS if options.only in (None, rival.__name__)]
+    rows = [row for rival in wanted for row in compared(rival, options.points)]
+    if options.only:
+        harness.show(rows, options.json)
         return
     sizes = [dict(zip(("rows", "MB before", "MB after"), memory(points), strict=True)) for points in (10, 40, 160)]
     fronts = {"M3": (("peak_torque", "M3_fdc"), None), "m4e": (("peak_torque", "m4e"), "balance")}
@@ -208,7 +208,7 @@ def main() -> None:
         for name, asking in fronts.items()
         for fresh in (True, False)
     ]
-    harness.show(rows, asked.json, memory=sizes, two_workers=ratios)
+    harness.show(rows, options.json, memory=sizes, two_workers=ratios)
 
 
 if __name__ == "__main__":

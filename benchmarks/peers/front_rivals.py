@@ -45,7 +45,7 @@ class Rival(NamedTuple):
 
 
 def beatup() -> Rival:
-    """Return peak torque against |M3| at front dead centre, by balance."""
+    """Peak torque against |M3| at front dead centre, by balance."""
     size, phi = balance.UPPER, np.linspace(-0.5, 2 * np.pi - 0.5, GRID, endpoint=False)
 
     def evaluate(x):
@@ -69,7 +69,7 @@ def beatup() -> Rival:
 
 
 def shedding() -> Rival:
-    """Return stiffness against preload, by plain_shedding: N is linear in K1 and K1 X0."""
+    """Stiffness against preload, by plain_shedding: N is linear in K1 and K1 X0."""
     size, bare = np.array([1e6, 0.080]), replace(SCENE, X0=0.0)
     spots = [(stretch, np.linspace(stretch[3], stretch[4], GRID // 4)) for stretch in plain_shedding.stretches(SCENE)]
     travel = np.concatenate([plain_shedding.state(np, SCENE, *spot)[0] for spot in spots])
@@ -92,7 +92,7 @@ def shedding() -> Rival:
 
 
 def rapier() -> Rival:
-    """Return peak |S''| against the lesser dwell, by layouts; l4 follows from the stroke, which is an equality."""
+    """Peak |S''| against the lesser dwell, by layouts; l4 follows from the stroke, which is an equality."""
     low, width = layouts.LOWER[1:], layouts.WIDTH[1:]
     phi, side = np.linspace(0, 2 * np.pi, GRID, endpoint=False), np.linspace(0, FARTHEST, GRID // 2)
     few, sleys = phi[:: GRID // FEW], [layouts.sley(angles) for angles in (phi, phi[:: GRID // FEW], side, -side)]
@@ -134,7 +134,7 @@ def rapier() -> Rival:
 
 
 def _secant(strokes: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarray:
-    """Return of each design the l4 with which it has the stroke, by secants within the bounds of l4."""
+    """Of each design the l4 with which it has the stroke, by secants within the bounds of l4."""
     ends = layouts.LOWER[0], layouts.UPPER[0]
     before, l4 = np.full(count, layouts.TODAY[0]), np.full(count, 1.1 * layouts.TODAY[0])
     missed = strokes(before) - layouts.NEEDS.stroke
@@ -147,7 +147,7 @@ def _secant(strokes: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarr
 
 
 def _top(values: np.ndarray) -> np.ndarray:
-    """Return the largest of values (designs, angles) on equal angles of a turn, by the parabola through the highest."""
+    """Largest of values (designs, angles) on equal angles of a turn, by the parabola through the highest."""
     every, at = np.arange(len(values)), values.argmax(axis=1)
     left, mid, right = (values[every, (at + k) % values.shape[1]] for k in (-1, 0, 1))
     bend = left - 2 * mid + right
@@ -155,7 +155,7 @@ def _top(values: np.ndarray) -> np.ndarray:
 
 
 def _arc(travel: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Return the angle up to which |S| (designs, angles) stays in the dwells' band, by the line between two angles."""
+    """Angle up to which |S| (designs, angles) stays in the dwells' band, by the line between two angles."""
     out = travel > layouts.NEEDS.band
     first = np.where(out.any(axis=1), np.maximum(out.argmax(axis=1), 1), len(angles) - 1)
     every = np.arange(len(travel))

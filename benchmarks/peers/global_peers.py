@@ -54,7 +54,7 @@ def scip(name, gap, limit):
     l1, l2, l3, l4, s = (model.addVar(n, lb=float(low), ub=float(high)) for n, low, high in ends)
 
     def angle(a, b, c):
-        """Return sine and cosine, as variables, of the angle between sides a and b, which c lies opposite."""
+        """Sine and cosine, as variables, of the angle between sides a and b, which c lies opposite."""
         cosine, sine = model.addVar(lb=-1, ub=1), model.addVar(lb=0, ub=1)
         model.addCons(2 * a * b * cosine == a * a + b * b - c * c)
         model.addCons(sine == root(1 - cosine * cosine))
@@ -91,7 +91,7 @@ def scip(name, gap, limit):
 
 
 def lowest_drawn(name, count, seed=0):
-    """Return the least |M3| of random designs that keep every limit, and how many those are."""
+    """Least |M3| of random designs that keep every limit, and how many those are."""
     rng = np.random.default_rng(seed)
     l1, l2, l3, l4, s = plain.LOWER[:, None] + rng.random((5, count)) * (plain.UPPER - plain.LOWER)[:, None]
     with np.errstate(invalid="ignore"):
@@ -101,7 +101,7 @@ def lowest_drawn(name, count, seed=0):
 
 
 def measured(quick):
-    """Return one row for each method and cloth, with what random designs say of the bound."""
+    """One row for each method and cloth, with what random designs say of the bound."""
     rows = []
     for name in CLOTHS:
         least, kept = lowest_drawn(name, DRAWN // (10 if quick else 1))
@@ -116,8 +116,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="a wider gap, less time, fewer designs")
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
-    harness.show(measured(asked.quick), asked.json)
+    options = parser.parse_args()
+    harness.show(measured(options.quick), options.json)
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ JOB = registry.find("rapier")
 
 
 def unscaled(z):
-    """Return the design, SI, of variables scaled by the widths of their bounds."""
+    """Design, SI, of variables scaled by the widths of their bounds."""
     return plain.LOWER + plain.WIDTH * np.clip(z[:8], 0.0, 1.0)
 
 
@@ -59,7 +59,7 @@ class Rows:
         self.needs, self.exact, self.at, self.evaluations = needs, exact, b"", 0
 
     def part(self, which):
-        """Return a constraint for SciPy: values and slopes of some of the rows."""
+        """Constraint for SciPy: values and slopes of some of the rows."""
 
         def of(name):
             def call(z):
@@ -98,7 +98,7 @@ class Rows:
 
 
 def slsqp(start, angles, ftol, needs=plain.NEEDS, exact=False):
-    """Return SLSQP's z from a start (the design, scaled, and T) with rows at the angles `Rows` takes."""
+    """SLSQP's z from a start (the design, scaled, and T) with rows at the angles `Rows` takes."""
     rows = Rows(angles, needs, exact)
     found = minimize(
         lambda z: OBJECTIVE @ z,
@@ -113,12 +113,12 @@ def slsqp(start, angles, ftol, needs=plain.NEEDS, exact=False):
 
 
 def turn(count):
-    """Return a uniform grid over the turn, rad."""
+    """Uniform grid over the turn, rad."""
     return np.linspace(0.0, 2 * np.pi, count, endpoint=False)
 
 
 def on_grid(start, count=GRID, needs=plain.NEEDS):
-    """Return the design SLSQP finds on a plain grid, which holds the ends of the dwells in any case.
+    """Design SLSQP finds on a plain grid, which holds the ends of the dwells in any case.
 
     At ftol = 1e-7 it stops up to 2e-4 short, at 1e-6 up to 4e-3; below 1e-8 nothing is gained on a grid.
     """
@@ -127,12 +127,12 @@ def on_grid(start, count=GRID, needs=plain.NEEDS):
 
 
 def grid(count, needs=plain.NEEDS):
-    """Return the angles of a plain grid as `Rows` takes them."""
+    """Angles of a plain grid as `Rows` takes them."""
     return [turn(count), np.linspace(-needs.before, needs.after, count // 6 + 1), turn(count)]
 
 
 def added(start, needs=plain.NEEDS, exact=False, rounds=20):
-    """Return the design SLSQP finds on a coarse grid to which the extremes it misses are added, round after round.
+    """Design SLSQP finds on a coarse grid to which the extremes it misses are added, round after round.
 
     exact: slopes by complex steps and tighter settings, for the best-known optimum. Otherwise ftol = 1e-9: at 1e-8 it
     takes 0.6 of the time and stops 2e-6 short.
@@ -153,7 +153,7 @@ def added(start, needs=plain.NEEDS, exact=False, rounds=20):
 
 
 def drawn(count, seed):
-    """Return random designs within the bounds that assemble all round, whatever their other limits."""
+    """Random designs within the bounds that assemble all round, whatever their other limits."""
     generator, found = np.random.default_rng(seed), list[np.ndarray]()
     with np.errstate(all="ignore"):
         while len(found) < count:
@@ -163,7 +163,7 @@ def drawn(count, seed):
 
 
 def evolution(seed, generations=1000):
-    """Return the design of SciPy's differential evolution on the grid, limits as penalties at a few times their worth.
+    """Design of SciPy's differential evolution on the grid, limits as penalties at a few times their worth.
 
     With penalties ten times as steep it stops up to 1e-2 short of the best.
     """
@@ -195,7 +195,7 @@ def evolution(seed, generations=1000):
 
 
 def best_known():
-    """Return the best peak of an exchange with exact slopes, from the paper's layout and from random designs."""
+    """Best peak of an exchange with exact slopes, from the paper's layout and from random designs."""
     ends = [added(start, exact=True) for start in (plain.TODAY, *drawn(2, seed=0))]
     assert max(plain.violation(end) for end in ends) < 1e-9
     peaks = [plain.peak(end) for end in ends]
@@ -214,18 +214,18 @@ class Loomopt:
         self.program = JOB.program(self.scene, "stroke-dwell")
 
     def solve(self, start):
-        """Return the design of one solve; no silent levels, no certificate."""
+        """Design of one solve; no silent levels, no certificate."""
         given = self.program.completed(dict(zip(plain.NAMES, map(float, start), strict=True)))
         point = exchange.solve(self.program, given, Settings())
         return self._plain(JOB.design(self.program, point.x))
 
     def call(self, _=None):
-        """Return the design of the whole public call from the scene's own starts, certificate and report with it."""
+        """Design of the whole public call from the scene's own starts, certificate and report with it."""
         self.answer = lo.solve(self.scene, "stroke-dwell")
         return self._plain(self.answer.design)
 
     def once(self, _=None):
-        """Return the design of the whole public call from one start, the paper's layout, certified."""
+        """Design of the whole public call from one start, the paper's layout, certified."""
         answer = lo.solve(self.scene, "stroke-dwell", starts=1)
         assert answer.status == "optimal"
         return self._plain(answer.design)
@@ -235,7 +235,7 @@ class Loomopt:
 
 
 def judged(runs, best):
-    """Return the columns of one method: runs are (seconds of each turn, design)."""
+    """Columns of one method: runs are (seconds of each turn, design)."""
     off = np.array([abs(plain.peak(found) / best - 1) for _, found in runs])
     broken = np.array([plain.violation(found) for _, found in runs])
     times, there = np.array([np.median(took) for took, _ in runs]), (off < WITHIN) & (broken < WITHIN)
@@ -252,7 +252,7 @@ def judged(runs, best):
 
 
 def timed(methods, starts, repeats):
-    """Return name → (seconds of each turn, design) for each start; all methods take each start in turn."""
+    """Name → (seconds of each turn, design) for each start; all methods take each start in turn."""
     runs: dict[str, list] = {name: [] for name in methods}
     for start in starts:
         designs: dict = {}
@@ -267,7 +267,7 @@ def timed(methods, starts, repeats):
 
 
 def beside(ours, theirs):
-    """Return the spread over the turns of how long the median start takes beside another method's."""
+    """Spread over the turns of how long the median start takes beside another method's."""
     times = [np.median([took for took, _ in runs], axis=0) for runs in (ours, theirs)]
     return harness.spread((times[0] / times[1]).tolist())
 
@@ -276,17 +276,17 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="the fast methods from a few starts")
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     warnings.simplefilter("ignore")
     best, own = best_known(), Loomopt()
     exact = "SciPy SLSQP, 72 points and the extremes missed"
     fast = {"loomopt: solve": own.solve, "SciPy SLSQP, 360 points": on_grid, exact: added}
-    starts = [plain.TODAY, *drawn(3 if asked.quick else 20, seed=1)]
+    starts = [plain.TODAY, *drawn(3 if options.quick else 20, seed=1)]
     runs = timed(fast, starts, TURNS)
     calls = {"loomopt: whole call, one start, certificate": own.once, "SciPy SLSQP, the paper's layout": on_grid}
     runs |= timed(calls, [plain.TODAY], TURNS)
     runs |= timed({"loomopt: whole call, own starts, certificate": own.call}, [plain.TODAY], TURNS)
-    if not asked.quick:
+    if not options.quick:
         runs |= timed({"SciPy SLSQP, 3600 points": lambda start: on_grid(start, 3600)}, starts[:6], 1)
         runs |= timed({"SciPy differential evolution, 360 points": evolution}, range(6), 1)
         hybrid = "SciPy differential evolution, 100 generations, then SLSQP"
@@ -294,7 +294,7 @@ def main():
     rows = [{"method": name, **judged(of, best)} for name, of in runs.items()]
     harness.show(
         rows,
-        asked.json,
+        options.json,
         best_off_known=best / KNOWN - 1,
         claimed_off_best=own.first.figures["peak_acceleration"] / best - 1,
         first_call_s=own.first_time,

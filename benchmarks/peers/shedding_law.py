@@ -51,12 +51,12 @@ IPOPT: dict[str, Any] = {
 
 
 def fixed(case):
-    """Return the least K1 with the softest of the fixed laws, and its name."""
+    """Least K1 with the softest of the fixed laws, and its name."""
     return min((float(plain.least_stiffness(replace(case, law=law))[0]), law) for law in plain.SMOOTH)
 
 
 def called(name, n, symmetric):
-    """Return loomopt's K1 and law, the share of its time that building takes, and seconds of the whole call."""
+    """Loomopt's K1 and law, the share of its time that building takes, and seconds of the whole call."""
     scene = lo.load(name).set("targets.law.intervals", n).set("targets.law.symmetric", symmetric)
     began = time.perf_counter()
     answer = lo.solve(scene, "law")
@@ -73,7 +73,7 @@ def faults(case, law):
 
 
 def row(name, n, symmetric):
-    """Return one row of the study."""
+    """One row of the study."""
     case = SCENES[name]
     best, _ = fixed(case)
     began = time.perf_counter()
@@ -97,7 +97,7 @@ def row(name, n, symmetric):
 
 
 def orders(rows):
-    """Return the order at which K1 converges, from each three sizes that double."""
+    """Order at which K1 converges, from each three sizes that double."""
     found = {}
     for of in dict.fromkeys((each["scene"], each["law"]) for each in rows):
         K1 = {each["intervals"]: each["K1 [N/m]"] for each in rows if (each["scene"], each["law"]) == of}
@@ -109,14 +109,14 @@ def orders(rows):
 
 
 def raised(name, n):
-    """Return the least K1 with the bound on s'' raised, by the linear programme alone, and what no law reaches."""
+    """Least K1 with the bound on s'' raised, by the linear programme alone, and what no law reaches."""
     case = SCENES[name]
     found = {f"{factor} x 2 pi": float(plain.least_law(case, n, amax=factor * BOUND)[0]) for factor in RAISED}
     return found | {"no law reaches": plain.unbounded_law(case)}
 
 
 def by_hand(case, n):
-    """Return the solver of the law's NLP in plain CasADi, what it is called with, and K1 of its unit, N/m.
+    """Solver of the law's NLP in plain CasADi, what it is called with, and K1 of its unit, N/m.
 
     Variables: s, s', s'' at the knots, K1, X0.
     """
@@ -154,7 +154,7 @@ def clocked(call):
 
 
 def beside(name, n):
-    """Return the row of one size beside IPOPT alone: medians of turns, the ratio by its spread."""
+    """Row of one size beside IPOPT alone: medians of turns, the ratio by its spread."""
     scene = lo.load(name).set("targets.law.intervals", n)
     taken: dict[str, list[float]] = {"build": [], "solve": [], "loomopt": []}
     for _ in range(TURNS):
@@ -184,15 +184,15 @@ def main():
     parser.add_argument("--intervals", type=int, nargs="+", default=[8, 16, 32, 64])
     parser.add_argument("--quick", action="store_true", help="8 and 16 intervals")
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
-    sizes = [8, 16] if asked.quick else asked.intervals
+    options = parser.parse_args()
+    sizes = [8, 16] if options.quick else options.intervals
     rows = [row(name, n, symmetric) for name in SCENES for symmetric in (False, True) for n in sizes]
     softest = {name: dict(zip(("K1", "law"), fixed(case), strict=True)) for name, case in SCENES.items()}
     bounds = {name: raised(name, sizes[-1]) for name in SCENES}
     lo.solve(lo.load("shedding"))  # what is imported once is no answer's
     costs = [beside("shedding", n) for n in BESIDE]
     facts = {"softest_fixed_law": softest, "orders": orders(rows), "bound_raised": bounds}
-    harness.show(rows, asked.json, **facts, beside_ipopt_alone=costs)
+    harness.show(rows, options.json, **facts, beside_ipopt_alone=costs)
 
 
 if __name__ == "__main__":

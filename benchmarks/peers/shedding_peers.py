@@ -50,7 +50,7 @@ TODAY = (8029.14, 0.080)
 
 @functools.cache
 def scene(case):
-    """Return the packaged scene with a case's numbers."""
+    """Packaged scene with a case's numbers."""
     values = {
         "operation.speed": f"{case.rpm} rpm",
         "operation.N_min": f"{case.N_min} N",
@@ -74,12 +74,12 @@ def scene(case):
 
 
 def turn(count):
-    """Return equally spaced cam angles, degrees, the first where the rise begins."""
+    """Equally spaced cam angles, degrees, the first where the rise begins."""
     return np.arange(count) * 360 / count
 
 
 def rows(case, theta):
-    """Return X and the rest of N, but for K1 (X + X0), at cam angles in degrees; at a corner, the worse side's."""
+    """X and the rest of N, but for K1 (X + X0), at cam angles in degrees; at a corner, the worse side's."""
     X, rest = np.zeros(len(theta)), np.full(len(theta), np.inf)
     for stretch in plain.stretches(case):
         sense, start, span, low, high, _ = stretch
@@ -94,7 +94,7 @@ def rows(case, theta):
 
 
 def refined(case, theta, worst):
-    """Return cam angles moved to the tops of a function of X and the rest of N, by parabolas on ever shorter steps."""
+    """Cam angles moved to the tops of a function of X and the rest of N, by parabolas on ever shorter steps."""
     for step in (0.5, 0.5, 0.1, 0.02):
         left, mid, right = (worst(*rows(case, (theta + shift) % 360)) for shift in (-step, 0, step))
         bend = left - 2 * mid + right
@@ -104,12 +104,12 @@ def refined(case, theta, worst):
 
 
 def stiffness_needed(case):
-    """Return the function of X and the rest of N that the least K1 is the largest value of."""
+    """Function of X and the rest of N that the least K1 is the largest value of."""
     return lambda X, rest: (case.N_min - rest) / (X + case.X0)
 
 
 def formula(case):
-    """Return K1 by its formula at the whole preload: 360 points, corners, and the highest ones refined."""
+    """K1 by its formula at the whole preload: 360 points, corners, and the highest ones refined."""
     need = stiffness_needed(case)
     corners = np.cumsum([0, *case.angles[:3]])
     theta = np.sort(
@@ -121,7 +121,7 @@ def formula(case):
 
 
 def slsqp(case, theta, start=TODAY):
-    """Return K1 and X0 by SLSQP with a row at each cam angle, slopes exact."""
+    """K1 and X0 by SLSQP with a row at each cam angle, slopes exact."""
     X, rest = rows(case, theta)
     scale = SIZE[0] * SIZE[1]
     found = minimize(
@@ -141,7 +141,7 @@ def slsqp(case, theta, start=TODAY):
 
 
 def exchanged(case):
-    """Return K1 and X0 by SLSQP on a coarse grid to which the places of least contact are added, round after round."""
+    """K1 and X0 by SLSQP on a coarse grid to which the places of least contact are added, round after round."""
     theta, start = np.append(turn(COARSE), np.cumsum(case.angles[:3])), TODAY
     fine = np.sort(np.concatenate([turn(360), theta]))
     for _ in range(20):
@@ -160,7 +160,7 @@ def exchanged(case):
 
 
 def called(case):
-    """Return K1 and X0 of loomopt's public call, certificate and report with it."""
+    """K1 and X0 of loomopt's public call, certificate and report with it."""
     answer = lo.solve(scene(case), "stiffness")
     assert answer.status == "optimal", (case, answer.status, answer.message)
     PARTS.append({part: answer.time[f"{part}_s"] for part in ("solve", "certify")})
@@ -168,7 +168,7 @@ def called(case):
 
 
 def even(count, case):
-    """Return K1 and X0 by the formula at equal points."""
+    """K1 and X0 by the formula at equal points."""
     return plain.uniform_grid(case, count), case.X0
 
 
@@ -186,7 +186,7 @@ SLOW: dict[str, Callable] = {
 
 
 def judged(found, best):
-    """Return the columns of one method: the worst of its cases."""
+    """Columns of one method: the worst of its cases."""
     off = {name: float(mp.mpf(K1) / best[name] - 1) for name, (K1, _) in found.items()}
     lost = [lift_off(CASES[name], *at) for name, at in found.items()]
     worst = max(off, key=lambda name: abs(off[name]))
@@ -210,13 +210,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="the fast methods")
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     warnings.simplefilter("ignore")
     best = {name: plain.least_stiffness(case)[0] for name, case in CASES.items()}
     began = time.perf_counter()
     called(plain.PAPER)
     first = time.perf_counter() - began
-    methods, found = METHODS if asked.quick else METHODS | SLOW, {}
+    methods, found = METHODS if options.quick else METHODS | SLOW, {}
 
     def kept(name):
         found[name] = {of: methods[name](case) for of, case in CASES.items()}
@@ -235,7 +235,7 @@ def main():
     lowest = "SciPy SLSQP, 36 points and the lowest added"
     harness.show(
         table,
-        asked.json,
+        options.json,
         solve_to_call=beside("solve", "loomopt: whole call"),
         certify_to_call=beside("certify", "loomopt: whole call"),
         solve_to_slsqp_lowest=beside("solve", lowest),
