@@ -55,7 +55,7 @@ def glossary_text() -> str:
         "units; here they are those of the packaged ones. An x marks what the sketch names. Joints are the sketch's.\n",
         "This page is written by `make outputs`; its words stand in the program.\n",
     ]
-    for job in registry.own_names():
+    for job in registry.builtin_names():
         scene = registry.load(SHOWN.get(job, job))
         title, *grids = glossary.parts(scene)
         parts.append(
@@ -74,7 +74,7 @@ def table(grid: TextTable) -> str:
 def sketches() -> dict[str, str]:
     """Drawings of the packaged machines as SVG, by file name."""
     drawings = {}
-    for name in registry.own_names():
+    for name in registry.builtin_names():
         scene = registry.load(SHOWN.get(name, name))
         drawings[f"sketch-{name}.svg"] = svg.render(
             outputs.drawing(scene, glossary.sketch_design(scene), outputs.DrawnSubject("sketch"))

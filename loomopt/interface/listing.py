@@ -23,7 +23,7 @@ def problems() -> tuple[tuple[Head, ...], list[BadInput]]:
     if silent or packaged.entry_points("loomopt.jobs"):  # whose targets only their jobs know: those are read whole
         from loomopt.jobs import registry
 
-        others, wrong = registry.brought()
+        others, wrong = registry.external_scenes()
         read, faults = registry.heads([*silent, *(others.keys() - packaged.problems().keys())])
         heads, faults = [*(head for head in heads if head.targets), *read], [*wrong, *faults]
     return tuple(sorted(heads)), faults
@@ -36,7 +36,9 @@ def new(name: str, path: str | os.PathLike[str]) -> Path:
     """
     from loomopt.jobs import registry
 
-    is_packaged = name in packaged.problems() and (name not in registry.own_names() or Path(path).suffix.lower() == ZIP)
+    is_packaged = name in packaged.problems() and (
+        name not in registry.builtin_names() or Path(path).suffix.lower() == ZIP
+    )
     return copy_scene(name, Path(path)) if is_packaged else template(name, Path(path))
 
 

@@ -205,7 +205,7 @@ def curves(
     given: dict[str, tuple[float, ...]] = {}
     if measured is not None:
         place = Path(arguments.path(measured, "measured", "a table: .csv, .xlsx or .parquet", "Name one"))
-        table = csv_tables.measured(place, _kinds(rows()))
+        table = csv_tables.read_measured(place, _kinds(rows()))
         given = dict(table.columns)
         angles = [angle % TURN for angle in given.pop(PHI)]
         rows = functools.partial(rows, also=angles)

@@ -39,12 +39,12 @@ from loomopt.physics.effects.kinds import Check, Event, label, owned
 from loomopt.physics.schema import Figure
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, START_ROOM
 from loomopt.picture.job_views import JobViews
-from loomopt.scenes.scene import Scene, kept
+from loomopt.scenes.scene import Scene, cached
 from loomopt.scenes.tables import SceneSchema
 
 Ends = tuple[float, float]
 """Lower and upper bound."""
-Demanded = Mapping[str, Sequence[tuple[str, float]]]
+Minima = Mapping[str, Sequence[tuple[str, float]]]
 """Variable → which limits ask how much of it at least."""
 
 
@@ -58,7 +58,7 @@ class Task(abc.ABC):
     read_from: Mapping[str, Sequence[str]] = Frozen()
     """Figures that are read from rows or quantities of other names."""
     remedy = "Take the limit off, or add what {name} needs."
-    """What helps where nothing in the scene gives the figure of a limit."""
+    """Remedy where nothing in the scene gives the figure of a limit."""
     any_numbers = False
     """Whether its numbers are a person's own, so that some may serve no level of a target."""
     tops: Mapping[str, str] = Frozen()
@@ -92,7 +92,7 @@ class Task(abc.ABC):
 
     @lazy
     def labels(self) -> dict[str, str]:
-        """What a designer calls each number of the effects that are on, by its full name."""
+        """Designer's name of each number of the effects that are on, by its full name."""
         return numbers.labels(self.scene)
 
     @lazy
@@ -110,7 +110,7 @@ class Task(abc.ABC):
             self.variables,
             self.parameters(),
             tuple(self.limits()),
-            self.held() if self.traded else self.objectives(),
+            self.higher_levels() if self.traded else self.objectives(),
             self.starts(),
             tuple(self.moves()),
             self.follow(),
@@ -154,8 +154,8 @@ class Task(abc.ABC):
         return ends
 
     @property
-    def demanded(self) -> Demanded:
-        """What limits on figures ask of variables that are these figures. Raises BadInput."""
+    def minima(self) -> Minima:
+        """Minima that limits on figures set to variables of the same name. Raises BadInput."""
         return {}
 
     @lazy
@@ -165,8 +165,8 @@ class Task(abc.ABC):
         One without room, or one that is not there yet, stands at the most that is asked.
         """
         variables = {v.name: v for v in self.bounded}
-        for name, pairs in self.demanded.items():
-            least, variable = max(value for _, value in pairs), self._asked_of(name)
+        for name, pairs in self.minima.items():
+            least, variable = max(value for _, value in pairs), self._minimum_variable(name)
             room = variable.lower < variable.upper
             if room and least > variable.upper:
                 remedy = f"Correct the limit, or the bounds of {variable.called}."
@@ -177,9 +177,9 @@ class Task(abc.ABC):
             )
         return tuple(variables.values())
 
-    def _asked_of(self, name: str) -> Variable:
+    def _minimum_variable(self, name: str) -> Variable:
         """Variable that limits ask something of; one that is not there yet stands at the most of it."""
-        least = max(value for _, value in self.demanded[name])
+        least = max(value for _, value in self.minima[name])
         return next((v for v in self.bounded if v.name == name), Variable(name, least, least, least, (least, least)))
 
     def parameters(self) -> dict[str, float]:
@@ -189,7 +189,7 @@ class Task(abc.ABC):
 
     def limits(self) -> list[Limit]:
         """All limits in order."""
-        return [*self.bounds(), *self.figures(), *self.demands(), *self.margins(), *self.wanted()]
+        return [*self.bounds(), *self.figures(), *self.demands(), *self.margins(), *self.goal_limits()]
 
     def bounds(self) -> list[Limit]:
         """Scene's bounds of variables as limits."""
@@ -197,8 +197,8 @@ class Task(abc.ABC):
 
     def floors(self) -> Iterator[Limit]:
         """Yield what limits ask of variables, the most first; a row that stood twice would have no price."""
-        for name, pairs in self.demanded.items():
-            variable = self._asked_of(name)
+        for name, pairs in self.minima.items():
+            variable = self._minimum_variable(name)
             binding = [(by, value) for by, value in pairs if variable.lower == variable.upper or value > variable.lower]
             seen = set[str | float]()
             for by, value in sorted(binding, key=lambda pair: -pair[1]):
@@ -249,18 +249,18 @@ class Task(abc.ABC):
 
     @property
     def length(self) -> float:
-        """What a margin of length is measured by: the longest length of today's design."""
+        """Scale of a margin of length: the longest length of today's design."""
         return max(self.known[name] for name, kind in self.scene.schema.variables.items() if kind == "length")
 
-    def wanted(self) -> list[Limit]:
+    def goal_limits(self) -> list[Limit]:
         """Goals that the target sets for figures, and that may be out of reach."""
         return []
 
     def goals(self) -> tuple[Goal, ...]:
         """Same as goals of the figures."""
-        return goals(self.wanted())
+        return goals(self.goal_limits())
 
-    def held(self) -> tuple[Objective, ...]:
+    def higher_levels(self) -> tuple[Objective, ...]:
         """Levels of the target that come before the axes: those before its last one that are no axes."""
         added = self.least() if self.target else ()
         levels = [level for level in self.objectives() if level not in added] if self.target else []
@@ -425,7 +425,7 @@ class LawFamily(NamedTuple):
 
 
 class Studied(NamedTuple):
-    """What a designer reads of a job.
+    """Results of a job that a designer reads.
 
     targets: the optima; peaks: figure → (quantity, whether its sign counts); static: figures of one position;
     motion: what the second derivative of the output's displacement is called.
@@ -440,7 +440,7 @@ class Studied(NamedTuple):
 
 
 class InBox(NamedTuple):
-    """How a figure of machines is read whose numbers are known to lie in a box, and no more.
+    """Reading of a figure of machines whose numbers lie anywhere in a box.
 
     It is the least of `rows`; or offset + sign · the peak of a quantity, on the pieces `where`, largest: whether of its
     value, not of its magnitude; or how far the crank turns from 0 to one side before |quantity| passes 1 (`leaves`).
@@ -476,9 +476,9 @@ class Job(abc.ABC):
     at_once: tuple[str, ...] = ()
     """Figures over the cycle that never wait until they are read."""
     own_schema: SceneSchema
-    """What a scene may hold, where that does not depend on the scene."""
+    """Schema of all scenes of the job, where it does not depend on the scene."""
     task: type[Task]
-    """What builds the program of a scene and target, or of axes that are traded."""
+    """Class that builds the program of a scene and target, or of axes."""
     members: "tuple[Scene, ...]" = ()
     """The scenes of a family, where it is one."""
     open_boxes: str = ""
@@ -515,7 +515,7 @@ class Job(abc.ABC):
 
     def program(self, scene: Scene, target: str) -> Program:
         """Target as a task: structure and numbers. Raises BadInput."""
-        return kept(scene, (self.name, target), lambda: self.task(scene, target).program())
+        return cached(scene, (self.name, target), lambda: self.task(scene, target).program())
 
     def schema(self, document: Mapping[str, Any]) -> SceneSchema:
         """Schema of a scene; document: the raw scene, on which the schema may depend."""
@@ -555,7 +555,7 @@ class Job(abc.ABC):
 
     def numbers(self, scene: Scene) -> dict[str, float]:
         """Every number of the scene by full name."""
-        return kept(scene, (self.name, "numbers"), lambda: Frozen(self.task(scene).known))
+        return cached(scene, (self.name, "numbers"), lambda: Frozen(self.task(scene).known))
 
     def numbers_of(self, scene: Scene, design: Numbers) -> dict[str, float]:
         """All numbers of a design, by any of their names; a number it does not name stays the scene's."""
@@ -622,7 +622,7 @@ class Job(abc.ABC):
         asked: which of those `over_cycle`, every one without it; the others are None or there too. What a motion of its
         own tells is not among those of many (`machines.at_once`).
         """
-        figures = alone(scene, sampled, names)
+        figures = static_figures(scene, sampled, names)
         peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in names}
         sampled.search(tuple(peaks.values()))
         return figures | {name: sampled.peak(quantity) for name, quantity in peaks.items()}
@@ -664,7 +664,7 @@ class Job(abc.ABC):
         return {name: name for name in model.quantities}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
-        """How each figure is read over a box of numbers that can be."""
+        """Reading of each figure that can be read over a box of numbers."""
         rows = {name: InBox((name,)) for name in scene.schema.figures if model.has_row(name)}
         return rows | {name: InBox(quantity=quantity) for name, quantity in self.peaks(model).items()}
 
@@ -707,7 +707,7 @@ class Job(abc.ABC):
         return " ".join(text for text in sentences if text)
 
 
-def alone(scene: Scene, sampled: "Sampler | Machines", names: Container[str]) -> dict[str, Number]:
+def static_figures(scene: Scene, sampled: "Sampler | Machines", names: Container[str]) -> dict[str, Number]:
     """Figures that are rows of the model, and its means that are demanded; None for every other."""
     figures: dict[str, Number] = {name: sampled.static.get(name) for name in scene.schema.figures}
     means = [name for mean in sampled.model.integrals for name in (mean.name, mean.root)]

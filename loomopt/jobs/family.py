@@ -14,7 +14,7 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.effects.kinds import Event, Speed, State
 from loomopt.physics.tolerances import FEASIBLE
 from loomopt.scenes import family
-from loomopt.scenes.scene import Scene, kept
+from loomopt.scenes.scene import Scene, cached
 from loomopt.scenes.tables import FAMILY
 
 
@@ -33,7 +33,7 @@ class FamilyJob(Job):
     @functools.cached_property
     def family(self) -> Family:
         """The program of all, and the share of each. Raises BadInput."""
-        return kept(self.scene, (FAMILY, FAMILY), self._family)
+        return cached(self.scene, (FAMILY, FAMILY), self._family)
 
     @property
     def parts(self) -> tuple[MemberShare, ...]:

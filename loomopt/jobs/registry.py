@@ -34,7 +34,7 @@ HERE = Path(__file__).parent
 
 
 @functools.cache
-def own_names() -> tuple[str, ...]:
+def builtin_names() -> tuple[str, ...]:
     """Names of this package's jobs."""
     return tuple(sorted(path.parent.name for path in HERE.glob("*/job.py")))
 
@@ -76,13 +76,13 @@ def _useless(point: "EntryPoint", what: str, why: str) -> BadInput:
 
 def names() -> tuple[str, ...]:
     """Names of all jobs, other distributions' too."""
-    return tuple(sorted({*own_names(), *(point.name for point in entry_points(JOBS))}))
+    return tuple(sorted({*builtin_names(), *(point.name for point in entry_points(JOBS))}))
 
 
 @functools.cache
 def find(name: str) -> Job:
     """Job by name. Raises BadInput for one that nobody brings, that several bring, or that does not import."""
-    if name in own_names():
+    if name in builtin_names():
         job: Job = importlib.import_module(f"loomopt.jobs.{name}.job").JOB
         return job
     point = _single(JOBS, name, "job")
@@ -113,7 +113,7 @@ class _Registered:
         return "REGISTERED"
 
     def __contains__(self, name: object) -> bool:
-        return name in own_names() or name in names()
+        return name in builtin_names() or name in names()
 
     def names(self) -> Collection[str]:
         """Names of all jobs."""
@@ -126,7 +126,7 @@ class _Registered:
             if schema.name != job:
                 raise BadInput(f"job {job} describes scenes of {schema.name}", key=job, remedy="Mend its schema")
             for name in dict.fromkeys(name for name in effects if name not in schema.effects):
-                effect = _brought(schema, name)
+                effect = _external_effect(schema, name)
                 if effect is not None:
                     schema = replace(schema, effects=ranked([*schema.effects.values(), effect]))
             targets = document.get("targets")
@@ -150,7 +150,7 @@ def _with_family(schema: SceneSchema) -> SceneSchema:
     return replace(schema, targets={**schema.targets, FAMILY: TARGET})
 
 
-def _brought(schema: SceneSchema, name: str) -> Effect | None:
+def _external_effect(schema: SceneSchema, name: str) -> Effect | None:
     """Another distribution's effect of a job; None where nobody brings it. Raises BadInput."""
     point = _single(EFFECTS, f"{schema.name}.{name}", "effect")
     if point is None:
@@ -166,13 +166,13 @@ def _brought(schema: SceneSchema, name: str) -> Effect | None:
 REGISTERED = _Registered()
 
 
-def brought() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
+def external_scenes() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
     """Files of other distributions' scenes by name, and what is wrong with their jobs."""
     paths: dict[str, Path] = {}
     faults: list[BadInput] = []
     for point in {point.name: point for point in entry_points(JOBS)}.values():
         try:
-            if point.name in own_names():
+            if point.name in builtin_names():
                 raise _useless(point, "job", "is not looked at, for loomopt has one of that name")
             files = packaged.scenes(_folder(point.name, "problems"))
         except BadInput as error:
@@ -199,7 +199,7 @@ def heads(names: Iterable[str]) -> tuple[list[packaged.Head], list[BadInput]]:
 
 def problems() -> dict[str, Path]:
     """Files of all packaged scenes by name, those of other distributions too; loomopt's own win."""
-    return dict(sorted((brought()[0] | packaged.problems()).items()))
+    return dict(sorted((external_scenes()[0] | packaged.problems()).items()))
 
 
 def is_packaged(scene: Scene) -> bool:
@@ -210,7 +210,7 @@ def is_packaged(scene: Scene) -> bool:
 
 def results(scene: Scene) -> Path:
     """Folder of the reference results of a scene's job."""
-    return packaged.results_path() if scene.job in own_names() else _folder(scene.job, "results")
+    return packaged.results_path() if scene.job in builtin_names() else _folder(scene.job, "results")
 
 
 def _folder(job: str, name: str) -> Path:
@@ -245,7 +245,7 @@ def load(name_or_path: str | os.PathLike[str]) -> Scene:
     files = packaged.problems()
     if given in files:
         return _read(files[given], files[given].name)
-    others, faults = brought()
+    others, faults = external_scenes()
     if given in others:
         return _read(others[given], str(others[given]))
     raise packaged.unknown_problem(given, files | others, faults)

@@ -9,7 +9,7 @@ from loomopt.maths.periodic_cubic import PeriodicCubic, PeriodicCubics
 from loomopt.physics.effects.kinds import Load, keys, label, owned, value_at
 from loomopt.physics.schema import Table
 from loomopt.scenes import csv_tables
-from loomopt.scenes.scene import Scene, kept
+from loomopt.scenes.scene import Scene, cached
 
 CORNER = "corner"
 """The column that marks corners of a curve."""
@@ -31,7 +31,7 @@ def words(scene: Scene) -> tuple[tuple[str, str, Any], ...]:
 
     Raises BadInput.
     """
-    return kept(scene, "words", lambda: tuple(_words(scene)))
+    return cached(scene, "words", lambda: tuple(_words(scene)))
 
 
 def _words(scene: Scene) -> Iterator[tuple[str, str, Any]]:

@@ -30,7 +30,7 @@ UNITS = {
 ALIASES = {"angle": ("phi", "theta"), "phi1": ("phi", "angle"), "phi": ("phi1", "angle")}
 """Column → other names under which it is found too: curves that are written have their angles under phi."""
 MARKS = {"": 0.0, "0": 0.0, "1": 1.0, "x": 1.0}
-"""What a column of marks may hold."""
+"""Cells of a column of marks."""
 TURN = 2 * math.pi + 1e-4
 """Largest angle, rad: one turn, with room for 6.2832."""
 WHOLE = 0.5
@@ -65,7 +65,7 @@ class _Column(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What is told of a table that was read, SI.
+    """Record of a table that was read, SI.
 
     key: under which the scene names it; rows: of numbers; precision: how far rounding may have moved a number of each
     column; misfit: rms by which samples, left out one at a time, lie off the curve of the others, by column; None where
@@ -89,7 +89,7 @@ class Record(NamedTuple):
 
 
 class Table(NamedTuple):
-    """What is read of a file.
+    """Columns of a file.
 
     file: as it was named; columns: by name, SI; halves: half a unit of the last digit of each number, SI, by name, 0 of
     whole degrees; marks: columns of marks by name; lines: of the file, for each row; units: as written, by column;
@@ -106,12 +106,12 @@ class Table(NamedTuple):
 
     @property
     def precision(self) -> dict[str, float]:
-        """How far a number of each column may be off by rounding, SI."""
+        """Largest rounding error of a number of each column, SI."""
         return {name: max(halves) for name, halves in self.halves.items()}
 
     @property
     def said(self) -> str:
-        """How it was read, in words: "angle to ±0.5 deg, s to ±0.0005 mm"."""
+        """Sentence on the precision, such as "angle to ±0.5 deg, s to ±0.0005 mm", and remarks."""
         halves = {name: self.precision[name] / factor(unit) for name, unit in self.units.items()}
         accuracies = (f"{name} to \u00b1{half:.2g} {self.units[name]}" for name, half in halves.items() if half)
         return "; ".join((f"read {', '.join(accuracies)}", *self.remarks))
@@ -140,26 +140,28 @@ def read(
     twice: whether an angle may stand in two rows, for both sides of a corner; digits: decimals of what is no angle, in
     place of those printed. Angles that fall are turned round.
     """
-    return _table(list(table_cells.read(_named(scene, given, key), given)), given, kinds, marks, fewest, twice, digits)
+    return _table(
+        list(table_cells.read(_file_of_scene(scene, given, key), given)), given, kinds, marks, fewest, twice, digits
+    )
 
 
 def columns(scene: Scene, given: str, key: str, kinds: Mapping[str, str]) -> tuple[str, ...]:
-    """Which columns of a table are there; kinds: those it may have. Raises BadInput.
+    """Names of the columns that a table has; kinds: those it may have. Raises BadInput.
 
     given: the file as the scene names it, under `key`.
     """
-    tables = list(table_cells.read(_named(scene, given, key), given))
-    return max((_there(cells, kinds) for cells in tables), key=len)
+    tables = list(table_cells.read(_file_of_scene(scene, given, key), given))
+    return max((_present_columns(cells, kinds) for cells in tables), key=len)
 
 
-def measured(path: Path, kinds: Mapping[str, str]) -> Table:
+def read_measured(path: Path, kinds: Mapping[str, str]) -> Table:
     """Columns of a caller's table whose names are in `kinds`, the first of which must be there. Raises BadInput.
 
     kinds: column name → kind of quantity, angles first. An empty cell, but for an angle, is NaN.
     """
     given, (angle, *names) = str(path), kinds
     tables = list(table_cells.read(_bytes(path, given, "", "beside"), given))
-    there = max((_there(cells, {name: kinds[name] for name in names}) for cells in tables), key=len)
+    there = max((_present_columns(cells, {name: kinds[name] for name in names}) for cells in tables), key=len)
     if any(cells.rows for cells in tables) and not there:
         allowed = ", ".join(f"{name} [{DISPLAY_UNIT[kinds[name]]}]" for name in names)
         remedy = "Name its columns as the curves are named"
@@ -173,7 +175,7 @@ def header(kinds: Mapping[str, str]) -> str:
     return ", ".join(f"{name} [{DISPLAY_UNIT[kind]}]" for name, kind in kinds.items())
 
 
-def _named(scene: Scene, given: str, key: str) -> bytes:
+def _file_of_scene(scene: Scene, given: str, key: str) -> bytes:
     """Bytes of a file that a scene names, or that came with it. Raises BadInput."""
     text = scene.paths.text(key)
     reads(scene, given)
@@ -210,16 +212,16 @@ def _table(
     gaps: bool = False,
 ) -> Table:
     """Table that a file's cells make, with the separator that gives most of the columns."""
-    cells = max(tables, key=lambda candidate: len(_there(candidate, kinds)))
+    cells = max(tables, key=lambda candidate: len(_present_columns(candidate, kinds)))
     if not cells.rows:
         raise refusal("the table is empty", origin, allowed=header(kinds), remedy="Give a header and rows")
-    head, rows = _headed(cells, kinds)
-    columns, units = _found(head, rows, kinds, origin)
+    head, rows = _split_heading(cells, kinds)
+    columns, units = _find_columns(head, rows, kinds, origin)
     rows = rows[units:]
     for row in rows:
         _check_length(row, head, cells.separator, origin)
     if columns[0].kind == "angle" and not twice:
-        rows = _once(rows, columns)
+        rows = _drop_repeats(rows, columns)
     if not fewest <= len(rows) <= MOST_ROWS:
         problem = f"the table has {len(rows)} rows below its header"
         raise refusal(problem, origin, allowed=f"{fewest} to {MOST_ROWS}", remedy="Give more, or fewer")
@@ -239,7 +241,7 @@ def _table(
         column.name: tuple(half * column.unit for half in _precision(column, texts[column], digits))
         for column in columns
     }
-    marked = {name: _marked(head, rows, name, origin) for name in marks}
+    marked = {name: _marks(head, rows, name, origin) for name in marks}
     lines = tuple(row.line for row in rows)
     first = columns[0]
     if first.kind == "angle":
@@ -277,13 +279,13 @@ def _places(row: Row, name: str) -> list[int]:
     return []
 
 
-def _there(cells: Cells, kinds: Mapping[str, str]) -> tuple[str, ...]:
-    """Which columns are there with one separator."""
-    head, _ = _headed(cells, kinds)
+def _present_columns(cells: Cells, kinds: Mapping[str, str]) -> tuple[str, ...]:
+    """Names of the columns that a table has with one separator."""
+    head, _ = _split_heading(cells, kinds)
     return tuple(name for name in kinds if _places(head, name))
 
 
-def _headed(cells: Cells, kinds: Mapping[str, str]) -> tuple[Row, Sequence[Row]]:
+def _split_heading(cells: Cells, kinds: Mapping[str, str]) -> tuple[Row, Sequence[Row]]:
     """Heading and the rows below it: the first row that names most of the columns, or a remark above."""
     candidates = [(row, cells.rows[k + 1 :]) for k, row in enumerate(cells.rows[:FIRST_ROWS])]
     candidates += [(row, cells.rows) for row in cells.remarks]
@@ -292,7 +294,7 @@ def _headed(cells: Cells, kinds: Mapping[str, str]) -> tuple[Row, Sequence[Row]]
     return max(candidates, key=lambda candidate: sum(bool(_places(candidate[0], name)) for name in kinds))
 
 
-def _found(head: Row, rows: Sequence[Row], kinds: Mapping[str, str], origin: str) -> tuple[list[_Column], int]:
+def _find_columns(head: Row, rows: Sequence[Row], kinds: Mapping[str, str], origin: str) -> tuple[list[_Column], int]:
     """Columns that a heading names, and how many rows of units stand below it, 0 or 1. Raises BadInput."""
     places = {name: _places(head, name) for name in kinds}
     below = 0
@@ -303,7 +305,7 @@ def _found(head: Row, rows: Sequence[Row], kinds: Mapping[str, str], origin: str
             raise refusal(f"the table has column {name} {len(there)} times", origin, remedy="Take out all but one")
         usual = " or ".join(UNITS.get(kind, (DISPLAY_UNIT[kind],)))
         if not there:
-            problem = f"the table has no column {name} (line {head.line}: holds {_quoted(head)})"
+            problem = f"the table has no column {name} (line {head.line}: holds {_quote(head)})"
             remedy = f"Name the columns so, each with its unit ({usual}); one row of headings, then rows of numbers"
             raise refusal(problem, origin, allowed=header(kinds), remedy=remedy)
         called, unit = _heading(head.cell(there[0]))
@@ -327,7 +329,7 @@ def _cell(text: str) -> str:
     return shown(text) if len(text) <= LONGEST_TOLD else f"a text of {len(text)} characters"
 
 
-def _quoted(row: Row) -> str:
+def _quote(row: Row) -> str:
     return ", ".join(map(_cell, row.cells[:8])) or "nothing"
 
 
@@ -479,8 +481,8 @@ def _halves(texts: Sequence[str], digits: int | None) -> list[float]:
     ]
 
 
-def _marked(head: Row, rows: Sequence[Row], name: str, origin: str) -> tuple[float, ...]:
-    """Which rows a column marks; none where there is no such column. Raises BadInput."""
+def _marks(head: Row, rows: Sequence[Row], name: str, origin: str) -> tuple[float, ...]:
+    """Marks of the rows; all 0 where there is no such column. Raises BadInput."""
     places = _places(head, name)
     if not places:
         return (0.0,) * len(rows)
@@ -495,7 +497,7 @@ def _marked(head: Row, rows: Sequence[Row], name: str, origin: str) -> tuple[flo
 # Angles.
 
 
-def _once(rows: Sequence[Row], columns: Sequence[_Column]) -> list[Row]:
+def _drop_repeats(rows: Sequence[Row], columns: Sequence[_Column]) -> list[Row]:
     """Rows without those that repeat the one before them in every column that is read."""
     distinct: list[Row] = []
     for row in rows:

@@ -25,7 +25,7 @@ LARGEST = 1e60
 OUTGROWN = 10.0
 """Factor on a machine's longest length beyond which a bare number is none in metres: one in mm is off by 1000."""
 MEANT = {"length": "metres", "angle": "radians"}
-"""What a bare number of a kind of quantity is in, where it may be taken for something else."""
+"""Unit that a user may mean by a bare number, by kind of quantity."""
 Design = Mapping[str, float | Sequence[float]]
 """A design by label, SI and rad; parts of it may be lists of numbers."""
 Given = Mapping[str, float | str | Sequence[float | str]]
@@ -52,10 +52,12 @@ def loaded(path: Path) -> object:
 
     origin = named(path)
     try:
-        raw = _piped() if str(path) == PIPE else _filed(path)
+        raw = _pipe_bytes() if str(path) == PIPE else _file_bytes(path)
         if len(raw) > LARGEST_FILE:
             raise refusal("the file is too large for a design", origin, allowed="up to 1 MB", remedy=_GIVE_FILE)
-        contents: object = json.loads(raw.decode("utf-8-sig"), object_pairs_hook=lambda pairs: _once(pairs, origin))
+        contents: object = json.loads(
+            raw.decode("utf-8-sig"), object_pairs_hook=lambda pairs: _unique_entries(pairs, origin)
+        )
     except OSError as error:
         reason = error.strerror or str(error)
         raise refusal(f"the design cannot be read: {reason}", origin, remedy="Check the path") from None
@@ -66,7 +68,7 @@ def loaded(path: Path) -> object:
     return contents
 
 
-def _filed(path: Path) -> bytes:
+def _file_bytes(path: Path) -> bytes:
     """Bytes of a file, one more than allowed at most. Raises BadInput for what is no file."""
     if not path.is_file():
         what = "it is no ordinary file" if path.exists() else "there is no such file"
@@ -77,7 +79,7 @@ def _filed(path: Path) -> bytes:
         return file.read(LARGEST_FILE + 1)
 
 
-def _piped() -> bytes:
+def _pipe_bytes() -> bytes:
     """Bytes of a pipe, one more than allowed at most. Raises BadInput where nothing comes through it."""
     raw = b"" if sys.stdin is None else sys.stdin.buffer.read(LARGEST_FILE + 1)
     if not raw.strip():
@@ -86,7 +88,7 @@ def _piped() -> bytes:
     return raw
 
 
-def _once(pairs: Sequence[tuple[str, object]], origin: str) -> dict[str, object]:
+def _unique_entries(pairs: Sequence[tuple[str, object]], origin: str) -> dict[str, object]:
     """Entries of a JSON object. Raises BadInput where a name comes twice."""
     entries: dict[str, object] = {}
     for name, value in pairs:
@@ -136,7 +138,7 @@ def checked(data: object, scene: Scene, origin: str = "<design>") -> dict[str, f
         known = ", ".join(scene.schema.variables)
         raise refusal("there is no design", origin, allowed=f"an object of {known}, SI", remedy=_GIVE)
     whole = Cursor(data, "design", Faults(origin))
-    data = {str(name): value for name, value in data.items() if name not in lists} | _listed(whole, lists)
+    data = {str(name): value for name, value in data.items() if name not in lists} | _list_numbers(whole, lists)
     design = {}
     for name, place in whole.entries(data).items():
         listed = next((lists[of] for of in lists if _place(name, of) is not None), None)
@@ -178,7 +180,7 @@ def _number(cursor: Cursor, quantity: Quantity) -> float:
 
 
 def _largest(scene: Scene, name: str, kind: str) -> float:
-    """How large a number without a unit may be before it is taken for one in another unit than SI."""
+    """Largest number without a unit that is read as SI; a larger one is in another unit."""
     if kind not in MEANT:
         return LARGEST
     quantities = quantities_of(scene.schema.mechanism)
@@ -197,7 +199,7 @@ def _other_unit(cursor: Cursor, scene: Scene, kind: str, value: float) -> BadInp
     return cursor.fault(problem, value, remedy=remedy)
 
 
-def _listed(design: Cursor, lists: Mapping[str, Quantity]) -> dict[str, object]:
+def _list_numbers(design: Cursor, lists: Mapping[str, Quantity]) -> dict[str, object]:
     """Numbers of a design's lists, each under a name of its own. Raises BadInput."""
     numbers: dict[str, object] = {}
     given = design.table()
@@ -231,11 +233,11 @@ def _fits(quantity: Quantity, value: float) -> bool:
 MOST_TOLD, LONGEST_TOLD = 8, 200
 """Changes that are told one by one: more are another scene altogether, and their number says so; characters of one."""
 PIPE = "-"
-"""What a design's file is called that comes through a pipe."""
+"""Name in messages of a design that comes through a pipe."""
 
 
 class DesignGiven(NamedTuple):
-    """What a design file brings: a design, unchecked; of a whole answer more.
+    """Contents of a design file: a design, unchecked; of a whole answer more.
 
     call: what its call changed in its scene; target, status: its own; document: the tables it was found in; files: the
     text of those that these name.
@@ -356,10 +358,10 @@ def scene_changes(scene: Scene, given: DesignGiven, origin: str, besides: Call) 
 
         now = {key: text for key, text in tables(scene).items() if not _is_of(besides, key)}
         changes += [f"{key} with other rows" for key, text in given.files.items() if now.get(key, text) != text]
-    return _shortened(changes)
+    return _shorten(changes)
 
 
-def _shortened(sentences: Sequence[str]) -> list[str]:
+def _shorten(sentences: Sequence[str]) -> list[str]:
     short = [clean(sentence, LONGEST_TOLD) for sentence in sentences[:MOST_TOLD]]
     return short if len(sentences) <= MOST_TOLD else [*short, f"and {len(sentences) - MOST_TOLD} more"]
 
@@ -389,7 +391,7 @@ def remark(scene: Scene, given: DesignGiven, later: Call, changes: Sequence[str]
     """
     current = given.call.then(later).said
     lasting = [text for text in given.call.said if text in current]
-    sentences = [f"{origin} brings what its call changed: {', '.join(_shortened(lasting))}"] if lasting else []
+    sentences = [f"{origin} brings what its call changed: {', '.join(_shorten(lasting))}"] if lasting else []
     sentences += (
         [f"{scene.origin} counts where {origin} was found in another scene: {', '.join(changes)}"] if changes else []
     )

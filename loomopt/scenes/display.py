@@ -62,10 +62,10 @@ def units(
     document: checked; its [display] goes before all.
     """
     first: dict[str, str] = {}
-    for kind, unit in _written(document, schema, active, ranges):
+    for kind, unit in _unit_entries(document, schema, active, ranges):
         if kind not in first and fits(unit, kind):
             first[kind] = ascii_unit(unit)
-    return _completed({**first, **read(Cursor(document.get("display", {}), "display", Faults()))})
+    return _complete_units({**first, **read(Cursor(document.get("display", {}), "display", Faults()))})
 
 
 def unit_for(si: str, known: Mapping[str, str]) -> str:
@@ -74,10 +74,10 @@ def unit_for(si: str, known: Mapping[str, str]) -> str:
     What swings stays in rad/s, whatever unit the shaft's speed has.
     """
     kind = next((kind for kind, unit in SI_UNIT.items() if unit == si and kind != "angular speed"), None)
-    return known[kind] if kind else _composed(si, {letter: known[base] for letter, base in _BASES.items()}) or si
+    return known[kind] if kind else _compose_unit(si, {letter: known[base] for letter, base in _BASES.items()}) or si
 
 
-def _written(
+def _unit_entries(
     document: Mapping[str, Any],
     schema: SceneSchema,
     active: Iterable[Effect],
@@ -99,7 +99,7 @@ def _written(
     yield from ((schema.figures[name].kind, limit.unit) for name, limit in limits.items())
 
 
-def _completed(given: Mapping[str, str]) -> dict[str, str]:
+def _complete_units(given: Mapping[str, str]) -> dict[str, str]:
     """A unit for every kind: the given one, else one composed of the scene's, else the usual one.
 
     The SI's own composed units (N*m, N/m, 1/m) stay wherever lengths, masses and forces are decimal multiples of its
@@ -120,11 +120,11 @@ def _completed(given: Mapping[str, str]) -> dict[str, str]:
         elif kind != "torque" and si.startswith(torque):
             units[kind] = si.replace(torque, units["torque"], 1)
         else:
-            units[kind] = _composed(si, letters) or DISPLAY_UNIT[kind]
+            units[kind] = _compose_unit(si, letters) or DISPLAY_UNIT[kind]
     return {kind: units[kind] for kind in SI_UNIT}
 
 
-def _composed(si: str, letters: Mapping[str, str]) -> str:
+def _compose_unit(si: str, letters: Mapping[str, str]) -> str:
     """An SI unit written with a scene's own units; "" where these are the SI's or its decimal multiples."""
     used = [unit for letter, unit in letters.items() if re.search(rf"\b{letter}\b", si)]
     if all(map(_is_decimal, used)) or not all(unit.isalpha() for unit in used):
@@ -135,7 +135,7 @@ def _composed(si: str, letters: Mapping[str, str]) -> str:
 def _pressure(bases: Mapping[str, str]) -> str:
     """Unit of pressure that goes with a scene's forces."""
     force = bases["force"]
-    composed = "" if _is_decimal(force) else _composed("N/m^2", {"N": force, "m": bases["length"]})
+    composed = "" if _is_decimal(force) else _compose_unit("N/m^2", {"N": force, "m": bases["length"]})
     return _PRESSURES.get(force) or composed or DISPLAY_UNIT["pressure"]
 
 

@@ -10,7 +10,7 @@ from loomopt.base.errors import BadInput, refusal, unknown
 from loomopt.base.records import Frozen
 from loomopt.physics.schema import Name, Target, TargetTable
 from loomopt.scenes.document import removed
-from loomopt.scenes.scene import TABLES, Scene, build, kept, places
+from loomopt.scenes.scene import TABLES, Scene, build, cached, places
 from loomopt.scenes.tables import FAMILY
 
 MOST_MEMBERS = 50
@@ -56,7 +56,7 @@ def changes(scene: Scene) -> tuple[dict[str, Any], ...]:
 
 def members(scene: Scene) -> tuple[Scene, ...]:
     """Scene of each member. Raises BadInput that names the member and the key."""
-    return kept(scene, FAMILY, lambda: tuple(_member(scene, k, change) for k, change in enumerate(changes(scene))))
+    return cached(scene, FAMILY, lambda: tuple(_member(scene, k, change) for k, change in enumerate(changes(scene))))
 
 
 def member_name(name: str, member: int) -> str:
@@ -81,7 +81,7 @@ def called(scene: Scene) -> Mapping[str, str]:
         kinds = ((True, 1), (False, 1), (False, 2), (False, -1))
         return member_names | {sum_name(name, *kind): name for name in names for kind in kinds}
 
-    return kept(scene, "family names", names_of_members)
+    return cached(scene, "family names", names_of_members)
 
 
 def _members(scene: Scene) -> list[dict[str, Any]]:
@@ -137,7 +137,7 @@ def _leaves(key: str, value: object) -> Iterator[tuple[str, Any]]:
         yield from _leaves(f"{key}.{name}", inner)
 
 
-def _alone(scene: Scene) -> Scene:
+def _without_family(scene: Scene) -> Scene:
     """Scene without its family."""
     settings = {key: value for key, value in scene.call.set.items() if not f"{key}.".startswith(f"targets.{FAMILY}.")}
     call = replace(scene.call, set=Frozen(settings), target=None)
@@ -153,7 +153,7 @@ def _member(scene: Scene, place: int, change: Mapping[str, Any]) -> Scene:
                 "a member cannot change it", scene.origin, f"{at}.{key}", allowed=allowed, remedy="Take it out"
             )
     try:
-        return _alone(scene).update(change)
+        return _without_family(scene).update(change)
     except BadInput as error:
         first = error.faults[0]
         raise BadInput(

@@ -81,7 +81,7 @@ PATTERN = f"^(({_LETTERS})([5-9]|10|11)|[kmnKMN][5-8])$"
 _CLASS = re.compile(r"([A-Za-z]{1,2})([0-9]{1,2})")
 
 
-def parted(name: str) -> tuple[str, int] | None:
+def split_class(name: str) -> tuple[str, int] | None:
     """Letter and grade of a tolerance class, None where it is none of the tables."""
     match = _CLASS.fullmatch(name)
     if match is None or match[1] not in LETTERS:
@@ -94,9 +94,9 @@ def parted(name: str) -> tuple[str, int] | None:
 def deviations(name: str, nominal: float) -> tuple[float, float]:
     """Lower and upper deviation of a tolerance class, m; not numbers for sizes outside the tables.
 
-    name: such as "H7"; nominal: size, m. Raises ValueError for what `parted` does not know.
+    name: such as "H7"; nominal: size, m. Raises ValueError for an unknown class.
     """
-    parts = parted(name)
+    parts = split_class(name)
     if parts is None:
         raise ValueError(f"{name} is no tolerance class of the tables")
     letter, grade = parts
@@ -120,7 +120,7 @@ def _shaft(letter: str, grade: int, width: int, size: float) -> tuple[float, flo
 
 
 def _raised(letter: str, size: float) -> int:
-    """How far the lower deviation of a shaft lies above its nominal, µm."""
+    """Lower deviation of a shaft above its nominal, µm."""
     return FINE[letter][bisect_left(FINE_ENDS, size)] if letter in FINE else BELOW[letter][bisect_left(ENDS, size)]
 
 

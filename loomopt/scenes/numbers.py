@@ -1,4 +1,4 @@
-"""What a study varies and depends on: the numbers of a scene by dotted key, and the files that it names."""
+"""Input of a study: the numbers of a scene by dotted key, and the files that it names."""
 
 import contextlib
 import re

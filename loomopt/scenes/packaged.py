@@ -1,4 +1,4 @@
-"""Where packaged scenes and reference results stand: in the installed package, else at the checkout's top."""
+"""Folders of packaged scenes and reference results: in the installed package, else at the checkout's top."""
 
 import functools
 import os
@@ -37,7 +37,7 @@ def problems() -> dict[str, Path]:
 
 
 class Head(NamedTuple):
-    """What `loomopt list` tells of a scene; targets: those it has a table for."""
+    """Row of `loomopt list`; targets: those for which the scene has a table."""
 
     name: str
     title: str

@@ -1,4 +1,4 @@
-"""Where a table comes from, and tables as CSV text that says so."""
+"""Origin of a table, and CSV text with this origin."""
 
 import functools
 from typing import TYPE_CHECKING

@@ -38,22 +38,22 @@ class Equation(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is of."""
+        """Name of the equation."""
 
     @property
     def text(self) -> str:
-        """It as plain text."""
+        """Equation as plain text."""
 
     @property
     def latex(self) -> str:
-        """It in LaTeX."""
+        """Equation in LaTeX."""
 
     def _repr_latex_(self) -> str:
         """LaTeX that Jupyter shows."""
 
 
 class Jobs(JobNames, Protocol):
-    """Where a scene finds its job by name."""
+    """Jobs by name, as a scene uses them."""
 
     def schema(self, job: str, document: Mapping[str, Any], effects: Collection[str], /) -> SceneSchema:
         """Schema of a scene of a job, with the effects it names where a distribution brings them."""
@@ -67,7 +67,7 @@ class Jobs(JobNames, Protocol):
 
 @dataclass(frozen=True)
 class Call:
-    """What a call changes in a scene: dotted keys set, effects put on, then off, bounds freed; target: as it names."""
+    """Changes of a scene by a call: dotted keys set, effects put on, then off, bounds freed; target: as it names."""
 
     set: Mapping[str, Any] = field(default_factory=Frozen)
     on: tuple[str, ...] = ()
@@ -77,7 +77,7 @@ class Call:
 
     @property
     def said(self) -> list[str]:
-        """What it changes, in words."""
+        """Sentences on the changes."""
         changes = [*(f"{name} on" for name in self.on), *(f"{name} off" for name in self.off)]
         changes += [f"{key} = {value if isinstance(value, str) else shown(value)}" for key, value in self.set.items()]
         return changes + [f"{name} free" for name in self.free]
@@ -89,9 +89,9 @@ class Call:
         free = tuple(name for name in self.free if not {f"bounds.{name}", f"bounds.{name}.free"} & set(later.set))
         return Call(
             Frozen({**earlier, **later.set}),
-            _once(*(name for name in self.on if name not in later.off), *later.on),
-            _once(*off, *later.off),
-            _once(*free, *later.free),
+            _unique(*(name for name in self.on if name not in later.off), *later.on),
+            _unique(*off, *later.off),
+            _unique(*free, *later.free),
             later.target or self.target,
         )
 
@@ -105,7 +105,7 @@ class Call:
         return {"set": copied(self.set, ""), **switches}
 
 
-def _once(*names: str) -> tuple[str, ...]:
+def _unique(*names: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
@@ -160,8 +160,8 @@ class Scene(Shown):
         return next((table for table in self.effects.values() if isinstance(table, model)), None)
 
     @lazy
-    def _kept(self) -> dict[Hashable, object]:
-        """What was made of it, by what that is."""
+    def _cache(self) -> dict[Hashable, object]:
+        """Objects that were made from the scene, by key."""
         return {}
 
     @lazy
@@ -246,7 +246,9 @@ class Scene(Shown):
         document = self._off(self._on(self._set(values), call.on), call.off)
         new_call = self.call.then(replace(call, set=values, free=()))
         if document is not self.document:
-            changed = _built(document, self.jobs, self.origin, self.paths.set_by_caller(caller_keys), new_call, self)
+            changed = _build_scene(
+                document, self.jobs, self.origin, self.paths.set_by_caller(caller_keys), new_call, self
+            )
         else:
             changed = self if new_call == self.call else replace(self, call=new_call)
         return changed.free(call.free) if call.free else changed
@@ -271,7 +273,7 @@ class Scene(Shown):
         if parts[0] == "bounds" and len(parts) > 2 and not isinstance(inside, Mapping):
             document = replaced(document, table_path, {}, self.origin, key)
         document = replaced(document, parts, value, self.origin, key)
-        for rival_key in _stood_for(effect, parts[len(table_path) :]):
+        for rival_key in _replaced_keys(effect, parts[len(table_path) :]):
             # A curve takes the place of numbers, and they that of a curve, but for what is set in the same call.
             place = [*table_path, rival_key]
             if looked_up(document, place) is not None and ".".join(place) not in values:
@@ -357,7 +359,7 @@ class Scene(Shown):
             },
             "bounds": {name: (bound.min, bound.max, bound.free) for name, bound in self.bounds.items()},
             "limits": {name: (limit.min, limit.max) for name, limit in self.limits.items()},
-            "targets": {name: _deciding(table) for name, table in self.targets.items()},
+            "targets": {name: _decisive_values(table) for name, table in self.targets.items()},
             **{name: self.document.get(name, {}) for name in self.schema.tables},
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
@@ -403,7 +405,7 @@ class Scene(Shown):
         return name.split(".")
 
 
-def _stood_for(effect: Effect | None, key: list[str]) -> tuple[str, ...]:
+def _replaced_keys(effect: Effect | None, key: list[str]) -> tuple[str, ...]:
     """Keys of an effect's table that say otherwise what the one that is set says."""
     curve = effect.tabulated if isinstance(effect, Load) else None
     if curve is None or len(key) != 1:
@@ -411,7 +413,7 @@ def _stood_for(effect: Effect | None, key: list[str]) -> tuple[str, ...]:
     return curve.instead if key[0] == curve.key else (curve.key,) if key[0] in curve.instead else ()
 
 
-def _deciding(table: Table) -> dict[str, Any]:
+def _decisive_values(table: Table) -> dict[str, Any]:
     """Values of a target's table that decide an answer; an indifference and digits only where they are given."""
     return table.model_dump(exclude={"expected"} | ({"indifference", "digits"} - table.model_fields_set))
 
@@ -431,10 +433,10 @@ def build(
     paths: where the files lie that it names; without, they are the caller's own. call: what made these tables of those
     that were read. Raises BadInput that names all that is wrong, the worst first.
     """
-    return _built(copied(document, origin), jobs, origin, paths, call)
+    return _build_scene(copied(document, origin), jobs, origin, paths, call)
 
 
-def _built(
+def _build_scene(
     original: Mapping[str, Any],
     jobs: Jobs,
     origin: str,
@@ -447,7 +449,7 @@ def _built(
     before: a scene whose tables are read again where these are not the very same.
     """
     faults = Faults(origin)
-    raw = _meant(original, TABLES)
+    raw = _raw_tables(original, TABLES)
     problem = read.problem(Cursor(raw["problem"], "problem", faults), jobs)
     named = [name for table in ("effects", "available") if isinstance(raw[table], Mapping) for name in raw[table]]
     try:
@@ -459,7 +461,7 @@ def _built(
         faults.add(error.placed(origin, original))
         raise faults.told() from None
     known = (*TABLES, *schema.tables)
-    raw = _meant(original, known)
+    raw = _raw_tables(original, known)
     top = Cursor(raw, "", faults)
     top.check_keys(original, known, "table")
     last = before if before is not None and before.schema is schema else None
@@ -512,7 +514,7 @@ def _built(
         from loomopt.scenes import sizes
 
         sizes.read(top, schema, known_places)
-    if _judged(scene, faults):
+    if _is_checkable(scene, faults):
         try:
             jobs.check(scene)
         except BadInput as error:
@@ -523,7 +525,7 @@ def _built(
     return scene
 
 
-def _meant(original: Mapping[str, Any], known: Collection[str]) -> dict[str, Any]:
+def _raw_tables(original: Mapping[str, Any], known: Collection[str]) -> dict[str, Any]:
     """Raw tables, empty ones too; one whose name nobody knows stands for the near one that is not there."""
     raw: dict[str, Any] = {name: {} for name in known} | dict(original)
     for name in original:
@@ -533,7 +535,7 @@ def _meant(original: Mapping[str, Any], known: Collection[str]) -> dict[str, Any
     return raw
 
 
-def _judged(scene: Scene, faults: Faults) -> bool:
+def _is_checkable(scene: Scene, faults: Faults) -> bool:
     """Whether today's machine can be checked: its only wrong numbers are those that it does not need."""
     mechanism = scene.tables["mechanism"]
     wrong = [name for name, value in mechanism if value != value]
@@ -574,13 +576,13 @@ def _numbers(table: Table) -> dict[str, float]:
     return numbers
 
 
-def kept(scene: Scene, key: Hashable, make: Callable[[], _Made]) -> _Made:
+def cached(scene: Scene, key: Hashable, make: Callable[[], _Made]) -> _Made:
     """Object made from a scene and stored with it by a key: once, unless files are read for the scene."""
-    if key in scene._kept:
-        return cast(_Made, scene._kept[key])
+    if key in scene._cache:
+        return cast(_Made, scene._cache[key])
     value = make()
     if not scene._files:
-        scene._kept[key] = value
+        scene._cache[key] = value
     return value
 
 

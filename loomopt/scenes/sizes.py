@@ -1,4 +1,4 @@
-"""What can be ordered of a number: multiples of a step, [steps], or sizes that are sold, [stock]."""
+"""Sizes of a number that can be ordered: multiples of a step, [steps], or sizes that are sold, [stock]."""
 
 import fnmatch
 import math
@@ -8,7 +8,7 @@ from typing import NamedTuple
 from loomopt.base.errors import nearest, refusal
 from loomopt.base.quantities import Quantity
 from loomopt.scenes.cursor import Cursor
-from loomopt.scenes.tables import Place, SceneSchema, labelled, quantity_of_label
+from loomopt.scenes.tables import Place, SceneSchema, label_entries, quantity_of_label
 
 WITHIN = 1e-9
 """Share of a step by which a size may lie outside its bounds: rounding of a unit."""
@@ -29,7 +29,7 @@ def read(scene: Cursor, schema: SceneSchema, known: Sequence[Place]) -> Sizes:
     labels = [*schema.variables, *(place.label for place in known)]
     for table in ("steps", "stock"):
         with scene.faults:
-            for label, place in labelled(scene.at(table), labels).items():
+            for label, place in label_entries(scene.at(table), labels).items():
                 with scene.faults:
                     quantity = Quantity(quantity_of_label(place, schema, known, STEP).kind, above=0)
                     if table == "steps":

@@ -17,9 +17,9 @@ LARGEST_FILE = 1_000_000
 MOST_ROWS, MOST_COLUMNS = 2500, 256
 """Rows and columns of a sheet that are looked at."""
 SEPARATORS = "\t;,|"
-"""What may stand between cells, the rarer inside a cell first."""
+"""Separators of cells, the rarer inside a cell first."""
 WORKBOOK, OLD_WORKBOOK, PARQUET = b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1"
-"""How files begin that are no text."""
+"""First bytes of files that are no text."""
 ENCODINGS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 """Byte order mark → encoding."""
 BLANKS = " \t\r\n\u00a0\u2009\u202f"
@@ -63,7 +63,7 @@ def read(raw: bytes, origin: str) -> Iterator[Cells]:
     if match:
         lines[first] = ""
     likely = [match[1]] if match else [sign for sign in SEPARATORS if any(sign in line for line in lines)] or [","]
-    tables = [cells for sign in likely if (cells := _parted(lines, sign)) is not None]
+    tables = [cells for sign in likely if (cells := _split_cells(lines, sign)) is not None]
     if not tables:
         remedy = "Write short cells, and close every quotation mark on its own line"
         raise refusal("the table is not CSV", origin, remedy=remedy)
@@ -73,12 +73,14 @@ def read(raw: bytes, origin: str) -> Iterator[Cells]:
 def text(raw: bytes, origin: str) -> str:
     """A table as text, a workbook's first sheet as CSV with commas. Raises BadInput for what is no table."""
     if raw.startswith(WORKBOOK):
-        return _written(_sheet(raw, origin))
+        return _csv_text(_sheet(raw, origin))
     if raw.startswith(PARQUET):
-        return _written(_parquet(raw, origin))
+        return _csv_text(_parquet(raw, origin))
     if raw.startswith(OLD_WORKBOOK):
         raise refusal("it is a workbook of Excel 97 (.xls)", origin, remedy=_TO_EXCEL)
-    encoding = next((name for mark, name in ENCODINGS.items() if raw.startswith(mark)), "") or _without_mark(raw)
+    encoding = next((name for mark, name in ENCODINGS.items() if raw.startswith(mark)), "") or _encoding_without_mark(
+        raw
+    )
     for name in (encoding, "cp1252") if encoding == "utf-8" else (encoding,):
         try:
             return raw.decode(name).removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
@@ -88,7 +90,7 @@ def text(raw: bytes, origin: str) -> str:
     raise refusal(f"it is no text in UTF-8, UTF-16 or Windows-1252 (byte {place})", origin, remedy=remedy)
 
 
-def _without_mark(raw: bytes) -> str:
+def _encoding_without_mark(raw: bytes) -> str:
     """Encoding of text without a byte order mark: every other byte of UTF-16 is mostly 0."""
     head = raw[:400]
     for name, odd in (("utf-16-le", head[1::2]), ("utf-16-be", head[0::2])):
@@ -97,7 +99,7 @@ def _without_mark(raw: bytes) -> str:
     return "utf-8"
 
 
-def _parted(lines: Sequence[str], separator: str) -> Cells | None:
+def _split_cells(lines: Sequence[str], separator: str) -> Cells | None:
     """Cells of lines; None where quotation marks do not fit the separator."""
     numbers: list[int] = []
 
@@ -123,7 +125,7 @@ def _row(line: int, cells: Iterable[str]) -> Row:
     return Row(line, tuple(values))
 
 
-def _written(rows: Iterable[Sequence[object]]) -> str:
+def _csv_text(rows: Iterable[Sequence[object]]) -> str:
     """Rows of cells as CSV text: numbers with all their digits."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

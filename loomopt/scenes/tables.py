@@ -1,4 +1,4 @@
-"""What a scene of a job may hold, and its tables checked against that.
+"""Schema of the scenes of a job, and the check of a scene's tables against it.
 
 A reader adds mistakes to the cursor's list and returns what can be read all the same.
 """
@@ -19,7 +19,7 @@ from loomopt.scenes.cursor import Cursor
 
 @dataclass(frozen=True)
 class SceneSchema:
-    """What a scene of a job may hold; it may follow from the raw scene.
+    """Schema of the scenes of a job; it may depend on the raw scene.
 
     operation, mechanism: models of those tables; keys that are required only by what reads them are optional there.
     effects: by name, in the order of the job. variables: design variables → kind of quantity, in the order shown.
@@ -68,7 +68,7 @@ class SceneSchema:
 
     @property
     def axes(self) -> dict[str, Axis]:
-        """What can be traded: variables, and every figure that can be limited; a job's own axes say it their way."""
+        """Axes of a front: variables, and figures that can be limited; the job's axes replace those of their name."""
         ends: dict[str, tuple[Sense, ...]] = {"min": ("most",), "max": ("least",)}
         axes = {name: Axis(name, kind) for name, kind in self.variables.items()}
         for figure in self.figures.values():
@@ -87,7 +87,7 @@ class SceneSchema:
 
 
 FAMILY = "family"
-"""What the target of several machines at once is called in every job."""
+"""Name of the target for several machines at once, in every job."""
 
 _NAME = re.compile(r"[^\W_][\w-]{0,63}")
 _ENDS = {"min", "max", "free"}
@@ -106,7 +106,7 @@ class JobNames(Protocol):
 
 
 class Problem(Table):
-    """What a scene says of itself; source: citation of where its numbers come from."""
+    """Head of a scene; source: citation for its numbers."""
 
     name: str
     job: str
@@ -132,7 +132,7 @@ class LimitRange(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where a number stands: table and key; what a designer calls it; what it may be.
+    """Place of a number: table and key; its designer's name; its quantity.
 
     given: whether the scene has a value for it; waits: whether the values of its effect, which is off, are at hand.
     """
@@ -309,17 +309,19 @@ def flat(raw: Mapping[str, Any], known: Iterable[str]) -> dict[str, Any]:
     names, entries = set(known), dict[str, Any]()
     begun = {name[:place] for name in names if "." in name for place, sign in enumerate(name) if sign == "."}
     for name, value in raw.items():
-        for called, entry in _parted(name, value, names, begun):
-            entries[called] = _together(entries.get(called), entry)
+        for called, entry in _split_labels(name, value, names, begun):
+            entries[called] = _merge(entries.get(called), entry)
     return entries
 
 
-def _together(first: object, second: object) -> object:
+def _merge(first: object, second: object) -> object:
     """Union of two entries of one label where both are tables, else the later one."""
     return {**first, **second} if isinstance(first, Mapping) and isinstance(second, Mapping) else second
 
 
-def _parted(name: str, value: object, known: Collection[str], begun: Collection[str]) -> Iterator[tuple[str, Any]]:
+def _split_labels(
+    name: str, value: object, known: Collection[str], begun: Collection[str]
+) -> Iterator[tuple[str, Any]]:
     """Yield what of a table's entry is of which label; the entry itself where no part of it is of a longer one.
 
     begun: what stands before a dot of a known label.
@@ -333,10 +335,10 @@ def _parted(name: str, value: object, known: Collection[str], begun: Collection[
     if rest or not inner:
         yield name, rest
     for key in inner:
-        yield from _parted(f"{name}.{key}", value[key], known, begun)
+        yield from _split_labels(f"{name}.{key}", value[key], known, begun)
 
 
-def labelled(cursor: Cursor, known: Iterable[str]) -> dict[str, Cursor]:
+def label_entries(cursor: Cursor, known: Iterable[str]) -> dict[str, Cursor]:
     """Entries of a table whose keys are labels: see `flat`; known: the labels. Raises BadInput."""
     return cursor.entries(flat(cursor.table(), known))
 
@@ -352,7 +354,7 @@ def bounds(cursor: Cursor, schema: SceneSchema, known: list[Place]) -> dict[str,
         labels = {f"{place.table}.{place.key}".removeprefix("effects."): place.label for place in known}
         for name, value in flat(cursor.table(), [*schema.variables, *labels, *labels.values()]).items():
             label = name if name in schema.variables else labels.get(name, name)
-            entries[label] = _together(entries.get(label), value)
+            entries[label] = _merge(entries.get(label), value)
     misread = {fault.key for fault in cursor.faults.found}
     for name, place in cursor.entries(entries).items():
         if f"mechanism.{name}" in misread:
@@ -368,7 +370,7 @@ def bounds(cursor: Cursor, schema: SceneSchema, known: list[Place]) -> dict[str,
 def number_or_waiting(
     cursor: Cursor, schema: SceneSchema, known: Sequence[Place], sort: str = "number to bound"
 ) -> tuple[Quantity, bool]:
-    """What the number of a label may be, and whether it counts: that of an effect that is off does not yet.
+    """Quantity of the number of a label, and whether it counts: the number of an effect that is off does not.
 
     Raises BadInput.
     """
@@ -382,7 +384,7 @@ def number_or_waiting(
 def quantity_of_label(
     cursor: Cursor, schema: SceneSchema, known: Sequence[Place], sort: str = "number to bound"
 ) -> Quantity:
-    """What a design variable, or the one number that is called so, may be; sort: what the label stands for.
+    """Quantity of a design variable, or of the one number of that name; sort: what the label stands for.
 
     Raises BadInput.
     """
@@ -431,7 +433,7 @@ def limits(cursor: Cursor, schema: SceneSchema, active: Collection[Effect]) -> d
     """Table [limits]: figures of the job, and of the effects that are on."""
     faults, inner = cursor.faults, dict[str, Cursor]()
     with faults:
-        inner = labelled(cursor, schema.figures)
+        inner = label_entries(cursor, schema.figures)
     limitable = [name for name, figure in schema.figures.items() if figure.sides]
     for name, place in inner.items():
         if name in schema.figures and name not in limitable:
@@ -442,7 +444,7 @@ def limits(cursor: Cursor, schema: SceneSchema, active: Collection[Effect]) -> d
     read = {}
     for name in (name for name in inner if name in limitable):
         with faults:
-            givers = [giver for giver, effect in schema.effects.items() if name in _told_by(effect)]
+            givers = [giver for giver, effect in schema.effects.items() if name in _effect_figures(effect)]
             if givers and not on.intersection(givers):
                 off = (
                     f"effect {givers[0]} is off: it" if len(givers) == 1 else f"effects {' and '.join(givers)} are off:"
@@ -454,7 +456,7 @@ def limits(cursor: Cursor, schema: SceneSchema, active: Collection[Effect]) -> d
     return read
 
 
-def _told_by(effect: Effect) -> Collection[str]:
+def _effect_figures(effect: Effect) -> Collection[str]:
     """Figures that an effect gives by rows or over the cycle."""
     if isinstance(effect, Check):
         return {*effect.over_cycle, *effect.rows}

@@ -47,7 +47,7 @@ AS_WRITTEN = 1e-9
 
 
 def plus_minus(name: str, nominal: float) -> float:
-    """How far a length of a nominal size, m, may be off on each side, m; not a number outside the table."""
+    """Allowed deviation of a length of a nominal size, m, on each side, m; not a number outside the table."""
     size = abs(nominal) * 1e3 - AS_WRITTEN
     ends, widths, unit = (ENDS, GRADES[name], 0.5e-6) if name in GRADES else (GENERAL_ENDS, GENERAL[name], 1e-3)
     place = bisect_left(ends, size)

@@ -1,4 +1,4 @@
-"""How a scene's numbers are made, [tolerances], and by which bands machines are judged, [accept]."""
+"""Tolerances of a scene's numbers, [tolerances], and bands in which a machine is accepted, [accept]."""
 
 import math
 import re
@@ -9,7 +9,7 @@ from loomopt.base.errors import refusal
 from loomopt.base.quantities import NUMBER_PATTERN, Quantity
 from loomopt.scenes import iso_fits, tolerance_classes
 from loomopt.scenes.cursor import Cursor
-from loomopt.scenes.tables import Place, SceneSchema, labelled, number_or_waiting
+from loomopt.scenes.tables import Place, SceneSchema, label_entries, number_or_waiting
 
 SIGMAS = 3.0
 """Standard deviations that a plus_minus is worth where nothing is said."""
@@ -22,7 +22,7 @@ UNIFORM = 1 / math.sqrt(3)
 
 
 class Tolerance(NamedTuple):
-    """How a number is made.
+    """Tolerance of a number.
 
     number: what a designer calls it; below, above: how far its band lies below and above the nominal, SI, or as shares
     of the nominal where `share`; one of them is negative where the whole band lies on one side; standard: its class,
@@ -45,7 +45,7 @@ class Tolerance(NamedTuple):
         if not self.standard:
             size = abs(nominal) if self.share else 1.0
             return -self.below * size, self.above * size
-        if iso_fits.parted(self.standard):
+        if iso_fits.split_class(self.standard):
             deviations = iso_fits.deviations(self.standard, nominal)
         else:
             half = tolerance_classes.plus_minus(self.standard, nominal)
@@ -78,7 +78,7 @@ def read(cursor: Cursor, schema: SceneSchema, known: Sequence[Place]) -> tuple[T
     tolerances = []
     with cursor.faults:
         labels = [*schema.variables, *(place.label for place in known)]
-        for place in labelled(cursor, labels).values():
+        for place in label_entries(cursor, labels).values():
             with cursor.faults:
                 quantity, counts = number_or_waiting(place, schema, known, "number with a tolerance")
                 tolerance = _tolerance(place, quantity)
@@ -91,7 +91,7 @@ def bands(cursor: Cursor, schema: SceneSchema) -> dict[str, float]:
     """Table [accept]: half the band around an equality or a goal by which machines are judged, SI, by figure."""
     bands: dict[str, float] = {}
     with cursor.faults:
-        inner = labelled(cursor, schema.figures)
+        inner = label_entries(cursor, schema.figures)
         for name, place in inner.items():
             with cursor.faults:
                 if name not in schema.figures:
@@ -184,7 +184,7 @@ def _fit(cursor: Cursor, quantity: Quantity) -> str:
     if quantity.kind != "length":
         problem = f"fits are of lengths, and this is of kind {quantity.kind}"
         raise cursor.fault(problem, raw, remedy="Give plus and minus instead")
-    if not isinstance(raw, str) or iso_fits.parted(raw) is None:
+    if not isinstance(raw, str) or iso_fits.split_class(raw) is None:
         allowed = f"a letter of {' '.join(iso_fits.LETTERS)} with a grade of {iso_fits.LEAST_GRADE} to "
         allowed += f"{iso_fits.MOST_GRADE}, k m n K M N to 8"
         raise cursor.fault("unknown tolerance class", raw, allowed, 'Write fit = "H7", or plus and minus')

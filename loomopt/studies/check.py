@@ -198,7 +198,7 @@ def check_names(problems: Iterable[str]) -> list[str]:
     """Names of packaged scenes, all without an argument. Raises BadInput for a name that is not packaged."""
     names, known, faults = list(problems), packaged.problems(), tuple[BadInput, ...]()
     if not names or not known.keys() >= set(names):
-        others, faults = registry.brought()
+        others, faults = registry.external_scenes()
         known = others | known
     for name in names:
         if name not in known:

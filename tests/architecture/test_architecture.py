@@ -13,7 +13,7 @@ from loomopt.jobs import registry
 from loomopt.physics.effects import kinds
 
 PACKAGE = Path(loomopt.__file__).parent
-JOBS = registry.own_names()
+JOBS = registry.builtin_names()
 
 ROOMS = ("base", "maths", "physics", "scenes", "model", "picture", "jobs", "solving", "studies", "interface")
 """In the order of imports: a room takes from itself and from those before it."""

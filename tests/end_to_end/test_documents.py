@@ -102,7 +102,7 @@ def test_a_table_between_marks_is_what_the_program_says(match):
 
 
 def test_the_effects_of_every_job_are_told():
-    assert {match[3] for match in TABLES if match[2] == "effects"} == set(registry.own_names())
+    assert {match[3] for match in TABLES if match[2] == "effects"} == set(registry.builtin_names())
     assert write.effects("beatup").count("| load |") > 5
 
 

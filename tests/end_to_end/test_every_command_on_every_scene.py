@@ -59,7 +59,7 @@ ALWAYS = (("show",), ("show", "--equations"), ("evaluate", "--json"), ("simulate
 def subjects():
     """Return, as pytest parameters: a scene, of a package or a template, and the effects that are put on."""
     found = []
-    for name in (*packaged.problems(), *(f"{job}.toml" for job in sorted(registry.own_names()))):
+    for name in (*packaged.problems(), *(f"{job}.toml" for job in sorted(registry.builtin_names()))):
         template = name.endswith(".toml")
         read = registry.scene(tomllib.loads(registry.template(name[:-5]))) if template else registry.load(name)
         alone = available(read)
@@ -149,7 +149,7 @@ def test_studies(name, on, place, capsys):
         called(words, where, on, capsys)
 
 
-@pytest.mark.parametrize("job", sorted(registry.own_names()))
+@pytest.mark.parametrize("job", sorted(registry.builtin_names()))
 def test_commands_of_a_job(job, capsys, tmp_path):
     for words in (["list", "--json"], ["schema", job], ["new", job, str(tmp_path / "new.toml")]):
         assert run(words) == 0

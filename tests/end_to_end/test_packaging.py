@@ -156,7 +156,7 @@ def test_the_wheel_holds_scenes_results_types_and_nothing_else(wheel):
     assert "loomopt/py.typed" in names
     assert {f"loomopt/interface/report/{name}" for name in ("report.css", "report.js")} <= names
     assert set(PICTURES.values()) <= names
-    assert {f"loomopt/jobs/{job}/template.toml" for job in registry.own_names()} <= names
+    assert {f"loomopt/jobs/{job}/template.toml" for job in registry.builtin_names()} <= names
     assert {name.split("/")[0].split("-")[0] for name in names} == {"loomopt"}
     assert not [name for name in names if "test" in name.lower() or "__pycache__" in name]
 

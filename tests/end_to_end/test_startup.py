@@ -98,9 +98,9 @@ def test_motions_that_follow_from_forces_are_imported_by_scenes_that_have_them_o
         assert motions == ({"loomopt.physics.motion", "loomopt.physics.motion.harmonic"} if with_it else set())
 
 
-@pytest.mark.parametrize("name", registry.own_names())
+@pytest.mark.parametrize("name", registry.builtin_names())
 def test_a_job_imports_no_module_of_another(name):
-    others = set(registry.own_names()) - {name}
+    others = set(registry.builtin_names()) - {name}
     scene = scene_of(name)
     code, modules = imported_together(("evaluate", scene), ("show", scene, "--equations"), ("simulate", scene))
     assert code == 0

@@ -65,12 +65,12 @@ def test_an_unknown_scene_is_sought_and_the_nearest_is_named(scans):
 def test_all_are_listed_with_a_scan(scans):
     assert set(packaged.problems()) <= set(registry.problems())
     assert scans == ["loomopt.jobs"]
-    assert set(registry.own_names()) <= set(registry.names())
+    assert set(registry.builtin_names()) <= set(registry.names())
     assert scans == ["loomopt.jobs"]
 
 
 def test_a_job_is_found_by_its_name_and_is_one_object():
-    for name in registry.own_names():
+    for name in registry.builtin_names():
         job = registry.find(name)
         assert job.name == name == job.schema({}).name
         assert registry.find(name) is job

@@ -93,14 +93,14 @@ def test_a_target_s_earlier_levels_are_held_before_what_is_traded(target, traded
     """Of any job: the last one is what the axes take the place of."""
     task = Ordered(SCENE, target, traded)
     assert tuple(level.figure for level in task.program().objectives) == held
-    assert JOB.task(SCENE, target, traded).held() == task.held()
+    assert JOB.task(SCENE, target, traded).higher_levels() == task.higher_levels()
 
 
 def test_a_level_that_an_effect_adds_is_none_of_the_target_s_own():
     shedding = registry.load("shedding").with_effect("coil")
     task = registry.of(shedding).task(shedding, "stiffness", ("K1", "X0"))
     assert [level.figure for level in task.objectives()] == ["K1", "spring_mass"]
-    assert task.held() == ()
+    assert task.higher_levels() == ()
 
 
 def test_an_axis_that_is_read_from_rows_of_other_names_has_their_size():

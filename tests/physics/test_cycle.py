@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.jobs.beatup.model import linked
+from loomopt.jobs.beatup.model import shared_linkage
 from loomopt.physics import cycle
 from loomopt.physics.effects.beatup import resistance
 
@@ -217,7 +217,7 @@ def test_the_pulse_of_the_curves_is_right_across_the_ends_of_the_turn(name):
     moving = np.abs(psi_1) > 1e-9
     assert friction[moving] == pytest.approx(-2.0 * np.sign(psi_1[moving]), rel=1e-9)
     assert lo.evaluate(scene).figures["M3_fdc"] == pytest.approx(
-        745.0 + 2.0 - 0.62 * linked(given).centres.psi_2_front * scene.operation["speed"] ** 2, rel=1e-12
+        745.0 + 2.0 - 0.62 * shared_linkage(given).centres.psi_2_front * scene.operation["speed"] ** 2, rel=1e-12
     )
 
 

@@ -90,7 +90,7 @@ def torques(names, numbers, phi, rod="exact", omega_dot=None, system=systems.FLO
     }
     switches = {name: load.switch(phi, corners[name]) for name, load in cornered.items()}
     angle = system.number(phi)
-    lengths = beatup.linked(given_).lengths
+    lengths = beatup.shared_linkage(given_).lengths
     pose = ReedMotion(angle, given_.values["speed"], crank_rocker.CrankRockerPose(system, lengths, angle), omega_dot)
     arguments = (system, found.loads, pose, given_, switches)
     return balance.output_force(*arguments), balance.crank_torque(*arguments)

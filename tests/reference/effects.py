@@ -611,7 +611,7 @@ def write(path):
     """Write the rows of the effects known here; those of others are kept as they stand, last."""
     from loomopt.jobs import registry
 
-    schemas = {job: registry.find(job).schema({}) for job in registry.own_names()}
+    schemas = {job: registry.find(job).schema({}) for job in registry.builtin_names()}
     examples = {job: {n: e.examples for n, e in schema.effects.items()} for job, schema in schemas.items()}
     header, *old = csv.reader(path.read_text(encoding="utf-8").splitlines())
     kept = [row for row in old if not knows(*row[:2])]

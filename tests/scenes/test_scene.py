@@ -266,7 +266,7 @@ def test_a_file_with_a_byte_order_mark_and_windows_lines_reads(tmp_path):
 def test_packaged_folders():
     assert {"beatup", "beatup-light", "beatup-heavy"} <= set(packaged.problems())
     assert packaged.results_path().name == "results"
-    assert set(registry.own_names()) == {load(name).job for name in packaged.problems()}
+    assert set(registry.builtin_names()) == {load(name).job for name in packaged.problems()}
 
 
 def calls(action):

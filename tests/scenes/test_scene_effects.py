@@ -218,7 +218,7 @@ def test_a_load_known_in_part_of_the_cycle_is_refused_by_jobs_that_cannot_judge_
         force=lambda at: 0 * at.pose.q,
         known_in=lambda words: (("segment", 1.0), ("segment", 3.0)),
     )
-    monkeypatch.setattr(registry, "_brought", lambda job, name: partly)
+    monkeypatch.setattr(registry, "_external_effect", lambda job, name: partly)
     raw = load(job).document
     document = {**raw, "effects": {**raw.get("effects", {}), "partly": {}}}
     if not refused:

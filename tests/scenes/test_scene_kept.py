@@ -8,7 +8,7 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.jobs.rapier.scene import MATCHED
 from loomopt.scenes import csv_tables
-from loomopt.scenes.scene import kept
+from loomopt.scenes.scene import cached
 
 SCENE = lo.load("beatup")
 JOB = registry.of(SCENE)
@@ -36,7 +36,7 @@ def test_what_fails_is_not_kept():
 
     for _ in range(2):
         try:
-            kept(scene, "what", fails)
+            cached(scene, "what", fails)
         except ValueError:
             continue
     assert len(asked) == 2

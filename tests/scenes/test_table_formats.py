@@ -53,7 +53,7 @@ def linkage_resistance(path):
 
 
 def measured(path):
-    return dict(csv_tables.measured(path, {"phi": "angle", "psi": "angle", "Md": "torque"}).columns)
+    return dict(csv_tables.read_measured(path, {"phi": "angle", "psi": "angle", "Md": "torque"}).columns)
 
 
 KINDS = {
@@ -175,7 +175,7 @@ def test_what_is_written_is_read_to_the_last_digit(tmp_path_factory, values, com
     frame.attrs["scene"] = "made up, 1.5"
     sheets.write(path, {"curves": frame}, comma)
     try:
-        found = csv_tables.measured(path, {"phi": "angle", "Md": "torque"})
+        found = csv_tables.read_measured(path, {"phi": "angle", "Md": "torque"})
     except BadInput as error:
         assert "part thousands" in str(error) or "decimal sign" in str(error)  # noqa: PT017 (only some tables have two readings)
         assert ending == ".csv"

@@ -15,7 +15,7 @@ from loomopt.physics.tolerances import FEASIBLE, STATIONARY
 from loomopt.picture.table import TextTable
 from loomopt.scenes import family as family_table
 from loomopt.scenes.designs import flat
-from loomopt.scenes.scene import Scene, kept
+from loomopt.scenes.scene import Scene, cached
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Evaluated, Solution, Words, changed
 from loomopt.solving.certificate.certificate import COMPLEMENTARY
@@ -257,7 +257,7 @@ def _scene(subject: Subject) -> Iterator[Part]:
     shown = scenes.parts(subject.scene)
     yield Part("The scene", tuple(shown))
     scene = subject.scene
-    written = kept(scene, "equations", lambda: mathml.page(registry.of(scene).views.equations(scene)))
+    written = cached(scene, "equations", lambda: mathml.page(registry.of(scene).views.equations(scene)))
     yield Part("Equations of this scene", (Markup(written),))
 
 

@@ -37,7 +37,7 @@ class CrankRockerDrawing:
 
     @functools.cached_property
     def skeleton(self) -> Skeleton:
-        """Its joints and links; crank and rod begin at B, so that folded their dashes coincide."""
+        """Joints and links; crank and rod begin at B, so that folded their dashes coincide."""
         sides, at, a, d = self.lengths, self.centres, Point(0.0, 0.0), Point(self.lengths.l4, 0.0)
         joints = {
             FRONT: {"B": a.towards(at.beta, sides.l1), "C": a.towards(at.beta, sides.l1 + sides.l2)},

@@ -9,7 +9,7 @@ from loomopt.base.errors import BadInput
 from loomopt.jobs import base
 from loomopt.jobs.base import EVERY, Figures, InBox, Job, Studied
 from loomopt.jobs.beatup.model import FRONT, LENGTHS
-from loomopt.jobs.beatup.program import BALANCE, BeatupTask, balanced_by, model, served
+from loomopt.jobs.beatup.program import BALANCE, BeatupTask, family_sentence, member_balance, model
 from loomopt.jobs.beatup.scene import RESISTED, SCHEMA, VARIABLES, RetrofitTarget, TorqueTarget, fault
 from loomopt.maths.systems import Number
 from loomopt.model.curves import Columns
@@ -126,7 +126,7 @@ class Beatup(Job):
         self, scene: Scene, sampled: "Sampler | Machines", names: Container[str] = EVERY
     ) -> dict[str, Number]:
         """Every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
-        figures, limited = base.alone(scene, sampled, names), self.task(scene).limited
+        figures, limited = base.static_figures(scene, sampled, names), self.task(scene).limited
         figures["mu_min"] = np.minimum(sampled.static["mu_near"], sampled.static["mu_far"])
         signs = dict.fromkeys(sampled.model.quantities, 1) | dict.fromkeys(sampled.model.least, -1)
         called = [name for name in signs if name in names]
@@ -147,7 +147,7 @@ class Beatup(Job):
         return {name: name for name in (*model.quantities, *model.least)} | {"mu_min": "obliquity"}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
-        """How each figure is read over a box of numbers: the transmission angle at both dead centres."""
+        """Reading of each figure over a box of numbers: the transmission angle at both dead centres."""
         boxes = super().in_boxes(scene, model) | {"mu_min": InBox(("mu_near", "mu_far"))}
         return boxes | {name: InBox(quantity=name, sign=-1.0) for name in model.least}
 
@@ -179,11 +179,11 @@ class Beatup(Job):
         """
         if not member_numbers.isdisjoint(LENGTHS):
             return ""
-        candidates = [balanced_by(scene, design, figures, member_numbers) for scene, design, figures in members]
+        candidates = [member_balance(scene, design, figures, member_numbers) for scene, design, figures in members]
         bands = [band for band in candidates if band is not None]
         if len(bands) < len(members):
             return ""
-        return served(bands, members[0][0])
+        return family_sentence(bands, members[0][0])
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """ψ, ψ', ψ'', the transmission angle, folded to at most 90°, the terms, M3 and Md."""

@@ -56,13 +56,13 @@ class ReedMotion(Motion):
 
 
 class FourBar(NamedTuple):
-    """What poses read at once of the four lengths."""
+    """Quantities of the four lengths that all poses share."""
 
     lengths: crank_rocker.Lengths
     centres: crank_rocker.DeadCentres
 
 
-def linked(given: Given) -> FourBar:
+def shared_linkage(given: Given) -> FourBar:
     """Quantities that all poses of a machine share."""
     linkage = given.linkage
     assert isinstance(linkage, FourBar)
@@ -127,7 +127,7 @@ class CrankRocker:
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """s = m4e r4e², kg·m², and both dead centres, rad."""
-        values, centres = given.values, linked(given).centres
+        values, centres = given.values, shared_linkage(given).centres
         angles = {"beta": centres.beta, "beta_r": centres.beta_r}
         return angles if "s" in values else angles | {"s": values["m4e"] * values["r4e"] ** 2}
 
@@ -137,13 +137,13 @@ class CrankRocker:
 
     def pose(self, maths: Maths, given: Given, node: Node) -> ReedMotion:
         """Pose at crank angles φ, rad."""
-        pose = crank_rocker.CrankRockerPose(maths, linked(given).lengths, node.phi)
+        pose = crank_rocker.CrankRockerPose(maths, shared_linkage(given).lengths, node.phi)
         return ReedMotion(node.phi, given.values.get("speed"), pose, given.values.get("omega_dot"))
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FrontPose:
         """Pose at front dead centre."""
         return FrontPose(
-            maths, linked(given), given.values["beta"], given.values.get("speed"), given.values.get("omega_dot")
+            maths, shared_linkage(given), given.values["beta"], given.values.get("speed"), given.values.get("omega_dot")
         )
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
@@ -180,11 +180,11 @@ def _front(at: Instant) -> Motion:
 
 
 ROWS: dict[str, DesignRow] = {
-    "swing": DesignRow(lambda at: linked(at.given).centres.swing),
-    "theta": DesignRow(lambda at: linked(at.given).centres.theta),
-    "beta": DesignRow(lambda at: linked(at.given).centres.beta),
+    "swing": DesignRow(lambda at: shared_linkage(at.given).centres.swing),
+    "theta": DesignRow(lambda at: shared_linkage(at.given).centres.theta),
+    "beta": DesignRow(lambda at: shared_linkage(at.given).centres.beta),
     "M3_fdc": DesignRow(lambda at: at.force, event=FRONT),
-    "alpha_fdc": DesignRow(lambda at: linked(at.given).centres.psi_2_front * _front(at).omega ** 2, ("speed",)),
+    "alpha_fdc": DesignRow(lambda at: shared_linkage(at.given).centres.psi_2_front * _front(at).omega ** 2, ("speed",)),
     "r4": DesignRow(eccentricity, ("m4", "r4", "m4e")),
     "r4e_square": DesignRow(lambda at: at.values["r4e"] ** 2),
 }

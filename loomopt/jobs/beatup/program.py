@@ -27,7 +27,7 @@ COUNTERWEIGHT = ("m4e", "r4e")
 BALANCED = 1e-8
 """|M3| at front dead centre below this share of the peak torque is called zero (words of the beat-up only)."""
 BALANCE = Goal("M3_fdc", 0.0, 0.0, BALANCED, "peak_torque")
-"""What target balance asks, and may find out of reach."""
+"""Goal of target balance, which may be out of reach."""
 AMPLE, LONG = 10.0, 3.0
 """Inertia beyond which no counterweight is of use, in those of the reed; radius beyond which none is built, in l4."""
 
@@ -111,7 +111,7 @@ class BeatupTask(Task):
         return self.target == "retrofit" or "change" in self.traded
 
     @property
-    def fallen(self) -> bool:
+    def trades_balance(self) -> bool:
         """Whether the reed torque at front dead centre is an axis, and what the target asks of it falls away."""
         return "M3_fdc" in self.traded
 
@@ -176,9 +176,9 @@ class BeatupTask(Task):
             for sign, value in ends(*self.limited["m4e"])
         ]
 
-    def wanted(self) -> list[Limit]:
+    def goal_limits(self) -> list[Limit]:
         """Limit that the target sets to the reed torque at front dead centre."""
-        if self.fallen or self.target not in ("retrofit", "torque"):
+        if self.trades_balance or self.target not in ("retrofit", "torque"):
             return []
         tolerance = self.scene.table(TorqueTarget).M3_tolerance if self.target == "torque" else 0.0
         tolerance = 0.01 * self.resistance if tolerance is None else tolerance
@@ -188,8 +188,8 @@ class BeatupTask(Task):
     def goals(self) -> tuple[Goal, ...]:
         """Goal of the reed torque; for balance, the tolerance within which it counts as zero."""
         if self.target != "balance":
-            return goals(self.wanted())
-        return () if self.fallen else (BALANCE,)
+            return goals(self.goal_limits())
+        return () if self.trades_balance else (BALANCE,)
 
     # Levels, starts and moves.
 
@@ -301,7 +301,7 @@ class BeatupTask(Task):
 
     @lazy
     def torque(self) -> float:
-        """What a design can change of the reed torque, N·m: its share beside the resistance."""
+        """Part of the reed torque that a design can change, N·m: all but the resistance."""
         return max(abs(self.front - self.resistance), MASKED * self.resistance) or self.peak
 
     @lazy
@@ -330,7 +330,7 @@ class BeatupTask(Task):
 
 
 class Band(NamedTuple):
-    """What a member needs: κ = M0/ω², kg·m², and its inertia with the least and the most counterweight, kg·m².
+    """Balance of a member: κ = M0/ω², kg·m², and its inertia with the least and the most counterweight, kg·m².
 
     bend: ψ'' at front dead centre.
     """
@@ -341,7 +341,7 @@ class Band(NamedTuple):
     bend: float
 
 
-def balanced_by(
+def member_balance(
     scene: Scene, design: Mapping[str, float], figures: Mapping[str, float | None], member_numbers: Collection[str]
 ) -> Band | None:
     """Balance that a member needs; None where more acts at front dead centre than the cloth and the reed's inertia."""
@@ -361,7 +361,7 @@ def balanced_by(
     return Band(resistance / speed**2, bare + least, bare + most, alpha / speed**2)
 
 
-def served(bands: Sequence[Band], scene: Scene) -> str:
+def family_sentence(bands: Sequence[Band], scene: Scene) -> str:
     """Sentence on the members that one ψ'' can balance, and on whether any balances all; scene: of the first member."""
     reached = [b.kappa / b.bend for b in bands]
     pairs = list(zip(bands, reached, strict=True))

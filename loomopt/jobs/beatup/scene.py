@@ -1,4 +1,4 @@
-"""What a beat-up scene may hold: its tables, design variables, figures and targets."""
+"""Schema of a beat-up scene: its tables, design variables, figures and targets."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ from loomopt.scenes.tables import SceneSchema
 
 
 class Operation(Table):
-    """What the loom does."""
+    """Operation of the loom."""
 
     speed: Speed | None = Field(None, description="speed of the main shaft")
     M0: Torque | None = Field(None, description="peak resistance of the cloth about the rocking shaft D")
@@ -43,7 +43,7 @@ class Mechanism(Table):
 
 
 class BeatupTarget(TargetTable):
-    """What every target of the job may hold; a retrofit weighs what is added itself."""
+    """Table of every target of the job; a retrofit minimises the added mass itself."""
 
     indifference: PureNumber | None = Field(
         None,

@@ -38,7 +38,7 @@ class LinkageDrawing:
 
     @property
     def linkage(self) -> Linkage:
-        """Its linkage."""
+        """Linkage of the design."""
         return linkage_of(self.sampler.model)
 
     @property
@@ -72,7 +72,7 @@ class LinkageDrawing:
 
     @property
     def paths(self) -> tuple[Line, ...]:
-        """Where points and sliders go."""
+        """Paths of points and sliders."""
         phi: Floats = TURN / SAMPLES * np.arange(SAMPLES, dtype=np.float64)
         pose = self.linkage.at(systems.numpy(), self.sampler.given, phi).joints
         parts = self.linkage.chain.parts
@@ -82,7 +82,7 @@ class LinkageDrawing:
 
     @property
     def skeleton(self) -> Skeleton:
-        """Its joints and links."""
+        """Joints and links."""
         at = {event: self.joints(angle) for event, angle in self.events.items()}
         first, fixed = next(iter(at.values())), self.linkage.chain.pivots
         moving = {event: {n: point for n, point in there.items() if n not in fixed} for event, there in at.items()}

@@ -53,7 +53,7 @@ class LinkageJob(Job):
         """Every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
         peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in names}
         sampled.search(tuple(peaks.values()))
-        figures = base.alone(scene, sampled, names)
+        figures = base.static_figures(scene, sampled, names)
         return figures | {name: self.read(name, sampled.peak(quantity)) for name, quantity in peaks.items()}
 
     def read(self, name: str, peak: Number) -> Number:
@@ -69,7 +69,7 @@ class LinkageJob(Job):
         return peaks | {f"mu.{part}": f"{part}.{OBLIQUITY}" for part in linkage_of(model).oblique}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
-        """How each figure is read over a box of numbers."""
+        """Reading of each figure over a box of numbers."""
         ends = {name: (self.read(name, 0.0), self.read(name, 1.0)) for name in self.peaks(model)}
         peaks = {
             name: InBox(quantity=of, sign=ends[name][1] - ends[name][0], offset=ends[name][0])

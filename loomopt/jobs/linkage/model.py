@@ -31,7 +31,7 @@ from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN, SAME_ANGLE
 
 OBLIQUITY = "obliquity"
-"""What the quantity of a part's transmission angle is called, after the part."""
+"""Name of the quantity of a part's transmission angle, after the part's name."""
 SCAN = 720
 """Samples of one turn between which turns of the output are sought."""
 BESIDE = 0.0123
@@ -48,7 +48,7 @@ packaged means are right to 2e-15)."""
 
 
 class Output(NamedTuple):
-    """What of the linkage the output is; measure: "angle", "slide", "x" or "y" of a link, part or joint.
+    """Output of the linkage; measure: "angle", "slide", "x" or "y" of a link, part or joint.
 
     against: another link, from which an angle is counted; sign: whether it counts so or the other way round.
     scale: what it is multiplied by; of an angle a length makes a length of it, so that the output slides. zero: the
@@ -66,7 +66,7 @@ class Output(NamedTuple):
     carrier: str = ""
 
 
-class Place(NamedTuple):
+class EventRule(NamedTuple):
     """An event: an extreme of q ("max", "min"), that nearest to a crank angle, rad, or the farthest of all without.
 
     Or where q is `travel` short of its value at another event, `beside`, before (side −1) or after (+1) it; or a crank
@@ -115,7 +115,7 @@ def event_value(event: str) -> str:
 
 
 OUTPUT_PLACES = "output at events"
-"""What loads call in that read where the output is at events."""
+"""Name by which loads request the position of the output at events."""
 
 
 def output_value(event: str, axis: str) -> str:
@@ -154,7 +154,7 @@ def inside(angle: float, corners: tuple[float, ...]) -> float:
 
 
 class Path(NamedTuple):
-    """Where a point should be: phi: crank angles, rad, none where its timing is free; x, y, m."""
+    """Path that a point should follow; phi: crank angles, rad, none where its timing is free; x, y, m."""
 
     point: str
     phi: tuple[float, ...]
@@ -243,7 +243,7 @@ class LinkageMotion(Motion):
         return rate - reference_rate
 
     def since(self, there: "LinkageMotion") -> Number:
-        """How far the output is from its place in another pose; of an angle as one atan2."""
+        """Travel of the output from its position in another pose; of an angle as one atan2."""
         if self.output.measure != "angle":
             return self.q - there.q
         return self._turned(there.direction)
@@ -262,17 +262,17 @@ class LinkageMotion(Motion):
 
     @lazy
     def q1(self) -> Number:
-        """Its first derivative with respect to φ."""
+        """First derivative of the output with respect to φ."""
         return self.order(1)
 
     @lazy
     def q2(self) -> Number:
-        """Its second derivative."""
+        """Second derivative of the output with respect to φ."""
         return self.order(2)
 
     @lazy
     def q3(self) -> Number:
-        """Its third derivative."""
+        """Third derivative of the output with respect to φ."""
         return self.order(3)
 
 
@@ -284,7 +284,7 @@ class Corner(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """Where the output turns: the crank angle, rad, which way, the output there, and q'' over its largest.
+    """Turning point of the output: the crank angle, rad, its kind, the output there, and q'' over its largest.
 
     rest: the corners of cams at which it comes to rest and leaves it; one twice where it turns at once.
     """
@@ -298,11 +298,13 @@ class Turn(NamedTuple):
     @property
     def rests(self) -> bool:
         """Whether the output stands still there for a while."""
-        return bool(self.rest) and abs(apart(self.rest[1].angle, self.rest[0].angle)) > SAME_ANGLE
+        return bool(self.rest) and abs(angle_difference(self.rest[1].angle, self.rest[0].angle)) > SAME_ANGLE
 
     def away(self, near: float) -> float:
-        """How far it is from a crank angle, rad."""
-        return min(abs(apart(angle, near)) for angle in (self.angle, *(corner.angle for corner in self.rest)))
+        """Distance from a crank angle, rad."""
+        return min(
+            abs(angle_difference(angle, near)) for angle in (self.angle, *(corner.angle for corner in self.rest))
+        )
 
 
 class UnfoundError(ValueError):
@@ -319,12 +321,12 @@ class Linkage(Kinematics):
 
     chain: Chain
     output: Output
-    places: tuple[Place, ...] = ()
+    places: tuple[EventRule, ...] = ()
     path: Path | None = None
 
     @property
     def structure(self) -> Hashable:
-        """What distinguishes its formulas from another's."""
+        """Key of its formulas: linkages with the same key share them."""
         return self.chain, self.output, self.places, self.path
 
     @lazy
@@ -350,10 +352,10 @@ class Linkage(Kinematics):
     def arcs(self) -> tuple[Arcs, ...]:
         """The stretches of each cam, with formulas of their own."""
         return tuple(
-            Arcs(cam_switch(cam), functools.partial(self._cornered, cam), stretch, cam) for cam in self.chain.cams
+            Arcs(cam_switch(cam), functools.partial(self._cam_corners, cam), stretch, cam) for cam in self.chain.cams
         )
 
-    def _cornered(self, cam: Part, maths: Maths, given: Given) -> tuple[Number, ...]:
+    def _cam_corners(self, cam: Part, maths: Maths, given: Given) -> tuple[Number, ...]:
         return self.chain.corners(cam, maths, given.values)
 
     def at(self, maths: Maths, given: Given, phi: Number) -> LinkageMotion:
@@ -380,15 +382,15 @@ class Linkage(Kinematics):
                 values[place.value] = number(maths, given.values, place.angle)
             elif place.hint in given.values:
                 here = given._replace(values={**given.values, **values})
-                values[place.value] = self._followed(maths, here, place)
-        values |= self._nearest(maths, given)
+                values[place.value] = self._event_angle(maths, here, place)
+        values |= self._mean_square_distance(maths, given)
         if OUTPUT_PLACES in called:
             for place in self.places:
                 if place.value in values or place.value in given.values:
-                    values |= self._placed(maths, given._replace(values={**given.values, **values}), place)
+                    values |= self._output_position(maths, given._replace(values={**given.values, **values}), place)
         return values
 
-    def _nearest(self, maths: Maths, given: Given) -> dict[str, Number]:
+    def _mean_square_distance(self, maths: Maths, given: Given) -> dict[str, Number]:
         """Crank angles, rad, at which a point without timing is nearest to the places of its path."""
         path, angles = self.path, dict[str, Number]()
         for k, name in enumerate(path.times if path else ()):
@@ -404,7 +406,7 @@ class Linkage(Kinematics):
                 angles[name] = turning_points.followed(rates, given.values[hint_of(name)])
         return angles
 
-    def _placed(self, maths: Maths, given: Given, place: Place) -> dict[str, Number]:
+    def _output_position(self, maths: Maths, given: Given, place: EventRule) -> dict[str, Number]:
         """Position of the output at an event, by name."""
         pose = self.at_event(maths, given, place.name)
         if self.output.measure != "angle":
@@ -412,7 +414,7 @@ class Linkage(Kinematics):
         seen = pose.direction
         return {output_value(place.name, "x"): seen.x, output_value(place.name, "y"): seen.y}
 
-    def _followed(self, maths: Maths, given: Given, place: Place) -> Number:
+    def _event_angle(self, maths: Maths, given: Given, place: EventRule) -> Number:
         """Crank angle of an event from near which it is: a root, or a corner of a cam."""
         values, rates = given.values, functools.partial(self._rates, maths, given, place)
         if place.corner not in values:
@@ -432,7 +434,7 @@ class Linkage(Kinematics):
         """Crank angles, rad, of the corners of all cams, one cam after the other."""
         return tuple(angle for cam in self.chain.cams for angle in self.chain.corners(cam, maths, given.values))
 
-    def _rates(self, maths: Maths, given: Given, place: Place, phi: Number) -> tuple[Number, Number, Number]:
+    def _rates(self, maths: Maths, given: Given, place: EventRule, phi: Number) -> tuple[Number, Number, Number]:
         """Expression that is zero at an event, with its first two derivatives."""
         pose = self.pose(maths, given, self._there(given, place.name, phi))
         if place.travel is None:
@@ -455,7 +457,7 @@ class Linkage(Kinematics):
             if not place.extreme:
                 angles[place.name] = hints[place.hint] = self._crossing(given, place, angles[place.beside])
                 continue
-            turn = chosen(turns, place)
+            turn = extreme_turn(turns, place)
             angles[place.name] = hints[place.hint] = turn.angle
             if self.chain.cams:
                 corner, turns_beyond = end_of_rest(turn, place), 0
@@ -516,14 +518,14 @@ class Linkage(Kinematics):
                 turns.append(Turn(rest[0].angle, extreme, float(here.q), abs(float(here.q2)) / largest, tuple(rest)))
                 continue
             ends = float(nodes.phi[k]), float(nodes.phi[after]) + (TURN if after < k else 0.0)
-            angle = self._settled(given, ends, (float(slopes[k]), float(slopes[after])))
+            angle = self._turning_angle(given, ends, (float(slopes[k]), float(slopes[after])))
             here = self.at(FLOAT, given, angle)
             turns.append(Turn(angle, extreme, float(here.q), abs(float(here.q2)) / largest))
         return tuple(turns)
 
-    def turn(self, given: Given, place: Place) -> Turn:
+    def turn(self, given: Given, place: EventRule) -> Turn:
         """Turn of the output that an extreme means. Raises UnfoundError."""
-        return chosen(self.turns(given), place)
+        return extreme_turn(self.turns(given), place)
 
     def corner_words(self, corner: Corner) -> str:
         """Sentence on a corner of the cams, such as "the return of follower begins"."""
@@ -560,7 +562,7 @@ class Linkage(Kinematics):
         switch = self.chain.switch(given.values, np.concatenate(middles))
         return Node(np.concatenate(angles), switch), corners
 
-    def _settled(self, given: Given, ends: tuple[float, float], slopes: tuple[float, float]) -> float:
+    def _turning_angle(self, given: Given, ends: tuple[float, float], slopes: tuple[float, float]) -> float:
         """Crank angle, rad, at which the output turns, between two at which its slopes have opposite signs."""
         (low, high), (at_low, at_high) = ends, slopes
         angle = low - at_low * (high - low) / (at_high - at_low)
@@ -574,7 +576,7 @@ class Linkage(Kinematics):
                 break
         return angle
 
-    def _crossing(self, given: Given, place: Place, beside: float) -> float:
+    def _crossing(self, given: Given, place: EventRule, beside: float) -> float:
         """Crank angle at which q is `travel` short of its value at another event: the nearest before or after it."""
         there = self.at(FLOAT, given, beside)
         assert place.travel is not None
@@ -608,7 +610,7 @@ class Linkage(Kinematics):
             )
             for place in free
         ]
-        turning = functools.partial(_rates_of, self, Place("a turn", "max"))
+        turning = functools.partial(_rates_of, self, EventRule("a turn", "max"))
         paths = [
             (event_value(place.beside), event)
             for place, event in zip(free, events, strict=True)
@@ -618,22 +620,22 @@ class Linkage(Kinematics):
             frozenset(place.hint for place in free),
             tuple(events),
             tuple(Followed("a turn of the output", "", turn.angle, turning) for turn in turns),
-            functools.partial(self._sure, turns, float(given.values.get(SWEPT, 0.0))),
+            functools.partial(self._scan_conditions, turns, float(given.values.get(SWEPT, 0.0))),
             tuple(paths),
         )
 
-    def _sure(
+    def _scan_conditions(
         self, turns: Sequence[Turn], swept: float, maths: Maths, given: Given, at: Sequence[Number]
     ) -> list[tuple[str, Number]]:
         """Expressions that are positive where a scan finds the same events as for the design with those turns."""
         conditions: list[tuple[str, Number]] = []
         for place in (place for place in self.places if place.extreme):
-            extreme = chosen(tuple(turns), place)
+            extreme = extreme_turn(tuple(turns), place)
             mine = next(k for k, turn in enumerate(turns) if (turn.extreme, turn.q) == (extreme.extreme, extreme.q))
             others = [k for k, turn in enumerate(turns) if turn.extreme == place.extreme and k != mine]
             text = f"another extreme of the output is {place.name}"
             if place.near is None:
-                angle = chosen(tuple(turns), place).angle
+                angle = extreme_turn(tuple(turns), place).angle
                 moved = at[mine] + (angle - turns[mine].angle)
                 beyond = f"{place.name} passes crank angle 0"
                 conditions += [(beyond, moved - 0.0), (beyond, TURN - moved)]
@@ -641,7 +643,7 @@ class Linkage(Kinematics):
                 q = [self.pose(maths, given, Node(at[k], {})).q for k in (mine, *others)]
                 conditions += [(text, sign * (q[0] - alternative)) for alternative in q[1:]]
                 continue
-            away = [_away(at[k], turns[k].angle, place.near) for k in (mine, *others)]
+            away = [_distance(at[k], turns[k].angle, place.near) for k in (mine, *others)]
             conditions += [(text, alternative - away[0]) for alternative in away[1:]]
             conditions.append((f"{place.name} passes half a turn from near", math.pi - away[0]))
         high, low = extremes(self.places)
@@ -681,7 +683,7 @@ SWEPT = "turn of sweep"
 """The value that makes the crank angle from the first maximum to the first minimum one of a single turn, rad."""
 
 
-def chosen(turns: tuple[Turn, ...], place: Place) -> Turn:
+def extreme_turn(turns: tuple[Turn, ...], place: EventRule) -> Turn:
     """Turn of the output that an extreme means, its angle within half a turn of `near`. Raises."""
     candidates = [turn for turn in turns if turn.extreme == place.extreme]
     if not candidates:
@@ -698,10 +700,10 @@ def chosen(turns: tuple[Turn, ...], place: Place) -> Turn:
     angle = choice.angle if corner is None else corner.angle
     if place.near is None:
         return choice._replace(angle=(angle + SAME_ANGLE) % TURN - SAME_ANGLE)
-    return choice._replace(angle=place.near + apart(angle, place.near))
+    return choice._replace(angle=place.near + angle_difference(angle, place.near))
 
 
-def end_of_rest(turn: Turn, place: Place) -> Corner | None:
+def end_of_rest(turn: Turn, place: EventRule) -> Corner | None:
     """Corner of a cam at which an extreme stands, by the end of the rest that is meant; None at none."""
     if not turn.rest:
         return None
@@ -709,10 +711,10 @@ def end_of_rest(turn: Turn, place: Place) -> Corner | None:
     if place.rest or place.near is None:
         return end if place.rest == "ends" else begin
     near = place.near
-    return min(turn.rest, key=lambda corner: abs(apart(corner.angle, near)))
+    return min(turn.rest, key=lambda corner: abs(angle_difference(corner.angle, near)))
 
 
-def _rates_of(linkage: Linkage, place: Place, maths: Maths, given: Given, phi: Number) -> Sequence[Number]:
+def _rates_of(linkage: Linkage, place: EventRule, maths: Maths, given: Given, phi: Number) -> Sequence[Number]:
     """Expression that is zero at an extreme or a travel, and its slope."""
     pose = linkage.pose(maths, given, Node(phi, {}))
     if place.travel is None:
@@ -720,19 +722,19 @@ def _rates_of(linkage: Linkage, place: Place, maths: Maths, given: Given, phi: N
     return pose.since(linkage.at_event(maths, given, place.beside)) + number(maths, given.values, place.travel), pose.q1
 
 
-def _away(at: Number, angle: float, near: float) -> Number:
-    """How far a turn near an angle, rad, is from another one."""
-    nearest = apart(angle, near)
+def _distance(at: Number, angle: float, near: float) -> Number:
+    """Distance of a turning point near an angle from another angle, rad."""
+    nearest = angle_difference(angle, near)
     off = at - angle + nearest
     return off if nearest >= 0 else -off
 
 
-def apart(angle: float, reference: float) -> float:
+def angle_difference(angle: float, reference: float) -> float:
     """Angle from another, rad, within half a turn."""
     return (angle - reference + math.pi) % TURN - math.pi
 
 
-def extremes(places: tuple[Place, ...]) -> tuple[str, str]:
+def extremes(places: tuple[EventRule, ...]) -> tuple[str, str]:
     """First event that is a maximum of q, and the first that is a minimum; "" without."""
     return tuple(next((p.name for p in places if p.extreme == kind), "") for kind in ("max", "min"))  # type: ignore[return-value]
 
@@ -771,7 +773,7 @@ def _angle(event: str, at: Instant) -> Number:
 
 
 class Reach(NamedTuple):
-    """How far a joint reaches along x or y; sign: +1 for the largest, −1 for the least coordinate."""
+    """Reach of a joint along x or y; sign: +1 for the largest, −1 for the least coordinate."""
 
     joint: str
     axis: str
@@ -788,7 +790,7 @@ class Reach(NamedTuple):
         return coordinate if self.sign > 0 else -coordinate
 
 
-def _travelled(window: Window, at: Instant) -> Number:
+def _window_travel(window: Window, at: Instant) -> Number:
     return at.node.switch[window.switch] * at.pose.since(_at(at, window.level))
 
 
@@ -799,14 +801,14 @@ def _square(a: Vector, x: Number, y: Number) -> Number:
     return (a.x - x) ** 2 + (a.y - y) ** 2
 
 
-def _missed(path: Path, at: Instant) -> Number:
+def _square_distance(path: Path, at: Instant) -> Number:
     """Square of the distance of the point from where it should be at a place of the table, m²."""
     place = at.node.switch["datum"]
     x, y = (at.maths.choose(place, [at.maths.number(v) for v in values]) for values in (path.x, path.y))
     return _square(at.pose.joints.joints[path.point].place, x, y)
 
 
-def _nearest(path: Path, at: Instant) -> Number:
+def _mean_square_distance(path: Path, at: Instant) -> Number:
     """Mean square of the distances at crank angles of the design's own, m²."""
     total = 0
     for name, x, y in zip(path.times, path.x, path.y, strict=True):
@@ -816,7 +818,7 @@ def _nearest(path: Path, at: Instant) -> Number:
 
 
 def _root(path: Path, at: Instant) -> Number:
-    return at.maths.sqrt(_nearest(path, at))
+    return at.maths.sqrt(_mean_square_distance(path, at))
 
 
 MOTION = {
@@ -848,7 +850,7 @@ def model(
         means.append(Integral(TORQUE_SQUARE, RMS_TORQUE, "torque_square", parts=1 if parted else SMOOTH))
     quantities |= {reach.name: CycleQuantity(reach.value, figure=False, signed=True) for reach in reaches}
     for window in windows:
-        quantities[f"travel.{window.name}"] = CycleQuantity(functools.partial(_travelled, window))
+        quantities[f"travel.{window.name}"] = CycleQuantity(functools.partial(_window_travel, window))
     for name, event in linkage.loads.items():
         rows[f"angle.{event}"] = DesignRow(functools.partial(_angle, event))
         rows[name] = DesignRow(operator.attrgetter("force"), event=event)
@@ -858,11 +860,11 @@ def model(
         rows["sweep"] = DesignRow(functools.partial(_sweep, high, low))
     path = linkage.path
     if path and path.phi:
-        quantities["path_square"] = CycleQuantity(functools.partial(_missed, path), figure=False)
+        quantities["path_square"] = CycleQuantity(functools.partial(_square_distance, path), figure=False)
         places = tuple(map(float, range(len(path.phi))))
         means.append(Integral(PATH_SQUARE, PATH, "path_square", angles=path.phi, data=places))
     elif path:
-        rows[PATH_SQUARE] = DesignRow(functools.partial(_nearest, path))
+        rows[PATH_SQUARE] = DesignRow(functools.partial(_mean_square_distance, path))
         rows[PATH] = DesignRow(functools.partial(_root, path))
     arcs = tuple(window.arcs() for window in windows)
     return JobModel(linkage, effects, words, quantities, rows, arcs, tuple(means), known=known)

@@ -21,7 +21,7 @@ DwellAngle = Annotated[float, Quantity("angle", least=0, below=2 * math.pi)]
 
 Json = dict[str, Any]
 Kind = Any
-"""What a number may be: an annotated float of `base.quantities`."""
+"""Type of a number: an annotated float of `base.quantities`."""
 Used = dict[str, tuple[Kind, str]]
 """Numbers of [mechanism] by name, in the order of their first use: what each may be, and what it is in words."""
 
@@ -30,7 +30,7 @@ MOST_PARTS, LONGEST_NAME = 100, 40
 _NAME = re.compile(r"[^\W\d_]\w*")
 
 
-class Number(NamedTuple):
+class NumberKey(NamedTuple):
     """A number of a table; kind: what it may be; needed: always.
 
     text: what it is in words, {} for the table's name, {key} for another word of the table.
@@ -41,7 +41,7 @@ class Number(NamedTuple):
     needed: bool = False
 
 
-class Word(NamedTuple):
+class WordKey(NamedTuple):
     """A word of a part; sort: what it names, a key of _SORTS; needed: always."""
 
     sort: str
@@ -54,72 +54,72 @@ ONE_LINK, TWO_LINKS, LEFT_RIGHT, AHEAD_BEHIND = "one link", "two links", "left o
 SLIDE, EVENT, ANGLE = "slider or slot", "event", "angle"
 SENSE, EXTREME, REST = "sense", "extreme", "end of a rest"
 SENSES = {"forward": 1, "backward": -1, "counter-clockwise": 1, "clockwise": -1}
-Keys = Mapping[str, Word | Number]
-"""What a table may hold, in the order shown."""
+Keys = Mapping[str, WordKey | NumberKey]
+"""Keys of a table, in the order shown."""
 
 _TURNING: Keys = {
-    "at": Word(JOINT, True),
-    "pin": Word(NEW_JOINT),
-    "length": Number(PositiveLength, "length of {}"),
+    "at": WordKey(JOINT, True),
+    "pin": WordKey(NEW_JOINT),
+    "length": NumberKey(PositiveLength, "length of {}"),
 }
 KEYS: Mapping[str, Keys] = {
-    "pivot": {"x": Number(Coordinate, "x of pivot {}"), "y": Number(Coordinate, "y of pivot {}")},
+    "pivot": {"x": NumberKey(Coordinate, "x of pivot {}"), "y": NumberKey(Coordinate, "y of pivot {}")},
     "crank": {
         **_TURNING,
-        "start": Number(Angle, "angle of crank {} at crank angle 0"),
-        "ratio": Word(WHOLE_RATIO),
+        "start": NumberKey(Angle, "angle of crank {} at crank angle 0"),
+        "ratio": WordKey(WHOLE_RATIO),
     },
     "dyad": {
-        "joins": Word(PAIR, True),
-        "pin": Word(NEW_JOINT, True),
-        "side": Word(LEFT_RIGHT, True),
-        "links": Word(TWO_LINKS, True),
+        "joins": WordKey(PAIR, True),
+        "pin": WordKey(NEW_JOINT, True),
+        "side": WordKey(LEFT_RIGHT, True),
+        "links": WordKey(TWO_LINKS, True),
     },
     "slider": {
-        "from": Word(JOINT, True),
-        "through": Word(JOINT, True),
-        "guide": Word(LINK),
-        "direction": Number(Angle, "direction of the guide of {}"),
-        "offset": Number(Coordinate, "guide of {} to the left of its joint"),
-        "side": Word(AHEAD_BEHIND, True),
-        "pin": Word(NEW_JOINT, True),
-        "links": Word(ONE_LINK, True),
+        "from": WordKey(JOINT, True),
+        "through": WordKey(JOINT, True),
+        "guide": WordKey(LINK),
+        "direction": NumberKey(Angle, "direction of the guide of {}"),
+        "offset": NumberKey(Coordinate, "guide of {} to the left of its joint"),
+        "side": WordKey(AHEAD_BEHIND, True),
+        "pin": WordKey(NEW_JOINT, True),
+        "links": WordKey(ONE_LINK, True),
     },
     "slot": {
-        "at": Word(JOINT, True),
-        "through": Word(JOINT, True),
-        "link": Word(NEW_LINK, True),
-        "offset": Number(Coordinate, "slot of {} to the left of its joint"),
-        "pin": Word(NEW_JOINT),
-        "length": Number(PositiveLength, "pin of {} from its joint"),
+        "at": WordKey(JOINT, True),
+        "through": WordKey(JOINT, True),
+        "link": WordKey(NEW_LINK, True),
+        "offset": NumberKey(Coordinate, "slot of {} to the left of its joint"),
+        "pin": WordKey(NEW_JOINT),
+        "length": NumberKey(PositiveLength, "pin of {} from its joint"),
     },
     "point": {
-        "on": Word(LINK, True),
-        "radius": Number(PositiveLength, "distance of point {} from its link's first joint"),
-        "angle": Number(Angle, "angle of point {} from its link's line"),
-        "along": Number(Coordinate, "place of point {} along its link's line"),
-        "across": Number(Coordinate, "place of point {} to the left of its link's line"),
+        "on": WordKey(LINK, True),
+        "radius": NumberKey(PositiveLength, "distance of point {} from its link's first joint"),
+        "angle": NumberKey(Angle, "angle of point {} from its link's line"),
+        "along": NumberKey(Coordinate, "place of point {} along its link's line"),
+        "across": NumberKey(Coordinate, "place of point {} to the left of its link's line"),
     },
     "gear": {
         **_TURNING,
-        "with": Word(LINK, True),
-        "carrier": Word(LINK),
-        "ratio": Word(RATIO, True),
-        "start": Number(Angle, "angle of gear {} where its mate stands at zero"),
-        "zero": Number(Angle, "angle of the mate of gear {} from which it counts"),
+        "with": WordKey(LINK, True),
+        "carrier": WordKey(LINK),
+        "ratio": WordKey(RATIO, True),
+        "start": NumberKey(Angle, "angle of gear {} where its mate stands at zero"),
+        "zero": NumberKey(Angle, "angle of the mate of gear {} from which it counts"),
     },
     "cam": {
         **_TURNING,
-        "law": Word(LAW, True),
-        "start": Number(Angle, "angle of cam follower {} in its lower dwell"),
-        "lift": Number(Angle, "angle by which cam follower {} rises", True),
-        "begins": Number(Angle, "crank angle where cam follower {} begins to rise"),
-        "rise": Number(PositiveAngle, "crank angle over which cam follower {} rises", True),
-        "far_dwell": Number(DwellAngle, "crank angle over which cam follower {} stays up"),
-        "return": Number(PositiveAngle, "crank angle over which cam follower {} returns", True),
+        "law": WordKey(LAW, True),
+        "start": NumberKey(Angle, "angle of cam follower {} in its lower dwell"),
+        "lift": NumberKey(Angle, "angle by which cam follower {} rises", True),
+        "begins": NumberKey(Angle, "crank angle where cam follower {} begins to rise"),
+        "rise": NumberKey(PositiveAngle, "crank angle over which cam follower {} rises", True),
+        "far_dwell": NumberKey(DwellAngle, "crank angle over which cam follower {} stays up"),
+        "return": NumberKey(PositiveAngle, "crank angle over which cam follower {} returns", True),
     },
 }
-"""What each kind of part may hold, in the order shown."""
+"""Keys of each kind of part, in the order shown."""
 
 # Names and numbers, for the scene's other tables too.
 
@@ -190,7 +190,7 @@ class Numbers:
 
 
 class Sort(NamedTuple):
-    """What a word may be: read(cursor) returns it or raises BadInput; schema() returns its JSON Schema."""
+    """Sort of a word: read(cursor) returns it or raises BadInput; schema() returns its JSON Schema."""
 
     read: Callable[[Cursor], Any]
     schema: Callable[[], Json]
@@ -241,7 +241,7 @@ def _links(count: int, example: str) -> Sort:
         return tuple(_new_name(cursor.at(name)._replace(raw=name)) for name in cursor.raw)
 
     def schema() -> Json:
-        lengths = number_schema(Number(PositiveLength, "its length"))
+        lengths = number_schema(NumberKey(PositiveLength, "its length"))
         ends: Json = {"minProperties": count, "maxProperties": count}
         return {"type": "object", "additionalProperties": lengths, "propertyNames": NAME_SCHEMA, **ends}
 
@@ -264,7 +264,7 @@ def _whole_ratio(cursor: Cursor) -> int:
     return ratio
 
 
-def number_schema(number: Number) -> Json:
+def number_schema(number: NumberKey) -> Json:
     """JSON Schema of a number of the linkage: a quantity, or the name of a number of [mechanism]."""
     quantity = number.kind.__metadata__[0].schema()
     name: Json = {"type": "string", "pattern": r"^[ \t]*-?[ \t]*[^\s\d+.-]"}
@@ -306,7 +306,7 @@ _SORTS: Mapping[str, Sort] = {
 def keys_schema(known: Keys, kind: str = "") -> Json:
     """JSON Schema of a table that holds these keys and no others; kind: of a part."""
     schemas = {
-        key: number_schema(entry) if isinstance(entry, Number) else _SORTS[entry.sort].schema()
+        key: number_schema(entry) if isinstance(entry, NumberKey) else _SORTS[entry.sort].schema()
         for key, entry in known.items()
     }
     properties: Json = {"kind": {"const": kind}, **schemas} if kind else schemas
@@ -330,14 +330,14 @@ def schema() -> Json:
     return {"type": "object", "additionalProperties": part, **names}
 
 
-class Entries(NamedTuple):
-    """What a table holds: its words by key, and its numbers by key (of a link by its name), both in its order."""
+class TableEntries(NamedTuple):
+    """Entries of a table: its words by key, and its numbers by key (of a link by its name), both in its order."""
 
     words: Mapping[str, Any]
     numbers: Mapping[str, Ref]
 
 
-def entries(cursor: Cursor, known: Keys, numbers: Numbers, of: str = "", name: str = "") -> Entries:
+def entries(cursor: Cursor, known: Keys, numbers: Numbers, of: str = "", name: str = "") -> TableEntries:
     """Words and numbers of a table. Raises BadInput with all mistakes.
 
     known: the keys that it may hold; numbers: those of [mechanism]; of: what the table is, in words; name: its name.
@@ -348,14 +348,14 @@ def entries(cursor: Cursor, known: Keys, numbers: Numbers, of: str = "", name: s
     for key in strange:
         cursor.faults.add(table[key].unknown(f"key of {of}" if of else "key", key, known, given=table))
     near = {nearest(key, known, table) for key in strange}
-    texts = {key: text_of(table[key].raw if key in table else "") for key in known if isinstance(known[key], Word)}
+    texts = {key: text_of(table[key].raw if key in table else "") for key in known if isinstance(known[key], WordKey)}
     for key, sort in known.items():
         if key not in table:
             if sort.needed and key not in near:
                 cursor.faults.add(cursor.at(key).fault(f"{of or 'the table'} needs {key}", remedy="Add it", grade=GAP))
             continue
         with cursor.faults:
-            if isinstance(sort, Number):
+            if isinstance(sort, NumberKey):
                 read[key] = numbers.read(table[key], sort.kind, sort.text.format(name, **texts))
             else:
                 words[key] = _SORTS[sort.sort].read(table[key])
@@ -364,7 +364,7 @@ def entries(cursor: Cursor, known: Keys, numbers: Numbers, of: str = "", name: s
                 with cursor.faults:
                     read[link] = numbers.read(length, PositiveLength, f"length of {link}")
     cursor.faults.tell()
-    return Entries(words, read)
+    return TableEntries(words, read)
 
 
 # One part.
@@ -454,7 +454,7 @@ def _name_faults(cursor: Cursor, parts: Sequence[Part]) -> Iterator[BadInput]:
         for sort, new_names in (("joint", chain.joints_of(part)), ("link", chain.links_of(part))):
             for name in new_names:
                 if name in placed:
-                    yield _twice(place, name, sort, part, *placed[name])
+                    yield _double_name(place, name, sort, part, *placed[name])
                 else:
                     placed[name] = part.name, sort
         for sort, names, known, others in (
@@ -478,7 +478,7 @@ def _name_faults(cursor: Cursor, parts: Sequence[Part]) -> Iterator[BadInput]:
         yield cursor.fault("there are no parts", remedy="Add a pivot, a crank and a dyad", grade=GAP)
 
 
-def _twice(cursor: Cursor, name: str, sort: str, part: Part, first: str, before: str) -> BadInput:
+def _double_name(cursor: Cursor, name: str, sort: str, part: Part, first: str, before: str) -> BadInput:
     """Mistake of a name that two parts place; first: the other part; before: what it places, a joint or a link."""
     if before != sort:
         return cursor.fault(f"{name} is the name of a {before} and of a {sort}", remedy="Rename one")
@@ -491,7 +491,7 @@ def _twice(cursor: Cursor, name: str, sort: str, part: Part, first: str, before:
 def _key_of(part: Part, name: str) -> str:
     if name in part.names("joins"):
         return "joins"
-    keys = (key for key, entry in KEYS[part.kind].items() if isinstance(entry, Word) and part.word(key) == name)
+    keys = (key for key, entry in KEYS[part.kind].items() if isinstance(entry, WordKey) and part.word(key) == name)
     return next(keys, "kind")
 
 
@@ -501,14 +501,14 @@ def _chain(cursor: Cursor, parts: Sequence[Part]) -> Chain:
     while waiting:
         ready = next((part for part in waiting if known.issuperset(chain.wants(part))), None)
         if ready is None:
-            raise _waiting(cursor, waiting, known)
+            raise _cycle_fault(cursor, waiting, known)
         known.update(chain.provides(ready))
         order.append(ready)
         waiting.remove(ready)
     return Chain(tuple(order))
 
 
-def _waiting(cursor: Cursor, waiting: Sequence[Part], known: Collection[str]) -> BadInput:
+def _cycle_fault(cursor: Cursor, waiting: Sequence[Part], known: Collection[str]) -> BadInput:
     """Mistake of parts that wait for each other, without those that only wait for them."""
     while True:
         wanted = {name for part in waiting for name in chain.wants(part)}

@@ -21,7 +21,7 @@ from loomopt.jobs.linkage.model import (
     Linkage,
     Path,
 )
-from loomopt.jobs.linkage.scene import TargetTable, path, reaches, reading
+from loomopt.jobs.linkage.scene import LinkageTarget, path, reaches, read_tables
 from loomopt.maths.systems import FLOAT
 from loomopt.model.axes import opposing
 from loomopt.model.limits import CycleLimit, DesignLimit, Limit
@@ -35,7 +35,7 @@ from loomopt.scenes.scene import Scene
 
 def model(scene: Scene, target: str = "") -> JobModel:
     """Linkage with the effects the scene calls for; target: whose path its point should follow."""
-    known = reading(scene.document)
+    known = read_tables(scene.document)
     pathed = path(scene, target)
     linkage = replace(known.linkage, path=pathed) if pathed else known.linkage
     names = frozenset(numbers(scene))
@@ -74,15 +74,15 @@ class LinkageTask(Task):
         return model
 
     @property
-    def table(self) -> TargetTable:
+    def table(self) -> LinkageTarget:
         """The target's own table."""
         table = self.scene.targets[self.target]
-        assert isinstance(table, TargetTable)
+        assert isinstance(table, LinkageTarget)
         return table
 
     @property
     def levels(self) -> tuple[tuple[str, str], ...]:
-        """What the target seeks in order, each with its end; the default target's where there is no table."""
+        """Figures of the target in order, each with "least" or "most"; the default target's where there is no table."""
         if not self.target:
             return ()
         return self.table.sought or ((("peak_torque", "least"),) if self.target == "torque" else ())
@@ -153,7 +153,7 @@ class LinkageTask(Task):
         """Target's levels in order."""
         return *(self.level(name, sense) for name, sense in self.levels), *self.least()
 
-    def held(self) -> tuple[Objective, ...]:
+    def higher_levels(self) -> tuple[Objective, ...]:
         """Levels before the first that is traded: what the target demands before it weighs anything."""
         before = itertools.takewhile(lambda level: level[0] not in self.traded, self.levels[:-1])
         return tuple(self.level(name, sense) for name, sense in before)

@@ -1,4 +1,4 @@
-"""What a linkage scene may hold: it follows from its own parts, output, events, windows and targets."""
+"""Schema of a linkage scene: it follows from the parts, output, events, windows and targets of the scene."""
 
 import functools
 import json
@@ -19,19 +19,19 @@ from loomopt.jobs.linkage.model import (
     RMS_TORQUE,
     SCAN,
     TORQUE_SQUARE,
+    EventRule,
     Linkage,
     Output,
     Path,
-    Place,
     Reach,
     Turn,
     UnfoundError,
     Window,
-    chosen,
+    extreme_turn,
     extremes,
     number,
 )
-from loomopt.jobs.linkage.parts import KEYS, SENSES, Json, Number, Numbers, Word
+from loomopt.jobs.linkage.parts import KEYS, SENSES, Json, NumberKey, Numbers, WordKey
 from loomopt.maths import systems
 from loomopt.model import drive
 from loomopt.physics.balance import Given
@@ -39,8 +39,7 @@ from loomopt.physics.cycle import Node
 from loomopt.physics.effects import kinds
 from loomopt.physics.mechanisms import chain, chain_forces
 from loomopt.physics.mechanisms.chain import Chain
-from loomopt.physics.schema import DIGITS, Axis, Figure, Name, Table, Target
-from loomopt.physics.schema import TargetTable as AnyTarget
+from loomopt.physics.schema import DIGITS, Axis, Figure, Name, Table, Target, TargetTable
 from loomopt.scenes import csv_tables
 from loomopt.scenes.cursor import Cursor
 from loomopt.scenes.scene import Scene, cursor
@@ -48,12 +47,12 @@ from loomopt.scenes.tables import SceneSchema
 
 
 class Operation(Table):
-    """What the machine does."""
+    """Operation of the machine."""
 
     speed: Speed | None = Field(None, description="speed of the crank")
 
 
-class TargetTable(AnyTarget):
+class LinkageTarget(TargetTable):
     """A target of the scene's own: figures that are sought one after the other, or a path."""
 
     least: tuple[Name, ...] = Field((), description="figures or numbers of which the least is sought, in order")
@@ -66,7 +65,7 @@ class TargetTable(AnyTarget):
 
     @property
     def sought(self) -> tuple[tuple[str, str], ...]:
-        """What is sought in order, each with its end."""
+        """Figures to optimise, in order, each with "least" or "most"."""
         path = ((PATH, "least"),) if self.point else ()
         return (*path, *((name, "least") for name in self.least), *((name, "most") for name in self.most))
 
@@ -80,27 +79,27 @@ FORMS = {"angle": "link", "slide": "slider or slot", "x": "joint", "y": "joint"}
 """Key of [output] → what it measures."""
 SCALE, TRAVEL = "what the output is multiplied by", "travel between {} and {before}{after}"
 OUTPUT_KEYS: parts.Keys = {
-    **{form: Word(what) for form, what in FORMS.items()},
-    "against": Word(parts.LINK),
-    "sense": Word(parts.SENSE),
-    "scale": Number(PositiveNumber, SCALE),
-    "zero": Number(Angle, "direction from which the output counts"),
+    **{form: WordKey(what) for form, what in FORMS.items()},
+    "against": WordKey(parts.LINK),
+    "sense": WordKey(parts.SENSE),
+    "scale": NumberKey(PositiveNumber, SCALE),
+    "zero": NumberKey(Angle, "direction from which the output counts"),
 }
 EVENT_KEYS: Mapping[str, parts.Keys] = {
-    "extreme": {"extreme": Word(parts.EXTREME, True), "near": Word(parts.ANGLE), "rest": Word(parts.REST)},
+    "extreme": {"extreme": WordKey(parts.EXTREME, True), "near": WordKey(parts.ANGLE), "rest": WordKey(parts.REST)},
     "travel": {
-        "travel": Number(parts.PositiveAngle, TRAVEL, True),
-        "before": Word(parts.EVENT),
-        "after": Word(parts.EVENT),
+        "travel": NumberKey(parts.PositiveAngle, TRAVEL, True),
+        "before": WordKey(parts.EVENT),
+        "after": WordKey(parts.EVENT),
     },
-    "angle": {"angle": Number(Angle, "crank angle of {}", True)},
+    "angle": {"angle": NumberKey(Angle, "crank angle of {}", True)},
 }
-"""What an event may hold, by the key that says what it is."""
+"""Keys of an event, by the key that gives its kind."""
 WINDOW_KEYS: parts.Keys = {
-    "after": Word(parts.EVENT, True),
-    "begins": Number(Angle, "crank angle from {after} where window {} begins", True),
-    "ends": Number(Angle, "crank angle from {after} where window {} ends", True),
-    "level": Word(parts.EVENT, True),
+    "after": WordKey(parts.EVENT, True),
+    "begins": NumberKey(Angle, "crank angle from {after} where window {} begins", True),
+    "ends": NumberKey(Angle, "crank angle from {after} where window {} ends", True),
+    "level": WordKey(parts.EVENT, True),
 }
 
 
@@ -108,13 +107,13 @@ def _output_schema() -> Json:
     """JSON Schema of [output]."""
     one_form: Json = {"oneOf": [{"required": [form]} for form in FORMS]}
     table_schema = parts.keys_schema(OUTPUT_KEYS)
-    scale = [parts.number_schema(Number(kind, SCALE)) for kind in (PositiveNumber, PositiveLength)]
+    scale = [parts.number_schema(NumberKey(kind, SCALE)) for kind in (PositiveNumber, PositiveLength)]
     return table_schema | one_form | {"properties": table_schema["properties"] | {"scale": {"anyOf": scale}}}
 
 
 def _events_schema() -> Json:
     """JSON Schema of [events]."""
-    lengths = {**EVENT_KEYS["travel"], "travel": Number(PositiveLength, TRAVEL, True)}
+    lengths = {**EVENT_KEYS["travel"], "travel": NumberKey(PositiveLength, TRAVEL, True)}
     forms = [parts.keys_schema(keys) for keys in (*EVENT_KEYS.values(), lengths)]
     return {"type": "object", "propertyNames": parts.NAME_SCHEMA, "additionalProperties": {"anyOf": forms}}
 
@@ -141,15 +140,15 @@ def _table_schema(name: str) -> Json:
     return {"description": text, **schema()}
 
 
-class Reading(NamedTuple):
-    """What the scene's own tables say; numbers: name → kind of quantity and words, in the scene's order."""
+class LinkageScene(NamedTuple):
+    """Contents of the scene's tables; numbers: name → kind of quantity and words, in the scene's order."""
 
     linkage: Linkage
     numbers: Mapping[str, tuple[Any, str]]
     windows: tuple[Window, ...] = ()
 
 
-Known = Mapping[str, Place]
+Known = Mapping[str, EventRule]
 
 
 def _output(cursor: Cursor, linked: Chain, numbers: Numbers) -> Output:
@@ -160,7 +159,7 @@ def _output(cursor: Cursor, linked: Chain, numbers: Numbers) -> Output:
         raise cursor.fault(problem, remedy='Such as angle = "rocker", slide = "ram" or y = "P"')
     form = forms[0]
     kind, slides_now = _scale(raw.get("scale", ""), form, numbers.names)
-    read = parts.entries(cursor, {**OUTPUT_KEYS, "scale": Number(kind, SCALE)}, numbers)
+    read = parts.entries(cursor, {**OUTPUT_KEYS, "scale": NumberKey(kind, SCALE)}, numbers)
     joints, links, slides = parts.kinds_of(linked)
     name = _one_of(cursor.at(form), {"angle": links, "slide": slides}.get(form, joints), FORMS[form])
     for key in ("against", "zero"):
@@ -201,9 +200,9 @@ def _scale(raw: object, form: str, names: Mapping[str, object]) -> tuple[Any, bo
     return PositiveLength, True
 
 
-def _places(cursor: Cursor, numbers: Numbers, output: Output) -> tuple[Place, ...]:
-    places: dict[str, Place] = {}
-    travel = Number(PositiveLength if output.slides else parts.PositiveAngle, TRAVEL, True)
+def _places(cursor: Cursor, numbers: Numbers, output: Output) -> tuple[EventRule, ...]:
+    places: dict[str, EventRule] = {}
+    travel = NumberKey(PositiveLength if output.slides else parts.PositiveAngle, TRAVEL, True)
     forms = {**EVENT_KEYS, "travel": {**EVENT_KEYS["travel"], "travel": travel}}
     for name, place in cursor.entries().items():
         table = place.table()
@@ -218,11 +217,11 @@ def _places(cursor: Cursor, numbers: Numbers, output: Output) -> tuple[Place, ..
         else:
             extreme = read.words.get("extreme", "")
             rest, near = read.words.get("rest", ""), read.words.get("near")
-            places[name] = Place(name, extreme, near, angle=read.numbers.get("angle"), rest=rest)
+            places[name] = EventRule(name, extreme, near, angle=read.numbers.get("angle"), rest=rest)
     return tuple(places.values())
 
 
-def _travel(cursor: Cursor, name: str, read: parts.Entries, known: Known) -> Place:
+def _travel(cursor: Cursor, name: str, read: parts.TableEntries, known: Known) -> EventRule:
     sides = [side for side in ("before", "after") if side in read.words]
     if len(sides) != 1:
         raise cursor.fault("a travel lies before or after another event", remedy='Such as before = "bottom"')
@@ -231,10 +230,10 @@ def _travel(cursor: Cursor, name: str, read: parts.Entries, known: Known) -> Pla
     if known[beside].extreme != "max":
         problem = f"a travel is short of a maximum of the output, and {beside} is none"
         raise side.fault(problem, remedy="Name an event with extreme = max")
-    return Place(name, travel=read.numbers["travel"], beside=beside, side=-1 if sides[0] == "before" else 1)
+    return EventRule(name, travel=read.numbers["travel"], beside=beside, side=-1 if sides[0] == "before" else 1)
 
 
-def _windows(cursor: Cursor, numbers: Numbers, places: Sequence[Place]) -> tuple[Window, ...]:
+def _windows(cursor: Cursor, numbers: Numbers, places: Sequence[EventRule]) -> tuple[Window, ...]:
     known, windows = [place.name for place in places], []
     for name, place in cursor.entries().items():
         place.table()
@@ -246,7 +245,7 @@ def _windows(cursor: Cursor, numbers: Numbers, places: Sequence[Place]) -> tuple
 
 
 @functools.lru_cache(maxsize=64)
-def _read(text: str) -> Reading:
+def _read(text: str) -> LinkageScene:
     scene = Cursor({"mechanism": {}} | json.loads(text), "", Faults())
     mechanism = scene.at("mechanism").table()
     numbers = Numbers(mechanism)
@@ -260,10 +259,10 @@ def _read(text: str) -> Reading:
         parts.check_name(place, name)
         if name not in numbers.uses:
             raise place.fault(f"nothing uses the number {name}", remedy="Use it, or take it out")
-    return Reading(Linkage(linked, output, places), {name: numbers.uses[name] for name in mechanism}, windows)
+    return LinkageScene(Linkage(linked, output, places), {name: numbers.uses[name] for name in mechanism}, windows)
 
 
-def reading(document: Mapping[str, Any]) -> Reading:
+def read_tables(document: Mapping[str, Any]) -> LinkageScene:
     """Contents of the tables that only linkage scenes have. Raises BadInput."""
     return _read(json.dumps({name: document.get(name, {}) for name in OWN}, default=repr))
 
@@ -278,7 +277,7 @@ def reaches(document: Mapping[str, Any], linked: Chain) -> tuple[Reach, ...]:
     for name in REACHES:
         joint_limits = limits.get(name) if isinstance(limits, Mapping) else None
         named += [f"{name}.{joint}" for joint in joint_limits] if isinstance(joint_limits, Mapping) else []
-    named += _sought(document, "least", "most")
+    named += _target_names(document, "least", "most")
     joints = parts.kinds_of(linked)[0]
     possible = {
         reach.name: reach
@@ -288,7 +287,7 @@ def reaches(document: Mapping[str, Any], linked: Chain) -> tuple[Reach, ...]:
     return tuple(possible[name] for name in dict.fromkeys(named) if name in possible)
 
 
-def figures(known: Reading, document: Mapping[str, Any]) -> dict[str, Figure]:
+def figures(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Figure]:
     """Figures of a linkage."""
     linkage, slides = known.linkage, known.linkage.output.slides
     travel, load = ("length", "force") if slides else ("angle", "torque")
@@ -310,19 +309,19 @@ def figures(known: Reading, document: Mapping[str, Any]) -> dict[str, Figure]:
     for reach in reaches(document, linkage.chain):
         side, text = ("max", "largest") if reach.sign > 0 else ("min", "least")
         figure_list.append(Figure(reach.name, "length", f"{text} {reach.axis} of {reach.joint}", sides=(side,)))
-    if _pathed(document):
+    if _has_path(document):
         figure_list.append(Figure(PATH, "length", "rms distance of the point from its path", sides=("max",)))
     return {figure.name: figure for figure in figure_list}
 
 
-def _pathed(document: Mapping[str, Any]) -> bool:
+def _has_path(document: Mapping[str, Any]) -> bool:
     targets = document.get("targets", {})
     return isinstance(targets, Mapping) and any(
         isinstance(table, Mapping) and table.get("point") is not None for table in targets.values()
     )
 
 
-def axes(known: Reading, document: Mapping[str, Any]) -> dict[str, Axis]:
+def axes(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Axis]:
     """Axes that are read otherwise than under their own name."""
     load = "force" if known.linkage.output.slides else "torque"
     axis_list = [
@@ -337,20 +336,20 @@ def axes(known: Reading, document: Mapping[str, Any]) -> dict[str, Axis]:
         ),
         *(Axis(name, load, form="magnitude", senses=("least",)) for name in known.linkage.loads),
     ]
-    if _pathed(document):
+    if _has_path(document):
         axis_list.append(Axis(PATH, "length", ("path_mean_square",), senses=("least",), power=2))
     # A number of which a target seeks the most is worth its most where it is traded, too.
-    most = dict.fromkeys(name for name in _sought(document, "most") if name in known.numbers)
+    most = dict.fromkeys(name for name in _target_names(document, "most") if name in known.numbers)
     axis_list += [Axis(name, _kind(known, name), senses=("most", "least")) for name in most]
     return {axis.name: axis for axis in axis_list}
 
 
-def _kind(known: Reading, name: str) -> str:
+def _kind(known: LinkageScene, name: str) -> str:
     """Kind of quantity of a number."""
     return str(known.numbers[name][0].__metadata__[0].kind)
 
 
-def _sought(document: Mapping[str, Any], *ends: str) -> Iterator[str]:
+def _target_names(document: Mapping[str, Any], *ends: str) -> Iterator[str]:
     """Yield the figures and numbers of which targets seek the least, or the most."""
     targets = document.get("targets", {})
     for table in targets.values() if isinstance(targets, Mapping) else ():
@@ -369,7 +368,7 @@ def targets(document: Mapping[str, Any]) -> dict[str, Target]:
         for key in ("least", "most"):
             names = entry.get(key, ())
             goals += [f"{key} {figure}" for figure in names] if isinstance(names, list | tuple) else []
-        targets[name] = Target(name, ", then ".join(goals) or "nothing", TargetTable)
+        targets[name] = Target(name, ", then ".join(goals) or "nothing", LinkageTarget)
     return targets
 
 
@@ -393,7 +392,7 @@ def schema(document: Mapping[str, Any]) -> SceneSchema:
 @functools.lru_cache(maxsize=64)
 def _schema(text: str) -> SceneSchema:
     document = json.loads(text)
-    known = reading(document)
+    known = read_tables(document)
     fields = {name: (kind, Field(description=words)) for name, (kind, words) in known.numbers.items()}
     mechanism = create_model("Mechanism", __base__=Table, __module__=__name__, **fields)  # type: ignore[call-overload]
     scene_targets = targets(document)
@@ -403,7 +402,7 @@ def _schema(text: str) -> SceneSchema:
         title="a planar linkage of one's own, described in the scene",
         operation=Operation,
         mechanism=mechanism,
-        effects={name: _fitted(effect, known.linkage) for name, effect in effects.items()},
+        effects={name: _linkage_effect(effect, known.linkage) for name, effect in effects.items()},
         variables={name: _kind(known, name) for name in known.numbers},
         own_figures=figures(known, document),
         targets=scene_targets,
@@ -421,7 +420,7 @@ def former_names(linkage: Linkage) -> dict[str, str]:
     return {} if linkage.output.slides else {f"force.{event}": name for name, event in linkage.loads.items()}
 
 
-def _fitted(effect: kinds.Effect, linkage: Linkage) -> kinds.Effect:
+def _linkage_effect(effect: kinds.Effect, linkage: Linkage) -> kinds.Effect:
     """An effect as this linkage uses it."""
     return effect.fitted(linkage.chain) if isinstance(effect, kinds.Check) and effect.fitted else effect
 
@@ -433,27 +432,27 @@ def path(scene: Scene, target: str) -> Path | None:
         return None
     columns = read_path(scene, name).columns
     table = scene.targets[name]
-    assert isinstance(table, TargetTable)
+    assert isinstance(table, LinkageTarget)
     return Path(str(table.point), columns.get("phi", ()), columns["x"], columns["y"])
 
 
 def path_target(scene: Scene, target: str) -> str | None:
     """Target whose path is read for a target: its own, else the first that has one; None where none has."""
-    names = [name for name, table in scene.targets.items() if isinstance(table, TargetTable) and table.point]
+    names = [name for name, table in scene.targets.items() if isinstance(table, LinkageTarget) and table.point]
     return target if target in names else next(iter(names), None)
 
 
 def read_path(scene: Scene, name: str) -> csv_tables.Table:
     """Table of the path of a target, with its precision. Raises BadInput."""
     table, key = scene.targets[name], f"targets.{name}.table"
-    assert isinstance(table, TargetTable)
+    assert isinstance(table, LinkageTarget)
     kinds, given = {"phi": "angle", "x": "length", "y": "length"}, str(table.table)
     there = csv_tables.columns(scene, given, key, kinds)
     kinds = {column: kind for column, kind in kinds.items() if column in ("x", "y", *there)}
     return csv_tables.read(scene, given, key, kinds, fewest=FEWEST, digits=table.digits)
 
 
-def _check_path(scene: Scene, known: Reading, name: str, table: TargetTable) -> None:
+def _check_path(scene: Scene, known: LinkageScene, name: str, table: LinkageTarget) -> None:
     """Raise BadInput for a path without its point or its table; the table is read by what needs it."""
     key = f"targets.{name}"
     if table.point is None:
@@ -491,7 +490,7 @@ def fault(linkage: Linkage, design: Mapping[str, float], shown: ShowValue = usua
 
 def check(scene: Scene) -> None:
     """Raise BadInput where today's linkage does not turn all round, or a name means nothing in it."""
-    known, faults = reading(scene.document), Faults()
+    known, faults = read_tables(scene.document), Faults()
     for check_part in (_check_names, _check_effects, _check_targets, _check_windows):
         with faults:
             check_part(scene, known)
@@ -507,7 +506,7 @@ def check(scene: Scene) -> None:
     _check_events(scene, known.linkage)
 
 
-def _check_names(scene: Scene, known: Reading) -> None:
+def _check_names(scene: Scene, known: LinkageScene) -> None:
     """Raise BadInput for a number that is called as something else is."""
     taken = dict.fromkeys(scene.schema.figures, "a figure") | {"speed": "the crank's speed"}
     taken |= dict.fromkeys(("omega", "omega_dot", "phi", "instance"), "a symbol of the equations")
@@ -522,7 +521,7 @@ def _check_names(scene: Scene, known: Reading) -> None:
         parts.check_name(mechanism.at(name), name, taken)
 
 
-def _check_effects(scene: Scene, known: Reading) -> None:
+def _check_effects(scene: Scene, known: LinkageScene) -> None:
     """Raise BadInput for a link, joint or event that an effect names and the scene does not have."""
     linked, events = known.linkage.chain, [place.name for place in known.linkage.places]
     faults = Faults()
@@ -564,12 +563,12 @@ def _check_sense(effect: kinds.Effect, values: Mapping[str, Any], path: str, ori
         raise refusal("it begins where it ends", origin, f"{path}.ends", values["ends"], remedy="Name another")
 
 
-def _check_targets(scene: Scene, known: Reading) -> None:
+def _check_targets(scene: Scene, known: LinkageScene) -> None:
     """Raise BadInput for what a target seeks and the scene does not have, or has no such end of."""
     faults, axes_ = Faults(), scene.schema.axes
     bounded = [name for name, bound in scene.bounds.items() if bound.min < bound.max]
     for name, table in scene.targets.items():
-        if not isinstance(table, TargetTable):
+        if not isinstance(table, LinkageTarget):
             continue
         key = f"targets.{name}"
         if name in scene.document.get("targets", {}) and not table.sought:
@@ -590,7 +589,7 @@ def _check_targets(scene: Scene, known: Reading) -> None:
     faults.tell()
 
 
-def _check_windows(scene: Scene, known: Reading) -> None:
+def _check_windows(scene: Scene, known: LinkageScene) -> None:
     """Raise BadInput for a window that ends before it begins, or is longer than a turn."""
     for window in known.windows:
         ends = [scene.mechanism[ref.name] if ref.name else ref.value for ref in (window.begins, window.ends)]
@@ -645,9 +644,9 @@ def _check_events(scene: Scene, linkage: Linkage) -> None:
         raise refusal(error.problem, scene.origin, key, remedy=remedy) from None
 
 
-def _check_extreme(scene: Scene, turns: Sequence[Turn], place: Place) -> None:
+def _check_extreme(scene: Scene, turns: Sequence[Turn], place: EventRule) -> None:
     """Raise BadInput for an extreme that is another, or that a small change of the design would exchange."""
-    key, choice = f"events.{place.name}", chosen(tuple(turns), place)
+    key, choice = f"events.{place.name}", extreme_turn(tuple(turns), place)
     candidates = [turn for turn in turns if turn.extreme == place.extreme]
     word = "highest" if place.extreme == "max" else "lowest"
 

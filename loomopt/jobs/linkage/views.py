@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from loomopt.jobs import registry
 from loomopt.jobs.linkage.model import LinkageMotion, Output, end_of_rest, event_value
 from loomopt.jobs.linkage.program import linkage_of
-from loomopt.jobs.linkage.scene import reading
+from loomopt.jobs.linkage.scene import read_tables
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT, Number
 from loomopt.model.model import JobModel
@@ -179,7 +179,7 @@ def _slot(written: _SymbolicParts, part: Part) -> None:
 
 
 WRITTEN = {"crank": _crank, "gear": _gear, "cam": _cam, "dyad": _dyad, "slider": _slider, "slot": _slot}
-"""How each kind of part is written; the others by their own formula."""
+"""Method that writes each kind of part; the other kinds have their own formula."""
 
 
 class SymbolicPose(LinkageMotion):
@@ -330,7 +330,7 @@ class LinkageViews(JobViews):
 
 def _without_place(scene: Scene) -> Iterator[str]:
     """Remark on the output's mass that the joint forces, or the weight, do not include."""
-    out, effects = reading(scene.document).linkage.output, scene.effects
+    out, effects = read_tables(scene.document).linkage.output, scene.effects
     tellers = " and ".join(effect.of_masses for effect in scene.active if effect.of_masses)
     for name in ("inertia", "counterweight"):
         if not tellers or name not in effects:

@@ -84,7 +84,7 @@ class Drive:
 
     @functools.cached_property
     def skeleton(self) -> Skeleton:
-        """Its joints and links, both cranks' circles and the path of D."""
+        """Joints and links, both cranks' circles and the path of D."""
         joints = {event: {name: Point(*at) for name, at in pose.joints.items()} for event, pose in self.poses.items()}
         path = self.turn(np.asarray(TURN / SAMPLES * np.arange(SAMPLES), dtype=np.float64)).joints["D"]
         d = tuple(Point(float(x), float(y)) for x, y in zip(path.x, path.y, strict=True))

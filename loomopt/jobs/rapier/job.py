@@ -9,7 +9,7 @@ import numpy as np
 from loomopt.base.errors import BadInput, refusal
 from loomopt.jobs import base
 from loomopt.jobs.base import EVERY, Crossing, Figures, InBox, Job, Studied
-from loomopt.jobs.rapier.model import jerk_mean, linked, match_mean, read, read_many
+from loomopt.jobs.rapier.model import jerk_mean, match_mean, read, read_many, shared_linkage
 from loomopt.jobs.rapier.program import SIDES, RapierTask, model
 from loomopt.jobs.rapier.scene import FIGURES, SCHEMA, STROKE, VARIABLES, MatchTarget, match_table, read_match
 from loomopt.maths import periodic_cubic
@@ -95,7 +95,7 @@ class Rapier(Job):
         peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in names and name != "stroke"}
         sampled.search(("S", *peaks.values()))
         reading = read(sampled) if isinstance(sampled, Sampler) else read_many(sampled)
-        figures, static = base.alone(scene, sampled, names), sampled.static
+        figures, static = base.static_figures(scene, sampled, names), sampled.static
         figures |= {"stroke": reading.stroke, "phi_stroke": reading.phi_stroke}
         if "s_dwell" in scene.operation:
             figures |= {"dwell_after": reading.dwell_after, "dwell_before": reading.dwell_before}
@@ -119,7 +119,7 @@ class Rapier(Job):
         return {name: name for name in model.quantities} | {"stroke": "S", "mu_min": "obliquity"}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
-        """How each figure is read over a box of numbers: dwells end where the head leaves s_dwell."""
+        """Reading of each figure over a box of numbers: dwells end where the head leaves s_dwell."""
         boxes = super().in_boxes(scene, model)
         boxes |= {"stroke": InBox(quantity="S", largest=True), "sley_mu_min": InBox(("sley_mu_near", "sley_mu_far"))}
         boxes["mu_min"] = InBox(quantity="obliquity", sign=-1.0, offset=math.pi / 2)
@@ -145,7 +145,7 @@ class Rapier(Job):
         """S with three derivatives, φ3, φ6, φ63, the folded transmission angle, terms, tape force and torque."""
         front = sampler.model.kinematics.still(FLOAT, sampler.given, "front dead centre", {}).joints  # type: ignore[attr-defined]
         gap = math.atan2(front.dyad.link2.y, front.dyad.link2.x) - front.phi3
-        centres = linked(sampler.given).centres
+        centres = shared_linkage(sampler.given).centres
         rear = math.pi + centres.beta_r - centres.beta
         return Columns(
             {

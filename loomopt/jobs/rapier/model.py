@@ -39,7 +39,7 @@ BEFORE, AFTER = -1.0, 1.0
 STROKE = "S''_stroke"
 """S'' at the hand-over, m/rad², which effects may call in."""
 HAND_OVER = "hand-over"
-"""Where the head is farthest out, rad, where that is no number of the program."""
+"""Name of the crank angle at which the head is farthest out, rad, where the program has no such number."""
 TURNS = "turns"
 """The event of the head's turning, which effects may call in."""
 JERK_NODES = 64
@@ -102,13 +102,13 @@ def _five_bar() -> Group:
 
 
 class DriveLinkage(NamedTuple):
-    """What poses read at once of the scene's numbers; centres: the sley's dead centres."""
+    """Quantities of the scene that all poses share; centres: the sley's dead centres."""
 
     dimensions: rapier_drive.Dimensions
     centres: crank_rocker.DeadCentres
 
 
-def linked(given: Given) -> DriveLinkage:
+def shared_linkage(given: Given) -> DriveLinkage:
     """Quantities that all poses of a machine share."""
     linkage = given.linkage
     assert isinstance(linkage, DriveLinkage)
@@ -141,10 +141,10 @@ class RapierDrive:
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """Sley's stand, the driving link's direction at front dead centre, and the turns if called in."""
-        values, centres = given.values, linked(given).centres
+        values, centres = given.values, shared_linkage(given).centres
         quantities = {"beta": centres.beta, "frame_angle": values["phi30"] - centres.psi_front}
         stand = rapier_drive.Stand(quantities["beta"], quantities["frame_angle"])
-        front = rapier_drive.RapierPose(maths, linked(given).dimensions, stand, 0).relative
+        front = rapier_drive.RapierPose(maths, shared_linkage(given).dimensions, stand, 0).relative
         quantities |= {"front_x": front.x, "front_y": front.y}
         given = given._replace(values={**values, **quantities})
         if STROKE in called:
@@ -165,7 +165,7 @@ class RapierDrive:
         """Pose at crank angles φ1, rad."""
         values = given.values
         stand = rapier_drive.Stand(values["beta"], values["frame_angle"])
-        joints = rapier_drive.RapierPose(maths, linked(given).dimensions, stand, node.phi)
+        joints = rapier_drive.RapierPose(maths, shared_linkage(given).dimensions, stand, node.phi)
         return HeadPose(
             joints, Vector(values["front_x"], values["front_y"]), values.get("speed"), values.get("omega_dot")
         )
@@ -191,7 +191,7 @@ class RapierDrive:
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
         """Both dead centres of the sley, rad."""
-        centres = linked(given).centres
+        centres = shared_linkage(given).centres
         return {"front dead centre": 0, "rear dead centre": maths.pi + centres.beta_r - centres.beta}
 
 
@@ -238,8 +238,8 @@ LOADED = (*TAPE_FORCE, drive.TORQUE, drive.POWER)
 """Figures that loads give."""
 
 ROWS: dict[str, DesignRow] = {
-    "swing": DesignRow(lambda at: linked(at.given).centres.swing),
-    "theta": DesignRow(lambda at: linked(at.given).centres.theta),
+    "swing": DesignRow(lambda at: shared_linkage(at.given).centres.swing),
+    "theta": DesignRow(lambda at: shared_linkage(at.given).centres.theta),
     "phi_stroke": DesignRow(lambda at: at.values["phi_stroke"], ("phi_stroke",)),
     "rest": DesignRow(lambda at: _at_stroke(at).q1, ("phi_stroke",)),
     "turning": DesignRow(lambda at: _at_stroke(at).q2, ("phi_stroke",)),
@@ -341,7 +341,7 @@ def read(sampler: Sampler) -> TravelReading:
 
 
 def _dwell(sampler: Sampler, extremes: list[float], room: float, side: int) -> float:
-    """How far the crank turns from front dead centre, on one side, before |S| leaves `room` (m)."""
+    """Crank angle from front dead centre, on one side, over which |S| stays within `room` (m)."""
     even = np.linspace(0.0, TURN, SAMPLES + 1)
     angles = np.unique(np.concatenate([even, np.mod(side * np.array(extremes), TURN)]))
 

@@ -6,7 +6,7 @@ from typing import final
 
 from loomopt.base.errors import BadInput, refusal
 from loomopt.base.records import Frozen, lazy
-from loomopt.jobs.base import Demanded, Ends, Task, bound_limits, distinct, ends, size_read
+from loomopt.jobs.base import Ends, Minima, Task, bound_limits, distinct, ends, size_read
 from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.model import (
     AFTER,
@@ -38,7 +38,7 @@ REQUIRED = {"stroke": 0, "s_dwell": 1, "dwell_after": -1, "dwell_before": -1}
 """Numbers of the operation that targets keep, and on which side a designer could give way."""
 SIDES = {"dwell_before": BEFORE, "dwell_after": AFTER}
 LOOSE = frozenset((DWELL, *SIDES, "stroke"))
-"""What is a number of its own where it is sought."""
+"""Figures that are variables where they are optimised."""
 ANGLES = ("alpha", "phi40", "phi30", *SIDES)
 S_DWELL = 0.005
 """Share of the stroke that the head may move in a usual dwell."""
@@ -46,26 +46,26 @@ TURN = (0.0, 2 * math.pi)
 
 
 def model(
-    scene: Scene, sought: Collection[str] = (), read: bool = True, dwelt: Collection[str] | None = None
+    scene: Scene, goal_names: Collection[str] = (), read: bool = True, dwell_numbers: Collection[str] | None = None
 ) -> JobModel:
     """Drive with the effects the scene calls for and what is sought; read: whether effects are.
 
-    sought: the target, or what is traded; dwelt: dwells that are asked for, those of the operation without.
+    goal_names: the target, or the axes; dwell_numbers: names of the dwells that are demanded, else the operation's.
     """
-    read_too = {*sought, *scene.limits}
+    read_too = {*goal_names, *scene.limits}
     means = [jerk_mean()] if {"smooth", "rms_jerk"} & read_too else []
     means += [match_mean(*match_table(scene))] if {"match", "match_rms"} & read_too else []
-    known = {*numbers(scene), *(("phi_stroke",) if sought else ()), *((DWELL,) if DWELL in sought else ())}
+    known = {*numbers(scene), *(("phi_stroke",) if goal_names else ()), *((DWELL,) if DWELL in goal_names else ())}
     effects = scene.active if read else ()
-    arcs = dwell_arcs(sought, scene.operation if dwelt is None else dwelt)
+    arcs = dwell_arcs(goal_names, scene.operation if dwell_numbers is None else dwell_numbers)
     return rapier.model(effects, words(scene), frozenset(known), arcs, tuple(means))
 
 
-def dwell_arcs(sought: Collection[str], dwelt: Collection[str]) -> tuple[tuple[float, str], ...]:
+def dwell_arcs(goal_names: Collection[str], dwell_numbers: Collection[str]) -> tuple[tuple[float, str], ...]:
     """Sides on which there is a dwell, each with the value that it is."""
-    if DWELL in sought:
+    if DWELL in goal_names:
         return tuple((side, DWELL) for side in SIDES.values())
-    return tuple((side, name) for name, side in SIDES.items() if name in dwelt)
+    return tuple((side, name) for name, side in SIDES.items() if name in dwell_numbers)
 
 
 def hand_over(model: JobModel, values: Numbers) -> Numbers:
@@ -83,7 +83,7 @@ class RapierTask(Task):
     tops = Frozen(phi_stroke="S")
 
     @property
-    def sought(self) -> tuple[str, ...]:
+    def goal_names(self) -> tuple[str, ...]:
         """The target, or what is traded."""
         return self.traded or (self.target,)
 
@@ -94,45 +94,50 @@ class RapierTask(Task):
         return {name: ends for name, ends in self.limited.items() if name in free}
 
     @lazy
-    def kept(self) -> list[str]:
-        """What the target keeps of the operation, and nobody trades."""
+    def required_names(self) -> list[str]:
+        """Numbers of the operation that the target needs and that are no axes."""
         traded = {end for name in self.traded for end in {DWELL: tuple(SIDES)}.get(name, (name,))}
         needs = self.scene.schema.targets[self.target].needs if self.target else ()
         return [name for name in needs if name in self.known and name not in traded]
 
     @lazy
-    def demanded(self) -> Demanded:
-        """What is asked of each dwell, rad, by name: by the operation, then by limits. Raises BadInput."""
+    def minima(self) -> Minima:
+        """Minima of the dwells, rad, by name: from the operation, then from limits. Raises BadInput."""
         limits = self.scene.limits
         least = {name: limit.min for name, limit in limits.items() if name in (DWELL, *SIDES) and limit.min}
-        if DWELL in self.sought:
+        if DWELL in self.goal_names:
             for name in (name for name in least if name in SIDES):
                 problem, remedy = "the lesser of both dwells is sought, on one angle for both sides", f"Limit {DWELL}."
                 raise refusal(problem, self.scene.origin, f"limits.{name}", remedy=remedy)
             return {DWELL: [(DWELL, least[DWELL])]} if least else {}
-        names = [name for name in self.kept if name not in self.free]
+        names = [name for name in self.required_names if name not in self.free]
         demands = {n: [(n, self.scene.operation[n])] if n in names else [] for n in REQUIRED if n in SIDES}
         for name, pairs in demands.items():
             pairs += [(by, least[by]) for by in (name, DWELL) if by in least]
         return {name: pairs for name, pairs in demands.items() if pairs}
 
     @property
-    def dwelt(self) -> Collection[str]:
+    def dwell_numbers(self) -> Collection[str]:
         """Numbers that are known or asked for, dwells among them."""
-        return {*self.known, *self.demanded}
+        return {*self.known, *self.minima}
 
     @lazy
     def model(self) -> JobModel:
         """The drive with what is sought; with the effects where anything that they give is read."""
         checks = [effect for effect in self.scene.active if isinstance(effect, Check)]
         given = {name for check in checks for name in (*check.over_cycle, *check.rows)}
-        read = bool((given | set(LOADED)) & {*self.scene.limits, *self.sought})
-        return model(self.scene, self.sought, read or any(check.demands or check.least for check in checks), self.dwelt)
+        read = bool((given | set(LOADED)) & {*self.scene.limits, *self.goal_names})
+        return model(
+            self.scene,
+            self.goal_names,
+            read or any(check.demands or check.least for check in checks),
+            self.dwell_numbers,
+        )
 
     @lazy
     def sampler(self) -> Sampler:
         """Today's drive; of a dwell that is not there yet, any angle."""
-        return sampled(self.model, {DWELL: 1.0, "phi_stroke": 0.0, **dict.fromkeys(self.demanded, 1.0), **self.known})
+        return sampled(self.model, {DWELL: 1.0, "phi_stroke": 0.0, **dict.fromkeys(self.minima, 1.0), **self.known})
 
     @lazy
     def reading(self) -> TravelReading:
@@ -162,11 +167,13 @@ class RapierTask(Task):
 
     @lazy
     def bounded(self) -> tuple[Variable, ...]:
-        """What the scene frees, what the target keeps, the hand-over, and what is sought as a number of its own."""
+        """Freed numbers, numbers that the target needs, the hand-over, and figures that are variables."""
         variables = [self.variable(name, ends) for name, ends in self.free.items()]
-        variables += [self.operated(name, (self.known[name],) * 2) for name in self.kept if name not in self.free]
+        variables += [
+            self.operated(name, (self.known[name],) * 2) for name in self.required_names if name not in self.free
+        ]
         variables.append(Variable("phi_stroke", *TURN, 1.0, TURN))
-        return *variables, *(self.loose(name) for name in self.sought if name in LOOSE and name not in self.free)
+        return *variables, *(self.loose(name) for name in self.goal_names if name in LOOSE and name not in self.free)
 
     def scale(self, name: str, ends: Ends) -> float:
         """Size of a variable: angles 1 rad, lengths the largest they may be."""
@@ -194,8 +201,16 @@ class RapierTask(Task):
     def limits(self) -> list[Limit]:
         """All limits; a figure whose limit a variable's bounds imply has none."""
         figures = [limit for limit in self.figures() if not self.implied(limit)]
-        required = [limit for limit in self.required() if limit.name not in self.demanded]
-        return [*self.bounds(), *required, *self.floors(), *self.meant(), *self.margins(), *figures, *self.demands()]
+        required = [limit for limit in self.required() if limit.name not in self.minima]
+        return [
+            *self.bounds(),
+            *required,
+            *self.floors(),
+            *self.definitions(),
+            *self.margins(),
+            *figures,
+            *self.demands(),
+        ]
 
     def bounds(self) -> list[Limit]:
         """Bounds of what the scene frees."""
@@ -204,13 +219,15 @@ class RapierTask(Task):
     def required(self) -> list[Limit]:
         """Limits on the figures that the target keeps, on the side on which a designer could give way."""
         known = self.known
-        names = [name for name in self.kept if name not in self.free]
+        names = [name for name in self.required_names if name not in self.free]
         return [BoundLimit(n, REQUIRED[n], n, known[n], self.operated_size(n)) for n in names]
 
-    def wanted(self) -> list[Limit]:
+    def goal_limits(self) -> list[Limit]:
         """Limits on figures that are goals of the target, from the bounds and from the figures it keeps."""
         return [
-            limit for limit in (*self.bounds(), *self.required()) if limit.name in self.kept and limit.name in FIGURES
+            limit
+            for limit in (*self.bounds(), *self.required())
+            if limit.name in self.required_names and limit.name in FIGURES
         ]
 
     def implied(self, limit: Limit) -> bool:
@@ -220,23 +237,23 @@ class RapierTask(Task):
             return False
         return (limit.sign > 0 or variable.lower >= limit.value) and (limit.sign < 0 or variable.upper <= limit.value)
 
-    def meant(self) -> list[Limit]:
+    def definitions(self) -> list[Limit]:
         """Limits that define stroke and dwells: the head rests at its stroke, and stays within s_dwell on the arcs.
 
         Where no stroke is kept, the hand-over that is traded or limited might be another rest, such as front dead
         centre: it is one at which the head turns back, outside its dwells.
         """
-        reached = {*self.kept, *self.demanded, *(name for name in self.sought if name in LOOSE)}
+        reached = {*self.required_names, *self.minima, *(name for name in self.goal_names if name in LOOSE)}
         size, rows = 1.0, {"head at rest at phi_stroke": "rest"}
         if "stroke" in reached:
             size, rows = self.known["stroke"], rows | {"stroke is reached": "stroke_short"}
         firm = {"relaxable": False, "hidden": True}
         limits: list[Limit] = [DesignLimit(name, 0, row, 0.0, size, **firm) for name, row in rows.items()]
-        if "stroke" not in reached and "phi_stroke" in {*self.sought, *self.scene.limits}:
+        if "stroke" not in reached and "phi_stroke" in {*self.goal_names, *self.scene.limits}:
             least = self.known.get("s_dwell", S_DWELL * self.reading.stroke)
             limits.append(DesignLimit("head turns back at phi_stroke", 1, "turning", 0.0, size, **firm))
             limits.append(DesignLimit("phi_stroke lies outside the dwells", -1, "reach", least, size, **firm))
-        for side, name in dwell_arcs(self.sought, self.dwelt):
+        for side, name in dwell_arcs(self.goal_names, self.dwell_numbers):
             if name in reached or name == DWELL:
                 text = f"head within s_dwell {'after' if side == AFTER else 'before'} front dead centre"
                 where = (DWELL, side)
@@ -284,7 +301,7 @@ class RapierTask(Task):
 
     def starts(self) -> tuple[dict[str, float], ...]:
         """Today's drive moved just inside its bounds, and the paper's own construction where it closes."""
-        built = constructed(self.known)
+        built = paper_construction(self.known)
         return distinct([self.inside(self.known), *([self.inside({**self.known, **built})] if built else [])])
 
     def moves(self) -> list[Move]:
@@ -304,7 +321,7 @@ class RapierTask(Task):
         return sizes.get(name) or size_read(self.sampler, name, self.scene.schema.figures)
 
 
-def constructed(known: Numbers) -> dict[str, float] | None:
+def paper_construction(known: Numbers) -> dict[str, float] | None:
     """C0, l5 and φ40 by the paper's construction [Hong17] for a scene's stroke; None where it does not close."""
     if "stroke" not in known:
         return None

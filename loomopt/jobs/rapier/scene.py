@@ -1,4 +1,4 @@
-"""What a rapier scene may hold: its tables, design variables, figures and targets."""
+"""Schema of a rapier scene: its tables, design variables, figures and targets."""
 
 import math
 
@@ -20,7 +20,7 @@ MATCHED = {"phi1": "angle", "S": "length"}
 
 
 class Operation(Table):
-    """What the drive must do."""
+    """Operation of the drive."""
 
     speed: Speed | None = Field(None, description="speed of the main shaft")
     stroke: PositiveLength | None = Field(None, description="travel S of the head, the largest")

@@ -48,7 +48,7 @@ machine; and the chord tolerance that is promised over what is measured."""
 WIDEST = math.radians(2.0)
 """rad; width of the first intervals."""
 INSIDE = np.linspace(0.0, 1.0, 9)
-"""Where an interval's deviation is looked for, its ends included."""
+"""Places of an interval at which its deviation is measured, its ends included."""
 MOST_PARTS = 32
 """Parts into which one round divides an interval at most."""
 
@@ -74,7 +74,7 @@ def traced_nodes(
 
 
 def deviation(curves: Callable[[Pieces, Floats], Sequence[Floats]], pieces: Pieces, u: Floats) -> float:
-    """How far the curves lie from straight lines from node to node; a piece's last may begin the next."""
+    """Largest distance of the curves from straight lines between nodes; a piece may begin at the last one's end."""
     begins = np.where(np.diff(pieces) == 0, u[:-1], 0.0)
     return float(np.max(_deviation(curves, pieces[1:], begins, u[1:])))
 
@@ -91,7 +91,7 @@ def _divided(pieces: Pieces, left: Floats, right: Floats, parts: NDArray[np.int_
 def _deviation(
     curves: Callable[[Pieces, Floats], Sequence[Floats]], pieces: Pieces, left: Floats, right: Floats
 ) -> Floats:
-    """How far the curves lie from the straight lines that join the ends of each interval."""
+    """Distance of the curves from the straight lines that join the ends of each interval."""
     u = left[:, None] * (1 - INSIDE) + right[:, None] * INSIDE
     curve_points = curves(np.repeat(pieces, len(INSIDE)), u.ravel())
     return np.asarray(np.max([_off_chord(points.reshape(*u.shape, 2)) for points in curve_points], axis=0))
@@ -128,12 +128,12 @@ class ReturnSpring:
 
     @property
     def levels(self) -> tuple[Point, Point, Point]:
-        """Where the load would be with the spring slack, where it is on top, and below."""
+        """Position of the load with a slack spring, its top position and its lowest position."""
         return Point(self.top.x, self.top.y + self.X0), self.top, Point(self.top.x, self.top.y - self.travel)
 
     @property
     def hung(self) -> Point:
-        """Where the spring hangs."""
+        """Point from which the spring hangs."""
         return self.levels[0].towards(math.pi / 2, LENGTH * self.h)
 
     def strokes(self) -> list[Primitive]:
@@ -232,7 +232,7 @@ class CamDrawing:
 
     @property
     def undercut(self) -> Extreme | None:
-        """Where it is undercut most: the roller is larger than the circle that its centre's curve bends by."""
+        """Point of the largest undercut: the roller is larger than the radius of curvature of its centre's path."""
         sharpest = self.sampler.extremes("curvature")[0]
         return sharpest if sharpest.value * self.follower.roller_radius >= 1.0 else None
 
@@ -260,7 +260,7 @@ def cam(scene: Scene, design: Mapping[str, float]) -> CamDrawing:
 
 
 def allowed(cam: CamDrawing) -> float:
-    """How far a cam's curves may lie from the straight lines that are drawn for them, m."""
+    """Allowed distance of a cam's curves from the straight lines that are drawn for them, m."""
     return max(CURVE_CLOSE, CURVE_NARROW * float(cam.follower.arm + cam.follower.centre_distance))
 
 

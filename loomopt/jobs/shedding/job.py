@@ -42,10 +42,10 @@ from loomopt.jobs.shedding.scene import (
     check_known,
     check_law,
     check_motion,
-    dwelt,
+    follower_fault,
+    has_dwells,
     read_law,
     refuse_unclear,
-    unfollowed,
 )
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT, Number
@@ -107,10 +107,10 @@ class Shedding(Job):
             turn = f"{scene.show(2 * math.pi, 'angle', 9)} together"
             raise _refused(scene, f"mechanism.{keys}", problem, turn, "Correct one of them.")
         if not several and not any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds):
-            dwells = zip(DWELLS, dwelt(scene.mechanism), strict=True)
+            dwells = zip(DWELLS, has_dwells(scene.mechanism), strict=True)
             check_known(scene, {(SEGMENT, float(segment)) for segment, on in dwells if on}, "dwells")
         check_law(scene)
-        reason = unfollowed(scene.mechanism, scene.show)
+        reason = follower_fault(scene.mechanism, scene.show)
         if reason:
             raise _refused(scene, "mechanism", f"the cam's follower cannot work: {reason}", "")
 
@@ -194,7 +194,7 @@ class Shedding(Job):
         self, scene: Scene, sampled: "Sampler | Machines", names: Container[str] = EVERY
     ) -> dict[str, Number]:
         """Every figure of a machine, or of many, but those of a frame that parts; None without its numbers."""
-        figures = base.alone(scene, sampled, names)
+        figures = base.static_figures(scene, sampled, names)
         peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in names}
         sampled.search(("lift", *peaks.values()))
         for name, quantity in peaks.items():
@@ -218,13 +218,13 @@ class Shedding(Job):
         return peaks | {name: name for name in check_names}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
-        """How each figure is read over a box of numbers: the least cam force and curvature are opposites."""
+        """Reading of each figure over a box of numbers: the least cam force and curvature are opposites."""
         opposite = {name: of for name, of in self.peaks(model).items() if of in ("concavity", "lift")}
         return super().in_boxes(scene, model) | {n: InBox(quantity=of, sign=-1.0) for n, of in opposite.items()}
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Sentence on an optimum of the target and on today's spring; figures in SI."""
-        dwells = judged(self.model(scene))
+        dwells = contact_dwells(self.model(scene))
         clause = f"keeps the roller on the cam {f'in {dwells}' if dwells else 'all round'}"
         if target == "speed":
             return f"Today's spring {clause} up to {scene.show(figures['speed'] or 0.0, 'angular speed', 9)}."
@@ -306,7 +306,7 @@ def _least(extremes: list[Extreme], sampled: Sampler) -> tuple[float, float]:
     return -highest, min(sampled.angle(extreme) % (2 * math.pi) for extreme in alike)
 
 
-def judged(model: JobModel) -> str:
+def contact_dwells(model: JobModel) -> str:
     """Dwells, in words, that the cam force is judged in; "" where it is known all round."""
     names = [SEGMENTS[k] for k in frame(model).segments if (SEGMENT, float(k)) in model.known_in]
     known = [name.replace("_", " ") for name in names]

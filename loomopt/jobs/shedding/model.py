@@ -32,7 +32,7 @@ RISE, FAR_DWELL, RETURN, NEAR_DWELL = range(4)
 """The cam's segments in order, as the numbers that stand for them."""
 DWELLS = FAR_DWELL, NEAR_DWELL
 LEAST, MOST = -1, 1
-"""Which end of what is not determined in a dwell is meant: the least cam force, or the largest."""
+"""End of the range of forces in a dwell that are not determined: the least cam force, or the largest."""
 SEGMENT, LAW = "segment", "law"
 HALF_OPEN = "half_open"
 """The event of a half open shed, which effects may call in: X = h/2 on the rise and on the return."""
@@ -238,7 +238,7 @@ class CamFrame:
 
 
 MOVES = {RISE: "rise", FAR_DWELL: "dwell", RETURN: "return"}
-"""What kinds of segments are called."""
+"""Names of the kinds of segments."""
 
 
 class Segment(NamedTuple):
@@ -457,11 +457,11 @@ QUANTITIES: dict[str, CycleQuantity] = {
     "law_fall": CycleQuantity(lambda at: moving(at, -at.pose.law.s1), figure=False, signed=True),
 }
 LIFT, AT_REST, FASTEST = "lift", "contact at rest", "contact at contact_speed"
-RACED: dict[str, CycleQuantity] = {
+SPEED_ROWS: dict[str, CycleQuantity] = {
     AT_REST: QUANTITIES["lift"]._replace(formula=lambda at: -at.at_speed(0).force),
     FASTEST: QUANTITIES["lift"]._replace(formula=lambda at: -at.at_speed(at.values["contact_speed"]).force),
 }
-"""What a limit on the speed up to which contact holds reads, SI."""
+"""Rows that a limit on the speed up to which contact holds reads, SI."""
 FOLLOWED: dict[str, CycleQuantity] = {
     "pressure_angle": CycleQuantity(lambda at: contact(at).pressure_angle),
     "curvature": CycleQuantity(lambda at: contact(at).curvature, signed=True),
@@ -515,10 +515,10 @@ def model(
     effects: tuple[Effect, ...],
     words: tuple[tuple[str, str, str], ...],
     known: frozenset[str],
-    raced: tuple[str, ...] = (),
+    speed_rows: tuple[str, ...] = (),
     moves: tuple[Segment, ...] = (),
 ) -> JobModel:
-    """Frame with its return spring and effects; raced: what of RACED is limited; moves: several segments."""
+    """Frame with return spring and effects; speed_rows: limited rows of SPEED_ROWS; moves: several segments."""
     motion = CamProgram(law, moves=moves) if moves else CamFrame(law, dwells)
     followed = known.issuperset(FOLLOWER)
     partly = JobModel(motion, effects, words).known_in
@@ -528,7 +528,7 @@ def model(
         motion,
         (RETURN_SPRING, *effects),
         words,
-        QUANTITIES | {name: RACED[name] for name in raced} | (FOLLOWED if followed else {}) | driven,
+        QUANTITIES | {name: SPEED_ROWS[name] for name in speed_rows} | (FOLLOWED if followed else {}) | driven,
         ROWS | law_rows(law),
         assembled={**arm, "the cam law never falls": ("law_fall", 0.0)},
         known=known,

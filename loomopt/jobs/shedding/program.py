@@ -10,7 +10,7 @@ import numpy as np
 
 from loomopt.base.errors import refusal
 from loomopt.base.records import Frozen, lazy
-from loomopt.jobs.base import Demanded, Ends, Task, bound_limits, ends, size_read
+from loomopt.jobs.base import Ends, Minima, Task, bound_limits, ends, size_read
 from loomopt.jobs.shedding import model as shedding
 from loomopt.jobs.shedding.model import AT_REST, CYCLE, FASTEST, FOLLOWER, LIFT, RETURN_SPRING, law_rows
 from loomopt.jobs.shedding.scene import (
@@ -18,8 +18,8 @@ from loomopt.jobs.shedding.scene import (
     VARIABLES,
     HealdFrame,
     LawTarget,
-    chosen,
-    dwelt,
+    cam_law,
+    has_dwells,
     moves,
     program_numbers,
 )
@@ -57,13 +57,13 @@ def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most:
     """
     nominal = float(values["speed"])
     at_rest = sampled(model, {**values, "speed": 0.0})
-    speed = _reached(at_rest, nominal, name, most, slack)
+    speed = _crossing_speed(at_rest, nominal, name, most, slack)
     if not (slack > 0.0 and speed < nominal and sampled(model, values).peak(name) <= most + slack):
         return speed
-    return nominal if nominal <= _reached(at_rest, nominal, name, most + slack, slack) else speed
+    return nominal if nominal <= _crossing_speed(at_rest, nominal, name, most + slack, slack) else speed
 
 
-def followed(
+def solved_speed(
     name: str, reached: Callable[[Sampler], float], model: JobModel, values: Mapping[str, float]
 ) -> dict[str, float]:
     """Speed, rad/s, that follows from all other numbers, by name; {} where no such speed exists."""
@@ -71,7 +71,7 @@ def followed(
     return {name: speed} if math.isfinite(speed) else {}
 
 
-def _reached(at_rest: Sampler, unit: float, name: str, most: float, slack: float) -> float:
+def _crossing_speed(at_rest: Sampler, unit: float, name: str, most: float, slack: float) -> float:
     """Speed, rad/s, up to which a quantity stays at most `most`; unit: a speed to read it at, rad/s."""
     nodes = at_rest.node(*at_rest.grid())
     rest, ahead, back = -_at_speeds(at_rest, name, nodes, (0.0, unit, -unit))
@@ -129,7 +129,7 @@ SPARE = 1.1
 SPEEDS = frozenset(("speed", CONTACT_SPEED))
 """The cam shaft's speed, and the one up to which contact holds: each is free where it is traded."""
 LINEAR = SPEEDS | {"K1", "X0", "contact_max", "contact_min", "spring_force_max", "spring_stretch"}
-"""What is linear, or a quotient of what is, in K1, K1 X0 and the speed's square."""
+"""Figures that are linear in K1, K1 X0 and the speed's square, or a quotient of such figures."""
 LEAST_SPARE = 1e-3
 """Of rounding: what a force is taken to spare where it spares none, so that its inverse is a number."""
 LEAST_STRETCH = 1e-3
@@ -146,23 +146,23 @@ def scene_numbers(scene: Scene) -> dict[str, float]:
     )
 
 
-def model(scene: Scene, law: CamLaw | None = None, raced: tuple[str, ...] = ()) -> JobModel:
-    """Frame with the effects the scene calls for; law: another than the scene's; raced: of model.RACED."""
+def model(scene: Scene, law: CamLaw | None = None, speed_rows: tuple[str, ...] = ()) -> JobModel:
+    """Frame with the effects the scene calls for; law: another than the scene's; speed_rows: of model.SPEED_ROWS."""
     free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
     several = moves(scene)
-    dwells = (True, True) if free or several else dwelt(scene.mechanism)
-    known = frozenset((*scene_numbers(scene), *((CONTACT_SPEED,) if FASTEST in raced else ())))
+    dwells = (True, True) if free or several else has_dwells(scene.mechanism)
+    known = frozenset((*scene_numbers(scene), *((CONTACT_SPEED,) if FASTEST in speed_rows else ())))
     law = next((move.law for move in several if move.law), law)
-    return shedding.model(law or chosen(scene), dwells, scene.active, words(scene), known, raced, several)
+    return shedding.model(law or cam_law(scene), dwells, scene.active, words(scene), known, speed_rows, several)
 
 
-def survived(sampler: Sampler, least: float) -> float:
+def largest_contact_speed(sampler: Sampler, least: float) -> float:
     """Speed, rad/s, up to which the cam force stays at least `least`, N, as closely as a solve keeps it."""
     slack = ACCURACY * abs(sampler.static["spring_force_max"])
     return speed_reached(sampler.model, sampler.values, "lift", -least, slack)
 
 
-def races(physics: JobModel) -> bool:
+def has_contact_speed(physics: JobModel) -> bool:
     """Whether a load grows with the speed, so that the roller leaves the cam at a speed that is known."""
     unknown = drive.motor(physics.effects) or physics.known_in
     return not unknown and any(load.moved for load in physics.loads if isinstance(load, Load))
@@ -170,9 +170,9 @@ def races(physics: JobModel) -> bool:
 
 def contact_speed(scene: Scene, sampler: Sampler) -> float | None:
     """Speed, rad/s, up to which the roller stays on the cam; None where none ends that, or it is unknown."""
-    if not races(sampler.model):
+    if not has_contact_speed(sampler.model):
         return None
-    speed = survived(sampler, scene.operation["N_min"])
+    speed = largest_contact_speed(sampler, scene.operation["N_min"])
     return speed if math.isfinite(speed) else None
 
 
@@ -181,7 +181,7 @@ def contact_speeds(machines: "Machines") -> Floats | None:
 
     As `speed_reached`, but that at each cam angle the inverse of the first root is a curve, and refined as one.
     """
-    if not races(machines.model):
+    if not has_contact_speed(machines.model):
         return None
     nominal, least = machines.values["speed"], machines.values["N_min"]
     slack = ACCURACY * np.abs(machines.static["spring_force_max"])
@@ -277,54 +277,60 @@ class SheddingTask(Task):
         return scene_numbers(self.scene) | named_knots(cam_spline.cycloid_like(self.law.intervals) if self.law else ())
 
     @property
-    def sped(self) -> bool:
+    def varies_speed(self) -> bool:
         """Whether the cam shaft's speed is sought."""
         return self.target == "speed" or "speed" in self.traded
 
     @property
-    def lasting(self) -> bool:
+    def varies_contact_speed(self) -> bool:
         """Whether the speed up to which contact holds is sought."""
         return CONTACT_SPEED in self.traded
 
     @lazy
-    def demanded(self) -> Demanded:
-        """What a limit asks of the speed up to which contact holds; the shaft's own where that is sought."""
+    def minima(self) -> Minima:
+        """Minimum of the speed up to which contact holds; of the shaft's speed where that is optimised."""
         limit = self.scene.limits.get(CONTACT_SPEED)
         if limit is None or not limit.min:
             return {}
-        return {"speed" if self.sped and not self.lasting else CONTACT_SPEED: [(CONTACT_SPEED, limit.min)]}
+        return {
+            "speed" if self.varies_speed and not self.varies_contact_speed else CONTACT_SPEED: [
+                (CONTACT_SPEED, limit.min)
+            ]
+        }
 
     @lazy
-    def raced(self) -> tuple[str, ...]:
+    def speed_rows(self) -> tuple[str, ...]:
         """Contact at rest, and at the speed up to which it must hold. Raises BadInput where none ends it."""
-        if self.demanded:
+        if self.minima:
             demand_moving(self.scene, f"take limits.{CONTACT_SPEED} out")
-        if self.lasting:
+        if self.varies_contact_speed:
             demand_moving(self.scene, "trade another axis")
             return AT_REST, FASTEST
-        if not self.demanded:
+        if not self.minima:
             return ()
         # At its own speed the frame is judged anyway: the same row twice would have no price.
         least = self.scene.limits[CONTACT_SPEED].min
-        judged = self.sped or ("speed" not in self.limited and self.known["speed"] == least)
+        judged = self.varies_speed or ("speed" not in self.limited and self.known["speed"] == least)
         return (AT_REST,) if judged else (AT_REST, FASTEST)
 
     @lazy
     def model(self) -> JobModel:
         """The frame with its law, and with contact at other speeds where that is limited."""
-        return model(self.scene, self.law, self.raced)
+        return model(self.scene, self.law, self.speed_rows)
 
     @lazy
     def fastest(self) -> float:
         """The speed that today's spring survives, rad/s; 0 where no speed is sought."""
-        if not (self.sped or self.lasting):
+        if not (self.varies_speed or self.varies_contact_speed):
             return 0.0
-        speed = survived(sampled(model(self.scene), scene_numbers(self.scene)), self.scene.operation["N_min"])
+        speed = largest_contact_speed(
+            sampled(model(self.scene), scene_numbers(self.scene)), self.scene.operation["N_min"]
+        )
         return speed if 0.0 < speed < math.inf else self.known["speed"]
 
     @lazy
-    def kept(self) -> list[str]:
-        """What the target keeps: the travel, and the speed where an effect needs it."""
+    def fixed_names(self) -> list[str]:
+        """Numbers that the target does not change: the travel, and the speed where an effect needs it."""
         needed = {key for effect in self.scene.active for key in effect.needs}
         travel = ["travel"] if "travel" in self.scene.mechanism else []
         return [*travel, *(["speed"] if SPEED in needed else [])]
@@ -343,7 +349,7 @@ class SheddingTask(Task):
 
     @lazy
     def bounded(self) -> tuple[Variable, ...]:
-        """What the target may choose, and what it keeps as variables without room, which gives it a price."""
+        """Variables of the target, and numbers that it fixes: variables without room, so that they have a price."""
         scene, known = self.scene, self.known
         free = {scene.full(name) for name, bound in scene.bounds.items() if bound.free} - {"near_dwell"}
         ends = {name: pair for name, pair in self.limited.items() if name in free}
@@ -355,9 +361,13 @@ class SheddingTask(Task):
             # A check's own numbers may give K1.
             tied = any("K1" in c.reads and any(d.sign == 0 for d in c.demands) for c in self.checks)
             ends |= {"X0": (known["X0"],) * 2} | ({} if tied else {"K1": (known["K1"],) * 2})
-        raced = [name for name, sought in (("speed", self.sped), (CONTACT_SPEED, self.lasting)) if sought]
-        ends |= {name: self.limited.get(name, (1e-3 * self.fastest, math.inf)) for name in raced}
-        for name in self.kept:
+        speed_names = [
+            name
+            for name, sought in (("speed", self.varies_speed), (CONTACT_SPEED, self.varies_contact_speed))
+            if sought
+        ]
+        ends |= {name: self.limited.get(name, (1e-3 * self.fastest, math.inf)) for name in speed_names}
+        for name in self.fixed_names:
             ends.setdefault(name, (known[name], known[name]))
         most, knots = self.most_acceleration, self.law.names if self.law else ()
         return (
@@ -396,7 +406,7 @@ class SheddingTask(Task):
         knots = set(self.law.names) if self.law else set()
         for v in (v for v in self.bounded if v.name not in knots):
             if v.lower == v.upper:
-                sign = -1 if v.name in self.kept else 1 if self.target == "speed" and v.name in VARIABLES else 0
+                sign = -1 if v.name in self.fixed_names else 1 if self.target == "speed" and v.name in VARIABLES else 0
                 bounded = v.called in self.scene.bounds or sign
                 limits += [BoundLimit(v.called, sign, v.name, v.lower, v.scale)] if bounded else []
                 continue
@@ -410,13 +420,13 @@ class SheddingTask(Task):
     def contact(self) -> list[Limit]:
         """Limit that is the job: contact where the warp's pull is known, up to a speed that is traded."""
         least, size = self.known["N_min"], self.sizes.force
-        row = FASTEST if self.lasting and not self.sped else LIFT
+        row = FASTEST if self.varies_contact_speed and not self.varies_speed else LIFT
         limit = self.row_limit("N_min", -1, row, least, size, relaxable=least > 0.0)
-        raced = [replace(limit, row=other_row, hidden=True) for other_row in self.raced if other_row != row]
+        speed_limits = [replace(limit, row=other_row, hidden=True) for other_row in self.speed_rows if other_row != row]
         if least > 0.0:
             # What is asked beyond contact may give way; contact itself may not.
-            return [limit, replace(limit, name="contact", value=0.0, relaxable=False, hidden=True), *raced]
-        return [limit, *raced]
+            return [limit, replace(limit, name="contact", value=0.0, relaxable=False, hidden=True), *speed_limits]
+        return [limit, *speed_limits]
 
     def angles(self) -> list[Limit]:
         """Limit on the near dwell, which takes the rest of the turn, where another angle is free."""
@@ -514,14 +524,14 @@ class SheddingTask(Task):
 
     def follow(self) -> Callable[[JobModel, Numbers], Numbers]:
         """Solved variable for the speed up to which contact holds, where that is sought."""
-        reached = functools.partial(survived, least=self.known["N_min"])
-        return functools.partial(followed, CONTACT_SPEED, reached) if self.lasting else nothing_follows
+        reached = functools.partial(largest_contact_speed, least=self.known["N_min"])
+        return functools.partial(solved_speed, CONTACT_SPEED, reached) if self.varies_contact_speed else nothing_follows
 
     def today(self) -> Numbers:
         """Knots of a free law nearest to the scene's own."""
         if self.law is None:
             return {}
-        return named_knots(accelerations(chosen(self.scene), scene_numbers(self.scene), self.law.intervals))
+        return named_knots(accelerations(cam_law(self.scene), scene_numbers(self.scene), self.law.intervals))
 
     def single(self) -> str:
         """Why every local optimum is the best there is; "" where that is not so.

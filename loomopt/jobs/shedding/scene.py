@@ -1,4 +1,4 @@
-"""What a shedding scene may hold: its tables, design variables, figures and targets."""
+"""Schema of a shedding scene: its tables, design variables, figures and targets."""
 
 import itertools
 import math
@@ -56,7 +56,7 @@ LAW = Literal[NAMED_LAW, "spline", "table"]
 
 
 class Operation(Table):
-    """What the motion must do."""
+    """Operation of the motion."""
 
     speed: Speed | None = Field(None, description="speed of the cam shaft")
     N_min: Force = Field(0.0, description="least cam force that counts as contact")
@@ -71,7 +71,7 @@ class SegmentTable(Table):
 
 
 class Lever(Table):
-    """Where the rod to the heald frame acts on the lever, for the force in its pivot."""
+    """Point of the lever at which the rod to the heald frame acts, for the force in the pivot."""
 
     arm: PositiveLength = Field(description="distance of the rod's line from the lever's pivot")
     direction: Angle = Field(
@@ -119,7 +119,7 @@ class LawTarget(TargetTable):
 
 
 SAID = {name: field.description or "" for own in (Operation, HealdFrame) for name, field in own.model_fields.items()}
-"""What figures are that are numbers of the scene too."""
+"""Descriptions of the scene's numbers, for figures of the same name."""
 
 VARIABLES = {"K1": "stiffness", "X0": "length"}
 
@@ -168,14 +168,14 @@ TARGETS = {
 }
 
 
-def dwelt(mechanism: Mapping[str, Any]) -> tuple[bool, bool]:
+def has_dwells(mechanism: Mapping[str, Any]) -> tuple[bool, bool]:
     """Whether there is a far dwell, and a near one in the rest of the turn; a rest that is rounding is none."""
     rise, far, turn, near = (float(mechanism[name]) for name in SEGMENTS)
     return far > SAME_ANGLE, min(near, 2 * math.pi - (rise + far + turn)) > SAME_ANGLE
 
 
 FORM = (*SEGMENTS, "travel")
-"""What a motion of rise, far dwell, return and near dwell gives."""
+"""Numbers that a motion of rise, far dwell, return and near dwell needs."""
 
 
 def check_motion(scene: Scene) -> None:
@@ -229,7 +229,7 @@ def moves(scene: Scene) -> tuple[Segment, ...]:
     for segment, end in zip(frame_table.segments, heights(scene), strict=True):
         still = end == before
         segments.append(
-            Segment(None) if still else Segment(NamedLaw(segment.law) if segment.law else chosen(scene), end > before)
+            Segment(None) if still else Segment(NamedLaw(segment.law) if segment.law else cam_law(scene), end > before)
         )
         before = end
     return tuple(segments)
@@ -256,7 +256,7 @@ def program_numbers(scene: Scene) -> dict[str, float]:
     return numbers | {height(k): end for k, end in enumerate(ends)} | {"travel": max(ends)}
 
 
-def chosen(scene: Scene) -> CamLaw:
+def cam_law(scene: Scene) -> CamLaw:
     """Cam law of the scene. Raises BadInput."""
     name = scene.table(HealdFrame).law
     if name == "spline":
@@ -418,7 +418,7 @@ def _even(angles: Sequence[float], halves: Sequence[float]) -> tuple[list[float]
     return [a / whole for a in angles], [half / whole for half in halves]
 
 
-def unfollowed(numbers: Mapping[str, Any], shown: ShowValue) -> str:
+def follower_fault(numbers: Mapping[str, Any], shown: ShowValue) -> str:
     """Reason why a scene's follower cannot work; "" when it can, or when the scene does not give one."""
     if any(numbers.get(name) is None for name in FOLLOWER):
         return ""
@@ -432,12 +432,12 @@ def fault(numbers: Mapping[str, Any], shown: ShowValue = usual) -> str:
     if reason:
         return f"its law is none: {reason}"
     if "rise" not in numbers:
-        return unfollowed(numbers, shown)
+        return follower_fault(numbers, shown)
     dwell = 2 * math.pi - sum(numbers[name] for name in ("rise", "far_dwell", "return"))
     if dwell < -1e-9:
         return "rise, far dwell and return take more than a whole turn"
     short = [name for name in ("rise", "return") if not numbers[name] >= NARROWEST]
-    return f"the {short[0]} takes no cam angle" if short else unfollowed(numbers, shown)
+    return f"the {short[0]} takes no cam angle" if short else follower_fault(numbers, shown)
 
 
 SCHEMA = SceneSchema(

@@ -14,7 +14,7 @@ from loomopt.interface.text import glossary
 from loomopt.jobs import registry
 from loomopt.model.curves import split
 
-JOBS = registry.own_names()
+JOBS = registry.builtin_names()
 
 
 def symbols(scene):

@@ -21,7 +21,7 @@ from loomopt.jobs import registry
 from loomopt.scenes import packaged
 from loomopt.scenes.scene import TABLES
 
-JOBS = registry.own_names()
+JOBS = registry.builtin_names()
 SCENES = {name: tomllib.loads(path.read_text("utf-8")) for name, path in packaged.problems().items()}
 TEMPLATES = {f"template of {name}": tomllib.loads(registry.template(name)) for name in JOBS}
 INCHES = {f"{name} in inches": inch.scene(scene_of(name)).document for name in JOBS}

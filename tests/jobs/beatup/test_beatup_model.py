@@ -9,7 +9,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.jobs.beatup.model import FRONT, REAR, CrankRocker, linked
+from loomopt.jobs.beatup.model import FRONT, REAR, CrankRocker, shared_linkage
 from loomopt.maths import systems
 from loomopt.model.model import JobModel
 from loomopt.physics.cycle import Node
@@ -46,7 +46,7 @@ def test_q_is_minus_psi_so_that_the_reed_torque_pushes_toward_the_fell():
     pose = CrankRocker().pose(systems.FLOAT, given, Node(2.0, {}))
     assert (pose.q, pose.q1, pose.q2) == (-pose.joints.psi, -pose.joints.psi_1, -pose.joints.psi_2)
     assert pose.omega == BEATUP.operation["speed"]
-    assert linked(given).centres.psi_front < linked(given).centres.psi_rear
+    assert shared_linkage(given).centres.psi_front < shared_linkage(given).centres.psi_rear
 
 
 def test_without_cloth_inertia_alone_beats_up():
@@ -113,7 +113,7 @@ def test_an_effect_may_read_joints_at_front_dead_centre():
     stills = JOB.sampler(rod, {}).stills
     found = model.static(systems.FLOAT, given, stills, ("M3_fdc",))["M3_fdc"]
     reed = JOB.model(rod).static(systems.FLOAT, without, stills, ("M3_fdc",))["M3_fdc"]
-    joints = crank_rocker.front_pose(systems.FLOAT, linked(given).lengths, linked(given).centres)
+    joints = crank_rocker.front_pose(systems.FLOAT, shared_linkage(given).lengths, shared_linkage(given).centres)
     own, l1 = given.own["rod_inertia"], BEATUP.mechanism["l1"]
     turn = (own["m2"] * own["s2"] ** 2 + own["JS2"]) * joints.rod_1 * joints.rod_2
     swing = own["m2"] * l1 * own["s2"] * joints.rod_2 * joints.cos_crank_rod
@@ -134,7 +134,7 @@ def test_static_figures_are_their_formulas():
     JS = FULL.own(counterweight_inertia.Parameters).JS
     assert found["J4"] == pytest.approx(0.62 + s + JS, rel=1e-15)
     assert found["r4"] == pytest.approx((56.8 * 0.045 - 3.0 * 0.07) / 59.8, rel=1e-15)
-    centres = linked(JOB.sampler(FULL, DESIGN).given).centres
+    centres = shared_linkage(JOB.sampler(FULL, DESIGN).given).centres
     assert found["alpha_fdc"] == pytest.approx(centres.psi_2_front * (20 * math.pi) ** 2, rel=1e-14)
     assert [found[name] for name in ("swing", "theta", "beta")] == [centres.swing, centres.theta, centres.beta]
     widths = {"l1": 5, "l2": 25, "l3": 30, "l4": 17, "m4e": 12.4, "r4e": 80}

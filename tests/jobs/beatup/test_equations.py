@@ -127,7 +127,7 @@ def test_printed_dead_centres_are_the_mechanisms():
     given, pose, _ = setting(found, 1.0)
     named = numbers(given, pose, 1.0)
     expected = {"beta": given.values["beta"], "beta_r": given.values["beta_r"]}
-    expected["psi''_FDC"] = beatup.linked(given).centres.psi_2_front
+    expected["psi''_FDC"] = beatup.shared_linkage(given).centres.psi_2_front
     shown = dict(equation.text.split(" = ") for equation in beatup_equations.equations(found))
     for name, number in expected.items():
         assert value(read(shown[name]), named) == pytest.approx(number, rel=1e-13)

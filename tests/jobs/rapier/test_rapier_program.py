@@ -7,7 +7,7 @@ import pytest
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.rapier.model import read
-from loomopt.jobs.rapier.program import constructed
+from loomopt.jobs.rapier.program import paper_construction
 from loomopt.model.limits import CycleLimit, DesignLimit
 from loomopt.model.objectives import Peak, Value
 from loomopt.model.program import Variable
@@ -90,12 +90,12 @@ def test_a_limit_on_the_transmission_angle_is_one_on_what_it_lacks_of_a_right_an
 def test_starts_are_todays_drive_and_the_papers_construction():
     today, built = JOB.program(SCENE, "stroke-dwell").starts
     assert today["l4"] == SCENE.mechanism["l4"]
-    made = constructed(JOB.numbers(SCENE))
+    made = paper_construction(JOB.numbers(SCENE))
     assert {name: built[name] for name in made} == pytest.approx(made, rel=1e-2)
     reached = read(JOB.sampler(SCENE, made)).stroke
     assert reached == pytest.approx(0.85, rel=2e-3), "the paper's own construction misses by as much"
-    assert constructed({name: value for name, value in JOB.numbers(SCENE).items() if name != "stroke"}) is None
-    assert constructed(JOB.numbers(SCENE) | {"l6": 0.001}) is None
+    assert paper_construction({name: value for name, value in JOB.numbers(SCENE).items() if name != "stroke"}) is None
+    assert paper_construction(JOB.numbers(SCENE) | {"l6": 0.001}) is None
 
 
 def test_scales_move_only_where_every_length_is_a_variable():

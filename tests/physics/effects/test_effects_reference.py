@@ -23,7 +23,7 @@ from reference import effects as plain_effects
 ROWS = [tuple(row.values()) for row in csv.DictReader((Path(__file__).parents[2] / "reference" / "effects.csv").open())]
 EFFECTS = {
     (job, name): effect
-    for job in registry.own_names()
+    for job in registry.builtin_names()
     for name, effect in registry.find(job).schema({}).effects.items()
 }
 OTHER = {
