@@ -121,5 +121,5 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """Return the public names: what an editor completes and `help` shows, nothing imported for it."""
+    """Public names, for completion and `help`, without an import of their modules."""
     return [*__all__, "__version__"]

@@ -1,1 +1,1 @@
-"""What people and programs see: Python, the command line, text, figures and files; never solves, knows no job."""
+"""Interface: Python, the command line, text, figures and files. It does not solve and knows no job."""

@@ -71,9 +71,24 @@ MACHINES = 100_000
 
 
 def load(name_or_path: str | os.PathLike[str]) -> Loaded:
-    """Scene of a packaged name or of a TOML file; of an answer's JSON file the answer, in its own scene.
+    """Load a scene, or an answer from its JSON file.
 
-    An answer comes as the `Evaluation` of its design, computed anew. Raises BadInput.
+    Parameters
+    ----------
+    name_or_path : name of a packaged problem, or path of a TOML scene or of an answer's JSON file.
+
+    Returns
+    -------
+    Scene; for an answer's file the `Evaluation` of its design in its scene, computed anew.
+
+    Raises
+    ------
+    BadInput : the file is missing or wrong.
+
+    Examples
+    --------
+    >>> load("beatup-light").mechanism["l1"]
+    0.031
     """
     loaded, design = _open(name_or_path)
     return loaded if design is None else results.evaluate_design(loaded, design, None)
@@ -118,6 +133,10 @@ def solve(
     round_to : steps of sizes by number or pattern, such as {"l*": "0.5 mm"}, beside [steps] and [stock] of the scene;
         True for those of the scene alone (`answer.rounded`).
     on_iteration, on_start, on_step : functions of (number), (number, total) and (text) that report progress.
+
+    Returns
+    -------
+    Answer with `design`, `figures`, `binding` and `certificate`; `status` says whether the solve was successful.
 
     Raises
     ------
@@ -182,10 +201,28 @@ def solve(
 
 
 def evaluate(scene: Given, design: Design | Evaluation | None = None, target: str | None = None) -> Evaluation:
-    """Figures and limits of a design (SI and rad; today's where it names nothing). Raises BadInput.
+    """Figures and limits of a design, SI and rad.
 
-    scene: as `load` takes it; without a design, an answer is judged as it is. design: a mapping, or an answer, of which
-    the design alone is taken. target: whose limits, the answer's own or the job's default without one.
+    Parameters
+    ----------
+    scene : Scene, answer, packaged name or path.
+    design : mapping of names to SI numbers or texts with units, or an answer, of which only the design is used;
+        without it the design of an answer, else today's machine.
+    target : target whose limits are checked; the answer's target or the job's default without it.
+
+    Returns
+    -------
+    Evaluation with `design`, `figures`, `limits` and `admissible`.
+
+    Raises
+    ------
+    BadInput : an argument or the scene is wrong.
+
+    Examples
+    --------
+    >>> evaluation = evaluate("beatup-light", {"l1": "30.5 mm"})
+    >>> round(evaluation.figures["peak_torque"], 2), evaluation.admissible
+    (89.6, False)
     """
     loaded, given = _request(scene, design)
     return results.evaluate_design(loaded, given, target)
@@ -194,11 +231,28 @@ def evaluate(scene: Given, design: Design | Evaluation | None = None, target: st
 def prove(
     scene: Given, design: Design | Evaluation | None = None, target: str | None = None, *, slack: float = SLACK
 ) -> "Proofs":
-    """Proofs that a design's limits (SI; today's without one) hold at every crank angle, or where they fail.
+    """Prove that the limits of a design hold at every crank angle, or find the angle where they fail.
 
-    design: a mapping, or an answer, of which the design alone is taken. target: whose limits,
-    the job's default without one. slack: what binding limits leave open, relative to each quantity's largest magnitude
-    over the cycle. Raises BadInput.
+    Parameters
+    ----------
+    scene : Scene, answer, packaged name or path.
+    design : mapping of names to SI numbers or texts with units, or an answer, of which only the design is used;
+        without it the design of an answer, else today's machine.
+    target : target whose limits are proven; the job's default without it.
+    slack : permitted violation, relative to the largest magnitude of each quantity over the cycle.
+
+    Returns
+    -------
+    Proofs, one for each limit; `passed` is true where all limits are proven.
+
+    Raises
+    ------
+    BadInput : an argument or the scene is wrong.
+
+    Examples
+    --------
+    >>> prove("beatup-light").passed
+    True
     """
     from loomopt.interface.progress import cell_progress
     from loomopt.solving.proof import whole_cycle
@@ -219,12 +273,32 @@ def simulate(
     accuracy: float | None = None,
     measured: str | os.PathLike[str] | None = None,
 ) -> "pd.DataFrame":
-    """Curves of a design (SI; today's without one) over the cycle, units in the column names.
+    """Curves of a design over the cycle.
 
-    design: a mapping, or an answer, of which the design alone is taken. target: what it was found for, to be named in
-    the table's provenance. accuracy: as few rows as show each column's largest magnitude to it; every half degree
-    without. measured: a CSV file of measured curves, `phi [deg]` and columns named as the curves; they become columns
-    NAME_measured, and the table's `attrs` hold the rms difference of each. Raises BadInput.
+    Parameters
+    ----------
+    scene : Scene, answer, packaged name or path.
+    design : mapping of names to SI numbers or texts with units, or an answer, of which only the design is used;
+        without it the design of an answer, else today's machine.
+    target : target that the provenance of the table names.
+    accuracy : relative accuracy of each column's largest magnitude, for as few rows as it needs; without it a row
+        every half degree.
+    measured : CSV file of measured curves, with `phi [deg]` and columns named as the curves. They become columns
+        NAME_measured; `attrs` holds the rms difference of each one.
+
+    Returns
+    -------
+    Table, SI, with units in the column names, such as `phi [rad]`.
+
+    Raises
+    ------
+    BadInput : an argument or the scene is wrong.
+
+    Examples
+    --------
+    >>> curves = simulate("beatup-light")
+    >>> list(curves.columns[:2])
+    ['phi [rad]', 'psi [rad]']
     """
     from loomopt.interface import tables
 
@@ -236,11 +310,27 @@ def simulate(
 
 
 def budget(scene: Given, design: Design | Evaluation | None = None, *, fluctuation: float | None = None) -> "Budget":
-    """Return where the crank torque of a design (SI; today's without one) comes from, effect by effect.
+    """Torque budget: share of each effect in the crank torque, and the size of the motor.
 
-    Each effect's share where the torque peaks, its rms, its energy a turn; what their sum asks of a motor. design: a
-    mapping, or an answer, of which the design alone is taken. fluctuation: (largest − least)/mean speed that a flywheel
-    is sized for. Raises BadInput, also where nothing acts on the crank.
+    Parameters
+    ----------
+    scene : Scene, answer, packaged name or path.
+    design : mapping of names to SI numbers or texts with units, or an answer, of which only the design is used;
+        without it the design of an answer, else today's machine.
+    fluctuation : (largest − least)/mean speed for which a flywheel is sized.
+
+    Returns
+    -------
+    Budget with the share of each effect at the peak torque, its rms and its energy per turn (`rows`), and `motor`.
+
+    Raises
+    ------
+    BadInput : an argument or the scene is wrong, or no effect acts on the crank.
+
+    Examples
+    --------
+    >>> [row.effect for row in budget("beatup-light").rows]
+    ['inertia', 'resistance']
     """
     from loomopt.interface.study.budget import compute
 
@@ -260,12 +350,34 @@ def sweep(
     seed: int = 0,
     on_row: "Callable[[Row], None] | None" = None,
 ) -> "StudyTable":
-    """A row for every combination of scene numbers, solved for a target (the job's default without one).
+    """Solve a target for every combination of scene numbers.
 
-    over: dotted key → its values as a scene gives them, or "LO:HI:STEP UNIT". executor: any of `concurrent.futures`, or
-    a function that makes one; workers: so many processes on this machine instead. The rows are the same, whoever
-    computes them. store: a file that each row is written to as it comes; resume: takes those that are there. accuracy,
-    seed: as in `solve`. on_row(row): called as each is there. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    Parameters
+    ----------
+    scene : Scene, answer, packaged name or path.
+    over : dotted key → its values as in a scene, or "LO:HI:STEP UNIT".
+    target : name of a target; the job's default without it.
+    executor : executor of `concurrent.futures`, or a function that makes one. It does not change the rows.
+    workers : number of processes on this machine, in place of `executor`.
+    store : file to which each finished row is written at once.
+    resume : use the rows that `store` already holds.
+    accuracy, seed : as in `solve`.
+    on_row : function of a row, called after each row.
+
+    Returns
+    -------
+    StudyTable with a row for each combination (`rows`), as a table by `.table()`.
+
+    Raises
+    ------
+    BadInput : an argument or the scene is wrong.
+    KeyboardInterrupt : Ctrl-C.
+
+    Examples
+    --------
+    >>> study = sweep("beatup-light", {"operation.M0": ["590 N*m", "600 N*m"]})
+    >>> [round(row.figures["M3_fdc"], 4) for row in study.rows]
+    [-86.9811, -76.9811]
     """
     from loomopt.interface.study.points import run_study
     from loomopt.studies.sweep import plan_sweep
@@ -285,12 +397,33 @@ def effects(
     seed: int = 0,
     on_row: "Callable[[Row], None] | None" = None,
 ) -> "EffectsStudy":
-    """Return what each effect is worth for a target (the job's default without one), and what may be left out.
+    """Influence of each effect on a target, and the effects that may be left out.
 
-    The reference has all effects of [effects] and [available] on that combine. tolerance: share of each objective's
-    natural size that leaving an effect out may change. executor, workers: as in `sweep`; the study is the same whoever
-    computes it. accuracy, seed: as in `solve`. on_row(row): called as each solve is there. Raises BadInput, and
-    KeyboardInterrupt on Ctrl-C.
+    The reference has all effects of [effects] and [available] that can be combined.
+
+    Parameters
+    ----------
+    scene : Scene, answer, packaged name or path.
+    target : name of a target; the job's default without it.
+    tolerance : permitted change of each objective without an effect, relative to the objective's scale.
+    executor : executor of `concurrent.futures`, or a function that makes one. It does not change the rows.
+    workers : number of processes on this machine, in place of `executor`.
+    accuracy, seed : as in `solve`.
+    on_row : function of a row, called after each solve.
+
+    Returns
+    -------
+    EffectsStudy with `rows`, `left_out` and `kept`.
+
+    Raises
+    ------
+    BadInput : an argument or the scene is wrong.
+    KeyboardInterrupt : Ctrl-C.
+
+    Examples
+    --------
+    >>> effects("beatup-light").left_out
+    ('bearing_friction', 'centrifugal')
     """
     from loomopt.interface.study.effects import run_effects
     from loomopt.studies.effects.study import plan_effects
@@ -302,10 +435,28 @@ def effects(
 def sensitivity(
     answer: Answer | Given, target: str | None = None, *, on_step: Callable[[str], None] | None = None
 ) -> "SensitivityStudy":
-    """How an answer moves with every number of its scene, and how far its prices hold.
+    """Derivatives of an answer with respect to every number of its scene, and the ranges of its prices.
 
-    answer: what `solve` returned; a scene, or what `load` takes, is solved first, for `target`. on_step(what):
-    progress. Raises BadInput, also for an answer that is not certified, and KeyboardInterrupt on Ctrl-C.
+    Parameters
+    ----------
+    answer : answer of `solve`; a scene, or an argument of `load`, is solved first.
+    target : target of that solve.
+    on_step : function of a text that reports progress.
+
+    Returns
+    -------
+    SensitivityStudy with `rows` and `prices`.
+
+    Raises
+    ------
+    BadInput : an argument or the scene is wrong, or the answer is not certified.
+    KeyboardInterrupt : Ctrl-C.
+
+    Examples
+    --------
+    >>> study = sensitivity("beatup-light")
+    >>> {row.number for row in study.rows if row.of == "M3_fdc"} >= {"operation.M0"}
+    True
     """
     from loomopt.interface.study.sensitivity import run_sensitivity
     from loomopt.studies.sensitivity.study import plan_sensitivity
@@ -330,12 +481,37 @@ def tolerance(
     resume: bool = False,
     on_step: Callable[[str], None] | None = None,
 ) -> "ToleranceStudy":
-    """How the machines of a design (SI; today's without one) spread as [tolerances] has them made.
+    """Spread of the figures of machines that are made to the [tolerances] of the scene, and the yield.
 
-    design, target: as in `evaluate`. samples: machines that are drawn, over 16 scrambles of Sobol's points by `seed`.
-    worst: whether the worst case of each figure within all tolerances is proven too, which takes seconds.
-    executor, workers, store, resume: as in `sweep`, a scramble a row; the study is the same whoever computes it.
-    on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    Parameters
+    ----------
+    scene : Scene, answer, packaged name or path.
+    design : mapping of names to SI numbers or texts with units, or an answer, of which only the design is used;
+        without it the design of an answer, else today's machine.
+    target : target whose limits judge the machines; the job's default without it.
+    executor : executor of `concurrent.futures`, or a function that makes one. It does not change the rows.
+    samples : number of machines, over 16 scrambles of Sobol's points.
+    seed : seed of the scrambles.
+    workers : number of processes on this machine, in place of `executor`.
+    worst : prove the worst case of each figure within all tolerances too, which takes seconds.
+    store : file to which each finished row is written at once.
+    resume : use the rows that `store` already holds.
+    on_step : function of a text that reports progress.
+
+    Returns
+    -------
+    ToleranceStudy with `figures`, `yields` and `worst`.
+
+    Raises
+    ------
+    BadInput : an argument or the scene is wrong.
+    KeyboardInterrupt : Ctrl-C.
+
+    Examples
+    --------
+    >>> scene = load("beatup-light").set("tolerances.l1", {"plus_minus": "0.06 mm", "sigmas": 3})
+    >>> tolerance(scene, samples=1600, worst=False).figures["M3_fdc"].shares
+    {'l1': 1.0}
     """
     from loomopt.interface.study.tolerance import run_tolerance
     from loomopt.studies.tolerance.plan import plan_tolerance
@@ -363,15 +539,39 @@ def pareto(
     accuracy: float = ACCURACY,
     on_row: "Callable[[Row], None] | None" = None,
 ) -> "StudyTable":
-    """Front of two axes: what the first costs of the second, every point certified.
+    """Front of two objectives, with a certificate at every point.
 
-    axes: figures or numbers that the scene bounds, freed where it holds them; M3_fdc counts by magnitude. target: whose
-    demands hold at every point, of all but the axes: the job's default without one, "none" for the scene's limits
-    alone. maximise: axes of which the most is sought; of the others it is the least, but of one that offers its most
-    alone, such as a dwell, or whose most a target of a linkage seeks, the most. ranges: axis → "LO:HI UNIT", or both
-    ends in SI, beyond which the front does not go. points: how many are asked for, 40 without; those that narrow
-    changes down come beside them. The rest is as in `sweep`. Raises BadInput, also for an end that has no least value,
-    and KeyboardInterrupt on Ctrl-C.
+    Parameters
+    ----------
+    scene : Scene, answer, packaged name or path.
+    axes : two figures, or numbers that the scene bounds, which are freed. M3_fdc counts by magnitude.
+    target : target whose requirements hold at every point, except those on the axes; the job's default without it,
+        "none" for the limits of the scene alone.
+    executor : executor of `concurrent.futures`, or a function that makes one. It does not change the rows.
+    maximise : axes that are maximised. The others are minimised, except an axis that can only be maximised, such as
+        a dwell, and one that a target of a linkage maximises.
+    ranges : axis → "LO:HI UNIT", or both ends in SI, which bound the front.
+    points : number of points, 40 without it. Points that locate changes of the binding limits are added.
+    workers : number of processes on this machine, in place of `executor`.
+    store : file to which each finished row is written at once.
+    resume : use the rows that `store` already holds.
+    accuracy : as in `solve`.
+    on_row : function of a row, called after each row.
+
+    Returns
+    -------
+    StudyTable with the rows in the order of the second axis.
+
+    Raises
+    ------
+    BadInput : an argument or the scene is wrong, or an axis has no end.
+    KeyboardInterrupt : Ctrl-C.
+
+    Examples
+    --------
+    >>> front = pareto("beatup-light", ("peak_torque", "m4e"), points=3)
+    >>> all(row.certified for row in front.rows)
+    True
     """
     from loomopt.interface.study.points import run_study
     from loomopt.studies.front import front
@@ -384,9 +584,28 @@ def pareto(
 
 
 def accuracy(scene: Given, *, full: bool = False, on_step: Callable[[str], None] | None = None) -> "AccuracyStudy":
-    """Return what accuracy costs in time, method by method; full: more settings and repeats, which take minutes.
+    """Work–precision study: error and time of each numerical method.
 
-    on_step(what): called before each step. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    Parameters
+    ----------
+    scene : Scene, answer, packaged name or path.
+    full : use more settings and repeats, which takes minutes.
+    on_step : function of a text, called before each step.
+
+    Returns
+    -------
+    AccuracyStudy with `rows`, `orders` and `advice`.
+
+    Raises
+    ------
+    BadInput : an argument or the scene is wrong.
+    KeyboardInterrupt : Ctrl-C.
+
+    Examples
+    --------
+    >>> study = accuracy("beatup-light")
+    >>> study.rows[0].method
+    'exchange'
     """
     from loomopt.interface.study.accuracy import run_accuracy
 
@@ -394,17 +613,48 @@ def accuracy(scene: Given, *, full: bool = False, on_step: Callable[[str], None]
 
 
 def problems() -> "tuple[Head, ...]":
-    """Packaged problems: name, title, job, targets and source of each. Raises BadInput."""
+    """List the packaged problems.
+
+    Returns
+    -------
+    Heads with `name`, `title`, `job`, `targets` and `source`, in alphabetical order.
+
+    Raises
+    ------
+    BadInput : an installed problem cannot be read.
+
+    Examples
+    --------
+    >>> [head.name for head in problems()][:3]
+    ['beatup', 'beatup-heavy', 'beatup-light']
+    """
     from loomopt.interface import listing
 
     return listing.problems()[0]
 
 
 def new(job: str, path: str | os.PathLike[str]) -> "Path":
-    """Write a commented scene of a job to start from, or a packaged scene by its name; return the file.
+    """Write a commented scene of a job, or a copy of a packaged scene.
 
-    path: one that is not there yet, and ends in .toml; of a packaged scene also in .zip, which takes all scenes of its
-    job. Raises BadInput.
+    Parameters
+    ----------
+    job : name of a job or of a packaged problem.
+    path : new file that ends in .toml; for a packaged problem also in .zip, which holds all scenes of its job.
+
+    Returns
+    -------
+    Path of the file.
+
+    Raises
+    ------
+    BadInput : the job is unknown, or the file exists already.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> folder = tempfile.mkdtemp()
+    >>> new("beatup", f"{folder}/my-loom.toml").name
+    'my-loom.toml'
     """
     from loomopt.interface import listing
 
@@ -412,17 +662,51 @@ def new(job: str, path: str | os.PathLike[str]) -> "Path":
 
 
 def schema(job: str) -> dict[str, object]:
-    """JSON Schema of a job's scenes, for editors. Raises BadInput."""
+    """JSON Schema of a job's scenes, for editors.
+
+    Parameters
+    ----------
+    job : name of a job, such as "beatup".
+
+    Returns
+    -------
+    JSON Schema, draft 2020-12.
+
+    Raises
+    ------
+    BadInput : the job is unknown.
+
+    Examples
+    --------
+    >>> "bounds" in schema("beatup")["properties"]
+    True
+    """
     from loomopt.interface.text import json_schema
 
     return json_schema.scene(registry.declared(arguments.text(job, "job", "a loom job", "Name one, such as beatup")))
 
 
 def compare(*answers: "Evaluation | str", scene: Given | None = None) -> "Comparison":
-    """Designs side by side in one unit, with what differs marked; their curves by `.plot()`.
+    """Compare designs side by side in the units of the first one.
 
-    answers: answers or evaluations of one job, and "today" for the first one's machine as it is. scene: in which all
-    are judged; each in its own without it. Raises BadInput.
+    Parameters
+    ----------
+    *answers : answers or evaluations of one job, and "today" for today's machine of the first one's scene.
+    scene : scene in which all designs are evaluated; without it, the scene of each design.
+
+    Returns
+    -------
+    Comparison with `rows`, which mark the differences; `.plot()` draws the curves.
+
+    Raises
+    ------
+    BadInput : an argument or the scene is wrong.
+
+    Examples
+    --------
+    >>> comparison = compare(evaluate("beatup-light", {"l1": "30.5 mm"}), "today")
+    >>> comparison.rows[0].name, comparison.rows[0].values
+    ('l1', (30.5, 31.0))
     """
     from loomopt.interface.study import comparison
 
@@ -430,12 +714,12 @@ def compare(*answers: "Evaluation | str", scene: Given | None = None) -> "Compar
 
 
 def _scene(given: Given) -> Scene:
-    """A scene that is given as itself, by its name or by its path; of an answer its own. Raises BadInput."""
+    """Scene of an object, a packaged name or a path; of an answer its scene. Raises BadInput."""
     return _open(given)[0]
 
 
 def _open(given: Given) -> tuple[Scene, dict[str, float] | None]:
-    """A scene; of an answer its own, which knows its target, and its design, checked. Raises BadInput."""
+    """Scene, and the checked design of an answer. Raises BadInput."""
     from loomopt.scenes import designs
 
     if isinstance(given, Scene):
@@ -449,7 +733,7 @@ def _open(given: Given) -> tuple[Scene, dict[str, float] | None]:
 
 
 def _request(scene: Given, design: Design | Evaluation | None) -> tuple[Scene, dict[str, float]]:
-    """A scene and a design in it, checked: of an answer its own, where none is given; else today's, as nothing.
+    """Scene and checked design: the answer's design where none is given, else an empty one for today's machine.
 
     Of an answer given as the design, its design alone. Raises BadInput.
     """

@@ -1,4 +1,4 @@
-"""Forces that a design's curves have by components: what a bearing is chosen by."""
+"""Forces of a design's curves that have components, for the choice of bearings."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
@@ -49,11 +49,11 @@ class TurnedForce(NamedTuple):
 
     @property
     def at(self) -> float:
-        """Where that is, rad."""
+        """Crank angle of the peak, rad."""
         return float(self.phi[int(self.size.argmax())])
 
     def mean(self, power: float = 1.0) -> float:
-        """Return (mean of |F|^power over the crank angle)^(1/power), N."""
+        """Mean force (mean of |F|^power over the crank angle)^(1/power), N."""
         phi, values = np.append(self.phi, self.phi[0] + TURN), np.append(self.size, self.size[:1]) ** power
         return float((np.sum(np.diff(phi) * (values[1:] + values[:-1]) / 2) / TURN) ** (1 / power))
 
@@ -91,7 +91,7 @@ def from_curves(scene: Scene, curves: "pd.DataFrame", design: Mapping[str, float
 
 
 def tells(scene: Scene) -> bool:
-    """Say whether an effect that is on tells forces by their components."""
+    """Whether an active effect gives forces by their components."""
     return any(map(_tells_forces, scene.active))
 
 

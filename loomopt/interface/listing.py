@@ -1,4 +1,4 @@
-"""What is there to start from: the packaged problems, commented scenes, and copies of both."""
+"""Packaged problems, commented scenes, and copies of both."""
 
 import functools
 import os

@@ -1,4 +1,4 @@
-"""What a designer works with in Python: a design that was evaluated or found, as tables, curves, figures and files."""
+"""Evaluations and answers in Python: tables, curves, figures and files of a design."""
 
 import dataclasses
 import inspect
@@ -31,7 +31,7 @@ PICTURE = arguments.PICTURE
 
 @dataclass(frozen=True, repr=False)
 class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
-    """A given design in its scene: its figures and limits, SI and rad; nothing was optimised.
+    """Figures and limits of a given design in its scene, SI and rad, without optimisation.
 
     target: whose limits it was judged by.
     """
@@ -40,13 +40,13 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
 
     @property
     def scene(self) -> Scene:
-        """What it holds in: the scene as it was asked for, with all that was set, put on and taken off."""
+        """Scene of the design, with all changes of the call."""
         assert self.result.scene is not None
         return self.result.scene
 
     @lazy
     def members(self) -> "tuple[Evaluation, ...]":
-        """Of a family each machine by itself."""
+        """Members of a family, evaluated one by one."""
         from loomopt.scenes import family
 
         return tuple(_to_evaluation(member, self.scene, family.of_target(self.scene)) for member in self.result.members)
@@ -56,15 +56,21 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         return self.result.as_dict(self.target)
 
     def table(self) -> "pd.DataFrame":
-        """Design and figures, a row each, beside today's machine and the limits, in the scene's own units."""
+        """Design and figures, a row each, with today's machine and the limits, in the units of the scene."""
         from loomopt.interface import tables
 
         return tables.answer(self.result, self.scene)
 
     def to_frame(self, *, si: bool = False) -> "pd.DataFrame":
-        """Design and figures as one row, units in the column names, to be set beside others by `pd.concat`.
+        """Design and figures as one row, for `pd.concat` with rows of other designs.
 
-        si: in SI, so that rows of scenes in different units have the same columns; else in the scene's own units.
+        Parameters
+        ----------
+        si : SI units, the same columns for all scenes; else the units of the scene.
+
+        Returns
+        -------
+        Table of one row, with units in the column names.
         """
         from loomopt.interface import tables
 
@@ -78,9 +84,20 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
     def plot(
         self, path: str | os.PathLike[str] | None = None, *, measured: str | os.PathLike[str] | None = None
     ) -> "Figure":
-        """Curves over the cycle as a figure, which shows itself in Jupyter.
+        """Draw the curves over the cycle.
 
-        path: a file to write it to as well: .png, .svg or .pdf. measured: as in `loomopt.simulate`. Raises BadInput.
+        Parameters
+        ----------
+        path : file to write the figure to as well: .png, .svg or .pdf.
+        measured : CSV file of measured curves, as in `loomopt.simulate`.
+
+        Returns
+        -------
+        Figure, which shows itself in Jupyter.
+
+        Raises
+        ------
+        BadInput : an argument is wrong.
         """
         solution.demand_single(self.result, "curves")
         from loomopt.interface.files import outputs
@@ -89,9 +106,19 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         return outputs.plot(self.result, self.scene, self.target, place, measured)
 
     def plot_forces(self, path: str | os.PathLike[str] | None = None) -> "Figure":
-        """Forces that an effect tells by components: size over the turn, and each one's polar diagram.
+        """Draw the forces of joints: their size over the turn, and their polar diagrams.
 
-        path: a file to write it to as well: .png, .svg or .pdf. Raises BadInput, also where no effect tells any.
+        Parameters
+        ----------
+        path : file to write the figure to as well: .png, .svg or .pdf.
+
+        Returns
+        -------
+        Figure, which shows itself in Jupyter.
+
+        Raises
+        ------
+        BadInput : an argument is wrong, or no active effect gives forces by components.
         """
         from loomopt.interface import forces
         from loomopt.interface.figures import forces as figures
@@ -101,7 +128,16 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         return drawn
 
     def draw(self) -> "Sketch":
-        """Mechanism drawn at full scale, which shows itself in Jupyter. Raises BadInput."""
+        """Draw the mechanism at full scale.
+
+        Returns
+        -------
+        Sketch, which shows itself in Jupyter.
+
+        Raises
+        ------
+        BadInput : the scene lacks a number that the drawing needs.
+        """
         solution.demand_single(self.result, "drawing")
         from loomopt.interface.files import outputs
         from loomopt.interface.text import notebook
@@ -109,9 +145,19 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         return notebook.sketch(self.scene, self.design, outputs.describe_design(self.result))
 
     def export(self, path: str | os.PathLike[str]) -> Path:
-        """Write linkage or cam for the workshop, as `loomopt export` does; return the file. Raises BadInput.
+        """Write the linkage or the cam for the workshop, as `loomopt export` does.
 
-        path: .dxf or .svg at true scale; .csv or .xlsx for the joints or the profile.
+        Parameters
+        ----------
+        path : .dxf or .svg at true scale; .csv or .xlsx for the joints or the profile.
+
+        Returns
+        -------
+        Path of the file.
+
+        Raises
+        ------
+        BadInput : an argument is wrong.
         """
         solution.demand_single(self.result, "drawing")
         from loomopt.interface.files import outputs
@@ -121,10 +167,21 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         return place
 
     def report(self, path: str | os.PathLike[str], *results: object) -> Path:
-        """Write one self-contained page, which says first what the design truly is; return the file. Raises BadInput.
+        """Write one self-contained page, which begins with the verdict on the design.
 
-        path: one that ends in .html. results: studies of the same scene that the page shows too: fronts,
-        sweeps, effects, sensitivities, tolerances, torque budgets, accuracy, proofs.
+        Parameters
+        ----------
+        path : file that ends in .html.
+        *results : studies of the same scene that the page shows too: fronts, sweeps, effects, sensitivities,
+            tolerances, torque budgets, accuracy, proofs.
+
+        Returns
+        -------
+        Path of the file.
+
+        Raises
+        ------
+        BadInput : an argument is wrong.
         """
         from loomopt.interface.report import document
 
@@ -133,9 +190,19 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         return place
 
     def animate(self, path: str | os.PathLike[str] | None = None) -> "MovingPicture":
-        """Mechanism moving through its turn, which shows itself in Jupyter. Raises BadInput.
+        """Animate the mechanism over its turn.
 
-        path: a file to write it to as well: .html, .gif, or .mp4 where ffmpeg is found.
+        Parameters
+        ----------
+        path : file to write the animation to as well: .html, .gif, or .mp4 if ffmpeg is installed.
+
+        Returns
+        -------
+        Animation, which shows itself in Jupyter.
+
+        Raises
+        ------
+        BadInput : an argument is wrong.
         """
         solution.demand_single(self.result, "drawing")
         from loomopt.interface.files import outputs
@@ -156,7 +223,20 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
     def simulate(
         self, *, accuracy: float | None = None, measured: str | os.PathLike[str] | None = None
     ) -> "pd.DataFrame":
-        """Curves of the design in its own scene; accuracy, measured: as in `loomopt.simulate`."""
+        """Curves of the design over the cycle, in its scene.
+
+        Parameters
+        ----------
+        accuracy, measured : as in `loomopt.simulate`.
+
+        Returns
+        -------
+        Table, SI, with units in the column names.
+
+        Raises
+        ------
+        BadInput : an argument is wrong.
+        """
         solution.demand_single(self.result, "curves")
         from loomopt.interface import tables
 
@@ -165,14 +245,40 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         return tables.curves(self.scene, self.design, accuracy, self.target, measured)
 
     def budget(self, *, fluctuation: float | None = None) -> "Budget":
-        """Return where the crank torque of the design comes from; fluctuation: as in `loomopt.budget`."""
+        """Torque budget of the design, in its scene.
+
+        Parameters
+        ----------
+        fluctuation : as in `loomopt.budget`.
+
+        Returns
+        -------
+        Budget.
+
+        Raises
+        ------
+        BadInput : no effect acts on the crank.
+        """
         solution.demand_single(self.result, "torque budget")
         from loomopt.interface.study.budget import compute
 
         return compute(self.scene, designs.checked(self.design, self.scene), fluctuation)
 
     def prove(self, *, slack: float = SLACK) -> "Proofs":
-        """Proofs of the limits of its own scene and target; slack: as in `loomopt.prove`. Raises BadInput."""
+        """Prove the limits of the design's target at every crank angle, in its scene.
+
+        Parameters
+        ----------
+        slack : as in `loomopt.prove`.
+
+        Returns
+        -------
+        Proofs, one for each limit.
+
+        Raises
+        ------
+        BadInput : an argument is wrong.
+        """
         from loomopt.solving.proof import whole_cycle
 
         solution.demand_single(self.result, "proofs")
@@ -185,17 +291,17 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
 
     @property
     def sought(self) -> str:
-        """What it answers, or was judged by: its target, or what its terms say."""
+        """Target of the solve or of the evaluation, or the summary of its terms."""
         return self.terms.said if self.terms else self.target
 
     @property
     def _outcome(self) -> str:
-        """What came of it, in a word."""
+        """Outcome in a word."""
         return "admissible" if self.admissible else "not admissible"
 
     @property
     def _summary(self) -> str:
-        """What a designer asks first: the figures that the target is about."""
+        """Figures that the target optimises, with values."""
         from loomopt.jobs import registry
         from loomopt.solving.answer.solution import Words
 
@@ -233,7 +339,7 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
 
 @dataclass(frozen=True, repr=False)
 class Answer(Evaluation):
-    """A solved target: the design that was found, what binds, what is certified, and today's machine beside it."""
+    """Result of a solve: the optimum, its binding limits, its certificate, and today's machine."""
 
     result: solution.Solution
 
@@ -258,7 +364,7 @@ class Answer(Evaluation):
 
 
 def _fields_signature(record: type) -> inspect.Signature:
-    """Names of what is in a record: whoever reads `help` looks for them."""
+    """Signature with the names of the fields of a record, for `help`."""
     known = inspect.signature(record).parameters.values()
     return inspect.Signature(
         [parameter.replace(annotation=parameter.empty, default=parameter.empty) for parameter in known]
@@ -279,12 +385,12 @@ records.show_by(_html)
 
 
 def evaluate_design(scene: Scene, design: Mapping[str, float] | None, target: str | None) -> Evaluation:
-    """Figures and limits of a design, checked, SI; today's without one. Raises BadInput."""
+    """Evaluation of a checked design, SI; of today's machine without one. Raises BadInput."""
     return _to_evaluation(report.evaluate(scene, design, target), scene, target_name(scene, target))
 
 
 def to_answer(record: solution.Solution, scene: Scene, target: str | None = None) -> Answer:
-    """What a solve says as an object to work with; target: as the call named it."""
+    """Answer of the record of a solve; target: as the call named it."""
     return Answer(dataclasses.replace(record, scene=scene, asked=target), record.target)
 
 

@@ -1,4 +1,4 @@
-"""The result of a study to work with: its tables, its charts, its part of a page; and how a study is run for one."""
+"""Results of studies: tables, charts and parts of a page; executors, stores and progress of a run."""
 
 import contextlib
 import functools
@@ -32,7 +32,7 @@ EXECUTORS = "an executor of concurrent.futures, or a function that makes one"
 
 
 class Presentation(ABC):
-    """What says its tables and charts once, and is read in a terminal, in Jupyter, as a figure and on a page."""
+    """Tables and charts of a result, for a terminal, Jupyter, a figure and a page."""
 
     @property
     @abstractmethod
@@ -52,9 +52,19 @@ class Presentation(ABC):
         return self.charts(), ()
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
-        """Draw the charts as a figure, which shows itself in Jupyter.
+        """Draw the charts.
 
-        path: a file to write it to as well: .png, .svg or .pdf. Raises BadInput.
+        Parameters
+        ----------
+        path : file to write the figure to as well: .png, .svg or .pdf.
+
+        Returns
+        -------
+        Figure, which shows itself in Jupyter.
+
+        Raises
+        ------
+        BadInput : an argument is wrong.
         """
         from loomopt.interface.figures import charts, figure
 
@@ -67,7 +77,7 @@ class Presentation(ABC):
         return drawn
 
     def report_parts(self) -> "list[Part]":
-        """What a page of an answer shows of it."""
+        """Parts for a page of an answer."""
         from loomopt.interface.report import charts
         from loomopt.interface.report.markup import Part
 
@@ -85,7 +95,7 @@ class Presentation(ABC):
 
 
 class StudyResult(RecordHolder[Record], Presentation):
-    """What a study found, to work with; the attributes of its record are its own too."""
+    """Result of a study; it has the attributes of its record."""
 
 
 @contextlib.contextmanager
@@ -112,7 +122,7 @@ def row_hook(progress: Callable[[int], str], on_row: run.OnRow | None) -> Iterat
 
 
 def workers(executor: Executor | run.Making | None, count: int | None) -> Executor | run.Making | None:
-    """Whoever computes a study: an executor, or a number of processes, not both. Raises BadInput."""
+    """Executor of a study, from an executor or a number of processes, not both. Raises BadInput."""
     if executor is not None and count is not None:
         remedy = "Give one of them"
         raise refusal("there are an executor and a number of workers", key="workers", origin="", remedy=remedy)

@@ -198,7 +198,7 @@ def _clean(column: NumberColumn, largest: float) -> NumberColumn:
 
 
 def frame(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> "pd.DataFrame":
-    """Return one line per row; si: in SI, so that studies of machines in different units can be compared."""
+    """Table of a line per row; si: in SI, for comparison with machines in other units."""
     import pandas as pd
 
     from loomopt.interface.table_frame import TableFrame
@@ -224,7 +224,7 @@ def _floats(column: NumberColumn) -> list[float]:
 
 
 def study_provenance(study: SceneStudy) -> dict[str, str]:
-    """Return where the rows of a study come from, once for all."""
+    """Provenance of the rows of a study."""
     return provenance(study.scene, study=study.name, target=study.target or "none", **study.conditions)
 
 
@@ -259,7 +259,7 @@ def _differs(column: NumberColumn) -> bool:
 
 
 def tables(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str | TextTable]:
-    """A line per row, what changes along it, and what came of it.
+    """Tables of a study: a line per row, the changes along it, and the outcome.
 
     rows: of all points that were solved.
     """

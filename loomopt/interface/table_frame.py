@@ -1,4 +1,4 @@
-"""A table that a person reads: six digits in each cell, whatever stands in the others."""
+"""Table with six digits in each cell, whatever the other cells hold."""
 
 from collections.abc import Mapping, Sequence
 

@@ -28,7 +28,7 @@ REACHED = {None: "", True: "yes", False: "no"}
 
 
 def answer(solution: Evaluated, scene: Scene) -> "pd.DataFrame":
-    """Return one row per design variable and figure: today, design, limits and unit, in the scene's display units.
+    """Table of a row per design variable and figure: today, design, limits and unit, in the scene's display units.
 
     Where no design is admissible, the nearest one's column is "relaxed". binds: the side, min or max, on which a solved
     design's limit binds; reached: yes or no where the target asks what may be out of reach. Of an evaluated design,

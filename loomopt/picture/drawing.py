@@ -53,7 +53,7 @@ def around(layer: str, centre: Point, radius: float, begin: float, end: float, t
 
 
 def place(labels: Sequence[Label], strokes: Sequence[Primitive], height: float) -> list[Text | Line]:
-    """Return each label where it meets no stroke and no earlier label, close to its point; far ones with a leader."""
+    """Labels placed close to their points, clear of strokes and earlier labels; far ones with a leader."""
     sizes = [shapes.text_box(Text(label.layer, Point(0.0, 0.0), label.text), height) for label in labels]
     wishes = [
         shapes.LabelWish((label.near, *label.also), label.side, size.right - size.left, size.top - size.bottom)
@@ -208,11 +208,11 @@ class Skeleton:
         return {event: "'" * k for k, event in enumerate(self.joints)}
 
     def at(self, event: str) -> dict[str, Point]:
-        """Return all joints at an event."""
+        """Positions of all joints at an event."""
         return {**self.pivots, **self.joints[event]}
 
     def strokes(self, h: float) -> list[Primitive]:
-        """Return what every drawing shows; h: text height, m."""
+        """Strokes that every drawing shows; h: text height, m."""
         frame = [link for link in self.links if set(link) <= set(self.pivots)]
         primitives: list[Primitive] = [Line("paths", (self.pivots[one], self.pivots[other])) for one, other in frame]
         for pivot in self.pivots.values():

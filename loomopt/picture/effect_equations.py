@@ -159,7 +159,7 @@ def term(load: Acting, pose: Motion, inputs: Given, letter: str) -> Equation:
 
 
 def _table_equation(load: Load[Any], name: Expression, inputs: Given) -> Equation:
-    """Say what a load's curve is: of each interval only its own numbers differ."""
+    """Equation of a load that is tabulated: one cubic form, whose coefficients differ between intervals."""
     assert load.tabulated is not None
     curve = inputs.own[load.name][load.tabulated.key]
     bent = f"{curve.corners} corners" if curve.corners != 1 else "one corner"
@@ -295,7 +295,7 @@ def event_equations(model: JobModel, poses: tuple[Motion, Motion], inputs: Given
 
 
 def terms(loads: Sequence[Acting], pose: Motion, inputs: Given) -> Mapping[str, Expression]:
-    """Return each load's term by its effect's name, one expression over the whole turn."""
+    """Terms of the loads by effect, one expression over the whole turn."""
     sp, phi, expressions = sympy(), symbol("phi"), {}
     for load in loads:
         intervals = pieces(load, pose, inputs)

@@ -148,7 +148,7 @@ def equation(name: str, left: Expression, right: Expression) -> Equation:
 
 
 def relation(name: str, left: Expression, sign: str, right: Expression, where: str = "") -> Equation:
-    """Return what a number must keep: sign is "=", "<=" or ">="; where: words that follow."""
+    """Requirement on a number: sign is "=", "<=" or ">="; where: text that follows."""
     sentence = f"{text(left)} {sign} {text(right)}{f' {where}' if where else ''}"
     form = (left, sign, right, *([where] if where else []))
     return Equation(name, sentence, functools.partial(_relation_text, left, sign, right, where), (form,))

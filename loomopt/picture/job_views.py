@@ -29,7 +29,7 @@ Marks = Mapping[str, float | Span]
 
 
 def tells_forces(scene: "Scene") -> bool:
-    """Say whether an effect that is on tells forces in joints."""
+    """Whether an active effect gives forces in joints."""
     return any(isinstance(effect, Check) and effect.joints for effect in scene.active)
 
 
@@ -53,7 +53,7 @@ class JobViews(abc.ABC):
 
     @abc.abstractmethod
     def joints_csv(self, scene: "Scene", design: Numbers) -> str:
-        """Return what `linkage` draws as CSV in its unit: joints and masses, or a profile. Raises BadInput."""
+        """The drawing as CSV in its unit: joints and masses, or a profile. Raises BadInput."""
 
     def motion(self, scene: "Scene", design: Numbers, angles: "Floats") -> "MechanismMotion | None":
         """Mechanism at crank angles, (n,) rad, as it moves; None where a job has none. Raises BadInput."""
@@ -68,17 +68,17 @@ class JobViews(abc.ABC):
         """Crank angles and stretches of the cycle a reader looks for."""
 
     def panels(self, scene: "Scene", design: Numbers, columns: Sequence[str]) -> "tuple[Panel, ...]":
-        """Return what a figure of the curves shows: all columns in the words of `words`, unless a job knows better."""
+        """Panels of a figure of curves: by default all columns, named by `words`."""
         from loomopt.picture.panels import arrange
 
         return arrange(scene, design, columns, self.words())
 
     def words(self) -> "Mapping[str, Curve]":
-        """Return what is known of the columns of the curves, by name."""
+        """Descriptions of the columns of the curves, by name."""
         return {}
 
     def remarks(self, scene: "Scene", design: Numbers) -> tuple[str, ...]:
-        """Return what to know beside the numbers, each a sentence without its full stop: curves, what checks remark."""
+        """Remarks on a design, sentences without a full stop: of curves and of checks."""
         from loomopt.maths.systems import FLOAT
         from loomopt.model.numbers import numbers, told
         from loomopt.physics.effects.kinds import Check, Inputs, owned

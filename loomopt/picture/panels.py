@@ -116,7 +116,7 @@ def _join(panel: Panel, other: Panel) -> Panel:
 
 
 def _of_effects(scene: Scene) -> dict[str, Curve]:
-    """Return what is known of the columns of effects that are on."""
+    """Descriptions of the columns of active effects."""
     curves = {}
     for effect in scene.active:
         if isinstance(effect, Load | State):
@@ -165,7 +165,7 @@ TWIST_SAMPLES = 3600
 
 
 def twist_remarks(scene: Scene, sampler: Sampler) -> tuple[str, ...]:
-    """Say where a state's coordinate exceeds a tenth of the output's travel while a load with corners acts on it."""
+    """Remarks on states whose coordinate exceeds a tenth of the output's travel under a load with corners."""
     model, names = sampler.model, []
     pieces, u = sampler.grid(TWIST_SAMPLES)
     for state in model.states:

@@ -104,7 +104,7 @@ def _beside(wish: LabelWish, near: tuple[float, float], gap: float, side: float)
 
 
 def _free(boxes: Floats, strokes: Floats, taken: Sequence[LabelSpot], room: float) -> NDArray[np.bool_]:
-    """Say of each box, (n, 4), whether no stroke and no box that is taken comes nearer to it than `room`."""
+    """Mask of the boxes, (n, 4), that are farther than `room` from all strokes and occupied boxes."""
     left, bottom, right, top = (boxes + np.array([-room, -room, room, room])).T[:, :, None]
     x, y = strokes[_within(strokes, left.min(), bottom.min(), right.max(), top.max())].T
     hit = np.any((x > left) & (x < right) & (y > bottom) & (y < top), axis=1)
@@ -115,7 +115,7 @@ def _free(boxes: Floats, strokes: Floats, taken: Sequence[LabelSpot], room: floa
 
 
 def _within(points: Floats, left: float, bottom: float, right: float, top: float) -> NDArray[np.bool_]:
-    """Say which points, (n, 2), lie between four sides."""
+    """Mask of the points, (n, 2), that lie between four sides."""
     x, y = points.T
     return np.asarray((x > left) & (x < right) & (y > bottom) & (y < top))
 
@@ -132,14 +132,14 @@ def _between(spot: LabelSpot, unit: float) -> Floats:
 
 
 def _meets(way: Floats, taken: Sequence[LabelSpot], unit: float) -> bool:
-    """Say whether a way comes too near to a box that is taken."""
+    """Whether a leader comes too near to an occupied box."""
     r = CLEAR * unit
     boxes = (spot.box for spot in taken)
     return any(np.any(_within(way, box.left - r, box.bottom - r, box.right + r, box.top + r)) for box in boxes)
 
 
 def _crosses(way: Floats, strokes: Floats, unit: float) -> bool:
-    """Say whether a stroke crosses the way from a point to its box; those at the point itself do not count."""
+    """Whether a stroke crosses the leader from a point to its box, strokes at the point excepted."""
     inner = way[np.hypot(*(way - way[0]).T) > 0.8 * unit]
     if not len(inner):
         return False
@@ -375,7 +375,7 @@ def _width(character: str) -> float:
 
 
 def extent(drawing: Drawing, margin: float = 2.0) -> Box:
-    """Return what the drawing covers with a margin in text heights."""
+    """Box of the drawing with a margin in text heights."""
     points = np.concatenate([marks(primitive, drawing.height) for primitive in drawing.primitives])
     (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
     room = margin * drawing.height

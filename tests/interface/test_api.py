@@ -1,6 +1,7 @@
 """The public functions as a notebook uses them."""
 
 import dataclasses
+import doctest
 import inspect
 import pickle
 import pydoc
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 import loomopt as lo
+from loomopt.interface import api
 from loomopt.interface.cli.app import run
 from loomopt.scenes.packaged import problems
 from loomopt.solving.answer import solution
@@ -377,3 +379,16 @@ EQUATED = "import sys, loomopt as lo; s = lo.load('beatup'); a = 'sympy' in sys.
 def test_sympy_waits_until_equations_are_asked_for():
     done = subprocess.run([sys.executable, "-c", EQUATED], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
+
+
+SLOW = ("accuracy", "effects", "sensitivity")
+"""Functions whose example takes seconds."""
+QUICK = sorted(set(api.__all__) - {"Answer", "Evaluation", "Scene", "scene", *SLOW})
+
+
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
+def test_public_functions_have_examples_that_run(name):
+    function = getattr(api, name)
+    (example,) = doctest.DocTestFinder(recurse=False).find(function, name, module=api, globs=dict(vars(api)))
+    assert example.examples
+    assert doctest.DocTestRunner().run(example).failed == 0

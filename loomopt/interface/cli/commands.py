@@ -47,7 +47,7 @@ def write(paths: Sequence[Path] | None, one: Callable[[Path], object]) -> None:
 
 
 def print_remarks(scene: "Scene", design: "DesignGiven") -> None:
-    """Say on stderr what a reader of a design's figures should know."""
+    """Print the remarks on a design to stderr."""
     from loomopt.jobs import registry
     from loomopt.scenes import designs
 

@@ -155,7 +155,7 @@ def _solve(scene: "Scene", target: str | None, prove: bool, studies: Sequence[st
 
 
 def _run_studies(evaluation: "Evaluation", studies: Sequence[str], say: Say) -> list[object]:
-    """Return what studies find of a design in its scene, each as its own command does by default. Raises BadInput."""
+    """Results of studies of a design in its scene, with the defaults of their commands. Raises BadInput."""
     made = []
     for name in studies:
         say(f"{name} of {evaluation.problem}")

@@ -93,7 +93,7 @@ def read_request(
 
 
 def only(option: str, given: list[Path] | None) -> Path | None:
-    """Return the one path that an option gives; None without it. Raises BadInput where it is given more than once."""
+    """Path of an option; None without it. Raises BadInput where the option is repeated."""
     from loomopt.base.errors import refusal
 
     if given and len(given) > 1:
@@ -138,7 +138,7 @@ def call_progress() -> "Progress":
 
 
 def remark(text: str) -> None:
-    """Say something beside the result; where nobody can hear it, the exit status still tells."""
+    """Print a remark to stderr. A closed stream is ignored, because the exit status reports the outcome."""
     with contextlib.suppress(OSError):
         print(text, file=sys.stderr)
 
@@ -183,7 +183,7 @@ def name_option(error: BadInput) -> BadInput:
 
 
 def mistake(error: Any) -> str:
-    """Return what is wrong with a command line, in one line, and where help is."""
+    """Error of a command line in one line, and the command that prints help."""
     problem = clean(" ".join(error.format_message().split()).rstrip("."))
     stop = "" if problem.endswith("?") else "."
     return f"{problem}{stop} See `{error.ctx.command_path if error.ctx else 'loomopt'} --help`."

@@ -54,7 +54,7 @@ def read_answer(path: Path) -> StoredAnswer:
 
 
 def _answer(document: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> Answer:
-    """Return what the file tells as an answer, with what was computed anew. Raises what a damaged file makes fail."""
+    """Answer of a file, with figures computed anew. A damaged file raises KeyError, TypeError or ValueError."""
     target, limits = document.get("target"), evaluation.limits
     if target is None or not _of_target(document, evaluation, scene):  # a point of a front, of which its message tells
         target = None
@@ -86,7 +86,7 @@ def _answer(document: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -
 
 
 def _of_target(document: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> bool:
-    """Say whether an optimum's message is that of its target, numbers apart: of a point of a front it is another."""
+    """Whether an optimum's message is that of its target, except for numbers; that of a point of a front differs."""
     if document["status"] != "optimal":
         return True
     message = registry.of(scene).say(scene, evaluation.target, evaluation.figures)
@@ -108,7 +108,7 @@ def _price(record: Mapping[str, Any], words: Words) -> Price:
 
 
 def _joint_price(record: Mapping[str, Any]) -> JointPrice:
-    """Return what limits are worth together, as it was told."""
+    """Price of limits that only move together, from its record."""
     worth = {str(figure): float(value) for figure, value in record["worth"].items()}
     alone = tuple(float(next(iter(price.values()))) for price in record["alone"])
     names, sides = (tuple(map(str, record[key])) for key in ("limits", "sides"))
@@ -136,7 +136,7 @@ def _certificate(record: Mapping[str, Any]) -> Certificate:
 
 
 def _global_bound(record: Mapping[str, Any], figures: Mapping[str, Any]) -> GlobalBound:
-    """Return what is proven of all designs; of which side of a bound the best is, the bound itself tells."""
+    """Global bound from its record; the sign of bound − best gives the side."""
     gap = math.inf if record["gap"] is None else float(record["gap"])
     levels = []
     for name, bound in record["bound"].items():

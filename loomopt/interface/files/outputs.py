@@ -288,7 +288,7 @@ def plot_curves(
 
 
 def describe_design(evaluated: Evaluated, target: str | None = None, status: str | None = None) -> DrawnSubject:
-    """Say what the design of an evaluation or of an answer is.
+    """Description of the design of an evaluation or of an answer.
 
     target, status: of the answer whose design was evaluated, where it was one's.
     """

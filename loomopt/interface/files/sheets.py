@@ -114,7 +114,7 @@ def _rows(frame: "pd.DataFrame") -> list[list[object]]:
 
 
 def _cell(value: object) -> object:
-    """Return what a cell holds: a number, a word, or nothing where nothing is known."""
+    """Value of a cell: a number, a word, or None for an unknown value."""
     if isinstance(value, str | bool):
         return value
     if isinstance(value, tuple | list):

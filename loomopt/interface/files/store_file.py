@@ -20,7 +20,7 @@ HEAD = b"SQLite format 3\x00"
 
 
 def is_store(path: Path) -> bool:
-    """Say whether a file is a database, as a store is."""
+    """Whether a file is an SQLite database, as a store is."""
     try:
         with path.open("rb") as file:
             return file.read(len(HEAD)) == HEAD

@@ -188,7 +188,7 @@ def frames(picture: MovingPicture) -> Iterator["Image"]:
 
 
 def _frame(layers: Sequence[tuple[MechanismMotion, bool]], frame: machine.Frame, pose: int, label: str) -> "Image":
-    """Return one frame: drawn finer than it is shown."""
+    """One frame, drawn at a multiple of its size and reduced."""
     from PIL import Image, ImageDraw
 
     scale = FINE * SIZE / frame.width

@@ -74,7 +74,7 @@ VERDICTS = {
 
 
 def status(subject: Subject) -> Status:
-    """Return what a design truly is, from what was checked, not from one word of its solver."""
+    """Verdict on a design, from its checks and not from the solver's status."""
     evaluated = subject.evaluated
     broken = tuple(limit.name for limit in evaluated.limits if not limit.ok and not limit.rounding)
     violations = (f"Limits NOT held: {', '.join(broken)}.",) if broken else ()
@@ -101,7 +101,7 @@ def status(subject: Subject) -> Status:
 
 
 def _certified_status(solution: Solution, scene: Scene) -> Status:
-    """Return what a certified optimum is, and what of what was asked for is not proven."""
+    """Verdict on a certified optimum, and the requested proofs that failed."""
     opened, proofs = list[str](), list[str]()
     missed = solution.outcome.partition(" but ")[2]
     if missed:
@@ -175,7 +175,7 @@ def _binding(subject: Subject) -> Iterator[Part]:
 
 
 def _certificate(subject: Subject) -> Iterator[Part]:
-    """Say the certificate in words: what was asked of the design, what was found."""
+    """The certificate in words: each requirement with its residual."""
     certificate = subject.evaluated.certificate if isinstance(subject.evaluated, Solution) else None
     if certificate is None:
         return

@@ -24,7 +24,7 @@ class Reported(Protocol):
     """What was computed beside an answer, and says itself what a page shows of it."""
 
     def report_parts(self) -> list[Part]:
-        """Return its parts of a page."""
+        """Parts of a page."""
 
 
 class Judged(Protocol):
@@ -86,7 +86,7 @@ def _more(results: Sequence[object]) -> list[Part]:
 
 
 def _parts(thing: object) -> list[Part]:
-    """Return what was computed beside an answer as parts of its chapter. Raises BadInput for what is no such thing."""
+    """Parts of a chapter for a study of the answer. Raises BadInput for any other object."""
     if isinstance(thing, Reported):
         return thing.report_parts()
     if isinstance(thing, Proofs):

@@ -165,7 +165,7 @@ def _outline(points: Sequence[tuple[float, float]], frame: Frame) -> str:
 
 
 def _layer(motion: MechanismMotion, frame: Frame, kind: str, pose: int) -> str:
-    """Return one machine at one pose, marked for the script: which joints its lines join, which turn."""
+    """SVG of one machine at one pose, with data for the script: joints of the lines, pieces that turn."""
     at = {name: frame.at(_all(motion, name))[0] for name in motion.pivots}
     at |= {name: frame.at(points)[pose] for name, points in motion.joints.items()}
     marks = [
@@ -206,7 +206,7 @@ def joint_names(motion: MechanismMotion, frame: Frame) -> list[str]:
 
 
 def _piece(place: int, piece: Turning, at: Mapping[str, Floats], frame: Frame, pose: int) -> str:
-    """Return what turns as one piece, with a line from its joint that shows how far."""
+    """SVG of a piece that turns, with a line from its joint that shows the angle."""
     x, y = at[piece.joint]
     turned = f"translate({x} {y}) rotate({-math.degrees(piece.turns[pose]):.2f})"
     return (

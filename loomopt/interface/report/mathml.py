@@ -25,7 +25,7 @@ def page(equations: Sequence[Equation]) -> str:
 
 @functools.lru_cache(512)
 def markup(equation: Equation) -> str:
-    """Return one equation as a block of MathML; its text stands where no browser knows MathML."""
+    """One equation as a block of MathML, with its plain text for browsers without MathML."""
     rows = [[_cell(cell) for cell in row] for row in equation.form]
     if not rows:
         inner = f"<mtext>{escape(equation.text)}</mtext>"
@@ -56,7 +56,7 @@ def _cell(expression: Expression) -> str:
 
 @functools.cache
 def _printer() -> Expression:
-    """Return what prints an expression; made when it is first asked for, as SymPy is."""
+    """Printer of expressions, made on first use because it imports SymPy."""
     from sympy.printing.mathml import MathMLPresentationPrinter
 
     class Printer(MathMLPresentationPrinter):  # type: ignore[misc]  # SymPy has no types

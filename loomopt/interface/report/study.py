@@ -19,7 +19,7 @@ STAGES = 12
 
 
 def status(study: SceneStudy, solved: Sequence[Row]) -> Status:
-    """Return what a study's rows truly are: certified, shown infeasible, or neither."""
+    """Verdict on a study: its rows are certified, shown infeasible, or neither."""
     findings = study.read(solved)
     rows = findings.rows
     counts = Counter("certified" if row.certified else row.status for row in rows)

@@ -45,7 +45,7 @@ def _turn(scene: Scene, full: Design, unit: str) -> DrawnTurn:
 
 
 def _key(shown: DrawnTurn, beside: bool) -> str:
-    """Return what vertical lines and shaded stretches are."""
+    """Legend of vertical lines and shaded intervals."""
     sentences = []
     for name, mark in shown.marks.items():
         if isinstance(mark, Span):
@@ -119,7 +119,7 @@ def _drawn_rows(panel: Panel, turn: DrawnTurn) -> "NDArray[np.intp]":
 
 
 def _marks(panel: Panel, turn: DrawnTurn, unit: str) -> list[tuple[float, float, str]]:
-    """Return what of a panel's first column is marked: angle, deg, value in the unit, and words."""
+    """Marked points of a panel's first column: angle, deg, value in the unit, and label."""
     values, marks = turn.of(panel.columns[0]), []
     for how in panel.marked:
         row = marked_row(values, turn, how)
@@ -133,7 +133,7 @@ def _marks(panel: Panel, turn: DrawnTurn, unit: str) -> list[tuple[float, float,
 
 
 def _parts(span: Span, low: float, high: float, whole: float) -> Sequence[tuple[float, float]]:
-    """Return where a stretch falls between two angles, deg."""
+    """Parts of an interval that lie between two angles, deg."""
     begin = low + (math.degrees(span.begin) - low) % whole
     end = begin + (math.degrees(span.end) - math.degrees(span.begin)) % whole
     both = ((max(a, low), min(b, high)) for a, b in ((begin, end), (begin - whole, end - whole)))

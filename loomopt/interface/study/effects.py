@@ -233,7 +233,7 @@ def verdict(result: EffectsResult) -> list[str]:
 
 
 def omission_sentences(result: EffectsResult) -> list[str]:
-    """Sentences on which figures are gone or others without what is left out, and which of them the target reads."""
+    """Sentences on figures that are missing or changed without the omitted effects, and on those the target reads."""
     rows = [row for row in result.rows if row.effect in result.left_out]
     sentences, names = list[str](), dict[str, None]()
     for row in (*rows, *([result.together] if result.together and len(rows) > 1 else [])):
@@ -266,7 +266,7 @@ def _change(by: str, of: str, value: float) -> str:
 
 
 def _only_figures(row: EffectImpact, tolerance: float) -> bool:
-    """Say whether a design found without an effect is good, and only its figures are wrong."""
+    """Whether the optimum without an effect is good in the reference, and only its figures are wrong."""
     numbers = (*row.regret.values(), row.excess)
     known = [value for value in row.shift.values() if value is not None]
     good = bool(known) and all(value is not None and value <= tolerance for value in numbers)

@@ -66,7 +66,7 @@ class StudyTable(Presentation):
         return study_table.frame(self.study, self.rows, arguments.flag(si, "si"))
 
     def tables(self, *, si: bool = False) -> list[str | TextTable]:
-        """A line per row, what changes along it, and what came of it."""
+        """Tables of a study: a line per row, the changes along it, and the outcome."""
         return study_table.tables(self.study, self.solved, si)
 
     def charts(self) -> Charts:
@@ -101,7 +101,7 @@ class StudyTable(Presentation):
         return place
 
     def report_parts(self) -> "list[Part]":
-        """What a page of an answer shows of it."""
+        """Parts for a page of an answer."""
         from loomopt.interface.report import document
 
         return document.part_of_study(self.study, self.solved)

@@ -1,4 +1,4 @@
-"""What a person sees of an answer: a sentence, short tables, the certificate in one line."""
+"""Text of an answer: a sentence, short tables, the certificate in one line."""
 
 import math
 import re
@@ -111,13 +111,13 @@ def comparison(evaluated: Evaluated, scene: Scene, before: Evaluated | None, hea
 
 
 def _of_member(name: str, evaluated: Evaluated) -> bool:
-    """Say whether a name is that of one member's figure, which is told beside the member."""
+    """Whether a name is that of one member's figure, which the table of members shows."""
     aliases = [figure for figure in evaluated.figures if isinstance(figure, Alias)]
     return name in aliases or name.removesuffix("_t") in aliases
 
 
 def lists(evaluated: Evaluated, scene: Scene) -> list[str]:
-    """Return one line for each part of a design that is a list of numbers."""
+    """A line for each part of a design that is a list of numbers."""
     formats = registry.of(scene).views.lists
     return [
         f"{name}: {formats[name].format(count=len(values))}, {min(values):.6g} ... {max(values):.6g}; all in design"
@@ -127,7 +127,7 @@ def lists(evaluated: Evaluated, scene: Scene) -> list[str]:
 
 
 def members(solution: Solution, scene: Scene) -> TextTable:
-    """Return what each member of a family changes, and what it reaches of what is sought."""
+    """Members of a family: the scene numbers that each one changes, and its objectives."""
     words, levels = Words(scene), solution.certificate.levels if solution.certificate else ()
     variables = [name for name in solution.members[0].design if name not in solution.design]
     # A sum of what members reach is named after their figure.
@@ -169,7 +169,7 @@ def _limit(low: float | None, high: float | None) -> str:
 
 
 def relaxation(answer: Solution) -> TextTable:
-    """Return what would have to give way."""
+    """Least relaxations of limits for which an admissible design exists."""
     lines: list[tuple[str, str]] = []
     for remedy in remedies(answer.relaxation):
         label = "this alone" if remedy[0].alone else "all of these" if len(remedy) > 1 else "this"
@@ -211,7 +211,7 @@ BEYOND = {-1: "below", 1: "above"}
 
 
 def global_summary(bound: GlobalBound, scene: Scene) -> str:
-    """Return what is proven of all admissible designs, in one line."""
+    """Global bound of all admissible designs, in one line."""
     words = Words(scene)
     sentences: list[str] = []
     remarks: list[str] = []
@@ -230,7 +230,7 @@ def global_summary(bound: GlobalBound, scene: Scene) -> str:
 
 
 def starts(answer: Solution, scene: Scene) -> str:
-    """How many starts found the best, and what other optima there are."""
+    """Number of starts that reached the best optimum, and the other optima."""
     solver, words = answer.solver, Words(scene)
     if not solver["starts_at_best"]:
         return f"Starts: {solver['starts']}, none reached an admissible design"
@@ -244,7 +244,7 @@ def starts(answer: Solution, scene: Scene) -> str:
 
 
 def proof_summary(proofs: "Proofs") -> list[str]:
-    """Return what was proven, and what was not, in a few lines."""
+    """Proven limits and unproven limits, in a few lines."""
     groups = {"limit": "limits", "assembly": "assembly", "peak": "peaks as claimed"}
     shown = {
         label: [unbroken(proof.said) for proof in proofs.proofs if proof.kind == kind and proof.status == "proven"]

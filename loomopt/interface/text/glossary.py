@@ -158,7 +158,7 @@ def columns(scene: Scene) -> Iterator[Symbol]:
 
 
 def _column_name(views: JobViews, name: str, unit: str) -> str:
-    """Return what a job calls a column of its own; one of several of a kind by that kind too; "" where it does not."""
+    """Name that a job gives to one of its columns, with the kind where there are several of a kind; "" without one."""
     curve = views.words().get(name)
     if not (curve and curve.name):
         return name.replace("_", " ") if len(name) > LONGEST_SYMBOL else ""
@@ -166,7 +166,7 @@ def _column_name(views: JobViews, name: str, unit: str) -> str:
 
 
 def _derivative(name: str) -> str:
-    """Return what a column says that is a derivative of another one, by its name; "" for any other."""
+    """Description of a column that is the derivative of another one, by its name; "" for any other."""
     base, _, order = name.rpartition("_")
     if base and order in ("1", "2", "3"):
         return f"{ORDINALS[int(order) - 1]} derivative of {base} with respect to the angle phi"

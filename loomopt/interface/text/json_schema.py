@@ -69,7 +69,7 @@ def scene(schema: SceneSchema) -> Json:
 
 
 def display(schema: SceneSchema) -> Json:
-    """Return [display]: the kinds of quantity, each with a unit."""
+    """Schema of [display]: a unit for each kind of quantity."""
     return _closed_table({key: _unit(kind) for key, kind in KINDS.items()})
 
 
@@ -97,7 +97,7 @@ def _effects(schema: SceneSchema) -> Json:
 
 
 def _bounds(schema: SceneSchema) -> Json:
-    """Return [bounds]: every number by its name, as a range or as one value."""
+    """Schema of [bounds]: every number by its name, as a range or as one value."""
     return _by_number(schema, lambda quantity: _bound(_quantity(quantity)))
 
 
@@ -124,7 +124,7 @@ def _bound(value: Json) -> Json:
 
 
 def _tolerances(schema: SceneSchema) -> Json:
-    """Return [tolerances]: every number by its name, how it is made."""
+    """Schema of [tolerances]: the tolerance of every number, by its name."""
     return _by_number(schema, _tolerance)
 
 
@@ -151,7 +151,7 @@ def _tolerance(quantity: Quantity) -> Json:
 
 
 def _accept(schema: SceneSchema) -> Json:
-    """Return [accept]: half the band around an equality or a goal by which machines are judged, by figure."""
+    """Schema of [accept]: half the acceptance band around an equality or a goal, by figure."""
     figures = schema.figures.values()
     return _closed_table({figure.name: _quantity(Quantity(figure.kind, above=0)) for figure in figures})
 
@@ -161,7 +161,7 @@ def _stock(quantity: Quantity) -> Json:
 
 
 def _limits(schema: SceneSchema) -> Json:
-    """Return [limits]: every figure that may be limited, on the sides on which it may be."""
+    """Schema of [limits]: every figure that can be limited, with the sides that can be limited."""
     figures = [figure for figure in schema.figures.values() if figure.sides]
     sides = {figure.name: dict.fromkeys(figure.sides, _quantity(Quantity(figure.kind))) for figure in figures}
     descriptions = {figure.name: figure.text for figure in figures}
@@ -174,7 +174,7 @@ def _limits(schema: SceneSchema) -> Json:
 
 
 def _either(effect: Effect) -> Json:
-    """Return that a load is either a curve of its own, or the numbers that this stands for."""
+    """Rule that a load has either a table of its curve or the numbers that the table replaces."""
     curve = effect.tabulated if isinstance(effect, Load) else None
     if curve is None:
         return {}
@@ -182,13 +182,13 @@ def _either(effect: Effect) -> Json:
 
 
 def _alternative(key: str, instead: Sequence[str], needed: Sequence[str]) -> Json:
-    """Return that a table has either a key, or those that it stands for; needed: of these, those without a default."""
+    """Rule that a table has either one key or the keys that it replaces; needed: those of them without a default."""
     others: Json = {"anyOf": [{"required": [name]} for name in instead]}
     return {"anyOf": [{"required": [key], "not": others}, {"required": list(needed), "not": {"required": [key]}}]}
 
 
 def _mechanism(schema: SceneSchema) -> Json:
-    """Return [mechanism]; what one key stands for is given, or that key."""
+    """Schema of [mechanism], with the rule for keys that replace others."""
     rules = [_alternative(key, instead, instead) for key, instead in schema.instead.items()]
     return _model(schema.mechanism) | ({"allOf": rules} if rules else {})
 
@@ -206,7 +206,7 @@ def _given(key: str, effect: Effect | None = None) -> Json:
 
 
 def _scene_targets(schema: SceneSchema) -> Json:
-    """Return [targets] where the scene names them: each by the models that targets of the job have."""
+    """Schema of [targets] where the scene names them: a target follows one of the models of the job."""
     models = _any([_model(target.own) for name, target in schema.targets.items() if name != FAMILY])
     family = {FAMILY: _model(schema.targets[FAMILY].own)} if FAMILY in schema.targets else {}
     return {"type": "object", "properties": family, "additionalProperties": models}

@@ -53,7 +53,7 @@ def render(parts: Sequence[str | TextTable], columns: int | None) -> str:
 
 
 def _fits(lines: list[str], columns: int) -> bool:
-    """Say whether lines are as wide as they are long, and none is wider than that."""
+    """Whether every line fits a width and each of its characters takes one cell."""
     return bool(lines) and all(len(line) <= columns and ONE_CELL.fullmatch(line) for line in lines)
 
 
@@ -166,7 +166,7 @@ def _wrap(parts: Sequence[str | TextTable], columns: int) -> str:
 
 
 def _split_call(line: str, columns: int) -> tuple[list[str], list[str]]:
-    """Return what stands before a call of the shell at a line's end that does not fit, and the lines of the call.
+    """Text before a shell command that does not fit at the end of a line, and the lines of the command.
 
     An option with its value that is itself too long is left to the terminal, which breaks nothing that is copied.
     """

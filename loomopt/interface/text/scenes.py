@@ -65,7 +65,7 @@ def _kinds(scene: Scene) -> dict[str, str]:
 
 
 def _targets(scene: Scene) -> list[tuple[str, str, str]]:
-    """Return each target with what the scene expects of it."""
+    """Targets with the values that the scene expects of them."""
     lines = []
     for name, target in scene.schema.targets.items():
         expected = getattr(scene.targets[name], "expected", None) or {}
