@@ -1,6 +1,5 @@
 """The public functions: load a scene, solve it, evaluate and simulate a design."""
 
-import functools
 import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ from loomopt.jobs.registry import scene
 from loomopt.physics.tolerances import ACCURACY, SLACK
 from loomopt.scenes.designs import Given as Design
 from loomopt.scenes.scene import Call, Scene
-from loomopt.solving.options import GAP, OMITTED, SECONDS, GlobalProof, check_global_proof, check_numbers, target_name
+from loomopt.solving.options import GAP, OMITTED, SECONDS, GlobalProof, check_numbers, target_name
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from loomopt.interface.study.tolerance import ToleranceStudy
     from loomopt.scenes.packaged import Head
     from loomopt.solving.answer.solution import Proofs
+    from loomopt.solving.reductions.reduction import Reduction
     from loomopt.studies.front.front import Given as Ranges
     from loomopt.studies.run.rows import Row
     from loomopt.studies.sweep import Over
@@ -162,41 +162,34 @@ def solve(
     arguments.flag(global_proof, "global_proof")
     if not isinstance(round_to, bool):
         round_to = arguments.table(round_to, "round_to", "numbers and their steps", "Write {'l1': '0.5 mm'}, or True")
+    reductions: list[Reduction] = []
+    if round_to:
+        from loomopt.solving.reductions.size_rounding import SizeRounding
+
+        reductions.append(SizeRounding(None if round_to is True else round_to))
+    if robust is not None or min_yield is not None:
+        from loomopt.studies.robust.backoff import BackOff
+
+        reductions.append(BackOff(robust, min_yield, seed=seed))
+    if len(reductions) > 1:
+        remedy = "Round first, then back off with the sizes set as bounds"
+        raise refusal("sizes and back-off cannot be combined", "", "round_to", remedy=remedy)
     with cell_progress() as say:
         on_text = on_step or say
-        proof = GlobalProof(gap, seconds, on_text or (lambda text: None)) if global_proof else None
-        hooks: dict[str, Any] = {"on_iteration": on_iteration, "on_start": on_start, "on_step": on_text}
-        anywhere = functools.partial(
-            engine.solve,
-            target=target,
+        solution = engine.solve(
+            loaded,
+            target,
             accuracy=accuracy,
             starts=starts,
             seed=seed,
             near=[warm_start.point] if warm_start and warm_start.point else [],
-            **hooks,
+            prove=prove,
+            global_proof=GlobalProof(gap, seconds, on_text or (lambda text: None)) if global_proof else None,
+            reductions=reductions,
+            on_iteration=on_iteration,
+            on_start=on_start,
+            on_step=on_text,
         )
-        once = functools.partial(anywhere, loaded)
-        if round_to:
-            from loomopt.studies.rounding import size_rounding
-
-            if robust is not None or min_yield is not None:
-                remedy = "Round first, then back off with the sizes set as bounds"
-                raise refusal("sizes and back-off cannot be combined", "", "round_to", remedy=remedy)
-            if proof:
-                remedy = "Leave out the proof: an answer in sizes says what of the lattice was read"
-                raise refusal("sizes and the global proof cannot be combined", "", "round_to", remedy=remedy)
-            rounding = size_rounding.asked(loaded, target, None if round_to is True else round_to)
-            told_last = functools.partial(anywhere, prove=prove)
-            solution = size_rounding.solved(rounding, anywhere, told_last, on_text)
-        elif robust is None and min_yield is None:
-            solution = once(prove=prove, global_proof=proof)
-        else:
-            from loomopt.studies.robust import backoff
-
-            request = backoff.asked(loaded, target, robust, min_yield, seed)
-            check_global_proof(proof)
-            last = functools.partial(once, prove=prove, global_proof=proof)
-            solution = backoff.solved(request, once, last, on_text)
     return results.to_answer(solution, loaded, loaded.call.target if target is None else target)
 
 

@@ -1,14 +1,13 @@
-"""Certified optimum of one task, its numbers continuous: search → proof of all designs → least change → answer."""
+"""Certified optimum of one task, its numbers continuous: search → global proof → added mass, least change → answer."""
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.model.program import Program
 from loomopt.model.sampling import SAMPLERS
-from loomopt.model.session import Session
+from loomopt.model.session import current
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Clash, Solution, Words
@@ -21,7 +20,11 @@ from loomopt.solving.search.search import Clock, OnStart, Search
 
 @dataclass(frozen=True)
 class Task:
-    """What is solved, checked; the fields are arguments of `engine.solve`, the target by name."""
+    """Scene and target to be solved, with the options of `engine.solve`, all checked.
+
+    margins: by how much limits are tightened, SI, by name and sign of the side; no_global_proof: why boxes cannot prove
+    that no design is better, "" where they can.
+    """
 
     scene: Scene
     target: str
@@ -29,10 +32,11 @@ class Task:
     starts: int | None = None
     seed: int = 0
     near: Sequence[Point] = ()
-    backed_off: Mapping[tuple[str, int], float] | None = None
-    wholly: bool = True
+    mass_tradeoff: bool = True
     global_proof: GlobalProof | None = None
     on_start: OnStart | None = None
+    margins: Mapping[tuple[str, int], float] = field(default_factory=dict)
+    no_global_proof: str = ""
 
     @property
     def job(self) -> Job:
@@ -40,27 +44,25 @@ class Task:
         return registry.of_target(self.scene, self.target)
 
     def program(self, job: Job) -> Program:
-        """Program with the limits backed off, and without added mass that no share of a figure pays for."""
-        program = job.program(self.scene, self.target).backed_off(self.backed_off or {})
-        if not self.wholly and program.added and program.added.wholly:
+        """Program with its limits tightened by the margins, and without added mass that no share of a figure pays for.
+
+        The mass stays where there is no tradeoff.
+        """
+        program = job.program(self.scene, self.target).backed_off(self.margins)
+        if not self.mass_tradeoff and program.added and program.added.wholly:
             return replace(program, added=None)
         return program
 
-
-class Optimum(NamedTuple):
-    """Answer to a task, the search that led to it, what is proven of all designs, and positions evaluated."""
-
-    answer: Solution
-    search: Search
-    bound: GlobalBound | None
-    evaluations: int
+    def at(self, step: str) -> "Task":
+        """Task as a step of a longer solve: reports the step, and its own steps below it."""
+        settings = self.settings.at(step)
+        inner = replace(self.settings, on_step=settings.say) if settings.on_step else self.settings
+        return replace(self, settings=inner)
 
 
-def search(task: Task, session: Session, clock: Clock, stock: Collection[str] = ()) -> Optimum:
-    """Search for the optimum of a task, its numbers continuous; without one the answer is what stands in its way.
-
-    clock: counts the seconds; stock: numbers that come in sizes, of which no proof of all designs knows.
-    """
+def search(task: Task) -> Solution:
+    """Optimum of a task, its numbers continuous; the limits that clash where there is none."""
+    clock, session = Clock(), current()
     scene, job = task.scene, task.job
     settings = task.settings.at(f"building the {task.target}")
     with clock.measure("import"):
@@ -77,8 +79,7 @@ def search(task: Task, session: Session, clock: Clock, stock: Collection[str] = 
     if task.global_proof:
         from loomopt.solving.proof import levels
 
-        refused = f"{', '.join(stock)} comes in sizes, which boxes do not tell" if stock else ""
-        state, bound = levels.claimed(state, task.global_proof, refused)
+        state, bound = levels.claimed(state, task.global_proof, task.no_global_proof)
     if state.best:
         from loomopt.solving.search import mass_tradeoff
 
@@ -93,4 +94,4 @@ def search(task: Task, session: Session, clock: Clock, stock: Collection[str] = 
             clash = elastic.clash(state, Words(scene))
     with clock.measure("report"):
         answer = report.answer(scene, task.target, state, clash)
-    return Optimum(answer, state, bound, evaluations)
+    return report.completed(answer, bound, evaluations, clock.seconds(state))

@@ -408,5 +408,10 @@ class Clock:
             "settle_s": search.tie_break_seconds,
             "certify_s": search.certify_seconds,
             "report_s": parts["report"],
-            "total_s": time.perf_counter() - self.start,
+            "total_s": self.total,
         }
+
+    @property
+    def total(self) -> float:
+        """Seconds since its making."""
+        return time.perf_counter() - self.start

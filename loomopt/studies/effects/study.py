@@ -207,7 +207,7 @@ class Effects:
         scene = self.without(frozenset(task.place))
         try:
             # A design without the counterweight would hide the impact of an effect.
-            answer = engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed, wholly=False)
+            answer = engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed, mass_tradeoff=False)
         except Broken:
             raise
         except BadInput as error:

@@ -6,8 +6,6 @@ they are made, judged by the limits as they stand.
 
 import functools
 import math
-import time
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -20,12 +18,12 @@ from loomopt.base.errors import BadInput, refusal
 from loomopt.base.records import Frozen
 from loomopt.jobs import registry
 from loomopt.maths import normal
-from loomopt.model.session import working
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import SIDES, SIGNS, Finding, Price, Robust, Sentences, Solution, Words, Yield
-from loomopt.solving.options import check_sought, target_name
+from loomopt.solving.optimum import Task
+from loomopt.solving.reductions.reduction import Solve
 from loomopt.studies.robust.margins import Margin, check_crossings, margins, narrow_band, share
 from loomopt.studies.tolerance.plan import SCRAMBLES, Plan, plan_tolerance
 from loomopt.studies.tolerance.study import ALL, Sums, estimate_yield, sum_scramble
@@ -50,8 +48,6 @@ ROOT, ROOTS = 1e-12, 60
 
 Band = tuple[float, float]
 """Lower and upper deviation of a number, SI."""
-Solve = Callable[..., Solution]
-"""solve(near=…, backed_off=…): the answer as it is asked for, but for its start and the tightening."""
 
 
 class Pass(NamedTuple):
@@ -73,18 +69,79 @@ class Pass(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is asked for: so many sigmas, or a yield; samples, seed: of the machines that are drawn."""
+class BackOff:
+    """Reduction of a task whose machines vary to tasks with tightened limits.
 
-    scene: Scene
-    target: str
+    sigmas: standard deviations, or share: yield, one of the two; samples, seed: of the machines that are drawn.
+    """
+
     sigmas: float | None = None
     share: float | None = None
     samples: int = SAMPLES
     seed: int = 0
 
+    def apply(self, task: Task) -> Task:
+        """Task of the nominal machine. Raises BadInput for a back-off that is none."""
+        if self.sigmas is not None and self.share is not None:
+            remedy = "Give one of them"
+            raise refusal("--robust and --yield say the same twice", "", "robust", self.sigmas, remedy=remedy)
+        if self.sigmas is not None:
+            allowed, remedy = f"more than 0, at most {MOST_SIGMAS:g} standard deviations", "Write --robust 3"
+            if not 0.0 < arguments.number(self.sigmas, "robust", allowed, remedy) <= MOST_SIGMAS:
+                raise refusal("there is no such back-off", "", "robust", self.sigmas, allowed, remedy)
+        if self.share is not None:
+            allowed, remedy = "a share of all machines between 0 and 1", "Write --yield 0.99"
+            if not 0.0 < arguments.number(self.share, "min_yield", allowed, remedy) < 1.0:
+                raise refusal("there is no such yield", "", "min_yield", self.share, allowed, remedy)
+        plan_tolerance(task.scene, None, task.target)
+        return replace(task, global_proof=None)
+
+    def invert(self, task: Task, answer: Solution, solve: Solve) -> Solution:
+        """Optimum whose limits are backed off; answer: the optimum of the nominal machine.
+
+        Where there is none, an answer that says why. Raises BadInput where a figure jumps within the back-off.
+        """
+        if answer.status != "optimal":
+            return answer
+        request = Request(self, task, solve)
+        plan = request.plan(answer, {})
+        start = Pass(answer, plan, margins(plan))
+        if not any(margin.sigma for margin in start.margins if not margin.fixed):
+            problem = "no limit of a figure moves with what [tolerances] names, so that there is nothing to back off"
+            remedy = "Give more numbers a tolerance, or take it off"
+            raise refusal(problem, task.scene.origin, "tolerances", remedy=remedy)
+        request.say("drawing machines of the optimum")
+        nominal_yields = _yields(plan)
+        if self.sigmas is not None:
+            sigmas = self.sigmas
+            reached = _search(request, start, lambda at: sigmas)
+        else:
+            reached = _search_yield(request, start, nominal_yields)
+        if isinstance(reached, Solution):
+            return reached
+        request.say("drawing machines")
+        return _explain(request, reached, answer, _yields(reached.plan), nominal_yields)
+
+
+@dataclass(frozen=True)
+class Request:
+    """Back-off of a task, with the solve of its tightened tasks."""
+
+    back_off: BackOff
+    task: Task
+    solve: Solve
+
+    @property
+    def scene(self) -> Scene:
+        """The scene of the task."""
+        return self.task.scene
+
+    def say(self, step: str) -> None:
+        """Report a step."""
+        self.task.settings.at(step)
+
     def plan(self, answer: Solution, frozen: "Mapping[str, Band]") -> Plan:
-        """Return the study of an answer's machines; frozen: bands, m, of numbers whose class would flip."""
+        """Study of an answer's machines; frozen: bands, m, of numbers whose class would flip."""
         given = self.scene.document["tolerances"]
         own = {name: {k: value for k, value in given[name].items() if k not in ("class", "fit")} for name in frozen}
         made = {
@@ -92,97 +149,33 @@ class Asked:
             for name, (low, high) in frozen.items()
         }
         scene = self.scene.update(made) if made else self.scene
-        return plan_tolerance(scene, designs.flat(answer.design), self.target, self.samples, self.seed)
-
-
-def asked(scene: Scene, target: str | None, sigmas: float | None, least: float | None, seed: int = 0) -> Asked:
-    """Return what is asked for, checked. Raises BadInput."""
-    name = target_name(scene, target)
-    check_sought(scene, "back-off")
-    if sigmas is not None and least is not None:
-        remedy = "Give one of them"
-        raise refusal("--robust and --yield say the same twice", "", "robust", sigmas, remedy=remedy)
-    if sigmas is not None:
-        allowed = f"more than 0, at most {MOST_SIGMAS:g} standard deviations"
-        if not 0.0 < arguments.number(sigmas, "robust", allowed, "Write --robust 3") <= MOST_SIGMAS:
-            raise refusal("there is no such back-off", "", "robust", sigmas, allowed, "Write --robust 3")
-    if least is not None:
-        allowed = "a share of all machines between 0 and 1"
-        if not 0.0 < arguments.number(least, "min_yield", allowed, "Write --yield 0.99") < 1.0:
-            raise refusal("there is no such yield", "", "min_yield", least, allowed, "Write --yield 0.99")
-    plan_tolerance(scene, None, name)
-    return Asked(scene, name, sigmas, least, seed=seed)
-
-
-@working()
-def solved(
-    asked: Asked, solve: Solve, last: Solve | None = None, on_step: Callable[[str], None] | None = None
-) -> Solution:
-    """Return the optimum whose limits are backed off; last: the solve whose answer is told, `solve` without it.
-
-    Where there is none, an answer that says why. Raises BadInput where a figure jumps within the back-off.
-    """
-    began, spent, say = time.perf_counter(), Counter[str](), on_step or (lambda text: None)
-
-    def timed(of: Solve) -> Solve:
-        def noted(answer: Solution) -> Solution:
-            spent.update(answer.time)
-            return answer
-
-        return lambda **how: noted(of(**how))
-
-    solve, last = timed(solve), timed(last or solve)
-    found = _solved(asked, solve, last, say)
-    return replace(found, time={**spent, "total_s": time.perf_counter() - began})
-
-
-def _solved(asked: Asked, solve: Solve, last: Solve, say: Callable[[str], None]) -> Solution:
-    nominal, solves = solve(), (solve, last)
-    if nominal.status != "optimal":
-        return nominal
-    plan = asked.plan(nominal, {})
-    found = margins(plan)
-    start = Pass(nominal, plan, found)
-    if not any(each.sigma for each in found if not each.fixed):
-        problem = "no limit of a figure moves with what [tolerances] names, so that there is nothing to back off"
-        raise refusal(problem, asked.scene.origin, "tolerances", remedy="Give more numbers a tolerance, or take it off")
-    say("drawing machines of the optimum")
-    before = _yields(plan)
-    if asked.sigmas is not None:
-        ended = _searched(asked, solves, start, lambda at: asked.sigmas or 0.0, say)
-    else:
-        ended = _yielding(asked, solves, start, before, say)
-    if isinstance(ended, Solution):
-        return ended
-    say("drawing machines")
-    return _told(asked, ended, nominal, _yields(ended.plan), before)
+        design = designs.flat(answer.design)
+        return plan_tolerance(scene, design, self.task.target, self.back_off.samples, self.back_off.seed)
 
 
 Sigmas = Callable[[Pass], float]
 """How many standard deviations a design's limits are to be backed off by."""
 
 
-def _searched(
-    asked: Asked, solves: tuple[Solve, Solve], start: Pass, sigmas: Sigmas, say: Callable[[str], None]
-) -> Pass | Solution:
-    """Return the fixed point that a search from scratch leads to as well, or why there is none."""
-    here, (solve, last) = start, solves
+def _search(request: Request, start: Pass, sigmas: Sigmas) -> Pass | Solution:
+    """Fixed point that a search from scratch leads to as well, or why there is none."""
+    here = start
     for _ in range(SEARCHES):
-        settled = _settled(asked, solve, here, sigmas, say)
-        if isinstance(settled, Solution):
-            return settled
-        here = settled
-        say("looking for better designs as far from their limits")
+        converged = _converge(request, here, sigmas)
+        if isinstance(converged, Solution):
+            return converged
+        here = converged
+        request.say("looking for better designs as far from their limits")
         off = tightened(here)
-        again = last(backed_off=off)
+        again = request.solve(replace(request.task, margins=off))
         if again.status != "optimal":
-            return _in_the_way(asked, again, here.sigmas)
+            return _in_the_way(request, again, here.sigmas)
         same = _same(again, here.answer)
-        here = here._replace(answer=again, plan=asked.plan(again, here.frozen), applied=off)
+        here = here._replace(answer=again, plan=request.plan(again, here.frozen), applied=off)
         if same:
             return here
         here = here._replace(margins=margins(here.plan))
-    return _unsettled(asked, here)
+    return _unsettled(request, here)
 
 
 def _same(one: Solution, other: Solution) -> bool:
@@ -197,30 +190,29 @@ SAME = 1e-8
 """Share of the largest figure sought by which two answers' figures may differ and be one."""
 
 
-def _settled(asked: Asked, solve: Solve, here: Pass, sigmas: Sigmas, say: Callable[[str], None]) -> Pass | Solution:
-    """Return the pass whose standard deviations are those of its own design."""
+def _converge(request: Request, here: Pass, sigmas: Sigmas) -> Pass | Solution:
+    """Pass whose standard deviations are those of its own design."""
     before: dict[tuple[str, int], float] = {}
     bands: dict[str, list[Band]] = {}
     for number in range(PASSES):
-        step = f"backing off, pass {number + 1}"
-        say(step)
+        request.say(f"backing off, pass {number + 1}")
         here = here._replace(sigmas=sigmas(here))
         if math.isnan(here.sigmas):
-            return _infeasible(asked, here.answer, _fixed(here))
+            return _infeasible(request, here.answer, _fixed(here))
         check_crossings(here.plan, here.sigmas)
         narrow = narrow_band(here.margins, here.sigmas, here.caps)
         if narrow:
-            return _narrow(asked, here, *narrow)
+            return _narrow(request, here, *narrow)
         off = tightened(here)
         size = max(off.values(), default=0.0)
         if before and all(abs(off[key] - before.get(key, 0.0)) <= SETTLED * (off[key] or size) for key in off):
             return here
-        step = f"backing off by {here.sigmas:.4g} sigma, pass {number + 1}"
+        step = request.task.at(f"backing off by {here.sigmas:.4g} sigma, pass {number + 1}")
         near = [here.answer.point] if here.answer.point else []
-        answer = solve(near=near, backed_off=off, on_step=lambda text, step=step: say(f"{step}: {text}"))
+        answer = request.solve(replace(step, near=near, margins=off, global_proof=None))
         if answer.status != "optimal":
-            return _in_the_way(asked, answer, here.sigmas)
-        plan, frozen = asked.plan(answer, here.frozen), dict(here.frozen)
+            return _in_the_way(request, answer, here.sigmas)
+        plan, frozen = request.plan(answer, here.frozen), dict(here.frozen)
         for name, made in plan.tolerances.items():
             if made.standard:
                 known, band = bands.setdefault(made.number, []), made.band(plan.nominal[name])
@@ -228,10 +220,10 @@ def _settled(asked: Asked, solve: Solve, here: Pass, sigmas: Sigmas, say: Callab
                     # A class that flips back and forth stays at its widest band.
                     frozen[made.number] = max(known, key=lambda each: each[1] - each[0])
                 known.append(band)
-        plan = asked.plan(answer, frozen) if frozen != here.frozen else plan
+        plan = request.plan(answer, frozen) if frozen != here.frozen else plan
         here = here._replace(answer=answer, plan=plan, margins=margins(plan), frozen=Frozen(frozen))
         here, before = here._replace(passes=here.passes + 1, applied=off), off
-    return _unsettled(asked, here)
+    return _unsettled(request, here)
 
 
 def tightened(here: Pass) -> dict[tuple[str, int], float]:
@@ -266,40 +258,38 @@ class Obstacle(NamedTuple):
     limits: tuple[str, ...] = ()
 
 
-def _yielding(
-    asked: Asked, solves: tuple[Solve, Solve], start: Pass, before: Mapping[str, Yield], say: Callable[[str], None]
-) -> Pass | Solution:
-    """Return the back-off whose sampled yield is no less than asked for, and hardly more.
+def _search_yield(request: Request, start: Pass, before: Mapping[str, Yield]) -> Pass | Solution:
+    """Back-off whose sampled yield is no less than asked for, and hardly more.
 
     Limits that have no room for so much are backed off as far as they can be, and the others farther. Where all that is
     too little, the answer says the most that was found, and what stands in the way of more.
     """
-    if before[ALL].value >= (asked.share or 0.0):
+    if before[ALL].value >= (request.back_off.share or 0.0):
         return start
     trials = Trials((0.0, before[ALL].value), (before[ALL], start))
     while True:
-        trials = _tried(asked, solves[0], trials, say)
+        trials = _try(request, trials)
         if trials.enough:
-            return _searched(asked, solves, trials.enough, lambda at, k=trials.high[0]: k, say)  # type: ignore[misc]
+            return _search(request, trials.enough, lambda at, k=trials.high[0]: k)  # type: ignore[misc]
         here, tight = trials.best[1], [name for name in trials.narrow if name not in trials.best[1].caps]
         if not tight or not trials.low[0]:
-            return _most(asked, *trials.best, trials.obstacle)
+            return _most(request, *trials.best, trials.obstacle)
         caps = Frozen({**here.caps, **dict.fromkeys(tight, CAPPED * trials.low[0])})
         trials = Trials(trials.low, (trials.best[0], here._replace(caps=caps)), obstacle=trials.obstacle)
 
 
-def _tried(asked: Asked, solve: Solve, trials: Trials, say: Callable[[str], None]) -> Trials:
-    """Return what back-offs between those known give, until one gives enough and hardly more, or none can."""
-    least, start = asked.share or 0.0, trials.best[1]
+def _try(request: Request, trials: Trials) -> Trials:
+    """Trials of back-offs between those known, until one gives enough and hardly more, or none can."""
+    least, start = request.back_off.share or 0.0, trials.best[1]
     following = linear(start, least)
     if math.isnan(following):
         # The sides that nothing backs off, or no farther, lose machines however far the others are backed off.
         top = share(start.margins, MOST_SIGMAS, start.applied, start.caps)
         following = max(linear(start, top * (1 - 1 / SAMPLES)), trials.low[0])
         trials = trials._replace(edge=following, obstacle=trials.obstacle or _fixed(start))
-        tried = _reached(asked, solve, start, lambda at: following, say)
+        tried = _reach(request, start, lambda at: following)
     else:
-        tried = _reached(asked, solve, start, lambda at: linear(at, least), say)
+        tried = _reach(request, start, lambda at: linear(at, least))
         tried = tried._replace(linear=tried.sigmas) if isinstance(tried, Pass) else tried
     following = tried.sigmas if isinstance(tried, Pass) else following
     for _ in range(TRIALS):
@@ -307,7 +297,7 @@ def _tried(asked: Asked, solve: Solve, trials: Trials, say: Callable[[str], None
             trials = trials._replace(edge=following, obstacle=tried.why, narrow=tried.limits)
             following = (trials.low[0] + following) / 2
         else:
-            say(f"drawing machines at {tried.sigmas:.6g} sigma")
+            request.say(f"drawing machines at {tried.sigmas:.6g} sigma")
             found, point = _yields(tried.plan)[ALL], tried.sigmas
             if found.value > trials.best[0].value:
                 trials = trials._replace(best=(found, tried))
@@ -315,7 +305,7 @@ def _tried(asked: Asked, solve: Solve, trials: Trials, say: Callable[[str], None
                 trials = trials._replace(enough=tried, high=min(trials.high, (point, found.value)))
             else:
                 trials = trials._replace(low=max(trials.low, (point, found.value)))
-            grain = max(MOST_BESIDE * found.se, 2.0 / asked.samples)
+            grain = max(MOST_BESIDE * found.se, 2.0 / request.back_off.samples)
             if 0.0 <= found.value - least <= grain or trials.high[0] - trials.low[0] <= SETTLED:
                 return trials
             following = _between(tried, trials.low, trials.high, found.value, least)
@@ -324,14 +314,14 @@ def _tried(asked: Asked, solve: Solve, trials: Trials, say: Callable[[str], None
         if not trials.enough and following >= trials.edge:
             following = (trials.low[0] + trials.edge) / 2
         start = trials.enough or trials.best[1]
-        tried = _reached(asked, solve, start, lambda at, k=following: k, say)  # type: ignore[misc]
+        tried = _reach(request, start, lambda at, k=following: k)  # type: ignore[misc]
     return trials
 
 
-def _reached(asked: Asked, solve: Solve, start: Pass, sigmas: Sigmas, say: Callable[[str], None]) -> Pass | Obstacle:
-    """Return the pass at a back-off, or why there is no design with it."""
+def _reach(request: Request, start: Pass, sigmas: Sigmas) -> Pass | Obstacle:
+    """Pass at a back-off, or why there is no design with it."""
     try:
-        found = _settled(asked, solve, start, sigmas, say)
+        found = _converge(request, start, sigmas)
     except BadInput as error:
         return Obstacle(error.problem)
     return found if isinstance(found, Pass) else Obstacle(found.message.rstrip("."), found.clash)
@@ -390,17 +380,17 @@ def _yields(plan: Plan) -> dict[str, Yield]:
 # What is told.
 
 
-def _told(
-    asked: Asked, ended: Pass, nominal: Solution, yields: Mapping[str, Yield], before: Mapping[str, Yield]
+def _explain(
+    request: Request, ended: Pass, nominal: Solution, yields: Mapping[str, Yield], before: Mapping[str, Yield]
 ) -> Solution:
     """Return the answer with its limits as the scene has them, the back-off beside each."""
-    scene, answer, off = asked.scene, ended.answer, tightened(ended)
+    scene, answer, off = request.scene, ended.answer, tightened(ended)
     words = Words(scene)
-    here = report.evaluated(scene, registry.of(scene), asked.target, ended.plan.full)
+    here = report.evaluated(scene, registry.of(scene), request.task.target, ended.plan.full)
     corners = dict.fromkeys(each.name for each in ended.margins if each.corner and not each.fixed)
     robust = Robust(
         ended.sigmas,
-        asked.share,
+        request.back_off.share,
         ended.linear,
         dict(yields),
         nominal,
@@ -408,8 +398,8 @@ def _told(
         ended.plan.goals_without_band + tuple(ended.plan.bands),
         tuple(corners),
         ended.passes,
-        asked.samples,
-        asked.seed,
+        request.back_off.samples,
+        request.back_off.seed,
         any(ended.plan.shifts.values()),
     )
     by_name = {name: by for (name, _), by in off.items()}
@@ -476,43 +466,43 @@ def _percent(share_of: Yield) -> str:
     return f"{100 * share_of.value:.6g} % (standard error {100 * share_of.se:.2g} %)"
 
 
-def _infeasible(asked: Asked, answer: Solution, why: str) -> Solution:
+def _infeasible(request: Request, answer: Solution, why: str) -> Solution:
     """Return that no design keeps its limits with the back-off."""
-    return _as_stands(asked, answer, "infeasible", f"No admissible design keeps clear of its limits as asked: {why}.")
+    return _as_stands(request, answer, "infeasible", f"No admissible design keeps clear of its limits as asked: {why}.")
 
 
-def _in_the_way(asked: Asked, answer: Solution, sigmas: float) -> Solution:
+def _in_the_way(request: Request, answer: Solution, sigmas: float) -> Solution:
     """Return an answer that is no optimum with what it was asked for."""
     result = f"With limits backed off by {sigmas:.6g} sigma: {answer.sentences.result}"
     sentences = answer.sentences._replace(result=result)
-    return replace(answer, scene=asked.scene, limits=_limits(asked, answer), sentences=sentences)
+    return replace(answer, scene=request.scene, limits=_limits(request, answer), sentences=sentences)
 
 
-def _as_stands(asked: Asked, answer: Solution, status: str, problem: str) -> Solution:
+def _as_stands(request: Request, answer: Solution, status: str, problem: str) -> Solution:
     """Answer without a certificate, judged by the limits of the scene; problem: why it is none to build."""
     return replace(
         answer,
         status=status,
         sentences=Sentences(problem),
-        limits=_limits(asked, answer),
-        scene=asked.scene,
+        limits=_limits(request, answer),
+        scene=request.scene,
         certificate=None,
         binding=(),
         bind_together=(),
     )
 
 
-def _limits(asked: Asked, answer: Solution) -> tuple[Finding, ...]:
+def _limits(request: Request, answer: Solution) -> tuple[Finding, ...]:
     """Return an answer's limits as the scene has them."""
-    own = {asked.scene.full(name): value for name, value in designs.flat(answer.design).items()}
-    return report.evaluated(asked.scene, registry.of(asked.scene), asked.target, own).limits
+    own = {request.scene.full(name): value for name, value in designs.flat(answer.design).items()}
+    return report.evaluated(request.scene, registry.of(request.scene), request.task.target, own).limits
 
 
-def _narrow(asked: Asked, here: Pass, name: str, width: float, needed: float) -> Solution:
+def _narrow(request: Request, here: Pass, name: str, width: float, needed: float) -> Solution:
     """Return that the band of a limit has no room for the back-off of both sides."""
-    words = Words(asked.scene)
+    words = Words(request.scene)
     why = f"the band of {name}, {words.shown(name, width, 4)}, is no wider than {words.shown(name, needed, 4)}"
-    found = _infeasible(asked, here.answer, f"{why} on both sides: {here.sigmas:.6g} sigma each")
+    found = _infeasible(request, here.answer, f"{why} on both sides: {here.sigmas:.6g} sigma each")
     return replace(found, clash=(name,))
 
 
@@ -522,17 +512,18 @@ def _fixed(here: Pass) -> str:
     return f"nothing backs off {fixed}" if fixed else f"no more than {MOST_SIGMAS:g} sigma are tried"
 
 
-def _most(asked: Asked, found: Yield, here: Pass, obstacle: str) -> Solution:
+def _most(request: Request, found: Yield, here: Pass, obstacle: str) -> Solution:
     """Return the answer of the most machines, which are fewer than asked for, and what stands in the way of more."""
+    least = 100 * (request.back_off.share or 0.0)
     problem = (
-        f"{100 * (asked.share or 0.0):.6g} % of the machines cannot hold all limits: the most that was found is "
+        f"{least:.6g} % of the machines cannot hold all limits: the most that was found is "
         f"{_percent(found)}, the yield of the design shown, with {_backed(here)}. In the way of more: "
         f"{obstacle or f'{TRIALS} back-offs were tried'}. Tighten the tolerances, widen the limits or ask for less."
     )
-    return _as_stands(asked, here.answer, "infeasible", problem)
+    return _as_stands(request, here.answer, "infeasible", problem)
 
 
-def _unsettled(asked: Asked, here: Pass) -> Solution:
+def _unsettled(request: Request, here: Pass) -> Solution:
     """Return that no fixed point was found."""
     problem = f"The standard deviations of the limits still change after {PASSES} solves. Ask for a smaller back-off."
-    return _as_stands(asked, here.answer, "failed", problem)
+    return _as_stands(request, here.answer, "failed", problem)

@@ -7,6 +7,8 @@ yields by 16 scrambles of 2^20 Sobol points, their standard errors in brackets b
 import functools
 import math
 import re
+from dataclasses import replace
+from typing import NamedTuple
 
 import pytest
 
@@ -14,9 +16,11 @@ import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface.text import answers, layout
 from loomopt.jobs import registry
+from loomopt.scenes import designs
 from loomopt.solving import engine
 from loomopt.studies.robust import backoff
 from loomopt.studies.robust.margins import margins
+from loomopt.studies.tolerance.plan import plan_tolerance
 
 LINKS = dict.fromkeys(("l1", "l2", "l3", "l4"), "0.06 mm")
 DIGITS = 2e-10
@@ -30,8 +34,19 @@ def beatup():
 
 
 def solved(scene, sigmas=None, least=None, target=None, starts=None):
-    solve = functools.partial(engine.solve, scene, target, starts=starts)
-    return backoff.solved(backoff.asked(scene, target, sigmas, least), solve)
+    return engine.solve(scene, target, starts=starts, reductions=[backoff.BackOff(sigmas, least)])
+
+
+class Tightened(NamedTuple):
+    """Reduction to a task with margins, once."""
+
+    margins: dict
+
+    def apply(self, task):
+        return replace(task, margins=self.margins)
+
+    def invert(self, task, answer, solve):
+        return answer
 
 
 @functools.cache
@@ -86,11 +101,10 @@ def test_limits_and_backoff_stay_apart():
 def test_standard_deviations_are_those_of_the_optimum():
     # One pass alone, with those of the optimum without back-off, ends elsewhere.
     scene = beatup()
-    own = backoff.asked(scene, None, 3.0, None)
     nominal = engine.solve(scene)
-    plan = own.plan(nominal, {})
+    plan = plan_tolerance(scene, designs.flat(nominal.design), None, backoff.SAMPLES)
     start = backoff.Pass(nominal, plan, margins(plan), 3.0)
-    once = engine.solve(scene, backed_off=backoff.tightened(start))
+    once = engine.solve(scene, reductions=[Tightened(backoff.tightened(start))])
     assert once.figures["peak_torque"] == pytest.approx(88.7187953646, rel=DIGITS)
 
 

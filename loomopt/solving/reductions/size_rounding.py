@@ -8,9 +8,9 @@ import functools
 import heapq
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,14 +26,14 @@ from loomopt.model.objectives import Magnitude
 from loomopt.model.program import Program
 from loomopt.model.reading import BatchReading, wide
 from loomopt.model.sampling import Sampler, sampled
-from loomopt.model.session import working
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
 from loomopt.scenes import designs, numbers, sizes
 from loomopt.scenes.scene import Scene, cursor
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Rounded, Sentences, Solution, Words, joined, risen
-from loomopt.solving.options import check_sought, target_name
+from loomopt.solving.optimum import Task
+from loomopt.solving.reductions.reduction import Solve
 from loomopt.solving.search.search import objectives
 
 MOST_POINTS, BLOCK = 10_000_000, 2**16
@@ -45,21 +45,64 @@ AFFINE = 1e-9
 AGREES = 1e-7
 """Share of its natural size by which a level read on the lattice and as solved may differ."""
 
-Solve = Callable[..., Solution]
-"""solve(scene, near=…, on_step=…): the answer of a scene as it is asked for."""
+
+@dataclass(frozen=True)
+class SizeRounding:
+    """Reduction of a task with sizes to tasks without them.
+
+    steps: sizes by number or pattern, such as {"l*": "0.5 mm"}, beside [steps] and [stock] of the scene.
+    """
+
+    steps: Mapping[str, object] | None = None
+
+    def apply(self, task: Task) -> Task:
+        """Task without sizes. Raises BadInput for sizes that are none."""
+        if task.global_proof:
+            remedy = "Leave out the proof: an answer in sizes says what of the lattice was read"
+            raise refusal("sizes and the global proof cannot be combined", "", "round_to", remedy=remedy)
+        read_sizes(task.scene, self.steps)
+        return task.at("solving without sizes")
+
+    def invert(self, task: Task, answer: Solution, solve: Solve) -> Solution:
+        """Certified optimum with numbers at sizes; answer: the optimum without sizes.
+
+        Raises BadInput where a goal is out of reach on the lattice alone, and no band says how close is close enough.
+        """
+        nominal = answer
+        if nominal.status != "optimal" or nominal.point is None:
+            return nominal
+        lattice = Lattice(task, read_sizes(task.scene, self.steps))
+        best = _read_lattice(lattice, nominal) if lattice.points < MOST_POINTS else None
+        best = best or _branch(lattice, nominal, solve)
+        if best.point is None:
+            return _without_sizes(lattice, nominal, best)
+        scene = lattice.within({name: (value, value) for name, value in best.point.items()})
+        answer = solve(replace(task.at("solving with the best sizes"), scene=scene))
+        if answer.status != "optimal":
+            sentences = answer.sentences._replace(result=f"With the best sizes found: {answer.sentences.result}")
+            return replace(answer, scene=task.scene, sentences=sentences)
+        _check_goals(lattice, nominal, answer)
+        if best.levels and not _agree(lattice, answer, best):
+            sentences = Sentences("What was read on the lattice and what was solved there differ; please report it.")
+            return replace(answer, status="uncertified", sentences=sentences, scene=task.scene)
+        return _explain(lattice, answer, nominal, best)
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is asked for; sizes: of each number by what a designer calls it, SI, ascending, within its bounds."""
+class Lattice:
+    """Task and its sizes: of each number by what a designer calls it, SI, ascending, within its bounds."""
 
-    scene: Scene
-    target: str
+    task: Task
     sizes: Mapping[str, tuple[float, ...]]
 
     @property
+    def scene(self) -> Scene:
+        """The scene of the task."""
+        return self.task.scene
+
+    @property
     def points(self) -> int:
-        """How many points the lattice has."""
+        """Number of points."""
         return math.prod(map(len, self.sizes.values()))
 
     @lazy
@@ -70,22 +113,23 @@ class Asked:
     @lazy
     def program(self) -> Program:
         """The task without sizes."""
-        return self.job.program(self.scene, self.target)
+        return self.job.program(self.scene, self.task.target)
 
     def within(self, ends: Mapping[str, tuple[float, float]]) -> Scene:
-        """Return the scene with numbers between sizes, SI."""
-        found: dict[str, object] = {}
+        """Scene with numbers between two sizes each, SI."""
+        bounds: dict[str, object] = {}
         for name, (low, high) in ends.items():
             si = SI_UNIT[numbers.quantity(self.scene, f"bounds.{name}").kind]
             text = [repr(end) if si == "1" else f"{end!r} {si}" for end in (low, high)]
-            found[f"bounds.{name}"] = text[0] if low == high else {"min": text[0], "max": text[1]}
-        return self.scene.update(found)
+            bounds[f"bounds.{name}"] = text[0] if low == high else {"min": text[0], "max": text[1]}
+        return self.scene.update(bounds)
 
 
-def asked(scene: Scene, target: str | None, given: Mapping[str, object] | None) -> Asked:
-    """Return what is asked for, checked; given: steps by number or pattern beside the scene's own. Raises BadInput."""
-    name = target_name(scene, target)
-    check_sought(scene, "rounding")
+def read_sizes(scene: Scene, given: Mapping[str, object] | None) -> dict[str, tuple[float, ...]]:
+    """Sizes of numbers, SI, ascending, within their bounds.
+
+    given: steps by number or pattern beside the scene's own. Raises BadInput for numbers that have no sizes.
+    """
     # A pattern speaks of what is free, a name of itself: the refusal of one that is not tells it.
     loose = [key for key, bound in scene.bounds.items() if bound.free or key in (given or ())]
     own = scene.update({f"steps.{key}": step for key, step in sizes.named(given, loose).items()}) if given else scene
@@ -117,7 +161,7 @@ def asked(scene: Scene, target: str | None, given: Mapping[str, object] | None) 
             remedy = f"Take {'a smaller step' if number in steps else 'other sizes'}, or wider bounds"
             raise refusal(problem, own.origin, key, remedy=remedy)
         found[number] = inside
-    return Asked(scene, name, found)
+    return found
 
 
 class Best(NamedTuple):
@@ -132,47 +176,13 @@ class Best(NamedTuple):
     reaching: int | None = None
 
 
-@working()
-def solved(
-    asked: Asked, solve: Solve, last: Solve | None = None, on_step: Callable[[str], None] | None = None
-) -> Solution:
-    """Return the certified optimum with numbers at sizes; last: the solve whose answer is told.
-
-    Raises BadInput where a goal is out of reach on the lattice alone, and no band says how close is close enough.
-    """
-    say = on_step or (lambda text: None)
-    nominal = _under("solving without sizes", asked.scene, solve, say)
-    if nominal.status != "optimal" or nominal.point is None:
-        return nominal
-    whole = _whole(asked, nominal, say) if asked.points < MOST_POINTS else None
-    best = whole or _branched(asked, nominal, solve, say)
-    if best.point is None:
-        return _without(asked, nominal, best)
-    fixed = asked.within({name: (value, value) for name, value in best.point.items()})
-    answer = _under("solving with the best sizes", fixed, last or solve, say)
-    if answer.status != "optimal":
-        sentences = answer.sentences._replace(result=f"With the best sizes found: {answer.sentences.result}")
-        return replace(answer, scene=asked.scene, sentences=sentences)
-    _check_goals(asked, nominal, answer)
-    if best.levels and not _agree(asked, answer, best):
-        sentences = Sentences("What was read on the lattice and what was solved there differ; please report it.")
-        return replace(answer, status="uncertified", sentences=sentences, scene=asked.scene)
-    return _told(asked, answer, nominal, best)
-
-
-def _under(step: str, scene: Scene, solve: Solve, say: Callable[[str], None], **how: Any) -> Solution:
-    """Return a scene's answer, the steps of its solve told below the step that it is one of."""
-    say(step)
-    return solve(scene, **how, on_step=lambda text: say(f"{step}: {text}"))
-
-
-def _check_goals(asked: Asked, nominal: Solution, answer: Solution) -> None:
+def _check_goals(lattice: Lattice, nominal: Solution, answer: Solution) -> None:
     """Raise BadInput for a goal that sizes put out of reach where [accept] has no band for it."""
     from loomopt.scenes import tolerances
 
-    scene = asked.scene
+    scene = lattice.scene
     bands = tolerances.bands(cursor(scene).at("accept"), scene.schema)
-    for goal in asked.program.goals:
+    for goal in lattice.program.goals:
         name, value = goal.figure, answer.figures.get(goal.figure)
         lost = nominal.reached.get(name) and not answer.reached.get(name)
         if lost and not (name in bands and value is not None and abs(value) <= bands[name] + abs(goal.high)):
@@ -183,21 +193,21 @@ def _check_goals(asked: Asked, nominal: Solution, answer: Solution) -> None:
             raise refusal(problem, scene.origin, f"accept.{name}", remedy=remedy)
 
 
-def _agree(asked: Asked, answer: Solution, best: Best) -> bool:
+def _agree(lattice: Lattice, answer: Solution, best: Best) -> bool:
     """Say whether an answer is worth what its point was read to be."""
-    x = asked.job.values(asked.program, {asked.scene.full(k): v for k, v in answer.design.items()})
-    found = objectives(asked.program, x)
+    x = lattice.job.values(lattice.program, {lattice.scene.full(k): v for k, v in answer.design.items()})
+    found = objectives(lattice.program, x)
     return all(abs(a - b) <= AGREES for a, b in zip(found, best.levels, strict=True))
 
 
 # The whole lattice.
 
 
-def _whole(asked: Asked, nominal: Solution, say: Callable[[str], None]) -> Best | None:
+def _read_lattice(lattice: Lattice, nominal: Solution) -> Best | None:
     """Return the best point of all; None where what is left to choose is more than one number."""
-    program, job = asked.program, asked.job
+    program, job = lattice.program, lattice.job
     assert nominal.point is not None
-    names = {asked.scene.full(name): own for name, own in asked.sizes.items()}
+    names = {lattice.scene.full(name): own for name, own in lattice.sizes.items()}
     known = {v.name: v for v in program.variables}
     if not names.keys() <= known.keys() or program.tops:
         return None
@@ -212,9 +222,9 @@ def _whole(asked: Asked, nominal: Solution, say: Callable[[str], None]) -> Best 
     reader = _Reader(program, base, like, chosen[0] if chosen else "")
     kept: list[dict[str, Floats]] = []
     grids = list(names.values())
-    for first in range(0, asked.points, BLOCK):
-        say(f"reading {asked.points} points of sizes, {100 * first // asked.points} %")
-        places = np.unravel_index(np.arange(first, min(first + BLOCK, asked.points)), [len(own) for own in grids])
+    for first in range(0, lattice.points, BLOCK):
+        lattice.task.settings.at(f"reading {lattice.points} points of sizes, {100 * first // lattice.points} %")
+        places = np.unravel_index(np.arange(first, min(first + BLOCK, lattice.points)), [len(own) for own in grids])
         point = {name: np.array(own)[at] for (name, own), at in zip(names.items(), places, strict=True)}
         part = reader.admissible(point)
         if part is None:
@@ -224,9 +234,9 @@ def _whole(asked: Asked, nominal: Solution, say: Callable[[str], None]) -> Best 
     levels = reader.levels(every)
     well = np.all(np.isfinite(levels), axis=1)
     count = int(np.sum(well))
-    rests = f"all {asked.points} points were read, at each the extremes of the whole cycle refined"
-    bounds = asked.scene.bounds.items()
-    loosely = [name for name, own in bounds if own.free and own.min != own.max and name not in asked.sizes]
+    rests = f"all {lattice.points} points were read, at each the extremes of the whole cycle refined"
+    bounds = lattice.scene.bounds.items()
+    loosely = [name for name, own in bounds if own.free and own.min != own.max and name not in lattice.sizes]
     rests += f" and {', '.join(loosely)} chosen so that {program.objectives[0].figure} is least" if chosen else ""
     if not count:
         return Best(None, 0, 0, 0.0, rests)
@@ -234,7 +244,7 @@ def _whole(asked: Asked, nominal: Solution, say: Callable[[str], None]) -> Best 
     for level in levels.T:
         left = left[level[left] <= level[left].min() + SAME_OBJECTIVE]
     at = int(left[0])
-    found = {name: float(every[asked.scene.full(name)][at]) for name in asked.sizes}
+    found = {name: float(every[lattice.scene.full(name)][at]) for name in lattice.sizes}
     reaching = int(np.sum(well & (levels[:, 0] <= SAME_OBJECTIVE))) if chosen else count
     return Best(found, count, 0, 0.0, rests, tuple(map(float, levels[at])), reaching)
 
@@ -337,10 +347,10 @@ class _Reader:
 Ends = Mapping[str, tuple[int, int]]
 
 
-def _branched(asked: Asked, nominal: Solution, solve: Solve, say: Callable[[str], None]) -> Best:
+def _branch(lattice: Lattice, nominal: Solution, solve: Solve) -> Best:
     """Return the best point that boxes of sizes lead to, the most promising first."""
     order = itertools.count()
-    whole: Ends = {name: (0, len(own) - 1) for name, own in asked.sizes.items()}
+    whole: Ends = {name: (0, len(own) - 1) for name, own in lattice.sizes.items()}
     queue: list[tuple[tuple[float, ...], int, Ends, Solution]] = []
     best: tuple[float, ...] | None = None
     point: Mapping[str, float] | None = None
@@ -353,21 +363,21 @@ def _branched(asked: Asked, nominal: Solution, solve: Solve, say: Callable[[str]
     def take(ends: Ends, near: Solution) -> None:
         nonlocal best, point, boxes, found
         boxes += 1
-        scene = asked.within({k: (asked.sizes[k][a], asked.sizes[k][b]) for k, (a, b) in ends.items()})
+        scene = lattice.within({k: (lattice.sizes[k][a], lattice.sizes[k][b]) for k, (a, b) in ends.items()})
         start = [near.point] if near.point else []
-        step = f"box {boxes} of sizes, {MOST_BOXES} at most; {_standing(asked, found, near)}"
-        answer = _under(step, scene, solve, say, near=start)
+        step = f"box {boxes} of sizes, {MOST_BOXES} at most; {_standing(lattice, found, near)}"
+        answer = solve(replace(lattice.task.at(step), scene=scene, near=start))
         if answer.status != "optimal" or answer.point is None:
             return
-        program = asked.job.program(scene, asked.target)
-        rescaled = zip(objectives(program, answer.point.x), program.objectives, asked.program.objectives, strict=True)
+        program = lattice.job.program(scene, lattice.task.target)
+        rescaled = zip(objectives(program, answer.point.x), program.objectives, lattice.program.objectives, strict=True)
         worth = tuple(
             round(value * now.scale / then.scale / SAME_OBJECTIVE) * SAME_OBJECTIVE for value, now, then in rescaled
         )
         if best is not None and worth >= best:
             return
-        if all(_off(asked, k, float(answer.design[k])) is None for k in asked.sizes):
-            best, point = worth, {k: _nearest(asked.sizes[k], float(answer.design[k])) for k in asked.sizes}
+        if all(_off(lattice, k, float(answer.design[k])) is None for k in lattice.sizes):
+            best, point = worth, {k: _nearest(lattice.sizes[k], float(answer.design[k])) for k in lattice.sizes}
             found = answer
             return
         heapq.heappush(queue, (worth, next(order), ends, answer))
@@ -375,7 +385,7 @@ def _branched(asked: Asked, nominal: Solution, solve: Solve, say: Callable[[str]
     take(whole, nominal)
     while queue and boxes < MOST_BOXES and (best is None or queue[0][0] < best):
         _, _, ends, answer = heapq.heappop(queue)
-        name, below = _split(asked, ends, answer)
+        name, below = _split(lattice, ends, answer)
         low, high = ends[name]
         take({**ends, name: (low, below)}, answer)
         take({**ends, name: (below + 1, high)}, answer)
@@ -387,25 +397,25 @@ def _branched(asked: Asked, nominal: Solution, solve: Solve, say: Callable[[str]
     return Best(point, None, boxes, gap, rests)
 
 
-def _standing(asked: Asked, best: Solution | None, bound: Solution) -> str:
+def _standing(lattice: Lattice, best: Solution | None, bound: Solution) -> str:
     """Return the best sizes' figures that are sought, and how much better others may be, as a phrase.
 
     bound: the answer of the most promising box that is open.
     """
-    words, names = Words(asked.scene), list(dict.fromkeys(each.figure for each in asked.program.objectives))
+    words, names = Words(lattice.scene), list(dict.fromkeys(each.figure for each in lattice.program.objectives))
     if best is None:
         return "no sizes found yet"
     told = ", ".join(f"{name} {words.shown(name, best.figures[name] or 0.0, 6)}" for name in names)
     gaps = {name: abs((best.figures[name] or 0.0) - (bound.figures[name] or 0.0)) for name in names}
-    sizes = {each.figure: each.scale ** (1 / each.power) for each in asked.program.objectives}
+    sizes = {each.figure: each.scale ** (1 / each.power) for each in lattice.program.objectives}
     open_ones = [f"{name} {words.shown(name, gap, 2)}" for name, gap in gaps.items() if gap > AGREES * sizes[name]]
     return f"best {told}; gap {', '.join(open_ones) or '0'}"
 
 
-def _off(asked: Asked, name: str, value: float) -> float | None:
+def _off(lattice: Lattice, name: str, value: float) -> float | None:
     """Return how far a number is from its nearest size, in widths between sizes; None where it is one."""
-    near = _nearest(asked.sizes[name], value)
-    own = asked.sizes[name]
+    near = _nearest(lattice.sizes[name], value)
+    own = lattice.sizes[name]
     width = (own[-1] - own[0]) / max(len(own) - 1, 1) or abs(near) or 1.0
     off = abs(value - near) / width
     return None if off <= sizes.WITHIN else off
@@ -415,24 +425,24 @@ def _nearest(own: tuple[float, ...], value: float) -> float:
     return min(own, key=lambda size: abs(size - value))
 
 
-def _split(asked: Asked, ends: Ends, answer: Solution) -> tuple[str, int]:
+def _split(lattice: Lattice, ends: Ends, answer: Solution) -> tuple[str, int]:
     """Return the number that is farthest from a size, and the place of the size below it."""
     open_ones = [name for name, (low, high) in ends.items() if low < high]
-    name = max(open_ones, key=lambda each: _off(asked, each, float(answer.design[each])) or 0.0)
+    name = max(open_ones, key=lambda each: _off(lattice, each, float(answer.design[each])) or 0.0)
     low, high = ends[name]
     value = float(answer.design[name])
-    below = max((k for k in range(low, high) if asked.sizes[name][k] <= value), default=low)
+    below = max((k for k in range(low, high) if lattice.sizes[name][k] <= value), default=low)
     return name, below
 
 
 # What is told.
 
 
-def _told(asked: Asked, answer: Solution, nominal: Solution, best: Best) -> Solution:
+def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) -> Solution:
     """Return the answer with what its sizes cost, and what the claim rests on."""
-    scene, words = asked.scene, Words(asked.scene)
-    ends = {name: (own[0], own[-1], len(own)) for name, own in asked.sizes.items()}
-    rounded = Rounded(ends, asked.points, best.admissible, best.reaching, best.boxes, best.gap, nominal, best.rests)
+    scene, words = lattice.scene, Words(lattice.scene)
+    ends = {name: (own[0], own[-1], len(own)) for name, own in lattice.sizes.items()}
+    rounded = Rounded(ends, lattice.points, best.admissible, best.reaching, best.boxes, best.gap, nominal, best.rests)
     costs = []
     for name, change in risen(answer, nominal).items():
         then, now = nominal.figures[name] or 0.0, answer.figures[name] or 0.0
@@ -443,17 +453,17 @@ def _told(asked: Asked, answer: Solution, nominal: Solution, best: Best) -> Solu
     chosen = ", ".join(f"{name} {words.shown(name, value)}" for name, value in (best.point or {}).items())
     said = [f"Sizes: {chosen}.", f"They cost {', '.join(costs)}." if costs else "They cost nothing of what is sought."]
     if best.boxes and best.gap:
-        said.append(f"Others on the lattice of {asked.points} points may be better by {best.gap:.2g} natural sizes")
+        said.append(f"Others on the lattice of {lattice.points} points may be better by {best.gap:.2g} natural sizes")
         said[-1] += f": {best.boxes} boxes were solved."
     else:
         kept = "" if best.admissible is None else f", {best.admissible} of which keep all limits"
         kept += f" and {best.reaching} reach the goal" if best.reaching != best.admissible else ""
-        said.append(f"None of the {asked.points} points of the lattice is better{kept}: {best.rests}.")
+        said.append(f"None of the {lattice.points} points of the lattice is better{kept}: {best.rests}.")
     own = {scene.full(name): value for name, value in designs.flat(answer.design).items()}
-    here = report.evaluated(scene, asked.job, asked.target, own)
+    here = report.evaluated(scene, lattice.job, lattice.task.target, own)
     # A size is what was chosen and no limit; and how far today's machine is goes by the widths of the scene's bounds.
-    binding = tuple(price for price in answer.binding if price.limit not in asked.sizes)
-    together = tuple(price for price in answer.bind_together if not {*price.limits} & {*asked.sizes})
+    binding = tuple(price for price in answer.binding if price.limit not in lattice.sizes)
+    together = tuple(price for price in answer.bind_together if not {*price.limits} & {*lattice.sizes})
     figures = {**answer.figures, **{name: here.figures[name] for name in ("change",) if name in answer.figures}}
     stops = report.stops(binding, together) if binding else "No limit binds beside the sizes."
     sentences = report.explained(answer, *said)._replace(limits=stops)
@@ -461,14 +471,14 @@ def _told(asked: Asked, answer: Solution, nominal: Solution, best: Best) -> Solu
     return replace(found, sentences=sentences, rounded=rounded)
 
 
-def _without(asked: Asked, nominal: Solution, best: Best) -> Solution:
+def _without_sizes(lattice: Lattice, nominal: Solution, best: Best) -> Solution:
     """Return that no point was found."""
     helps = "Take smaller steps or wider bounds; the design told is the optimum without sizes."
     if best.gap:
         status = "failed"
-        problem = f"No admissible sizes were found in {best.boxes} boxes of a lattice of {asked.points} points."
+        problem = f"No admissible sizes were found in {best.boxes} boxes of a lattice of {lattice.points} points."
     else:
         status = "infeasible"
-        problem = f"None of the {asked.points} points of the lattice keeps all limits: {best.rests}."
+        problem = f"None of the {lattice.points} points of the lattice keeps all limits: {best.rests}."
     sentences = Sentences(joined(problem, helps))
     return replace(nominal, status=status, sentences=sentences, certificate=None, binding=(), bind_together=())

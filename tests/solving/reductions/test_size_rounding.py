@@ -14,14 +14,12 @@ from loomopt.interface.files import answer_file
 from loomopt.interface.text import answers
 from loomopt.jobs import registry
 from loomopt.solving import engine
-from loomopt.studies.rounding import size_rounding
+from loomopt.solving.reductions.size_rounding import SizeRounding, read_sizes
 
 
 def rounded(problem, steps, target=None, **changes):
     scene = registry.load(problem).update(changes)
-    return size_rounding.solved(
-        size_rounding.asked(scene, target, steps), lambda of, **how: engine.solve(of, target, **how)
-    )
+    return engine.solve(scene, target, reductions=[SizeRounding(steps)])
 
 
 @pytest.mark.parametrize(
@@ -48,9 +46,7 @@ def test_the_whole_lattice_of_links(step, points, reaching, links, peak):
 
 def test_boxes_of_sizes_find_what_solving_every_point_finds():
     scene = registry.load("beatup").update({"bounds.l2": {"min": "75 mm", "max": "77 mm"}})
-    found = size_rounding.solved(
-        size_rounding.asked(scene, "pulse", {"l2": "1 mm"}), lambda of, **how: engine.solve(of, "pulse")
-    )
+    found = engine.solve(scene, "pulse", reductions=[SizeRounding({"l2": "1 mm"})])
     each = [engine.solve(scene.set("bounds.l2", f"{size} mm"), "pulse") for size in (75, 76, 77)]
     best = min(each, key=lambda one: one.figures["pulse_rms"] if one.status == "optimal" else float("inf"))
     assert found.rounded.boxes > 0
@@ -136,9 +132,9 @@ def test_without_a_limit_beside_the_sizes():
 def test_a_pattern_leaves_what_is_held():
     scene = registry.load("rapier")
     assert not scene.bounds["l1"].free
-    assert set(size_rounding.asked(scene, None, {"l*": "1 mm"}).sizes) == {"l4", "l5", "l6", "l3p"}
+    assert set(read_sizes(scene, {"l*": "1 mm"})) == {"l4", "l5", "l6", "l3p"}
     with pytest.raises(BadInput, match="l1 is not free"):
-        size_rounding.asked(scene, None, {"l1": "1 mm"})
+        read_sizes(scene, {"l1": "1 mm"})
 
 
 def test_progress_says_boxes_best_and_gap_through_every_solve():

@@ -6,16 +6,40 @@ from dataclasses import replace
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Sentences, Solution, Words
+from loomopt.solving.optimum import Task
+from loomopt.solving.reductions.reduction import Solve
 
 FARTHEST_SIZE, SAME_SIZE = 4, 1e-9
 """Sizes sold that are tried on either side, and the share by which two answers to them are equally good."""
 
-Solve = Callable[[Scene], Solution]
 Stock = Mapping[str, Sequence[float]]
 Tried = tuple[float, Solution]
+SolveScene = Callable[[Scene], Solution]
 
 
-def fitted(scene: Scene, ideal: Solution, stock: Stock, solve: Solve) -> Solution:
+class StockSizes:
+    """Reduction of numbers that come in sizes only to continuous ones."""
+
+    def apply(self, task: Task) -> Task:
+        """Task with continuous numbers, of whose sizes no global proof knows."""
+        stock = task.job.sizes(task.scene)
+        return replace(
+            task, no_global_proof=f"{', '.join(stock)} comes in sizes, which boxes do not tell" if stock else ""
+        )
+
+    def invert(self, task: Task, answer: Solution, solve: Solve) -> Solution:
+        """Best answer at sizes in stock next to the continuous optimum, with the counts of its search."""
+        stock = task.job.sizes(task.scene)
+        if not stock or answer.status != "optimal":
+            return answer
+        step = task.at(f"trying sizes of {', '.join(stock)}")
+        local = replace(step, starts=task.starts or 1, near=(), mass_tradeoff=True, global_proof=None)
+        found = fitted(task.scene, answer, stock, lambda scene: solve(replace(local, scene=scene)))
+        solver = {**found.solver, "evaluations": answer.solver["evaluations"]}
+        return replace(found, solver=solver, global_bound=answer.global_bound)
+
+
+def fitted(scene: Scene, ideal: Solution, stock: Stock, solve: SolveScene) -> Solution:
     """Best optimum whose numbers are at sizes that are sold; `ideal` itself where it is one already, or no optimum.
 
     stock: sizes (SI, ascending) by number; solve(scene): optimum of a changed scene, its numbers continuous.
@@ -26,7 +50,7 @@ def fitted(scene: Scene, ideal: Solution, stock: Stock, solve: Solve) -> Solutio
     return ideal
 
 
-def _at_a_size(scene: Scene, ideal: Solution, name: str, stock: Stock, solve: Solve) -> Solution:
+def _at_a_size(scene: Scene, ideal: Solution, name: str, stock: Stock, solve: SolveScene) -> Solution:
     """Best optimum with one number at a size; on either side the nearest size with an admissible design is enough.
 
     Where there is none, `ideal` with sentences that say so, as no answer to build.
@@ -57,7 +81,7 @@ def _at_a_size(scene: Scene, ideal: Solution, name: str, stock: Stock, solve: So
     return replace(best, sentences=report.explained(best, explanation))
 
 
-def _until_admissible(scene: Scene, name: str, sizes: Iterator[float], solve: Solve) -> Iterator[Tried]:
+def _until_admissible(scene: Scene, name: str, sizes: Iterator[float], solve: SolveScene) -> Iterator[Tried]:
     """Yield sizes with their answers, ending with the first that is optimal."""
     bound = scene.bounds[name]
     for _, size in zip(range(FARTHEST_SIZE), sizes, strict=False):

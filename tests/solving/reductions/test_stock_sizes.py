@@ -8,7 +8,7 @@ import loomopt as lo
 from loomopt.base.units import DISPLAY_UNIT, show
 from loomopt.solving.answer.solution import Sentences, Solution
 from loomopt.solving.certificate.records import Certificate, Level
-from loomopt.solving.search.stock_sizes import FARTHEST_SIZE, fitted
+from loomopt.solving.reductions.stock_sizes import FARTHEST_SIZE, fitted
 
 MM = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
 SIZES = tuple(float(f"{size:g}e-3") for size in MM)

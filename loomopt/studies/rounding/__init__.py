@@ -1,1 +1,0 @@
-"""Optima whose numbers are sizes that can be ordered."""
