@@ -77,18 +77,18 @@ def texts(given: object, key: str, allowed: str, remedy: str) -> tuple[str, ...]
     """Names of a sequence, in its order. Raises BadInput for anything else: a set has no order."""
     if isinstance(given, str) or not _ordered(given):
         raise refusal("it is no list of names", "", key, given, allowed, remedy)
-    return tuple(text(each, key, allowed, remedy) for each in given)
+    return tuple(text(name, key, allowed, remedy) for name in given)
 
 
 def names(given: object, key: str, allowed: str, remedy: str) -> tuple[str, ...]:
     """Names of an iterable, in its order. Raises BadInput for anything else, a single name too."""
     try:
-        found = None if isinstance(given, str | bytes | Mapping) else iter(given)  # type: ignore[call-overload]
+        items = None if isinstance(given, str | bytes | Mapping) else iter(given)  # type: ignore[call-overload]
     except TypeError:
-        found = None
-    if found is None:
+        items = None
+    if items is None:
         raise refusal("it is no list of names", "", key, given, allowed, remedy)
-    return tuple(text(each, key, allowed, remedy) for each in found)
+    return tuple(text(name, key, allowed, remedy) for name in items)
 
 
 def listed(given: object, key: str, allowed: str, remedy: str) -> list[Any]:

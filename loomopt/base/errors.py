@@ -26,10 +26,10 @@ _MOST, _MOST_TOLD = 100, 20
 def clean(text: str, longest: int = 1000) -> str:
     """Text without control characters, shortened to about `longest` characters."""
     ending = f"... ({len(text)} characters)" if len(text) > longest else ""
-    kept = text[:longest]
-    if not kept.isprintable():
-        kept = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in kept)[:longest]
-    return kept + ending
+    head = text[:longest]
+    if not head.isprintable():
+        head = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in head)[:longest]
+    return head + ending
 
 
 class FormerNameWarning(FutureWarning):
@@ -81,7 +81,7 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
     def placed(self, file: str, tables: Collection[str]) -> "BadInput":
         """Same mistakes, those in one of these tables as mistakes of a file, where they name none."""
         first, *others = (
-            each._in(file) if not each.file and each.key.split(".")[0] in tables else each for each in self.faults
+            fault._in(file) if not fault.file and fault.key.split(".")[0] in tables else fault for fault in self.faults
         )
         return first.together(others) if others else first
 
@@ -92,12 +92,12 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
 
     def together(self, others: "Sequence[BadInput]") -> "BadInput":
         """One error of this mistake and of others, a line each."""
-        found = copy.copy(self)
-        found.others = tuple(others)
-        told, more = others[: _MOST_TOLD - 1], len(others) - _MOST_TOLD + 1
+        error = copy.copy(self)
+        error.others = tuple(others)
+        named, more = others[: _MOST_TOLD - 1], len(others) - _MOST_TOLD + 1
         rest = [f"and {more} more: correct these first"] if more > 0 else []
-        found.text = "\n".join([*(each.line for each in (self, *told)), *rest])
-        return found
+        error.text = "\n".join([*(fault.line for fault in (self, *named)), *rest])
+        return error
 
 
 class Faults:
@@ -124,11 +124,11 @@ class Faults:
 
     def within(self, *tables: str) -> bool:
         """Whether a mistake is in one of these tables."""
-        return any(each.key.split(".")[0] in tables for each in self.found)
+        return any(mistake.key.split(".")[0] in tables for mistake in self.found)
 
     def told(self) -> BadInput:
         """Error of all mistakes, the worst first; there must be one."""
-        first, *others = sorted(self.found, key=lambda each: each.grade)
+        first, *others = sorted(self.found, key=lambda mistake: mistake.grade)
         return first.together(others) if others else first
 
     def tell(self) -> None:
@@ -152,14 +152,14 @@ def blamed(error: BaseException) -> BaseException:
     """
     if isinstance(error, BadInput | KeyboardInterrupt | GeneratorExit) or not BROUGHT:
         return error
-    told = " ".join(f"{type(error).__name__}: {error}".rstrip(": ").split())
+    message = " ".join(f"{type(error).__name__}: {error}".rstrip(": ").split())
     for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
         module = str(frame.f_globals.get("__name__"))
-        owners = [each for each in BROUGHT if _is_of(module, each)]
+        owners = [name for name in BROUGHT if _is_of(module, name)]
         if owners:
             owner = module if module in owners else owners[0]
             where = f"{frame.f_code.co_name}, line {line} of {module}"
-            return Broken(f"{BROUGHT[owner]} fails in {where}: {told}", remedy="Mend it, or go without it")
+            return Broken(f"{BROUGHT[owner]} fails in {where}: {message}", remedy="Mend it, or go without it")
     note = f"other distributions take part: {', '.join(sorted(set(BROUGHT.values())))}"
     if note not in getattr(error, "__notes__", ()):
         error.add_note(note)
@@ -178,10 +178,10 @@ def naming() -> Iterator[None]:
     try:
         yield
     except BaseException as error:
-        told = blamed(error)
-        if told is error:
+        blame = blamed(error)
+        if blame is error:
             raise
-        raise told from error
+        raise blame from error
 
 
 _LONGEST_VALUE, _LONGEST_PART = 80, 450
@@ -253,12 +253,12 @@ def nearest(name: str, known: Iterable[str], given: Collection[str] = (), least:
 
     given: names that come last among equally near ones; least: how alike names must be, 1 for the same letters.
     """
-    plain, found = _plain(name[:_LONGEST_VALUE]), ("", 0.0)
-    for each in sorted(known, key=lambda each: each in given):
-        alike = difflib.SequenceMatcher(None, _plain(each), plain).ratio()
-        if alike >= least and alike > found[1]:
-            found = each, alike
-    return found[0]
+    plain, best = _plain(name[:_LONGEST_VALUE]), ("", 0.0)
+    for candidate in sorted(known, key=lambda candidate: candidate in given):
+        alike = difflib.SequenceMatcher(None, _plain(candidate), plain).ratio()
+        if alike >= least and alike > best[1]:
+            best = candidate, alike
+    return best[0]
 
 
 def _plain(name: str) -> str:
@@ -269,9 +269,9 @@ def near_file(path: Path) -> str:
     """Path of the file beside one that is not there which is meant; "" where none is near."""
     with contextlib.suppress(OSError, ValueError):
         beside = itertools.islice(path.parent.iterdir(), _MOST_FILES)
-        names = [each.name for each in beside if each.suffix == path.suffix and each.is_file()]
-        found = nearest(path.stem, [Path(name).stem for name in names], least=SAME)
-        return str(path.with_name(found + path.suffix)) if found else ""
+        names = [entry.name for entry in beside if entry.suffix == path.suffix and entry.is_file()]
+        near = nearest(path.stem, [Path(name).stem for name in names], least=SAME)
+        return str(path.with_name(near + path.suffix)) if near else ""
     return ""
 
 

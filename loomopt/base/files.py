@@ -61,8 +61,8 @@ def check_room(folder: Path) -> None:
 
 def suffix(path: Path, allowed: Sequence[str]) -> str:
     """Suffix of `path` in small letters: ".dxf". Raises BadInput when it is not allowed."""
-    found = path.suffix.lower()
-    if found not in allowed:
+    ending = path.suffix.lower()
+    if ending not in allowed:
         raise BadInput(
             "the file name's ending does not name a format that can be written here",
             file=str(path),
@@ -70,7 +70,7 @@ def suffix(path: Path, allowed: Sequence[str]) -> str:
             allowed=", ".join(allowed),
             remedy=f"End the name in one of these, such as {path.stem or 'file'}{allowed[0]}",
         )
-    return found
+    return ending
 
 
 def _place(path: Path) -> Path:

@@ -21,8 +21,8 @@ _came: list[int] = []
 
 def leave() -> NoReturn:
     """End the process, whatever it is at."""
-    for each in SIGNALS:
-        signal.signal(each, signal.SIG_IGN)
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
     with contextlib.suppress(OSError):
         os.write(2, f"{STOPPED}\n".encode())
     os._exit(INTERRUPTED)
@@ -65,6 +65,6 @@ def check() -> None:
 
 def _handle(handler: Callable[[int, "FrameType | None"], None]) -> None:
     """Set what Ctrl-C and SIGTERM do, but where whoever started the process has them ignored."""
-    for each in SIGNALS:
-        if signal.getsignal(each) is not signal.SIG_IGN:
-            signal.signal(each, handler)
+    for signum in SIGNALS:
+        if signal.getsignal(signum) is not signal.SIG_IGN:
+            signal.signal(signum, handler)

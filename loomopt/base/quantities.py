@@ -60,13 +60,13 @@ def pattern_schema(kind: str, least: float, above: float, below: float, allowed:
         text["not"] = {"anyOf": [{"pattern": pattern} for pattern in refused]}
     head = {QUANTITY_PATTERN: _name(kind, least, above, below), "description": allowed}
     if kind != "number":
-        return {**head, **told(text, allowed)}
+        return {**head, **describe(text, allowed)}
     ends = {"minimum": least, "exclusiveMinimum": above, "exclusiveMaximum": below}
     number = {"type": "number"} | {name: end for name, end in ends.items() if math.isfinite(end)}
     return {**head, **told({"anyOf": [number, text]}, allowed)}
 
 
-def told(check: dict[str, Any], allowed: str) -> dict[str, Any]:
+def describe(check: dict[str, Any], allowed: str) -> dict[str, Any]:
     """JSON Schema that takes what `check` takes, and of anything else says what is allowed.
 
     Editors repeat the part that fails: a pattern says nothing to a person, the one value that would be taken does.
@@ -338,8 +338,8 @@ class Quantity(NamedTuple):
     def schema(self) -> dict[str, Any]:
         """JSON Schema of its raw value."""
         kind, least, above, below = self
-        said = f"{described(kind)}, {self.range}" if self.range else described(kind)
-        return pattern_schema(kind, least, above, below, said)
+        text = f"{described(kind)}, {self.range}" if self.range else described(kind)
+        return pattern_schema(kind, least, above, below, text)
 
 
 class NumberList(NamedTuple):
@@ -391,14 +391,14 @@ def quantity_of(model: type[BaseModel], field: str) -> Quantity | None:
 @functools.lru_cache(maxsize=MOST_MODELS)
 def quantities_of(model: type[BaseModel]) -> Mapping[str, Quantity]:
     """Quantities of a model's fields; those of a table inside the model under "table.key"."""
-    found: dict[str, Quantity] = {}
+    quantities: dict[str, Quantity] = {}
     for name in model.model_fields:
         quantity, inner = quantity_of(model, name), table_inside(model, name)
         if quantity:
-            found[name] = quantity
+            quantities[name] = quantity
         elif inner:
-            found |= {f"{name}.{key}": each for key, each in quantities_of(inner).items()}
-    return MappingProxyType(found)
+            quantities |= {f"{name}.{key}": inner_quantity for key, inner_quantity in quantities_of(inner).items()}
+    return MappingProxyType(quantities)
 
 
 def table_inside(model: type[BaseModel], field: str) -> type[BaseModel] | None:
@@ -412,9 +412,9 @@ def _find_quantity(*parts: object) -> Quantity | None:
     for part in parts:
         if isinstance(part, Quantity):
             return part
-        found = _find_quantity(*typing.get_args(part))
-        if found:
-            return found
+        quantity = _find_quantity(*typing.get_args(part))
+        if quantity:
+            return quantity
     return None
 
 

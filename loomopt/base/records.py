@@ -37,7 +37,7 @@ class Awaited(Mapping[str, float | None]):
 
     def __getitem__(self, name: str) -> float | None:
         if name in self._names and name not in self._known:
-            missing = [each for each in self._names if each not in self._known] if self._asked else [name]
+            missing = [absent for absent in self._names if absent not in self._known] if self._asked else [name]
             self._known, self._asked = {**self._known, **self._later(missing)}, True
         return self._known[name]
 

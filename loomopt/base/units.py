@@ -148,8 +148,8 @@ def usual(value: float, kind: str, digits: int = 6) -> str:
 def fits(unit_text: str, kind: str) -> bool:
     """Whether a unit is one of a kind of quantity. Raises QuantityError for an unknown unit."""
     *mechanical, angle = parse_unit(unit_text).powers
-    *asked, asked_angle = parse_unit(SI_UNIT[kind]).powers
-    return mechanical == asked and (angle == asked_angle or angle == 0 > asked_angle)
+    *wanted, wanted_angle = parse_unit(SI_UNIT[kind]).powers
+    return mechanical == wanted and (angle == wanted_angle or angle == 0 > wanted_angle)
 
 
 @functools.lru_cache(maxsize=512)

@@ -32,21 +32,21 @@ def closed_biarcs(points: Sequence[tuple[float, float]], tolerance: float) -> Ar
         at = at[:-1]
     tangents, count = _tangents(at), len(at)
     ring, turned = np.append(at, at[0]), np.append(tangents, tangents[0])
-    found: Arcs = []
+    arcs: Arcs = []
     here = 0
     while here < count:
         reach = _longest(ring, turned, here, tolerance)
-        found += _biarc(ring[here], turned[here], ring[reach], turned[reach])
+        arcs += _biarc(ring[here], turned[here], ring[reach], turned[reach])
         here = reach
-    return found
+    return arcs
 
 
 def _tangents(at: "NDArray[np.complex128]") -> "NDArray[np.complex128]":
     """Unit tangents at points of a ring, of the circle through each and its neighbours."""
     back, ahead = at - np.roll(at, 1), np.roll(at, -1) - at
     direction = back / np.abs(back) ** 2 + ahead / np.abs(ahead) ** 2
-    found: NDArray[np.complex128] = direction / np.abs(direction)
-    return found
+    unit: NDArray[np.complex128] = direction / np.abs(direction)
+    return unit
 
 
 def _longest(ring: "NDArray[np.complex128]", tangents: "NDArray[np.complex128]", here: int, tolerance: float) -> int:
@@ -88,16 +88,16 @@ def _bulge(along: complex, chord: complex) -> float:
     """Bulge of the arc that leaves along a tangent over a chord: the tangent of half the angle between them."""
     turned = chord / along
     half = math.atan2(turned.imag, turned.real)
-    found = math.tan(half / 2)
-    return 0.0 if abs(found) < STRAIGHT else found
+    bulge = math.tan(half / 2)
+    return 0.0 if abs(bulge) < STRAIGHT else bulge
 
 
 def distance(points: "NDArray[np.complex128]", arcs: Arcs) -> Floats:
     """Distance of points from a chain of arcs; its last entry is where it ends."""
-    found = np.full(len(points), np.inf)
+    nearest = np.full(len(points), np.inf)
     for (a, bulge), (b, _) in itertools.pairwise(arcs):
-        found = np.minimum(found, _from_arc(points, a, b, bulge))
-    return found
+        nearest = np.minimum(nearest, _from_arc(points, a, b, bulge))
+    return nearest
 
 
 def _from_arc(points: "NDArray[np.complex128]", a: complex, b: complex, bulge: float) -> Floats:
@@ -121,10 +121,10 @@ def reach(a: complex, b: complex, bulge: float) -> list[complex]:
         return [a, b]
     chord, swept = b - a, 4 * math.atan(bulge)
     centre = (a + b) / 2 + chord * 1j * (1 - bulge**2) / (4 * bulge)
-    found = [a, b]
+    points = [a, b]
     for quarter in (1, 1j, -1, -1j):
         point = centre + abs(a - centre) * quarter
         turned = np.angle((point - centre) / (a - centre)) * np.sign(swept) % (2 * math.pi)
         if turned <= abs(swept):
-            found.append(point)
-    return found
+            points.append(point)
+    return points

@@ -86,10 +86,10 @@ class IntervalSeries(Enclosure):
 
     def __pow__(self, power: int) -> "IntervalSeries":
         """Power of a whole number above 0."""
-        found = self
+        product = self
         for _ in range(power - 1):
-            found = found * self
-        return found
+            product = product * self
+        return product
 
 
 def _whole(x: Number) -> SeriesTerms:
@@ -141,12 +141,12 @@ def floor(x: Number) -> Number:
     """Largest whole numbers up to what x may be; where these are several, slopes are without bound."""
     if not isinstance(x, IntervalSeries):
         return intervals.floor(x)
-    found = intervals.floor(x.terms.value)
-    worth = found.v if isinstance(found, Enclosure) else found
+    whole = intervals.floor(x.terms.value)
+    worth = whole.v if isinstance(whole, Enclosure) else whole
     if not (several := worth.low != worth.high).any():
-        return found
+        return whole
     endless = Interval(np.where(several, -np.inf, 0.0), np.where(several, np.inf, 0.0))
-    return IntervalSeries(SeriesTerms(found, endless, endless))
+    return IntervalSeries(SeriesTerms(whole, endless, endless))
 
 
 def chosen(place: Number, values: Sequence[Number]) -> Number:

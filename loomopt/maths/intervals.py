@@ -150,11 +150,11 @@ def _outward(x: Floats, sign: float) -> Floats:
         step = np.abs(x)
         step *= STEP
         step += LEAST
-        found: Floats = np.subtract(x, step, out=step) if sign < 0 else np.add(x, step, out=step)
-        lost = ~np.isfinite(found)
+        moved: Floats = np.subtract(x, step, out=step) if sign < 0 else np.add(x, step, out=step)
+        lost = ~np.isfinite(moved)
         if lost.any():
-            found[lost] = np.nextafter(x[lost], sign * np.inf)
-    return found
+            moved[lost] = np.nextafter(x[lost], sign * np.inf)
+    return moved
 
 
 def interval(x: Number) -> Interval:
@@ -193,15 +193,15 @@ def _sine_cosine(x: Floats) -> tuple[Floats, Floats]:
     sine, cosine = r + r * sine, (1 - z / 2) + cosine * z
     turned = np.mod(quarters, 4)
     odd, back = np.mod(turned, 2) == 1, turned >= 2
-    found = np.where(odd, cosine, sine), np.where(odd, -sine, cosine)
-    return np.where(back, -found[0], found[0]), np.where(back, -found[1], found[1])
+    pair = np.where(odd, cosine, sine), np.where(odd, -sine, cosine)
+    return np.where(back, -pair[0], pair[0]), np.where(back, -pair[1], pair[1])
 
 
 def _wave(x: Interval, phase: int) -> Interval:
     """Sine (phase 0) or the cosine (phase 1): its tops lie at (1 − phase) quarter turns."""
     ends = [_sine_cosine(np.where(np.abs(end) <= LARGEST_ANGLE, end, 0.0))[phase] for end in (x.low, x.high)]
     low, high = np.minimum(*ends) - TRIG_ERROR, np.maximum(*ends) + TRIG_ERROR
-    begin, end = ((each * (2 / math.pi) - (1 - phase)) / 4 for each in (x.low, x.high))
+    begin, end = ((bound * (2 / math.pi) - (1 - phase)) / 4 for bound in (x.low, x.high))
     far = (np.abs(x.low) > LARGEST_ANGLE) | (np.abs(x.high) > LARGEST_ANGLE)
     top = far | (np.floor(end + NEAR_A_TOP) >= np.ceil(begin - NEAR_A_TOP))
     bottom = far | (np.floor(end - 0.5 + NEAR_A_TOP) >= np.ceil(begin - 0.5 - NEAR_A_TOP))
@@ -217,8 +217,8 @@ def _angle(y: Interval, x: Interval) -> Interval:
     # Whatever NumPy's angle t is worth, the true one is t + δ with tan δ = (y cos t − x sin t)/(x cos t + y sin t).
     sine, cosine = _wave(interval(angles), 0), _wave(interval(angles), 1)
     off = (cosine * ups - sine * rights) / (cosine * rights + sine * ups)
-    found = Interval(np.minimum(off.low, 0.0), np.maximum(off.high, 0.0)) + angles
-    low, high = found.low.min(axis=0), found.high.max(axis=0)
+    angle = Interval(np.minimum(off.low, 0.0), np.maximum(off.high, 0.0)) + angles
+    low, high = angle.low.min(axis=0), angle.high.max(axis=0)
     return Interval(np.where(cut, -PI.high, low), np.where(cut, PI.high, high))
 
 
@@ -287,8 +287,8 @@ class Enclosure:
     def __rtruediv__(self, other: Number) -> "Enclosure":
         """Quotient, the other number on top."""
         inverse = self.v.inverse()
-        found: Enclosure = self.mapped(inverse, -inverse.square()) * other
-        return found
+        quotient: Enclosure = self.mapped(inverse, -inverse.square()) * other
+        return quotient
 
     def __pow__(self, power: int) -> "Enclosure":
         """Integer power."""
@@ -329,9 +329,13 @@ def atan2(y: Number, x: Number) -> Number:
     """Angle of (x, y) in (−π, π]; where it may jump, its slopes are without bound."""
     if not isinstance(y, Enclosure) and not isinstance(x, Enclosure):
         return _angle(interval(y), interval(x))
-    up, right = (each.v if isinstance(each, Enclosure) else interval(each) for each in (y, x))
+    up, right = (coordinate.v if isinstance(coordinate, Enclosure) else interval(coordinate) for coordinate in (y, x))
     scale = (up.square() + right.square()).inverse()
-    parts = [each.g * part for each, part in ((y, right * scale), (x, -up * scale)) if isinstance(each, Enclosure)]
+    parts = [
+        coordinate.g * part
+        for coordinate, part in ((y, right * scale), (x, -up * scale))
+        if isinstance(coordinate, Enclosure)
+    ]
     slopes = parts[0] if len(parts) == 1 else parts[0] + parts[1]
     cut = _across_the_cut(up, right)
     if cut.any():
@@ -342,12 +346,12 @@ def atan2(y: Number, x: Number) -> Number:
 def floor(x: Number) -> Number:
     """Largest whole numbers up to what x may be; where these are several, slopes are without bound."""
     value = x.v if isinstance(x, Enclosure) else interval(x)
-    found = Interval(np.floor(value.low), np.floor(value.high))
-    several = found.low != found.high
+    whole = Interval(np.floor(value.low), np.floor(value.high))
+    several = whole.low != whole.high
     if not isinstance(x, Enclosure) or not several.any():
-        return found
+        return whole
     endless = np.broadcast_to(np.where(several, np.inf, 0.0), np.broadcast_shapes(x.g.shape, several.shape))
-    return Enclosure(found, Interval(-endless, endless))
+    return Enclosure(whole, Interval(-endless, endless))
 
 
 def chosen(place: Number, values: Sequence[Number]) -> Number:
@@ -355,17 +359,17 @@ def chosen(place: Number, values: Sequence[Number]) -> Number:
     places = np.asarray(place.low if isinstance(place, Interval) else place, dtype=np.intp)
     if places.ndim == 0:
         return values[int(places)]
-    width = max((each.g.shape[0] for each in values if isinstance(each, Enclosure)), default=0)
+    width = max((value.g.shape[0] for value in values if isinstance(value, Enclosure)), default=0)
     if not width:
-        return _picked(places, [interval(each) for each in values])
+        return _picked(places, [interval(value) for value in values])
     flat = interval(np.zeros((width, 1, 1)))
-    full = [each if isinstance(each, Enclosure) else Enclosure(interval(each), flat) for each in values]
-    return Enclosure(_picked(places, [each.v for each in full]), _picked(places, [each.g for each in full]))
+    full = [value if isinstance(value, Enclosure) else Enclosure(interval(value), flat) for value in values]
+    return Enclosure(_picked(places, [value.v for value in full]), _picked(places, [value.g for value in full]))
 
 
 def _picked(places: NDArray[np.intp], values: Sequence[Interval]) -> Interval:
-    found = values[0]
-    for k, each in enumerate(values[1:], 1):
+    picked = values[0]
+    for k, value in enumerate(values[1:], 1):
         here = places == k
-        found = Interval(np.where(here, each.low, found.low), np.where(here, each.high, found.high))
-    return found
+        picked = Interval(np.where(here, value.low, picked.low), np.where(here, value.high, picked.high))
+    return picked

@@ -159,12 +159,12 @@ def variables(values: Sequence[Number], directions: Floats, curved: bool) -> lis
     curved: whether second derivatives are carried along.
     """
     width = directions.shape[1]
-    found = []
+    jets = []
     for value, slopes in zip(values, directions, strict=True):
         shape = np.shape(value)
         g = np.broadcast_to(slopes, (*shape, width))
-        found.append(Jet(value, g, np.zeros((*(1 for _ in shape), width, width)) if curved else None))
-    return found
+        jets.append(Jet(value, g, np.zeros((*(1 for _ in shape), width, width)) if curved else None))
+    return jets
 
 
 def lifted(
@@ -191,7 +191,7 @@ def atan2(y: Number, x: Number) -> Number:
     """Angle of (x, y) in (−π, π]; its slopes are those of x dy − y dx over x² + y²."""
     if not isinstance(y, Jet) and not isinstance(x, Jet):
         return np.arctan2(y, x)
-    values = [each.v if isinstance(each, Jet) else each for each in (y, x)]
+    values = [coordinate.v if isinstance(coordinate, Jet) else coordinate for coordinate in (y, x)]
     square = values[0] * values[0] + values[1] * values[1]
     up, right = values[1] / square, -values[0] / square
     angle = np.arctan2(*values)
@@ -202,7 +202,7 @@ def atan2(y: Number, x: Number) -> Number:
     h = None
     if y.h is not None and x.h is not None:
         twice = _wide(_wide(2 * up * right))
-        square_y, square_x = (each.g[..., :, None] * each.g[..., None, :] for each in (y, x))
+        square_y, square_x = (coordinate.g[..., :, None] * coordinate.g[..., None, :] for coordinate in (y, x))
         bent = twice * (square_y - square_x) + _wide(_wide(right * right - up * up)) * _mixed(y.g, x.g)
         h = _wide(_wide(up)) * y.h + _wide(_wide(right)) * x.h + bent
     return Jet(angle, _wide(up) * y.g + _wide(right) * x.g, h)
@@ -215,11 +215,11 @@ def floor(x: Number) -> Number:
 
 def stacked(values: Sequence[Number]) -> Number:
     """Scalar numbers as one of shape (count,); a jet where one of them is."""
-    own = next((value for value in values if isinstance(value, Jet)), None)
-    if own is None:
+    sample = next((value for value in values if isinstance(value, Jet)), None)
+    if sample is None:
         return np.array([float(value) for value in values])
-    none = np.zeros(own.g.shape)
-    flat = None if own.h is None else np.zeros(own.h.shape)
+    none = np.zeros(sample.g.shape)
+    flat = None if sample.h is None else np.zeros(sample.h.shape)
     jets = [value if isinstance(value, Jet) else Jet(value, none, flat) for value in values]
     h = None if flat is None else np.array([np.broadcast_to(jet.curvature, flat.shape) for jet in jets])
     return Jet(np.array([jet.v for jet in jets], dtype=np.float64), np.array([jet.g for jet in jets]), h)
@@ -227,7 +227,7 @@ def stacked(values: Sequence[Number]) -> Number:
 
 def spread(numbers: Sequence[float], beside: Iterable[Number]) -> Floats:
     """Floats as an array of shape (count, 1 ...) that broadcasts with the other operands."""
-    axes = max((np.ndim(each.v if isinstance(each, Jet) else each) for each in beside), default=0)
+    axes = max((np.ndim(number.v if isinstance(number, Jet) else number) for number in beside), default=0)
     return np.array(numbers, dtype=np.float64).reshape(-1, *(1,) * axes)
 
 
@@ -237,7 +237,7 @@ def weighted(weights: Sequence[Sequence[float]], values: Number) -> list[Number]
     if not isinstance(values, Jet):
         return list(np.tensordot(table, values, axes=1))
     whole = values.whole()
-    v, g = (np.tensordot(table, each, axes=1) for each in (whole.v, whole.g))
+    v, g = (np.tensordot(table, part, axes=1) for part in (whole.v, whole.g))
     h = None if whole.h is None else np.tensordot(table, whole.h, axes=1)
     return [Jet(v[k], g[k], None if h is None else h[k]) for k in range(len(table))]
 
@@ -254,22 +254,22 @@ def chosen(place: Number, values: Sequence[Number]) -> Number:
 
 def _picked(places: NDArray[np.intp], values: Sequence[Number]) -> Number:
     """Value at each node of its place, of numbers of which some are arrays of nodes."""
-    found = None
+    picked = None
     for k in np.unique(places).tolist():
         share = np.asarray(places == k, dtype=np.float64)
         masked = _masked(values[k], share)
-        found = masked if found is None else found + masked
-    return found
+        picked = masked if picked is None else picked + masked
+    return picked
 
 
 def _masked(value: Number, share: Floats) -> Number:
     """Value where share is 1, exactly 0 elsewhere whatever it is there."""
     on = share > 0
 
-    def kept(numbers: Number, axes: int) -> Number:
+    def masked(numbers: Number, axes: int) -> Number:
         wide = on.reshape(on.shape + (1,) * axes)
         return np.where(wide, numbers, 0.0)
 
     if not isinstance(value, Jet):
-        return kept(value, 0)
-    return Jet(kept(value.v, 0), kept(value.g, 1), None if value.h is None else kept(value.h, 2))
+        return masked(value, 0)
+    return Jet(masked(value.v, 0), masked(value.g, 1), None if value.h is None else masked(value.h, 2))

@@ -52,29 +52,29 @@ def within(ways: Floats, low: Floats, high: Floats) -> float:
 
 def _merged(units: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats]:
     """Values without repetition, opposites included: repeated values share one bound."""
-    kept: list[int] = []
+    independent: list[int] = []
     low, high = low.copy(), high.copy()
     for k, unit in enumerate(units):
-        for other in kept:
+        for other in independent:
             cosine = float(unit @ units[other])
             if abs(cosine) > 1.0 - ALIKE:
                 ends = (low[k], high[k]) if cosine > 0.0 else (-high[k], -low[k])
                 low[other], high[other] = max(low[other], ends[0]), min(high[other], ends[1])
                 break
         else:
-            kept.append(k)
-    return units[kept], low[kept], high[kept]
+            independent.append(k)
+    return units[independent], low[independent], high[independent]
 
 
 def _factored(correlation: Floats) -> Floats:
     """Cholesky's factor of a correlation, with zeros where values depend on those before."""
     count = len(correlation)
-    found = np.zeros((count, count))
+    factor = np.zeros((count, count))
     for k in range(count):
-        left = correlation[k:, k] - found[k:, :k] @ found[k, :k]
+        left = correlation[k:, k] - factor[k:, :k] @ factor[k, :k]
         if left[0] > ALIKE:
-            found[k:, k] = left / math.sqrt(left[0])
-    return found
+            factor[k:, k] = left / math.sqrt(left[0])
+    return factor
 
 
 def _ends(factor: Floats, k: int, before: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
@@ -82,8 +82,8 @@ def _ends(factor: Floats, k: int, before: Floats, low: Floats, high: Floats) -> 
     known = before @ factor[k, :k]
     if factor[k, k] > 0.0:
         return (low[k] - known) / factor[k, k], (high[k] - known) / factor[k, k]
-    kept = (low[k] <= known) & (known <= high[k])
-    return np.where(kept, -FAR, FAR), np.where(kept, FAR, FAR)
+    inside = (low[k] <= known) & (known <= high[k])
+    return np.where(inside, -FAR, FAR), np.where(inside, FAR, FAR)
 
 
 @functools.lru_cache(maxsize=4)

@@ -95,13 +95,13 @@ class _Used:
         """Unconstrained solution over the columns in use, 0 elsewhere."""
         count = len(self.columns)
         across, inverse = self._across[:, :count], self._inverse[:count, :count]
-        found = np.zeros(self.matrix.shape[1])
+        x = np.zeros(self.matrix.shape[1])
         self.left = self.target
         # The second pass takes out what rounding of R⁻¹ leaves.
         for _ in range(2):
-            found[self.columns] += inverse @ (self.left @ across)
-            self.left = self.target - self.matrix @ found
-        return found
+            x[self.columns] += inverse @ (self.left @ across)
+            self.left = self.target - self.matrix @ x
+        return x
 
 
 TINY = 1e-300
@@ -133,8 +133,10 @@ def least_on_cone(hessian: Floats, slopes: Floats) -> float:
 
 def onto_cone(direction: Floats, slopes: Floats) -> Floats | None:
     """Unit direction of the nearest point of the cone slopes d ≤ 0; None where that is its tip."""
-    kept = direction - slopes.T @ nnls(slopes.T, direction)
-    length = float(np.linalg.norm(kept))
-    if length <= CONE_TIP * max(1.0, float(np.linalg.norm(direction))) or np.any(slopes @ kept > CONE_OPEN * length):
+    projection = direction - slopes.T @ nnls(slopes.T, direction)
+    length = float(np.linalg.norm(projection))
+    if length <= CONE_TIP * max(1.0, float(np.linalg.norm(direction))) or np.any(
+        slopes @ projection > CONE_OPEN * length
+    ):
         return None
-    return np.asarray(kept / length)
+    return np.asarray(projection / length)

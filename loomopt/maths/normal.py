@@ -54,7 +54,7 @@ def quantile(p: Floats) -> Floats:
 
 
 def _fraction(powers: tuple[tuple[float, ...], tuple[float, ...]], x: Floats) -> Floats:
-    above, below = (np.polynomial.polynomial.polyval(x, np.array(own)) for own in powers)
+    above, below = (np.polynomial.polynomial.polyval(x, np.array(coefficients)) for coefficients in powers)
     return np.asarray(above / below)
 
 

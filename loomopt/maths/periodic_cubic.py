@@ -60,8 +60,8 @@ class PeriodicCubic(NamedTuple):
     @property
     def acting(self) -> tuple[float, ...]:
         """The intervals in which it is not 0 all over; all of them where it is 0 everywhere."""
-        found = tuple(float(k) for k, cubic in enumerate(self.cubics) if any(cubic))
-        return found or tuple(map(float, range(self.samples)))
+        places = tuple(float(k) for k, cubic in enumerate(self.cubics) if any(cubic))
+        return places or tuple(map(float, range(self.samples)))
 
     def since(self, k: int) -> tuple[float, ...]:
         """Distance, rad, from the start of interval k to the middle of each interval, within one turn."""
@@ -116,8 +116,8 @@ class PeriodicCubics(NamedTuple):
     @property
     def spread(self) -> float | None:
         """The largest spread of any."""
-        found = [curve.spread for curve in self.curves if curve.spread is not None]
-        return max(found, default=None)
+        spreads = [curve.spread for curve in self.curves if curve.spread is not None]
+        return max(spreads, default=None)
 
 
 def misfit(angles: Sequence[float], values: Sequence[float]) -> float | None:
@@ -181,13 +181,13 @@ class _Row(NamedTuple):
 
 def _sides(rows: Sequence[tuple[float, float, bool]]) -> list[_Row]:
     """Samples in the order of their angles; two of one angle are both sides of a corner."""
-    found: list[_Row] = []
+    samples: list[_Row] = []
     for angle, value, mark in rows:
-        if found and found[-1].angle == angle:
-            found[-1] = found[-1]._replace(value=value, corner=True)
+        if samples and samples[-1].angle == angle:
+            samples[-1] = samples[-1]._replace(value=value, corner=True)
         else:
-            found.append(_Row(angle, value, value, mark))
-    return found
+            samples.append(_Row(angle, value, value, mark))
+    return samples
 
 
 def _refuse_gaps(rows: Sequence[_Row]) -> None:
@@ -232,9 +232,9 @@ def _slopes(widths: "Floats", chords: "Floats", closed: bool) -> "Floats":
         return np.array([chords[0] - bend * widths[0], *(chords + bend * widths)])
     matrix, right = np.zeros((count, count)), np.zeros(count)
     for k in range(0 if closed else 1, count - 1):
-        last, own = widths[k - 1], widths[k]
-        matrix[k, [k - 1 if k else count - 2, k, k + 1]] += own, 2 * (last + own), last
-        right[k] = 3 * (own * chords[k - 1] + last * chords[k])
+        last, width = widths[k - 1], widths[k]
+        matrix[k, [k - 1 if k else count - 2, k, k + 1]] += width, 2 * (last + width), last
+        right[k] = 3 * (width * chords[k - 1] + last * chords[k])
     if closed:
         matrix[-1, [0, -1]] = 1.0, -1.0
         return np.asarray(np.linalg.solve(matrix, right))

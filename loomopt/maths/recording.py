@@ -158,12 +158,12 @@ class Tape:
 
     def needed(self, outputs: Iterable[Number], since: int = 0) -> set[int]:
         """Places that outputs need, and what may fail from the place `since` on."""
-        found = {self.place(output) for output in outputs}
-        found |= {k for k in range(since, len(self.operations)) if not HARMLESS.fullmatch(self.operations[k].template)}
+        places = {self.place(output) for output in outputs}
+        places |= {k for k in range(since, len(self.operations)) if not HARMLESS.fullmatch(self.operations[k].template)}
         for place in range(len(self.operations) - 1, -1, -1):
-            if place in found:
-                found.update(self.operations[place].of)
-        return found
+            if place in places:
+                places.update(self.operations[place].of)
+        return places
 
     def program(
         self, outputs: tuple[Number, ...], called: Sequence[Recorded], known: Sequence[Recorded], since: int = 0
@@ -172,16 +172,16 @@ class Tape:
 
         called, known: inputs, of each call and of all calls; since: place from which on what may fail is always done.
         """
-        levels = {each.place: CALLED for each in called} | {each.place: KNOWN for each in known}
-        names = {each.place: f"x{k}" for k, each in enumerate(called)}
-        names |= {each.place: f"a{k}" for k, each in enumerate(known)}
+        levels = {operand.place: CALLED for operand in called} | {operand.place: KNOWN for operand in known}
+        names = {operand.place: f"x{k}" for k, operand in enumerate(called)}
+        names |= {operand.place: f"a{k}" for k, operand in enumerate(known)}
         needed = sorted(self.needed(outputs, since))
         written = _Written(self.operations, needed, list(map(self.place, outputs)), levels)
         code = compile(written.text(names), "<recorded formula>", "exec")
         space: dict[str, Number] = {"__name__": __name__, **written.literals}
         exec(code, space)
-        found: Program = space["program"]
-        return found
+        compiled: Program = space["program"]
+        return compiled
 
 
 ALWAYS, KNOWN, CALLED = range(3)
@@ -219,17 +219,17 @@ class _Written:
 
     def _named(self) -> set[int]:
         """Values that need a name: read several times, never, or later than computed, or nested too deeply."""
-        found, depth = set(), dict.fromkeys(self.needed, 0)
+        names, depth = set(), dict.fromkeys(self.needed, 0)
         for place in self.needed:
             template, operands, _ = self.operations[place]
             if template in (INPUT, LITERAL):
                 continue
-            depth[place] = 1 + max((depth[operand] for operand in operands if operand not in found), default=0)
+            depth[place] = 1 + max((depth[operand] for operand in operands if operand not in names), default=0)
             readers = self.readers[place]
             later = any(self.level[reader] > self.level[place] for reader in readers)
             if len(readers) != 1 or later or depth[place] == DEEPEST:
-                found.add(place)
-        return found
+                names.add(place)
+        return names
 
     def _last_read(self) -> dict[int, int]:
         """For each result the one that reads it last."""
@@ -253,7 +253,7 @@ class _Written:
                 names[place] = self._literal(place, value)
                 continue
             if level == CALLED and template in ARITHMETIC:
-                for operand in (each for each in operands if self.level[each] < CALLED and each not in wide):
+                for operand in (number for number in operands if self.level[number] < CALLED and number not in wide):
                     wide[operand] = f"w{operand}"
                     lines[self.level[operand]].append(f"w{operand} = constant({names[operand]})")
                 written = template.format(*(wide.get(operand, names[operand]) for operand in operands))
@@ -273,7 +273,7 @@ class _Written:
     def _nested(self, lines: Sequence[Sequence[str]], inputs: Mapping[int, str], result: str) -> str:
         """Source of `program` from the lines of each level."""
         templates = {self.operations[place].template for place in self.needed}
-        used = sorted({found[0] for template in templates if (found := re.match(r"[a-z0-9]+_\d+", template))})
+        used = sorted({match[0] for template in templates if (match := re.match(r"[a-z0-9]+_\d+", template))})
         taken = [f"{name} = systems[{name.split('_')[1]}].{name.split('_')[0]}" for name in used]
         known, called = (
             [name for place, name in inputs.items() if self.level[place] == level] for level in (KNOWN, CALLED)
@@ -310,8 +310,8 @@ def recorded(tape: Tape, system: int = 0) -> Maths:
         return tape.call(system, "spread", tape.listed(numbers), tape.listed(beside))
 
     def weighted(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:
-        found = tape.call(system, "weighted", tape.listed([tape.listed(row) for row in weights]), values)
-        return [tape.record("{0}[{1}]", found, k) for k in range(len(weights))]
+        result = tape.call(system, "weighted", tape.listed([tape.listed(row) for row in weights]), values)
+        return [tape.record("{0}[{1}]", result, k) for k in range(len(weights))]
 
     sin, cos, sqrt, atan2, number, exp = map(function, ("sin", "cos", "sqrt", "atan2", "number", "exp"))
     pi, choose, floor = tape.record(f"pi_{system}"), functools.partial(tape.choose, system), function("floor")

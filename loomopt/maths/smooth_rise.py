@@ -75,14 +75,14 @@ def through(u: tuple[float, ...], s: tuple[float, ...], half: tuple[float, ...])
     """
     import numpy as np
 
-    places, values, halves = (np.array(each, dtype=np.float64) for each in (u, s, half))
+    places, values, halves = (np.array(column, dtype=np.float64) for column in (u, s, half))
     given = places, values
     if len(u) > MOST + 1:
-        kept = np.unique(np.round(np.linspace(0, len(u) - 1, MOST + 1)).astype(int))
-        places, values, halves = places[kept], values[kept], halves[kept]
+        sample = np.unique(np.round(np.linspace(0, len(u) - 1, MOST + 1)).astype(int))
+        places, values, halves = places[sample], values[sample], halves[sample]
     still = _dwells(values, 2 * float(halves.max()))
     height = float(np.abs(values).max()) or 1.0
-    found, uncertain, noisy, jumps = [], [np.zeros(1)], [np.zeros(1)], list[int]()
+    parts, uncertain, noisy, jumps = [], [np.zeros(1)], [np.zeros(1)], list[int]()
     misfits: list[float] = []
     ends = [0, *itertools.chain.from_iterable(still), len(places) - 1]
     for k, (first, last) in enumerate(itertools.pairwise(ends)):
@@ -90,22 +90,22 @@ def through(u: tuple[float, ...], s: tuple[float, ...], half: tuple[float, ...])
         if last == first:
             continue
         if k % 2:
-            found.append(_still(values[cut]))
+            parts.append(_still(values[cut]))
             continue
         part = _smooth(places[cut], values[cut], halves[cut] * (halves[cut] > EXACT * height))
-        found.append(part.columns)
+        parts.append(part.columns)
         uncertain.append(part.uncertain)
         noisy.append(part.noise)
         misfits += part.left_out
         jumps += [first + jump for jump in part.jumps]
-    heights = np.concatenate([found[0][0], *(each[0][1:] for each in found[1:])])
-    slopes = np.concatenate([found[0][1], *(each[1][1:] for each in found[1:])])
-    after = np.concatenate([*(each[2][:-1] for each in found), found[-1][2][-1:]])
-    before = np.concatenate([found[0][3][:1], *(each[3][1:] for each in found)])
+    heights = np.concatenate([parts[0][0], *(columns[0][1:] for columns in parts[1:])])
+    slopes = np.concatenate([parts[0][1], *(columns[1][1:] for columns in parts[1:])])
+    after = np.concatenate([*(columns[2][:-1] for columns in parts), parts[-1][2][-1:]])
+    before = np.concatenate([parts[0][3][:1], *(columns[3][1:] for columns in parts)])
     largest = float(max(np.abs(after).max(), np.abs(before).max())) or 1.0
     curve = (places, heights, slopes, after, before)
     change = float(np.abs(_at(curve, given[0]) - given[1]).max())
-    at, s_at, v_at, behind, ahead = (tuple(map(float, each)) for each in curve)
+    at, s_at, v_at, behind, ahead = (tuple(map(float, sequence)) for sequence in curve)
     return SmoothRise(
         at,
         s_at,
@@ -115,17 +115,17 @@ def through(u: tuple[float, ...], s: tuple[float, ...], half: tuple[float, ...])
         change=0.0 if change < EXACT * height else change,
         uncertainty=float(np.concatenate(uncertain).max()) / largest,
         noise=float(np.concatenate(noisy).max()) / largest,
-        misfit=math.sqrt(math.fsum(each**2 for each in misfits) / len(misfits)) if misfits else 0.0,
+        misfit=math.sqrt(math.fsum(distance**2 for distance in misfits) / len(misfits)) if misfits else 0.0,
         jumps=tuple(jumps),
         dwells=still,
     )
 
 
-def values(found: SmoothRise, u: Sequence[float]) -> list[float]:
+def values(rise: SmoothRise, u: Sequence[float]) -> list[float]:
     """Curve's values at arguments within its own."""
     import numpy as np
 
-    curve = tuple(np.array(each) for each in found[:5])
+    curve = tuple(np.array(column) for column in rise[:5])
     return [float(value) for value in _at((curve[0], curve[1], curve[2], curve[3], curve[4]), np.array(u))]
 
 
@@ -136,8 +136,8 @@ def _at(curve: "tuple[Floats, Floats, Floats, Floats, Floats]", u: "Floats") -> 
     places, s, v, after, before = curve
     k = np.clip(np.searchsorted(places, u, side="right") - 1, 0, len(places) - 2)
     t, width = u - places[k], places[k + 1] - places[k]
-    found: Floats = s[k] + t * (v[k] + t * (after[k] / 2 + t * (before[k + 1] - after[k]) / (6 * width)))
-    return found
+    height: Floats = s[k] + t * (v[k] + t * (after[k] / 2 + t * (before[k + 1] - after[k]) / (6 * width)))
+    return height
 
 
 _Columns = tuple["Floats", "Floats", "Floats", "Floats"]
@@ -158,7 +158,7 @@ def _dwells(values: "Floats", unit: float) -> tuple[tuple[int, int], ...]:
     Rounding too makes equal values, where a law sets out slowly: as u^`STEEPEST` it reaches `SHARP` units at twice the
     length of the equal values. A dwell ends where such a law, seen from behind, would set out.
     """
-    found = []
+    dwells = []
     last = len(values) - 1
     begin = 0
     while begin < last:
@@ -171,9 +171,9 @@ def _dwells(values: "Floats", unit: float) -> tuple[tuple[int, int], ...]:
             stop = last if end == last else end if far[:1] == [end + 1] else 2 * end - (far or [last])[0]
             start = 0 if begin == 0 else begin if near[:1] == [begin - 1] else 2 * begin - (near or [0])[0]
             if stop - start >= 2:
-                found.append((start, stop))
+                dwells.append((start, stop))
         begin = end + 1
-    return tuple(found)
+    return tuple(dwells)
 
 
 class _Part(NamedTuple):
@@ -289,15 +289,15 @@ def _fitted(spline: _Spline, s: "Floats", half: "Floats", jumps: Sequence[int]) 
     low, high = -2 * math.log10(sizes[0]) - 9, -2 * math.log10(max(sizes[-1], 1e-12 * sizes[0])) + 3
     best = (math.inf, 10.0**low)
     for power in np.arange(low, high, 0.1):
-        found, shares = at(10.0**power)
-        off = right.T @ (found - there)
+        scores, shares = at(10.0**power)
+        off = right.T @ (scores - there)
         if np.max(np.abs(off) * sigma / half[1:-1].clip(1e-3 * half.max())) <= MARGIN:
             best = min(best, (float(off @ off + 2 * shares.sum()), 10.0**power))
     weight = best[1]
 
     def fit(weight: float) -> _Fit:
-        found, shares = at(weight)
-        values = np.concatenate([s[:1], sigma * (right.T @ found), s[-1:]])
+        scores, shares = at(weight)
+        values = np.concatenate([s[:1], sigma * (right.T @ scores), s[-1:]])
         gain = sigma[:, None] * (right.T * shares)
         ahead = (spline.bend - spline.kick[:, jumps] @ (away @ spline.rough))[:, 1:-1]
         return made(values, ((right.T * shares) * right.T).sum(1), np.sqrt(((ahead @ gain) ** 2).sum(1)))
@@ -311,8 +311,8 @@ def _noise(spline: _Spline, half: "Floats", jumps: Sequence[int]) -> "Floats":
 
     steps = spline.step[:, jumps]
     ahead = spline.bend - spline.kick[:, jumps] @ (np.linalg.pinv(steps) @ spline.rough if jumps else spline.rough[:0])
-    found: Floats = np.sqrt((ahead[:, 1:-1] ** 2) @ (half[1:-1] ** 2) / 3)
-    return found
+    deviation: Floats = np.sqrt((ahead[:, 1:-1] ** 2) @ (half[1:-1] ** 2) / 3)
+    return deviation
 
 
 def _jump(spline: _Spline, s: "Floats", half: "Floats", weight: float, jumps: Sequence[int]) -> int | None:
@@ -327,20 +327,20 @@ def _jump(spline: _Spline, s: "Floats", half: "Floats", weight: float, jumps: Se
     spread = (rough * sigma**2) @ rough.T if half.any() else 0.0 * rough
     spread = spread + np.eye(len(rough)) * (1 / weight if math.isfinite(weight) else 1.0)
     root = np.linalg.cholesky(spread)
-    found, patterns = np.linalg.solve(root, spline.rough @ s), np.linalg.solve(root, step)
+    residual, patterns = np.linalg.solve(root, spline.rough @ s), np.linalg.solve(root, step)
     if jumps:
         known = np.linalg.qr(patterns[:, jumps])[0]
-        found, patterns = found - known @ (known.T @ found), patterns - known @ (known.T @ patterns)
+        residual, patterns = residual - known @ (known.T @ residual), patterns - known @ (known.T @ patterns)
     lengths = (patterns**2).sum(0)
     usable = lengths > 1e-9 * lengths.max()
     usable[jumps] = False
     usable[[0, -1]] = False
-    explained = np.where(usable, (patterns.T @ found) ** 2 / np.where(usable, lengths, 1.0), 0.0)
+    explained = np.where(usable, (patterns.T @ residual) ** 2 / np.where(usable, lengths, 1.0), 0.0)
     place = int(np.argmax(explained))
-    size = abs(float(patterns[:, place] @ found)) / lengths[place]
+    size = abs(float(patterns[:, place] @ residual)) / lengths[place]
     chance = np.sqrt((((np.linalg.solve(root.T, patterns[:, place]) @ rough) * sigma) ** 2).sum()) / lengths[place]
     sure = size > max(SURE * chance, SMALLEST * np.abs(spline.bend @ s).max())
-    return place if sure and explained[place] > JUMP * float(found @ found) else None
+    return place if sure and explained[place] > JUMP * float(residual @ residual) else None
 
 
 def _coarseness(before: "Floats", after: "Floats", jumps: Sequence[int]) -> "Floats":
@@ -350,17 +350,17 @@ def _coarseness(before: "Floats", after: "Floats", jumps: Sequence[int]) -> "Flo
     """
     import numpy as np
 
-    found = np.zeros(len(before))
+    errors = np.zeros(len(before))
     ends = [0, *(jump + 1 for jump in jumps), len(before) - 1]
     for first, last in itertools.pairwise(ends):
-        own = before[first : last + 1].copy()
-        own[0] = after[first]
-        if len(own) > 2:
-            bends = np.abs(np.diff(own, 2)) / 12
+        stretch = before[first : last + 1].copy()
+        stretch[0] = after[first]
+        if len(stretch) > 2:
+            bends = np.abs(np.diff(stretch, 2)) / 12
             bends = np.concatenate([bends[:1], bends, bends[-1:]])
             wide = np.maximum(bends, np.maximum(np.append(bends[1:], 0), np.insert(bends[:-1], 0, 0)))
-            found[first : last + 1] = np.maximum(found[first : last + 1], wide)
-    return found
+            errors[first : last + 1] = np.maximum(errors[first : last + 1], wide)
+    return errors
 
 
 def _left_out(u: "Floats", s: "Floats") -> list[float]:
@@ -369,11 +369,11 @@ def _left_out(u: "Floats", s: "Floats") -> list[float]:
 
     if len(u) < FEWEST_SMOOTHED:
         return []
-    found = []
+    distances = []
     for k in range(1, len(u) - 1):
         near = slice(max(0, k - 8), k + 9)
         at, values = np.delete(u[near], k - near.start), np.delete(s[near], k - near.start)
         bends = _spline(at).bend @ values
         slopes = np.concatenate([[0.0], np.diff(values) / np.diff(at) + np.diff(at) * (bends[:-1] + 2 * bends[1:]) / 6])
-        found.append(float(_at((at, values, slopes, bends, bends), u[k : k + 1])[0] - s[k]))
-    return found
+        distances.append(float(_at((at, values, slopes, bends, bends), u[k : k + 1])[0] - s[k]))
+    return distances

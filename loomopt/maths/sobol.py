@@ -40,15 +40,15 @@ def points(count: int, dimensions: int, seed: int = 0, first: int = 0) -> Floats
     spread = min(dimensions, len(POLYNOMIALS) + 1)
     index = np.arange(first, first + count, dtype=np.uint64)
     gray = index ^ (index >> np.uint64(1))
-    found = np.empty((count, dimensions))
+    sample = np.empty((count, dimensions))
     for k in range(spread):
         digits = np.zeros(count, dtype=np.uint64)
         for bit, direction in enumerate(_directions(k)):
             digits ^= np.where((gray >> np.uint64(bit)) & np.uint64(1), np.uint64(direction), np.uint64(0))
-        found[:, k] = (digits ^ shift[k]) / 2.0**BITS
+        sample[:, k] = (digits ^ shift[k]) / 2.0**BITS
     generator = np.random.default_rng([seed, first]) if first else generator
-    found[:, spread:] = generator.random((count, dimensions - spread))
-    return found
+    sample[:, spread:] = generator.random((count, dimensions - spread))
+    return sample
 
 
 def _directions(coordinate: int) -> list[int]:
@@ -56,10 +56,10 @@ def _directions(coordinate: int) -> list[int]:
     if coordinate == 0:
         return [1 << (BITS - 1 - bit) for bit in range(BITS)]
     degree, inner, first = POLYNOMIALS[coordinate - 1]
-    found = [number << (BITS - 1 - bit) for bit, number in enumerate(first)]
+    directions = [number << (BITS - 1 - bit) for bit, number in enumerate(first)]
     for bit in range(degree, BITS):
-        number = found[bit - degree] ^ (found[bit - degree] >> degree)
+        number = directions[bit - degree] ^ (directions[bit - degree] >> degree)
         for k in range(1, degree):
-            number ^= found[bit - k] * ((inner >> (degree - 1 - k)) & 1)
-        found.append(number)
-    return found
+            number ^= directions[bit - k] * ((inner >> (degree - 1 - k)) & 1)
+        directions.append(number)
+    return directions

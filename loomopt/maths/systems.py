@@ -68,16 +68,16 @@ def _spread_floats(numbers: Sequence[Number], beside: Iterable[Number]) -> Numbe
 def _weighted_floats(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:
     import numpy as np
 
-    found = np.tensordot(np.asarray(weights), values, axes=1)
-    return found.tolist() if found.ndim == 1 else list(found)
+    sums = np.tensordot(np.asarray(weights), values, axes=1)
+    return sums.tolist() if sums.ndim == 1 else list(sums)
 
 
 def _spread_objects(numbers: Sequence[Number], beside: Iterable[Number]) -> Number:
     import numpy as np
 
-    found = np.empty(len(numbers), dtype=object)
-    found[:] = numbers
-    return found
+    array = np.empty(len(numbers), dtype=object)
+    array[:] = numbers
+    return array
 
 
 def _weighted_objects(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:
@@ -126,7 +126,7 @@ def _elementwise(system: Maths) -> Maths:
     import numpy as np
 
     single = (system.sin, system.cos, system.sqrt, system.exp, system.floor)
-    sin, cos, sqrt, exp, floor = (np.frompyfunc(each, 1, 1) for each in single)
+    sin, cos, sqrt, exp, floor = (np.frompyfunc(function, 1, 1) for function in single)
     return replace(system, sin=sin, cos=cos, sqrt=sqrt, exp=exp, floor=floor, atan2=np.frompyfunc(system.atan2, 2, 1))
 
 
@@ -146,10 +146,10 @@ def numpy() -> Maths:
         places = np.asarray(place, dtype=np.intp)
         if places.size <= FEW and len(values) <= CHOICES:
             return np.choose(places, values)
-        found: Number = math.nan
+        chosen: Number = math.nan
         for k, value in enumerate(values):
-            found = np.where(places == k, value, found)
-        return found
+            chosen = np.where(places == k, value, chosen)
+        return chosen
 
     def constant(x: Number) -> Number:
         # An array without axes saves NumPy the conversion of a scalar in every operation: half the time of a short one.
@@ -277,10 +277,10 @@ def box_series() -> Maths:
     """Truncated Taylor series along the cycle, over arrays of boxes: every result encloses the true one."""
     from loomopt.maths import interval_series, intervals
 
-    own = interval_series
-    functions = own.sin, own.cos, own.sqrt, own.atan2
-    more = own.chosen, _unserved, _unserved, _unserved
-    return Maths("box series", *functions, intervals.PI, intervals.interval, *more, floor=own.floor)
+    series = interval_series
+    functions = series.sin, series.cos, series.sqrt, series.atan2
+    more = series.chosen, _unserved, _unserved, _unserved
+    return Maths("box series", *functions, intervals.PI, intervals.interval, *more, floor=series.floor)
 
 
 @functools.cache

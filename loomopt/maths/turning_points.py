@@ -41,7 +41,7 @@ def turns(slope: Callable[[Floats], Any]) -> list[float]:
         slopes = np.asarray(slope(angles), dtype=np.float64)
     if not np.all(np.isfinite(slopes)):
         return []
-    found = []
+    changes = []
     known = np.flatnonzero(slopes)
     for before, after in zip(np.roll(known, 1), known, strict=True):
         if (slopes[before] > 0) == (slopes[after] > 0):
@@ -52,10 +52,10 @@ def turns(slope: Callable[[Floats], Any]) -> list[float]:
             return sign * float(np.asarray(slope(np.array([angle])))[0])
 
         begin = float(angles[before]) - (2 * np.pi if after < before else 0.0)
-        found.append((crossing(signed, begin, float(angles[after])) % (2 * np.pi), sign > 0))
-    found.sort()
-    first = next((place for place, (_, outward) in enumerate(found) if outward), 0)
-    return [angle for angle, _ in found[first:] + found[:first]]
+        changes.append((crossing(signed, begin, float(angles[after])) % (2 * np.pi), sign > 0))
+    changes.sort()
+    first = next((place for place, (_, outward) in enumerate(changes) if outward), 0)
+    return [angle for angle, _ in changes[first:] + changes[:first]]
 
 
 def crossing(excess: Callable[[float], float], low: float, high: float) -> float:
@@ -84,22 +84,22 @@ def crossings(excess: Callable[[Floats, NDArray[np.intp]], tuple[Floats, Floats]
     brackets the root.
     """
     low, high = low.copy(), high.copy()
-    found, left = (low + high) / 2, np.arange(len(low))
+    roots, left = (low + high) / 2, np.arange(len(low))
     for _ in range(CROSSING_STEPS):
-        at = found[left]
+        at = roots[left]
         value, slope = excess(at, left)
         inside = value <= 0.0
         low[left], high[left] = np.where(inside, at, low[left]), np.where(inside, high[left], at)
         with np.errstate(divide="ignore", invalid="ignore"):
             newton = at - value / slope
-        kept = (newton >= low[left]) & (newton <= high[left])
-        found[left] = np.where(kept, newton, (low[left] + high[left]) / 2)
-        there = np.abs(found[left] - at) <= NEWTON_DONE * np.maximum(1.0, np.abs(at))
+        inside_bracket = (newton >= low[left]) & (newton <= high[left])
+        roots[left] = np.where(inside_bracket, newton, (low[left] + high[left]) / 2)
+        there = np.abs(roots[left] - at) <= NEWTON_DONE * np.maximum(1.0, np.abs(at))
         there |= ~np.isfinite(value)
         left = left[~there]
         if not len(left):
             break
-    return found
+    return roots
 
 
 SPIKE_WIDEST, SPIKE_HALVINGS, SPIKE_SECTIONS = 0.02, 44, 90

@@ -55,13 +55,15 @@ class Traded(NamedTuple):
         return self.objective.limits(name, value)
 
 
-def requested_of(axes: Mapping[str, Axis], numbers: Iterable[str], asked: Requested, origin: str) -> dict[str, Axis]:
+def requested_of(
+    axes: Mapping[str, Axis], numbers: Iterable[str], requested: Requested, origin: str
+) -> dict[str, Axis]:
     """Axes of the names that are asked for; numbers: those of the scene that are bounded, axes too.
 
     Raises BadInput for a name that is no axis, and for an end that is not offered.
     """
     known = {name: Axis(name, "") for name in numbers} | dict(axes)
-    for name, sense in asked.items():
+    for name, sense in requested.items():
         if name not in known:
             remedy = "Name one of them, or give a number of the scene min and max in [bounds]"
             raise unknown("axis", name, known, origin, name, remedy)
@@ -69,13 +71,13 @@ def requested_of(axes: Mapping[str, Axis], numbers: Iterable[str], asked: Reques
             other = "least" if sense == "most" else "most"
             problem = f"of {name} the {other} can be sought, not the {sense}"
             raise BadInput(problem, file=origin, key=name, remedy="Ask for its other end.")
-    return {name: known[name] for name in asked}
+    return {name: known[name] for name in requested}
 
 
 def with_axes(
     program: Program,
     axes: Mapping[str, Axis],
-    asked: Requested,
+    requested: Requested,
     full: Callable[[str], str],
     size: Callable[[str], float],
 ) -> tuple[Program, tuple[Traded, ...]]:
@@ -84,11 +86,11 @@ def with_axes(
     program: its objectives are what is held before them; full: name among the model's values; size: natural one of a
     value, SI. Raises BadInput for an axis that nothing in the scene gives.
     """
-    found = []
-    for name, sense in asked.items():
+    traded_axes = []
+    for name, sense in requested.items():
         # A figure comes before a number that the designer calls the same, such as one of an effect's.
-        own = program.model.has_row(name) or program.model.has_quantity(name)
-        axis, rows = axes[name], axes[name].rows or (name if own else full(name),)
+        is_in_model = program.model.has_row(name) or program.model.has_quantity(name)
+        axis, rows = axes[name], axes[name].rows or (name if is_in_model else full(name),)
         _demand(program, name, rows)
         square = program.model.square(rows[0]) if program.model.has_quantity(rows[0]) else ""
         if square:
@@ -99,9 +101,9 @@ def with_axes(
             program = replace(program, model=opposing(program.model, rows))
             rows = tuple(map(opposite, rows))
         objective = _objective(name, rows, FORMS[form], size(name) ** (2 if square else 1), axis.power)
-        found.append(Traded(axis, sense, objective))
-    levels = (*program.objectives, *(traded.objective for traded in found))
-    return replace(program, objectives=levels), tuple(found)
+        traded_axes.append(Traded(axis, sense, objective))
+    levels = (*program.objectives, *(traded.objective for traded in traded_axes))
+    return replace(program, objectives=levels), tuple(traded_axes)
 
 
 def _objective(name: str, rows: Sequence[str], kind: type[Objective], scale: float, power: int) -> Objective:
@@ -125,8 +127,8 @@ def opposing(model: JobModel, rows: tuple[str, ...]) -> JobModel:
 
 
 def _opposed(model: JobModel, name: str) -> DesignRow:
-    own = model.own_rows.get(name) or DesignRow(functools.partial(_read, name), () if model.has_row(name) else (name,))
-    return own._replace(formula=functools.partial(_negative, own.formula))
+    row = model.own_rows.get(name) or DesignRow(functools.partial(_read, name), () if model.has_row(name) else (name,))
+    return row._replace(formula=functools.partial(_negative, row.formula))
 
 
 def _read(name: str, at: Instant) -> Number:

@@ -89,21 +89,21 @@ def budget(sampler: Sampler, fluctuation: float | None = None) -> TorqueBudget:
     parted = Sampler(_with_shares(sampler.model, shares), sampler.values, sampler.samples)
     parted.search((*names, drive.TORQUE))
     largest = parted.extremes(drive.TORQUE)
-    alike = (each for each in largest if each.height >= (1 - ALIKE) * largest[0].height)
-    top = min(alike, key=lambda each: parted.angle(each) % TURN)  # of two that mirror each other, the first
+    alike = (extreme for extreme in largest if extreme.height >= (1 - ALIKE) * largest[0].height)
+    top = min(alike, key=lambda extreme: parted.angle(extreme) % TURN)  # of two that mirror each other, the first
     node = np.array([top.piece]), np.array([top.u])
     at_peak = {name: float(values[0]) + 0.0 for name, values in parted.together(names, *node).items()}
     edges, energies, squares = _integrated(parted, (*names, drive.TORQUE))
 
-    def told(name: str, effect: str, at: float) -> TorqueShare:
+    def share_of(name: str, effect: str, at: float) -> TorqueShare:
         share = at / top.value if top.value else None
         return TorqueShare(effect, at, share, parted.peak(name), math.sqrt(squares[name] / TURN), energies[name])
 
     pieces, u, phi = rows(parted, Columns({}, ""), STEPS, [parted.angle(top) % TURN])
     drawn = parted.together(names, pieces, u)
     return TorqueBudget(
-        tuple(told(name, load.name, at_peak[name]) for name, load in shares.items()),
-        told(drive.TORQUE, TOTAL, top.value),
+        tuple(share_of(name, load.name, at_peak[name]) for name, load in shares.items()),
+        share_of(drive.TORQUE, TOTAL, top.value),
         _motor(parted, edges, fluctuation),
         parted.angle(top) % TURN,
         fluctuation,
@@ -114,10 +114,10 @@ def budget(sampler: Sampler, fluctuation: float | None = None) -> TorqueBudget:
 
 def _with_shares(model: JobModel, shares: Mapping[str, Acting]) -> JobModel:
     """Model with the shares of its loads among its quantities, and with the motor's torque."""
-    own = {name: CycleQuantity(functools.partial(_share, load), figure=False) for name, load in shares.items()}
-    own[MOTOR] = CycleQuantity(lambda at: drive.motor_torque(at, at.crank_torque), figure=False)
-    own[drive.SPEED] = CycleQuantity(lambda at: at.pose.omega, figure=False)
-    return replace(model, own_quantities={**model.own_quantities, **own})
+    quantities = {name: CycleQuantity(functools.partial(_share, load), figure=False) for name, load in shares.items()}
+    quantities[MOTOR] = CycleQuantity(lambda at: drive.motor_torque(at, at.crank_torque), figure=False)
+    quantities[drive.SPEED] = CycleQuantity(lambda at: at.pose.omega, figure=False)
+    return replace(model, own_quantities={**model.own_quantities, **quantities})
 
 
 def shared(loads: Sequence[Acting]) -> tuple[Acting, ...]:
@@ -134,21 +134,21 @@ def _share(load: Acting, at: Instant) -> Number:
     member takes in between, F (q' − q'_carried).
     """
     model = at.model
-    state = next((each for each in model.loads if isinstance(each, State) and each.moved), None)
+    state = next((acting for acting in model.loads if isinstance(acting, State) and acting.moved), None)
     if state and load.name in (state.name, *state.carries):
         loading = balance.Loaded(at.maths, model.loads, at.pose, at.given, at.node.switch)
         moving = loading.carried.velocity / at.pose.omega
         if load is state:
-            (force,) = (term for each, term in loading.terms if each is state)
+            (force,) = (term for acting, term in loading.terms if acting is state)
             return force * (at.pose.q1 - moving)
         if isinstance(load, Load) and load.moved:
             inertia = load.moved(at.given.inputs(at.maths, load))
             return inertia * loading.carried.acceleration * moving
-        (force,) = (term for each, term in loading.terms if each is load)
+        (force,) = (term for acting, term in loading.terms if acting is load)
         return force * moving
-    others = {each.name for each in at.model.loads} - {load.name}
-    found = balance.terms(at.maths, at.model.loads, at.pose, at.given, at.node.switch, others)
-    ((_, term),) = found
+    others = {acting.name for acting in at.model.loads} - {load.name}
+    terms = balance.terms(at.maths, at.model.loads, at.pose, at.given, at.node.switch, others)
+    ((_, term),) = terms
     if load.acts != "output":
         return term
     beside = balance.inside(at.maths, load, at.pose, at.given)
@@ -164,8 +164,8 @@ class _Quadrature(NamedTuple):
 
     def by_stretch(self, values: Floats) -> Floats:
         """Integral over each stretch."""
-        found: Floats = (self.weights * values).reshape(-1, len(gauss()[0])).sum(axis=1)
-        return found
+        integrals: Floats = (self.weights * values).reshape(-1, len(gauss()[0])).sum(axis=1)
+        return integrals
 
 
 Edges = Sequence[Floats]
@@ -183,7 +183,7 @@ def _rule(cycle: Cycle, edges: Edges) -> _Quadrature:
 
 def _integrated(sampler: Sampler, names: Sequence[str]) -> tuple[Edges, dict[str, float], dict[str, float]]:
     """Fine stretches, and the integrals of quantities over the turn, J, and of their squares, (N·m)²."""
-    widths, found = np.diff(sampler.cycle.starts), tuple[dict[str, float], ...]()
+    widths, integrals = np.diff(sampler.cycle.starts), tuple[dict[str, float], ...]()
     for halved in range(HALVINGS):
         counts = np.maximum(np.ceil(widths * 2**halved / WIDEST), 1).astype(int)
         edges = [np.linspace(0.0, 1.0, count + 1) for count in counts]
@@ -192,7 +192,7 @@ def _integrated(sampler: Sampler, names: Sequence[str]) -> tuple[Edges, dict[str
         sizes = {name: float(np.dot(rule.weights, np.abs(of))) for name, of in values.items()}
         energies = {name: float(np.dot(rule.weights, of)) for name, of in values.items()}
         squares = {name: float(np.dot(rule.weights, of**2)) for name, of in values.items()}
-        before, found = found, (energies, squares)
+        before, integrals = integrals, (energies, squares)
         if before and all(
             abs(energies[name] - before[0][name]) <= SAME_ENERGY * sizes[name]
             and abs(squares[name] - before[1][name]) <= SAME_ENERGY * squares[name]
@@ -207,11 +207,11 @@ def _motor(sampler: Sampler, edges: Edges, fluctuation: float | None) -> MotorSi
     known = "speed" in sampler.given.values
     rule = _rule(sampler.cycle, edges)
     names = (MOTOR, drive.SPEED) if known else (MOTOR,)
-    found = sampler.together(names, rule.pieces, rule.u)
+    values = sampler.together(names, rule.pieces, rule.u)
     # A crank whose speed is not known is taken to turn evenly.
-    times = rule.weights / found[drive.SPEED] if known else rule.weights
+    times = rule.weights / values[drive.SPEED] if known else rule.weights
     period = float(times.sum())
-    rms = math.sqrt(float(np.dot(times, found[MOTOR] ** 2)) / period)
+    rms = math.sqrt(float(np.dot(times, values[MOTOR] ** 2)) / period)
     work = rule.by_stretch(sampler.at(drive.TORQUE, rule.pieces, rule.u))
     swing = _swing(sampler, edges, float(work.sum()) / TURN)
     if not known:
@@ -220,7 +220,7 @@ def _motor(sampler: Sampler, edges: Edges, fluctuation: float | None) -> MotorSi
     given = parted.by_stretch(sampler.at(MOTOR, parted.pieces, parted.u))
     omega = TURN / period
     rounding = SAME_ENERGY * float(np.abs(given).sum())
-    whole, back = (float(each.sum()) for each in (given, np.maximum(-given, 0.0)))
+    whole, back = (float(energy.sum()) for energy in (given, np.maximum(-given, 0.0)))
     return MotorSize(
         rms,
         whole / period if abs(whole) > rounding else 0.0,
@@ -249,4 +249,4 @@ def _with_crossings(sampler: Sampler, name: str, edges: Edges, level: float) -> 
         middle = (low + high) / 2
         beyond = (sampler.at(name, piece, middle) > level) == rises
         low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-    return [np.unique(np.concatenate([own, low[piece == place]])) for place, own in enumerate(edges)]
+    return [np.unique(np.concatenate([edge, low[piece == place]])) for place, edge in enumerate(edges)]

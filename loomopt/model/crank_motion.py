@@ -144,5 +144,5 @@ class TurnedCrank(Kinematics):
         apart = apart - TURN * np.round(apart / TURN)
         # Two loads may have one corner: the piece between is one angle.
         speeds = self.turning.at(pieces, apart / np.where(ends > begins, ends - begins, TURN) + 0.5)
-        omega, omega_dot = ((float(each) if each.ndim == 0 else each) for each in speeds)
+        omega, omega_dot = ((float(value) if value.ndim == 0 else value) for value in speeds)
         return omega, omega_dot

@@ -84,42 +84,42 @@ def columns_at(sampler: Sampler, columns: Columns, rows: Rows) -> dict[str, Floa
     unknown = np.zeros(u.shape, dtype=bool)
     if sampler.model.known_in:
         unknown = ~np.any([sampler.cycle.on(where)[pieces] for where in sampler.model.known_in], axis=0)
-    found = {ANGLE: phi} | {name: _column(formula, at, u) for name, formula in columns.motion.items()}
-    found |= _in_time(found, at)
+    curves = {ANGLE: phi} | {name: _column(formula, at, u) for name, formula in columns.motion.items()}
+    curves |= _in_time(curves, at)
     if sampler.model.states:
         from loomopt.model import model
 
-        found |= {name: _column(formula, at, u) for name, formula in model.state_columns(sampler.model.states).items()}
+        curves |= {name: _column(formula, at, u) for name, formula in model.state_columns(sampler.model.states).items()}
     loads = sampler.model.loads
     for load, term in zip(loads, at.terms().values(), strict=True):
         whole = np.broadcast_to(np.asarray(term, dtype=float), u.shape).astype(float)
         partial = bool(getattr(load, "known_in", dict)(sampler.model.words_of(load.name)))
         unit = columns.unit if load.acts == "output" else SI_UNIT["torque"]
-        found[f"{load_name(load)} [{unit}]"] = np.where(unknown, np.nan, whole) if partial else whole
+        curves[f"{load_name(load)} [{unit}]"] = np.where(unknown, np.nan, whole) if partial else whole
         within = balance.inside(at.maths, load, at.pose, at.given)
         if within is not None:
             name = f"{drive_name(load)} [{SI_UNIT['torque']}]"
-            found[name] = np.broadcast_to(np.asarray(within, dtype=float), u.shape).astype(float)
+            curves[name] = np.broadcast_to(np.asarray(within, dtype=float), u.shape).astype(float)
     if columns.force and any(load.acts == "output" for load in loads):
-        found[columns.force[0]] = np.where(unknown, np.nan, _column(columns.force[1], at, u))
+        curves[columns.force[0]] = np.where(unknown, np.nan, _column(columns.force[1], at, u))
     if columns.torque and loads:
         torque = np.where(unknown, np.nan, _column(columns.torque[1], at, u))
-        found |= {columns.torque[0]: torque} | ({} if at.pose.omega is None else {POWER: motor_power(at, torque)})
+        curves |= {columns.torque[0]: torque} | ({} if at.pose.omega is None else {POWER: motor_power(at, torque)})
     for name, unit in columns.checks.items():
         column = _column(sampler.model.formula(name), at, u)
         # What only pushes is 0 where the output would have to be pulled.
         lost = name in sampler.model.pushes and _column(FORCE, at, u) < 0.0
-        found[f"{name} [{unit}]"] = np.where(lost, 0.0, column)
-    return found | {name: _column(formula, at, u) for name, formula in columns.after.items()}
+        curves[f"{name} [{unit}]"] = np.where(lost, 0.0, column)
+    return curves | {name: _column(formula, at, u) for name, formula in columns.after.items()}
 
 
 def tops(sampler: Sampler, quantities: Iterable[str]) -> list[float]:
     """Crank angles, rad, at which quantities are largest, wherever they are alike."""
-    found = []
+    angles = []
     for extremes in map(sampler.extremes, quantities):
         alike = ALIKE * max((abs(extreme.value) for extreme in extremes), default=0.0)
-        found += [sampler.angle(each) for each in extremes if each.height >= extremes[0].height - alike]
-    return found
+        angles += [sampler.angle(top) for top in extremes if top.height >= extremes[0].height - alike]
+    return angles
 
 
 def _in_time(columns: Mapping[str, Floats], at: Instant) -> dict[str, Floats]:
@@ -130,14 +130,14 @@ def _in_time(columns: Mapping[str, Floats], at: Instant) -> dict[str, Floats]:
     omega, change = at.pose.omega, at.pose.omega_dot
     if omega is None:
         return {}
-    known, found = {split(column)[0]: values for column, values in columns.items()}, dict[str, Floats]()
+    known, rates = {split(column)[0]: values for column, values in columns.items()}, dict[str, Floats]()
     for name, unit in map(split, columns):
         by_angle = [known.get(f"{name}_{order}") for order in ((1, 2, 3) if change is None else (1, 2))]
-        for order, values in enumerate(itertools.takewhile(lambda each: each is not None, by_angle), 1):
+        for order, values in enumerate(itertools.takewhile(lambda array: array is not None, by_angle), 1):
             rate = values * omega**order
             rate = rate if change is None or order == 1 else rate + by_angle[0] * change
-            found[f"{name}_{'t' * order} [{unit}/s{f'^{order}' if order > 1 else ''}]"] = rate
-    return found
+            rates[f"{name}_{'t' * order} [{unit}/s{f'^{order}' if order > 1 else ''}]"] = rate
+    return rates
 
 
 def drive_name(load: Acting) -> str:
@@ -198,17 +198,17 @@ def sparse_curves(sampler: Sampler, rows: CurveRows, accuracy: float) -> tuple[d
     also = [sampler.cycle.angles(*sampler.grid(steps)) % TURN]
     also += [turning_points.graded_nodes(centre) for centre in sampler.singular]
     for _ in range(SPARSE_ROUNDS):
-        found = rows(steps, np.concatenate(also).tolist())
-        added, left = _around_tops(found, accuracy / 10)
-        if not added or len(found[ANGLE]) > SPARSE_MOST_ROWS:
+        curves = rows(steps, np.concatenate(also).tolist())
+        added, left = _around_tops(curves, accuracy / 10)
+        if not added or len(curves[ANGLE]) > SPARSE_MOST_ROWS:
             break
         also.append(np.array(added))
-    return found, max(left, ROUNDED)
+    return curves, max(left, ROUNDED)
 
 
 def _around_tops(columns: Mapping[str, Floats], least: float) -> tuple[list[float], float]:
     """Angles, rad, where rows are missing, and the largest share by which a column's top may still rise."""
-    angles, found, worst = columns[ANGLE], set(), 0.0
+    angles, more, worst = columns[ANGLE], set(), 0.0
     # The turn closes: a top may stand between the last row and the first.
     phi = np.concatenate([angles[-1:] - TURN, angles, angles[:1] + TURN])
     # Neighbours at another angle: both rows of a corner look past each other.
@@ -228,20 +228,20 @@ def _around_tops(columns: Mapping[str, Floats], least: float) -> tuple[list[floa
             rise = _rise(phi, sizes, int(k)) / top if top > 0.0 else 0.0
             worst = max(worst, rise)
             if rise > max(least, ROUNDED):
-                found |= set(_between(phi, sizes, int(k)))
-    return sorted(found), worst
+                more |= set(_between(phi, sizes, int(k)))
+    return sorted(more), worst
 
 
 def _on_levels(phi: Floats, sizes: Floats, tops: Pieces) -> NDArray[np.bool_]:
     """Whether a top cannot rise: two rows on one side, of a corner too, are as large as the top."""
-    found = np.zeros(len(tops), dtype=bool)
+    level = np.zeros(len(tops), dtype=bool)
     for side in (-1, 1):
         near, beyond = tops + side, tops + 2 * side
         there = (beyond >= 0) & (beyond < len(sizes)) & (phi[near] != phi[tops]) & np.isfinite(sizes[near])
         far = sizes[np.clip(beyond, 0, len(sizes) - 1)]
         drop = np.fmax(np.abs(sizes[tops] - sizes[near]), np.abs(sizes[tops] - far))
-        found |= there & (drop <= SPARSE_LEVEL * sizes[tops])
-    return found
+        level |= there & (drop <= SPARSE_LEVEL * sizes[tops])
+    return level
 
 
 def _rise(phi: Floats, sizes: Floats, k: int) -> float:
@@ -273,12 +273,12 @@ def _bent(phi: Floats, sizes: Floats, k: int, side: int) -> float | None:
 def _between(phi: Floats, sizes: Floats, k: int) -> list[float]:
     """Angles, rad, between row k and its neighbours: thirds, and the vertex of their parabola."""
     before, after = phi[k] - phi[k - 1], phi[k + 1] - phi[k]
-    found = [phi[k] - share * before for share in (1 / 3, 2 / 3)] if before > 0.0 else []
-    found += [phi[k] + share * after for share in (1 / 3, 2 / 3)] if after > 0.0 else []
+    angles = [phi[k] - share * before for share in (1 / 3, 2 / 3)] if before > 0.0 else []
+    angles += [phi[k] + share * after for share in (1 / 3, 2 / 3)] if after > 0.0 else []
     rise, fall = sizes[k] - sizes[k - 1], sizes[k] - sizes[k + 1]
     bend = rise * after + fall * before
     if before > 0.0 and after > 0.0 and bend > 0.0:
         vertex = phi[k] + (rise * after**2 - fall * before**2) / (2 * bend)
         width = min(before, after) / 64
-        found += [vertex - width, vertex, vertex + width]
-    return [float(angle % TURN) for angle in found]
+        angles += [vertex - width, vertex, vertex + width]
+    return [float(angle % TURN) for angle in angles]

@@ -30,8 +30,10 @@ def quantities(effects: Iterable[Effect], known: Collection[str]) -> dict[str, C
     """
     if not any(isinstance(effect, Load | State) for effect in effects):
         return {}
-    found = {TORQUE: CycleQuantity(lambda at: at.crank_torque)}
-    return found | ({POWER: CycleQuantity(lambda at: motor_power(at, at.crank_torque))} if "speed" in known else {})
+    crank_quantities = {TORQUE: CycleQuantity(lambda at: at.crank_torque)}
+    return crank_quantities | (
+        {POWER: CycleQuantity(lambda at: motor_power(at, at.crank_torque))} if "speed" in known else {}
+    )
 
 
 def motion() -> dict[str, CycleQuantity]:
@@ -49,10 +51,10 @@ def motor(effects: Iterable[Effect]) -> Speed | None:
 
 def motor_torque(at: Instant, crank_torque: Number) -> Number:
     """Motor's torque, N·m, from the crank's torque; the difference accelerates the flywheel."""
-    omega_dot, own = at.pose.omega_dot, motor(at.model.effects)
-    if omega_dot is None or own is None:
+    omega_dot, speed = at.pose.omega_dot, motor(at.model.effects)
+    if omega_dot is None or speed is None:
         return crank_torque
-    return crank_torque + own.flywheel(at.given.inputs(at.maths, own)) * omega_dot
+    return crank_torque + speed.flywheel(at.given.inputs(at.maths, speed)) * omega_dot
 
 
 def motor_power(at: Instant, crank_torque: Number) -> Number:

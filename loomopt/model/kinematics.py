@@ -47,11 +47,13 @@ class Group(NamedTuple):
 
     def singular(self, prefix: str, squares: Squares) -> tuple[float, ...]:
         """Crank angles, rad, where the links nearly fold or stretch; prefix: what their quantities have."""
-        own = functools.partial(squares, tuple(prefix + name for name in self.closes.values()))
+        squares_at = functools.partial(squares, tuple(prefix + name for name in self.closes.values()))
         if self.closest:
-            tops = [pair for values in own(np.array(self.closest)) for pair in zip(self.closest, values, strict=True)]
+            tops = [
+                pair for values in squares_at(np.array(self.closest)) for pair in zip(self.closest, values, strict=True)
+            ]
         else:
-            tops = list(_tops(own))
+            tops = list(_tops(squares_at))
         return tuple(dict.fromkeys(top for top, square in tops if square > (1 - NEARLY_SINGULAR) ** 2))
 
 
@@ -66,8 +68,8 @@ def _tops(squares: Callable[[Floats], Sequence[Floats]]) -> Iterator[tuple[float
 
         top = int(np.argmax(sampled))
         if sampled[top] > 1 - WORTH_A_LOOK * NEARLY_SINGULAR:
-            found = turning_points.sectioned(height, float(angles[top]) - step, float(angles[top]) + step)
-            yield found, float(height(np.array([found]))[0])
+            place = turning_points.sectioned(height, float(angles[top]) - step, float(angles[top]) + step)
+            yield place, float(height(np.array([place]))[0])
 
 
 class DerivedChain(NamedTuple):

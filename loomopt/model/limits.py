@@ -207,8 +207,8 @@ class CycleLimit(Limit):
 
     def near(self, sampler: Sampler) -> list[Extreme]:
         """Extremes of the quantity that come near the bound, or exceed it."""
-        found = sampler.extremes(self.row, self.where)
-        return [e for e in found if e.height >= self.bound - ACTIVE * self.scale]
+        extremes = sampler.extremes(self.row, self.where)
+        return [e for e in extremes if e.height >= self.bound - ACTIVE * self.scale]
 
     def _touches(self, sampler: Sampler, excess: float) -> list[Touch]:
         return [Touch(self, (e.height - self.bound) / self.scale, e) for e in self.near(sampler)]

@@ -77,8 +77,8 @@ class Machines:
 
     def single(self, name: str) -> Floats:
         """Figure, row or number of each machine, (machines,), SI."""
-        found: Floats = wide(self.rows.single(name), self.count)
-        return found
+        value: Floats = wide(self.rows.single(name), self.count)
+        return value
 
     @lazy
     def static(self) -> dict[str, Floats]:
@@ -88,8 +88,8 @@ class Machines:
 
     def mean(self, integral: Integral) -> Floats:
         """Mean over the cycle of each machine, (machines,), SI."""
-        found: Floats = self.rows.mean(integral)
-        return found
+        value: Floats = self.rows.mean(integral)
+        return value
 
     def peak(self, name: str, where: Where | None = None) -> Floats:
         """Largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, (machines,)."""
@@ -102,14 +102,14 @@ class Machines:
         if not new:
             return
         new += [name for name in self._margins if name not in (*self._sampled, *new)]
-        found = {name: np.empty((len(self.u), self.count)) for name in new}
+        sampled = {name: np.empty((len(self.u), self.count)) for name in new}
         step = max(1, POSITIONS // self.count)
         for begin in range(0, len(self.u), step):
             part = slice(begin, begin + step)
             read = self.rows.quantities(new, self.rows.node(self.pieces[part], self.u[part]))
             for name in new:
-                found[name][part] = read[name]
-        self._sampled |= found
+                sampled[name][part] = read[name]
+        self._sampled |= sampled
         self.like.session.positions += len(new) * len(self.u) * self.count
 
     def sampled(self, name: str) -> Floats:
@@ -134,21 +134,21 @@ class Machines:
         shape: tuple[int, ...],
     ) -> list[Floats]:
         """Quantities, (…, chosen), of machines (chosen,), in blocks that fit the processor's cache."""
-        found = [np.empty(shape) for _ in names]
+        quantities = [np.empty(shape) for _ in names]
         step = max(1, POSITIONS // math.prod(shape[:-1]))
         for begin in range(0, shape[-1], step):
             part = slice(begin, begin + step)
             rows = self.rows.of(machines[part])
             read = rows.quantities(names, node(rows, part))
-            for values, name in zip(found, names, strict=True):
+            for values, name in zip(quantities, names, strict=True):
                 values[..., part] = read[name]
         self.like.session.positions += len(names) * math.prod(shape)
-        return found
+        return quantities
 
     def angles(self, tops: Tops) -> Floats:
         """Crank angles of tops, rad, (machines,)."""
-        found: Floats = self.rows.own_node(tops.piece, tops.u).phi
-        return found
+        phi: Floats = self.rows.own_node(tops.piece, tops.u).phi
+        return phi
 
     def tops(self, name: str, where: Where | None = None, signed: bool = False) -> Tops:
         """Position where |quantity| (of a signed one, the quantity) is highest over the cycle or the pieces `where`.
@@ -200,7 +200,7 @@ class Machines:
         inner, before = sizes[1:-1], np.arange(1, last)[:, None] < first
         reach = inner + np.abs(sizes[:-2] - 2 * inner + sizes[2:])
         tops = (inner >= sizes[:-2]) & (inner >= sizes[2:]) & (reach > bound) & before
-        nodes, machines = (each[::-1] for each in np.nonzero(tops))
+        nodes, machines = (places[::-1] for places in np.nonzero(tops))
         if len(nodes):
             top = self._turning(name, side * turned[nodes + 1, machines], machines)
             out = np.abs(self.at_angles((name,), top, machines)[0]) > (bound * (1 + slack))[machines]
@@ -222,32 +222,32 @@ class Machines:
 
     def _turning(self, name: str, angles: Floats, machines: Places) -> Floats:
         """Crank angles, rad, where |quantity| is highest near angles (chosen,) of machines (chosen,)."""
-        step, found = TURN / GRID, angles
+        step, peak = TURN / GRID, angles
         for closer in (1.0, CLOSER, CLOSER**2):
-            around = found + closer * step * np.arange(-2, 3)[:, None]
-            found = found + closer * step * vertex(np.abs(self.at_angles((name,), around, machines)[0]))
-        return found
+            around = peak + closer * step * np.arange(-2, 3)[:, None]
+            peak = peak + closer * step * vertex(np.abs(self.at_angles((name,), around, machines)[0]))
+        return peak
 
     @lazy
     def nearly_singular(self) -> NDArray[np.bool_]:
         """Which machines come so near to a singular position, or pass it, that one must be looked at alone."""
-        found = np.zeros(self.count, dtype=bool)
+        near = np.zeros(self.count, dtype=bool)
         for prefix, group in self.model.kinematics.groups.items():
             names = [prefix + name for name in group.closes.values()] if group.closest else []
             squares = self.rows.quantities(names, Node(np.array(group.closest)[:, None], {})) if names else {}
             for name in names:
-                found |= ~(squares[name].max(axis=0) <= (1 - NEARLY_SINGULAR) ** 2)
+                near |= ~(squares[name].max(axis=0) <= (1 - NEARLY_SINGULAR) ** 2)
         for name, most in self._margins.items():
-            found |= ~(self.sampled(name).max(axis=0) <= most)
-        return found
+            near |= ~(self.sampled(name).max(axis=0) <= most)
+        return near
 
     @lazy
     def _margins(self) -> dict[str, float]:
         """Quantities that say how near a singular position is, and the most of each on the grid, SI."""
         groups = self.model.kinematics.groups.items()
         closes = [prefix + name for prefix, group in groups if not group.closest for name in group.closes.values()]
-        found = dict.fromkeys(closes, 1 - WORTH_A_LOOK * NEARLY_SINGULAR)
-        return found | {name: most + SAME_ANGLE for name, most in self.model.assembled.values()}
+        margins = dict.fromkeys(closes, 1 - WORTH_A_LOOK * NEARLY_SINGULAR)
+        return margins | {name: most + SAME_ANGLE for name, most in self.model.assembled.values()}
 
 
 class _Refined:
@@ -265,8 +265,8 @@ class _Refined:
     @property
     def bend(self) -> Floats:
         """Second difference, of either sign."""
-        found: Floats = np.abs(self.beside[0] - 2 * self.beside[1] + self.beside[2])
-        return found
+        difference: Floats = np.abs(self.beside[0] - 2 * self.beside[1] + self.beside[2])
+        return difference
 
     def highest(self, at: At) -> Tops:
         """Highest top of each machine."""
@@ -275,8 +275,8 @@ class _Refined:
         np.maximum.at(best, self.machines, height)
         there = np.flatnonzero(height >= (best - ALIKE * self.size)[self.machines])[::-1]
         tops = Tops(np.zeros(self.of.count, dtype=np.intp), np.zeros(self.of.count), np.full(self.of.count, np.nan))
-        for found, own in zip(tops, (self.piece, u, self.sign * height), strict=True):
-            found[self.machines[there]] = own[there]
+        for column, entries in zip(tops, (self.piece, u, self.sign * height), strict=True):
+            column[self.machines[there]] = entries[there]
         return tops
 
     def refined(self, at: At) -> tuple[Floats, Floats]:
@@ -334,25 +334,25 @@ def read_all(model: JobModel, values: Values, like: Sampler, read: Read, alone: 
     alone(values): of one, where many cannot be read at once.
     """
     count = max(np.size(value) for value in values.values())
-    found: dict[str, Floats] = {}
+    values_by_name: dict[str, Floats] = {}
 
     def put(places: Places, read: Mapping[str, Number]) -> None:
         for name, of in read.items():
             if of is not None:
-                found.setdefault(name, np.full(count, np.nan))[places] = of
+                values_by_name.setdefault(name, np.full(count, np.nan))[places] = of
 
     for begin in range(0, count, BLOCK):
         every = np.arange(begin, min(begin + BLOCK, count))
-        own = _picked(values, every)
+        block = _picked(values, every)
         left = np.ones(len(every), dtype=bool)
         with np.errstate(all="ignore"):
-            for places, machines in _in_order(model, own, like) if at_once(model) else ():
+            for places, machines in _in_order(model, block, like) if at_once(model) else ():
                 put(every[places], read(machines))
                 left[places] = machines.nearly_singular
         for place in np.flatnonzero(left):
-            put(every[[place]], dict.fromkeys(found, math.nan))
-            put(every[[place]], alone({name: float(v) for name, v in _picked(own, place).items()}))
-    return found
+            put(every[[place]], dict.fromkeys(values_by_name, math.nan))
+            put(every[[place]], alone({name: float(v) for name, v in _picked(block, place).items()}))
+    return values_by_name
 
 
 def _picked(values: Values, places: Number) -> dict[str, Number]:
@@ -368,14 +368,14 @@ def _in_order(model: JobModel, values: Values, like: Sampler) -> Iterator[tuple[
     events = [wide(model.event(systems.numpy(), given, event), count) for event in model.events_read]
     keys = _orders(corners, np.array(events).reshape(-1, count))
     real = np.isfinite(corners).all(axis=0)
-    own = _orders(*(np.array(each).reshape(-1, 1) for each in _angles(model, like)))
+    like_keys = _orders(*(np.array(angles).reshape(-1, 1) for angles in _angles(model, like)))
     while real.any():
         first = int(np.argmax(real))
         same = real & (keys == keys[:, first : first + 1]).all(axis=0)
         real &= ~same
         places = np.flatnonzero(same)
         one = {name: float(value) for name, value in _picked(values, first).items()}
-        leader = like if (keys[:, first] == own[:, 0]).all() else Sampler(model, one)
+        leader = like if (keys[:, first] == like_keys[:, 0]).all() else Sampler(model, one)
         yield places, Machines(model, values if len(places) == count else _picked(values, places), leader)
 
 
@@ -394,4 +394,4 @@ def _orders(corners: Floats, events: Floats) -> NDArray[np.float64]:
     order = np.argsort(placed, axis=0, kind="stable")
     ends = np.roll(np.take_along_axis(placed, order, axis=0), -1, axis=0)
     before = [np.argmin((ends - angle + SAME_ANGLE) % TURN, axis=0) for angle in events]
-    return np.concatenate([turns, order, *(each[None] for each in before)])
+    return np.concatenate([turns, order, *(row[None] for row in before)])

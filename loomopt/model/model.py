@@ -84,8 +84,8 @@ class Instant:
 
     def terms(self) -> dict[str, Number]:
         """Term of every load by name, N or N·m."""
-        found = balance.terms(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
-        return {load.name: term for load, term in found}
+        pairs = balance.terms(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
+        return {load.name: term for load, term in pairs}
 
     def joints(self, check: "Check[Any]") -> Number:
         """Values that a check reads of the forces in the joints; checks that read the same values share them."""
@@ -102,9 +102,9 @@ class Instant:
 
     def at_speed(self, speed: Number) -> "Instant":
         """Same node with the crank at another speed, rad/s; its pose must be a dataclass with `omega`."""
-        found = Instant(self.model, self.maths, self.given, self.node, self.event)
-        found._pose = replace(self.pose, omega=speed)
-        return found
+        instant = Instant(self.model, self.maths, self.given, self.node, self.event)
+        instant._pose = replace(self.pose, omega=speed)
+        return instant
 
 
 Formula = Callable[[Instant], Number]
@@ -227,29 +227,31 @@ FRAME = "frame"
 
 def jointed(check: Check[Any], known: Collection[str]) -> dict[str, CycleQuantity]:
     """Values that a check reads of the forces in the joints; known: names of scene numbers that are given."""
-    found: dict[str, CycleQuantity] = {}
+    quantities: dict[str, CycleQuantity] = {}
     lacked = lacking(check, known)
     for name in (name for name in check.vectors if name not in lacked):
         square = squared(name)
-        found[name] = CycleQuantity(functools.partial(size_of, check, name), loaded=True, square=square)
-        found[square] = CycleQuantity(functools.partial(square_of, check, name), figure=False, loaded=True)
+        quantities[name] = CycleQuantity(functools.partial(size_of, check, name), loaded=True, square=square)
+        quantities[square] = CycleQuantity(functools.partial(square_of, check, name), figure=False, loaded=True)
         for axis in COMPONENTS:
             part = functools.partial(component, check, name, axis)
-            found[f"{name}_{axis}"] = CycleQuantity(part, figure=False, loaded=True)
+            quantities[f"{name}_{axis}"] = CycleQuantity(part, figure=False, loaded=True)
     for body in {body for name, bodies in check.sides.items() if name not in lacked for body in bodies} - {FRAME}:
         for axis in COMPONENTS:
             heading = functools.partial(heading_of, check, body, axis)
-            found[heading_name(body, axis)] = CycleQuantity(heading, figure=False, loaded=True)
+            quantities[heading_name(body, axis)] = CycleQuantity(heading, figure=False, loaded=True)
     for name, work in check.worked.items():
         if name not in lacked:
-            found[work] = CycleQuantity(functools.partial(work_of, check, work), figure=False, loaded=True)
-            found[SLOWNESS] = CycleQuantity(slowness, figure=False)
+            quantities[work] = CycleQuantity(functools.partial(work_of, check, work), figure=False, loaded=True)
+            quantities[SLOWNESS] = CycleQuantity(slowness, figure=False)
     for name in (name for name in check.scalars if name not in lacked):
-        found[name] = CycleQuantity(functools.partial(scalar_of, check, name), signed=name in check.signed, loaded=True)
+        quantities[name] = CycleQuantity(
+            functools.partial(scalar_of, check, name), signed=name in check.signed, loaded=True
+        )
         for axis in COMPONENTS if name in check.directed else ():
             part = functools.partial(component, check, check.directed[name], axis)
-            found[f"{name}_{axis}"] = CycleQuantity(part, figure=False, loaded=True)
-    return found
+            quantities[f"{name}_{axis}"] = CycleQuantity(part, figure=False, loaded=True)
+    return quantities
 
 
 def design_value(formula: Callable[[Maths, Values], Number], at: Instant) -> Number:
@@ -272,34 +274,34 @@ class Cornered(NamedTuple):
 
 def cornered(model: "JobModel", maths: Maths, given: Given) -> list[Cornered]:
     """Switches of a model."""
-    found: list[Cornered] = []
+    corners: list[Cornered] = []
     for arc in (*model.kinematics.arcs, *model.arcs):
         angles = arc.corners(maths, given)
-        found.append(Cornered(angles, arc.switch, arc.parting(maths, given) if arc.parting else angles))
+        corners.append(Cornered(angles, arc.switch, arc.parting(maths, given) if arc.parting else angles))
     for load in model.loads:
         if isinstance(load, Load) and load.corners:
             angles = load.corners(given.inputs(maths, load))
             # An event on a corner of the motion's own arcs would be that corner twice.
             events = model.kinematics.breaks.intersection(load.reads)
             there = {id(angle) for event in events for angle in given.values[event]}
-            found.append(Cornered(angles, load.switch, tuple(a for a in angles if id(a) not in there)))
-    return found
+            corners.append(Cornered(angles, load.switch, tuple(a for a in angles if id(a) not in there)))
+    return corners
 
 
-def with_states_eliminated(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], found: Given) -> Given:
+def with_states_eliminated(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], given: Given) -> Given:
     """Scene's numbers with what follows from them for each state."""
     for state in (load for load in loads if isinstance(load, State)):
-        moving = carried_by(maths, kinematics, loads, found, state)
-        derived = state.derived(found.inputs(maths, state), moving)
-        found = found._replace(values={**found.values, **derived})
-    return found
+        moving = carried_by(maths, kinematics, loads, given, state)
+        derived = state.derived(given.inputs(maths, state), moving)
+        given = given._replace(values={**given.values, **derived})
+    return given
 
 
 def carried_by(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], given: Given, state: State) -> Carried:
     """Bodies that move with a state's coordinate."""
-    own = [load for load in loads if isinstance(load, Load) and load.name in state.carries]
-    inertias = [load.moved(given.inputs(maths, load)) for load in own if load.moved]
-    smooth = [load for load in own if not load.corners]
+    loads_carried = [load for load in loads if isinstance(load, Load) and load.name in state.carries]
+    inertias = [load.moved(given.inputs(maths, load)) for load in loads_carried if load.moved]
+    smooth = [load for load in loads_carried if not load.corners]
 
     def weigh(angles: Sequence[Number], weights: Sequence[Sequence[Number]]) -> list[Number]:
         system = arrays(maths)
@@ -348,9 +350,9 @@ def state_columns(states: Sequence[State]) -> Mapping[str, Callable[[Instant], N
     }
 
 
-def uncovered(effects: Sequence[Effect], own: Mapping[str, Values]) -> tuple[str, ...]:
+def uncovered(effects: Sequence[Effect], values: Mapping[str, Values]) -> tuple[str, ...]:
     """Parts of states and events that neither proofs nor studies of accuracy cover; own: values by effect."""
-    return tuple(each.rests(own[each.name]) for each in effects if isinstance(each, State | Event))
+    return tuple(effect.rests(values[effect.name]) for effect in effects if isinstance(effect, State | Event))
 
 
 __all__ = ["CycleQuantity", "DesignRow", "Formula", "Instant", "Integral", "JobModel", "Stills"]
@@ -384,8 +386,8 @@ class JobModel:
         """What distinguishes this model's formulas from another's."""
         means = tuple((mean.name, len(mean.angles), mean.parts) for mean in self.integrals)
         arcs = tuple((arc.name, arc.structure) for arc in self.arcs)
-        own = self.kinematics.structure, arcs, means, tuple(self.own_quantities), tuple(self.own_rows)
-        return own, self.effects, self.words, self.known
+        structure = self.kinematics.structure, arcs, means, tuple(self.own_quantities), tuple(self.own_rows)
+        return structure, self.effects, self.words, self.known
 
     @lazy
     def loads(self) -> tuple[Acting, ...]:
@@ -415,7 +417,7 @@ class JobModel:
     @lazy
     def _full(self) -> dict[str, dict[str, str]]:
         """Keys of each effect's table with the full names of their numbers."""
-        return {each.name: {key: owned(each, key) for key in keys(each.table)} for each in self.effects}
+        return {effect.name: {key: owned(effect, key) for key in keys(effect.table)} for effect in self.effects}
 
     def words_of(self, effect: str) -> dict[str, str]:
         """Words of an effect's table by key."""
@@ -425,7 +427,7 @@ class JobModel:
     def known_in(self) -> tuple[Where, ...]:
         """The pieces where all loads are known; empty for all of the cycle."""
         loads = [load for load in self.loads if isinstance(load, Load)]
-        return next((found for load in loads if (found := load.known_in(self.words_of(load.name)))), ())
+        return next((places for load in loads if (places := load.known_in(self.words_of(load.name)))), ())
 
     def known_of(self, name: str) -> tuple[Where, ...]:
         """Pieces where a whole-cycle quantity is known; empty for all of the cycle."""
@@ -433,37 +435,37 @@ class JobModel:
 
     def counted(self, cycle: Cycle, name: str, where: Where | None = None) -> NDArray[np.bool_]:
         """Whether a quantity is known and counts, by piece of a cycle; where: the pieces to look at."""
-        known, asked = [cycle.on(place) for place in self.known_of(name)], cycle.on(where)
-        return asked & np.any(known, axis=0) if known else asked
+        known, requested = [cycle.on(place) for place in self.known_of(name)], cycle.on(where)
+        return requested & np.any(known, axis=0) if known else requested
 
     # Quantities and rows.
 
     @lazy
     def _quantities(self) -> dict[str, CycleQuantity]:
-        found = dict(self.own_quantities)
+        quantities = dict(self.own_quantities)
         for prefix, group in self.kinematics.groups.items():
             for name, formula in group.quantities.items():
-                found[prefix + name] = CycleQuantity(functools.partial(group_value, formula), figure=False)
+                quantities[prefix + name] = CycleQuantity(functools.partial(group_value, formula), figure=False)
         for check in self.checks:
             for name in check.quantities:
-                found[name] = CycleQuantity(functools.partial(check_value, check, name))
-            found |= jointed(check, self.known) if check.joints else {}
+                quantities[name] = CycleQuantity(functools.partial(check_value, check, name))
+            quantities |= jointed(check, self.known) if check.joints else {}
         if not self.states:
-            return found
+            return quantities
 
-        return found | state_quantities(self.states)
+        return quantities | state_quantities(self.states)
 
     @lazy
     def _rows(self) -> dict[str, DesignRow]:
-        found = dict(self.own_rows)
+        rows = dict(self.own_rows)
         for prefix, group in self.kinematics.groups.items():
             for name, formula in group.rows.items():
-                found[name if name in group.margins else prefix + name] = DesignRow(
+                rows[name if name in group.margins else prefix + name] = DesignRow(
                     functools.partial(design_value, formula)
                 )
         for check in self.checks:
-            found |= {name: DesignRow(functools.partial(check_row, check, name)) for name in check.rows}
-        return {name: row for name, row in found.items() if self._sufficed(row)}
+            rows |= {name: DesignRow(functools.partial(check_row, check, name)) for name in check.rows}
+        return {name: row for name, row in rows.items() if self._sufficed(row)}
 
     def _sufficed(self, row: DesignRow) -> bool:
         known = not self.known or self.known.issuperset(row.needs)
@@ -482,7 +484,7 @@ class JobModel:
     @lazy
     def least(self) -> tuple[str, ...]:
         """Figures that are the least of a value over the cycle: their quantities are its opposite."""
-        return tuple(name for each in self.states for name, peak in each.peaks.items() if peak.least)
+        return tuple(name for state in self.states for name, peak in state.peaks.items() if peak.least)
 
     @lazy
     def signed(self) -> frozenset[str]:
@@ -504,7 +506,7 @@ class JobModel:
 
     def has_row(self, name: str) -> bool:
         """Whether a name is that of a row for which this model has the numbers."""
-        means = {each for mean in self.integrals for each in (mean.name, mean.root)}
+        means = {figure for mean in self.integrals for figure in (mean.name, mean.root)}
         turned = {row for effect in self.effects if isinstance(effect, Speed) for row in effect.rows}
         return name in {*self._rows, *means, *turned}
 
@@ -522,15 +524,15 @@ class JobModel:
     @lazy
     def told(self) -> dict[str, str]:
         """What checks tell over the cycle, each with the figure whose kind it is of; of a vector its components too."""
-        found: dict[str, str] = {}
+        figures: dict[str, str] = {}
         for check in self.checks:
             lacked = lacking(check, self.known)
-            found |= {name: name for name in check.quantities}
+            figures |= {name: name for name in check.quantities}
             for name in (name for name in check.vectors if name not in lacked):
-                found |= {f"{name}_{axis}": name for axis in COMPONENTS} | {name: name}
+                figures |= {f"{name}_{axis}": name for axis in COMPONENTS} | {name: name}
             for name in (name for name in check.scalars if name not in lacked):
-                found |= {f"{name}_{axis}": name for axis in COMPONENTS if name in check.directed} | {name: name}
-        return found
+                figures |= {f"{name}_{axis}": name for axis in COMPONENTS if name in check.directed} | {name: name}
+        return figures
 
     @lazy
     def sides(self) -> dict[str, tuple[str, str]]:
@@ -556,11 +558,11 @@ class JobModel:
     @lazy
     def undefined(self) -> dict[str, str]:
         """Figures of checks that have no value, and why, each a sentence without its full stop."""
-        found: dict[str, str] = {}
+        reasons: dict[str, str] = {}
         for check in self.checks:
             for name, missing in lacking(check, self.known).items():
-                found[name] = f"{name} needs {asked(missing, self.known)}"
-        return found
+                reasons[name] = f"{name} needs {asked(missing, self.known)}"
+        return reasons
 
     @property
     def demands(self) -> tuple[tuple[Check[Any], Demand], ...]:
@@ -575,18 +577,18 @@ class JobModel:
 
     def samples(self, given: Given) -> int:
         """Number of samples per turn that the states of a design need; 0 without states."""
-        return max((math.ceil(each.samples(given.inputs(FLOAT, each))) for each in self.states), default=0)
+        return max((math.ceil(state.samples(given.inputs(FLOAT, state))) for state in self.states), default=0)
 
     def plain(self, maths: Maths, values: Values) -> Given:
         """Scene's numbers with what follows from the mechanism alone, SI."""
-        own: dict[str, dict[str, Any]] = {}
+        by_effect: dict[str, dict[str, Any]] = {}
         for effect, full in self._full.items():
-            own[effect] = {key: values[name] for key, name in full.items() if name in values}
-            own[effect] |= self.words_of(effect)
-        for each in self.effects:
-            if each.instance:
-                own[each.name]["instance"] = each.instance
-        given = Given(values, own, frozenset(values), self.kinematics.linkage(maths, values))
+            by_effect[effect] = {key: values[name] for key, name in full.items() if name in values}
+            by_effect[effect] |= self.words_of(effect)
+        for active in self.effects:
+            if active.instance:
+                by_effect[active.name]["instance"] = active.instance
+        given = Given(values, by_effect, frozenset(values), self.kinematics.linkage(maths, values))
         return given._replace(values={**values, **self.kinematics.derived(maths, given, self.called)})
 
     @lazy
@@ -604,13 +606,13 @@ class JobModel:
 
     def corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
         """Corner angles of the cycle, rad, as declared one after the other."""
-        return tuple(angle for each in cornered(self, maths, given) for angle in each.placed)
+        return tuple(angle for arc in cornered(self, maths, given) for angle in arc.placed)
 
     def split(self, maths: Maths, given: Given) -> Cycle:
         """Pieces of the cycle; maths: of floats."""
-        found = cornered(self, maths, given)
-        corners = [angle for each in found for angle in each.placed]
-        return cycle.split(corners, self.switches, lambda angle: [each.switch(angle, each.angles) for each in found])
+        arcs = cornered(self, maths, given)
+        corners = [angle for arc in arcs for angle in arc.placed]
+        return cycle.split(corners, self.switches, lambda angle: [arc.switch(angle, arc.angles) for arc in arcs])
 
     def hints(self, given: Given) -> dict[str, float]:
         """Angles of corners that no formula gives, by name of value: the start of `given`."""
@@ -648,14 +650,14 @@ class JobModel:
             known = given.values
             names = [name for name, row in self._rows.items() if all(need in known for need in row.needs)]
         instants: dict[str, Instant] = {}
-        found = {}
+        figures = {}
         for name in names:
             if name in self._rows:
                 event = self._rows[name].event
                 if event not in instants:
                     instants[event] = Instant(self, maths, given, Node(None, stills.get(event, {})), event)
-                found[name] = self._rows[name].formula(instants[event])
-        return found
+                figures[name] = self._rows[name].formula(instants[event])
+        return figures
 
     def event(self, maths: Maths, given: Given, name: str) -> Number:
         """Crank angle of an event, rad."""

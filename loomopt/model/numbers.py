@@ -17,13 +17,13 @@ CORNER = "corner"
 
 def numbers(scene: Scene) -> dict[str, float]:
     """Every number of the scene by full name, SI."""
-    found = {**scene.mechanism, **scene.operation}
-    for effect, own in zip(scene.active, scene.effects.values(), strict=True):
+    values = {**scene.mechanism, **scene.operation}
+    for effect, table in zip(scene.active, scene.effects.values(), strict=True):
         for key in keys(effect.table):
-            value = value_at(own, key)
+            value = value_at(table, key)
             if isinstance(value, float | int):
-                found[owned(effect, key)] = float(value)
-    return found
+                values[owned(effect, key)] = float(value)
+    return values
 
 
 def words(scene: Scene) -> tuple[tuple[str, str, Any], ...]:
@@ -36,8 +36,8 @@ def words(scene: Scene) -> tuple[tuple[str, str, Any], ...]:
 
 def _words(scene: Scene) -> Iterator[tuple[str, str, Any]]:
     known = curves(scene)
-    for name, own in scene.effects.items():
-        for key, value in own.model_dump().items():
+    for name, table in scene.effects.items():
+        for key, value in table.model_dump().items():
             if isinstance(value, str):
                 yield name, key, known.get((name, key), value)
 
@@ -53,15 +53,17 @@ def curves(scene: Scene) -> dict[tuple[str, str], Curve]:
 def _curves(scene: Scene) -> dict[tuple[str, str], tuple[Curve, csv_tables.Table]]:
     """Curves that the scene's loads are, each with its table. Raises BadInput."""
     on = zip(scene.active, scene.effects.values(), strict=True)
-    loads = [(effect, own) for effect, own in on if isinstance(effect, Load) and effect.tabulated]
-    found = {(load.name, load.tabulated.key): _curve(scene, load, own) for load, own in loads if load.tabulated}
-    return {place: curve for place, curve in found.items() if curve is not None}
+    loads = [(effect, table) for effect, table in on if isinstance(effect, Load) and effect.tabulated]
+    curve_tables = {
+        (load.name, load.tabulated.key): _curve(scene, load, table) for load, table in loads if load.tabulated
+    }
+    return {place: curve for place, curve in curve_tables.items() if curve is not None}
 
 
-def _curve(scene: Scene, load: Load[Any], own: Table) -> tuple[Curve, csv_tables.Table] | None:
+def _curve(scene: Scene, load: Load[Any], parameters: Table) -> tuple[Curve, csv_tables.Table] | None:
     """Curve that a load's table names, with the table; None where it names none. Raises BadInput."""
     table = load.tabulated
-    given = getattr(own, table.key) if table else None
+    given = getattr(parameters, table.key) if table else None
     if table is None or given is None:
         return None
     key = ".".join(("effects", *load.path, table.key))
@@ -73,13 +75,13 @@ def _curve(scene: Scene, load: Load[Any], own: Table) -> tuple[Curve, csv_tables
         marks=(CORNER,),
         fewest=periodic_cubic.FEWEST,
         twice=True,
-        digits=getattr(own, "digits", None),
+        digits=getattr(parameters, "digits", None),
     )
     angles, *values = read.columns.values()
     marked = read.marks[CORNER]
     try:
-        found = tuple(periodic_cubic.through(angles, each, tuple(map(bool, marked))) for each in values)
-        return (PeriodicCubics(found) if table.beside else found[0]), read
+        cubics = tuple(periodic_cubic.through(angles, samples, tuple(map(bool, marked))) for samples in values)
+        return (PeriodicCubics(cubics) if table.beside else cubics[0]), read
     except ValueError as error:
         remedy = f"Correct the table: angles are {table.angle}; a column {CORNER} marks corners with 1"
         raise refusal(f"the table is no curve over one turn: {error}", read.file, remedy=remedy) from None
@@ -90,11 +92,11 @@ def bounds(scene: Scene, known: Mapping[str, float]) -> dict[str, tuple[float, f
 
     What is held stands at today's value.
     """
-    found = {name: (known[name], known[name]) for name in scene.schema.variables}
+    pairs = {name: (known[name], known[name]) for name in scene.schema.variables}
     for name, bound in scene.bounds.items():
         full = scene.full(name)
-        found[full] = (bound.min, bound.max) if bound.free else (known[full], known[full])
-    return found
+        pairs[full] = (bound.min, bound.max) if bound.free else (known[full], known[full])
+    return pairs
 
 
 def labels(scene: Scene) -> dict[str, str]:
@@ -109,7 +111,7 @@ def told(scene: Scene) -> tuple[str, ...]:
 
 def records(scene: Scene) -> tuple[csv_tables.Record, ...]:
     """Remarks on the tables of the loads. Raises BadInput."""
-    found = []
+    remarks = []
     loads = {load.name: load for load in scene.active if isinstance(load, Load)}
     for (name, key), (curve, read) in _curves(scene).items():
         table = loads[name].tabulated
@@ -119,11 +121,11 @@ def records(scene: Scene) -> tuple[csv_tables.Record, ...]:
         if curve.spread is not None:
             left = f"; left out one at a time, samples lie {scene.show(curve.spread, table.kind, 3)} rms off the curve "
             left += "of the others"
-        unread = [each for each in table.needless if scene.given(each) is not None]
+        unread = [number for number in table.needless if scene.given(number) is not None]
         said = f"a cubic through {curve.samples} samples with {corners}, "
         said += f"rms of the fit {scene.show(0.0, table.kind)}{left}"
         parts = curve.curves if isinstance(curve, PeriodicCubics) else (curve,)
         columns = [column for column in table.columns if column != "angle"]
         record = read.record(f"{name}.{key}", {n: part.spread for n, part in zip(columns, parts, strict=True)}, said)
-        found.append(record._replace(said=f"{record.said}{f'. {unread[0]} is not read' if unread else ''}"))
-    return tuple(found)
+        remarks.append(record._replace(said=f"{record.said}{f'. {unread[0]} is not read' if unread else ''}"))
+    return tuple(remarks)

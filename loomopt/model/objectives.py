@@ -81,8 +81,8 @@ class Objective(abc.ABC):
 
     def worth(self, rows: Rows) -> Number:
         """Value, SI, for a design or for many at once."""
-        found = [*(sign * rows.single(row) for row, sign in self.sides), *map(rows.highest, self.quantities)]
-        return functools.reduce(np.maximum, found)
+        values = [*(sign * rows.single(row) for row, sign in self.sides), *map(rows.highest, self.quantities)]
+        return functools.reduce(np.maximum, values)
 
     def merit(self, sampler: Sampler) -> float:
         """Value of a design, SI."""
@@ -90,8 +90,8 @@ class Objective(abc.ABC):
 
     def figure_of(self, sampler: Sampler) -> float:
         """Figure of a design, SI: with its sign where it is a number of its own."""
-        own = sampler.figure(self.figure)
-        return float(self.merit(sampler) ** (1 / self.power)) if own is None else own
+        figure = sampler.figure(self.figure)
+        return float(self.merit(sampler) ** (1 / self.power)) if figure is None else figure
 
     def worsening(self, now: float, then: float, most: bool) -> float:
         """Amount by which the figure becomes worse from now to then, SI; most: whether the most of it is sought."""
@@ -117,8 +117,8 @@ class Objective(abc.ABC):
 
     def pieces(self, sampler: Sampler) -> list[Piece]:
         """Smooth functions the largest of which it is at a design."""
-        found = [Piece(row, sign * sampler.single(row), sign) for row, sign in self.sides]
-        return found + [Piece(row, e.height, e.sign, e) for row in self.quantities for e in sampler.extremes(row)]
+        smooth = [Piece(row, sign * sampler.single(row), sign) for row, sign in self.sides]
+        return smooth + [Piece(row, e.height, e.sign, e) for row in self.quantities for e in sampler.extremes(row)]
 
     @abc.abstractmethod
     def limits(self, name: str, most: float) -> list[Limit]:

@@ -28,9 +28,9 @@ class Alias(str):
 
     def __new__(cls, text: str, of: str) -> "Alias":
         """Name."""
-        found = super().__new__(cls, text)
-        found.of = of
-        return found
+        alias = super().__new__(cls, text)
+        alias.of = of
+        return alias
 
     def __reduce__(self) -> tuple[type["Alias"], tuple[str, str]]:
         """Constructor and values with which pickle makes it again."""
@@ -198,7 +198,7 @@ class Goal(NamedTuple):
 
 def shortfall(reached: Mapping[str, bool]) -> str:
     """Goals that are missed, in words: "M3_fdc not reached"; "" for none. reached: goal → whether it is."""
-    missed = [name for name, met in reached.items() if not met]
+    missed = [name for name, is_reached in reached.items() if not is_reached]
     return f"{' and '.join(missed)} not reached" if missed else ""
 
 
@@ -207,12 +207,12 @@ def goals(limits: Iterable[Limit]) -> tuple[Goal, ...]:
     sides: dict[str, list[Limit]] = {}
     for limit in limits:
         sides.setdefault(limit.name, []).append(limit)
-    found = []
-    for name, each in sides.items():
-        low = max((limit.value for limit in each if limit.sign <= 0), default=-math.inf)
-        high = min((limit.value for limit in each if limit.sign >= 0), default=math.inf)
-        found.append(Goal(name, low, high, FEASIBLE * max(limit.scale for limit in each)))
-    return tuple(found)
+    ranges = []
+    for name, of_figure in sides.items():
+        low = max((limit.value for limit in of_figure if limit.sign <= 0), default=-math.inf)
+        high = min((limit.value for limit in of_figure if limit.sign >= 0), default=math.inf)
+        ranges.append(Goal(name, low, high, FEASIBLE * max(limit.scale for limit in of_figure)))
+    return tuple(ranges)
 
 
 def nothing_follows(model: JobModel, values: Numbers) -> Numbers:
@@ -275,13 +275,13 @@ class Program:
         moved = {limit.row for limit, old in zip(limits, self.limits, strict=True) if limit is not old}
 
         def within(variable: Variable) -> Variable:
-            own = [each for each in limits if isinstance(each, BoundLimit) and each.row == variable.name]
-            if variable.name not in moved or not own:
+            bounds = [bound for bound in limits if isinstance(bound, BoundLimit) and bound.row == variable.name]
+            if variable.name not in moved or not bounds:
                 return variable
-            low = max([variable.lower, *(each.value for each in own if each.sign < 0)])
-            high = min([variable.upper, *(each.value for each in own if each.sign > 0)])
+            low = max([variable.lower, *(bound.value for bound in bounds if bound.sign < 0)])
+            high = min([variable.upper, *(bound.value for bound in bounds if bound.sign > 0)])
             if variable.lower == variable.upper:
-                low = high = next(each.value for each in own if each.row in moved)
+                low = high = next(bound.value for bound in bounds if bound.row in moved)
             around = (low, high) if variable.lower == variable.upper else variable.range
             return variable._replace(lower=low, upper=high, range=around)
 

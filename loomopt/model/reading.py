@@ -124,7 +124,7 @@ def recorded_quantities(
     outputs = tuple([read(name) for name in names])
     needed = tape.needed(outputs, since)
     used = {place: of for place, of in inputs.items() if place in needed}
-    called = {name: each for name, each in switch.items() if each.place in needed}
+    called = {name: operand for name, operand in switch.items() if operand.place in needed}
     program = tape.program(outputs, (phi, *called.values()), [Recorded(tape, place) for place in used], since)
     return Recording(program, tuple(used.values()), tuple(called))
 

@@ -92,11 +92,11 @@ class Sampler:
     @lazy
     def stills(self) -> Stills:
         """The switches just before each event that a row stands at, by event and name."""
-        found = {}
+        switches = {}
         for event in self.model.events_read:
             piece = self.cycle.piece_before(float(self.model.event(systems.FLOAT, self.given, event)))
-            found[event] = {name: float(value) for name, value in self.cycle.switch(piece).items()}
-        return found
+            switches[event] = {name: float(value) for name, value in self.cycle.switch(piece).items()}
+        return switches
 
     @lazy
     def static(self) -> dict[str, float]:
@@ -141,15 +141,15 @@ class Sampler:
 
     def together(self, names: Sequence[str], pieces: Pieces, u: Floats) -> dict[str, Floats]:
         """Several quantities at nodes (pieces, u), SI: the pose is computed once for all."""
-        found = {name: np.empty(u.shape) for name in names}
-        self.session.positions += len(u) * len(found)
+        values_by_name = {name: np.empty(u.shape) for name in names}
+        self.session.positions += len(u) * len(values_by_name)
         for begin in range(0, len(u), CHUNK):
             part = slice(begin, begin + CHUNK)
             with np.errstate(invalid="ignore", divide="ignore"):
-                read = self.quantities(tuple(found), self.node(pieces[part], u[part]))
-                for values, own in zip(found.values(), read, strict=True):
-                    values[part] = own
-        return found
+                read = self.quantities(tuple(values_by_name), self.node(pieces[part], u[part]))
+                for values, row in zip(values_by_name.values(), read, strict=True):
+                    values[part] = row
+        return values_by_name
 
     def at_angle(self, names: tuple[str, ...], phi: float) -> tuple[float, ...]:
         """Quantities that no load's switch changes at one crank angle, rad, SI; raises without a real value."""
@@ -193,9 +193,9 @@ class Sampler:
         """
         if name not in self._extremes:
             self.search((name,))
-        found = self._extremes[name]
+        tops = self._extremes[name]
         on = self.on(name, where)
-        return [e for e in found if on[e.piece]]
+        return [e for e in tops if on[e.piece]]
 
     def knows(self, name: str) -> bool:
         """Whether the extremes of a quantity are computed already."""
@@ -214,21 +214,23 @@ class Sampler:
         peaks = {name: self._peaks(self.heights(name, of)) for name, of in values.items()}
         refined = self._refined(values, {name: at for name, at in peaks.items() if at is not None})
         for name in new:
-            found = refined.get(name)
-            if found is None:
+            extremes = refined.get(name)
+            if extremes is None:
                 self._extremes[name] = [Extreme(0, 0.0, float("inf"))]
                 continue
             if self.singular:
-                found += self._spikes(name)
-            self._extremes[name] = sorted(found, key=lambda extreme: -extreme.height)
+                extremes += self._spikes(name)
+            self._extremes[name] = sorted(extremes, key=lambda extreme: -extreme.height)
 
     def share(self) -> None:
         """Take the extremes that were found of this design last under fewer or other names of its numbers.
 
         What they were read from are numbers that are the same here, to the last bit and the sign of a zero.
         """
-        found = (each for each in self.session.latest(SAMPLERS) if isinstance(each, Sampler) and each is not self)
-        for other in found:
+        others = (
+            sampler for sampler in self.session.latest(SAMPLERS) if isinstance(sampler, Sampler) and sampler is not self
+        )
+        for other in others:
             if other._extremes and other._numbers <= self._numbers and self._holds(other):
                 self._extremes = {**other._extremes, **self._extremes}
                 return
@@ -282,11 +284,11 @@ class Sampler:
         def heights(angles: Floats) -> Floats:
             return self.heights(name, self.at_angles(name, angles))
 
-        found = []
+        extremes = []
         for angle in (peak for centre in self.singular for peak in turning_points.spike_peaks(heights, centre)):
             value = float(self.at_angles(name, np.array([angle]))[0])
-            found.append(Extreme(*self.cycle.place(angle), value, signed=name in self.model.signed))
-        return found
+            extremes.append(Extreme(*self.cycle.place(angle), value, signed=name in self.model.signed))
+        return extremes
 
     def at_angles(self, name: str, angles: Floats) -> Floats:
         """Quantity at crank angles, rad, as they are: a spike may be narrower than u resolves."""
@@ -332,19 +334,19 @@ class Sampler:
         bent = (around[0] != around[2]) | (around[4] != around[2])
         better = (refined >= sampled) & bent
         best_u, best = np.where(better, top, u[at]), sign * np.where(better, refined, sampled)
-        found = list(zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True))
+        tops = list(zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True))
         signed = self.model.signed
-        return {n: [Extreme(*extreme, signed=n in signed) for extreme in found[span]] for n, span in spans.items()}
+        return {n: [Extreme(*extreme, signed=n in signed) for extreme in tops[span]] for n, span in spans.items()}
 
     def _each_at(self, spans: Mapping[str, slice], pieces: Pieces, u: Floats) -> Floats:
         """Values of quantities, SI, each at its columns of nodes (pieces, u)."""
         read = self.together(tuple(spans), pieces.ravel(), u.ravel())
         if len(spans) == 1:
             return read[next(iter(spans))].reshape(u.shape)
-        found = np.empty(u.shape)
+        values = np.empty(u.shape)
         for name, span in spans.items():
-            found[..., span] = read[name].reshape(u.shape)[..., span]
-        return found
+            values[..., span] = read[name].reshape(u.shape)[..., span]
+        return values
 
     def angle(self, extreme: Extreme) -> float:
         """Crank angle of an extreme, rad."""
@@ -356,12 +358,14 @@ class Sampler:
 
     def pushed(self, name: str) -> float:
         """Largest |quantity| where Q is not negative, SI; of what only pushes that is its peak."""
-        found = [each for each in self.extremes(name) if each.height > 0.0]
-        if not found:
+        extremes = [extreme for extreme in self.extremes(name) if extreme.height > 0.0]
+        if not extremes:
             return 0.0
-        node = self.node(np.array([each.piece for each in found]), np.array([each.u for each in found]))
+        node = self.node(
+            np.array([extreme.piece for extreme in extremes]), np.array([extreme.u for extreme in extremes])
+        )
         force = np.asarray(self.model.instant(systems.numpy(), self.given, node).force)
-        return max((each.height for each, own in zip(found, force, strict=True) if own >= 0.0), default=0.0)
+        return max((extreme.height for extreme, push in zip(extremes, force, strict=True) if push >= 0.0), default=0.0)
 
     def mean(self, integral: Integral) -> float:
         """Mean of an integral's quantity over its pieces, or at its own angles, SI."""
@@ -440,7 +444,7 @@ def near_zero(sampler: Sampler, name: str, most: float, least: float) -> list[tu
     if not inside.size:
         return []
     runs = np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1)
-    found = [(float(angles[run[0]]), float(angles[run[-1]])) for run in runs]
-    if len(found) > 1 and inside[0] == 0 and inside[-1] == len(u) - 1:
-        found = [*found[1:-1], (found[-1][0], found[0][1] + TURN)]
-    return [(begin, end) for begin, end in found if end - begin >= least]
+    spans = [(float(angles[run[0]]), float(angles[run[-1]])) for run in runs]
+    if len(spans) > 1 and inside[0] == 0 and inside[-1] == len(u) - 1:
+        spans = [*spans[1:-1], (spans[-1][0], spans[0][1] + TURN)]
+    return [(begin, end) for begin, end in spans if end - begin >= least]

@@ -82,25 +82,25 @@ def sizes(sampler: Sampler) -> ProbeSizes:
 def forms(sampler: Sampler, event: Event) -> Forms:
     """Linear forms of the output's loads. Raises UnfollowedError."""
     ends = [-math.inf, *_corners(sampler, event), math.inf]
-    found = {}
+    by_load = {}
     for load in (load for load in sampler.model.loads if load.acts == "output"):
         spans = itertools.pairwise(ends)
-        found[load.name] = tuple(_form(sampler, event, load, _switch(sampler, event, load, *span)) for span in spans)
-    return found
+        by_load[load.name] = tuple(_form(sampler, event, load, _switch(sampler, event, load, *span)) for span in spans)
+    return by_load
 
 
 def body(sampler: Sampler, event: Event, known: Forms) -> Body:
     """Output on its own; known: the linear forms of its loads. Raises UnfollowedError."""
-    zones = [tuple(each) for each in zip(*known.values(), strict=True)]
-    mass, damping, _, _, friction = (math.fsum(values) for values in zip(*zones[0], strict=True))
-    held = tuple(Zone(math.fsum(f.stiffness for f in each), math.fsum(f.steady for f in each)) for each in zones)
+    rows = [tuple(forms) for forms in zip(*known.values(), strict=True)]
+    mass, damping, _, _, friction = (math.fsum(values) for values in zip(*rows[0], strict=True))
+    zones = tuple(Zone(math.fsum(f.stiffness for f in forms), math.fsum(f.steady for f in forms)) for forms in rows)
     least = {"mass": mass - math.ulp(0.0), "damping": damping, "friction": friction}
-    least["stiffness"] = min(zone.stiffness for zone in held)
+    least["stiffness"] = min(zone.stiffness for zone in zones)
     for name, value in least.items():
         if value < 0.0:
             remedy = f"Take {event.name} off (--without {event.name})"
             raise UnfollowedError(event.name, f"without its mechanism the output has no {name} above 0", remedy)
-    return Body(mass, damping, friction, tuple(_corners(sampler, event)), held)
+    return Body(mass, damping, friction, tuple(_corners(sampler, event)), zones)
 
 
 def _corners(sampler: Sampler, event: Event) -> list[float]:
@@ -129,15 +129,15 @@ def _switch(sampler: Sampler, event: Event, load: Acting, low: float, high: floa
         raise _refused(event, load, "it moves on its own")
     if load.known_in(sampler.model.words_of(load.name)):
         raise _refused(event, load, "it is known in part of the turn only")
-    own = _cornered(sampler, load)
-    if not own:
+    corners = _cornered(sampler, load)
+    if not corners:
         return 0.0
     places = event.places(sampler.given.values)
     angles = {angle for name in load.reads if name in places for angle in sampler.given.values[name]}
-    found = {switch for place, switch in _switches(sampler, load) if low <= place <= high}
-    if set(own) != angles or len(found) != 1:
+    switches = {switch for place, switch in _switches(sampler, load) if low <= place <= high}
+    if set(corners) != angles or len(switches) != 1:
         raise _refused(event, load, "it goes by the crank angle")
-    return found.pop()
+    return switches.pop()
 
 
 def _switches(sampler: Sampler, load: Acting) -> Iterator[tuple[float, float]]:
@@ -209,9 +209,9 @@ class Parted:
         """Curves from one end of a stretch to the other; whole: the rows of a turn."""
         output = next(iter(columns.motion))
         name, unit = split(output)
-        found = columns_at(self.sampler, columns, self._rows(whole, stretch))
-        face = found[output]
-        flown = found | (self._flown(found, columns, stretch) if stretch.piece else {})
+        curves = columns_at(self.sampler, columns, self._rows(whole, stretch))
+        face = curves[output]
+        flown = curves | (self._flown(curves, columns, stretch) if stretch.piece else {})
         gap = np.maximum(flown[output] - face, 0.0)
         beside = {f"{HELD.format(name)} [{unit}]": face, f"{GAP} [{unit}]": gap}
         first = {ANGLE: flown[ANGLE], output: flown[output], **beside}
@@ -231,17 +231,17 @@ class Parted:
             np.concatenate([[stretch.begin], whole[2][inside], [stretch.end]]),
         )
 
-    def _flown(self, found: dict[str, Floats], columns: Columns, stretch: Stretch) -> dict[str, Floats]:
+    def _flown(self, curves: dict[str, Floats], columns: Columns, stretch: Stretch) -> dict[str, Floats]:
         """Columns that are the output's own in flight; nothing acts between it and the mechanism."""
         piece, omega, body = stretch.piece, self.course.cam.omega, self.course.body
         assert piece
-        motions = [self.course.free(stretch, float(angle)) for angle in found[ANGLE]]
+        motions = [self.course.free(stretch, float(angle)) for angle in curves[ANGLE]]
         x, v, a = (np.array(values) for values in zip(*motions, strict=True))
-        jerk = np.array([0.0 if piece.stuck else piece.jerk(each) for each in motions])
+        jerk = np.array([0.0 if piece.stuck else piece.jerk(motion) for motion in motions])
         name, orders = split(next(iter(columns.motion)))[0], (x, v, a, jerk)
-        own = {f"{name}_{k}" if k else name: values / omega**k for k, values in enumerate(orders)}
-        own |= {f"{name}_{'t' * k}": values for k, values in enumerate(orders) if k}
-        shown = {column: own[split(column)[0]] for column in found if split(column)[0] in own}
+        motion_columns = {f"{name}_{k}" if k else name: values / omega**k for k, values in enumerate(orders)}
+        motion_columns |= {f"{name}_{'t' * k}": values for k, values in enumerate(orders) if k}
+        shown = {column: motion_columns[split(column)[0]] for column in curves if split(column)[0] in motion_columns}
         direction = -body.rest(piece.zone, piece.x) / body.friction if piece.stuck else piece.sign
         drive = np.zeros(len(x))
         for load in self.sampler.model.loads:
@@ -249,13 +249,13 @@ class Parted:
                 term = self.loads[load.name][piece.zone].at(x, v, a, direction)
                 shown[f"{load_name(load)} [{columns.unit}]"] = np.broadcast_to(term, x.shape)
             else:
-                drive = drive + found[f"{load_name(load)} [{SI_UNIT['torque']}]"]
+                drive = drive + curves[f"{load_name(load)} [{SI_UNIT['torque']}]"]
         none = np.zeros(len(x))
         torque = columns.torque[0] if columns.torque else ""
         ends = {columns.force[0] if columns.force else "": none, torque: drive, POWER: drive * omega}
         # What checks read holds of an output that rests on its mechanism.
         unknown = {f"{check} [{unit}]": np.full(len(x), np.nan) for check, unit in columns.checks.items()}
-        return shown | {column: values for column, values in (ends | unknown).items() if column in found}
+        return shown | {column: values for column, values in (ends | unknown).items() if column in curves}
 
 
 def followed(scene: Scene, sampler: Sampler) -> Parted | None:
@@ -312,7 +312,7 @@ def _pulls(sampler: Sampler, event: Event) -> tuple[tuple[float, float], ...]:
     """
     pieces, u = sampler.grid(SAMPLES)
     least = sampler.extremes(event.least)
-    pieces, u = np.append(pieces, [each.piece for each in least]), np.append(u, [each.u for each in least])
+    pieces, u = np.append(pieces, [extreme.piece for extreme in least]), np.append(u, [extreme.u for extreme in least])
     order = np.lexsort((u, pieces))
     pieces, u = pieces[order], u[order]
     force, angles = sampler.at(event.force, pieces, u), sampler.cycle.angles(pieces, u)

@@ -33,22 +33,22 @@ class Session:
         what: of which there are so many at most.
         """
         with LOCK:
-            found = self._kept.setdefault(what, OrderedDict())
-            if key in found:
-                found.move_to_end(key)
+            values = self._kept.setdefault(what, OrderedDict())
+            if key in values:
+                values.move_to_end(key)
             else:
-                found[key] = make()
-                if len(found) > most:
-                    found.popitem(last=False)
-            return cast(Made, found[key])
+                values[key] = make()
+                if len(values) > most:
+                    values.popitem(last=False)
+            return cast(Made, values[key])
 
     def beside(self, owner: object, key: Hashable, make: Callable[[], Made]) -> Made:
         """Cached value of an owner by a key, made where it is missing; it is dropped with its owner."""
         with LOCK:
-            found = self._beside.setdefault(owner, {})
-            if key not in found:
-                found[key] = make()
-            return cast(Made, found[key])
+            values = self._beside.setdefault(owner, {})
+            if key not in values:
+                values[key] = make()
+            return cast(Made, values[key])
 
     def latest(self, what: str) -> Iterator[object]:
         """Yield all that are kept of one sort, the one used last first."""

@@ -72,7 +72,7 @@ def terms(
         if isinstance(load, State):
             yield load, load.force(at, replied(maths, load, loads, pose, given, switch))
         elif load.upon:
-            others = [each for each in loads if each is not load]
+            others = [acting for acting in loads if acting is not load]
             yield load, load.upon(at, Loaded(maths, others, pose, given, switch))
         else:
             yield load, load.force(at)
@@ -82,12 +82,12 @@ def replied(
     maths: Maths, state: State, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values
 ) -> tuple[Number, Number]:
     """z and z˙ in answer to the loads with corners that a state carries."""
-    found = []
+    answers = []
     for load in loads:
         if isinstance(load, Load) and load.name in state.carries and load.response:
             oscillator = state.oscillator(given.inputs(maths, state))
-            found.append(load.response(given.inputs(maths, load, pose, switch), oscillator))
-    return total([position for position, _ in found]), total([rate for _, rate in found])
+            answers.append(load.response(given.inputs(maths, load, pose, switch), oscillator))
+    return total([position for position, _ in answers]), total([rate for _, rate in answers])
 
 
 def total(numbers: Sequence[Number]) -> Number:
@@ -113,9 +113,9 @@ def output_force(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Giv
 
 def crank_torque(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values) -> Number:
     """Torque on the crank, N·m: Q q' and the drive's own terms."""
-    found = list(terms(maths, loads, pose, given, switch, carried(loads)))
-    output = [term for load, term in found if load.acts == "output"]
-    drive = [term for load, term in found if load.acts == "drive"]
+    pairs = list(terms(maths, loads, pose, given, switch, carried(loads)))
+    output = [term for load, term in pairs if load.acts == "output"]
+    drive = [term for load, term in pairs if load.acts == "drive"]
     drive += [term for load in loads if (term := inside(maths, load, pose, given)) is not None]
     return total([total(output) * pose.q1, *drive] if output else drive)
 
@@ -160,8 +160,8 @@ class Loaded:
         inertia = total([load.moved(self.given.inputs(self.maths, load)) for load, _ in moving if load.moved])
         pushed = total([term for load, term in moving if not load.moved])
         acceleration = (self.force - pushed) / inertia
-        found: Motion = state.moved(at, coordinate, self.force, acceleration)
-        return found
+        motion: Motion = state.moved(at, coordinate, self.force, acceleration)
+        return motion
 
     @lazy
     def masses(self) -> Sequence[tuple[LinkMass, Motion]]:
@@ -181,36 +181,36 @@ class Loaded:
     @lazy
     def applied(self) -> Sequence[Applied]:
         """Forces on links and joints by name."""
-        found: list[Applied] = []
+        forces: list[Applied] = []
         for load in (load for load in self.loads if isinstance(load, Load) and load.applied):
             assert load.applied is not None
-            found += load.applied(self.given.inputs(self.maths, load, self.pose, self.switch))
-        return found
+            forces += load.applied(self.given.inputs(self.maths, load, self.pose, self.switch))
+        return forces
 
 
 def masses(
     maths: Maths, loads: Sequence[Acting], given: Given, motions: tuple[Motion, Motion]
 ) -> list[tuple[LinkMass, Motion]]:
     """Masses that loads move, inertia alone where a load has no mass; motions: the output's, and of carried parts."""
-    found = []
+    pairs = []
     gone = carried(loads)
     for load in (load for load in loads if isinstance(load, Load)):
         at, motion = given.inputs(maths, load), motions[load.name in gone]
         if load.mass:
-            found.append((load.mass(at), motion))
+            pairs.append((load.mass(at), motion))
         elif load.moved:
-            found.append((LinkMass("", 0, 0, 0, load.moved(at)), motion))
-    return found
+            pairs.append((LinkMass("", 0, 0, 0, load.moved(at)), motion))
+    return pairs
 
 
 def pushes(
     maths: Maths, terms: Sequence[tuple[Acting, Number]], given: Given, motions: tuple[Motion, Motion]
 ) -> "list[Vector]":
     """Forces that loads tell of their terms, N; motions: the output's, and of what is carried."""
-    found = []
+    vectors = []
     gone = carried([load for load, _ in terms])
     for load, term in terms:
         if isinstance(load, Load) and load.push:
             push = load.push(given.inputs(maths, load, motions[load.name in gone]), term)
-            found += [] if push is None else [push]
-    return found
+            vectors += [] if push is None else [push]
+    return vectors

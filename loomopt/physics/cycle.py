@@ -95,8 +95,8 @@ class Cycle:
 
     def begins(self, corners: Sequence[Number], pi: Number) -> list[Number]:
         """Starts in another number system; corners: as declared, flat, rad; pi: π of that system."""
-        found = [corners[place] + 2 * pi * turn for place, turn in self.order] or [0 * pi]
-        return [*found, found[0] + 2 * pi]
+        angles = [corners[place] + 2 * pi * turn for place, turn in self.order] or [0 * pi]
+        return [*angles, angles[0] + 2 * pi]
 
     def located(self, angles: Floats) -> tuple[Pieces, Floats]:
         """Nodes (pieces, u) at crank angles in rad."""

@@ -166,9 +166,9 @@ class ModelNeeds(NamedTuple):
     may: tuple[str, ...] = ()
 
 
-def model_of(effect: "Effect", own: Table) -> ModelNeeds:
+def model_of(effect: "Effect", table: Table) -> ModelNeeds:
     """Numbers that an effect needs with the model that its table names; none where it has one model only."""
-    return effect.models.get(str(getattr(own, "model", "")), ModelNeeds())
+    return effect.models.get(str(getattr(table, "model", "")), ModelNeeds())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -240,11 +240,11 @@ class LoadTable(NamedTuple):
         return {"angle": "angle", self.column: self.kind} | ({self.beside: self.kind} if self.beside else {})
 
 
-def needed(effect: "Effect", own: Table) -> tuple[str, ...]:
+def needed(effect: "Effect", parameters: Table) -> tuple[str, ...]:
     """Scene keys that an effect needs with the values of its table."""
     table = effect.tabulated if isinstance(effect, Load) else None
-    given = table is not None and getattr(own, table.key) is not None
-    own_needs = (*effect.needs, *model_of(effect, own).needs)
+    given = table is not None and getattr(parameters, table.key) is not None
+    own_needs = (*effect.needs, *model_of(effect, parameters).needs)
     return tuple(key for key in own_needs if not (given and table and key in table.needless))
 
 
@@ -254,8 +254,8 @@ def required(effect: "Effect") -> tuple[str, ...]:
     for_curve = table.instead if table else ()
     fields = effect.table.model_fields
     usual = effect.models.get(str(fields["model"].default), ModelNeeds()) if effect.models else ModelNeeds()
-    asked = {*for_curve, *usual.keys}
-    return tuple(key for key, info in fields.items() if info.is_required() or (key in asked and info.default is None))
+    wanted = {*for_curve, *usual.keys}
+    return tuple(key for key, info in fields.items() if info.is_required() or (key in wanted and info.default is None))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -332,7 +332,7 @@ def inertia_load(
     )
 
 
-def nothing_sold(own: Any) -> Mapping[str, Sequence[float]]:
+def nothing_sold(parameters: Any) -> Mapping[str, Sequence[float]]:
     """Empty: no number of the effect comes in sizes."""
     return {}
 
@@ -345,7 +345,7 @@ def nothing_remarked(at: Inputs[None], shown: ShowValue) -> str:
 def nothing_explained(
     known: Mapping[str, float],
     bounds: Mapping[str, tuple[float, float]],
-    own: Any,
+    parameters: Any,
     clash: Collection[str],
     shown: ShowValue,
 ) -> str:
@@ -522,7 +522,7 @@ class Event(Effect):
     read: "Callable[[Course], Mapping[str, float | None]]"
     rules: Callable[[EventTerms], Sequence[Rule]]
 
-    def rests(self, own: Values) -> str:
+    def rests(self, table: Values) -> str:
         """Parts of the effect that no proof and no study of accuracy covers."""
         return f"{self.name}, which is simulated ({', '.join(figure.name for figure in self.figures)})"
 
@@ -601,20 +601,20 @@ class Written(NamedTuple):
 @functools.lru_cache(maxsize=256)
 def keys(table: type[Table]) -> tuple[str, ...]:
     """Keys of a table's values, those of the tables inside it dotted."""
-    found: list[str] = []
+    names: list[str] = []
     for key, info in table.model_fields.items():
         kinds = (info.annotation, *get_args(info.annotation))
         inner = next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Table)), None)
-        found += [f"{key}.{each}" for each in keys(inner)] if inner else [key]
-    return tuple(found)
+        names += [f"{key}.{inner_key}" for inner_key in keys(inner)] if inner else [key]
+    return tuple(names)
 
 
 def value_at(table: Table, key: str) -> object:
     """Table's value by a dotted key; None where it, or the table that it would stand in, is not given."""
-    found: object = table
+    value: object = table
     for part in key.split("."):
-        found = None if found is None else getattr(found, part)
-    return found
+        value = None if value is None else getattr(value, part)
+    return value
 
 
 def owned(effect: Effect, key: str) -> str:
@@ -627,11 +627,11 @@ def lacking(check: Check[Any], known: Collection[str]) -> dict[str, tuple[str, .
 
     known: names of scene numbers that are given; empty for all of them.
     """
-    found: dict[str, tuple[str, ...]] = {}
+    figures: dict[str, tuple[str, ...]] = {}
     for name, keys in check.wanted.items():
         missing = tuple(key for key in keys if known and key.split(".", 1)[1] not in known)
-        found |= {name: missing} if missing else {}
-    return found
+        figures |= {name: missing} if missing else {}
+    return figures
 
 
 def asked(missing: Collection[str], known: Collection[str]) -> str:
@@ -654,10 +654,10 @@ def of(package: str, variant: str = "EFFECT") -> Mapping[str, Effect]:
     variant: another name under which a module may declare it, or None where it then has no effect.
     """
     folder = importlib.import_module(package)
-    names = [found.name for found in pkgutil.iter_modules(folder.__path__)]
+    names = [entry.name for entry in pkgutil.iter_modules(folder.__path__)]
     modules = [importlib.import_module(f"{package}.{name}") for name in names]
-    found = (getattr(module, variant, module.EFFECT) for module in modules if hasattr(module, "EFFECT"))
-    return ranked(effect for effect in found if effect is not None)
+    effects = (getattr(module, variant, module.EFFECT) for module in modules if hasattr(module, "EFFECT"))
+    return ranked(effect for effect in effects if effect is not None)
 
 
 class Fault(NamedTuple):
@@ -671,7 +671,7 @@ class Fault(NamedTuple):
 
 def faults(active: Mapping[Effect, Table]) -> Iterator[Fault]:
     """Yield what keeps effects from being on together; active: effects with their tables, in the order of the job."""
-    tables = {effect.name: own for effect, own in active.items()}
+    tables = {effect.name: table for effect, table in active.items()}
     for effect in active:
         for name in effect.beside:
             if name not in tables:

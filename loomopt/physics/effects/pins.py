@@ -30,8 +30,8 @@ def own(pins: Mapping[str, str]) -> type[Table]:
     inner = create_model("Pins", __base__=Table, __module__=__name__, __doc__="Friction of each pin.", **fields)  # type: ignore[call-overload]
     whole = (inner | None, Field(None, description="friction of the pins, for what they lose: a figure only"))
     doc = "What only the loss by friction reads."
-    found: type[Table] = create_model("Parameters", __base__=Table, __module__=__name__, __doc__=doc, pins=whole)  # type: ignore[arg-type]
-    return found
+    model: type[Table] = create_model("Parameters", __base__=Table, __module__=__name__, __doc__=doc, pins=whole)  # type: ignore[arg-type]
+    return model
 
 
 def read(effect: str, pins: Mapping[str, str]) -> tuple[str, ...]:
@@ -44,7 +44,7 @@ def works(at: Inputs[Any], turned: Mapping[str, tuple[str, Number]]) -> dict[str
 
     turned: pin → the name of its force, and δ', how the pin turns per rad of the crank.
     """
-    found = {}
+    work = {}
     for pin, (force, turn) in turned.items():
-        found[force] = at.table[f"pins.{pin}.mu"] * at.table[f"pins.{pin}.radius"] * at.maths.sqrt(turn**2)
-    return found
+        work[force] = at.table[f"pins.{pin}.mu"] * at.table[f"pins.{pin}.radius"] * at.maths.sqrt(turn**2)
+    return work

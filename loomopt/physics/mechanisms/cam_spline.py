@@ -159,9 +159,9 @@ def tabulated(u: Sequence[float], s: Sequence[float], half: Sequence[float] = ()
     if fault:
         raise ValueError(fault)
     halves = tuple(half) or (0.0,) * len(places)
-    found = smooth_rise.through(tuple(places.tolist()), tuple(heights.tolist()), halves)
-    _refuse_a_fall(found, DIP + 4 * max(halves) / float(np.diff(places).min()))
-    return LawTable(found.u, found.s, found.v, found.after, found.before, found)
+    curve = smooth_rise.through(tuple(places.tolist()), tuple(heights.tolist()), halves)
+    _refuse_a_fall(curve, DIP + 4 * max(halves) / float(np.diff(places).min()))
+    return LawTable(curve.u, curve.s, curve.v, curve.after, curve.before, curve)
 
 
 def _table_fault(u: "Floats", s: "Floats") -> str:
@@ -183,11 +183,11 @@ def _table_fault(u: "Floats", s: "Floats") -> str:
     return ""
 
 
-def _refuse_a_fall(found: SmoothRise, dip: float) -> None:
+def _refuse_a_fall(curve: SmoothRise, dip: float) -> None:
     """Raise ValueError naming the interval where the slope, a parabola, is least, if it is below −dip there."""
     import numpy as np
 
-    u, v, begin, end = (np.array(each) for each in (found.u, found.v, found.after[:-1], found.before[1:]))
+    u, v, begin, end = (np.array(values) for values in (curve.u, curve.v, curve.after[:-1], curve.before[1:]))
     rise = end - begin
     bowl = np.where(rise > 0, rise, 1.0)
     share = np.where(rise > 0, np.clip(-begin / bowl, 0.0, 1.0), 0.0)

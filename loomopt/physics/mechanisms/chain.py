@@ -85,19 +85,19 @@ class Part:
 
     def word(self, key: str) -> str:
         """Word by its key; "" without it."""
-        found = self._words.get(key, "")
-        return found if isinstance(found, str) else ""
+        text = self._words.get(key, "")
+        return text if isinstance(text, str) else ""
 
     def names(self, key: str) -> tuple[str, ...]:
         """List of words by its key."""
-        found = self._words.get(key, ())
-        return found if isinstance(found, tuple) else ()
+        words = self._words.get(key, ())
+        return words if isinstance(words, tuple) else ()
 
     @property
     def ratio(self) -> int | float:
         """How often it turns for one turn of what drives it."""
-        found = self._words.get("ratio", 1)
-        return found if isinstance(found, int | float) else 1
+        number = self._words.get("ratio", 1)
+        return number if isinstance(number, int | float) else 1
 
 
 @dataclass
@@ -207,12 +207,12 @@ def _power(unit: Vector, exponent: int) -> Vector:
     """Unit vector whose angle is a whole multiple of another's."""
     if exponent < 0:
         unit, exponent = Vector(unit.x, -unit.y), -exponent
-    found = X
+    power = X
     while exponent:
         if exponent & 1:
-            found = turned_by(unit, found)
+            power = turned_by(unit, power)
         unit, exponent = turned_by(unit, unit), exponent >> 1
-    return found
+    return power
 
 
 def _cam(pose: ChainPose, part: Part) -> None:
@@ -299,8 +299,8 @@ DRIVERS = frozenset({"crank", "gear", "cam"})
 
 def joints_of(part: Part) -> tuple[str, ...]:
     """Joints that a part places."""
-    own = (part.name,) if part.kind in ("pivot", "point") else ()
-    return (*own, part.word("pin")) if part.word("pin") else own
+    names = (part.name,) if part.kind in ("pivot", "point") else ()
+    return (*names, part.word("pin")) if part.word("pin") else names
 
 
 def links_of(part: Part) -> tuple[str, ...]:
@@ -317,14 +317,14 @@ def provides(part: Part) -> tuple[str, ...]:
 
 def wanted_joints(part: Part) -> tuple[str, ...]:
     """Joints that a part hangs on."""
-    found = (*part.names("joins"), *(part.word(key) for key in ("at", "from", "through")))
-    return tuple(name for name in found if name)
+    names = (*part.names("joins"), *(part.word(key) for key in ("at", "from", "through")))
+    return tuple(name for name in names if name)
 
 
 def wanted_links(part: Part) -> tuple[str, ...]:
     """Links that a part hangs on; the frame is always there."""
-    found = (part.word(key) for key in ("on", "guide", "with", "carrier"))
-    return tuple(name for name in found if name not in ("", FRAME_NAME))
+    names = (part.word(key) for key in ("on", "guide", "with", "carrier"))
+    return tuple(name for name in names if name not in ("", FRAME_NAME))
 
 
 def wants(part: Part) -> tuple[str, ...]:
@@ -407,27 +407,27 @@ class Chain:
     @lazy
     def bars(self) -> tuple[tuple[str, str, str], ...]:
         """(link, joint, joint) of every line that is drawn."""
-        found: list[tuple[str, str, str]] = []
+        triples: list[tuple[str, str, str]] = []
         origin: dict[str, str] = {}
         for part in self.parts:
             pin = part.word("pin")
             starts = part.names("joins") or (part.word("from") or part.word("at"),)
             origin |= dict(zip(links_of(part), starts, strict=False))
             if part.kind == "slot":
-                found.append((part.word("link"), part.word("at"), part.word("through")))
+                triples.append((part.word("link"), part.word("at"), part.word("through")))
             if part.kind == "point":
-                found.append((part.word("on"), origin[part.word("on")], part.name))
+                triples.append((part.word("on"), origin[part.word("on")], part.name))
             elif pin:
-                found += [(link, origin[link], pin) for link in links_of(part)]
-        return tuple(found)
+                triples += [(link, origin[link], pin) for link in links_of(part)]
+        return tuple(triples)
 
     @lazy
     def bodies(self) -> Mapping[str, tuple[str, ...]]:
         """All joints of each link, those of a plate in the order in which they came; the frame's are its pivots."""
-        found: dict[str, tuple[str, ...]] = {FRAME_NAME: self.pivots}
+        joints: dict[str, tuple[str, ...]] = {FRAME_NAME: self.pivots}
         for link, a, b in self.bars:
-            found[link] = tuple(dict.fromkeys((*found.get(link, ()), a, b)))
-        return found
+            joints[link] = tuple(dict.fromkeys((*joints.get(link, ()), a, b)))
+        return joints
 
 
 SAMPLES, WORTH_A_LOOK, SINGULAR = 720, 0.99, 1e-12
@@ -445,28 +445,28 @@ def fault(chain: Chain, values: Values, shown: ShowValue = usual) -> str:
 
     with np.errstate(all="ignore"):
         for part in chain.parts:
-            found = _cam_fault(chain, part, values, shown) if part.kind == "cam" else ""
-            found = found or (_gear_fault(chain, part, values, shown) if part.kind == "gear" else "")
-            for phrase, span in {} if found else _spans(part).items():
+            problem = _cam_fault(chain, part, values, shown) if part.kind == "cam" else ""
+            problem = problem or (_gear_fault(chain, part, values, shown) if part.kind == "gear" else "")
+            for phrase, span in {} if problem else _spans(part).items():
                 top, place = _top(functools.partial(_heights, chain, part, span, values))
                 if not top < 1 - SINGULAR:
                     return f"{phrase} fails at crank angle {shown(place, 'angle')}"
-            if found:
-                return found
+            if problem:
+                return problem
     return ""
 
 
 def _spans(part: Part) -> Mapping[str, str]:
     """Quantities that must be positive for a part to close; of a dyad also the distance of its outer joints."""
-    own = closes(part)
-    return {**own, **_apart(part, *part.names("joins"))} if part.kind == "dyad" else own
+    spans = closes(part)
+    return {**spans, **_apart(part, *part.names("joins"))} if part.kind == "dyad" else spans
 
 
 def _heights(chain: Chain, part: Part, span: str, values: Values, phi: "Floats") -> "Floats":
     import numpy as np
 
-    found = chain.pose(numpy(), values, phi, chain.switch(values, phi)).margins[part.name].spans[span]()
-    return np.broadcast_to(np.asarray(found, dtype=np.float64), phi.shape)
+    heights = chain.pose(numpy(), values, phi, chain.switch(values, phi)).margins[part.name].spans[span]()
+    return np.broadcast_to(np.asarray(heights, dtype=np.float64), phi.shape)
 
 
 def _top(heights: "Callable[[Floats], Floats]") -> tuple[float, float]:
@@ -479,14 +479,14 @@ def _top(heights: "Callable[[Floats], Floats]") -> tuple[float, float]:
     angles: Floats = step * np.arange(SAMPLES, dtype=np.float64)
     values = heights(angles)
     best = int(np.argmax(values))
-    found = [(float(values[best]), float(angles[best]))]
-    if not found[0][0] < 1 - SINGULAR:
-        return found[0]
+    candidates = [(float(values[best]), float(angles[best]))]
+    if not candidates[0][0] < 1 - SINGULAR:
+        return candidates[0]
     tops = (values >= np.roll(values, 1)) & (values >= np.roll(values, -1)) & (values > WORTH_A_LOOK)
     for angle in angles[tops]:
         at = sectioned(heights, float(angle) - step, float(angle) + step)
-        found.append((float(heights(np.array([at]))[0]), at % (2 * math.pi)))
-    return max(found, key=lambda each: math.inf if math.isnan(each[0]) else each[0])
+        candidates.append((float(heights(np.array([at]))[0]), at % (2 * math.pi)))
+    return max(candidates, key=lambda candidate: math.inf if math.isnan(candidate[0]) else candidate[0])
 
 
 def _cam_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> str:
@@ -514,7 +514,7 @@ def _gear_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> s
         if steps[jump] > math.pi:
             end = f"{part.name}: {part.word('with')} keeps within half a turn of zero"
             return f"{end} fails at crank angle {shown(float(angles[jump]), 'angle')}"
-    x, y = (np.broadcast_to(each, angles.shape) for each in pose.links[part.name].unit())
+    x, y = (np.broadcast_to(component, angles.shape) for component in pose.links[part.name].unit())
     if math.hypot(x[-1] - x[0], y[-1] - y[0]) > 1e-9:
         return f"{part.name}: after a turn of the crank it stands elsewhere, for its ratio is no whole number"
     return ""

@@ -27,32 +27,36 @@ def slider_of(part: str) -> str:
 
 def owners(linked: Chain) -> dict[str, str]:
     """Body that each joint belongs to."""
-    found = {}
+    bodies = {}
     for part in linked.parts:
         pin = part.word("pin")
         if part.kind == "pivot":
-            found[part.name] = FRAME_NAME
+            bodies[part.name] = FRAME_NAME
         elif part.kind == "point":
-            found[part.name] = part.word("on")
+            bodies[part.name] = part.word("on")
         elif pin:
-            own = {"dyad": part.names("links")[-1:], "slider": (slider_of(part.name),), "slot": (part.word("link"),)}
-            found[pin] = own.get(part.kind, (part.name,))[0]
-    return found
+            by_kind = {
+                "dyad": part.names("links")[-1:],
+                "slider": (slider_of(part.name),),
+                "slot": (part.word("link"),),
+            }
+            bodies[pin] = by_kind.get(part.kind, (part.name,))[0]
+    return bodies
 
 
 def origins(linked: Chain) -> dict[str, str]:
     """Joint about which each link's moment is reckoned."""
-    found: dict[str, str] = {}
+    joints: dict[str, str] = {}
     for part in linked.parts:
         if part.kind == "dyad":
-            found |= dict(zip(part.names("links"), part.names("joins"), strict=True))
+            joints |= dict(zip(part.names("links"), part.names("joins"), strict=True))
         elif part.kind == "slider":
-            found[part.names("links")[0]] = part.word("from")
+            joints[part.names("links")[0]] = part.word("from")
         elif part.kind == "slot":
-            found[part.word("link")] = part.word("at")
+            joints[part.word("link")] = part.word("at")
         elif part.kind in ("crank", "gear", "cam"):
-            found[part.name] = part.word("at")
-    return found
+            joints[part.name] = part.word("at")
+    return joints
 
 
 def held(linked: Chain) -> Iterator[tuple[str, str]]:
@@ -70,9 +74,9 @@ def held(linked: Chain) -> Iterator[tuple[str, str]]:
 
 def names(linked: Chain) -> dict[tuple[str, str], str]:
     """Names of the forces by joint and part: after the joint, and after the part too where several parts share it."""
-    found = list(held(linked))
-    shared = [joint for joint, _ in found]
-    return {each: each[0] if shared.count(each[0]) == 1 else f"{each[0]}_{each[1]}" for each in found}
+    places = list(held(linked))
+    shared = [joint for joint, _ in places]
+    return {place: place[0] if shared.count(place[0]) == 1 else f"{place[0]}_{place[1]}" for place in places}
 
 
 def pinned(linked: Chain) -> dict[tuple[str, str], str]:
@@ -82,19 +86,19 @@ def pinned(linked: Chain) -> dict[tuple[str, str], str]:
 
 def joined(linked: Chain, place: tuple[str, str]) -> tuple[str, str]:
     """Bodies that a force is between: of the first on the second one."""
-    joint, own = place
-    part = next(each for each in linked.parts if each.name == own)
+    joint, name = place
+    part = next(candidate for candidate in linked.parts if candidate.name == name)
     if part.kind == "dyad":
         first, second = part.names("links")
         if joint == part.word("pin"):
             return first, second
         return owners(linked)[joint], first if joint == part.names("joins")[0] else second
     if part.kind == "slider":
-        (link,), slider = part.names("links"), slider_of(own)
-        if joint == own:
+        (link,), slider = part.names("links"), slider_of(name)
+        if joint == name:
             return part.word("guide") or FRAME_NAME, slider
         return (link, slider) if joint == part.word("pin") else (owners(linked)[joint], link)
-    return owners(linked)[joint], part.word("link") if part.kind == "slot" else own
+    return owners(linked)[joint], part.word("link") if part.kind == "slot" else name
 
 
 def guides(linked: Chain) -> dict[str, str]:
@@ -112,9 +116,9 @@ def turned(linked: Chain, pose: ChainPose, place: tuple[str, str]) -> Number:
 
 def geared(linked: Chain) -> tuple[str, ...]:
     """Gears that touch their mates at their pitch circles."""
-    own = origins(linked)
+    joints = origins(linked)
     gears = (part for part in linked.parts if part.kind == "gear" and part.ratio != 1)
-    return tuple(part.name for part in gears if own[part.word("with")] != part.word("at"))
+    return tuple(part.name for part in gears if joints[part.word("with")] != part.word("at"))
 
 
 @dataclass
@@ -156,8 +160,8 @@ class Walk:
 
     def acting(self, body: str, joint: str) -> Wrench | None:
         """Load on a body about one of its joints; None without any."""
-        found = joint_forces.together(self.loads.get(body, ()))
-        return None if found is None else Wrench(found.force, found.moment - cross(self.at(joint), found.force))
+        wrench = joint_forces.together(self.loads.get(body, ()))
+        return None if wrench is None else Wrench(wrench.force, wrench.moment - cross(self.at(joint), wrench.force))
 
     def given(self, joint: str, part: Part, force: Vector) -> None:
         """Keep the force of a joint on a part's link, and its opposite on what the joint belongs to."""
@@ -175,10 +179,10 @@ class Walk:
     def _dyad(self, part: Part) -> None:
         (a, b), (first, second), pin = part.names("joins"), part.names("links"), part.word("pin")
         r1, r2 = plus(self.at(pin), minus(self.at(a))), plus(self.at(pin), minus(self.at(b)))
-        found = joint_forces.two_links(Dyad(r1, r2, 2 * cross(r1, r2)), self.acting(first, a), self.acting(second, b))
-        self.forces[pin, part.name] = found.inner
-        self.given(a, part, found.outer1)
-        self.given(b, part, found.outer2)
+        forces = joint_forces.two_links(Dyad(r1, r2, 2 * cross(r1, r2)), self.acting(first, a), self.acting(second, b))
+        self.forces[pin, part.name] = forces.inner
+        self.given(a, part, forces.outer1)
+        self.given(b, part, forces.outer2)
 
     def _slider(self, part: Part) -> None:
         start, pin, guide = part.word("from"), part.word("pin"), part.word("guide") or FRAME_NAME
@@ -186,10 +190,10 @@ class Walk:
         link = self.acting(part.names("links")[0], start) or Wrench(Vector(0, 0), 0)
         slider = self.acting(slider_of(part.name), pin) or Wrench(Vector(0, 0), 0)
         arm = plus(self.at(pin), minus(self.at(start)))
-        found = joint_forces.link_and_slider(arm, along, link, slider.force)
-        self.forces[pin, part.name], self.forces[part.name, part.name] = found.inner, found.outer2
-        self.push(guide, minus(found.outer2), self.at(pin))
-        self.given(start, part, found.outer1)
+        forces = joint_forces.link_and_slider(arm, along, link, slider.force)
+        self.forces[pin, part.name], self.forces[part.name, part.name] = forces.inner, forces.outer2
+        self.push(guide, minus(forces.outer2), self.at(pin))
+        self.given(start, part, forces.outer1)
 
     def sliding(self, part: Part) -> Vector:
         """Unit direction in which a slider moves."""
@@ -200,29 +204,29 @@ class Walk:
         pivot, through, link = part.word("at"), part.word("through"), part.word("link")
         arm, lever = plus(self.at(through), minus(self.at(pivot))), self.acting(link, pivot)
         nothing = Wrench(Vector(0, 0), 0)
-        found = joint_forces.slotted_lever(arm, self.pose.links[link].unit(), lever or nothing, nothing)
-        self.given(pivot, part, found.outer1)
-        self.given(through, part, found.outer2)
+        forces = joint_forces.slotted_lever(arm, self.pose.links[link].unit(), lever or nothing, nothing)
+        self.given(pivot, part, forces.outer1)
+        self.given(through, part, forces.outer2)
 
     def _driver(self, part: Part) -> None:
         joint = part.word("at")
-        own = self.acting(part.name, joint)
-        if own is None:
-            own = Wrench(Vector(0, 0), 0)
+        wrench = self.acting(part.name, joint)
+        if wrench is None:
+            wrench = Wrench(Vector(0, 0), 0)
         rate = part.ratio if part.kind == "crank" else known(self.pose.links[part.name].rates(1))
-        self.torque = self.torque - own.moment * rate
+        self.torque = self.torque - wrench.moment * rate
         if part.kind == "crank":
-            self.given(joint, part, minus(own.force))
+            self.given(joint, part, minus(wrench.force))
 
     def _gear(self, part: Part) -> None:
         joint, mate = part.word("at"), part.word("with")
-        own = self.acting(part.name, joint) or Wrench(Vector(0, 0), 0)
-        torque, here = -own.moment, self.at(joint)
+        wrench = self.acting(part.name, joint) or Wrench(Vector(0, 0), 0)
+        torque, here = -wrench.moment, self.at(joint)
         if part.name not in geared(self.linked):
             # On one axis, or side by side with the same speed: a couple, and what is left of it on the carrier.
             self.push(mate, None, here, -part.ratio * torque)
             self.push(part.word("carrier") or FRAME_NAME, None, here, (part.ratio - 1) * torque)
-            self.given(joint, part, minus(own.force))
+            self.given(joint, part, minus(wrench.force))
             return
         between = plus(self.at(self.origins[mate]), minus(here))
         distance = self.pose.maths.sqrt(dot(between, between))
@@ -230,7 +234,7 @@ class Walk:
         self.teeth[part.name] = torque / radius
         push = joint_forces.tooth_force(torque, radius, towards)
         self.push(mate, minus(push), Vector(here.x + radius * towards.x, here.y + radius * towards.y))
-        self.given(joint, part, minus(plus(own.force, push)))
+        self.given(joint, part, minus(plus(wrench.force, push)))
 
 
 def walked(linked: Chain, pose: ChainPose, applied: Sequence[Applied]) -> Walk:
@@ -248,10 +252,10 @@ def walked(linked: Chain, pose: ChainPose, applied: Sequence[Applied]) -> Walk:
 
 def shaken(applied: Sequence[Applied], pose: ChainPose, about: Vector) -> Wrench:
     """Force, N, and moment about a point, N·m, of all moving masses on the frame."""
-    found = []
+    wrenches = []
     for load in (load for load in applied if load.inertial):
         force = load.force or Vector(0, 0)
         place = load.place or (pose.joints[load.on].place if load.on in pose.joints else about)
         moment = cross(plus(place, minus(about)), force)
-        found.append(Wrench(force, moment if load.couple is None else moment + load.couple))
-    return joint_forces.together(found) or Wrench(Vector(0, 0), 0)
+        wrenches.append(Wrench(force, moment if load.couple is None else moment + load.couple))
+    return joint_forces.together(wrenches) or Wrench(Vector(0, 0), 0)

@@ -127,12 +127,12 @@ def curves(lengths: Lengths, phi: "Floats", chunk: int = 8192) -> tuple["Floats"
     import numpy as np
 
     phi = np.asarray(phi, dtype=float)
-    flat, found = phi.ravel(), np.empty((3, phi.size))
+    flat, values = phi.ravel(), np.empty((3, phi.size))
     for begin in range(0, phi.size, chunk):
         part = slice(begin, begin + chunk)
         pose = CrankRockerPose(numpy(), lengths, flat[part])
-        found[0, part], found[1, part], found[2, part] = pose.psi, pose.psi_1, pose.psi_2
-    psi, psi_1, psi_2 = found.reshape(3, *phi.shape)
+        values[0, part], values[1, part], values[2, part] = pose.psi, pose.psi_1, pose.psi_2
+    psi, psi_1, psi_2 = values.reshape(3, *phi.shape)
     return psi, psi_1, psi_2
 
 
@@ -301,7 +301,7 @@ def fault(l1: float, l2: float, l3: float, l4: float, *, shown: ShowValue = usua
         return "every length must be greater than 0"
     least = TELLING * (l1 + l2 + l3 + l4)
     lengths = Lengths(l1, l2, l3, l4)
-    failed = next((each for each, margin in assembly_margins(lengths).items() if not margin > least), None)
+    failed = next((phrase for phrase, margin in assembly_margins(lengths).items() if not margin > least), None)
     if failed is None:
         return ""
     shorter, longer = (shown(math.fsum(getattr(lengths, name) for name in side), "length") for side in failed)

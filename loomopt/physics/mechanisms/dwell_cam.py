@@ -36,7 +36,7 @@ class Stretches:
 
     def corners(self, maths: Maths) -> tuple[Number, ...]:
         """Crank angles between stretches, in order from where the rise begins."""
-        breaks = [maths.number(each.numerator) / each.denominator for each in LAWS[self.law].breaks]
+        breaks = [maths.number(fraction.numerator) / fraction.denominator for fraction in LAWS[self.law].breaks]
         up = [self.begins, *(self.begins + self.rise * at for at in breaks), self.begins + self.rise]
         down = [self.falls, *(self.falls + self.fall * (1 - at) for at in reversed(breaks)), self.falls + self.fall]
         return (*up, *down)

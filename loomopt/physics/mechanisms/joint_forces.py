@@ -59,13 +59,13 @@ def turned(direction: Vector, along: Number, across: Number) -> Vector:
 
 def together(wrenches: Iterable[Wrench]) -> Wrench | None:
     """Sum of what acts on one link about one joint; None for nothing."""
-    found = list(wrenches)
-    if not found:
+    parts = list(wrenches)
+    if not parts:
         return None
-    moment = found[0].moment
-    for other in found[1:]:
+    moment = parts[0].moment
+    for other in parts[1:]:
         moment = moment + other.moment
-    return Wrench(plus(*(each.force for each in found)), moment)
+    return Wrench(plus(*(part.force for part in parts)), moment)
 
 
 def inertia(

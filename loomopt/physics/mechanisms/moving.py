@@ -36,12 +36,12 @@ def by_order(formula: Callable[[int], Found]) -> Callable[[int], Found]:
 
 def once(formula: Callable[[], Found]) -> Callable[[], Found]:
     """Formula that is computed when it is first read."""
-    found: list[Found] = []
+    value: list[Found] = []
 
     def read() -> Found:
-        if not found:
-            found.append(formula())
-        return found[0]
+        if not value:
+            value.append(formula())
+        return value[0]
 
     return read
 
@@ -87,10 +87,10 @@ def minus(a: Vector | None, b: Vector | None) -> Vector | None:
 
 def total(*terms: Number | None) -> Number | None:
     """Sum of the terms that are not zero by construction."""
-    found = None
+    result = None
     for term in terms:
-        found = term if found is None else found if term is None else found + term
-    return found
+        result = term if result is None else result if term is None else result + term
+    return result
 
 
 def times(first: Number | None, *factors: Number | None) -> Number | None:

@@ -264,8 +264,8 @@ class RapierPose:
     @lazy
     def sley_dyad(self) -> Dyad:
         """Rod (A→B1) and sley (B0→B1)."""
-        found = self.four_bar.dyad
-        return Dyad(self._placed(found.link1), self._placed(found.link2), found.area4)
+        bar_dyad = self.four_bar.dyad
+        return Dyad(self._placed(bar_dyad.link1), self._placed(bar_dyad.link2), bar_dyad.area4)
 
     @lazy
     def joints(self) -> dict[str, Vector]:
@@ -355,13 +355,13 @@ def _angles(d: Dimensions) -> Floats:
     span = _span(d, even)
     before, after = np.roll(span, 1), np.roll(span, -1)
     turns = np.flatnonzero((span - before) * (after - span) <= 0.0)
-    found: Floats = even[turns]
+    centres: Floats = even[turns]
     for width in (step, step / 16, step / 256):
-        low, mid, high = (_span(d, found + k * width) for k in (-1, 0, 1))
+        low, mid, high = (_span(d, centres + k * width) for k in (-1, 0, 1))
         bend = low - 2 * mid + high
         shift = np.divide(low - high, 2 * bend, out=np.zeros_like(bend), where=bend != 0.0)
-        found = found + width * np.clip(shift, -1.0, 1.0)
-    return np.unique(np.concatenate([even, np.mod(found, 2 * math.pi)]))
+        centres = centres + width * np.clip(shift, -1.0, 1.0)
+    return np.unique(np.concatenate([even, np.mod(centres, 2 * math.pi)]))
 
 
 def _stretches(angles: Floats, open_at: NDArray[np.bool_], shown: ShowValue) -> str:

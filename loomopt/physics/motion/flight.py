@@ -99,8 +99,8 @@ class Course:
     def first(self) -> tuple[float, float | None]:
         """Angles where the first flight begins and ends, rad from the start; None where it never lands."""
         begun, lift = next((k, turn.lifts[0]) for k, turn in enumerate(self.turns) if turn.lifts)
-        landed = ((k, each) for k, turn in enumerate(self.turns) for each in turn.landings)
-        end = next(((k, each) for k, each in landed if (k, each.angle) > (begun, lift)), None)
+        landed = ((k, landing) for k, turn in enumerate(self.turns) for landing in turn.landings)
+        end = next(((k, landing) for k, landing in landed if (k, landing.angle) > (begun, lift)), None)
         return TURN * begun + lift, TURN * end[0] + end[1].angle if end else None
 
     @property
@@ -112,12 +112,12 @@ class Course:
     def gap_max(self) -> float:
         """The largest gap of the first flight, m."""
         begin, end = self.first
-        found = 0.0
+        largest = 0.0
         for k, turn in enumerate(self.turns):
             for stretch in turn.stretches:
                 if stretch.piece and begin <= TURN * k + (stretch.begin + stretch.end) / 2 <= (end or math.inf):
-                    found = max(found, self._highest(stretch))
-        return found
+                    largest = max(largest, self._highest(stretch))
+        return largest
 
     def _highest(self, stretch: Stretch) -> float:
         """Largest gap within a stretch of flight, m: where the gap's speed changes its sign."""
@@ -145,16 +145,16 @@ def follow(body: Body, cam: Cam, restitution: float, turns: int) -> Course:
     Raises ArithmeticError where a turn does not end in a reasonable number of pieces.
     """
     states: list[FlightState | None] = [None]
-    found: list[FlightTurn] = []
+    course: list[FlightTurn] = []
     rule = _Rule(body, cam, restitution)
-    while len(found) < turns:
-        found.append(rule.turn(states[-1]))
-        end = found[-1].end
+    while len(course) < turns:
+        course.append(rule.turn(states[-1]))
+        end = course[-1].end
         alike = [k for k, state in enumerate(states) if _same(state, end, cam)]
         states.append(end)
         if alike:
-            return Course(body, cam, tuple(found), len(found) - alike[-1])
-    return Course(body, cam, tuple(found), None)
+            return Course(body, cam, tuple(course), len(course) - alike[-1])
+    return Course(body, cam, tuple(course), None)
 
 
 def _same(one: FlightState | None, other: FlightState | None, cam: Cam) -> bool:

@@ -139,11 +139,11 @@ class FourierSeries(NamedTuple):
 
     def at(self, maths: Maths, phi: Number) -> Number:
         """Sum at a crank angle, rad; sines of multiples, for a recurrence would let balls grow."""
-        found = self.cosines[0]
+        value = self.cosines[0]
         for n in range(1, len(self.cosines)):
             angle = n * phi
-            found = found + self.cosines[n] * maths.cos(angle) + self.sines[n] * maths.sin(angle)
-        return found
+            value = value + self.cosines[n] * maths.cos(angle) + self.sines[n] * maths.sin(angle)
+        return value
 
     def tail(self) -> float:
         """Largest of the last harmonics over the largest of all."""
@@ -207,8 +207,8 @@ def named(prefix: str, values: Constants | FourierSeries) -> dict[str, Number]:
     """Numbers by name, as `read_constants` and `read_series` find them again."""
     if isinstance(values, Constants):
         return {f"{prefix}.{name}": value for name, value in values._asdict().items()}
-    found = {f"{prefix}.cos {n}": value for n, value in enumerate(values.cosines)}
-    return found | {f"{prefix}.sin {n}": value for n, value in enumerate(values.sines) if n}
+    cosines = {f"{prefix}.cos {n}": value for n, value in enumerate(values.cosines)}
+    return cosines | {f"{prefix}.sin {n}": value for n, value in enumerate(values.sines) if n}
 
 
 def read_constants(prefix: str, values: Mapping[str, Number]) -> Constants:

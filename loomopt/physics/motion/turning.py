@@ -102,21 +102,24 @@ def _resolved(starts: Floats, mean: float, surplus: Surplus, points_first: int) 
     guess = _Motion(np.zeros(sum(degrees)), mean**2 / 2, mean)
     while True:
         points = _Points(starts, degrees)
-        found = _newton(points, guess, mean, surplus)
-        series = points.series(found.change)
-        largest = max(float(abs(each).max()) for each in series)
+        solution = _newton(points, guess, mean, surplus)
+        series = points.series(solution.change)
+        largest = max(float(abs(values).max()) for values in series)
         least = max(TAIL * largest, np.finfo(float).eps * mean**2)
-        coarse = [float(abs(each[-(len(each) // 8) :]).max()) > least for each in series]
+        coarse = [float(abs(values[-(len(values) // 8) :]).max()) > least for values in series]
         if not any(coarse):
-            halves = points.integrated(series, found.half)
-            if min(float(chebyshev.chebval(np.linspace(-1, 1, 8 * len(each)), each).min()) for each in halves) <= 0.0:
+            halves = points.integrated(series, solution.half)
+            if (
+                min(float(chebyshev.chebval(np.linspace(-1, 1, 8 * len(values)), values).min()) for values in halves)
+                <= 0.0
+            ):
                 raise NoTurn
-            return CrankTurn(starts, found.no_load, tuple(series), tuple(halves))
+            return CrankTurn(starts, solution.no_load, tuple(series), tuple(halves))
         degrees = [2 * degree if more else degree for degree, more in zip(degrees, coarse, strict=True)]
         if max(degrees) > MOST:
             raise NoTurn
-        finer = [chebyshev.chebval(chebyshev.chebpts1(n), each) for n, each in zip(degrees, series, strict=True)]
-        guess = found._replace(change=np.concatenate(finer))
+        finer = [chebyshev.chebval(chebyshev.chebpts1(n), values) for n, values in zip(degrees, series, strict=True)]
+        guess = solution._replace(change=np.concatenate(finer))
 
 
 class _Motion(NamedTuple):
@@ -148,8 +151,8 @@ class _Points:
         self.weights = shares * np.concatenate([_rule(n)[1] for n in degrees])
         self.integral = np.where(self.pieces[:, None] > self.pieces[None, :], self.weights, 0.0)
         for piece, n in enumerate(degrees):
-            own = slice(sum(degrees[:piece]), sum(degrees[: piece + 1]))
-            self.integral[own, own] = self.half_widths[piece] * _rule(n)[0]
+            block = slice(sum(degrees[:piece]), sum(degrees[: piece + 1]))
+            self.integral[block, block] = self.half_widths[piece] * _rule(n)[0]
 
     def series(self, values: Floats) -> list[Floats]:
         """Chebyshev series on each piece of values at the points."""
@@ -158,11 +161,11 @@ class _Points:
 
     def integrated(self, series: Sequence[Floats], first: float) -> list[Floats]:
         """Series of the integral, which is continuous and begins with `first`."""
-        found = []
-        for half_width, each in zip(self.half_widths, series, strict=True):
-            found.append(chebyshev.chebint(half_width * each, k=[first], lbnd=-1))
-            first = float(chebyshev.chebval(1.0, found[-1]))
-        return found
+        integrals = []
+        for half_width, values in zip(self.half_widths, series, strict=True):
+            integrals.append(chebyshev.chebint(half_width * values, k=[first], lbnd=-1))
+            first = float(chebyshev.chebval(1.0, integrals[-1]))
+        return integrals
 
 
 @functools.cache

@@ -58,9 +58,9 @@ def upon(at: Inputs[ReedPose], loading: Loading) -> Number:
     from loomopt.physics.effects.beatup.joint_forces import CrankRockerForces
     from loomopt.physics.mechanisms.dyad import Vector, dot
 
-    found = CrankRockerForces(at, loading)
-    share, dyad = at.table["mu"] * at.table["radius"], found.linkage.dyad
-    across, H = Vector(-2 * dyad.link1.x / dyad.area4, -2 * dyad.link1.y / dyad.area4), found.force_D
+    forces = CrankRockerForces(at, loading)
+    share, dyad = at.table["mu"] * at.table["radius"], forces.linkage.dyad
+    across, H = Vector(-2 * dyad.link1.x / dyad.area4, -2 * dyad.link1.y / dyad.area4), forces.force_D
     drag = at.table["viscous"] * at.pose.velocity if "viscous" in at.table else None
     H = H if drag is None else Vector(H.x + drag * across.x, H.y + drag * across.y)
     along, left = at.switch * dot(H, across) * share, 1 - share**2 * dot(across, across)

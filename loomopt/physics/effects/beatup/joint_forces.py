@@ -70,25 +70,25 @@ class CrankRockerForces:
     @property
     def linkage(self) -> "CrankRockerPose":
         """The linkage itself."""
-        found: CrankRockerPose = self.at.pose.joints  # type: ignore[assignment]  # it is one, whole or in symbols
-        return found
+        pose: CrankRockerPose = self.at.pose.joints  # type: ignore[assignment]  # it is one, whole or in symbols
+        return pose
 
     @lazy
     def rod(self) -> Wrench | None:
         """What acts on the rod by its own mass, about B; None for a rod without mass."""
-        linkage, rods = self.linkage, [each for each, _ in self.loading.masses if each.link == "rod"]
+        linkage, rods = self.linkage, [pair for pair, _ in self.loading.masses if pair.link == "rod"]
         if not rods:
             return None
         direction = joint_forces.unit(linkage.dyad.link1, linkage.lengths.l2)
         return joint_forces.together(
             joint_forces.inertia(
-                own.mass,
-                joint_forces.turned(direction, own.along, own.across),
-                own.second,
+                body.mass,
+                joint_forces.turned(direction, body.along, body.across),
+                body.second,
                 self._turning(linkage.rod_1, linkage.rod_2),
                 self._carried(linkage.crank),
             )
-            for own in rods
+            for body in rods
         )
 
     def _turning(self, rate: Number, second: Number) -> tuple[Number, Number]:
@@ -109,28 +109,28 @@ class CrankRockerForces:
         return joint_forces.together(self._swinging()) or Wrench(Vector(0, 0), 0)
 
     def _swinging(self) -> Iterator[Wrench]:
-        for own, motion in self._on_shaft():
+        for mass, motion in self._on_shaft():
             turning = -motion.velocity, -motion.acceleration
             if motion is self.at.pose:
                 line = joint_forces.unit(self.linkage.dyad.link2, self.linkage.lengths.l3)
             else:
                 line = Vector(self.at.maths.cos(motion.q), -self.at.maths.sin(motion.q))
-            first = joint_forces.turned(line, own.along, own.across)
-            yield joint_forces.inertia(own.mass, first, own.second, turning)
+            first = joint_forces.turned(line, mass.along, mass.across)
+            yield joint_forces.inertia(mass.mass, first, mass.second, turning)
 
     def _on_shaft(self) -> Iterator[tuple[LinkMass, Swinging]]:
         """Yield what swings about D, each with its motion: reed and counterweight first, in line with the rocker."""
-        given, found = self.at.values, [each for each in self.loading.masses if each[0].link != "rod"]
-        if "m4" in given and "r4" in given and not any(own.link == "reed" for own, _ in found):
+        given, pairs = self.at.values, [pair for pair in self.loading.masses if pair[0].link != "rod"]
+        if "m4" in given and "r4" in given and not any(mass.link == "reed" for mass, _ in pairs):
             first = given["m4"] * given["r4"] - given["m4e"] * given["r4e"]
             yield LinkMass("reed", given["m4"] + given["m4e"], first, 0, 0), self.loading.carried
-        yield from found
+        yield from pairs
 
     @lazy
     def group(self) -> PairForces:
         """The group of rod and rocker, loaded by M3, all masses and weights."""
         force = joint_forces.plus(self.swung.force, *self.loading.pushes)
-        rod = joint_forces.together(each for each in (self.rod, self.rod_weight) if each is not None)
+        rod = joint_forces.together(wrench for wrench in (self.rod, self.rod_weight) if wrench is not None)
         return joint_forces.two_links(self.linkage.dyad, rod, Wrench(force, self.loading.force))
 
     @lazy
@@ -163,8 +163,8 @@ class CrankRockerForces:
     @lazy
     def force_A(self) -> Vector:
         """Of the frame on the crank."""
-        own = (each for each in (self.crank, self._crank_weight) if each is not None)
-        return joint_forces.plus(self.group.outer1, *map(joint_forces.minus, own))
+        wrenches = (wrench for wrench in (self.crank, self._crank_weight) if wrench is not None)
+        return joint_forces.plus(self.group.outer1, *map(joint_forces.minus, wrenches))
 
     @property
     def force_B(self) -> Vector:

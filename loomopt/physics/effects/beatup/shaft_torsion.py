@@ -129,24 +129,24 @@ def samples(at: Inputs[object]) -> float:
     return float(SAMPLES * min(rate / at.values["speed"], MOST_DECAYS))
 
 
-def motion(written: "Written", own: Values) -> tuple[Number, Number]:
+def motion(written: "Written", table: Values) -> tuple[Number, Number]:
     """Both sides of J z¨ + c z˙ + k z = F."""
     z, z1, z2 = written.coordinate
     omega = written.omega
-    return written.inertia * omega**2 * z2 + own["damping"] * omega * z1 + own["stiffness"] * z, written.force
+    return written.inertia * omega**2 * z2 + table["damping"] * omega * z1 + table["stiffness"] * z, written.force
 
 
-def term(written: "Written", own: Values) -> Number:
+def term(written: "Written", table: Values) -> Number:
     """k z + c z˙."""
-    return own["stiffness"] * written.coordinate[0] + own["damping"] * written.omega * written.coordinate[1]
+    return table["stiffness"] * written.coordinate[0] + table["damping"] * written.omega * written.coordinate[1]
 
 
-def rests(own: Values) -> str:
+def rests(table: Values) -> str:
     """Remark on the sum that gives the steady state."""
     from loomopt.physics.motion import harmonic
 
     return (
-        f"the steady state of {NAME} is summed from {own['harmonics']} harmonics of the rocker's motion; that those "
+        f"the steady state of {NAME} is summed from {table['harmonics']} harmonics of the rocker's motion; that those "
         f"beyond are below {harmonic.TAIL:g} of the largest is measured at this design, not proven or varied"
     )
 

@@ -33,22 +33,22 @@ def weighed(at: Inputs[LinkagePose]) -> Iterator[OutputMass]:
 
 def force(at: Inputs[LinkagePose]) -> Number:
     """Crank torque that lifts what has a mass, N·m."""
-    x, y, found = at.maths.cos(at.table["down"]), at.maths.sin(at.table["down"]), 0
+    x, y, torque = at.maths.cos(at.table["down"]), at.maths.sin(at.table["down"]), 0
     for weight in weighed(at):
         rate = weight.at.at(1)
         if rate is not None:
             rate = weight.along(rate)
-            found = found - at.maths.number(STANDARD_GRAVITY) * weight.mass * (x * rate.x + y * rate.y)
-    return found
+            torque = torque - at.maths.number(STANDARD_GRAVITY) * weight.mass * (x * rate.x + y * rate.y)
+    return torque
 
 
 def applied(at: Inputs[LinkagePose]) -> list[Applied]:
     """Weights, each in its centre of mass."""
-    x, y, found = at.maths.cos(at.table["down"]), at.maths.sin(at.table["down"]), []
+    x, y, forces = at.maths.cos(at.table["down"]), at.maths.sin(at.table["down"]), []
     for weight in weighed(at):
         size = at.maths.number(STANDARD_GRAVITY) * weight.mass
-        found.append(Applied(weight.on, weight.along(Vector(size * x, size * y)), weight.at.place))
-    return found
+        forces.append(Applied(weight.on, weight.along(Vector(size * x, size * y)), weight.at.place))
+    return forces
 
 
 EFFECT = Load(

@@ -56,7 +56,7 @@ class LinkageForces:
         if out.measure != "slide":
             direction = Vector(1, 0) if out.measure == "x" else Vector(0, 1)
             return [Applied(out.name, scaled(size, direction), None, None, inertial)]
-        part = next(each for each in self.linked.parts if each.name == out.name)
+        part = next(candidate for candidate in self.linked.parts if candidate.name == out.name)
         if part.kind == "slider":
             on, under, place = slider_of(part.name), part.word("guide") or "frame", walk.at(part.word("pin"))
             push = scaled(size, walk.sliding(part))
@@ -98,8 +98,8 @@ class LinkageForces:
         from loomopt.physics.mechanisms import chain_forces
 
         body = chain_forces.guides(self.linked).get(part, part)
-        found: Vector = self.pose.joints.links[body].unit()
-        return found
+        direction: Vector = self.pose.joints.links[body].unit()
+        return direction
 
     @lazy
     def friction_work(self) -> Mapping[str, Number]:

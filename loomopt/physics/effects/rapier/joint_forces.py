@@ -66,8 +66,8 @@ class RapierForces:
 
     @property
     def _drive(self) -> "RapierPose":
-        found: RapierPose = self.at.pose.joints
-        return found
+        pose: RapierPose = self.at.pose.joints
+        return pose
 
     @lazy
     def couple(self) -> Number:

@@ -165,18 +165,18 @@ WINDINGS = {"bench": ("0.135", "0.00625"), "machine": ("0.075", "0.00375")}
 bench, or on an automatic coiling machine."""
 
 
-def initial_band(maths: Maths, own: Values) -> tuple[Number, Number]:
+def initial_band(maths: Maths, table: Values) -> tuple[Number, Number]:
     """Least and greatest initial stress, Pa: by the ends that the scene gives, else by the winding it names."""
-    made, winding = coil(own), WINDINGS.get(own.get("winding", ""))
+    made, winding = coil(table), WINDINGS.get(table.get("winding", ""))
     if winding is None:
         least, most = made.initial_stress_least(maths), made.initial_stress_most(maths)
     else:
         a, b = (maths.number(float(text)) for text in winding)
-        least, most = 0 * made.index, (a - b * made.index) * tensile(maths, own)
-    if "initial_tension_min" in own:
-        least = made.torsion(maths, own["initial_tension_min"])
-    if "initial_tension_max" in own:
-        most = made.torsion(maths, own["initial_tension_max"])
+        least, most = 0 * made.index, (a - b * made.index) * tensile(maths, table)
+    if "initial_tension_min" in table:
+        least = made.torsion(maths, table["initial_tension_min"])
+    if "initial_tension_max" in table:
+        most = made.torsion(maths, table["initial_tension_max"])
     return least, most
 
 
@@ -244,19 +244,19 @@ class Parameters(Table):
         }
 
 
-def coil(own: Values) -> Coil:
+def coil(table: Values) -> Coil:
     """Coil by name."""
     return Coil(
-        own["wire"],
-        own["diameter"],
-        own["turns"],
-        own["shear_modulus"],
-        own["density"],
-        own["initial_tension"],
-        own["elasticity"],
-        own["hook_factor"],
-        own.get("hook_length", own["diameter"] - own["wire"]) if own.get("hooks") == "free" else None,
-        str(own.get("factor", "Wahl")),
+        table["wire"],
+        table["diameter"],
+        table["turns"],
+        table["shear_modulus"],
+        table["density"],
+        table["initial_tension"],
+        table["elasticity"],
+        table["hook_factor"],
+        table.get("hook_length", table["diameter"] - table["wire"]) if table.get("hooks") == "free" else None,
+        str(table.get("factor", "Wahl")),
     )
 
 
@@ -265,9 +265,9 @@ def load(at: Inputs[object]) -> Number:
     return at.values["K1"] * (at.values["X0"] + at.values["travel"]) / at.table["springs"]
 
 
-def tensile(maths: Maths, own: Values) -> Number:
+def tensile(maths: Maths, table: Values) -> Number:
     """Tensile strength of the wire, Pa."""
-    return strength(maths, own["wire"], own["strength"], own["strength_exponent"])
+    return strength(maths, table["wire"], table["strength"], table["strength_exponent"])
 
 
 def _length(at: Inputs[object]) -> Number:
@@ -310,15 +310,15 @@ FIGURES = (
 )
 
 
-def sold(own: Parameters) -> Mapping[str, Sequence[float]]:
+def sold(parameters: Parameters) -> Mapping[str, Sequence[float]]:
     """Wire diameters that are sold, m, where the wire must be one of them."""
-    return {"wire": WIRES} if own.sizes == "preferred" else {}
+    return {"wire": WIRES} if parameters.sizes == "preferred" else {}
 
 
 def explain(
     known: Mapping[str, float],
     bounds: Mapping[str, tuple[float, float]],
-    own: Parameters,
+    parameters: Parameters,
     clash: Collection[str],
     shown: ShowValue = usual,
 ) -> str:
@@ -330,15 +330,15 @@ def explain(
     if "surge_ratio" not in clash or not {"shear_share", "bending_share"}.intersection(clash):
         return ""
     stretch = bounds["X0"][1] + known["travel"]
-    thinnest = bounds.get("coil.wire", (own.wire, own.wire))[0]
-    slimmest = Coil(1.0, INDEX[1], 1.0, own.shear_modulus, own.density, 0.0, own.elasticity)
-    surge = own.surge_ratio * known["speed"] / (2 * math.pi)
-    least = 2 * slimmest.wahl * stretch * surge * math.sqrt(2 * own.shear_modulus * own.density)
-    most = own.shear_share * strength(FLOAT, thinnest, own.strength, own.strength_exponent)
+    thinnest = bounds.get("coil.wire", (parameters.wire, parameters.wire))[0]
+    slimmest = Coil(1.0, INDEX[1], 1.0, parameters.shear_modulus, parameters.density, 0.0, parameters.elasticity)
+    surge = parameters.surge_ratio * known["speed"] / (2 * math.pi)
+    least = 2 * slimmest.wahl * stretch * surge * math.sqrt(2 * parameters.shear_modulus * parameters.density)
+    most = parameters.shear_share * strength(FLOAT, thinnest, parameters.strength, parameters.strength_exponent)
     if least <= most:
         return ""
     return (
-        f"Coils that surge at {own.surge_ratio:g} times the cam's speed and stretch by X0 + travel = "
+        f"Coils that surge at {parameters.surge_ratio:g} times the cam's speed and stretch by X0 + travel = "
         f"{shown(stretch, 'length', 4)} carry at least {shown(least, 'pressure', 4)} of shear, whatever their size "
         f"(tau >= 2 K_W (X0 + travel) f sqrt(2 G rho)); the wire allows {shown(most, 'pressure', 4)} at most. "
         "Less preload asks for a stiffer spring. A lower speed, less travel or a softer cam law (target law) helps."

@@ -43,8 +43,8 @@ class CamForces:
         from loomopt.physics.mechanisms.cam_follower import Follower
 
         names = [key.removeprefix("mechanism.") for key in FOLLOWED]
-        found: Contact = self.at.pose.contact(Follower(**{name: self.at.values[name] for name in names}))
-        return found
+        contact: Contact = self.at.pose.contact(Follower(**{name: self.at.values[name] for name in names}))
+        return contact
 
     @lazy
     def lever_couple(self) -> Number:

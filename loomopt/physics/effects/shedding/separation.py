@@ -72,11 +72,11 @@ def places(given: Values) -> Mapping[str, float]:
     return {"half_open": given["travel"] / 2}
 
 
-def follow(body: "Body", cam: "Cam", own: Values) -> "Course":
+def follow(body: "Body", cam: "Cam", table: Values) -> "Course":
     """Frame's course until its state at cam angle 0 repeats."""
     from loomopt.physics.motion import flight
 
-    return flight.follow(body, cam, own["restitution"], int(own["turns"]))
+    return flight.follow(body, cam, table["restitution"], int(table["turns"]))
 
 
 def read(course: "Course") -> dict[str, float | None]:
@@ -100,16 +100,16 @@ def rules(terms: EventTerms) -> Sequence[Rule]:
     X, omega = symbol("X"), symbol("omega")
     before, after, face = symbol("X'_before"), symbol("X'_after"), symbol("X'_cam")
     e, fastest, v = symbol("restitution"), symbol("X'_cam_max"), symbol("landing_speed")
-    own = "X, X', X'' are the frame's own" + (", and friction is against X'" if terms.friction != 0 else "")
-    found = [
+    note = "X, X', X'' are the frame's own" + (", and friction is against X'" if terms.friction != 0 else "")
+    equations = [
         Rule("lift-off", symbol("N"), "<=", 0, "and falling, where X = X_cam"),
-        Rule("flight", total, "=", 0, f"while X > X_cam; {own}"),
+        Rule("flight", total, "=", 0, f"while X > X_cam; {note}"),
     ]
     if terms.friction != 0:
-        held = f"where X' = 0 and the other terms together are no more than {terms.friction}"
-        found.append(Rule("at rest in flight", symbol("X''"), "=", 0, held))
+        condition = f"where X' = 0 and the other terms together are no more than {terms.friction}"
+        equations.append(Rule("at rest in flight", symbol("X''"), "=", 0, condition))
     return [
-        *found,
+        *equations,
         Rule("landing", X, "=", symbol("X_cam"), "again"),
         Rule("landing", after, "=", face - e * (before - face)),
         Rule("end of the rebounds", e * (face - before), "<=", fastest / 10**6),
