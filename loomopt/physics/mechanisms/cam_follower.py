@@ -173,7 +173,7 @@ def fault(follower: Follower, shown: ShowValue = usual) -> str:
     shown(value, kind): a value as text in the reader's unit.
     """
 
-    def in_units(length: float) -> str:
+    def size(length: float) -> str:
         return shown(length, "length")
 
     a, arm, r0 = follower.centre_distance, follower.arm, follower.base_radius
@@ -183,17 +183,17 @@ def fault(follower: Follower, shown: ShowValue = usual) -> str:
             return f"{name} must be greater than 0 and finite"
     if not r0 > abs(a - arm):
         return (
-            f"base_radius {in_units(r0)} must be greater than the difference {in_units(abs(a - arm))} of centre_distance "
-            f"{in_units(a)} and arm {in_units(arm)}: the roller cannot come so near to the cam's axis"
+            f"base_radius {size(r0)} must be greater than the difference {size(abs(a - arm))} of centre_distance "
+            f"{size(a)} and arm {size(arm)}: the roller cannot come so near to the cam's axis"
         )
     if not r0 < a + arm:
         return (
-            f"base_radius {in_units(r0)} must be less than centre_distance {in_units(a)} plus arm {in_units(arm)}, "
-            f"{in_units(a + arm)}: the roller cannot reach so far from the cam's axis"
+            f"base_radius {size(r0)} must be less than centre_distance {size(a)} plus arm {size(arm)}, "
+            f"{size(a + arm)}: the roller cannot reach so far from the cam's axis"
         )
     if not follower.roller_radius < r0:
         return (
-            f"roller_radius {in_units(follower.roller_radius)} must be less than base_radius {in_units(r0)} (of the roller's "
+            f"roller_radius {size(follower.roller_radius)} must be less than base_radius {size(r0)} (of the roller's "
             f"centre): nothing is left for the cam"
         )
     start = follower.start_angle(FLOAT)

@@ -143,8 +143,8 @@ def fitted(linked: "Chain") -> Check[LinkagePose]:
         shared = f", of {part}" if joint != name and parts[part].kind != "pivot" else ""
         vectors[f"force_{name}"] = f"peak force {where}{shared}"
     shaking = {"shaking_force": "peak inertia force of all moving masses on the frame"}
-    told = [Figure(name, "force", text, sides=("max",)) for name, text in (vectors | shaking).items()]
-    told += [
+    forces = [Figure(name, "force", text, sides=("max",)) for name, text in (vectors | shaking).items()]
+    forces += [
         Figure(name, "force", f"peak force of the teeth of {gear}", sides=("max",)) for name, gear in teeth.items()
     ]
     rubbed = {name: f"joint {joint}" for (joint, _), name in chain_forces.pinned(linked).items()}
@@ -158,7 +158,7 @@ def fitted(linked: "Chain") -> Check[LinkagePose]:
         joints=functools.partial(LinkageForces, linked),
         vectors=(*vectors, *shaking),
         scalars=(*teeth, "shaking_moment"),
-        figures=(*told, Figure("shaking_moment", "torque", moment, sides=("max",)), pins.FIGURE),
+        figures=(*forces, Figure("shaking_moment", "torque", moment, sides=("max",)), pins.FIGURE),
         fitted=None,
     )
 
