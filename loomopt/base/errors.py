@@ -105,7 +105,7 @@ class Faults:
 
     def __init__(self, file: str = "") -> None:
         self.file = file
-        self.found: list[BadInput] = []
+        self.mistakes: list[BadInput] = []
 
     def __enter__(self) -> "Faults":
         return self
@@ -118,23 +118,23 @@ class Faults:
 
     def add(self, error: BadInput) -> None:
         """Keep a mistake. Raises BadInput where there are too many to go on."""
-        self.found += error.faults
-        if len(self.found) >= _MOST:
+        self.mistakes += error.faults
+        if len(self.mistakes) >= _MOST:
             self.tell()
 
     def within(self, *tables: str) -> bool:
         """Whether a mistake is in one of these tables."""
-        return any(mistake.key.split(".")[0] in tables for mistake in self.found)
+        return any(mistake.key.split(".")[0] in tables for mistake in self.mistakes)
 
-    def told(self) -> BadInput:
+    def error(self) -> BadInput:
         """Error of all mistakes, the worst first; there must be one."""
-        first, *others = sorted(self.found, key=lambda mistake: mistake.grade)
+        first, *others = sorted(self.mistakes, key=lambda mistake: mistake.grade)
         return first.together(others) if others else first
 
     def tell(self) -> None:
         """Raise BadInput where there is any mistake."""
-        if self.found:
-            raise self.told()
+        if self.mistakes:
+            raise self.error()
 
 
 class Broken(BadInput):

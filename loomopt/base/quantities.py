@@ -48,7 +48,7 @@ _RATIO_PATTERN = rf"^[ \t]*{NUMBER_PATTERN}(?: */ *{NUMBER_PATTERN})?[ \t]*$"
 def pattern_schema(kind: str, least: float, above: float, below: float, allowed: str) -> dict[str, Any]:
     """JSON Schema of a quantity's raw value; least, above, below: its range, SI; allowed: it in words.
 
-    Under the key `QUANTITY` stands a name that equal ones share. A mistake is explained by a sentence: see `explained`.
+    Under the key `QUANTITY` stands a name that equal ones share. `message_schema` adds the message.
     """
     refused = [_NEGATIVE] if max(least, above) >= 0 else []
     refused += [_ZERO] if above >= 0 else []
@@ -60,13 +60,13 @@ def pattern_schema(kind: str, least: float, above: float, below: float, allowed:
         text["not"] = {"anyOf": [{"pattern": pattern} for pattern in refused]}
     head = {QUANTITY_PATTERN: _name(kind, least, above, below), "description": allowed}
     if kind != "number":
-        return {**head, **explained(text, allowed)}
+        return {**head, **message_schema(text, allowed)}
     ends = {"minimum": least, "exclusiveMinimum": above, "exclusiveMaximum": below}
     number = {"type": "number"} | {name: end for name, end in ends.items() if math.isfinite(end)}
-    return {**head, **explained({"anyOf": [number, text]}, allowed)}
+    return {**head, **message_schema({"anyOf": [number, text]}, allowed)}
 
 
-def explained(check: dict[str, Any], allowed: str) -> dict[str, Any]:
+def message_schema(check: dict[str, Any], allowed: str) -> dict[str, Any]:
     """JSON Schema that takes what `check` takes, and of anything else says what is allowed.
 
     Editors repeat the part that fails: a pattern says nothing to a person, the one value that would be taken does.

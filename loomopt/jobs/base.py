@@ -577,7 +577,9 @@ class Job(abc.ABC):
         sampler = self.sampler(scene, design)
         peaks = tops(sampler, self.peaks(sampler.model).values())
         kinds = {name: figure.kind for name, figure in scene.schema.figures.items()} | drive.KINDS
-        names = sampler.model.told | ({k: k for k in drive.KINDS} if drive.motor(sampler.model.effects) else {})
+        names = sampler.model.check_figures | (
+            {k: k for k in drive.KINDS} if drive.motor(sampler.model.effects) else {}
+        )
         checks = {name: SI_UNIT[kinds[figure]] for name, figure in names.items()}
         columns, parted = self.columns(scene, sampler)._replace(checks=checks), self.parted(scene, sampler)
         return (parted.curves if parted else functools.partial(curves, sampler))(columns, steps, [*peaks, *also])

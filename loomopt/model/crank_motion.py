@@ -37,7 +37,7 @@ def turned(steady: Sampler, scene: Scene) -> Sampler:
         problem = f"effects {motor.name} and {others[0].name} cannot be on together: the crank has one speed"
         raise refusal(problem, scene.origin, f"effects.{others[0].name}", remedy="Take one of them off")
     try:
-        return steady.session.kept("turned", KEPT, (steady, motor), lambda: _turned(steady, motor))
+        return steady.session.cached("turned", KEPT, (steady, motor), lambda: _turned(steady, motor))
     except NoTurn:
         problem = f"effect {motor.name}: no speed was found that the crank keeps, turn after turn, without stopping"
         remedy = "Give a larger flywheel, a higher speed, or less load on the crank"

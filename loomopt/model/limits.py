@@ -199,9 +199,9 @@ class CycleLimit(Limit):
 
     def figure(self, sampler: Sampler) -> float:
         """Quantity of a design that is compared with the value, SI."""
-        return self.told(sampler.peak(self.row, self.where))
+        return self.compared(sampler.peak(self.row, self.where))
 
-    def told(self, peak: float) -> float:
+    def compared(self, peak: float) -> float:
         """Part of a quantity's peak, SI, that is compared with the value, SI."""
         return self.sign * (peak - self.complement)
 

@@ -31,8 +31,8 @@ from loomopt.physics.effects.kinds import (
     State,
     StateInstant,
     UnsteadyError,
-    asked,
     keys,
+    keys_in_words,
     label,
     lacking,
     owned,
@@ -522,7 +522,7 @@ class JobModel:
         return closes | dict(self.assembled)
 
     @lazy
-    def told(self) -> dict[str, str]:
+    def check_figures(self) -> dict[str, str]:
         """What checks tell over the cycle, each with the figure whose kind it is of; of a vector its components too."""
         figures: dict[str, str] = {}
         for check in self.checks:
@@ -537,7 +537,9 @@ class JobModel:
     @lazy
     def sides(self) -> dict[str, tuple[str, str]]:
         """Forces that checks tell, each with the parts that it is between."""
-        return {name: parts for check in self.checks for name, parts in check.sides.items() if name in self.told}
+        return {
+            name: parts for check in self.checks for name, parts in check.sides.items() if name in self.check_figures
+        }
 
     @lazy
     def worked(self) -> dict[str, str]:
@@ -549,7 +551,7 @@ class JobModel:
     def pushes(self) -> frozenset[str]:
         """What checks tell over the cycle that is 0 where Q is negative, components of vectors too."""
         pushed = {name for check in self.checks for name in check.pushes}
-        return frozenset(name for name, figure in (self.told | self._works).items() if figure in pushed)
+        return frozenset(name for name, figure in (self.check_figures | self._works).items() if figure in pushed)
 
     @property
     def _works(self) -> dict[str, str]:
@@ -561,7 +563,7 @@ class JobModel:
         reasons: dict[str, str] = {}
         for check in self.checks:
             for name, missing in lacking(check, self.known).items():
-                reasons[name] = f"{name} needs {asked(missing, self.known)}"
+                reasons[name] = f"{name} needs {keys_in_words(missing, self.known)}"
         return reasons
 
     @property

@@ -104,7 +104,7 @@ def labels(scene: Scene) -> dict[str, str]:
     return {owned(effect, key): label(effect, key) for effect in scene.active for key in keys(effect.table)}
 
 
-def told(scene: Scene) -> tuple[str, ...]:
+def table_remarks(scene: Scene) -> tuple[str, ...]:
     """Remarks on the curves of the loads: sentences without full stop."""
     return tuple(record.said for record in records(scene))
 

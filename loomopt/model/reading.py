@@ -83,7 +83,7 @@ class Quantities:
         switches = tuple(node.switch)
         run = self._bound.get((names, switches))
         if run is None:
-            history = current().beside(self.model, (names, switches, self.given.known), _History)
+            history = current().cached_for(self.model, (names, switches, self.given.known), _History)
             run = self._run(names, switches, history)
         if run is None:
             read = self.model.together(self.systems[1], self.given, node)
@@ -119,7 +119,7 @@ def recorded_quantities(
     values = {of: tape.known(value) if isinstance(value, Recorded) else value for of, value in raw.values.items()}
     inputs = {value.place: of for of, value in values.items() if isinstance(value, Recorded)}
     since = len(tape.operations)
-    given = Given(values, raw.own, linkage=raw.linkage)
+    given = Given(values, raw.tables, linkage=raw.linkage)
     read = model.together(there, given, Node(phi, switch))
     outputs = tuple([read(name) for name in names])
     needed = tape.needed(outputs, since)

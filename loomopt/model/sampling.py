@@ -406,7 +406,7 @@ def sampled(model: JobModel, values: Mapping[str, float], samples: int = SAMPLES
     def made() -> Sampler:
         return Sampler(model, dict(zip(names, numbers, strict=True)), samples)
 
-    return current().kept(SAMPLERS, KEPT, (model, names, numbers.tobytes(), samples), made)
+    return current().cached(SAMPLERS, KEPT, (model, names, numbers.tobytes(), samples), made)
 
 
 class _SampledRows(Rows):

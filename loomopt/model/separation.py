@@ -264,7 +264,7 @@ def followed(scene: Scene, sampler: Sampler) -> Parted | None:
     Raises BadInput where it cannot be followed.
     """
     try:
-        return sampler.session.kept("parted", MOST_PARTED, sampler, lambda: _followed(sampler))
+        return sampler.session.cached("parted", MOST_PARTED, sampler, lambda: _followed(sampler))
     except UnfollowedError as error:
         problem = error.problem.format(force=scene.show(error.force, "force"))
         raise refusal(problem, scene.origin, f"effects.{error.effect}", remedy=error.remedy) from None
@@ -284,7 +284,7 @@ def _followed(sampler: Sampler) -> Parted | None:
     event, known = events[0], forms(sampler, events[0])
     try:
         free, cam = body(sampler, event, known), _cam(sampler, event)
-        return Parted(sampler, event, event.follow(free, cam, sampler.given.own[event.name]), known)
+        return Parted(sampler, event, event.follow(free, cam, sampler.given.tables[event.name]), known)
     except ArithmeticError as error:
         remedy = f"Lower the restitution, or take {event.name} off (--without {event.name})"
         raise UnfollowedError(event.name, f"the flight does not end: {error}", remedy) from None

@@ -27,7 +27,7 @@ class Session:
         self._kept: dict[str, OrderedDict[Hashable, object]] = {}
         self._beside: weakref.WeakKeyDictionary[object, dict[Hashable, object]] = weakref.WeakKeyDictionary()
 
-    def kept(self, what: str, most: int, key: Hashable, make: Callable[[], Made]) -> Made:
+    def cached(self, what: str, most: int, key: Hashable, make: Callable[[], Made]) -> Made:
         """Cached value of a key, made where it is missing; beyond `most` values the least recently used is dropped.
 
         what: of which there are so many at most.
@@ -42,7 +42,7 @@ class Session:
                     values.popitem(last=False)
             return cast(Made, values[key])
 
-    def beside(self, owner: object, key: Hashable, make: Callable[[], Made]) -> Made:
+    def cached_for(self, owner: object, key: Hashable, make: Callable[[], Made]) -> Made:
         """Cached value of an owner by a key, made where it is missing; it is dropped with its owner."""
         with LOCK:
             values = self._beside.setdefault(owner, {})

@@ -40,14 +40,14 @@ class Pose(Motion):
 
 
 class Given(NamedTuple):
-    """All numbers of a scene in one number system: `values` by name, `own` values of each effect.
+    """All numbers of a scene in one number system: `values` by name, `tables` values of each effect.
 
     known: names of the scene's numbers, from which all else follows. linkage: the mechanism's own record of what its
     poses read at once, such as lengths and dead centres.
     """
 
     values: Values
-    own: Mapping[str, Values]
+    tables: Mapping[str, Values]
     known: frozenset[str] = frozenset()
     linkage: object = None
 
@@ -55,7 +55,7 @@ class Given(NamedTuple):
         self, maths: Maths, effect: Effect, pose: Motion | None = None, switch: Values = NO_SWITCH
     ) -> Inputs[Any]:
         """Inputs of an effect's formulas; switch: by a load's name, which of its formulas holds."""
-        return Inputs(maths, self.values, self.own[effect.name], pose, switch.get(effect.name, 0))
+        return Inputs(maths, self.values, self.tables[effect.name], pose, switch.get(effect.name, 0))
 
 
 def terms(

@@ -124,7 +124,7 @@ def _load_equations(model: JobModel, load: Acting, pose: Motion, inputs: Given, 
             [item.moved(inputs.inputs(systems.sympy(), item)) for item in carried_loads if item.moved]
         )
         carried = balance.total([symbol(f"{letter}_{item.name}") for item in carried_loads])
-        left, right = load.motion(_in_symbols(pose, inertia, carried), inputs.own[load.name])
+        left, right = load.motion(_in_symbols(pose, inertia, carried), inputs.tables[load.name])
         yield equation(load.name, left, right)
         moved, still = map(symbol, load.between)
         yield relation(load.name, symbol("z"), "=", moved - still, "after every turn the same")
@@ -140,7 +140,7 @@ def _in_symbols(pose: Motion, inertia: Expression, carried: Expression) -> "Writ
 def term(load: Acting, pose: Motion, inputs: Given, letter: str) -> Equation:
     """Write a load's term, with where each of its formulas holds."""
     name = symbol(f"{letter}_{load.name}")
-    if isinstance(load, Load) and load.tabulated and load.tabulated.key in inputs.own[load.name]:
+    if isinstance(load, Load) and load.tabulated and load.tabulated.key in inputs.tables[load.name]:
         return _table_equation(load, name, inputs)
     if isinstance(load, Load) and load.told:
         rows: list[Case] = [(force(load, pose, inputs, switch), where) for switch, where in load.told.items()]
@@ -161,7 +161,7 @@ def term(load: Acting, pose: Motion, inputs: Given, letter: str) -> Equation:
 def _table_equation(load: Load[Any], name: Expression, inputs: Given) -> Equation:
     """Equation of a load that is tabulated: one cubic form, whose coefficients differ between intervals."""
     assert load.tabulated is not None
-    curve = inputs.own[load.name][load.tabulated.key]
+    curve = inputs.tables[load.name][load.tabulated.key]
     bent = f"{curve.corners} corners" if curve.corners != 1 else "one corner"
     description = f"a cubic between each of the table's {curve.samples} samples and the next, C2 but for {bent}"
     description += f", angles {load.tabulated.angle}"
@@ -172,7 +172,7 @@ def _table_equation(load: Load[Any], name: Expression, inputs: Given) -> Equatio
 def force(load: Acting, pose: Motion, inputs: Given, switch: float) -> Expression:
     """A load's formula at a switch, on the turn on which its corners lie: no whole turns are taken off."""
     if isinstance(load, State):
-        return load.term(_in_symbols(pose, 0, 0), inputs.own[load.name])
+        return load.term(_in_symbols(pose, 0, 0), inputs.tables[load.name])
     sp = sympy()
     value = load.force(inputs.inputs(systems.sympy(), load, pose, {load.name: sp.Rational(switch)}))
     return sp.sympify(value).replace(sp.floor, lambda turns: sp.Integer(0))
@@ -240,7 +240,7 @@ def joint_equations(model: JobModel, pose: Motion, inputs: Given, total: Express
             equations |= {
                 component: equation(check.name, symbol(component), value) for component, value in _between(joints, name)
             }
-        for name in (name for name in (*check.vectors, *check.scalars) if name in model.told):
+        for name in (name for name in (*check.vectors, *check.scalars) if name in model.check_figures):
             parts = [""] if name in check.scalars else [f"_{axis}" for axis in COMPONENTS]
             for part in parts:
                 value = getattr(joints, name)

@@ -56,7 +56,11 @@ def joint_forces(sampler: Sampler, events: Sequence[str], places: Mapping[str, s
 
     places: the joints of forces that are not called after them.
     """
-    names = [name for name in sampler.model.told if name.startswith(PREFIX) and f"{name}_x" in sampler.model.told]
+    names = [
+        name
+        for name in sampler.model.check_figures
+        if name.startswith(PREFIX) and f"{name}_x" in sampler.model.check_figures
+    ]
     cycle, arrows = sampler.cycle, []
     for event in events if names else ():
         angle = float(sampler.model.event(FLOAT, sampler.given, event))

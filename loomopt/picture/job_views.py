@@ -80,11 +80,11 @@ class JobViews(abc.ABC):
     def remarks(self, scene: "Scene", design: Numbers) -> tuple[str, ...]:
         """Remarks on a design, sentences without a full stop: of curves and of checks."""
         from loomopt.maths.systems import FLOAT
-        from loomopt.model.numbers import numbers, told
+        from loomopt.model.numbers import numbers, table_remarks
         from loomopt.physics.effects.kinds import Check, Inputs, owned
 
         known = numbers(scene) | {scene.full(name): value for name, value in design.items()}
-        sentences = list(told(scene))
+        sentences = list(table_remarks(scene))
         for check in (effect for effect in scene.active if isinstance(effect, Check)):
             inputs = {key: known.get(owned(check, key)) for key in check.table.model_fields}
             sentences.append(check.remark(Inputs(FLOAT, known, inputs, None), scene.show))

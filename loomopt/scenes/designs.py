@@ -305,7 +305,7 @@ def read_answer(path: Path, jobs: Jobs) -> tuple[Scene, DesignGiven]:
         for fault in error.faults:
             advice = {"allowed": fault.allowed, "remedy": fault.remedy}
             faults.add(refusal(fault.problem, origin, f"scene.document.{fault.key}", **advice, grade=fault.grade))
-        raise faults.told() from None
+        raise faults.error() from None
 
 
 def resumed(given: DesignGiven, scene: Scene, later: Call, origin: str) -> Scene:

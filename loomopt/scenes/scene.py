@@ -459,7 +459,7 @@ def _build_scene(
             original, schema = current, jobs.schema(problem.job, current, named)
     except BadInput as error:
         faults.add(error.placed(origin, original))
-        raise faults.told() from None
+        raise faults.error() from None
     known = (*TABLES, *schema.tables)
     raw = _raw_tables(original, known)
     top = Cursor(raw, "", faults)

@@ -153,7 +153,7 @@ def problem(cursor: Cursor, jobs: JobNames) -> Problem:
     """
     faults, read = cursor.faults, cursor.record(Problem)
     if not isinstance(read.job, str):
-        raise faults.told()
+        raise faults.error()
     if isinstance(read.name, str) and (not _NAME.fullmatch(read.name) or read.name.lower() in _TAKEN):
         remedy = "Name it as a file could be named anywhere, such as beatup-wide"
         allowed = "up to 64 letters, digits, - and _, a letter or digit first, but for CON, NUL and the like"
@@ -163,7 +163,7 @@ def problem(cursor: Cursor, jobs: JobNames) -> Problem:
     faults.add(cursor.at("job").unknown("job", read.job, jobs.names()))
     near = nearest(read.job, jobs.names(), least=SAME)
     if not near:
-        raise faults.told()
+        raise faults.error()
     return read.model_copy(update={"job": near})
 
 
@@ -355,7 +355,7 @@ def bounds(cursor: Cursor, schema: SceneSchema, known: list[Place]) -> dict[str,
         for name, value in flat(cursor.table(), [*schema.variables, *labels, *labels.values()]).items():
             label = name if name in schema.variables else labels.get(name, name)
             entries[label] = _merge(entries.get(label), value)
-    misread = {fault.key for fault in cursor.faults.found}
+    misread = {fault.key for fault in cursor.faults.mistakes}
     for name, place in cursor.entries(entries).items():
         if f"mechanism.{name}" in misread:
             continue

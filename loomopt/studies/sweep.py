@@ -237,7 +237,7 @@ class Sweep:
         """Scene of a point. Raises BadInput for an invalid combination."""
         places = zip(self.axes, self.lattice.places(point), strict=True)
         changes = {axis.key: axis.texts[k] for axis, k in places}
-        return current().kept(SCENES, MOST_CACHED, (self.key, point), lambda: self.scene.update(changes))
+        return current().cached(SCENES, MOST_CACHED, (self.key, point), lambda: self.scene.update(changes))
 
     def solve(self, task: StudyTask, parent: Row | None) -> Solution:
         """Answer of a task. Raises BadInput for an invalid combination."""

@@ -184,7 +184,7 @@ def _damped(scene):
     job = registry.of(scene)
     sampler = job.sampler(scene, job.today(scene))
     (state,) = sampler.model.states
-    damping, omega = sampler.given.own[state.name]["damping"], sampler.given.values["speed"]
+    damping, omega = sampler.given.tables[state.name]["damping"], sampler.given.values["speed"]
     loss = CycleQuantity(lambda at: damping * (_carried(at) - at.pose.q1 * omega) ** 2 / omega, figure=False)
     model = replace(sampler.model, own_quantities={**sampler.model.own_quantities, "loss": loss})
     return 2 * math.pi * Sampler(model, sampler.values).mean(Integral("", "", "loss", parts=400))

@@ -280,7 +280,7 @@ def test_the_balance_has_exactly_the_active_terms(combination):
     assert list(terms) == always + [load.name for load in loads_of(combination)]
     checks = [effect.name for effect in effects_of(combination) if isinstance(effect, Check)]
     assert [check.name for check in sampled.model.checks] == checks
-    assert set(sampled.given.own) == {*always, *combination.names}
+    assert set(sampled.given.tables) == {*always, *combination.names}
 
 
 @stated

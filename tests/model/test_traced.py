@@ -245,7 +245,7 @@ def test_numbers_made_by_hand_are_not_recorded(monkeypatch):
     """Nobody knows what they follow from."""
     monkeypatch.setattr(reading, "WORTH_IT", 0)
     sampler = Sampler(yoke(), NUMBERS)
-    by_hand = Given(sampler.given.values, sampler.given.own)
+    by_hand = Given(sampler.given.values, sampler.given.tables)
     node = Node(1.0, {"cloth": 0.0})
     (found,) = Quantities(sampler.model, (systems.FLOAT, systems.FLOAT), by_hand)(("torque",), node)
     assert found == sampler.model.quantity(systems.FLOAT, sampler.given, "torque", node)

@@ -85,7 +85,7 @@ def torques(names, numbers, phi, rod="exact", omega_dot=None, system=systems.FLO
     plain = found.given(systems.FLOAT, numbers)
     cornered = {load.name: load for load in found.loads if load.corners}
     corners = {
-        name: load.corners(Inputs(systems.FLOAT, plain.values, plain.own[name], None))
+        name: load.corners(Inputs(systems.FLOAT, plain.values, plain.tables[name], None))
         for name, load in cornered.items()
     }
     switches = {name: load.switch(phi, corners[name]) for name, load in cornered.items()}

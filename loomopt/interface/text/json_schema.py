@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from loomopt.base.quantities import NUMBER_PATTERN, QUANTITY_PATTERN, Quantity, foreign, quantity_of, told
+from loomopt.base.quantities import NUMBER_PATTERN, QUANTITY_PATTERN, Quantity, foreign, message_schema, quantity_of
 from loomopt.base.units import DISPLAY_UNIT
 from loomopt.physics.effects.kinds import Effect, Load, required
 from loomopt.physics.schema import Table
@@ -76,7 +76,7 @@ def display(schema: SceneSchema) -> Json:
 def _unit(kind: str) -> Json:
     description = f'a unit of {kind} such as "{DISPLAY_UNIT[kind]}"'
     known = {"type": "string", "not": {"pattern": rf"^[ \t]*(?:{foreign(kind)})[ \t]*$"}}
-    return {"description": description, **told(known, description)}
+    return {"description": description, **message_schema(known, description)}
 
 
 def _problem(schema: SceneSchema) -> Json:
@@ -84,7 +84,7 @@ def _problem(schema: SceneSchema) -> Json:
     table["properties"] |= {"job": {"const": schema.name}}
     name = table["properties"]["name"]
     del name["type"]
-    name |= told({"type": "string", "pattern": _NAME}, "a name of letters, digits, - and _, as of a file")
+    name |= message_schema({"type": "string", "pattern": _NAME}, "a name of letters, digits, - and _, as of a file")
     return table
 
 

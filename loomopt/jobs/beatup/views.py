@@ -11,7 +11,7 @@ from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
 from loomopt.model.curves import tops
 from loomopt.model.model import JobModel
-from loomopt.model.numbers import told
+from loomopt.model.numbers import table_remarks
 from loomopt.physics import balance
 from loomopt.physics.cycle import TURN
 from loomopt.physics.effects.kinds import Check, State
@@ -149,7 +149,9 @@ class BeatupViews(JobViews):
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
         """Remarks: on curves, checks, a reed that twists away while it beats up."""
-        remarks = super().remarks(scene, design) if any(isinstance(e, Check) for e in scene.active) else told(scene)
+        remarks = (
+            super().remarks(scene, design) if any(isinstance(e, Check) for e in scene.active) else table_remarks(scene)
+        )
         if not any(isinstance(effect, State) for effect in scene.active):
             return remarks
         from loomopt.picture.panels import twist_remarks

@@ -373,14 +373,14 @@ def entries(cursor: Cursor, known: Keys, numbers: Numbers, of: str = "", name: s
 def _part(name: str, cursor: Cursor, numbers: Numbers) -> Part | None:
     """One part; None where its mistakes leave none."""
     faults = cursor.faults
-    before = len(faults.found)
+    before = len(faults.mistakes)
     with faults:
         check_name(cursor, name, {FRAME_NAME: "what does not move"})
     with faults:
         kind = _kind(cursor)
         read = entries(cursor, KEYS[kind], numbers, f"a {kind}", name)
         part = Part(kind, name, tuple(read.words.items()), tuple(read.numbers.items()))
-        if len(faults.found) == before:
+        if len(faults.mistakes) == before:
             _check_sense(cursor, part)
             return part
     return None

@@ -496,8 +496,8 @@ def check(scene: Scene) -> None:
             check_part(scene, known)
     with faults:
         parts.demand_used(known.linkage.chain, scene.document)
-    if faults.found:
-        raise faults.told().placed(scene.origin, scene.document)
+    if faults.mistakes:
+        raise faults.error().placed(scene.origin, scene.document)
     reason = chain.fault(known.linkage.chain, scene.mechanism, scene.show)
     if reason:
         remedy = "Correct the dimensions: today's linkage must close at every crank angle"

@@ -16,7 +16,7 @@ from loomopt.jobs.linkage.scene import read_tables
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT, Number
 from loomopt.model.model import JobModel
-from loomopt.model.numbers import told
+from loomopt.model.numbers import table_remarks
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN
 from loomopt.physics.effects.kinds import Effect
@@ -293,7 +293,7 @@ class LinkageViews(JobViews):
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
         """Remarks: on the curves, and on events that lie elsewhere than today's."""
-        remarks = (*told(scene), *_without_place(scene))
+        remarks = (*table_remarks(scene), *_without_place(scene))
         moved = self._moved(scene, design)
         return (*remarks, *self._rests(scene, design), *((moved,) if moved else ()))
 

@@ -367,7 +367,7 @@ PINS = {"cam_shaft_force": "A", "lever_pivot_force": "B", "roller_force": "C"}
 def _forces(drawn: Picture) -> list[ForceArrow]:
     """Forces on the lever and in the cam's bearings in the drawing's axes, which turn with the cam."""
     sampler, arrows = drawn.cam.sampler, []
-    for name in (name for name in PINS if name in sampler.model.told):
+    for name in (name for name in PINS if name in sampler.model.check_figures):
         pushed = sampler.pushed(name)
         nodes = [(top.piece, top.u, "") for top in sampler.extremes(name) if top.height == pushed][:1]
         nodes.append((*(part[0] for part in sampler.cycle.located(np.array([drawn.theta[LEAST]]))), LEAST))

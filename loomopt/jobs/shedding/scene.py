@@ -323,7 +323,7 @@ class LawRead(NamedTuple):
 
     def record(self, scene: Scene) -> csv_tables.Record:
         """Remarks: the change by smoothing, and the accuracy of s''."""
-        table = self.law.found
+        table = self.law.fit
         change, misfit = table.change * self.travel, table.misfit * self.travel
         moved = f"smoothed by {scene.show(change, 'length', 2)} at most" if change else "not smoothed"
         text = f"a cubic through {len(table.u)} points, {moved}"
@@ -341,7 +341,7 @@ class LawRead(NamedTuple):
         unit = factor(self.read.units["s"])
         size = 2 * max(self.half) * self.travel / unit
         decimals = max(0, round(-math.log10(size))) if size else 15
-        u, table = self.law.u, self.law.found
+        u, table = self.law.u, self.law.fit
         helps = []
         for more in FINER:
             s = [round(at * self.travel / unit, decimals + more) * unit / self.travel for at in self.law.s]
@@ -365,8 +365,8 @@ def refuse_unclear(scene: Scene, reads_accelerations: bool) -> None:
     if scene.table(HealdFrame).law != "table" or not reads_accelerations:
         return
     reading = read_law(scene)
-    if reading.law.found.uncertainty > UNCLEAR:
-        share = 100 * reading.law.found.uncertainty
+    if reading.law.fit.uncertainty > UNCLEAR:
+        share = 100 * reading.law.fit.uncertainty
         problem = f"the table cannot tell accelerations: s'' is uncertain by {share:.2g} % of its peak"
         remedy = f"Give {reading.needed()}; or digits, where zeros were cut off"
         raise refusal(problem, reading.read.file, LAW_TABLE, allowed=f"up to {100 * UNCLEAR:g} %", remedy=remedy)

@@ -634,7 +634,7 @@ def lacking(check: Check[Any], known: Collection[str]) -> dict[str, tuple[str, .
     return figures
 
 
-def asked(missing: Collection[str], known: Collection[str]) -> str:
+def keys_in_words(missing: Collection[str], known: Collection[str]) -> str:
     """Scene keys in words; of an empty table inside an effect's table the name of the table alone."""
     given = {tuple(name.split(".")[:2]) for name in known}
     cut = {key: key.split(".") for key in missing}

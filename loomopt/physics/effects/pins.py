@@ -24,7 +24,7 @@ class Pin(Table):
     radius: PositiveLength | None = Field(None, description="radius of the pin or journal")
 
 
-def own(pins: Mapping[str, str]) -> type[Table]:
+def parameters(pins: Mapping[str, str]) -> type[Table]:
     """Table of an effect that tells what pins lose; pins: name → what it is."""
     fields = {name: (Pin | None, Field(None, description=text)) for name, text in pins.items()}
     inner = create_model("Pins", __base__=Table, __module__=__name__, __doc__="Friction of each pin.", **fields)  # type: ignore[call-overload]

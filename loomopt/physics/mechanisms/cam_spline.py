@@ -121,7 +121,7 @@ class LawTable:
     """The cubic through the points of a table, at rest at both ends; s'' need not be 0 there.
 
     u, s: the points, moved as far as their digits allow; v, a: the slope, and the second derivative behind each; ahead:
-    the second derivative ahead of each, another one where it jumps. found: how well all of it is known.
+    the second derivative ahead of each, another one where it jumps. fit: how well all of it is known.
     """
 
     u: tuple[float, ...]
@@ -129,7 +129,7 @@ class LawTable:
     v: tuple[float, ...]
     a: tuple[float, ...]
     ahead: tuple[float, ...]
-    found: SmoothRise
+    fit: SmoothRise
 
     @property
     def breaks(self) -> tuple[Fraction, ...]:

@@ -59,7 +59,7 @@ def origins(linked: Chain) -> dict[str, str]:
     return joints
 
 
-def held(linked: Chain) -> Iterator[tuple[str, str]]:
+def joint_pairs(linked: Chain) -> Iterator[tuple[str, str]]:
     """Yield each force that a chain has: a joint and the part that has it there; a slider's guide, a gear's teeth."""
     for part in linked.parts:
         if part.kind == "dyad":
@@ -74,7 +74,7 @@ def held(linked: Chain) -> Iterator[tuple[str, str]]:
 
 def names(linked: Chain) -> dict[tuple[str, str], str]:
     """Names of the forces by joint and part: after the joint, and after the part too where several parts share it."""
-    places = list(held(linked))
+    places = list(joint_pairs(linked))
     shared = [joint for joint, _ in places]
     return {place: place[0] if shared.count(place[0]) == 1 else f"{place[0]}_{place[1]}" for place in places}
 

@@ -163,7 +163,7 @@ class QuantityFunctions:
         self._worth: dict[object, Any] = {identity(symbol): values[name] for name, symbol in symbols.items()}
         symbolic = model.given(replace(systems.casadi(), choose=value_at), symbols)
         shared = self._shared(symbolic.values, given.values)
-        self.given, self._in_symbols = given, Given(shared, symbolic.own, linkage=symbolic.linkage)
+        self.given, self._in_symbols = given, Given(shared, symbolic.tables, linkage=symbolic.linkage)
         self.phi, self.switches = ca.SX.sym("phi"), {name: ca.SX.sym(name) for name in switches}
         self._traced: dict[str, _Traced] = {}
 

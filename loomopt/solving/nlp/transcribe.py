@@ -378,5 +378,5 @@ def transcribe(
             on_build()
         return Transcription(nlp_structure)
 
-    nlp = sampler.session.kept(NLPS, CACHE_SIZE, nlp_structure.key, build)
+    nlp = sampler.session.cached(NLPS, CACHE_SIZE, nlp_structure.key, build)
     return nlp, nlp.structure is nlp_structure

@@ -60,7 +60,7 @@ def prove(
     words = Words(own)
     found = tuple(each._replace(unit=words.si(each.name)) for each in _merged(_decided(program, job, words, reads)))
     whole = reads[1].sampler
-    return Proofs(scene.name, name, found, scene, model.uncovered(whole.model.effects, whole.given.own))
+    return Proofs(scene.name, name, found, scene, model.uncovered(whole.model.effects, whole.given.tables))
 
 
 FIRST_BOXES, SECONDS = 2000, 5.0

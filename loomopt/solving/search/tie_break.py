@@ -84,7 +84,7 @@ class _TestedMove(NamedTuple):
 def _test_move(program: Program, x: Numbers, move: Move, way: Numbers) -> _TestedMove:
     key = id(program), tuple(x.items()), tuple(way.items())
     make = functools.partial(_change_along, program, x, list(move.ends(way, x)))
-    return current().kept(TESTED_MOVES, TESTED_MOST, key, lambda: _TestedMove(program, make()))
+    return current().cached(TESTED_MOVES, TESTED_MOST, key, lambda: _TestedMove(program, make()))
 
 
 def _change_along(program: Program, x: Numbers, ends: Sequence[Numbers]) -> float:

@@ -112,7 +112,7 @@ def summarise(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> Accu
     rows = tuple(row for _, ladder_rows in climbs for row in ladder_rows)
     attributes = provenance.provenance(scene, study="full" if full else "quick")
     sampler = registry.of(scene).sampler(scene, {})
-    uncovered = [f" Not covered: {text}." for text in model.uncovered(sampler.model.effects, sampler.given.own)]
+    uncovered = [f" Not covered: {text}." for text in model.uncovered(sampler.model.effects, sampler.given.tables)]
     return AccuracyResult(scene.name, rows, orders, knees, "".join([advice(rows), *uncovered]), attributes)
 
 

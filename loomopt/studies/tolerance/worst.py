@@ -243,7 +243,7 @@ def _box_formula(plan: Plan, name: str) -> InBox | None:
         cycle_limits = (limit for limit in plan.program.limits if isinstance(limit, CycleLimit))
         limit = next((limit for limit in cycle_limits if limit.name == name), None)
         if limit and plan.model.has_quantity(limit.row):
-            formula = InBox(quantity=limit.row, sign=float(limit.sign), offset=limit.told(0.0), where=limit.where)
+            formula = InBox(quantity=limit.row, sign=float(limit.sign), offset=limit.compared(0.0), where=limit.where)
     return formula
 
 

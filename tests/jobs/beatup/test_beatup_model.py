@@ -114,7 +114,7 @@ def test_an_effect_may_read_joints_at_front_dead_centre():
     found = model.static(systems.FLOAT, given, stills, ("M3_fdc",))["M3_fdc"]
     reed = JOB.model(rod).static(systems.FLOAT, without, stills, ("M3_fdc",))["M3_fdc"]
     joints = crank_rocker.front_pose(systems.FLOAT, shared_linkage(given).lengths, shared_linkage(given).centres)
-    own, l1 = given.own["rod_inertia"], BEATUP.mechanism["l1"]
+    own, l1 = given.tables["rod_inertia"], BEATUP.mechanism["l1"]
     turn = (own["m2"] * own["s2"] ** 2 + own["JS2"]) * joints.rod_1 * joints.rod_2
     swing = own["m2"] * l1 * own["s2"] * joints.rod_2 * joints.cos_crank_rod
     assert found - reed == pytest.approx((turn + swing) * (20 * math.pi) ** 2, rel=1e-9)

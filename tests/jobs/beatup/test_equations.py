@@ -163,9 +163,9 @@ def test_printed_forces_in_joints_are_the_effects():
     assert len({name for name, _ in told}) == len(told)
     for name, right in told:
         named[name] = value(read(right), named)
-        if name in found.told:
+        if name in found.check_figures:
             assert named[name] == pytest.approx(found.formula(name)(at), rel=1e-12)
-    assert {name for name, _ in told if name in found.told} == found.told.keys() - {
+    assert {name for name, _ in told if name in found.check_figures} == found.check_figures.keys() - {
         *(f"force_{joint}" for joint in "ABCD"),
         "shaking_force",
     }

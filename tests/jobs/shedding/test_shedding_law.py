@@ -242,7 +242,7 @@ def slope(sampled, piece, corner):
         node = Node(corner + inside * away * (end - start), switch)
         pose = sampled.model.instant(systems.FLOAT, sampled.given, node).pose
         pull = -warp.force(
-            systems.FLOAT, pose, sampled.given.values, sampled.given.own["warp_tension"], switch["warp_tension"]
+            systems.FLOAT, pose, sampled.given.values, sampled.given.tables["warp_tension"], switch["warp_tension"]
         )
         found.append((pose.q, pull))
     return (found[1][1] - found[0][1]) / (found[1][0] - found[0][0])

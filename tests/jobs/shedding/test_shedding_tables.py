@@ -137,7 +137,7 @@ def test_rounded_angles_of_even_steps_are_even(tmp_path, unit, size):
 
     law = read_law(heald(path)).law
     assert law.u == pytest.approx(np.arange(37) / 36, abs=1e-15)
-    assert law.found.uncertainty < 0.02
+    assert law.fit.uncertainty < 0.02
 
 
 def test_tables_of_other_jobs_are_told_too():

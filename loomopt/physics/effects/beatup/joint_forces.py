@@ -222,7 +222,7 @@ def remark(at: Inputs[object], shown: ShowValue) -> str:
 EFFECT = Check(
     name="joint_forces",
     summary="forces in the joints, and of all moving masses on the frame",
-    table=pins.own(PINS),
+    table=pins.parameters(PINS),
     rank=85,
     joints=CrankRockerForces,
     between=("rod", "rod_weight", "swung"),

@@ -151,7 +151,7 @@ def fitted(linked: "Chain") -> Check[LinkagePose]:
     moment = "peak moment of all moving masses about the crank shaft"
     return replace(
         EFFECT,
-        table=pins.own(rubbed),
+        table=pins.parameters(rubbed),
         sides={f"force_{name}": chain_forces.joined(linked, place) for place, name in places.items()},
         worked={pins.LOSS: "friction_work"},
         wanted={pins.LOSS: ("operation.speed", *pins.read("joint_forces", rubbed))},

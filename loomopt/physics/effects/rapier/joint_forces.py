@@ -176,7 +176,7 @@ def remark(at: Inputs[object], shown: ShowValue) -> str:
 EFFECT: Check[Motion] = Check(
     name="joint_forces",
     summary="forces in the joints and in the gear mesh",
-    table=pins.own(PINS),
+    table=pins.parameters(PINS),
     rank=40,
     joints=RapierForces,
     between=("sley",),

@@ -116,7 +116,7 @@ class CamForces:
 EFFECT = Check(
     name="joint_forces",
     summary="forces of the roller, in its lever and the cam shaft, and of the moving masses",
-    table=pins.own(PINS),
+    table=pins.parameters(PINS),
     rank=95,
     joints=CamForces,
     vectors=("lever_pivot_force", "shaking_force"),
