@@ -241,8 +241,6 @@ def slope(sampled, piece, corner):
     for away in (0.0, 1e-4):
         node = Node(corner + inside * away * (end - start), switch)
         pose = sampled.model.instant(systems.FLOAT, sampled.given, node).pose
-        pull = -warp.force(
-            systems.FLOAT, pose, sampled.given.values, sampled.given.tables["warp_tension"], switch["warp_tension"]
-        )
+        pull = -warp.force(sampled.given.inputs(systems.FLOAT, warp, pose, switch))
         found.append((pose.q, pull))
     return (found[1][1] - found[0][1]) / (found[1][0] - found[0][0])
