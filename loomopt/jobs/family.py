@@ -51,7 +51,7 @@ class FamilyJob(Job):
             self.job.check(member)
 
     def demand(self, scene: Scene, target: str) -> None:
-        """Raise BadInput where members speak of what the scene does not have."""
+        """Raise BadInput where a member lacks a number or an effect that the target needs."""
         for member in self.members:
             self.job.demand(member, self.target)
 
@@ -92,7 +92,7 @@ class FamilyJob(Job):
     # Designs: what is shared under its own name, what is not under the member's.
 
     def today(self, scene: Scene) -> dict[str, float]:
-        """Return today's design."""
+        """Today's design."""
         return self._whole([self.job.today(member) for member in self.members])
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
@@ -133,7 +133,7 @@ class FamilyJob(Job):
         return {**x, **tidied}
 
     def _joined(self, each: Sequence[Mapping[str, float]], otherwise: Numbers) -> dict[str, float]:
-        """Return members' variables as the whole's; of a shared one that they do not agree on what is given."""
+        """Members' variables as variables of the whole; `otherwise` for a shared one on which they do not agree."""
         found: dict[str, float] = {}
         apart = set[str]()
         for part, own in zip(self.parts, each, strict=True):
@@ -145,22 +145,22 @@ class FamilyJob(Job):
     # What only members have.
 
     def sampler(self, scene: Scene, design: Numbers) -> Sampler:
-        """Return all members ready to be sampled."""
+        """Sampler of all members."""
         from loomopt.model.sampling import sampled
 
         program = self.family.program
         return sampled(program.model, {**program.parameters, **self.values(program, design)})
 
     def sizes(self, scene: Scene) -> Mapping[str, Sequence[float]]:
-        """Return nothing: what comes in sizes is refused."""
+        """Empty: a family with numbers in sizes is refused."""
         return {}
 
     def explain(self, scene: Scene, clash: Collection[str]) -> str:
-        """Return nothing: physics speaks of one member."""
+        """Empty: explanations are those of single members."""
         return ""
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
-        """Return nothing: what a family is worth is said of its members."""
+        """Empty: sentences are those of single members."""
         return ""
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
@@ -169,7 +169,7 @@ class FamilyJob(Job):
 
 
 def _structure(program: Program) -> tuple[object, ...]:
-    """Return what members of one family share: everything but numbers."""
+    """Structure of a program, which all members share: everything but numbers."""
     return (
         tuple(variable.name for variable in program.variables),
         tuple((type(limit), limit.name, limit.sign, limit.reads) for limit in program.limits),

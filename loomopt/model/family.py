@@ -31,7 +31,7 @@ Combine = Literal["worst", "sum"]
 
 
 def of_member(name: str, member: int) -> Alias:
-    """Return what the whole calls a member's own: members are counted from 1 where a person reads it."""
+    """Name in the whole of a number of one member; members are counted from 1."""
     return Alias(member_name(name, member), name)
 
 
@@ -46,7 +46,7 @@ class Scenario(NamedTuple):
     switches: Mapping[str, str]
 
     def given(self, maths: Maths, values: Values) -> Given:
-        """Return its numbers and what follows from them, SI; values: of the whole."""
+        """Its numbers and those that follow from them, SI; values: of the whole."""
         return self.model.given(maths, {own: values[name] for own, name in self.values.items() if name in values})
 
     def node(self, node: Node) -> Node:
@@ -78,21 +78,21 @@ class FamilyKinematics:
         return tuple(scenario.given(maths, values) for scenario in self.scenarios)
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
-        """Return nothing: each member has its own."""
+        """Empty: each member has its own."""
         return {}
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
-        """Return where each member's events lie that no formula gives."""
+        """Angles of each member's events that no formula gives."""
         pairs = zip(self.scenarios, members_of(given), strict=True)
         return {each.values[name]: at for each, own in pairs for name, at in each.model.hints(own).items()}
 
     def pose(self, maths: Maths, given: Given, node: Node) -> Number:
-        """Return every member at a node; what no formula reads is not computed."""
+        """Every member at a node; unread quantities are not computed."""
         pairs = zip(self.scenarios, members_of(given), strict=True)
         return tuple(each.model.instant(maths, own, each.node(node)) for each, own in pairs)
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> Number:
-        """Return every member at an event of one of them."""
+        """Every member at an event of one of them."""
         return self.pose(maths, given, Node(self.events(maths, given)[event], switch))
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
@@ -231,7 +231,7 @@ class WorstOf(Objective):
         return [piece for each in self.of for piece in each.pieces(sampler)]
 
     def limits(self, name: str, most: float) -> list[Limit]:
-        """Return what keeps every one of them at `most`, SI."""
+        """Limits that keep every one of them at `most`, SI."""
         return [limit for each in self.of for limit in each.limits(name, most)]
 
 
@@ -255,11 +255,11 @@ class MemberShare(NamedTuple):
     limits: Mapping[str, str]
 
     def own(self, x: Numbers) -> dict[str, float]:
-        """Return its variables, SI, of the whole's."""
+        """Its variables, SI, from those of the whole."""
         return {name: x[whole] for name, whole in self.names.items()}
 
     def sampler(self, x: Numbers) -> Sampler:
-        """Return its design of the whole's variables, SI."""
+        """Its design, SI, from the variables of the whole."""
         return sampled(self.program.model, {**self.program.parameters, **self.own(x)})
 
 
@@ -358,15 +358,15 @@ class _Combining:
     # Names.
 
     def name(self, member: int, name: str) -> str:
-        """Return what the whole calls a number of a member."""
+        """Name in the whole of a member's number."""
         return of_member(name, member) if name in self.apart else name
 
     def is_shared(self, name: str) -> bool:
-        """Say whether a row or quantity is the same for all members."""
+        """Whether a row or quantity is the same for all members."""
         return self.roots.of(name).isdisjoint(self.apart)
 
     def read(self, member: int, name: str) -> str:
-        """Return what the whole calls a row, quantity, mean or number of a member, which it has from then on."""
+        """Name in the whole of a member's row, quantity, mean or number; it is added where it is missing."""
         if name in self.first.parameters or name in self.variables:
             return self.name(member, name)
         shared, model = self.is_shared(name), self.model
@@ -402,7 +402,7 @@ class _Combining:
         return called
 
     def where(self, member: int, where: Where | None) -> Where | None:
-        """Return pieces of a member's cycle as pieces of the whole's."""
+        """Pieces of a member's cycle as pieces of the cycle of the whole."""
         return where and (self.scenarios[member].switches[where[0]], where[1])
 
     # The model.
@@ -436,7 +436,7 @@ class _Combining:
         return list(found.values())
 
     def closing(self) -> tuple[dict[str, Group], dict[str, tuple[str, float]]]:
-        """Return what says that members assemble: as groups of links, and beside them."""
+        """Rows by which members assemble: those of groups of links, and the others."""
         closes, beside = dict[str, str](), dict[str, tuple[str, float]]()
         groups = self.model.kinematics.groups
         for k in range(len(self.programs)):
@@ -505,7 +505,7 @@ class _Combining:
         return list(found.values())
 
     def objective(self, member: int, objective: Objective) -> Objective:
-        """Return what a member seeks as a part of what the whole does."""
+        """Objective of a member as a part of that of the whole."""
         found = replace(objective, row=self.read(member, objective.row))
         if isinstance(found, Worst):
             found = replace(found, others=tuple(self.read(member, row) for row in found.others))
@@ -543,7 +543,7 @@ class _Combining:
         return Value(figure, figure, first.scale, power=first.power)
 
     def stands(self, row: str) -> bool:
-        """Say whether a row stands at an event, of which a sum has none."""
+        """Whether a row stands at an event; a sum has no events."""
         return row in self.rows and bool(self.rows[row].event)
 
     def least(self, member: int, own: Objective) -> str:

@@ -112,7 +112,7 @@ def _changes(scene: Scene, place: int) -> dict[str, Any]:
 
 
 def _flat(scene: Scene, at: str, given: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield dotted keys with their values; a short name is that of the one number it calls."""
+    """Dotted keys with their values; a short name stands for the one number of that name."""
     numbers = places(scene)
     for name, value in given.items():
         if name in TABLES or "." in name:
@@ -129,7 +129,7 @@ def _flat(scene: Scene, at: str, given: Mapping[str, Any]) -> Iterator[tuple[str
 
 
 def _leaves(key: str, value: object) -> Iterator[tuple[str, Any]]:
-    """Yield the values inside tables by their dotted keys."""
+    """Values inside tables by their dotted keys."""
     if not isinstance(value, Mapping):
         yield key, value
         return

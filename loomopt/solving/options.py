@@ -1,4 +1,4 @@
-"""What a solve is asked for, checked before anything is computed."""
+"""Options of a solve, checked before anything is computed."""
 
 import math
 from collections.abc import Callable
@@ -12,20 +12,20 @@ from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import FAMILY
 
 MOST_STARTS = 10_000
-"""Starts that may be asked for: hours; more is a slip of the pen."""
+"""Largest number of starts: it takes hours, and more is a typing error."""
 
 GAP, SECONDS = 1e-3, 60.0
-"""What a proof that no design is better leaves open, relative to each objective, and how long it may take: usual."""
+"""Usual gap of a global proof, relative to each objective, and its usual time limit, s."""
 OMITTED = 0.01
-"""Share of an objective's natural size that leaving out an effect may change, usual."""
+"""Usual share of an objective's scale that leaving out an effect may change."""
 LEAST_GAP, MOST_GAP = 1e-6, 0.5
-"""Gaps that may be asked for: an answer is right to 1e-8, and boxes round it close ever more slowly."""
+"""Range of gaps: an answer is right to 1e-8, and boxes close ever more slowly round it."""
 
 
 class GlobalProof(NamedTuple):
-    """That an answer be proven best of all admissible designs; say: is told how far the proof has come.
+    """Request for a proof that no admissible design is better.
 
-    gap: relative, what is left open; seconds: how long it may take.
+    gap: relative to each objective; seconds: time limit; say: function that takes the progress as text.
     """
 
     gap: float = GAP
@@ -36,14 +36,14 @@ class GlobalProof(NamedTuple):
 def check(
     scene: Scene, accuracy: float, starts: int | None, seed: int, global_proof: GlobalProof | None = None
 ) -> None:
-    """Raise BadInput for a scene that cannot be solved, or options outside what can be kept."""
+    """Raise BadInput for a scene that cannot be solved, or for options out of range."""
     check_sought(scene)
     check_numbers(accuracy, starts, seed)
     check_global_proof(global_proof)
 
 
 def check_global_proof(proof: GlobalProof | None) -> None:
-    """Raise BadInput for a gap or a time outside what can be kept, where a proof is asked for at all."""
+    """Raise BadInput for a gap or a time out of range, where there is a proof."""
     if proof is None:
         return
     arguments.number(proof.gap, "gap", f"{LEAST_GAP:g} to {MOST_GAP:g}", "Give 1e-3 as a number, or leave it out")
@@ -67,9 +67,9 @@ def check_global_proof(proof: GlobalProof | None) -> None:
 
 
 def target_name(scene: Scene, target: str | None, families: bool = False) -> str:
-    """Return the target's name; without one that of the answer that the scene is of, else the job's default.
+    """Name of the target; without one that of the answer the scene comes from, else the job's default.
 
-    families: whether what is asked is answered for several machines at once. Raises BadInput.
+    families: whether the call can serve several machines at once. Raises BadInput.
     """
     if target is not None:
         arguments.text(target, "target", ", ".join(scene.schema.targets), "Choose one of them")
@@ -108,7 +108,7 @@ def check_sought(scene: Scene, what: str = "solve") -> None:
 
 
 def check_numbers(accuracy: float, starts: int | None, seed: int = 0) -> None:
-    """Raise BadInput for settings outside what can be kept."""
+    """Raise BadInput for settings out of range."""
     accuracy = arguments.number(
         accuracy, "accuracy", f"{TIGHTEST:g} to {COARSEST:g}", "Give 1e-8 as a number, or leave it out"
     )

@@ -31,6 +31,7 @@ from loomopt.solving.answer.solution import (
     Words,
     joined,
     remedies,
+    risen,
 )
 from loomopt.solving.certificate.records import Certificate, GlobalBound
 from loomopt.solving.nlp.point import BEATEN, excess, sampler_at
@@ -467,3 +468,18 @@ def completed(answer: Solution, bound: GlobalBound | None, evaluations: int, sec
     if answer.certificate:
         solver["error_estimate"] = answer.certificate.error
     return replace(answer, solver=solver, time=seconds, global_bound=bound)
+
+
+def cost_sentence(subject: str, answer: Solution, nominal: Evaluated, words: Words, negligible: float) -> str:
+    """Sentence on the rise of an answer's objectives above those of a nominal one; subject: "It costs".
+
+    negligible: share of the largest figure of the same unit that counts as no change.
+    """
+    costs = []
+    for name, change in risen(answer, nominal).items():
+        then, now = nominal.figures[name] or 0.0, answer.figures[name] or 0.0
+        largest = max(abs(value or 0.0) for key, value in answer.figures.items() if words.si(key) == words.si(name))
+        if abs(change) > negligible * largest:
+            share = f" ({100 * change / abs(then):+.3g} %)" if abs(then) > negligible * largest else ""
+            costs.append(f"{name} {words.shown(name, now, 9)} instead of {words.shown(name, then, 9)}{share}")
+    return f"{subject} {', '.join(costs) or 'nothing of what is sought'}."

@@ -31,7 +31,7 @@ from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
 from loomopt.scenes import designs, numbers, sizes
 from loomopt.scenes.scene import Scene, cursor
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import Rounded, Sentences, Solution, Words, joined, risen
+from loomopt.solving.answer.solution import Rounded, Sentences, Solution, Words, joined
 from loomopt.solving.optimum import Task
 from loomopt.solving.reductions.reduction import Solve
 from loomopt.solving.search.search import objectives
@@ -194,7 +194,7 @@ def _check_goals(lattice: Lattice, nominal: Solution, answer: Solution) -> None:
 
 
 def _agree(lattice: Lattice, answer: Solution, best: Best) -> bool:
-    """Say whether an answer is worth what its point was read to be."""
+    """Whether the levels of an answer agree with those read at its point."""
     x = lattice.job.values(lattice.program, {lattice.scene.full(k): v for k, v in answer.design.items()})
     found = objectives(lattice.program, x)
     return all(abs(a - b) <= AGREES for a, b in zip(found, best.levels, strict=True))
@@ -204,7 +204,7 @@ def _agree(lattice: Lattice, answer: Solution, best: Best) -> bool:
 
 
 def _read_lattice(lattice: Lattice, nominal: Solution) -> Best | None:
-    """Return the best point of all; None where what is left to choose is more than one number."""
+    """Best point of the whole lattice; None where more than one number is free beside the sizes."""
     program, job = lattice.program, lattice.job
     assert nominal.point is not None
     names = {lattice.scene.full(name): own for name, own in lattice.sizes.items()}
@@ -260,12 +260,12 @@ class _Reader:
         self.cycles = [limit for limit in program.limits if isinstance(limit, CycleLimit)]
 
     def reading(self, point: Mapping[str, Floats]) -> BatchReading:
-        """Return what reads points."""
+        """Reading of points."""
         values = {**self.base, **self.like.hints, **point}
         return BatchReading(self.program.model, systems.numpy(), values, self.like.cycle, self.like.stills)
 
     def admissible(self, point: Mapping[str, Floats]) -> dict[str, Floats] | None:
-        """Return the points that keep all limits of one position, with what is chosen; None where no line chooses."""
+        """Points that keep all limits of one position, with the chosen number; None where no line gives it."""
         count = len(next(iter(point.values())))
         with np.errstate(all="ignore"):
             full = dict(point)
@@ -282,7 +282,7 @@ class _Reader:
         return {name: values[well] for name, values in full.items()}
 
     def _zero(self, point: Mapping[str, Floats], count: int) -> Floats | None:
-        """Return where the first level is least between what limits leave, (points,); None where it is no line."""
+        """Number at which the first level is least, (points,); None where the level is not linear in it."""
         level, name = self.program.objectives[0], self.chosen
         own = next(v for v in self.program.variables if v.name == name)
         low, high = np.full(count, own.lower), np.full(count, own.upper)
@@ -309,7 +309,7 @@ class _Reader:
         return np.asarray(found)
 
     def levels(self, points: Mapping[str, Floats]) -> Floats:
-        """Return what points are worth, (points, levels) in natural sizes; infinite where a cycle's limit is broken."""
+        """Levels of points, (points, levels), in their scales; infinite where a limit of the cycle is exceeded."""
         program = self.program
         if not len(next(iter(points.values()))):
             return np.zeros((0, len(program.objectives)))
@@ -348,7 +348,7 @@ Ends = Mapping[str, tuple[int, int]]
 
 
 def _branch(lattice: Lattice, nominal: Solution, solve: Solve) -> Best:
-    """Return the best point that boxes of sizes lead to, the most promising first."""
+    """Best point by branch and bound over boxes of sizes; the box with the best bound is split first."""
     order = itertools.count()
     whole: Ends = {name: (0, len(own) - 1) for name, own in lattice.sizes.items()}
     queue: list[tuple[tuple[float, ...], int, Ends, Solution]] = []
@@ -365,7 +365,7 @@ def _branch(lattice: Lattice, nominal: Solution, solve: Solve) -> Best:
         boxes += 1
         scene = lattice.within({k: (lattice.sizes[k][a], lattice.sizes[k][b]) for k, (a, b) in ends.items()})
         start = [near.point] if near.point else []
-        step = f"box {boxes} of sizes, {MOST_BOXES} at most; {_standing(lattice, found, near)}"
+        step = f"box {boxes} of sizes, {MOST_BOXES} at most; {_progress(lattice, found, near)}"
         answer = solve(replace(lattice.task.at(step), scene=scene, near=start))
         if answer.status != "optimal" or answer.point is None:
             return
@@ -376,7 +376,7 @@ def _branch(lattice: Lattice, nominal: Solution, solve: Solve) -> Best:
         )
         if best is not None and worth >= best:
             return
-        if all(_off(lattice, k, float(answer.design[k])) is None for k in lattice.sizes):
+        if all(_distance(lattice, k, float(answer.design[k])) is None for k in lattice.sizes):
             best, point = worth, {k: _nearest(lattice.sizes[k], float(answer.design[k])) for k in lattice.sizes}
             found = answer
             return
@@ -397,8 +397,8 @@ def _branch(lattice: Lattice, nominal: Solution, solve: Solve) -> Best:
     return Best(point, None, boxes, gap, rests)
 
 
-def _standing(lattice: Lattice, best: Solution | None, bound: Solution) -> str:
-    """Return the best sizes' figures that are sought, and how much better others may be, as a phrase.
+def _progress(lattice: Lattice, best: Solution | None, bound: Solution) -> str:
+    """Phrase of the objectives at the best sizes, and of the gap to the bound.
 
     bound: the answer of the most promising box that is open.
     """
@@ -412,8 +412,8 @@ def _standing(lattice: Lattice, best: Solution | None, bound: Solution) -> str:
     return f"best {told}; gap {', '.join(open_ones) or '0'}"
 
 
-def _off(lattice: Lattice, name: str, value: float) -> float | None:
-    """Return how far a number is from its nearest size, in widths between sizes; None where it is one."""
+def _distance(lattice: Lattice, name: str, value: float) -> float | None:
+    """Distance of a number from its nearest size, in mean widths between sizes; None where it is a size."""
     near = _nearest(lattice.sizes[name], value)
     own = lattice.sizes[name]
     width = (own[-1] - own[0]) / max(len(own) - 1, 1) or abs(near) or 1.0
@@ -426,32 +426,25 @@ def _nearest(own: tuple[float, ...], value: float) -> float:
 
 
 def _split(lattice: Lattice, ends: Ends, answer: Solution) -> tuple[str, int]:
-    """Return the number that is farthest from a size, and the place of the size below it."""
+    """Number that is farthest from a size, and the place of the size below it."""
     open_ones = [name for name, (low, high) in ends.items() if low < high]
-    name = max(open_ones, key=lambda each: _off(lattice, each, float(answer.design[each])) or 0.0)
+    name = max(open_ones, key=lambda each: _distance(lattice, each, float(answer.design[each])) or 0.0)
     low, high = ends[name]
     value = float(answer.design[name])
     below = max((k for k in range(low, high) if lattice.sizes[name][k] <= value), default=low)
     return name, below
 
 
-# What is told.
+# The answer.
 
 
 def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) -> Solution:
-    """Return the answer with what its sizes cost, and what the claim rests on."""
+    """Answer with the cost of its sizes, and the evidence that no other sizes are better."""
     scene, words = lattice.scene, Words(lattice.scene)
     ends = {name: (own[0], own[-1], len(own)) for name, own in lattice.sizes.items()}
     rounded = Rounded(ends, lattice.points, best.admissible, best.reaching, best.boxes, best.gap, nominal, best.rests)
-    costs = []
-    for name, change in risen(answer, nominal).items():
-        then, now = nominal.figures[name] or 0.0, answer.figures[name] or 0.0
-        alike = [abs(value or 0.0) for figure, value in answer.figures.items() if words.si(figure) == words.si(name)]
-        if abs(change) > AGREES * max(alike):
-            share = f" ({100 * change / abs(then):+.3g} %)" if abs(then) > AGREES * max(alike) else ""
-            costs.append(f"{name} {words.shown(name, now, 9)} instead of {words.shown(name, then, 9)}{share}")
     chosen = ", ".join(f"{name} {words.shown(name, value)}" for name, value in (best.point or {}).items())
-    said = [f"Sizes: {chosen}.", f"They cost {', '.join(costs)}." if costs else "They cost nothing of what is sought."]
+    said = [f"Sizes: {chosen}.", report.cost_sentence("They cost", answer, nominal, words, AGREES)]
     if best.boxes and best.gap:
         said.append(f"Others on the lattice of {lattice.points} points may be better by {best.gap:.2g} natural sizes")
         said[-1] += f": {best.boxes} boxes were solved."
@@ -472,7 +465,7 @@ def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) 
 
 
 def _without_sizes(lattice: Lattice, nominal: Solution, best: Best) -> Solution:
-    """Return that no point was found."""
+    """Answer without a certificate: no admissible point was found."""
     helps = "Take smaller steps or wider bounds; the design told is the optimum without sizes."
     if best.gap:
         status = "failed"

@@ -82,7 +82,7 @@ def _at_a_size(scene: Scene, ideal: Solution, name: str, stock: Stock, solve: So
 
 
 def _until_admissible(scene: Scene, name: str, sizes: Iterator[float], solve: SolveScene) -> Iterator[Tried]:
-    """Yield sizes with their answers, ending with the first that is optimal."""
+    """Sizes with their answers, up to the first that is optimal."""
     bound = scene.bounds[name]
     for _, size in zip(range(FARTHEST_SIZE), sizes, strict=False):
         if not bound.min <= size <= bound.max:
@@ -94,7 +94,7 @@ def _until_admissible(scene: Scene, name: str, sizes: Iterator[float], solve: So
 
 
 def _better(one: Solution, other: Solution) -> bool:
-    """Say whether one answer's objectives are less, level by level."""
+    """Whether one answer's objectives are less, level by level."""
     for level in one.certificate.levels if one.certificate else ():
         a, b = one.figures.get(level.objective) or 0.0, other.figures.get(level.objective) or 0.0
         if abs(a - b) > SAME_SIZE * max(abs(a), abs(b)):

@@ -30,7 +30,7 @@ from loomopt.studies.tolerance.study import ALL, Sums, estimate_yield, sum_scram
 
 SAMPLES = 2**15
 """Machines that are drawn to verify a yield."""
-PASSES, SETTLED = 40, 1e-10
+PASSES, CONVERGED = 40, 1e-10
 """Solves until standard deviations are those of the design, and the share of a back-off that may then be left."""
 SEARCHES = 3
 """Times that a search from scratch may lead to another optimum, with standard deviations of its own."""
@@ -169,17 +169,17 @@ def _search(request: Request, start: Pass, sigmas: Sigmas) -> Pass | Solution:
         off = tightened(here)
         again = request.solve(replace(request.task, margins=off))
         if again.status != "optimal":
-            return _in_the_way(request, again, here.sigmas)
+            return _not_optimal(request, again, here.sigmas)
         same = _same(again, here.answer)
         here = here._replace(answer=again, plan=request.plan(again, here.frozen), applied=off)
         if same:
             return here
         here = here._replace(margins=margins(here.plan))
-    return _unsettled(request, here)
+    return _not_converged(request, here)
 
 
 def _same(one: Solution, other: Solution) -> bool:
-    """Say whether two answers are one: every figure that is sought to the certificate's accuracy."""
+    """Whether the objectives of two answers agree to the certificate's accuracy."""
     names = [level.objective for level in one.certificate.levels] if one.certificate else []
     pairs = [(one.figures.get(name) or 0.0, other.figures.get(name) or 0.0) for name in names]
     size = max((abs(value) for pair in pairs for value in pair), default=0.0)
@@ -205,13 +205,13 @@ def _converge(request: Request, here: Pass, sigmas: Sigmas) -> Pass | Solution:
             return _narrow(request, here, *narrow)
         off = tightened(here)
         size = max(off.values(), default=0.0)
-        if before and all(abs(off[key] - before.get(key, 0.0)) <= SETTLED * (off[key] or size) for key in off):
+        if before and all(abs(off[key] - before.get(key, 0.0)) <= CONVERGED * (off[key] or size) for key in off):
             return here
         step = request.task.at(f"backing off by {here.sigmas:.4g} sigma, pass {number + 1}")
         near = [here.answer.point] if here.answer.point else []
         answer = request.solve(replace(step, near=near, margins=off, global_proof=None))
         if answer.status != "optimal":
-            return _in_the_way(request, answer, here.sigmas)
+            return _not_optimal(request, answer, here.sigmas)
         plan, frozen = request.plan(answer, here.frozen), dict(here.frozen)
         for name, made in plan.tolerances.items():
             if made.standard:
@@ -223,15 +223,15 @@ def _converge(request: Request, here: Pass, sigmas: Sigmas) -> Pass | Solution:
         plan = request.plan(answer, frozen) if frozen != here.frozen else plan
         here = here._replace(answer=answer, plan=plan, margins=margins(plan), frozen=Frozen(frozen))
         here, before = here._replace(passes=here.passes + 1, applied=off), off
-    return _unsettled(request, here)
+    return _not_converged(request, here)
 
 
 def tightened(here: Pass) -> dict[tuple[str, int], float]:
-    """Return by how much each side is tightened, SI."""
+    """Margins by which each side is tightened, SI, by name and sign."""
     return {each.key: each.back_off(here.sigmas, here.caps) for each in here.margins if not each.fixed}
 
 
-# A yield that is asked for.
+# A required yield.
 
 
 class Trials(NamedTuple):
@@ -306,7 +306,7 @@ def _try(request: Request, trials: Trials) -> Trials:
             else:
                 trials = trials._replace(low=max(trials.low, (point, found.value)))
             grain = max(MOST_BESIDE * found.se, 2.0 / request.back_off.samples)
-            if 0.0 <= found.value - least <= grain or trials.high[0] - trials.low[0] <= SETTLED:
+            if 0.0 <= found.value - least <= grain or trials.high[0] - trials.low[0] <= CONVERGED:
                 return trials
             following = _between(tried, trials.low, trials.high, found.value, least)
         if not trials.enough and trials.edge - trials.low[0] <= EDGE:
@@ -328,29 +328,29 @@ def _reach(request: Request, start: Pass, sigmas: Sigmas) -> Pass | Obstacle:
 
 
 def _between(at: Pass, low: tuple[float, float], high: tuple[float, float], found: float, least: float) -> float:
-    """Return where a yield is likely to be what is asked for: by the linear one's slope, within what is known."""
+    """Next back-off to try: Newton's step on the yield with the slope of the linear one, within the known bracket."""
     step = 1e-4
-    sides = [_scored(share(at.margins, at.sigmas + shift, at.applied, at.caps)) for shift in (0.0, step)]
+    sides = [_quantile(share(at.margins, at.sigmas + shift, at.applied, at.caps)) for shift in (0.0, step)]
     # A little beyond it, for what is found must be no less.
-    following = at.sigmas + (_scored(least) - _scored(found)) / ((sides[1] - sides[0]) / step or 1.0) * 1.02
+    following = at.sigmas + (_quantile(least) - _quantile(found)) / ((sides[1] - sides[0]) / step or 1.0) * 1.02
     if low[0] < following < high[0]:
         return following
     return (low[0] + high[0]) / 2 if math.isfinite(high[0]) else low[0] + 0.1
 
 
-def _scored(value: float) -> float:
-    """Return the value below which a share of the standard normal distribution lies, for all but none and all."""
+def _quantile(value: float) -> float:
+    """Quantile of the standard normal distribution; shares of 0 and 1 are moved inside."""
     return float(normal.quantile(np.array([min(max(value, 1e-12), 1 - 1e-12)]))[0])
 
 
 def linear(at: Pass, least: float) -> float:
-    """Return of how many standard deviations the linear joint normal yield is `least`; no number where of none.
+    """Standard deviations at which the linear joint normal yield is `least`; NaN where there are none.
 
     By secants of what a normal distribution has below it, nearly straight in them.
     """
 
     def short(sigmas: float) -> float:
-        return _scored(share(at.margins, sigmas, at.applied, at.caps)) - _scored(least)
+        return _quantile(share(at.margins, sigmas, at.applied, at.caps)) - _quantile(least)
 
     if short(0.0) >= 0.0:
         return 0.0
@@ -372,18 +372,18 @@ def linear(at: Pass, least: float) -> float:
 
 
 def _yields(plan: Plan) -> dict[str, Yield]:
-    """Return the share of machines that hold, by limit and of all, drawn with the plan's seed."""
+    """Sampled yields by limit, and of all limits together, drawn with the plan's seed."""
     sums: list[Sums] = list(map(functools.partial(sum_scramble, plan, {}), range(SCRAMBLES)))
     return {name: estimate_yield([part.passes[name] / part.machines for part in sums]) for name in sums[0].passes}
 
 
-# What is told.
+# The answer.
 
 
 def _explain(
     request: Request, ended: Pass, nominal: Solution, yields: Mapping[str, Yield], before: Mapping[str, Yield]
 ) -> Solution:
-    """Return the answer with its limits as the scene has them, the back-off beside each."""
+    """Answer with the limits of the scene, the back-off of each, and the sampled yields."""
     scene, answer, off = request.scene, ended.answer, tightened(ended)
     words = Words(scene)
     here = report.evaluated(scene, registry.of(scene), request.task.target, ended.plan.full)
@@ -406,12 +406,12 @@ def _explain(
     limits = tuple(each._replace(backed_off=by_name.get(each.name, 0.0)) for each in here.limits)
     binding = tuple(_priced(words, price, off) for price in answer.binding)
     found = replace(answer, limits=limits, reached=here.reached, scene=scene, binding=binding, robust=robust)
-    sentences = report.explained(found, *_said(scene, ended, found, robust))
+    sentences = report.explained(found, *_sentences(scene, ended, found, robust))
     return replace(found, sentences=sentences._replace(limits=report.stops(binding, answer.bind_together)))
 
 
 def _priced(words: Words, price: Price, off: Mapping[tuple[str, int], float]) -> Price:
-    """Return a price of a limit as the scene has it, the back-off apart."""
+    """Price of a limit at its value in the scene, with its back-off."""
     signs = {word: sign for sign, word in SIDES.items()}
     sign = signs[price.side]
     by = off.get((price.limit, sign), 0.0)
@@ -423,21 +423,12 @@ def _priced(words: Words, price: Price, off: Mapping[tuple[str, int], float]) ->
     return price._replace(value=value, text=text, backed_off=by)
 
 
-def _said(scene: Scene, ended: Pass, answer: Solution, robust: Robust) -> list[str]:
-    """Return what back-off costs and what it buys, as sentences."""
-    words, told = Words(scene), list[str]()
-    for name, change in robust.cost(answer).items():
-        then = robust.nominal.figures[name] or 0.0
-        size = max(abs(value or 0.0) for figure, value in answer.figures.items() if words.si(figure) == words.si(name))
-        if abs(change) > SAME * size:
-            share_of = f" ({100 * change / abs(then):+.3g} %)" if abs(then) > SAME * size else ""
-            text = f"{name} {words.shown(name, answer.figures[name] or 0.0, 9)} instead of {words.shown(name, then, 9)}"
-            told.append(f"{text}{share_of}")
+def _sentences(scene: Scene, ended: Pass, answer: Solution, robust: Robust) -> list[str]:
+    """Sentences on the cost of the back-off and on the yield."""
     now, was = robust.yields[ALL], robust.nominal_yields[ALL]
-    costs = f"It costs {', '.join(told)}." if told else "It costs nothing of what is sought."
     found = [
         f"That is with {_backed(ended)}{_from(robust)}.",
-        costs,
+        report.cost_sentence("It costs", answer, robust.nominal, Words(scene), SAME),
         f"All limits hold on {_percent(now)} of the machines instead of {100 * was.value:.4g} %.",
     ]
     if robust.kept:
@@ -452,7 +443,7 @@ def _said(scene: Scene, ended: Pass, answer: Solution, robust: Robust) -> list[s
 
 
 def _from(robust: Robust) -> str:
-    """Say from what back-off counts where it is not the nominal machine."""
+    """Phrase that names the mean machine where the back-off is measured from it."""
     return " from the mean machine, that in the middle of all tolerance bands" if robust.shifted else ""
 
 
@@ -467,19 +458,21 @@ def _percent(share_of: Yield) -> str:
 
 
 def _infeasible(request: Request, answer: Solution, why: str) -> Solution:
-    """Return that no design keeps its limits with the back-off."""
-    return _as_stands(request, answer, "infeasible", f"No admissible design keeps clear of its limits as asked: {why}.")
+    """Answer without a certificate: no design keeps its limits with the back-off."""
+    return _uncertified(
+        request, answer, "infeasible", f"No admissible design keeps clear of its limits as asked: {why}."
+    )
 
 
-def _in_the_way(request: Request, answer: Solution, sigmas: float) -> Solution:
-    """Return an answer that is no optimum with what it was asked for."""
+def _not_optimal(request: Request, answer: Solution, sigmas: float) -> Solution:
+    """Answer that is no optimum, with its back-off."""
     result = f"With limits backed off by {sigmas:.6g} sigma: {answer.sentences.result}"
     sentences = answer.sentences._replace(result=result)
     return replace(answer, scene=request.scene, limits=_limits(request, answer), sentences=sentences)
 
 
-def _as_stands(request: Request, answer: Solution, status: str, problem: str) -> Solution:
-    """Answer without a certificate, judged by the limits of the scene; problem: why it is none to build."""
+def _uncertified(request: Request, answer: Solution, status: str, problem: str) -> Solution:
+    """Answer without a certificate, judged by the limits of the scene; problem: the reason, as a sentence."""
     return replace(
         answer,
         status=status,
@@ -493,13 +486,13 @@ def _as_stands(request: Request, answer: Solution, status: str, problem: str) ->
 
 
 def _limits(request: Request, answer: Solution) -> tuple[Finding, ...]:
-    """Return an answer's limits as the scene has them."""
+    """Limits of the scene, judged at an answer's design."""
     own = {request.scene.full(name): value for name, value in designs.flat(answer.design).items()}
     return report.evaluated(request.scene, registry.of(request.scene), request.task.target, own).limits
 
 
 def _narrow(request: Request, here: Pass, name: str, width: float, needed: float) -> Solution:
-    """Return that the band of a limit has no room for the back-off of both sides."""
+    """Answer without a certificate: the band of a limit has no room for the back-off of both sides."""
     words = Words(request.scene)
     why = f"the band of {name}, {words.shown(name, width, 4)}, is no wider than {words.shown(name, needed, 4)}"
     found = _infeasible(request, here.answer, f"{why} on both sides: {here.sigmas:.6g} sigma each")
@@ -507,23 +500,23 @@ def _narrow(request: Request, here: Pass, name: str, width: float, needed: float
 
 
 def _fixed(here: Pass) -> str:
-    """Return which sides lose machines that no back-off saves."""
+    """Phrase of the sides that no back-off can move."""
     fixed = ", ".join(dict.fromkeys(each.name for each in here.margins if each.fixed))
     return f"nothing backs off {fixed}" if fixed else f"no more than {MOST_SIGMAS:g} sigma are tried"
 
 
 def _most(request: Request, found: Yield, here: Pass, obstacle: str) -> Solution:
-    """Return the answer of the most machines, which are fewer than asked for, and what stands in the way of more."""
+    """Answer with the largest yield, which is less than the required one, and the obstacle to a larger one."""
     least = 100 * (request.back_off.share or 0.0)
     problem = (
         f"{least:.6g} % of the machines cannot hold all limits: the most that was found is "
         f"{_percent(found)}, the yield of the design shown, with {_backed(here)}. In the way of more: "
         f"{obstacle or f'{TRIALS} back-offs were tried'}. Tighten the tolerances, widen the limits or ask for less."
     )
-    return _as_stands(request, here.answer, "infeasible", problem)
+    return _uncertified(request, here.answer, "infeasible", problem)
 
 
-def _unsettled(request: Request, here: Pass) -> Solution:
-    """Return that no fixed point was found."""
+def _not_converged(request: Request, here: Pass) -> Solution:
+    """Answer without a certificate: no fixed point was found."""
     problem = f"The standard deviations of the limits still change after {PASSES} solves. Ask for a smaller back-off."
-    return _as_stands(request, here.answer, "failed", problem)
+    return _uncertified(request, here.answer, "failed", problem)

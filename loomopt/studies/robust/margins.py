@@ -56,7 +56,7 @@ class Margin(NamedTuple):
 
 
 def margins(plan: Plan) -> tuple[Margin, ...]:
-    """Return every side of what a design's machines are judged by. Raises BadInput for what has no value."""
+    """Margins of all sides of the criteria of a design's machines. Raises BadInput for a figure without a value."""
     found, own = list[Margin](), slopes(plan)
     values = plan.read({name: np.full(1, plan.nominal[name]) for name in plan.tolerances})
     bands = {goal.figure for goal in plan.goals}
@@ -77,7 +77,7 @@ def margins(plan: Plan) -> tuple[Margin, ...]:
 
 
 def _way(plan: Plan, judged: Criterion, slope: Slopes, side: str) -> Floats:
-    """Return what independent numbers do to a side's figure, less its own end where that is one of the numbers."""
+    """Change of a side's room by one standard deviation of each independent number, (numbers,), SI."""
     left = _left(plan, judged, slope, side)
     groups = sorted({each.group for each in plan.tolerances.values() if each.group})
     way = np.zeros(len(plan.tolerances) + len(groups))
@@ -142,7 +142,7 @@ def check_crossings(plan: Plan, sigmas: float) -> None:
 
 
 def _tops(plan: Plan, crossing: Crossing) -> Iterator[tuple[float, float, float]]:
-    """Yield angle, size and its standard deviation, SI, of the extremes of a travel up to the first past a crossing."""
+    """Angle, size and its standard deviation, SI, of the extremes of a travel up to the first past a crossing."""
     quantity, side, dwell = crossing.quantity, crossing.side, plan.figures[crossing.figure]
     found = _extremes(plan.nominal_sampler, quantity, side)
     inside = [angle for angle in found if 0.0 < angle < dwell]
@@ -158,12 +158,12 @@ def _tops(plan: Plan, crossing: Crossing) -> Iterator[tuple[float, float, float]
 
 
 def _moved(plan: Plan, name: str, sigmas: int) -> Sampler:
-    """Return a machine of which one number is off by so many standard deviations."""
+    """Machine with one number moved by a multiple of its standard deviation."""
     return sampled(plan.model, {**plan.nominal, name: plan.nominal[name] + sigmas * plan.sigmas[name]})
 
 
 def _extremes(sampler: Sampler, quantity: str, side: int) -> dict[float, float]:
-    """Return |quantity| where it turns by how far the crank has turned on one side of angle 0, in order."""
+    """Extremes of |quantity| by the crank's turn from angle 0 to one side, in order."""
     turn = 2 * math.pi
     # What is highest at an end of a piece only turns with the cycle's pieces.
     inside = [each for each in sampler.extremes(quantity) if 0.0 < each.u < 1.0]
