@@ -1,3 +1,3 @@
-"""What every room stands on: errors, records, files, arguments, units; no mechanics."""
+"""Base of all packages: errors, records, files, arguments, units; no mechanics."""
 
 __version__ = "0.1.0"

@@ -10,7 +10,7 @@ from typing import Any, ParamSpec, TypeGuard, TypeVar
 from loomopt.base.errors import refusal
 
 PICTURE = "a path that ends in .png, .svg or .pdf", "Name a file, or leave it out"
-"""What a figure may be written to, and what to do where it is none."""
+"""Allowed paths of a picture, and the remedy for another one."""
 
 
 Arguments = ParamSpec("Arguments")
@@ -49,7 +49,7 @@ def number(given: object, key: str, allowed: str, remedy: str) -> float:
     try:
         return float(given)
     except OverflowError:
-        raise refusal("it is beyond all numbers that are computed with", "", key, given, allowed, remedy) from None
+        raise refusal("the number is too large to compute with", "", key, given, allowed, remedy) from None
 
 
 def flag(given: object, key: str, remedy: str = "Write True or False") -> bool:

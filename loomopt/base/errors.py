@@ -1,4 +1,4 @@
-"""The one error a user can cause, and which other distribution's code has failed.
+"""Error of bad input, and the error of another distribution's code.
 
 Text from outside is shortened, and stripped of whatever a terminal would obey.
 """
@@ -18,9 +18,9 @@ from loomopt.base.units import QuantityError
 _LONGEST = {"file": 240, "key": 190, "problem": 480, "value": 120, "allowed": 480, "remedy": 240}
 """Characters of each part, so that a message is read."""
 WHOLE, MACHINE, GAP, NAME, VALUE = range(5)
-"""How bad a mistake is: it hides others, the machine cannot work, something is missing, a name or a value is none."""
+"""Grades of mistakes: it hides others, the machine cannot work, a value is missing, a name or a value is wrong."""
 _MOST, _MOST_TOLD = 100, 20
-"""Mistakes after which nothing more is read; those that are told one by one."""
+"""Number of mistakes after which reading stops; number of mistakes with a line of their own."""
 
 
 def clean(text: str, longest: int = 1000) -> str:
@@ -75,7 +75,7 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
 
     @property
     def faults(self) -> "tuple[BadInput, ...]":
-        """Each mistake as an error of its own, the worst first."""
+        """Mistakes as separate errors, the worst first."""
         return (self._in(self.file) if self.others else self, *self.others)
 
     def placed(self, file: str, tables: Collection[str]) -> "BadInput":
@@ -101,7 +101,7 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
 
 
 class Faults:
-    """Mistakes of an input: `with faults:` adds one and goes on, `tell` raises them all; file: where they stand."""
+    """Mistakes of an input: `with faults:` adds one and continues, `tell` raises all; file: name of the input."""
 
     def __init__(self, file: str = "") -> None:
         self.file = file
@@ -117,7 +117,7 @@ class Faults:
         return True
 
     def add(self, error: BadInput) -> None:
-        """Keep a mistake. Raises BadInput where there are too many to go on."""
+        """Add a mistake. Raises BadInput where there are too many."""
         self.mistakes += error.faults
         if len(self.mistakes) >= _MOST:
             self.tell()
@@ -159,7 +159,7 @@ def blamed(error: BaseException) -> BaseException:
         if owners:
             owner = module if module in owners else owners[0]
             where = f"{frame.f_code.co_name}, line {line} of {module}"
-            return Broken(f"{BROUGHT[owner]} fails in {where}: {message}", remedy="Mend it, or go without it")
+            return Broken(f"{BROUGHT[owner]} fails in {where}: {message}", remedy="Correct it, or remove it")
     note = f"other distributions take part: {', '.join(sorted(set(BROUGHT.values())))}"
     if note not in getattr(error, "__notes__", ()):
         error.add_note(note)
@@ -188,13 +188,13 @@ _LONGEST_VALUE, _LONGEST_PART = 80, 450
 _MOST_FILES = 1000
 """Files of a folder that are looked through for one of a near name."""
 NEAR, SAME = 0.5, 0.75
-"""Share of letters that two names have in common: of which one may be meant, and of which one surely is."""
+"""Share of equal letters of two names: for a possible match, and for a sure match."""
 NOTHING = object()
-"""Stands for no value: None is one."""
+"""Marker for a missing value: None is a value."""
 
 
 def shown(value: object) -> str:
-    """Scene's raw value as it would be written, shortened."""
+    """Raw value as text of a scene, shortened."""
     if isinstance(value, str):
         return f'"{clean(value, _LONGEST_VALUE)}"'
     if isinstance(value, bool) or value is None:
@@ -236,7 +236,7 @@ def unknown(
     remedy: str = "Correct the name or take it out",
     given: Collection[str] = (),
 ) -> BadInput:
-    """Error for a name nobody knows, with the nearest known one; what: "key", "effect", …
+    """Error for an unknown name, with the nearest known one; what: "key", "effect", …
 
     remedy: where none is near; given: names that are there too, and so are meant less likely.
     """
@@ -276,5 +276,5 @@ def near_file(path: Path) -> str:
 
 
 def misread(error: QuantityError, origin: str, key: str, value: object) -> BadInput:
-    """Error for a value that is not the quantity asked for."""
+    """Error for a value that is not the expected quantity."""
     return refusal(error.problem, origin, key, value, error.allowed, error.remedy)

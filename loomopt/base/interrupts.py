@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 """Exit status."""
 SIGNALS = signal.SIGINT, signal.SIGTERM
-"""What stops a run: Ctrl-C, and what a system sends that wants a process to end."""
+"""Signals that stop a run: Ctrl-C, and the system's request to end a process."""
 STOPPED = "loomopt: stopped; nothing was left half-written."
 _came: list[int] = []
 """Signals that have come while a run was stoppable."""
 
 
 def leave() -> NoReturn:
-    """End the process, whatever it is at."""
+    """End the process at once."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     with contextlib.suppress(OSError):
@@ -64,7 +64,7 @@ def check() -> None:
 
 
 def _handle(handler: Callable[[int, "FrameType | None"], None]) -> None:
-    """Set what Ctrl-C and SIGTERM do, but where whoever started the process has them ignored."""
+    """Set the handler of Ctrl-C and SIGTERM, except where the parent process has made them ignored."""
     for signum in SIGNALS:
         if signal.getsignal(signum) is not signal.SIG_IGN:
             signal.signal(signum, handler)

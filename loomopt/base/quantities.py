@@ -281,7 +281,7 @@ def _misreading(text: str, kind: str, problem: str = "", remedy: str = "") -> Qu
         inches = 12 * float(feet[1]) + float(feet[2])
         return _refusal(kind, "feet and inches are two numbers", f'Write one number: "{inches:.10g} in"')
     if _ARITHMETIC.search(text):
-        return _refusal(kind, "arithmetic is not worked out here", "Write the result as one number")
+        return _refusal(kind, "arithmetic is not evaluated", "Write the result as one number")
     if not re.match(r"[+\- .]*[0-9]", text):
         return _refusal(
             kind,
@@ -294,7 +294,7 @@ def _misreading(text: str, kind: str, problem: str = "", remedy: str = "") -> Qu
 
 
 class Quantity(NamedTuple):
-    """What a scene's number may be: its kind, and its range in SI units."""
+    """Kind of a scene's number and its range in SI units."""
 
     kind: str
     least: float = -math.inf

@@ -20,7 +20,7 @@ class Frozen(dict[str, Any]):
 
 
 class Awaited(Mapping[str, float | None]):
-    """A mapping that never changes, some values of which are computed when they are read: one alone, then the rest.
+    """An immutable mapping with values that are computed when they are read: first one alone, then the rest.
 
     names: of all, in order; known: those that are there; later(names): others, which cost less together. It pickles as
     a `Frozen`.
@@ -87,7 +87,7 @@ class lazy(functools.cached_property[Computed]):  # noqa: N801 (it is written li
     def __get__(self, instance: object, owner: type[Any] | None = None) -> Computed: ...
 
     def __get__(self, instance: object | None, owner: type[Any] | None = None) -> "lazy[Computed] | Computed":
-        """Value, computed once and kept in the instance."""
+        """Value, computed once and stored in the instance."""
         if instance is None:
             return self
         value = instance.__dict__[self.attrname or ""] = self.func(instance)
@@ -98,7 +98,7 @@ _SHOWN_BY: list[Callable[["Shown"], str]] = []
 
 
 class Shown:
-    """What shows itself in Jupyter as HTML, once it is said how; as its `repr` until then."""
+    """Record that Jupyter shows as HTML once `show_by` is called, and by its `repr` before."""
 
     def _repr_html_(self) -> str | None:
         return _SHOWN_BY[-1](self) if _SHOWN_BY else None

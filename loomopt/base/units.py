@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 
 
 class QuantityError(ValueError):
-    """Text that is not the quantity asked for: problem, what is allowed, remedy; each in plain words."""
+    """Text that is not the expected quantity: problem, allowed values and remedy in plain words."""
 
     def __init__(self, problem: str, allowed: str, remedy: str) -> None:
         super().__init__(problem)
@@ -124,7 +124,7 @@ _LARGEST_EXPONENT, _LONGEST_UNIT = 4, 20
 _TOKEN = re.compile(r"\*\*|[*/^()]|[+-]?[0-9]+|[^\W\d_]+|.", re.DOTALL)
 _SUPERSCRIPT = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _MISTAKEN = {"Nm": "N*m", "Nmm": "N*mm", "kNm": "kN*m", "Ns": "N*s", "Nms": "N*m*s", "grad": "deg"}
-"""What pint would take for a yarn count, a plural or a gon → what is meant."""
+"""Text that pint would read as a yarn count, a plural or a gon → the unit that is meant."""
 _QUOTES = str.maketrans({"″": '"', "”": '"', "′": "'", "’": "'"})
 _LOOKALIKE = str.maketrans({"·": "*", "⋅": "*", "µ": "u", "μ": "u", "°": "deg"})
 

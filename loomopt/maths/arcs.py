@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 STRAIGHT = 1e-12
-"""Bulge below which an arc is told as a straight line."""
+"""Bulge below which an arc is a straight line."""
 Arcs = list[tuple[complex, float]]
 """Points where arcs begin, and their bulges: tan of a quarter of their angle, positive to the left."""
 

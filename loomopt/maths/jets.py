@@ -1,4 +1,4 @@
-"""Forward derivatives as a number: a value with its slopes, and with its curvatures where they are asked for.
+"""Forward derivatives as a number: a value with its slopes, and with its curvatures on request.
 
 Truncated Taylor arithmetic in several directions at once, over NumPy arrays [Griewank and Walther, Evaluating
 Derivatives, 2nd ed., chapter 3 and section 13.2]: exact but for rounding, no step to choose.

@@ -37,7 +37,7 @@ class RecordedOperation(NamedTuple):
 
 
 class Recorded:
-    """A number of which only is known how it came about: its place on a tape."""
+    """Number on a tape: its place, without a value."""
 
     __slots__ = ("place", "tape")
     __array_ufunc__ = None

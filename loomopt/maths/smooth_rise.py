@@ -40,7 +40,7 @@ JUMP, SURE, MOST_JUMPS = 0.5, 6.0, 6
 SMALLEST = 0.05
 """Share of the largest s'' below which a jump is none."""
 SAFETY = 1.5
-"""Ratio of the uncertainty that is told to the one that is estimated."""
+"""Ratio of the reported uncertainty to the estimated one."""
 LESS = 30.0
 """Ratio by which λ is made smaller to see what smoothing does to s''."""
 

@@ -1,4 +1,4 @@
-"""Axes of a scene as objectives of a program: what is traded, which way, and what of it a limit says."""
+"""Axes of a scene as objectives of a program, with their directions and limits."""
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,9 +14,9 @@ from loomopt.model.program import Program
 from loomopt.physics.schema import Axis, Sense
 
 Requested = Mapping[str, Sense]
-"""Axis → which end of it is sought."""
+"""Axis → the end that is sought, least or most."""
 FORMS: Mapping[str, type[Objective]] = {"value": Value, "magnitude": Magnitude, "peak": Peak}
-"""How an axis says that it is read → the kind of objective that it is."""
+"""Form of an axis → the kind of its objective."""
 
 
 class Traded(NamedTuple):
@@ -33,7 +33,7 @@ class Traded(NamedTuple):
 
     @property
     def called(self) -> str:
-        """Its name; of a magnitude it says so."""
+        """Name; of a magnitude with the word."""
         return f"|{self.axis.name}|" if self.objective.is_magnitude else self.axis.name
 
     def figure(self, value: float) -> float:
@@ -42,7 +42,7 @@ class Traded(NamedTuple):
         return self.axis.offset + self.sign * root
 
     def value(self, figure: float) -> float:
-        """Value that is sought the least of, of a figure, SI."""
+        """Value to minimise, from a figure, SI."""
         return float((self.sign * (figure - self.axis.offset)) ** self.axis.power)
 
     def slope(self, figure: float) -> float:
@@ -58,7 +58,7 @@ class Traded(NamedTuple):
 def requested_of(
     axes: Mapping[str, Axis], numbers: Iterable[str], requested: Requested, origin: str
 ) -> dict[str, Axis]:
-    """Axes of the names that are asked for; numbers: those of the scene that are bounded, axes too.
+    """Axes by the requested names; numbers: bounded numbers of the scene, which are axes too.
 
     Raises BadInput for a name that is no axis, and for an end that is not offered.
     """
@@ -81,7 +81,7 @@ def with_axes(
     full: Callable[[str], str],
     size: Callable[[str], float],
 ) -> tuple[Program, tuple[Traded, ...]]:
-    """Program whose last levels are the axes in the order asked for, and what they are.
+    """Program whose last levels are the axes in the requested order, and these axes.
 
     program: its objectives are what is held before them; full: name among the model's values; size: natural one of a
     value, SI. Raises BadInput for an axis that nothing in the scene gives.

@@ -1,4 +1,4 @@
-"""Where the crank torque comes from: each effect's share over the turn, and what motor and flywheel their sum asks for.
+"""Crank torque by effect: shares over the turn, and the motor and flywheel that their sum needs.
 
 A share is the effect's term times q', or its term where it acts in the drive [balance.py]; the shares add up to the
 crank torque. Energies are integrals over the turn by Gauss's rule on each smooth piece, so that what gives back all
@@ -36,7 +36,7 @@ BISECTIONS = 54
 
 
 class TorqueShare(NamedTuple):
-    """What an effect is of the crank torque: where that peaks, at its own peak, rms (N·m), and its energy a turn, J.
+    """Share of an effect in the crank torque: at the torque's peak, at its own peak, rms (N·m), and energy per turn, J.
 
     share: of the crank torque at its peak; None where that is 0.
     """
@@ -50,10 +50,10 @@ class TorqueShare(NamedTuple):
 
 
 class MotorSize(NamedTuple):
-    """What the crank asks of a motor: rms torque, N·m, over time; mean and peak power and what it gives back, W.
+    """Size of the motor: rms torque over time, N·m; mean power, peak power and regenerated power, W.
 
-    energy_swing: what a flywheel must take in and give back in a turn, J, where the motor's torque is constant;
-    flywheel: kg·m² at the crank for the fluctuation that is asked for. None where the speed, or that, is not known.
+    energy_swing: energy that a flywheel stores and returns in a turn, J, where the motor's torque is constant;
+    flywheel: inertia at the crank, kg·m², for the given fluctuation. None where the speed or fluctuation is unknown.
     """
 
     rms_torque: float
@@ -82,7 +82,7 @@ class TorqueBudget:
 
 
 def budget(sampler: Sampler, fluctuation: float | None = None) -> TorqueBudget:
-    """Budget of a sampled design, on whose crank something acts all over the turn."""
+    """Torque budget of a sampled design; a load acts on its crank over the whole turn."""
     loads = shared(sampler.model.loads)
     names = tuple(f"share of {load.name}" for load in loads)
     shares = dict(zip(names, loads, strict=True))
@@ -121,7 +121,7 @@ def _with_shares(model: JobModel, shares: Mapping[str, Acting]) -> JobModel:
 
 
 def shared(loads: Sequence[Acting]) -> tuple[Acting, ...]:
-    """Loads that have a share of their own: all but those that a state carries without telling how."""
+    """Loads with a share of their own: all but those of a state that does not declare its inertia."""
     silent = [load for load in loads if isinstance(load, State) and not load.moved]
     gone = balance.carried(silent)
     return tuple(load for load in loads if load.name not in gone)
@@ -169,7 +169,7 @@ class _Quadrature(NamedTuple):
 
 
 Edges = Sequence[Floats]
-"""Of each piece of the cycle the u from 0 to 1 at which it is parted."""
+"""Division of each piece of the cycle: u from 0 to 1."""
 
 
 def _rule(cycle: Cycle, edges: Edges) -> _Quadrature:
@@ -232,7 +232,7 @@ def _motor(sampler: Sampler, edges: Edges, fluctuation: float | None) -> MotorSi
 
 
 def _swing(sampler: Sampler, edges: Edges, mean: float) -> float:
-    """Largest less the least energy, J, that the crank has taken beyond its mean torque up to some angle."""
+    """Largest minus least energy, J, that the crank has taken above its mean torque."""
     parted = _rule(sampler.cycle, _with_crossings(sampler, drive.TORQUE, edges, mean))
     beyond = parted.by_stretch(sampler.at(drive.TORQUE, parted.pieces, parted.u) - mean)
     taken = np.concatenate([[0.0], np.cumsum(beyond)])

@@ -1,4 +1,4 @@
-"""A design whose crank has a motion of its own: its speed is solved once, then every pose carries it."""
+"""Crank whose speed varies: the speed is solved once, then every pose contains it."""
 
 import functools
 from collections.abc import Collection, Hashable, Mapping
@@ -39,7 +39,7 @@ def turned(steady: Sampler, scene: Scene) -> Sampler:
     try:
         return steady.session.cached("turned", KEPT, (steady, motor), lambda: _turned(steady, motor))
     except NoTurn:
-        problem = f"effect {motor.name}: no speed was found that the crank keeps, turn after turn, without stopping"
+        problem = f"effect {motor.name}: the crank has no periodic motion without a stop"
         remedy = "Give a larger flywheel, a higher speed, or less load on the crank"
         raise refusal(problem, scene.origin, f"effects.{motor.name}", remedy=remedy) from None
 
@@ -90,7 +90,7 @@ class TurnedCrank(Kinematics):
 
     @property
     def structure(self) -> Hashable:
-        """What distinguishes its formulas from another's."""
+        """Key of its formulas: equal for mechanisms with the same formulas."""
         return self.steady.structure, PIECE
 
     @property

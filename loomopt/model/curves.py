@@ -40,7 +40,7 @@ FORCE: Formula = operator.attrgetter("force")
 ANGLE = "phi [rad]"
 POWER = "motor_power [W]"
 ALIKE = 1e-12
-"""Share of a quantity's largest magnitude by which two of its largest values are one: they mirror each other."""
+"""Share of a quantity's largest magnitude by which two equal, mirrored maxima may differ."""
 COLUMN = re.compile(r"(?P<name>.+) \[(?P<unit>.+)\]")
 
 Rows = tuple[Pieces, Floats, Floats]
@@ -48,7 +48,7 @@ Rows = tuple[Pieces, Floats, Floats]
 
 
 class Columns(NamedTuple):
-    """What curves show.
+    """Columns of the curves.
 
     motion: column name with unit → formula; from name_1, name_2 … with respect to φ follow name_t, name_tt … with
     respect to time, where the speed is known. force: column of the output force, and the quantity (of which sign) that
@@ -114,7 +114,7 @@ def columns_at(sampler: Sampler, columns: Columns, rows: Rows) -> dict[str, Floa
 
 
 def tops(sampler: Sampler, quantities: Iterable[str]) -> list[float]:
-    """Crank angles, rad, at which quantities are largest, wherever they are alike."""
+    """Crank angles, rad, at which quantities are largest; equal maxima are included."""
     angles = []
     for extremes in map(sampler.extremes, quantities):
         alike = ALIKE * max((abs(extreme.value) for extreme in extremes), default=0.0)
@@ -151,7 +151,7 @@ def load_name(load: Acting) -> str:
 
 
 def split(column: str) -> tuple[str, str]:
-    """Column's name and unit."""
+    """Name and unit of a column."""
     match = COLUMN.fullmatch(column)
     return (match["name"], match["unit"]) if match else (column, "1")
 

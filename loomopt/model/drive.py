@@ -20,7 +20,7 @@ FIGURES = (
 
 SPEED, MOTOR = "omega", "motor_torque"
 KINDS = {SPEED: "angular speed", MOTOR: "torque"}
-"""What is told over the cycle of a crank whose speed changes: its speed, and the motor's own torque."""
+"""Whole-cycle quantities of a crank whose speed changes: its speed and the motor's torque."""
 
 
 def quantities(effects: Iterable[Effect], known: Collection[str]) -> dict[str, CycleQuantity]:

@@ -1,4 +1,4 @@
-"""What a mechanism offers a job: poses, events by name, and groups of links that must close."""
+"""Mechanism for a job: poses, events by name, and groups of links that must close."""
 
 import functools
 import math
@@ -93,7 +93,7 @@ class Arcs(NamedTuple):
     corners: Callable[[Maths, Given], tuple[Number, ...]]
     switch: Callable[[float, tuple[float, ...]], float]
     structure: Hashable = None
-    """What distinguishes stretches of one name."""
+    """Key that distinguishes stretches of one name."""
     chain: DerivedChain | None = None
     """What their formulas are made of, where that is a chain."""
     parting: Callable[[Maths, Given], tuple[Number, ...]] | None = None
@@ -141,7 +141,7 @@ class Kinematics(Protocol):
 
     @property
     def structure(self) -> Hashable:
-        """What distinguishes its formulas from another's."""
+        """Key of its formulas: equal for mechanisms with the same formulas."""
 
     @property
     def groups(self) -> Mapping[str, Group]:

@@ -19,7 +19,7 @@ from loomopt.physics.tolerances import ACTIVE
 class Touch(NamedTuple):
     """A smooth row of a limit that a design touches.
 
-    limit: as it holds there; excess: by how much it is exceeded, in its natural size; node: of a whole-cycle row.
+    limit: as it holds there; excess: amount over the limit as a multiple of the scale; node: of a whole-cycle row.
     """
 
     limit: "Limit"
@@ -31,7 +31,7 @@ class Touch(NamedTuple):
 class Limit(abc.ABC):
     """A limit as `sign · (row − value) ≤ 0`: sign +1 for a maximum, −1 for a minimum, 0 for an equality.
 
-    name: as the scene calls it; row: what it reads; value: SI; scale: natural size of the row; relaxable: whether a
+    name: name in the scene; row: name of its row; value: SI; scale: scale of the row, SI; relaxable: whether a
     designer could give way; hidden: it states what a named one means.
     """
 
@@ -45,21 +45,21 @@ class Limit(abc.ABC):
     hidden: bool = False
 
     is_of_variable: ClassVar[bool] = False
-    """Whether what the designer calls by its name is a variable, not a figure."""
+    """Whether the name is that of a variable, not of a figure."""
 
     @property
     def bound(self) -> float:
-        """What its row is compared with, SI."""
+        """Number with which the row is compared, SI."""
         return self.value
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """The rows and quantities that it reads."""
+        """Rows and quantities that it reads."""
         return (self.row,)
 
     @property
     def side(self) -> tuple[type["Limit"], str, int]:
-        """What it shares with the other rows of one side of a limit: they give way together."""
+        """Key that the rows of one side of a limit share: they are relaxed together."""
         return type(self), self.name, self.sign
 
     @property
@@ -69,7 +69,7 @@ class Limit(abc.ABC):
 
     @property
     def named_scale(self) -> float:
-        """The natural size, SI, of what the designer calls by its name."""
+        """Scale, SI, of the quantity that has this name for the designer."""
         return self.scale
 
     @abc.abstractmethod
@@ -90,7 +90,7 @@ class Limit(abc.ABC):
         return 1.0
 
     def touches(self, sampler: Sampler) -> list[Touch]:
-        """Smooth rows of it that a design touches, none where it keeps clear of it."""
+        """Smooth rows of the limit that a design touches; none where the limit is not active."""
         excess = self.excess(sampler)
         return [] if self.sign != 0 and excess < -ACTIVE else self._touches(sampler, excess)
 
@@ -153,7 +153,7 @@ class RatioLimit(DesignLimit):
 
     @property
     def named_scale(self) -> float:
-        """The natural size of the quotient: what it is limited to, SI."""
+        """Scale of the quotient: its limit, SI."""
         return abs(self.value) or 1.0
 
     def factor(self, rows: Rows) -> Number:

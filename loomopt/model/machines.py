@@ -230,7 +230,7 @@ class Machines:
 
     @lazy
     def nearly_singular(self) -> NDArray[np.bool_]:
-        """Which machines come so near to a singular position, or pass it, that one must be looked at alone."""
+        """Mask of machines so close to a singular position, or past it, that each needs its own sampler."""
         near = np.zeros(self.count, dtype=bool)
         for prefix, group in self.model.kinematics.groups.items():
             names = [prefix + name for name in group.closes.values()] if group.closest else []
@@ -243,7 +243,7 @@ class Machines:
 
     @lazy
     def _margins(self) -> dict[str, float]:
-        """Quantities that say how near a singular position is, and the most of each on the grid, SI."""
+        """Quantities that measure the distance to a singular position → the largest allowed on the grid, SI."""
         groups = self.model.kinematics.groups.items()
         closes = [prefix + name for prefix, group in groups if not group.closest for name in group.closes.values()]
         margins = dict.fromkeys(closes, 1 - WORTH_A_LOOK * NEARLY_SINGULAR)
@@ -315,7 +315,7 @@ def _fourth(around: Floats) -> Floats:
 
 
 ALIKE = 1e-12
-"""Share of the largest |sample| by which a top may be lower than another and count as alike: rounding."""
+"""Share of the largest |sample| by which two equal tops may differ: rounding."""
 
 
 def at_once(model: JobModel) -> bool:

@@ -168,7 +168,7 @@ def squared(name: str) -> str:
 
 
 COMPONENTS = ("x", "y")
-"""Of a vector, in the mechanism's axes."""
+"""Components of a vector in the mechanism's axes."""
 
 
 def component(check: Check[Any], name: str, axis: str, at: Instant) -> Number:
@@ -203,7 +203,7 @@ def _magnitude(check: Check[Any], name: str, at: Instant) -> Number:
 
 
 SLOWNESS = "slowness"
-"""What the time that the crank takes per angle is called."""
+"""Name of the time that the crank takes per angle."""
 
 
 def slowness(at: Instant) -> Number:
@@ -222,7 +222,7 @@ def heading_of(check: Check[Any], part: str, axis: str, at: Instant) -> Number:
 
 
 FRAME = "frame"
-"""What does not move, among the parts that a force is between."""
+"""Name of the frame among the parts between which a force acts."""
 
 
 def jointed(check: Check[Any], known: Collection[str]) -> dict[str, CycleQuantity]:
@@ -351,7 +351,7 @@ def state_columns(states: Sequence[State]) -> Mapping[str, Callable[[Instant], N
 
 
 def uncovered(effects: Sequence[Effect], values: Mapping[str, Values]) -> tuple[str, ...]:
-    """Parts of states and events that neither proofs nor studies of accuracy cover; own: values by effect."""
+    """Parts of states and events that neither proofs nor studies of accuracy cover; values: by effect."""
     return tuple(effect.rests(values[effect.name]) for effect in effects if isinstance(effect, State | Event))
 
 
@@ -383,7 +383,7 @@ class JobModel:
 
     @lazy
     def key(self) -> Hashable:
-        """What distinguishes this model's formulas from another's."""
+        """Key of the model's formulas: equal for models with the same formulas."""
         means = tuple((mean.name, len(mean.angles), mean.parts) for mean in self.integrals)
         arcs = tuple((arc.name, arc.structure) for arc in self.arcs)
         structure = self.kinematics.structure, arcs, means, tuple(self.own_quantities), tuple(self.own_rows)
@@ -391,12 +391,12 @@ class JobModel:
 
     @lazy
     def loads(self) -> tuple[Acting, ...]:
-        """What acts in the balance, in order."""
+        """Loads and states of the balance, in order."""
         return tuple(effect for effect in self.effects if isinstance(effect, Load | State))
 
     @lazy
     def states(self) -> tuple[State, ...]:
-        """What of them has a coordinate of its own."""
+        """Loads that have a coordinate of their own."""
         return tuple(load for load in self.loads if isinstance(load, State))
 
     @lazy
@@ -406,7 +406,7 @@ class JobModel:
 
     @lazy
     def called(self) -> frozenset[str]:
-        """What the effects read beside the mechanism's lengths: numbers, and events of the motion."""
+        """Numbers and events of the motion that effects read in addition to the mechanism's lengths."""
         return frozenset(name for effect in self.effects for name in effect.reads)
 
     @lazy
@@ -483,7 +483,7 @@ class JobModel:
 
     @lazy
     def least(self) -> tuple[str, ...]:
-        """Figures that are the least of a value over the cycle: their quantities are its opposite."""
+        """Figures that are minima over the cycle; their quantities have the opposite sign."""
         return tuple(name for state in self.states for name, peak in state.peaks.items() if peak.least)
 
     @lazy
@@ -516,14 +516,14 @@ class JobModel:
 
     @lazy
     def assembly(self) -> dict[str, tuple[str, float]]:
-        """What says that the mechanism assembles at an angle: phrase → (quantity, the largest |value| it may have)."""
+        """Conditions of assembly at an angle: phrase → (quantity, largest |value| that is allowed)."""
         groups = self.kinematics.groups.items()
         closes = {phrase: (prefix + name, 1.0) for prefix, group in groups for phrase, name in group.closes.items()}
         return closes | dict(self.assembled)
 
     @lazy
     def check_figures(self) -> dict[str, str]:
-        """What checks tell over the cycle, each with the figure whose kind it is of; of a vector its components too."""
+        """Whole-cycle quantities of checks → the figure that has the same kind; components of vectors are included."""
         figures: dict[str, str] = {}
         for check in self.checks:
             lacked = lacking(check, self.known)
@@ -536,7 +536,7 @@ class JobModel:
 
     @lazy
     def sides(self) -> dict[str, tuple[str, str]]:
-        """Forces that checks tell, each with the parts that it is between."""
+        """Forces of checks → the two parts between which the force acts."""
         return {
             name: parts for check in self.checks for name, parts in check.sides.items() if name in self.check_figures
         }
@@ -549,7 +549,7 @@ class JobModel:
 
     @lazy
     def pushes(self) -> frozenset[str]:
-        """What checks tell over the cycle that is 0 where Q is negative, components of vectors too."""
+        """Whole-cycle quantities of checks that are 0 where Q is negative; components of vectors are included."""
         pushed = {name for check in self.checks for name in check.pushes}
         return frozenset(name for name, figure in (self.check_figures | self._works).items() if figure in pushed)
 
@@ -559,7 +559,7 @@ class JobModel:
 
     @lazy
     def undefined(self) -> dict[str, str]:
-        """Figures of checks that have no value, and why, each a sentence without its full stop."""
+        """Figures of checks that have no value → the reason, a sentence without full stop."""
         reasons: dict[str, str] = {}
         for check in self.checks:
             for name, missing in lacking(check, self.known).items():
@@ -568,7 +568,7 @@ class JobModel:
 
     @property
     def demands(self) -> tuple[tuple[Check[Any], Demand], ...]:
-        """What checks demand while they are on."""
+        """Demands of active checks."""
         return tuple((check, demand) for check in self.checks for demand in check.demands)
 
     # Numbers and corners.
@@ -595,7 +595,7 @@ class JobModel:
 
     @lazy
     def switches(self) -> tuple[str, ...]:
-        """Names of what has corners in the cycle: the motion's arcs, the job's, then loads'."""
+        """Names of the switches, which have corners in the cycle: arcs of the motion, arcs of the job, loads."""
         arcs = (*self.kinematics.arcs, *self.arcs)
         cornered = [load.name for load in self.loads if isinstance(load, Load) and load.corners]
         return (*(arc.name for arc in arcs), *cornered)

@@ -1,4 +1,4 @@
-"""A scene's numbers by one name each, whatever table they stand in."""
+"""Numbers of a scene by full name, from all its tables."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -21,7 +21,7 @@ from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE
 
 Sought = Literal["least", "least magnitude", "most"]
-"""What of a figure is sought."""
+"""End of a figure that is sought."""
 
 
 class Piece(NamedTuple):
@@ -35,9 +35,9 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class Objective(abc.ABC):
-    """One level of a target, the least of which is sought.
+    """One level of a target, which is minimised.
 
-    figure: what the designer reads; row: what it is read from; scale: natural size of the row, SI; power: the figure's
+    figure: name for the designer; row: name of the row; scale: scale of the row, SI; power: the figure's
     power that the row is.
     """
 
@@ -52,7 +52,7 @@ class Objective(abc.ABC):
     is_magnitude: ClassVar[bool] = False
     """Whether both signs of its row count."""
     least: ClassVar[float] = -math.inf
-    """What it is never less than, where no quantity that it reads is signed."""
+    """Lower bound of the value, where no quantity that it reads is signed."""
 
     @property
     def rows(self) -> tuple[str, ...]:
@@ -61,12 +61,12 @@ class Objective(abc.ABC):
 
     @property
     def sides(self) -> tuple[tuple[str, float], ...]:
-        """Rows of the design with their signs: it is no less than any of them."""
+        """Rows of the design with their signs; the objective is at least as large as each of them."""
         return ()
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Quantities whose extremes over the cycle it is no less than."""
+        """Quantities; the objective is at least as large as their extremes over the cycle."""
         return ()
 
     @property
@@ -76,7 +76,7 @@ class Objective(abc.ABC):
 
     @property
     def sought(self) -> Sought:
-        """Which end of the figure is sought."""
+        """End of the figure that is sought: the least or the most."""
         return "least" if self.power > 0 else "most"
 
     def worth(self, rows: Rows) -> Number:
@@ -116,7 +116,7 @@ class Objective(abc.ABC):
         return np.asarray(wide(self.worth(designs), designs.count))[None]
 
     def pieces(self, sampler: Sampler) -> list[Piece]:
-        """Smooth functions the largest of which it is at a design."""
+        """Smooth functions of which the objective is the largest at a design."""
         smooth = [Piece(row, sign * sampler.single(row), sign) for row, sign in self.sides]
         return smooth + [Piece(row, e.height, e.sign, e) for row in self.quantities for e in sampler.extremes(row)]
 
@@ -227,5 +227,5 @@ class Peak(Objective):
 
 
 def opposite(row: str) -> str:
-    """Name of a row's opposite, the least of which is the row's most."""
+    """Name of a row's opposite: its minimum is the row's maximum."""
     return f"-{row}"

@@ -22,7 +22,7 @@ LEAST_CHANGE = "least change from today"
 
 
 class Alias(str):
-    """What a program calls something that a designer knows by another name, `of`."""
+    """Name in a program of something that has another name, `of`, for the designer."""
 
     of: str
 
@@ -38,7 +38,7 @@ class Alias(str):
 
 
 class Preference(NamedTuple):
-    """Where along a move the silent levels would go, and why: to today's values, to the least or to the most.
+    """Target of the tie-break along a move, with its reason: today's values, the least or the most.
 
     when, above: it holds where that variable exceeds that value, SI; "" for always.
     """
@@ -50,7 +50,7 @@ class Preference(NamedTuple):
 
     @property
     def is_least_change(self) -> bool:
-        """Whether it is for the least change from today."""
+        """Whether the reason is the least change from today."""
         return self.toward == "today"
 
 
@@ -71,7 +71,7 @@ class Move(abc.ABC):
     """Whether each variable changes by itself."""
 
     def wished(self, values: Numbers) -> Preference | None:
-        """First wish that holds at these values (SI)."""
+        """First wish that is valid at these values (SI)."""
         return next((wish for wish in self.wishes if not wish.when or values[wish.when] > wish.above), None)
 
     @abc.abstractmethod
@@ -163,7 +163,7 @@ class Variable(NamedTuple):
 
     @property
     def called(self) -> str:
-        """What a designer calls it."""
+        """Name for the designer."""
         return self.label or self.name
 
 
@@ -240,11 +240,11 @@ class Program:
     today: Numbers = field(default_factory=dict)
     """Today's values, SI, of variables that are no numbers of the scene."""
     single: str = ""
-    """Why every local optimum is the best there is, where that is so."""
+    """Reason why every local optimum is global, where there is one."""
     goals: tuple[Goal, ...] = ()
-    """What the target asks of figures, and may find out of reach."""
+    """Goals of the target for figures; they may be out of reach."""
     added: Added | None = None
-    """What is added as mass, where levels may give way for less of it."""
+    """Mass that a design adds, where levels may become worse for less of it."""
     any_numbers: bool = False
     """Whether its variables are numbers of a person's own, of which some may serve no level."""
 
@@ -334,13 +334,13 @@ class Program:
 
     @lazy
     def held(self) -> frozenset[str]:
-        """Variables that are held without being limited: their value is today's, not a choice."""
+        """Variables that are constant without a limit: their value is today's, not a choice."""
         limited = {limit.row for limit in self.bound_limits.values()}
         return frozenset(v.name for v in self.variables if v.lower == v.upper and v.name not in limited)
 
     @lazy
     def fixed(self) -> frozenset[str]:
-        """Variables without room."""
+        """Variables whose bounds are equal."""
         return frozenset(v.name for v in self.variables if v.lower == v.upper)
 
     def completed(self, x: Mapping[str, float]) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""What a program's rows are worth at one design or at many, in any number system: the one place that says how."""
+"""Values of a program's rows at one design or at many, in any number system."""
 
 import abc
 import functools
@@ -327,7 +327,7 @@ def plain(value: Number) -> Number:
 
 
 def wide(value: Number, count: int) -> Number:
-    """Number of all of so many designs, (designs,)."""
+    """Number as an array over designs, (designs,)."""
     return _shaped(value, (count,))
 
 

@@ -46,12 +46,12 @@ class Extreme(NamedTuple):
 
     @property
     def height(self) -> float:
-        """What is compared with a bound, SI."""
+        """Number that is compared with a bound, SI."""
         return self.value if self.signed else abs(self.value)
 
     @property
     def sign(self) -> float:
-        """What the value is multiplied by to give the height."""
+        """Factor from the value to the height."""
         return -1.0 if self.value < 0 and not self.signed else 1.0
 
 
@@ -167,7 +167,7 @@ class Sampler:
     def node_at(self, angles: Floats) -> Node:
         """Nodes at crank angles, rad, with the switches there.
 
-        Those of another turn are told as of the cycle's own: a cam's formulas hold on the turn that it begins.
+        Angles of another turn are moved into the cycle: a cam's formulas are valid on the turn that it begins.
         """
         angles = angles - TURN * np.floor((angles - self.cycle.starts[0]) / TURN)
         return Node(angles, self.cycle.switch(self.cycle.located(angles)[0]))
@@ -189,7 +189,7 @@ class Sampler:
     def extremes(self, name: str, where: Where | None = None) -> list[Extreme]:
         """Local extremes of |quantity| (of a signed one, its maxima), largest first, right to rounding.
 
-        where: the pieces they are asked for; every piece without it.
+        where: the pieces to look at; every piece without it.
         """
         if name not in self._extremes:
             self.search((name,))
@@ -206,7 +206,7 @@ class Sampler:
         return self.model.counted(self.cycle, name, where)
 
     def search(self, names: Iterable[str]) -> None:
-        """Find the extremes of several quantities in one pass, so that they need not be looked for one by one."""
+        """Compute the extremes of several quantities in one pass."""
         new = [name for name in dict.fromkeys(names) if name not in self._extremes]
         if not new:
             return
@@ -223,9 +223,9 @@ class Sampler:
             self._extremes[name] = sorted(extremes, key=lambda extreme: -extreme.height)
 
     def share(self) -> None:
-        """Take the extremes that were found of this design last under fewer or other names of its numbers.
+        """Take the extremes of the last sampler of the same design, with fewer or other names of its numbers.
 
-        What they were read from are numbers that are the same here, to the last bit and the sign of a zero.
+        The numbers behind these extremes are equal here, to the last bit and the sign of a zero.
         """
         others = (
             sampler for sampler in self.session.latest(SAMPLERS) if isinstance(sampler, Sampler) and sampler is not self
@@ -271,7 +271,7 @@ class Sampler:
 
     @lazy
     def singular(self) -> tuple[float, ...]:
-        """Crank angles, rad, where the mechanism comes very near to a singular position."""
+        """Crank angles, rad, where the mechanism is close to a singular position."""
 
         def squares(names: tuple[str, ...], phi: Floats) -> Sequence[Floats]:
             return [np.zeros(phi.shape) + values for values in self.quantities(names, self.node_at(phi))]
@@ -396,7 +396,7 @@ certificate look at, and those of all designs that are certified together."""
 
 
 def sampled(model: JobModel, values: Mapping[str, float], samples: int = SAMPLES) -> Sampler:
-    """Sampler of a design: the one there is already where the same design was asked for just now.
+    """Sampler of a design; a recent sampler of the same design is used again.
 
     The same to the last bit, and to the sign of a zero. Raises what a design without a real cycle raises.
     """

@@ -1,4 +1,4 @@
-"""What loads do to an output that has parted from its mechanism: their own formulas, tried and taken only if linear.
+"""Loads on an output that has left its mechanism: their formulas, tried and used only if they are linear.
 
 A load that goes by the crank angle, by the mechanism's position or by anything but the output's position, speed,
 acceleration and direction of motion cannot be followed, and is refused by name.
@@ -29,7 +29,7 @@ from loomopt.physics.tolerances import ACCURACY, SAME_ANGLE
 from loomopt.scenes.scene import Scene
 
 LINEAR = 1e-12
-"""Share of a load's largest term by which it may miss the sum of its parts: rounding."""
+"""Share of a load's largest term by which it may differ from the sum of its parts: rounding."""
 SAMPLES = 3600
 """Of one turn, by which the output's own stroke, speed and acceleration are known: a tenth of a degree misses less than
 1e-4 of a peak of any law."""
@@ -117,9 +117,7 @@ def _cornered(sampler: Sampler, load: Load[Any]) -> tuple[float, ...]:
 
 
 def _refused(event: Event, load: Acting, why: str) -> UnfollowedError:
-    problem = (
-        f"effects {event.name} and {load.name} cannot be on together: in flight {load.name} is not known, for {why}"
-    )
+    problem = f"effects {event.name} and {load.name} cannot be on together: {load.name} is not defined in flight: {why}"
     return UnfollowedError(event.name, problem, f"Take one of them off (--without {load.name})")
 
 
@@ -136,7 +134,7 @@ def _switch(sampler: Sampler, event: Event, load: Acting, low: float, high: floa
     angles = {angle for name in load.reads if name in places for angle in sampler.given.values[name]}
     switches = {switch for place, switch in _switches(sampler, load) if low <= place <= high}
     if set(corners) != angles or len(switches) != 1:
-        raise _refused(event, load, "it goes by the crank angle")
+        raise _refused(event, load, "it depends on the crank angle")
     return switches.pop()
 
 
@@ -174,12 +172,12 @@ def _form(sampler: Sampler, event: Event, load: Acting, switch: float) -> Linear
 BEYOND = 1.01
 """Share of the largest sampled acceleration that no acceleration exceeds."""
 HELD, GAP = "{}_cam", "gap"
-"""Columns of what the output rests on, and of how far it is from that."""
+"""Columns of the surface under the output and of its distance from the output."""
 
 
 @dataclass(frozen=True)
 class Parted:
-    """A design, followed. loads: of the output, each with its linear form in every zone of its position."""
+    """Design whose output may leave its mechanism; loads: linear forms of its loads, by zone of its position."""
 
     sampler: Sampler
     event: Event
@@ -271,7 +269,7 @@ def followed(scene: Scene, sampler: Sampler) -> Parted | None:
 
 
 MOST_PARTED = 8
-"""Designs of which it is kept how the output parts from its mechanism."""
+"""Number of designs whose flights are cached."""
 
 
 def _followed(sampler: Sampler) -> Parted | None:

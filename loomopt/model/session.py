@@ -1,4 +1,4 @@
-"""What one solve leaves for the next and what is counted meanwhile; one thread computes at a time.
+"""Cache and counters that solves share; one thread computes at a time.
 
 CasADi counts the references to its expressions without a lock, and all expressions share some of theirs.
 """
@@ -20,7 +20,7 @@ LOCK = threading.RLock()
 
 
 class Session:
-    """What is kept, and how many positions of mechanisms were evaluated, by samples, nodes and boxes."""
+    """Cache, and the number of evaluated positions of mechanisms, by samples, nodes and boxes."""
 
     def __init__(self) -> None:
         self.positions = 0
@@ -30,7 +30,7 @@ class Session:
     def cached(self, what: str, most: int, key: Hashable, make: Callable[[], Made]) -> Made:
         """Cached value of a key, made where it is missing; beyond `most` values the least recently used is dropped.
 
-        what: of which there are so many at most.
+        what: the kind of value, of which `most` are cached.
         """
         with LOCK:
             values = self._kept.setdefault(what, OrderedDict())
@@ -51,7 +51,7 @@ class Session:
             return cast(Made, values[key])
 
     def latest(self, what: str) -> Iterator[object]:
-        """Yield all that are kept of one sort, the one used last first."""
+        """Yield the cached values of one kind, the last used first."""
         return reversed(self._kept.get(what, OrderedDict()).values())
 
     def count(self, what: str) -> int:
@@ -59,7 +59,7 @@ class Session:
         return len(self._kept.get(what, ()))
 
     def forget(self, *sorts: str) -> None:
-        """Let go of all that is kept of these sorts."""
+        """Drop the cached values of these kinds."""
         for what in sorts:
             self._kept.pop(what, None)
 

@@ -165,7 +165,7 @@ class Loaded:
 
     @lazy
     def masses(self) -> Sequence[tuple[LinkMass, Motion]]:
-        """What the loads move, each with its motion."""
+        """Masses of the loads with their motions."""
         return masses(self.maths, self.loads, self.given, (self.pose, self.carried))
 
     @property

@@ -1,4 +1,4 @@
-"""What tables of a scene are made of, and what a designer reads and asks: figures and targets."""
+"""Records of a scene's tables, its figures and its targets."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple
@@ -19,7 +19,7 @@ Name = Annotated[str, Field(pattern=r"\S")]
 
 
 class TargetTable(Table):
-    """What every target's table may hold."""
+    """Keys that every target's table may have."""
 
     expected: dict[str, Any] | None = Field(None, description="what the target is known to reach: shown, never used")
 
@@ -41,7 +41,7 @@ class Figure(NamedTuple):
 
 
 class Target(NamedTuple):
-    """What a job can be asked for; `own` models the values of its `[targets.NAME]` table.
+    """Target of a job; `own` models the values of its `[targets.NAME]` table.
 
     needs: numbers of [operation] it keeps; needs_effects: effects without which it says nothing.
     """
@@ -54,7 +54,7 @@ class Target(NamedTuple):
 
 
 Sense = Literal["least", "most"]
-"""Which end of an axis is sought."""
+"""End of an axis that is sought."""
 BOTH: tuple[Sense, ...] = ("least", "most")
 
 

@@ -26,18 +26,18 @@ START_ROOM = 0.01
 
 # NLP
 #
-# Variables, rows and objectives in their natural sizes. The experiment: benchmarks/measure/tolerances.py solves every
+# Variables, rows and objectives divided by their scales. The experiment: benchmarks/measure/tolerances.py solves every
 # target of three packaged scenes, and two neighbours of each, with one number at a time a tenth and ten times as large
 # (counts: half and double). What is not said below changes no objective there by 4e-11, nor IPOPT's iterations by a
 # tenth.
 
 NEAR, ROUNDING = 1e-8, 1e-12
 """Largest excess between nodes that ends the exchange whatever the accuracy: Newton's method must start near. And the
-smallest that is asked: a sum of rounded terms cannot be told closer."""
+smallest accuracy: a sum of rounded terms is not known better."""
 
 BINDING = 1e-6
 """Multiplier above which a row binds where a solve ends: IPOPT leaves TOLERANCE/distance, so what is farther than 1e-5
-from its bound is below it. A row wrongly held is told by the certificate."""
+from its bound is below it. The certificate finds a row that is active by mistake."""
 
 TOUCHING, CONVERGED = 1e-8, 1e-8
 """Distance from its bound at which an extreme is polished onto it; move, in u or scaled, below which nothing moves:
@@ -56,14 +56,14 @@ SAME_NODE = 1e-3
 
 # Certificate and search
 #
-# Sizes are natural sizes: a row, a variable or an objective divided by its own `scale`. Rows are read to 1e-15 of them
+# Sizes are relative: a row, a variable or an objective divided by its `scale`. Rows are read to 1e-15 of them
 # in floats and differenced at 40 digits, so that everything below is far above rounding.
 
 ACCURACY, TIGHTEST, COARSEST = 1e-8, 1e-11, 0.1
 """Relative accuracy of whole-cycle values: usual, tightest (a sampled extreme is right to 1e-12), coarsest allowed."""
 
 FEASIBLE = 1e-9
-"""What a limit may be exceeded by and still hold. Two decades above IPOPT's constr_viol_tol; certificate, findings."""
+"""Excess of a limit that is still satisfied. Two decades above IPOPT's constr_viol_tol; certificate, findings."""
 
 STATIONARY = 1e-6
 """Slope that KKT multipliers may leave: an objective that curves by 1 is then within 1e-12 of its least."""
@@ -72,7 +72,7 @@ ACTIVE = 1e-7
 """Distance from its bound at which a row takes part in the KKT system: ten times what complementarity lets pass."""
 
 POSITIVE = 1e-8
-"""Multiplier above which a limit binds: below it, loosening by a whole natural size gains less than the accuracy."""
+"""Multiplier above which a limit binds: below it, a relaxation by the whole scale gains less than the accuracy."""
 
 RANK = 1e-7
 """Singular value, relative to the largest, below which slopes of binding rows depend on each other.
@@ -101,7 +101,7 @@ NEWTON_SHIFT = "1e-3"
 """How far, in u, one Newton step may move a sampled extreme: it is right to 1e-8, what moves farther is no extreme."""
 
 GIVES_WAY, MOVED = 1e-12, 1e-9
-"""What a limit may give way to a silent level, and the least move of a variable that is told as a choice."""
+"""Amount by which a tie-break may exceed a limit, and the least move of a variable that is reported as a choice."""
 
 INDIFFERENT = 1e-3
 """Share of a figure that no part is added for: a tenth of what machining and measuring leave of a torque."""
@@ -117,7 +117,7 @@ SLACK, LEAST_SLACK, MOST_SLACK = 1e-8, 1e-13, 0.1
 """What a proof leaves open, relative to a quantity's largest magnitude: usual, what balls resolve, most allowed."""
 
 ROUNDED = 1e-15
-"""Nothing is known better, relative to its natural size: the least error an answer claims."""
+"""Least error that an answer claims, relative to the scale: nothing is known better."""
 
 # Pictures
 #

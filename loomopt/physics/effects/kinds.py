@@ -1,4 +1,4 @@
-"""What an effect may declare. Every job honours every kind, or refuses it by name; nothing else knows an effect's name.
+"""Kinds of effects. Every job accepts every kind, or refuses it by name; nothing else knows an effect's name.
 
 An effect that is absent from a scene is absent from its equations.
 """
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Motion:
-    """What every pose knows: q, q1, q2 (output and its derivatives with respect to φ) give q˙ and q¨."""
+    """Values of every pose: q, q1, q2 (output and its derivatives with respect to φ) give q˙ and q¨."""
 
     phi: Number
     q: Number
@@ -66,7 +66,7 @@ class Inputs(NamedTuple, Generic[AnyPose]):
 
 
 class LinkMass(NamedTuple):
-    """What a load moves of one rigid link, by its joint nearest the drive or the frame; numbers of one system.
+    """Mass of a load on one rigid link, by its joint nearest to the drive or the frame; numbers of one system.
 
     link: as the mechanism calls it; mass: kg; along, across: mass times the way from that joint to its centre, kg·m,
     along the link and to its left; second: inertia about the joint, kg·m².
@@ -105,7 +105,7 @@ class Loading(Protocol):
 
     @property
     def masses(self) -> "Sequence[tuple[LinkMass, Any]]":
-        """What the loads move, each with its motion."""
+        """Masses of the loads with their motions."""
 
     @property
     def inertia(self) -> Number:
@@ -249,7 +249,7 @@ def needed(effect: "Effect", parameters: Table) -> tuple[str, ...]:
 
 
 def required(effect: "Effect") -> tuple[str, ...]:
-    """Keys of an effect's table without which it is none, those that a curve may stand for included."""
+    """Keys that an effect's table must have; keys that a curve may replace are included."""
     table = effect.tabulated if isinstance(effect, Load) else None
     for_curve = table.instead if table else ()
     fields = effect.table.model_fields
@@ -563,7 +563,7 @@ class SteadyOscillator(Protocol):
 
 
 class Carried(NamedTuple):
-    """What moves with a state's coordinate.
+    """Bodies that move with a state's coordinate.
 
     inertia: of it all, kg·m² or kg; weigh(angles, weights): sums Σ weights[k][i] F(angles[i]) at crank angles, rad, of
     the terms F without corners.

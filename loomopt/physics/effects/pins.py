@@ -25,7 +25,7 @@ class Pin(Table):
 
 
 def parameters(pins: Mapping[str, str]) -> type[Table]:
-    """Table of an effect that tells what pins lose; pins: name → what it is."""
+    """Table of an effect with friction in pins; pins: name → description."""
     fields = {name: (Pin | None, Field(None, description=text)) for name, text in pins.items()}
     inner = create_model("Pins", __base__=Table, __module__=__name__, __doc__="Friction of each pin.", **fields)  # type: ignore[call-overload]
     whole = (inner | None, Field(None, description="friction of the pins, for what they lose: a figure only"))

@@ -1,6 +1,6 @@
 """Assur groups of class II, closed by one formula each: RRR (two links), RRP (a slider), RPR (a slotted link).
 
-Each hangs between joints and links whose motion is known and adds links of its own without adding a freedom. Lengths
+Each hangs between joints and links whose motion is known. Its links add no degree of freedom. Lengths
 in m, angles in rad, derivatives with respect to the crank angle φ, in closed form up to the third: each order is
 linear in what is new, with the same determinant, which vanishes with the sine of the transmission angle.
 """
@@ -30,7 +30,7 @@ ZERO = Vector(0, 0)
 
 
 class Closure(Protocol):
-    """How far a group is from its singular positions."""
+    """Distance of a group from its singular positions."""
 
     @property
     def spans(self) -> Mapping[str, Callable[[], Number]]:
@@ -196,7 +196,7 @@ class OnGuide:
 
     @lazy
     def reach(self) -> Number:
-        """What the link reaches along the guide."""
+        """Reach of the link along the guide."""
         return self.side * self.maths.sqrt((self.r - self.height) * (self.r + self.height))
 
     @lazy

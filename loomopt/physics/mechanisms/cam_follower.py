@@ -118,7 +118,7 @@ class Contact:
 
     @lazy
     def rolling(self) -> Number:
-        """How a roller that does not slip turns on its arm, per rad of the cam.
+        """Rotation of a roller without slip on its arm, per rad of the cam.
 
         On a cam at rest it turns by its centre's way over its radius, and its arm goes round with it.
         """

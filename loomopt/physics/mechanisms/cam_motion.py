@@ -23,7 +23,7 @@ class CamLaw(Hashable, Protocol):
 
     @property
     def key(self) -> Hashable:
-        """What distinguishes it from another law."""
+        """Key of the law: equal for the same law."""
 
     @property
     def breaks(self) -> tuple[Fraction, ...]:

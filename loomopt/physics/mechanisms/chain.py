@@ -95,7 +95,7 @@ class Part:
 
     @property
     def ratio(self) -> int | float:
-        """How often it turns for one turn of what drives it."""
+        """Number of turns per turn of its driver."""
         number = self._words.get("ratio", 1)
         return number if isinstance(number, int | float) else 1
 
@@ -494,7 +494,7 @@ def _cam_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> st
     spent = corners[-1] - corners[0]
     if spent < 2 * math.pi:
         return ""
-    return f"{part.name}: rise, far_dwell and return take {shown(spent, 'angle')}, and a turn has less room"
+    return f"{part.name}: rise, far_dwell and return take {shown(spent, 'angle')}, more than one turn"
 
 
 def _gear_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> str:
@@ -516,5 +516,7 @@ def _gear_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> s
             return f"{end} fails at crank angle {shown(float(angles[jump]), 'angle')}"
     x, y = (np.broadcast_to(component, angles.shape) for component in pose.links[part.name].unit())
     if math.hypot(x[-1] - x[0], y[-1] - y[0]) > 1e-9:
-        return f"{part.name}: after a turn of the crank it stands elsewhere, for its ratio is no whole number"
+        return (
+            f"{part.name}: its angle does not repeat after a turn of the crank, because its ratio is not a whole number"
+        )
     return ""

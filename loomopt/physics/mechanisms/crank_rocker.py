@@ -87,7 +87,7 @@ class CrankRockerPose:
 
     @lazy
     def obliquity(self) -> Number:
-        """By how much the transmission angle at C falls short of a right angle, rad; negative where it exceeds."""
+        """Right angle minus the transmission angle at C, rad; negative where that angle is larger."""
         dyad_at_c = self.dyad
         across = self.lengths.side * dyad_at_c.area4 / 2
         return self.maths.atan2(dyad.dot(dyad_at_c.link1, dyad_at_c.link2), across)
@@ -289,7 +289,7 @@ def assembly_margins(lengths: Lengths) -> dict[Inequality, Number]:
 
 
 TELLING = 1e-15
-"""Share of the links' sum below which a margin cannot be told from rounding: the linkage is at its change point."""
+"""Share of the links' sum below which a margin is rounding: the linkage is at its change point."""
 
 
 def fault(l1: float, l2: float, l3: float, l4: float, *, shown: ShowValue = usual) -> str:

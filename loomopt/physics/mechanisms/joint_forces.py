@@ -16,7 +16,7 @@ from loomopt.physics.mechanisms.dyad import Dyad, Vector, cross, dot
 
 
 class Wrench(NamedTuple):
-    """What acts on a link, but for its joints: force, N, and moment about its outer joint, N·m."""
+    """Load on a link without its joints: force, N, and moment about its outer joint, N·m."""
 
     force: Vector
     moment: Number

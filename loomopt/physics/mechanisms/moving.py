@@ -94,7 +94,7 @@ def total(*terms: Number | None) -> Number | None:
 
 
 def times(first: Number | None, *factors: Number | None) -> Number | None:
-    """Product, zero by construction where a factor is."""
+    """Product; None where a factor is None, which stands for zero."""
     for factor in factors:
         first = None if first is None or factor is None else first * factor
     return first
@@ -186,4 +186,4 @@ class Link:
 
 
 FRAME = Link(Joint(lambda order: None), lambda: X, lambda order: None, angle=lambda: None)
-"""What does not move: x of the scene from its origin."""
+"""Frame, which does not move: x of the scene from its origin."""

@@ -62,7 +62,7 @@ def between(first: Vector, second: Vector) -> Vector:
 
 @dataclass(frozen=True)
 class Stand:
-    """How the drive stands and turns: what every position shares.
+    """Values of the drive that all positions share.
 
     beta: crank angle of front dead centre from A0→B0; frame_angle: of A0→B0 from x; rad.
     mirror: +1 as in the paper, −1 for the machine seen in a mirror; sense: +1 where the main crank turns
@@ -96,7 +96,7 @@ class Sley:
 
     @lazy
     def stand(self) -> Stand:
-        """How it stands: at front dead centre the sley is at φ30."""
+        """Position: at front dead centre the sley is at φ30."""
         frame_angle = self.dimensions.phi30 - self.centres.psi_front
         return Stand(self.centres.beta, frame_angle, self.mirror, self.sense)
 
@@ -237,7 +237,7 @@ class RapierPose:
 
     @lazy
     def obliquity(self) -> Number:
-        """By how much the angle at D between l5 and l6 falls short of a right angle, rad; negative where it exceeds."""
+        """Right angle minus the angle at D between l5 and l6, rad; negative where that angle is larger."""
         angle = between(self.dyad.link1, self.dyad.link2)
         return self.maths.atan2(angle.x, -self.stand.mirror * angle.y)
 

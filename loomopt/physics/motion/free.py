@@ -14,7 +14,7 @@ SERIES_REACH, SERIES_TERMS = 1.0, 26
 
 
 class Zone(NamedTuple):
-    """What holds the body back between two corners of its position: stiffness · x + force, N/m and N."""
+    """Resistance between two corners of the body's position: stiffness · x + force, N/m and N."""
 
     stiffness: float
     force: float
@@ -36,7 +36,7 @@ class Body:
 
     @property
     def quarter(self) -> float:
-        """A quarter of the shortest period it can swing with, s."""
+        """A quarter of the shortest period of oscillation, s."""
         stiffest = max(zone.stiffness for zone in self.zones)
         return math.pi / 2 * math.sqrt(self.mass / stiffest) if stiffest > 0.0 else math.inf
 
@@ -50,7 +50,7 @@ class Moving(NamedTuple):
 
 
 class Response(NamedTuple):
-    """What a unit step of force per mass and a unit speed do after some time: w; s = ẇ."""
+    """Response to a unit step of force per mass and to a unit speed after a time: w; s = ẇ."""
 
     step: float
     speed: float

@@ -25,7 +25,7 @@ Pair = tuple[Number, Number]
 
 
 class Constants(NamedTuple):
-    """What an oscillator is made of, SI, and what follows from that at once.
+    """Parameters of an oscillator, SI, and numbers that follow from them.
 
     decay: c/2J; square: k/J − decay²; rate: the root of its magnitude; cosine, sine: `Oscillator.free` one turn later.
     """
@@ -107,7 +107,7 @@ def _over(maths: Maths, of: Constants, elapsed: Number) -> Pair:
 SIGNS = {"under": 1, "over": -1}
 """Of k/J − (c/2J)²."""
 REGIMES = {"under": _under, "critical": _critical, "over": _over}
-"""How an oscillator is damped → its free vibration; each has its own closed form."""
+"""Damping regime → free vibration in closed form."""
 
 
 def regime(inertia: float, damping: float, stiffness: float) -> str:

@@ -32,7 +32,7 @@ square of it."""
 
 
 class NoTurn(ArithmeticError):  # noqa: N818 (it names what was found)
-    """No periodic motion was found in which the crank never stops."""
+    """There is no periodic motion in which the crank never stops."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def solved(starts: Floats, mean: float, surplus: Surplus) -> CrankTurn:
 
 
 def _resolved(starts: Floats, mean: float, surplus: Surplus, points_first: int) -> CrankTurn:
-    """Motion, with so many points on each piece at first, and twice as many where that is too few."""
+    """Motion; the number of points on a piece is doubled where it is too small."""
     degrees = [points_first] * (len(starts) - 1)
     guess = _Motion(np.zeros(sum(degrees)), mean**2 / 2, mean)
     while True:

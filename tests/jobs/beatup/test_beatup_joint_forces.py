@@ -515,7 +515,7 @@ def test_where_the_cloth_pushes_is_asked_for_in_a_remark():
     views, scene = registry.find("beatup").views, scene_of("today")
     told = views.remarks(scene, {})
     assert (
-        len([text for text in told if text.startswith("force_D takes the resistance of the cloth for a couple")]) == 1
+        len([text for text in told if text.startswith("force_D contains the resistance of the cloth as a couple")]) == 1
     )
     assert not views.remarks(scene_of("reach"), {})
     assert not views.remarks(scene_of("no cloth"), {})

@@ -181,7 +181,7 @@ def test_without_a_load_every_force_is_zero_and_a_remark_says_so():
     figures = lo.evaluate(scene).figures
     assert {figures[name] for name in (*FORCES, "gear_force")} == {0.0}
     (said,) = views.remarks(scene, {})
-    assert said == "forces in the joints have nothing of the head in them: put on head_inertia or tape_friction"
+    assert said == "the joint forces do not contain the head: add the effect head_inertia or tape_friction"
     for effect in BOTH:
         assert not views.remarks(scene.with_effect(effect), {})
 

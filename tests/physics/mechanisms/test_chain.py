@@ -449,7 +449,9 @@ def test_a_gear_that_counts_past_its_end_or_does_not_come_back_is_told():
     unit = linked({}).pose(systems.FLOAT, {}, math.radians(angle)).links["rocker"].unit()
     assert math.atan2(unit.y, unit.x) == pytest.approx(passed, abs=0.01)
     told_ = fault(geared(ratio=0.5, **{"with": "crank"}), {})
-    assert told_ == "wheel: after a turn of the crank it stands elsewhere, for its ratio is no whole number"
+    assert (
+        told_ == "wheel: its angle does not repeat after a turn of the crank, because its ratio is not a whole number"
+    )
     assert fault(geared(ratio=2, **{"with": "crank"}), {}) == ""
 
 
@@ -460,7 +462,7 @@ def test_a_cam_of_more_than_a_turn_is_told():
     }
     assert fault(chain(parts), {"a": 3.1}) == ""
     told_ = fault(chain(parts), {"a": math.radians(190)})
-    assert told_ == "arm: rise, far_dwell and return take 380 deg, and a turn has less room"
+    assert told_ == "arm: rise, far_dwell and return take 380 deg, more than one turn"
 
 
 def test_a_slider_that_stands_across_its_guide_is_told():

@@ -35,7 +35,7 @@ def force(at: Inputs[ReedPose]) -> Number:
 
 
 def rocker_moment(given: Values) -> Number | None:
-    """Mass of the rocker times its centre's distance from the rocking shaft, kg·m; None where it is not told."""
+    """Mass of the rocker times its centre's distance from the rocking shaft, kg·m; None where it is unknown."""
     if "rocker_inertia.m3" not in given or "rocker_inertia.s3" not in given:
         return None
     return given["rocker_inertia.m3"] * given["rocker_inertia.s3"]

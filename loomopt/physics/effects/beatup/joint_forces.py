@@ -98,14 +98,14 @@ class CrankRockerForces:
         return rate * omega, steady if change is None else steady + rate * change
 
     def _carried(self, arm: Vector) -> Vector:
-        """Acceleration, m/s², of what turns with the crank."""
+        """Acceleration, m/s², of a point that turns with the crank."""
         square, change = self.at.pose.omega**2, self.at.pose.omega_dot
         x, y = -square * arm.x, -square * arm.y
         return Vector(x, y) if change is None else Vector(x - change * arm.y, y + change * arm.x)
 
     @lazy
     def swung(self) -> Wrench:
-        """What acts on the rocker by the masses on the rocking shaft, about D."""
+        """Inertia load of the masses on the rocking shaft, about D."""
         return joint_forces.together(self._swinging()) or Wrench(Vector(0, 0), 0)
 
     def _swinging(self) -> Iterator[Wrench]:
@@ -119,7 +119,7 @@ class CrankRockerForces:
             yield joint_forces.inertia(mass.mass, first, mass.second, turning)
 
     def _on_shaft(self) -> Iterator[tuple[LinkMass, Swinging]]:
-        """Yield what swings about D, each with its motion: reed and counterweight first, in line with the rocker."""
+        """Yield the masses that swing about D with their motions: first those in line with the rocker."""
         given, pairs = self.at.values, [pair for pair in self.loading.masses if pair[0].link != "rod"]
         if "m4" in given and "r4" in given and not any(mass.link == "reed" for mass, _ in pairs):
             first = given["m4"] * given["r4"] - given["m4e"] * given["r4e"]
@@ -214,8 +214,8 @@ def remark(at: Inputs[object], shown: ShowValue) -> str:
     if at.values.get("resistance.pulse") is None or at.values.get("resistance.reach") is not None:
         return ""
     return (
-        "force_D takes the resistance of the cloth for a couple: where the cloth pushes is not told, and it changes "
-        "the force in D, though in no other joint. Give effects.resistance.reach, its distance from the rocking shaft"
+        "force_D contains the resistance of the cloth as a couple, because the point where the cloth pushes is not "
+        "given. No other joint force needs it. Give effects.resistance.reach, its distance from the rocking shaft"
     )
 
 

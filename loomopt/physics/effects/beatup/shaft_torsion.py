@@ -51,8 +51,8 @@ def fixed(at: Inputs[object], carried: "Carried") -> Mapping[str, str]:
     natural = (at.table["stiffness"] / carried.inertia) ** 0.5
     if natural > QUICKEST * at.values["speed"]:
         raise UnsteadyError(
-            f"the shaft swings {natural / at.values['speed']:.4g} times a turn by itself, more than {QUICKEST}: it is "
-            "as good as rigid",
+            f"the natural frequency of the shaft is {natural / at.values['speed']:.4g} times the speed, more than "
+            f"{QUICKEST}: it is practically rigid",
             "Use the rigid model: take the table out",
         )
     try:
@@ -60,7 +60,7 @@ def fixed(at: Inputs[object], carried: "Carried") -> Mapping[str, str]:
     except ArithmeticError:
         raise UnsteadyError(
             f"the rocker's acceleration is too sharp for {harmonic.MOST} harmonics",
-            "Keep the mechanism farther from where it jams, or use the rigid model",
+            "Keep the mechanism farther from its singular positions, or use the rigid model",
         ) from None
     damped = harmonic.regime(carried.inertia, at.table["damping"], at.table["stiffness"])
     return {"regime": damped, "harmonics": str(count)}
@@ -146,8 +146,8 @@ def rests(table: Values) -> str:
     from loomopt.physics.motion import harmonic
 
     return (
-        f"the steady state of {NAME} is summed from {table['harmonics']} harmonics of the rocker's motion; that those "
-        f"beyond are below {harmonic.TAIL:g} of the largest is measured at this design, not proven or varied"
+        f"the steady state of {NAME} is the sum of {table['harmonics']} harmonics of the rocker's motion; higher "
+        f"harmonics are below {harmonic.TAIL:g} of the largest, which is measured at this design, not proven"
     )
 
 

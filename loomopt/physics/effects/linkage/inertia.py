@@ -29,7 +29,9 @@ class Parameters(Table):
     def _place(cls, m: float | None, given: ValidationInfo) -> float | None:
         centre, inertia = given.data.get("centre", 0.0), given.data.get("J")
         if m is not None and centre is None:
-            raise QuantityError("centre is missing: m alone has no place", "neither, or both", 'Add centre = "45 mm"')
+            raise QuantityError(
+                "centre is missing: m needs the place of its centre", "neither, or both", 'Add centre = "45 mm"'
+            )
         if m is not None and centre is not None and inertia is not None and inertia < m * centre**2:
             problem = f"J is less than m*centre^2 = {m * centre**2:.6g} kg*m^2, the least that such a mass has"
             raise QuantityError(problem, "J >= m*centre^2", "Give J about the output link's axis, not about the centre")

@@ -170,7 +170,7 @@ def remark(at: Inputs[object], shown: ShowValue) -> str:
     """Remark that the forces contain nothing of the head."""
     if "head_inertia.mass" in at.values or "tape_friction.force" in at.values:
         return ""
-    return "forces in the joints have nothing of the head in them: put on head_inertia or tape_friction"
+    return "the joint forces do not contain the head: add the effect head_inertia or tape_friction"
 
 
 EFFECT: Check[Motion] = Check(

@@ -37,8 +37,8 @@ def remark(at: Inputs[object], shown: ShowValue) -> str:
     if natural >= SLOW * at.values["speed"]:
         return ""
     return (
-        f"the head on its tape swings at {shown(natural, 'angular speed', 4)}, less than {SLOW:g} times the shaft's "
-        "speed: head_overrun, which takes the stretch for quasi-static, is too rough. What helps: a stiffer tape"
+        f"the natural frequency of the head on its tape is {shown(natural, 'angular speed', 4)}, less than {SLOW:g} "
+        "times the shaft's speed: head_overrun, a quasi-static value, is inaccurate. Use a stiffer tape"
     )
 
 

@@ -22,7 +22,7 @@ class FramePose(Protocol):
 
     @property
     def worst(self) -> Number:
-        """Which end of what is not determined is meant."""
+        """End of the range that is meant, where the value is not determined."""
 
     @property
     def direction(self) -> Number:

@@ -311,7 +311,7 @@ FIGURES = (
 
 
 def sold(parameters: Parameters) -> Mapping[str, Sequence[float]]:
-    """Wire diameters that are sold, m, where the wire must be one of them."""
+    """Preferred wire diameters, m, where the wire must have one of them."""
     return {"wire": WIRES} if parameters.sizes == "preferred" else {}
 
 

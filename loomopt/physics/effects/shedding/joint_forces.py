@@ -26,7 +26,7 @@ LEVER = ("mechanism.lever.arm", "mechanism.lever.direction")
 
 
 PUSHES = ("roller_force", "roller_side", "cam_shaft_force", "lever_couple", "lever_pivot_force")
-"""What there is none of without contact."""
+"""Forces that are absent without contact."""
 
 PINS = {"shaft": "cam shaft's bearings", "roller": "pin of the roller, which rolls", "lever": "pivot of the lever"}
 
@@ -53,7 +53,7 @@ class CamForces:
 
     @lazy
     def _across(self) -> Number:
-        """What of the roller's force turns the lever."""
+        """Component of the roller's force that turns the lever."""
         return self.lever_couple / self.at.values["arm"]
 
     @lazy
@@ -75,7 +75,7 @@ class CamForces:
 
     @lazy
     def roller_side(self) -> Number:
-        """What of it runs along the lever, from its pivot to the roller."""
+        """Component of the roller's force along the lever, from its pivot to the roller."""
         along, across = self._contact.sides
         return -self._across * across / along
 
@@ -104,7 +104,7 @@ class CamForces:
 
     @lazy
     def friction_work(self) -> Mapping[str, Number]:
-        """What a newton in each pin takes by friction, m per rad of the cam; the roller rolls and does not slip."""
+        """Friction work per newton in each pin, m per rad of the cam; the roller rolls and does not slip."""
         turned = {
             "shaft": ("cam_shaft_force", 1),
             "roller": ("roller_force", self._contact.rolling),
