@@ -170,7 +170,9 @@ class Task(abc.ABC):
             room = variable.lower < variable.upper
             if room and least > variable.upper:
                 remedy = f"Correct the limit, or the bounds of {variable.called}."
-                raise BadInput(f"{variable.called} cannot be as large", key=f"limits.{pairs[0][0]}.min", remedy=remedy)
+                raise BadInput(
+                    f"{variable.called} cannot reach the limit", key=f"limits.{pairs[0][0]}.min", remedy=remedy
+                )
             upper, around = (variable.upper, variable.range) if room else (least, (least, least))
             variables[name] = variable._replace(
                 lower=max(least, variable.lower) if room else least, upper=upper, range=around

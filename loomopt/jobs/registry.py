@@ -71,7 +71,7 @@ def _loaded(point: "EntryPoint", what: str, kind: type, name: str) -> Any:
 
 def _useless(point: "EntryPoint", what: str, why: str) -> BadInput:
     problem = f"{what} {point.name} of {_distribution(point)} {why}"
-    return BadInput(problem, key=point.name, value=point.value, remedy="Mend or uninstall it")
+    return BadInput(problem, key=point.name, value=point.value, remedy="Repair or uninstall it")
 
 
 def names() -> tuple[str, ...]:
@@ -124,7 +124,7 @@ class _Registered:
         with naming():
             schema = find(job).schema(document)
             if schema.name != job:
-                raise BadInput(f"job {job} describes scenes of {schema.name}", key=job, remedy="Mend its schema")
+                raise BadInput(f"job {job} describes scenes of {schema.name}", key=job, remedy="Correct its schema")
             for name in dict.fromkeys(name for name in effects if name not in schema.effects):
                 effect = _external_effect(schema, name)
                 if effect is not None:
@@ -159,7 +159,7 @@ def _external_effect(schema: SceneSchema, name: str) -> Effect | None:
     taken = {*schema.variables, *schema.figures, *schema.margins}
     for new_name in (*(figure.name for figure in effect.figures), *effect.margins):
         if new_name in taken:
-            raise _useless(point, "effect", f"brings {new_name}, which there is already")
+            raise _useless(point, "effect", f"brings {new_name}, which exists already")
     return effect
 
 
@@ -173,7 +173,7 @@ def external_scenes() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
     for point in {point.name: point for point in entry_points(JOBS)}.values():
         try:
             if point.name in builtin_names():
-                raise _useless(point, "job", "is not looked at, for loomopt has one of that name")
+                raise _useless(point, "job", "is ignored: loomopt has a job of that name")
             files = packaged.scenes(_folder(point.name, "problems"))
         except BadInput as error:
             faults.append(error)

@@ -438,7 +438,7 @@ def _number(text: str, row: Row, column: _Column, origin: str, gap: bool) -> flo
             f"{where}: the number {_cell(text)} is too large or too small",
             origin,
             allowed="0, and sizes of 1e-60 to 1e60",
-            remedy="Write 0 for next to nothing",
+            remedy="Write 0 for a negligible value",
         )
     if value is None:
         cell = row.cell(column.place)

@@ -146,7 +146,7 @@ def checked(data: object, scene: Scene, origin: str = "<design>") -> dict[str, f
             kinds[name] = listed
         of, member, _ = name.partition("[")
         if member and of in kinds:
-            problem = f"{of} is of one member of a family, and this takes one machine"
+            problem = f"{of} belongs to one member of a family, and one machine is needed"
             remedy = "Give members[0].design of the answer, or another's, with that member's numbers set"
             raise place.fault(problem, remedy=remedy)
         if name not in kinds:
@@ -176,7 +176,7 @@ def _number(cursor: Cursor, quantity: Quantity) -> float:
         if _fits(quantity, value):
             return float(value)
         allowed = f"{_ALLOWED}; {quantity.range}"
-    raise cursor.fault("no design can have it", value, allowed, "Correct the number")
+    raise cursor.fault("the value is out of range", value, allowed, "Correct the number")
 
 
 def _largest(scene: Scene, name: str, kind: str) -> float:
@@ -207,7 +207,7 @@ def _list_numbers(design: Cursor, lists: Mapping[str, Quantity]) -> dict[str, ob
         place, values = design.at(name), given.get(name, [])
         if not isinstance(values, list | tuple) or len(values) > LONGEST:
             allowed = f"a list of up to {LONGEST} numbers"
-            raise place.fault("it is not such a list", allowed=allowed, remedy=_GIVE)
+            raise place.fault("it is not a list, or it is too long", allowed=allowed, remedy=_GIVE)
         if values and any(_place(str(key), name) is not None for key in given):
             raise place.fault(f"{name} is given as a list and by number", remedy=_GIVE)
         numbers |= {f"{name}_{k}": value for k, value in enumerate(values)}
@@ -285,7 +285,7 @@ def _call(raw: object, origin: str) -> Call:
     if "" in entries or not listed or not isinstance(values, Mapping) or not isinstance(target, str | None):
         remedy = "Give the answer as it was printed, or its design object alone"
         allowed = "set: keys and values; with, without, free: names; target: a name"
-        raise refusal("it does not say what a call changes", origin, "scene.call", allowed=allowed, remedy=remedy)
+        raise refusal("the changes of the call cannot be read", origin, "scene.call", allowed=allowed, remedy=remedy)
     on, off, free = (tuple(entry) for entry in names)
     return Call(copied(values, origin), on, off, free, target)
 
@@ -295,7 +295,7 @@ def read_answer(path: Path, jobs: Jobs) -> tuple[Scene, DesignGiven]:
     given, origin = read_given(path), named(path)
     if given.document is None:
         remedy = "Give what `loomopt solve --json` prints; a design alone goes with a scene: --design"
-        raise refusal("it is no answer with its scene", origin, remedy=remedy)
+        raise refusal("it is not an answer with its scene", origin, remedy=remedy)
     call = given.call.then(Call(target=given.target))
     try:
         # Somebody else may have made the file: what it names is bound as what a scene file names.
@@ -321,7 +321,7 @@ def resumed(given: DesignGiven, scene: Scene, later: Call, origin: str) -> Scene
         scene.called(later, later.set)  # which raises its own fault
         remedy = f"{error.remedy.rstrip('.')}; or give its design object alone"
         raise refusal(
-            f"what the answer's call changed cannot be: {error.problem}",
+            f"the changes of the answer's call are invalid: {error.problem}",
             origin,
             f"scene.call: {error.key}",
             allowed=error.allowed,
@@ -333,8 +333,8 @@ def check_job(job: object, scene: Scene, origin: str) -> None:
     """Raise BadInput for an answer of another job than a scene's."""
     if job != scene.job:
         name = clean(job, 80) if isinstance(job, str) else shown(job)
-        remedy = "Give an answer of this job, or the scene that the answer was found for"
-        raise refusal(f"the answer is one of job {name}, the scene one of {scene.job}", origin, remedy=remedy)
+        remedy = "Give an answer of this job, or the scene of the answer"
+        raise refusal(f"the answer is of job {name}, the scene of job {scene.job}", origin, remedy=remedy)
 
 
 def scene_changes(scene: Scene, given: DesignGiven, origin: str, besides: Call) -> list[str]:
@@ -391,9 +391,9 @@ def remark(scene: Scene, given: DesignGiven, later: Call, changes: Sequence[str]
     """
     current = given.call.then(later).said
     lasting = [text for text in given.call.said if text in current]
-    sentences = [f"{origin} brings what its call changed: {', '.join(_shorten(lasting))}"] if lasting else []
+    sentences = [f"{origin} adds the changes of its call: {', '.join(_shorten(lasting))}"] if lasting else []
     sentences += (
-        [f"{scene.origin} counts where {origin} was found in another scene: {', '.join(changes)}"] if changes else []
+        [f"the settings differ from those of {origin}; {scene.origin} is used: {', '.join(changes)}"] if changes else []
     )
     return "; ".join(sentences)
 

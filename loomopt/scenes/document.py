@@ -35,7 +35,7 @@ def read_document(path: Path | str) -> Mapping[str, Any]:
     except RecursionError:
         problem, remedy = "its tables or lists are nested too deep", "Write a scene as `loomopt new` does"
     except ValueError:
-        problem, remedy = "it holds a whole number of thousands of digits", "Correct the number"
+        problem, remedy = "a whole number has too many digits", "Correct the number"
     raise refusal(problem, origin, allowed="a scene in TOML", remedy=remedy) from None
 
 
@@ -113,9 +113,7 @@ def _copied_value(value: object, origin: str, path: tuple[str, ...]) -> object:
         items = [_copied_value(item, origin, (*path, str(k))) for k, item in enumerate(value, 1)]
         return items if isinstance(value, list) else tuple(items)
     if isinstance(value, int) and value.bit_length() > _LONGEST_NUMBER:
-        raise refusal(
-            "it is a whole number of thousands of digits", origin, ".".join(path), remedy="Correct the number"
-        )
+        raise refusal("the whole number has too many digits", origin, ".".join(path), remedy="Correct the number")
     return value
 
 
@@ -210,7 +208,7 @@ class Paths:
             folder = self.folder.resolve()
             path = (folder / given).resolve()
         except (OSError, ValueError, RuntimeError):  # a loop of links, a name that no file can have
-            problem = "there can be no file of this name"
+            problem = "the file name is invalid"
             raise refusal(problem, origin, key, given, remedy="Correct the path") from None
         if not path.is_relative_to(folder):
             raise _outside(given, key, origin)

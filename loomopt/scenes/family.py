@@ -90,7 +90,12 @@ def _members(scene: Scene) -> list[dict[str, Any]]:
         raise refusal("a family needs members", scene.origin, key, remedy='Write members = [{ M0 = "600 N*m" }, ...]')
     if len(members) > MOST_MEMBERS:
         raise refusal(
-            "a family of so many", scene.origin, key, str(len(members)), f"1 to {MOST_MEMBERS}", "Take some out"
+            "the family has too many members",
+            scene.origin,
+            key,
+            str(len(members)),
+            f"1 to {MOST_MEMBERS}",
+            "Take some out",
         )
     return members
 
@@ -98,14 +103,14 @@ def _members(scene: Scene) -> list[dict[str, Any]]:
 def _changes(scene: Scene, place: int) -> dict[str, Any]:
     at, given = f"targets.{FAMILY}.members[{place + 1}]", _members(scene)[place]
     if not given:
-        raise refusal("a member that changes nothing", scene.origin, at, remedy='Write { M0 = "600 N*m" }')
+        raise refusal("the member changes nothing", scene.origin, at, remedy='Write { M0 = "600 N*m" }')
     changes: dict[str, Any] = {}
     free = {f"{p.table}.{p.key}" for p in places(scene) if (bound := scene.bounds.get(p.label)) and bound.free}
     for key, value in _flat(scene, at, given):
         if key in changes:
             raise refusal("it is changed twice", scene.origin, f"{at}.{key}", remedy="Take one of them out")
         if key in free:
-            problem, remedy = "it is free, so that the family chooses it", "Change its bounds, or take it out"
+            problem, remedy = "it is free: the family chooses it", "Change its bounds, or take it out"
             raise refusal(problem, scene.origin, f"{at}.{key}", remedy=remedy)
         changes[key] = value
     return changes

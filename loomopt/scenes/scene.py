@@ -206,7 +206,7 @@ class Scene(Shown):
         """A kind of quantity that there is. Raises BadInput for any other."""
         if not isinstance(kind, str) or kind not in self.units:
             allowed = ", ".join(self.units)
-            raise refusal("there is no such kind of quantity", "", "kind", kind, allowed, "Choose one of them")
+            raise refusal("unknown kind of quantity", "", "kind", kind, allowed, "Choose one of them")
         return kind
 
     def unit_for(self, si: str) -> str:
@@ -217,7 +217,7 @@ class Scene(Shown):
         """An SI value as text with the unit in which a person sees its kind; digits: significant ones."""
         arguments.number(value, "value", "a number in SI", "Give a number")
         if not 1 <= arguments.whole(digits, "digits", *_DIGITS) <= _MOST_DIGITS:
-            raise refusal("there is no such number of digits", "", "digits", digits, *_DIGITS)
+            raise refusal("the number of digits is invalid", "", "digits", digits, *_DIGITS)
         return show(value, self.shown_in(kind), digits)
 
     def set(self, key: str, value: object) -> "Scene":

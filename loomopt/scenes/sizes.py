@@ -55,7 +55,7 @@ def named(given: Mapping[str, object], bounded: Collection[str]) -> dict[str, ob
         if not fitting:
             near = nearest(name, bounded)
             remedy = f'Perhaps "{near}" is meant' if near else "Name a number of [bounds]"
-            raise refusal(f"{name} is no number that is free", "", "round", name, ", ".join(bounded), remedy)
+            raise refusal(f"{name} is not a free number", "", "round", name, ", ".join(bounded), remedy)
         steps |= dict.fromkeys(fitting, step)
     return steps
 

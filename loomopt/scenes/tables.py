@@ -183,7 +183,9 @@ def effects(cursor: Cursor, schema: SceneSchema) -> dict[Effect, Table]:
         place = inner[name]
         with cursor.faults:
             if isinstance(effect, Event) and not schema.parts:
-                problem = f"effect {name} parts the output from the mechanism, which job {schema.name} cannot follow"
+                problem = (
+                    f"effect {name} separates the output from the mechanism, which job {schema.name} cannot simulate"
+                )
                 raise place.fault(problem, remedy="Take the table out")
             if not effect.many:
                 read[effect] = _effect(effect, place)
@@ -210,7 +212,7 @@ def _effect(effect: Effect, cursor: Cursor) -> Table:
         return read
     others = [key for key in curve.instead if key in read.model_fields_set]
     if others:
-        problem = f"{curve.key} and {', '.join(others)} say the same twice"
+        problem = f"{curve.key} and {', '.join(others)} define the same quantity twice"
         raise cursor.at(curve.key).fault(problem, remedy=f"Take {curve.key} out, or {', '.join(others)}")
     return read
 
@@ -235,7 +237,7 @@ def check_needs(
                 if name not in given:
                     faults.add(place.missing(type(mechanism), name))
         elif given:
-            problem = f"{key} and {', '.join(given)} say the same twice"
+            problem = f"{key} and {', '.join(given)} define the same quantity twice"
             faults.add(place.at(key).fault(problem, remedy=f"Take {key} out, or {', '.join(given)}"))
     for effect, table in active.items():
         _check_model(scene.at("effects").at(effect.name), effect, table)
@@ -246,7 +248,9 @@ def check_needs(
             continue
         words = {key: value for key, value in table if isinstance(value, str)}
         if isinstance(effect, Load) and effect.known_in(words) and not schema.partly_known:
-            problem = f"effect {effect.name} is known in part of the cycle only, which job {schema.name} cannot judge"
+            problem = (
+                f"effect {effect.name} is known in part of the cycle only, which job {schema.name} does not support"
+            )
             remedy = "Take it off, or choose other values"
             faults.add(scene.at("effects").at(effect.name).fault(problem, remedy=remedy))
 
@@ -261,7 +265,7 @@ def _check_model(cursor: Cursor, effect: Effect, table: Table) -> None:
         for key in set(other_model.keys) - {*model.keys, *model.may}:
             if getattr(table, key) is not None:
                 remedy = f'Write model = "{word}", or take {key} out'
-                cursor.faults.add(cursor.at(key).fault(f"{key} is of model {word}", remedy=remedy))
+                cursor.faults.add(cursor.at(key).fault(f"{key} belongs to model {word}", remedy=remedy))
 
 
 def _check_together(cursor: Cursor, active: Mapping[Effect, Table]) -> None:
@@ -437,7 +441,7 @@ def limits(cursor: Cursor, schema: SceneSchema, active: Collection[Effect]) -> d
     limitable = [name for name, figure in schema.figures.items() if figure.sides]
     for name, place in inner.items():
         if name in schema.figures and name not in limitable:
-            problem, remedy = "this figure is told of a design, and no limit holds it", "Limit another, or take it out"
+            problem, remedy = "this figure cannot be limited", "Limit another, or take it out"
             faults.add(place.fault(problem, allowed=", ".join(limitable), remedy=remedy, grade=NAME))
     cursor.check_keys([name for name in inner if name not in schema.figures], limitable, "figure to limit")
     on = {effect.name for effect in active}

@@ -51,7 +51,7 @@ class Tolerance(NamedTuple):
             half = tolerance_classes.plus_minus(self.standard, nominal)
             deviations = -half, half
         if math.isnan(deviations[0]):
-            problem = f"{self.standard} says nothing of {1e3 * nominal:g} mm"
+            problem = f"{self.standard} does not cover {1e3 * nominal:g} mm"
             raise refusal(problem, "", f"tolerances.{self.number}", remedy="Give plus_minus instead")
         return deviations
 
@@ -109,7 +109,7 @@ def _tolerance(cursor: Cursor, quantity: Quantity) -> Tolerance:
             raise cursor.at(key).unknown("key", key, KEYS, given=given)
     forms = [form for form in FORMS if form in given]
     if len(forms) != 1:
-        problem = f"{' and '.join(forms)} say the same twice" if forms else "plus_minus is missing"
+        problem = f"{' and '.join(forms)} define the same quantity twice" if forms else "plus_minus is missing"
         raise cursor.fault(problem, remedy=f'Give one of {", ".join(FORMS)}, such as plus_minus = "0.06 mm"')
     if ("plus" in given) != ("minus" in given):
         lacking = "minus" if "plus" in given else "plus"
@@ -136,7 +136,7 @@ def _tolerance(cursor: Cursor, quantity: Quantity) -> Tolerance:
         below = above
     spread = cursor.at("spread").word(SPREADS, "spread") if "spread" in given else SPREADS[0]
     if spread == "uniform" and "sigmas" in given:
-        problem = "a uniform spread has no sigmas: its band is all there is"
+        problem = "a uniform spread has no sigmas: all values lie in its band"
         raise cursor.at("sigmas").fault(problem, remedy="Take sigmas out")
     sigmas = cursor.at("sigmas").number(Quantity("number", above=0)) if "sigmas" in given else SIGMAS
     group = given.get("group", "")

@@ -75,7 +75,7 @@ def test_an_answer_is_read_as_it_was_solved(cli, solved, problem, changes):
     for name, value in answer["figures"].items():
         assert found["figures"][name] == (None if value is None else pytest.approx(value, rel=1e-12, abs=1e-9)), name
     told = any(word.startswith("--") and word not in ("--target", "--starts") for word in changes)
-    assert err.count("Remark: a.json brings what its call changed: ") == told
+    assert err.count("Remark: a.json adds the changes of its call: ") == told
     assert "another scene" not in err
     alone, err = evaluated(cli, "a.json")
     assert (alone, "Remark: a.json" in err) == (found, False)
@@ -104,7 +104,9 @@ def test_the_file_on_the_command_line_wins_over_the_scene_of_an_answer(cli, solv
     found, err = evaluated(cli, "my.toml", "--design", "a.json")
     assert found["design"] == answer["design"]
     assert found["figures"]["M3_fdc"] == pytest.approx(answer["figures"]["M3_fdc"] - 145, abs=1e-6)
-    told = "Remark: my.toml counts where a.json was found in another scene: operation.M0 = 600 N*m (a.json: 745 N*m).\n"
+    told = (
+        "Remark: the settings differ from those of a.json; my.toml is used: operation.M0 = 600 N*m (a.json: 745 N*m).\n"
+    )
     assert err == told
     own, err = evaluated(cli, "a.json")
     assert (own["figures"], err) == (answer["figures"], "")
@@ -127,8 +129,8 @@ def test_an_answer_brings_to_another_file_what_its_call_changed_and_nothing_else
     assert found == same
     assert "gravity" in found["effects"]
     assert err == (
-        "Remark: a.json brings what its call changed: gravity on, operation.M0 = 700 N*m; "
-        "my.toml counts where a.json was found in another scene: operation.speed = 500 rpm (a.json: 600 rpm).\n"
+        "Remark: a.json adds the changes of its call: gravity on, operation.M0 = 700 N*m; "
+        "the settings differ from those of a.json; my.toml is used: operation.speed = 500 rpm (a.json: 600 rpm).\n"
     )
 
 
@@ -139,7 +141,7 @@ def test_the_calls_own_changes_come_last(cli, solved):
     )
     assert found["effects"] == [*answer["effects"], "centrifugal"]
     assert found["figures"]["M3_fdc"] == pytest.approx(answer["figures"]["M3_fdc"] + 100, abs=1e-6)
-    assert err == "Remark: a.json brings what its call changed: gravity on.\n"
+    assert err == "Remark: a.json adds the changes of its call: gravity on.\n"
 
 
 def test_a_design_comes_through_a_pipe(cli, solved, monkeypatch):
@@ -148,7 +150,7 @@ def test_a_design_comes_through_a_pipe(cli, solved, monkeypatch):
         monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(json.dumps(given).encode())))
         found, err = evaluated(cli, "beatup", "--design", "-")
         assert found["design"] == answer["design"]
-        assert err.startswith("Remark: standard input brings") == (given is answer)
+        assert err.startswith("Remark: standard input adds") == (given is answer)
     for stdin in (io.TextIOWrapper(io.BytesIO(b"\n")), None):
         monkeypatch.setattr("sys.stdin", stdin)
         status, out, err = cli("evaluate", "beatup", "--design", "-")
@@ -200,7 +202,7 @@ def test_setting_an_effects_value_changes_it_and_only_without_takes_the_effect_o
     assert other["effects"] == answer["effects"]
     off, err = evaluated(cli, "beatup", "--design", "a.json", "--without", "gravity")
     assert off["effects"] == ["inertia", "resistance"]
-    assert err == "Remark: a.json brings what its call changed: operation.M0 = 700 N*m.\n"
+    assert err == "Remark: a.json adds the changes of its call: operation.M0 = 700 N*m.\n"
 
 
 def test_an_unchanged_answer_needs_no_remark(cli, solved):
@@ -214,7 +216,7 @@ def test_an_answer_of_another_job_is_refused(cli, solved, command, tmp_path):
     out = {"export": ("--out", "x.svg"), "show": ("--figure", "x.svg")}.get(command, ())
     status, shown, err = cli(command, "beatup", "--design", "a.json", *out)
     assert (status, shown) == (2, "")
-    assert err.startswith("loomopt: a.json: the answer is one of job shedding, the scene one of beatup.")
+    assert err.startswith("loomopt: a.json: the answer is of job shedding, the scene of job beatup.")
     assert err.count("\n") == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json"]
 

@@ -280,7 +280,7 @@ def test_an_answer_stands_for_its_design_in_another_scene(answer):
 def test_an_answer_of_another_job_stands_for_nothing():
     static = lo.solve("shedding-static")
     for function in (lo.evaluate, lo.simulate, lo.prove):
-        with pytest.raises(lo.BadInput, match="one of job shedding, the scene one of beatup"):
+        with pytest.raises(lo.BadInput, match="of job shedding, the scene of job beatup"):
             function(SCENE, static)
 
 

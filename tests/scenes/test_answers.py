@@ -158,7 +158,7 @@ def test_an_answers_file_is_loaded_as_the_answer_in_its_own_scene(answer, file):
 def test_a_design_alone_is_no_scene(tmp_path):
     place = tmp_path / "design.json"
     place.write_text(json.dumps({"design": {"l1": 0.03}}))
-    with pytest.raises(lo.BadInput, match="it is no answer with its scene") as caught:
+    with pytest.raises(lo.BadInput, match="it is not an answer with its scene") as caught:
         lo.load(place)
     assert "--design" in caught.value.remedy
 
@@ -207,7 +207,7 @@ def test_what_is_expected_is_no_part_of_the_machine():
 @pytest.mark.parametrize(
     ("changes", "problem"),
     [
-        ({"scene__document__problem": {"name": "x", "job": "rapier"}}, "of job rapier, the scene one of beatup"),
+        ({"scene__document__problem": {"name": "x", "job": "rapier"}}, "of job rapier, the scene of job beatup"),
         ({"scene__document__problem": {"name": "x", "job": 7}}, "of job 7"),
         ({"scene__document__problem": 7}, "of job none"),
         ({"scene": 3}, "has no tables"),
@@ -215,12 +215,12 @@ def test_what_is_expected_is_no_part_of_the_machine():
         ({"scene__document": []}, "has no tables"),
         ({"scene__files": ["x"]}, "the answer's files are no texts"),
         ({"scene__files": {"targets.match.table": 3}}, "the answer's files are no texts"),
-        ({"scene__call": 3}, "does not say what a call changes"),
-        ({"scene__call__with": "gravity"}, "does not say what a call changes"),
-        ({"scene__call__set": ["x"]}, "does not say what a call changes"),
-        ({"scene__call__target": 5}, "does not say what a call changes"),
-        ({"scene__call__set": {"operation.M0": "7 mm"}}, "scene.call: operation.M0: what the answer's call changed"),
-        ({"scene__call__with": ["gravitas"]}, "scene.call: effects: what the answer's call changed cannot be: unknown"),
+        ({"scene__call": 3}, "the changes of the call cannot be read"),
+        ({"scene__call__with": "gravity"}, "the changes of the call cannot be read"),
+        ({"scene__call__set": ["x"]}, "the changes of the call cannot be read"),
+        ({"scene__call__target": 5}, "the changes of the call cannot be read"),
+        ({"scene__call__set": {"operation.M0": "7 mm"}}, "scene.call: operation.M0: the changes of the answer's call"),
+        ({"scene__call__with": ["gravitas"]}, "scene.call: effects: the changes of the answer's call are invalid"),
         ({"target": 5}, "the target is no name"),
     ],
 )

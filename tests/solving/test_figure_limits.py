@@ -164,9 +164,9 @@ def test_today_is_judged_by_what_its_figures_are(rapier, cam):
 @pytest.mark.parametrize(
     ("key", "value", "target", "said"),
     [
-        ("limits.dwell_after.min", "35 deg", "dwell", "the lesser of both dwells is sought.*Limit dwell"),
-        ("limits.dwell.min", "-5 deg", None, "it is no dwell.*more than 0 deg and less than 180 deg"),
-        ("limits.dwell.min", "180 deg", None, "it is no dwell"),
+        ("limits.dwell_after.min", "35 deg", "dwell", "the lesser of both dwells is maximised.*Limit dwell"),
+        ("limits.dwell.min", "-5 deg", None, "the dwell is out of range.*more than 0 deg and less than 180 deg"),
+        ("limits.dwell.min", "180 deg", None, "the dwell is out of range"),
         ("limits.dwell_before.max", "40 deg", None, "dwell_before has no limit max"),
         ("limits.rms_jerk.min", "1 m/rad^3", None, "rms_jerk has no limit min"),
     ],
@@ -187,7 +187,7 @@ def test_a_dwell_may_not_be_asked_for_beyond_its_bounds(rapier):
     program = registry.of(rapier).program(bounded.set("limits.dwell_after.min", "30 deg"), "stroke-dwell")
     (dwell,) = (each for each in program.variables if each.name == "dwell_after")
     assert (dwell.lower / DEGREE, dwell.upper / DEGREE) == pytest.approx((30.0, 40.0))
-    with pytest.raises(BadInput, match=r"limits\.dwell_after\.min: dwell_after cannot be as large"):
+    with pytest.raises(BadInput, match=r"limits\.dwell_after\.min: dwell_after cannot reach the limit"):
         lo.solve(bounded.set("limits.dwell_after.min", "50 deg"))
 
 

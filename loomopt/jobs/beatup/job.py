@@ -166,7 +166,7 @@ class Beatup(Job):
         if target == "balance" and BALANCE.reached(figures):
             return f"Balanced: the reed torque {where} is zero, and then {peak_text}."
         if target == "balance":
-            nearest = f"the reed torque nearest to zero found {where} is {front}"
+            nearest = f"the reed torque nearest to zero {where} is {front}"
             return f"Balance is out of reach: {nearest}, and then {peak_text}."
         if target == "torque":
             return f"With the reed torque at {front} {where}, {peak_text}."

@@ -371,8 +371,8 @@ def family_sentence(bands: Sequence[Band], scene: Scene) -> str:
     text = f"At front dead centre M3 = M0 - J psi'' speed^2, and this design's psi'' is {bands[0].bend:.6g}."
     text += _ratio(bands, scene) if len({(b.least, b.most) for b in bands}) == 1 else ""
     if needed > allowed:
-        return f"{text} All would need one of {needed:.6g} or more, and of {allowed:.6g} or less: no linkage has it."
-    return f"{text} All would need one from {needed:.6g} to {allowed:.6g}."
+        return f"{text} Requirements conflict: psi'' must be at least {needed:.6g} and at most {allowed:.6g}."
+    return f"{text} All members are balanced by a psi'' from {needed:.6g} to {allowed:.6g}."
 
 
 def _ratio(bands: Sequence[Band], scene: Scene) -> str:

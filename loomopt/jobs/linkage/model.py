@@ -593,7 +593,7 @@ class Linkage(Kinematics):
             travelled = np.asarray(pose.since(there), dtype=np.float64)
         beyond = np.flatnonzero(-(travelled + level) > 0.0)
         if not beyond.size or beyond[0] == 0:
-            problem = f"the output never travels as far as event {place.name} asks"
+            problem = f"the output never reaches the travel of event {place.name}"
             raise UnfoundError(place.name, problem)
         k = int(beyond[0])
         return beside + place.side * turning_points.crossing(excess, float(steps[k - 1]), float(steps[k]))

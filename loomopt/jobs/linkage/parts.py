@@ -229,7 +229,7 @@ def _pair(cursor: Cursor) -> tuple[str, ...]:
         raise cursor.fault("a dyad joins two joints", raw, allowed, remedy)
     first, second = (_name(cursor.at(place)) for place in (1, 2))
     if first == second:
-        raise cursor.fault(f"both ends of the dyad hang on {first}", remedy="Name two joints")
+        raise cursor.fault(f"both ends of the dyad are joint {first}", remedy="Name two joints")
     return first, second
 
 
@@ -406,7 +406,9 @@ def _check_sense(cursor: Cursor, part: Part) -> None:
         polar = {"radius", "angle"} & numbers.keys()
         cartesian = {"along", "across"} & numbers.keys()
         if polar and cartesian:
-            problem = f"{' and '.join(sorted(polar))} and {' and '.join(sorted(cartesian))} say the same twice"
+            problem = (
+                f"{' and '.join(sorted(polar))} and {' and '.join(sorted(cartesian))} define the same quantity twice"
+            )
             raise cursor.fault(problem, remedy="Give radius and angle, or along and across")
         if "radius" not in numbers and not cartesian:
             raise cursor.fault("the point has no place", remedy="Add radius and angle, or along and across")
@@ -433,8 +435,8 @@ def linked(cursor: Cursor, numbers: Numbers) -> Chain:
     if not isinstance(raw, Mapping):
         raise cursor.fault("it is not a table", raw, remedy="Write a table [parts]", grade=WHOLE)
     if len(raw) > MOST_PARTS:
-        problem = f"{len(raw)} parts are no linkage of one freedom"
-        raise cursor.fault(problem, allowed=f"up to {MOST_PARTS}", remedy="Take out what moves nothing")
+        problem = f"{len(raw)} parts are too many"
+        raise cursor.fault(problem, allowed=f"up to {MOST_PARTS}", remedy="Take out parts that drive nothing")
     read = [_part(name, place, numbers) for name, place in cursor.entries().items()]
     parts = [part for part in read if part is not None]
     if len(parts) == len(read):
@@ -484,7 +486,7 @@ def _double_name(cursor: Cursor, name: str, sort: str, part: Part, first: str, b
         return cursor.fault(f"{name} is the name of a {before} and of a {sort}", remedy="Rename one")
     if sort == "link":
         return cursor.fault(f"{name} is a link of {first} and of {part.name}", remedy="Rename one")
-    problem = f"{name} is placed by {first} and by {part.name}: a loop too many, it cannot move"
+    problem = f"{name} is placed by {first} and by {part.name}: the linkage has a loop too many and cannot move"
     return cursor.fault(problem, remedy=f"Give {part.name} a joint of its own, or take one of the two out")
 
 
@@ -517,9 +519,9 @@ def _cycle_fault(cursor: Cursor, waiting: Sequence[Part], known: Collection[str]
             break
         waiting = ring
     lacking = "; ".join(f"{p.name} for {', '.join(n for n in chain.wants(p) if n not in known)}" for p in waiting)
-    problem = f"parts wait for each other ({lacking}): together they are an Assur group of class III or higher"
+    problem = f"parts depend on each other ({lacking}): together they are an Assur group of class III or higher"
     remedy = "Only chains of dyads, sliders and slots close in closed form: drive it at another link"
-    allowed = "parts of which each hangs on joints and links that others place before it"
+    allowed = "parts that depend only on joints and links of earlier parts"
     return cursor.at(waiting[0].name).fault(problem, allowed=allowed, remedy=remedy)
 
 
@@ -540,8 +542,8 @@ def demand_used(linked: Chain, document: Mapping[str, Any]) -> None:
         if part.kind == "point" or provided & (words | wanted):
             wanted.update(chain.wants(part))
             continue
-        problem = f"nothing reads the part {part.name}: no other part hangs on it, and no table names it"
-        table.faults.add(table.at(part.name).fault(problem, remedy="Take it out, or name it where it is read"))
+        problem = f"part {part.name} is not used: no other part depends on it, and no table names it"
+        table.faults.add(table.at(part.name).fault(problem, remedy="Take it out, or name it in a table"))
     table.faults.tell()
 
 

@@ -209,7 +209,7 @@ def _places(cursor: Cursor, numbers: Numbers, output: Output) -> tuple[EventRule
         parts.check_name(place, name)
         given = [form for form in forms if form in table]
         if len(given) != 1:
-            problem = "an event is one of an extreme, a travel from another event, and an angle"
+            problem = "an event needs an extreme, a travel from another event, or an angle"
             raise place.fault(problem, remedy='Such as { extreme = "max", near = "60 deg" }')
         read = parts.entries(place, forms[given[0]], numbers, name=name)
         if given[0] == "travel":
@@ -228,7 +228,7 @@ def _travel(cursor: Cursor, name: str, read: parts.TableEntries, known: Known) -
     side = cursor.at(sides[0])
     beside = _one_of(side, known, "event above it")
     if known[beside].extreme != "max":
-        problem = f"a travel is short of a maximum of the output, and {beside} is none"
+        problem = f"a travel counts from a maximum of the output, and {beside} is none"
         raise side.fault(problem, remedy="Name an event with extreme = max")
     return EventRule(name, travel=read.numbers["travel"], beside=beside, side=-1 if sides[0] == "before" else 1)
 
@@ -258,7 +258,7 @@ def _read(text: str) -> LinkageScene:
         place = scene.at("mechanism").at(name)
         parts.check_name(place, name)
         if name not in numbers.uses:
-            raise place.fault(f"nothing uses the number {name}", remedy="Use it, or take it out")
+            raise place.fault(f"number {name} is not used", remedy="Use it, or take it out")
     return LinkageScene(Linkage(linked, output, places), {name: numbers.uses[name] for name in mechanism}, windows)
 
 
@@ -457,7 +457,7 @@ def _check_path(scene: Scene, known: LinkageScene, name: str, table: LinkageTarg
     key = f"targets.{name}"
     if table.point is None:
         if table.table is not None:
-            problem = "a table is that of a point's path"
+            problem = "the table of a path needs its point"
             raise refusal(problem, scene.origin, f"{key}.point", remedy="Name the point")
         return
     joints = known.linkage.chain.joints
@@ -554,11 +554,11 @@ def _check_sense(effect: kinds.Effect, values: Mapping[str, Any], path: str, ori
     if effect.kind == "load":
         if given.isdisjoint(("x", "y", "table")) or ("table" in given and not given.isdisjoint(("x", "y", "begins"))):
             remedy = "Give x and y, with begins and ends or without, or a table"
-            raise refusal("the load is one of constant components and a table", origin, path, remedy=remedy)
+            raise refusal("a load needs either constant components or a table", origin, path, remedy=remedy)
         if len(given & {"begins", "ends"}) == 1:
             raise refusal("a load begins at an event and ends at another", origin, path, remedy="Give both, or none")
         if "at" in given and "table" not in given:
-            raise refusal("at is of a table", origin, f"{path}.at", remedy="Take it out")
+            raise refusal("at needs a table", origin, f"{path}.at", remedy="Take it out")
     if {"begins", "ends"} <= given and values["begins"] == values["ends"]:
         raise refusal("it begins where it ends", origin, f"{path}.ends", values["ends"], remedy="Name another")
 
@@ -572,7 +572,11 @@ def _check_targets(scene: Scene, known: LinkageScene) -> None:
             continue
         key = f"targets.{name}"
         if name in scene.document.get("targets", {}) and not table.sought:
-            faults.add(refusal("the target seeks nothing", scene.origin, key, remedy='Such as least = ["peak_torque"]'))
+            faults.add(
+                refusal(
+                    "the target has nothing to optimise", scene.origin, key, remedy='Such as least = ["peak_torque"]'
+                )
+            )
         for figure, sense in dict.fromkeys(table.sought):
             path_ = f"{key}.{'point' if figure == PATH else sense}"
             axis = axes_.get(figure)
@@ -581,9 +585,9 @@ def _check_targets(scene: Scene, known: LinkageScene) -> None:
             elif axis and sense not in axis.senses:
                 opposite = "least" if sense == "most" else "most"
                 problem = f"of {figure} the {opposite} can be sought, not the {sense}"
-                faults.add(refusal(problem, scene.origin, path_, remedy=f"Write {opposite}, or seek another figure"))
+                faults.add(refusal(problem, scene.origin, path_, remedy=f"Write {opposite}, or choose another figure"))
         if len(dict.fromkeys(table.sought)) < len(table.sought):
-            faults.add(refusal("a figure is sought twice", scene.origin, key, remedy="Take one out"))
+            faults.add(refusal("a figure stands twice", scene.origin, key, remedy="Take one out"))
         with faults:
             _check_path(scene, known, name, table)
     faults.tell()
@@ -608,7 +612,7 @@ def _check_output(scene: Scene, linkage: Linkage) -> None:
     form, name = linkage.output.measure, linkage.output.name
     if np.ptp(q) == 0.0:
         problem = f"the output {form} of {name} stands still"
-        raise refusal(problem, scene.origin, f"output.{form}", remedy="Name what moves")
+        raise refusal(problem, scene.origin, f"output.{form}", remedy="Name a part that moves")
     scale = 1.0 if linkage.output.scale is None else number(systems.numpy(), scene.mechanism, linkage.output.scale)
     q = q / scale  # rad, of an angle
     jumps = np.abs(np.diff(q)) > JUMP
@@ -657,8 +661,10 @@ def _check_extreme(scene: Scene, turns: Sequence[Turn], place: EventRule) -> Non
         swing = max(turn.q for turn in turns) - min(turn.q for turn in turns)
         alike = [turn for turn in candidates if abs(turn.q - choice.q) <= LEVEL * swing]
         if len(alike) > 1:
-            problem = f"the output is {word}, within {LEVEL:.1%} of its swing, at {at(alike)}: {place.name} may be any"
-            raise refusal(problem, scene.origin, key, remedy='Say which: near = "60 deg"')
+            problem = (
+                f"the output is {word}, within {LEVEL:.1%} of its swing, at {at(alike)}: {place.name} is ambiguous"
+            )
+            raise refusal(problem, scene.origin, key, remedy='Add near = "60 deg"')
         return
     distances = [turn.away(place.near) for turn in turns if turn.extreme != place.extreme]
     if min(distances) < min(turn.away(place.near) for turn in candidates):

@@ -325,7 +325,7 @@ class LinkageViews(JobViews):
             for place in linkage.places
         )
         often = f"the output turns {turns} times in a turn of the crank, today's {before} times"
-        return f"{often}; its events stand at {where}"
+        return f"{often}; its events lie at {where}"
 
 
 def _without_place(scene: Scene) -> Iterator[str]:
@@ -338,7 +338,7 @@ def _without_place(scene: Scene) -> Iterator[str]:
         if out.carrier:
             if name == "inertia" and getattr(effects[name], "m", 0.0) is None:
                 key = "effects.inertia.m and centre"
-                yield f"left out of {tellers}: the mass of the output. effects.inertia tells J alone. Give {key}"
+                yield f"left out of {tellers}: the mass of the output. effects.inertia gives J alone. Give {key}"
         else:
             yield (
                 f"left out of {tellers}: the mass of effects.{name}, but for what it does to the output itself. The "

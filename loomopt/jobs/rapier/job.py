@@ -55,7 +55,9 @@ class Rapier(Job):
                 raise refusal("a dwell needs s_dwell", scene.origin, "operation.s_dwell", remedy="Give it")
             if not 0.0 < least < math.pi:
                 key, allowed = f"limits.{name}.min", "more than 0 deg and less than 180 deg"
-                raise refusal("it is no dwell", scene.origin, key, scene.given(key), allowed, "Correct the value")
+                raise refusal(
+                    "the dwell is out of range", scene.origin, key, scene.given(key), allowed, "Correct the value"
+                )
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Drive with the effects the scene calls for."""

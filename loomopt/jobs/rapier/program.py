@@ -107,7 +107,10 @@ class RapierTask(Task):
         least = {name: limit.min for name, limit in limits.items() if name in (DWELL, *SIDES) and limit.min}
         if DWELL in self.goal_names:
             for name in (name for name in least if name in SIDES):
-                problem, remedy = "the lesser of both dwells is sought, on one angle for both sides", f"Limit {DWELL}."
+                problem, remedy = (
+                    "the lesser of both dwells is maximised, so one dwell alone cannot be limited",
+                    f"Limit {DWELL}.",
+                )
                 raise refusal(problem, self.scene.origin, f"limits.{name}", remedy=remedy)
             return {DWELL: [(DWELL, least[DWELL])]} if least else {}
         names = [name for name in self.required_names if name not in self.free]

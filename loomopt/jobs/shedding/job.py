@@ -132,7 +132,7 @@ class Shedding(Job):
         table = scene.table(LawTarget)
         fewest, most = cam_spline.FEWEST, cam_spline.MOST
         if target == "law" and (not fewest <= table.intervals <= most or (table.symmetric and table.intervals % 2)):
-            problem, key = "a law cannot have so many intervals", "targets.law.intervals"
+            problem, key = "the number of intervals is invalid", "targets.law.intervals"
             allowed = f"{fewest} to {most}, an even number for a symmetric law"
             raise refusal(problem, scene.origin, key, table.intervals, allowed, "Write intervals = 16.")
         self.parted(scene, self.sampler(scene, self.today(scene)))

@@ -224,7 +224,7 @@ def _inverse_shares(machines: "Machines", runs: "Sequence[Machines]", least: Flo
 def demand_moving(scene: Scene, instead: str) -> None:
     """Raise BadInput where contact holds, or is lost, whatever the speed; instead: what else could be done."""
     if contact_speed(scene, sampled(model(scene), scene_numbers(scene))) is None:
-        problem = "nothing limits the speed: as the scene stands, the roller stays on the cam at any"
+        problem = "nothing limits the speed: the roller stays on the cam at any speed"
         keys = "effects.inertia.M, mechanism.travel, effects.warp_tension.shape"
         allowed = "a moving mass, a travel, and a warp tension that is known in the moves (linear, step)"
         raise refusal(problem, scene.origin, keys, allowed=allowed, remedy=f"Correct them, or {instead}.")

@@ -202,14 +202,14 @@ def check_motion(scene: Scene) -> None:
     ]
     for name in loads:
         if not _opens_once(scene):
-            problem = f"{name} is told for one move from the lowest X to the highest and one back, of symmetric laws"
+            problem = f"{name} needs one move from the lowest X to the highest and one back, of symmetric laws"
             remedy = f"Give effects.{name}.table, a curve over the cam angle"
             raise refusal(problem, scene.origin, "mechanism.segments", remedy=remedy)
         shape = getattr(scene.effects[name], "shape", "linear")
         if shape != "linear":
             remedy = 'Write shape = "linear", or give a table'
             raise refusal(
-                "of segments the shape is linear", scene.origin, f"effects.{name}.shape", shape, remedy=remedy
+                "with segments the shape must be linear", scene.origin, f"effects.{name}.shape", shape, remedy=remedy
             )
 
 
@@ -367,7 +367,7 @@ def refuse_unclear(scene: Scene, reads_accelerations: bool) -> None:
     reading = read_law(scene)
     if reading.law.fit.uncertainty > UNCLEAR:
         share = 100 * reading.law.fit.uncertainty
-        problem = f"the table cannot tell accelerations: s'' is uncertain by {share:.2g} % of its peak"
+        problem = f"the table is too coarse for accelerations: s'' is uncertain by {share:.2g} % of its peak"
         remedy = f"Give {reading.needed()}; or digits, where zeros were cut off"
         raise refusal(problem, reading.read.file, LAW_TABLE, allowed=f"up to {100 * UNCLEAR:g} %", remedy=remedy)
 
@@ -430,7 +430,7 @@ def fault(numbers: Mapping[str, Any], shown: ShowValue = usual) -> str:
     coefficients = tuple(map(float, knots(numbers)))
     reason = cam_spline.fault(coefficients) if coefficients else ""
     if reason:
-        return f"its law is none: {reason}"
+        return f"its law is invalid: {reason}"
     if "rise" not in numbers:
         return follower_fault(numbers, shown)
     dwell = 2 * math.pi - sum(numbers[name] for name in ("rise", "far_dwell", "return"))

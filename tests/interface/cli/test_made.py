@@ -88,5 +88,5 @@ def test_the_design_of_a_family_is_no_machine(capsys, tmp_path):
     path.write_text(json.dumps({"l1": 0.03, "m4e[1]": 0.0}))
     status, out, err = called(capsys, "evaluate", "beatup", "--design", str(path))
     assert (status, out) == (2, "")
-    assert "m4e is of one member of a family" in err
+    assert "m4e belongs to one member of a family" in err
     assert "members[0].design" in err

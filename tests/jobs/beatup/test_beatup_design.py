@@ -84,7 +84,7 @@ def test_a_freed_number_of_an_effect_is_in_the_design():
     ("target", "front", "words"),
     [
         ("balance", 0.0, "Balanced: the reed torque at front dead centre is zero"),
-        ("balance", 20.0, "Balance is out of reach: the reed torque nearest to zero found at front dead centre is 20 "),
+        ("balance", 20.0, "Balance is out of reach: the reed torque nearest to zero at front dead centre is 20 "),
         ("torque", 7.45, "With the reed torque at 7.45 N*m at front dead centre, the least peak crank torque"),
         ("pulse", 5.0, "The least reed torque over the pulse is 300 N*m rms (5 N*m at front dead centre)."),
         ("retrofit", 0.0, "Balanced with the least change from today's machine; the peak crank torque"),

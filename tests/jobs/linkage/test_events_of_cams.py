@@ -114,7 +114,7 @@ def test_equal_extremes_are_told_by_those_of_the_kind_asked_for():
     twice = {"crank": {"kind": "crank", "at": "D", "ratio": 2, "pin": "P", "length": "arm"}, "sley": None}
     changes = {"parts": twice, "output": {"y": "P", "angle": None}, "bounds": None, "effects": None}
     scene = changed({**SLEY, "mechanism": {"arm": "700 mm"}}, changes)
-    with pytest.raises(BadInput, match=r"highest, within 0.1% of its swing, at 45 deg, 225 deg: front may be any"):
+    with pytest.raises(BadInput, match=r"highest, within 0.1% of its swing, at 45 deg, 225 deg: front is ambiguous"):
         registry.scene(scene)
 
 

@@ -118,7 +118,7 @@ def cli(capsys):
 def answered(cli, *arguments):
     status, out, err = cli(*arguments, "--json")
     assert status == 0
-    assert err == "" or "brings what its call changed: targets.law.intervals = 8." in err
+    assert err == "" or "adds the changes of its call: targets.law.intervals = 8." in err
     return json.loads(out, parse_constant=pytest.fail)
 
 

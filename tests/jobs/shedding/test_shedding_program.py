@@ -145,8 +145,12 @@ def test_what_coils_demand_is_in_the_program_and_their_mass_comes_after_the_spri
         (SCENE.without_effect("inertia"), "law", "needs the effect inertia"),
         (SCENE.set("mechanism.travel", "0 mm"), "speed", "nothing limits the speed"),
         (SCENE.set("effects.warp_tension.shape", "levels"), "speed", "nothing limits the speed"),
-        (SCENE.set("targets.law.intervals", 3), "law", "cannot have so many intervals"),
-        (SCENE.update({"targets.law.intervals": 9, "targets.law.symmetric": True}), "law", "cannot have so many"),
+        (SCENE.set("targets.law.intervals", 3), "law", "number of intervals is invalid"),
+        (
+            SCENE.update({"targets.law.intervals": 9, "targets.law.symmetric": True}),
+            "law",
+            "number of intervals is invalid",
+        ),
     ],
 )
 def test_what_a_target_lacks_is_named(scene, target, problem):

@@ -103,7 +103,7 @@ def test_segments_that_are_no_motion_are_refused(segments, told):
 
 
 def test_segments_and_a_rise_are_refused_and_a_motion_without_either_asks_for_the_rise():
-    with pytest.raises(BadInput, match="say the same twice"):
+    with pytest.raises(BadInput, match="define the same quantity twice"):
         several(SEGMENTS, rise="60 deg")
     document = {name: dict(own) for name, own in PACKAGED.document.items()}
     del document["mechanism"]["rise"]

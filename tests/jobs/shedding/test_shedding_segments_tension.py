@@ -46,7 +46,7 @@ def test_levels_follow_from_where_the_frame_is(order):
 @pytest.mark.parametrize(
     ("segments", "tension", "told"),
     [
-        ([DOWN, DWELL, UP, DWELL], {**TENSION, "shape": "step"}, "shape is linear"),
+        ([DOWN, DWELL, UP, DWELL], {**TENSION, "shape": "step"}, "shape must be linear"),
         (
             [
                 {"angle": "90 deg", "to": "70 mm"},

@@ -78,7 +78,7 @@ def test_it_is_a_figure_only():
     )
     assert plain_answer.figures["peak_torque"] == told.figures["peak_torque"]
     assert told.figures["friction_loss"] > 0.0
-    with pytest.raises(BadInput, match="told of a design, and no limit holds it"):
+    with pytest.raises(BadInput, match="this figure cannot be limited"):
         scene_of().set("limits.friction_loss.max", "800 W")
     texts = [each.text for each in scene_of().equations() if "friction_loss" in each.text]
     assert len(texts) == 1

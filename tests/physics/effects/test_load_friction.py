@@ -83,11 +83,11 @@ def test_its_numbers_are_asked_for_by_name():
     plain = lo.load("beatup")
     with pytest.raises(BadInput, match=r"effects.bearing_friction.radius"):
         plain.set("effects.bearing_friction", {"model": "load", "mu": "0.1"})
-    with pytest.raises(BadInput, match=r"coulomb is of model constant"):
+    with pytest.raises(BadInput, match=r"coulomb belongs to model constant"):
         plain.set("effects.bearing_friction", OWN | {"coulomb": "2 N*m"})
     with pytest.raises(BadInput, match=r"effects.bearing_friction.viscous"):
         plain.set("effects.bearing_friction", {"coulomb": "2 N*m"})
-    with pytest.raises(BadInput, match=r"mu is of model load"):
+    with pytest.raises(BadInput, match=r"mu belongs to model load"):
         plain.set("effects.bearing_friction", {"coulomb": "2 N*m", "viscous": "0 N*m*s/rad", "mu": "0.1"})
     equations = {each.name: each.text for each in scene_of().equations()}
     assert "force_D*mu*radius" in equations["bearing_friction"]

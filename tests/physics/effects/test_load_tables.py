@@ -109,7 +109,7 @@ def test_a_table_that_is_no_curve_is_refused_when_the_scene_is_read(tmp_path, ro
 
 def test_both_a_table_and_a_pulse_are_refused(tmp_path):
     both = {"effects.resistance.table": pulse(tmp_path / "p.csv"), "effects.resistance.pulse": "20 deg"}
-    with pytest.raises(BadInput, match="say the same twice"):
+    with pytest.raises(BadInput, match="define the same quantity twice"):
         lo.load("beatup").update(both)
 
 

@@ -77,7 +77,7 @@ def test_curves_of_a_frame_that_stays_on_are_those_without_the_effect():
         ({"mechanism.K1": "1000 N/m"}, "begins in contact at cam angle 0, where the force of contact would be -414"),
         ({"effects.separation.restitution": 1}, "out of range"),
         ({"effects.separation.turns": 0}, "Allowed: a whole number, at least 1, at most 10000"),
-        ({"limits.gap_max.max": "1 mm"}, "told of a design, and no limit holds it"),
+        ({"limits.gap_max.max": "1 mm"}, "this figure cannot be limited"),
     ],
 )
 def test_what_cannot_be_followed_is_refused(changes, said):

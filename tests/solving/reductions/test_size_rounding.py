@@ -73,7 +73,7 @@ def test_from_python_and_the_scene():
 @pytest.mark.parametrize(
     ("steps", "said"),
     [
-        ({"q": "1 mm"}, "q is no number that is free"),
+        ({"q": "1 mm"}, "q is not a free number"),
         ({"l1": "20 mm"}, "no size of l1 lies within its bounds"),
         ({"l1": "1 kg"}, "l1"),
         ({"l1": "-1 mm"}, "out of range"),
