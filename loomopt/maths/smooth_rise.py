@@ -177,7 +177,7 @@ def _dwells(values: "Floats", unit: float) -> tuple[tuple[int, int], ...]:
 
 
 class _Part(NamedTuple):
-    """One rise between dwells; uncertain, noise: of s'' at its points; left_out: by what the misfit is told."""
+    """One rise between dwells; uncertain, noise: of s'' at its points; left_out: distances for the misfit."""
 
     columns: _Columns
     uncertain: "Floats"
@@ -219,7 +219,7 @@ def _spline(u: "Floats") -> _Spline:
 
 
 class _Fit(NamedTuple):
-    """What is found of a part with given jumps. values: at its points; ahead: s'' there; size: of the jumps."""
+    """Fit of a part with given jumps. values: at its points; ahead: s'' there; size: of the jumps."""
 
     values: "Floats"
     ahead: "Floats"

@@ -1,7 +1,7 @@
 """The number systems formulas run in: float, NumPy arrays, jets, CasADi, mpmath, SymPy, balls, boxes, recordings.
 
 A formula takes a `Maths` as its first argument and uses nothing but its `sin cos exp sqrt atan2 pi choose floor`,
-operators and integers, so it is written once. Each system is imported only when it is asked for.
+operators and integers, so it is written once. Each system is imported when it is first used.
 """
 
 import functools
@@ -162,7 +162,7 @@ def numpy() -> Maths:
 
 @functools.cache
 def jets() -> Maths:
-    """Forward derivatives over floats or arrays of them: values that know their slopes, and curvatures if asked."""
+    """Forward derivatives over floats or arrays of them: values with their slopes, and with curvatures on request."""
     from loomopt.maths import jets
 
     functions = jets.sin, jets.cos, jets.sqrt, jets.atan2

@@ -83,7 +83,7 @@ def with_axes(
 ) -> tuple[Program, tuple[Traded, ...]]:
     """Program whose last levels are the axes in the requested order, and these axes.
 
-    program: its objectives are what is held before them; full: name among the model's values; size: natural one of a
+    program: its objectives come first and are limits then; full: name among the model's values; size: scale of a
     value, SI. Raises BadInput for an axis that nothing in the scene gives.
     """
     traded_axes = []

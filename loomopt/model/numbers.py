@@ -90,7 +90,7 @@ def _curve(scene: Scene, load: Load[Any], parameters: Table) -> tuple[Curve, csv
 def bounds(scene: Scene, known: Mapping[str, float]) -> dict[str, tuple[float, float]]:
     """Lower and upper bound of the design variables and of every bounded number, by full name, SI.
 
-    What is held stands at today's value.
+    A constant number has today's value at both ends.
     """
     pairs = {name: (known[name], known[name]) for name in scene.schema.variables}
     for name, bound in scene.bounds.items():

@@ -211,7 +211,7 @@ class Rows(abc.ABC):
 
 
 class Reading(Rows):
-    """Rows and whole-cycle quantities of one design in one number system; cycle: its pieces, found in floats."""
+    """Rows and whole-cycle quantities of one design in one number system; cycle: its pieces, computed in floats."""
 
     def __init__(self, model: JobModel, maths: Maths, given: Given, cycle: Cycle, stills: Stills) -> None:
         super().__init__(model, maths, given, stills)

@@ -64,7 +64,7 @@ Forms = dict[str, tuple[Linear, ...]]
 
 
 class ProbeSizes(NamedTuple):
-    """Of the output held on its mechanism: stroke, m, largest speed, m/s, and acceleration, m/s²."""
+    """Sizes of the output in contact with its mechanism: stroke, m, largest speed, m/s, and acceleration, m/s²."""
 
     stroke: float
     speed: float

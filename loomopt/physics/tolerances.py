@@ -124,4 +124,4 @@ ROUNDED = 1e-15
 # How closely a curve is drawn, and what is shown of a number.
 
 SHOWN_AS_ZERO = 1e-8
-"""Share of the largest number of its kind below which one is shown as 0: the accuracy asked by default."""
+"""Share of the largest number of its kind below which one is shown as 0: the default accuracy."""

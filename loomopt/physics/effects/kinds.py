@@ -362,10 +362,10 @@ class Check(Effect, Generic[Pose]):
     sold(own): numbers of its table that come in sizes → those sold, SI, ascending.
     joints(at, loading): an object whose attributes are read by their names: `vectors`, whose size
     is the quantity and whose components stand beside it, and `scalars`; wanted: which of them, or of the quantities,
-    needs scene keys, and has no value without; between: what acts on links by their mass, told apart in equations;
+    needs scene keys, and has no value without; between: inertia loads on links, with terms of their own in equations;
     sides: force → the parts that it is between, of the first on the second one, "frame" for what does not move; their
     unit directions are what `heading(part)` of the object returns.
-    directed: scalars that are sizes of a vector, each with the attribute that is it: its components are told too.
+    directed: scalars that are sizes of a vector, each with the attribute that is it: its components are quantities too.
     signed: scalars of which the largest value counts; pushes: those that are 0 where Q is negative: contact is lost
     there. worked: figure, a mean power over a turn → what of them tells by each vector's name the work of
     its size, per rad of the crank.

@@ -150,7 +150,7 @@ class Spline:
 
 
 class LawColumn(Sequence[Number]):
-    """Values by names in order, each read when it is asked for: a choice among them reads one."""
+    """Values by names in order, read one by one: a choice among them reads one."""
 
     def __init__(self, values: Values, names: tuple[str, ...]) -> None:
         self.values, self.names = values, names

@@ -139,7 +139,7 @@ class Coil:
         return self._initial_stress_usual(maths) + self._initial_stress_spread()
 
     def _initial_stress_usual(self, maths: Maths) -> Number:
-        """231 exp(−0.105 C) MPa in Pa, a power, since no number system here is asked for exp [eq 10-41]."""
+        """231 exp(−0.105 C) MPa in Pa, a power, since not every number system here has exp [eq 10-41]."""
         return 231_000_000 * maths.number(DECAY) ** self.index
 
     def _initial_stress_spread(self) -> Number:
