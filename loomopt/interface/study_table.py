@@ -170,7 +170,7 @@ def _kind(study: SceneStudy, name: str) -> str:
 
 
 def _place_example(study: SceneStudy, rows: Sequence[Row]) -> str:
-    """How a row's place is written, by its first number."""
+    """Example of a row's place, by its first number."""
     column = next(iter(columns(study, rows)["place"]), None)
     value = next((number for number in column.shown if number is not None), None) if column else None
     if column is None or value is None:
@@ -237,11 +237,11 @@ SAME = 1e-9
 """Relative spread of a column below which its number is the same in all rows."""
 
 KINDS = {"jump": "jump", "kink": "kink", "active set": "what binds changes"}
-"""Kind of a change, as it is told."""
+"""Name of a kind of change."""
 NARROWS = "*"
-"""What marks a point that was not asked for, but narrows a change down."""
+"""Mark of an added point that locates a change."""
 MOST_REASONS = 5
-"""Reasons that are told below a table."""
+"""Largest number of reasons below a table."""
 
 
 def shown_columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[NumberColumn]:
@@ -317,7 +317,7 @@ LINES = 7
 
 
 def charts(study: SceneStudy, findings: Findings) -> Charts:
-    """What a study is about over the first number that varies, a line for each combination of the others."""
+    """Charts of a study over the first number that varies, a line for each combination of the others."""
     rows = findings.rows
     made = columns(study, rows)
     places = made["place"]

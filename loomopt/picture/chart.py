@@ -32,7 +32,7 @@ class Axis:
     linear: float = math.inf
 
     def share(self, values: Floats | float) -> Floats:
-        """Where values lie between the ends, from 0 to 1."""
+        """Positions of values between the ends, from 0 to 1."""
         low, high, at = (
             self._scaled(np.asarray(values_in, dtype=float)) for values_in in (self.low, self.high, values)
         )
@@ -102,7 +102,7 @@ class Chart:
 
     @property
     def caption(self) -> str:
-        """What is drawn, and over what."""
+        """Quantity and abscissa."""
         return f"{self.title} over {self.x.name}" if self.x.name else self.title
 
 

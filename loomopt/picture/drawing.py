@@ -1,4 +1,4 @@
-"""What drawings of mechanisms share: joints and links, signs, labels that keep clear of strokes, title and legend."""
+"""Drawings of mechanisms: joints and links, signs, labels clear of strokes, title and legend."""
 
 import math
 import textwrap
@@ -92,7 +92,7 @@ def sheet(body: Drawing) -> Drawing:
 
 
 POINTER = 6.0
-"""How far a pointer reaches, in text heights."""
+"""Length of a pointer, in text heights."""
 MASS = 0.7
 """Radius of the sign of a centre of mass, in text heights."""
 HEAD = 0.8

@@ -203,7 +203,7 @@ def check_equations(check: Check[Any], pose: Motion, inputs: Given) -> list[Equa
 
 
 class WrittenLoading(NamedTuple):
-    """What acts on a mechanism, in symbols."""
+    """Inputs of a mechanism, in symbols."""
 
     force: Expression
     carried: Number

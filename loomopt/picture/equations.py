@@ -252,5 +252,5 @@ def symbol(name: str) -> Expression:
 
 
 def sympy() -> Any:
-    """SymPy, imported when it is first asked for."""
+    """SymPy, imported on first use."""
     return importlib.import_module("sympy")

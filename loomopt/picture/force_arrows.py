@@ -52,7 +52,7 @@ class ForceArrow(NamedTuple):
 
 
 def joint_forces(sampler: Sampler, events: Sequence[str], places: Mapping[str, str] = NOWHERE) -> list[ForceArrow]:
-    """Forces in all joints that a design tells by components: just before each event, and at their peaks.
+    """Forces in all joints that have components: just before each event, and at their peaks.
 
     places: the joints of forces that are not called after them.
     """

@@ -1,4 +1,4 @@
-"""How a job shows itself: what its own views return, and views/ renders."""
+"""Views of a job: drawings, equations, panels and remarks."""
 
 import abc
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What stands in the panels of a figure of curves: which columns together, in which words, what is marked, limits."""
+"""Panels of a figure of curves: groups of columns, names, marks and limits."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import LimitRange
 
 EXTREMES = ("peak", "most", "least")
-"""What of a curve may be marked: its largest magnitude, its largest and its least value."""
+"""Marks of a curve: its largest magnitude, its largest and its least value."""
 BY_EFFECT, DRIVE = "by effect", "on the crank, by effect"
 """Panels that the loads' terms share."""
 ORDERS = 3
@@ -28,7 +28,7 @@ _KIND = {unit: kind for kind, unit in SI_UNIT.items() if kind != "angular speed"
 
 
 class Curve(NamedTuple):
-    """What a person calls a column, and what of it is a figure.
+    """Name of a column, and the figures among its extremes.
 
     panel: what comes behind "torques" or "angles" where several share a panel, one of its own without it. peak, most,
     least: figures that are its largest magnitude, its largest and its least value. at: mark → the figure that is its
@@ -67,7 +67,7 @@ class Panel(NamedTuple):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What each column is called."""
+        """Names of the columns."""
         return self.names or tuple(_column_title(column, Curve()) for column in self.columns)
 
     @property

@@ -1,4 +1,4 @@
-"""What is shown of a design whose output may part from its mechanism: remarks, marks over the period, a panel."""
+"""Views of an output that may lose contact: remarks, marks over the period, a panel."""
 
 from collections.abc import Iterator, Sequence
 

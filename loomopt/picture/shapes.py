@@ -27,7 +27,7 @@ OUTSIDE = 100.0
 TURNS = (0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8)
 """Eighths of a half turn from the side that is wished for, in the order they are tried in."""
 BEHIND = 3.0
-"""What it costs a label, in text heights, that a stroke lies between it and its point."""
+"""Cost of a label, in text heights, for a stroke between it and its point."""
 
 
 class Box(NamedTuple):
@@ -121,7 +121,7 @@ def _within(points: Floats, left: float, bottom: float, right: float, top: float
 
 
 def _gap(spot: LabelSpot) -> float:
-    """How far a spot's box is from its point."""
+    """Distance of a spot's box from its point."""
     return math.dist(spot.box.nearest(spot.x, spot.y), (spot.x, spot.y))
 
 
@@ -153,7 +153,7 @@ if TYPE_CHECKING:
     from loomopt.scenes.scene import Scene
 
 Unit = Literal["mm", "in"]
-"""What a workshop measures in."""
+"""Length units of a workshop."""
 
 
 class Units(NamedTuple):
@@ -166,7 +166,7 @@ class Units(NamedTuple):
 
     @property
     def said(self) -> str:
-        """What a legend says of lengths."""
+        """Text of a legend on lengths."""
         return "lengths in inches" if self.length == "in" else "lengths in mm"
 
     def size(self, metres: float, digits: int = 6) -> str:
@@ -210,7 +210,7 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True)
 class Layer:
-    """How a layer looks: colour on white; aci: AutoCAD colour; width: of lines, mm where text is 3.5 mm high."""
+    """Style of a layer: colour on white; aci: AutoCAD colour; width: of lines, mm where text is 3.5 mm high."""
 
     colour: str
     aci: int

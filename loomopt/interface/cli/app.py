@@ -72,9 +72,9 @@ CommandLineError: type[Any] = typer.BadParameter.__mro__[2]
 
 def start(
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Show the versions: its own, CasADi's, IPOPT's.")] = False,
+    version: Annotated[bool, typer.Option("--version", help="Show the versions of loomopt, CasADi and IPOPT.")] = False,
 ) -> None:
-    """Show the version, or what there is to do."""
+    """Show the version or the help."""
     if version:
         print(line())
         raise typer.Exit
@@ -87,19 +87,19 @@ def solve(
     target: Target = None,
     changes: SceneOptions = NO_CHANGES,
     accuracy: Annotated[str, typer.Option(metavar="R", help="Relative accuracy, 1e-11 to 0.1.")] = "1e-8",
-    starts: Annotated[str | None, typer.Option(metavar="N", help="So many starts; a wide search without it.")] = None,
-    proven: Annotated[bool, typer.Option("--prove", help="Prove every limit at every crank angle too.")] = False,
+    starts: Annotated[str | None, typer.Option(metavar="N", help="Number of starts; a wide search without it.")] = None,
+    proven: Annotated[bool, typer.Option("--prove", help="Also prove every limit at every crank angle.")] = False,
     everywhere: Annotated[bool, typer.Option("--global", help="Prove that no admissible design is better.")] = False,
-    gap: Annotated[str, typer.Option(metavar="R", help="What --global leaves open, relative.")] = "1e-3",
-    seconds: Annotated[str, typer.Option("--time", metavar="S", help="How long --global may take, s.")] = "60",
+    gap: Annotated[str, typer.Option(metavar="R", help="Relative gap of --global.")] = "1e-3",
+    seconds: Annotated[str, typer.Option("--time", metavar="S", help="Time limit of --global, s.")] = "60",
     robust: Annotated[
-        str | None, typer.Option(metavar="SIGMAS", help="Back every limit off by so many sigma of its figure.")
+        str | None, typer.Option(metavar="SIGMAS", help="Margin of every limit in sigma of its figure.")
     ] = None,
     least: Annotated[
-        str | None, typer.Option("--yield", metavar="Y", help="So far that this share of machines holds all limits.")
+        str | None, typer.Option("--yield", metavar="Y", help="Margins for this share of admissible machines.")
     ] = None,
     steps: Annotated[
-        str | None, typer.Option("--round", metavar="NAME=STEP,…", help="Put numbers to sizes; `scene`: to its own.")
+        str | None, typer.Option("--round", metavar="NAME=STEP,…", help="Round numbers to steps; `scene`: its [steps].")
     ] = None,
     as_json: Json = False,
     outs: Annotated[
@@ -148,7 +148,7 @@ def solve(
 def accuracy(
     problem: Problem,
     changes: SceneOptions = NO_CHANGES,
-    full: Annotated[bool, typer.Option("--full", help="More settings, more repeats: minutes.")] = False,
+    full: Annotated[bool, typer.Option("--full", help="More settings and repeats; takes minutes.")] = False,
     as_json: Json = False,
     out: Annotated[
         list[Path] | None,
@@ -156,7 +156,7 @@ def accuracy(
     ] = None,
     decimal: Decimal = "point",
 ) -> None:
-    """Show what accuracy costs in time, method by method."""
+    """Show error and time of each numerical method."""
     from loomopt.base import files
     from loomopt.interface.files import outputs, sheets
     from loomopt.interface.study.accuracy import AccuracyStudy

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 def tell(
     as_json: bool, document: Callable[[], Mapping[str, object]], parts: "Callable[[], Sequence[str | TextTable]]"
 ) -> None:
-    """Print what was found as one JSON object, or its parts."""
+    """Print a result as one JSON object, or its parts as text."""
     if as_json:
         from loomopt.interface.files import outputs
 
@@ -40,7 +40,7 @@ def tell(
 
 
 def write(paths: Sequence[Path] | None, one: Callable[[Path], object]) -> None:
-    """Write every file that is asked for, and say so."""
+    """Write the requested files, with a remark for each."""
     for path in paths or ():
         one(path)
         remark(f"Wrote {path}")
@@ -122,11 +122,13 @@ def schema(job: Annotated[str, typer.Argument(help="A loom job; a wrong name lis
 
 def show(
     problem: Problem,
-    equations: Annotated[bool, typer.Option("--equations", help="Print the equations the scene really uses.")] = False,
-    symbols: Annotated[bool, typer.Option("--symbols", help="Print what every symbol of its tables means.")] = False,
-    sources: Annotated[bool, typer.Option("--sources", help="Print its source's figures, and as computed.")] = False,
+    equations: Annotated[bool, typer.Option("--equations", help="Print the equations of the active effects.")] = False,
+    symbols: Annotated[bool, typer.Option("--symbols", help="Explain every symbol of its tables.")] = False,
+    sources: Annotated[
+        bool, typer.Option("--sources", help="Print the figures of its source, and as computed.")
+    ] = False,
     figure: Figure = None,
-    animate: Annotated[list[Path] | None, typer.Option(metavar="F", help="Have it move: .html, .gif or .mp4.")] = None,
+    animate: Annotated[list[Path] | None, typer.Option(metavar="F", help="Animate it: .html, .gif or .mp4.")] = None,
     design: Design = None,
     changes: SceneOptions = NO_CHANGES,
 ) -> None:
@@ -181,7 +183,7 @@ def prove(
     problem: Problem,
     design: Design = None,
     target: Limits = None,
-    slack: Annotated[str, typer.Option(metavar="R", help="What binding limits leave open, relative.")] = "1e-8",
+    slack: Annotated[str, typer.Option(metavar="R", help="Permitted violation, relative.")] = "1e-8",
     changes: SceneOptions = NO_CHANGES,
     as_json: Json = False,
 ) -> None:
@@ -206,12 +208,12 @@ def simulate(
         typer.Option(metavar="F", help="Write curves (.csv, .xlsx, .parquet) or a figure (.png, .svg, .pdf)."),
     ] = None,
     accuracy: Annotated[
-        str | None, typer.Option(metavar="R", help="As few rows as show each peak to R; with --out.")
+        str | None, typer.Option(metavar="R", help="Fewest rows that show each peak to R; with --out.")
     ] = None,
     beside: Annotated[
-        Path | None, typer.Option(metavar="F.csv", help="What was measured: phi [deg] and columns of the curves.")
+        Path | None, typer.Option(metavar="F.csv", help="Measured curves: phi [deg] and columns of the curves.")
     ] = None,
-    forces: Annotated[bool, typer.Option("--forces", help="Forces in joints; pictures are their diagrams.")] = False,
+    forces: Annotated[bool, typer.Option("--forces", help="Forces in joints; figures are polar diagrams.")] = False,
     decimal: Decimal = "point",
     changes: SceneOptions = NO_CHANGES,
 ) -> None:
@@ -248,7 +250,7 @@ def budget(
     problem: Problem,
     design: Design = None,
     fluctuation: Annotated[
-        str | None, typer.Option(metavar="R", help="Size the flywheel for this change of speed, such as 0.02.")
+        str | None, typer.Option(metavar="R", help="Size the flywheel for this speed fluctuation, such as 0.02.")
     ] = None,
     figures: Annotated[
         list[Path] | None, typer.Option("--figure", metavar="F", help="Draw the shares: .png, .svg or .pdf.")

@@ -23,9 +23,9 @@ Problem = Annotated[
 Set = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set a scene key by its dotted path.")
 ]
-With = Annotated[list[str] | None, typer.Option("--with", metavar="EFFECT", help="Put on an effect from [available].")]
-Without = Annotated[list[str] | None, typer.Option("--without", metavar="EFFECT", help="Take an effect off.")]
-Free = Annotated[list[str] | None, typer.Option("--free", metavar="NAMES", help="Free bounds that are held.")]
+With = Annotated[list[str] | None, typer.Option("--with", metavar="EFFECT", help="Switch on an effect of [available].")]
+Without = Annotated[list[str] | None, typer.Option("--without", metavar="EFFECT", help="Switch off an effect.")]
+Free = Annotated[list[str] | None, typer.Option("--free", metavar="NAMES", help="Free variables with free = false.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Design = Annotated[
     Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON; - for a pipe.")
@@ -33,9 +33,11 @@ Design = Annotated[
 Decimal = Annotated[str, typer.Option(metavar="point|comma", help="The decimal sign of CSV files.")]
 Limits = Annotated[
     str | None,
-    typer.Option("--target", help="Whose limits count; the answer's own, or the job's default, without it."),
+    typer.Option(
+        "--target", help="Target whose limits count; that of the answer or the default of the job without it."
+    ),
 ]
-Target = Annotated[str | None, typer.Option(help="What to optimise; the job's default without it.")]
+Target = Annotated[str | None, typer.Option(help="Target; the job's default without it.")]
 Out = Annotated[list[Path] | None, typer.Option(metavar="F", help="Write the table: .csv, .xlsx or .parquet.")]
 Figure = Annotated[list[Path] | None, typer.Option("--figure", metavar="F", help="Draw it: .png, .svg or .pdf.")]
 
@@ -47,7 +49,7 @@ class Options:
 
 @dataclass(frozen=True)
 class SceneOptions(Options):
-    """What a call changes in a scene."""
+    """Changes of a scene by a call."""
 
     sets: Set = None
     free: Free = None
@@ -84,10 +86,10 @@ class SceneOptions(Options):
 
 @dataclass(frozen=True)
 class ComputerOptions(Options):
-    """Who computes a study."""
+    """Workers of a study."""
 
-    workers: Annotated[str | None, typer.Option(metavar="N", help="So many processes on this machine.")] = None
-    dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="The scheduler of a Dask cluster instead.")] = None
+    workers: Annotated[str | None, typer.Option(metavar="N", help="Number of processes on this machine.")] = None
+    dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster.")] = None
 
     @property
     def count(self) -> int | None:
@@ -113,12 +115,12 @@ class ComputerOptions(Options):
 
 @dataclass(frozen=True)
 class StoreOptions(Options):
-    """Where finished rows stay."""
+    """Store of finished rows."""
 
-    store: Annotated[Path | None, typer.Option("--store", metavar="FILE", help="Keep each row there as it comes.")] = (
-        None
-    )
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with what the store holds.")] = False
+    store: Annotated[
+        Path | None, typer.Option("--store", metavar="FILE", help="Write each finished row there at once.")
+    ] = None
+    resume: Annotated[bool, typer.Option("--resume", help="Use the finished rows of the store.")] = False
 
 
 @dataclass(frozen=True)

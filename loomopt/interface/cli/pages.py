@@ -23,20 +23,20 @@ Problems = Annotated[
 Page = Annotated[list[Path], typer.Option("--out", metavar="F.html", help="The page to write.")]
 Beside = Annotated[
     list[str] | None,
-    typer.Option("--study", metavar="S", help="Beside each: budget, tolerance, sensitivity, effects, accuracy, proof."),
+    typer.Option("--study", metavar="S", help="Add a study: budget, tolerance, sensitivity, effects, accuracy, proof."),
 ]
 Answers = Annotated[
-    list[str], typer.Argument(metavar="A.json B.json ... [today]", help="Answers; today for the machine as it is.")
+    list[str], typer.Argument(metavar="A.json B.json ... [today]", help="Answers; today for today's machine.")
 ]
 
 
 def report(
     things: Problems,
     out: Page,
-    target: Annotated[str | None, typer.Option(help="What scenes are solved for; their job's default without.")] = None,
+    target: Annotated[str | None, typer.Option(help="Target of the scenes; their job's default without it.")] = None,
     changes: SceneOptions = NO_CHANGES,
     proven: Annotated[
-        bool, typer.Option("--prove", help="Prove every limit of scenes at every crank angle too.")
+        bool, typer.Option("--prove", help="Also prove every limit of scenes at every crank angle.")
     ] = False,
     studies: Beside = None,
 ) -> None:
@@ -52,7 +52,7 @@ def report(
     wanted = tuple(dict.fromkeys(studies or ()))
     for name in wanted:
         if name not in STUDIES:
-            raise refusal("there is no such study", "", "--study", name, ", ".join(STUDIES), "Choose one of them")
+            raise refusal("unknown study", "", "--study", name, ", ".join(STUDIES), "Choose one of them")
     inputs = [_checked_input(thing, target, changes, wanted, proven) for thing in things]
     if wanted and not any(source.scene for source in inputs):
         remedy = "Leave out --study, or name an answer or a scene too"
@@ -76,7 +76,7 @@ Say = Callable[[str], None]
 
 
 class Input(NamedTuple):
-    """What a page is made of, checked but not computed yet.
+    """Input of a page, checked before any computation.
 
     chapters(say): its chapters; scene: that of its design, None of a store.
     """
@@ -200,19 +200,21 @@ STUDIES: "dict[str, Callable[[Evaluation, Callable[[str], None]], object]]" = {
     "accuracy": _accuracy,
     "proof": lambda evaluation, say: evaluation.prove(),
 }
-"""What may stand on a page beside a design → how it is computed."""
+"""Name of a study → function that computes it for a page."""
 
 
 def compare(
     answers: Answers,
-    within: Annotated[str | None, typer.Option("--in", metavar="PROBLEM", help="Judge all in this scene.")] = None,
+    within: Annotated[
+        str | None, typer.Option("--in", metavar="PROBLEM", help="Evaluate all designs in this scene.")
+    ] = None,
     figure: Annotated[
-        list[Path] | None, typer.Option(metavar="F", help="Lay their curves over each other: .png, .svg or .pdf.")
+        list[Path] | None, typer.Option(metavar="F", help="Draw their curves together: .png, .svg or .pdf.")
     ] = None,
     files: TableOptions = NO_TABLE,
     as_json: Json = False,
 ) -> None:
-    """Show designs side by side, what differs marked."""
+    """Compare designs side by side."""
     from loomopt.interface.files import answer_file, outputs
     from loomopt.interface.study import comparison
     from loomopt.jobs import registry
@@ -232,7 +234,7 @@ def compare(
 
 
 def _answer(given: str) -> Path:
-    """Path of an answer's file. Raises BadInput for what is none."""
+    """Path of an answer's file. Raises BadInput for any other argument."""
     from loomopt.base.errors import refusal
     from loomopt.jobs import registry
 

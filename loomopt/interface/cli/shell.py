@@ -1,4 +1,4 @@
-"""What the commands share: reading their arguments, remarks."""
+"""Shared parts of the commands: arguments and remarks."""
 
 import contextlib
 import sys
@@ -43,7 +43,7 @@ def read_value(text: str) -> object:
 
 
 class DesignRequest(NamedTuple):
-    """What a command line asks of a design: the scene it holds in, the design (SI; none for today's), the target.
+    """Request of a command line: the scene, the design (SI; None for today's), the target.
 
     status: of an answer in its own scene and for its own target, as its file says.
     """

@@ -38,18 +38,18 @@ ANSWERED = "needed", "evaluated"
 
 @dataclass(frozen=True)
 class RunOptions(Options):
-    """How a front or a sweep is run, and the files that it goes into."""
+    """Options of a front or a sweep, and its files."""
 
     computer: ComputerOptions = ALONE
     rows: StoreOptions = NO_STORE
     table: TableOptions = NO_TABLE
     figure: Annotated[
-        list[Path] | None, typer.Option(metavar="F", help="Draw it, with designs beside: .png, .svg or .pdf.")
+        list[Path] | None, typer.Option(metavar="F", help="Draw it with some designs: .png, .svg or .pdf.")
     ] = None
     animate: Annotated[
-        list[Path] | None, typer.Option(metavar="F", help="Have the designs along it move: .html, .gif or .mp4.")
+        list[Path] | None, typer.Option(metavar="F", help="Animate its designs: .html, .gif or .mp4.")
     ] = None
-    si: Annotated[bool, typer.Option("--si", help="Tables in SI, not in the scene's own units.")] = False
+    si: Annotated[bool, typer.Option("--si", help="Tables in SI, not in the units of the scene.")] = False
     as_json: Json = False
 
     def check(self) -> None:
@@ -108,28 +108,24 @@ def sweep(
 
 def pareto(
     problem: Problem,
-    against: Annotated[str, typer.Option(metavar="B", help="The axis that pays for it.")],
-    minimise: Annotated[
-        list[str] | None, typer.Option(metavar="A", help="The axis of which the least is sought.")
-    ] = None,
-    maximise: Annotated[
-        list[str] | None, typer.Option(metavar="A", help="An axis of which the most is sought.")
-    ] = None,
+    against: Annotated[str, typer.Option(metavar="B", help="The other axis.")],
+    minimise: Annotated[list[str] | None, typer.Option(metavar="A", help="The axis that is minimised.")] = None,
+    maximise: Annotated[list[str] | None, typer.Option(metavar="A", help="An axis that is maximised.")] = None,
     bounds: Annotated[
         list[str] | None,
-        typer.Option("--range", metavar="B=LO:HI UNIT", help='No further along an axis, such as "m4e=0:5 kg".'),
+        typer.Option("--range", metavar="B=LO:HI UNIT", help='Range of an axis, such as "m4e=0:5 kg".'),
     ] = None,
     points: Annotated[
         str | None,
-        typer.Option(metavar="N", help="So many points, 40 without it, beside those that narrow changes down."),
+        typer.Option(metavar="N", help="Number of points, 40 without it; points that locate changes are added."),
     ] = None,
     target: Annotated[
-        str | None, typer.Option(help="Whose demands hold, of all but the axes; the job's default without it, or none.")
+        str | None, typer.Option(help="Target whose other requirements hold; the job's default without it, or none.")
     ] = None,
     changes: SceneOptions = NO_CHANGES,
     how: RunOptions = USUAL,
 ) -> None:
-    """Show what two figures cost each other: the whole front."""
+    """Compute the front of two objectives."""
     from loomopt.studies.front import front
 
     scene = changes.scene(problem)
@@ -160,7 +156,7 @@ def _axes(minimise: list[str], maximise: list[str], against: str) -> tuple[str, 
 
 
 def _split_items(items: list[str], option: str, example: str, form: str) -> dict[str, str]:
-    """Key → what an option gives for it. Raises BadInput."""
+    """Key → value of an option KEY=VALUE. Raises BadInput."""
     from loomopt.base.errors import refusal
 
     parts: dict[str, str] = {}
@@ -212,14 +208,14 @@ def effects(
     problem: Problem,
     target: Target = None,
     tolerance: Annotated[
-        str, typer.Option(metavar="R", help="What an effect may change, relative to natural sizes.")
+        str, typer.Option(metavar="R", help="Permitted change by an effect, relative to scales.")
     ] = "0.01",
     changes: SceneOptions = NO_CHANGES,
     computer: ComputerOptions = ALONE,
     figure: Figure = None,
     as_json: Json = False,
 ) -> None:
-    """Show what each effect is worth, and what may be left out."""
+    """Show the influence of effects; find those to leave out."""
     from loomopt.interface.files import outputs
     from loomopt.interface.study.effects import EffectsStudy, run_effects, summarise_effects
     from loomopt.studies.effects.study import plan_effects
@@ -290,8 +286,8 @@ def tolerance(
     problem: Problem,
     design: Design = None,
     target: Target = None,
-    samples: Annotated[str, typer.Option(metavar="N", help="So many machines are drawn.")] = "100000",
-    seed: Annotated[str, typer.Option(metavar="S", help="Of the scrambled points they are drawn by.")] = "0",
+    samples: Annotated[str, typer.Option(metavar="N", help="Number of machines.")] = "100000",
+    seed: Annotated[str, typer.Option(metavar="S", help="Seed of the random machines.")] = "0",
     worst: Annotated[bool, typer.Option(help="Prove the worst case of each figure within all tolerances.")] = True,
     changes: SceneOptions = NO_CHANGES,
     computer: ComputerOptions = ALONE,

@@ -175,7 +175,7 @@ def _dot(kind: str) -> dict[str, Any]:
 
 
 def _handle(kind: str) -> Any:
-    """What stands for a kind of style in a key; None for a heading of it."""
+    """Sample of a kind of style in a key; None for a heading."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

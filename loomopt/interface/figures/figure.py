@@ -167,7 +167,7 @@ def _characters(path: str) -> frozenset[str]:
 
 
 Entry = tuple[Any, str]
-"""What a legend shows a line or a point as, and what it says of it."""
+"""Entry of a legend: its line or point, and its text."""
 HEAD_SIZE, TITLE_SIZE = 8.0, 9.0
 """Of texts, and of the title above them, pt."""
 HEAD_GAP = 4.0
@@ -177,7 +177,7 @@ ROOMY = 0.95
 HEAD_COLOUR = "#374151"
 HEAD_LEGEND: dict[str, Any] = {"frameon": False, "borderpad": 0.0, "labelspacing": 0.25}
 HEAD_LEGEND |= {"columnspacing": 1.4, "handlelength": 2.6}
-"""What every legend looks like."""
+"""Style of every legend."""
 
 
 def page(width: float, height: float, title: str) -> Any:
@@ -268,7 +268,7 @@ def _page(artist: Any) -> Any:
 
 
 def _columns(entries: Sequence[Entry], where: Any, width: float) -> int:
-    """How many columns of a legend have room in a width, pixels."""
+    """Number of columns of a legend that fit a width, pixels."""
     root = _page(where)
     for count in range(min(len(entries), 4), 1, -1):
         legend = _legend(where, entries, count, 1.0)

@@ -34,10 +34,10 @@ AROUND, HEAD = 1.0, 0.9
 ROOMY = 1.08
 DRAWN = {
     "in the frame": (COLOURS[0], "-"),
-    "on the part it comes from": (COLOURS[2], ":"),
+    "reaction": (COLOURS[2], ":"),
     "on the part it acts on": (COLOURS[1], "--"),
 }
-"""What a tip is drawn on → colour and style."""
+"""Label of a polar curve → colour and style."""
 
 
 def plot(scene: Scene, forces: Mapping[str, TurnedForce], path: Path | None = None) -> Any:

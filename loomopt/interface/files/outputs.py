@@ -42,11 +42,11 @@ FOUND = {
     "failed": "no design for {} found, where the search ended",
     "interrupted": "best design for {} so far, interrupted",
 }
-"""What an answer's design is, by its status and target."""
+"""Description of an answer's design, by status and target."""
 
 
 class DrawnSubject(NamedTuple):
-    """What a drawn design is, in a few words, the limits that it does not hold, and what of its goals it misses."""
+    """Description of a drawn design: its name, its violated limits, its missed goals."""
 
     name: str
     broken: tuple[str, ...] = ()
@@ -59,7 +59,7 @@ class DrawnSubject(NamedTuple):
 
 
 class Serialisable(Protocol):
-    """What has JSON data."""
+    """Object with JSON data."""
 
     def as_dict(self) -> Mapping[str, object]:
         """Its JSON data."""
@@ -311,7 +311,7 @@ def drawing(scene: Scene, design: Design, subject: DrawnSubject | None = None) -
 
 
 class Workshop(NamedTuple):
-    """How a drawing for the workshop is written.
+    """Options of a drawing for the workshop.
 
     version: of DXF, a key of `dxf.VERSIONS`; arcs: tolerance, m, within which closed curves are written as arcs of
     circles, None for straight strokes; only: the one layer that is drawn, "" for all of them.
@@ -449,7 +449,7 @@ def _dxf(path: Path, scene: Scene, design: Design, subject: DrawnSubject | None,
 
 Writer = Callable[[Path, Scene, Design, DrawnSubject | None], None]
 DRAWINGS: dict[str, Writer] = {".svg": _svg, ".dxf": _dxf, ".csv": _joints, ".xlsx": _joints}
-"""Ending of a file → what writes a linkage to it."""
+"""Ending of a file → function that writes a linkage."""
 
 
 def picture(path: Path, scene: Scene, design: Design, subject: DrawnSubject | None = None) -> None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 ENDINGS = (".csv", ".xlsx", ".parquet")
 """Endings of files that take any table."""
 DECIMALS = {"point": False, "comma": True}
-"""What `--decimal` may be → whether numbers have a decimal comma, and cells a semicolon between them."""
+"""Value of `--decimal` → whether numbers have a decimal comma and cells are separated by semicolons."""
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 WIDEST, ABOUT = 40, "about"
 """Characters of the widest column; the sheet that tells where all the others come from."""

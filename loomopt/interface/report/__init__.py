@@ -5,5 +5,5 @@ from importlib.resources.abc import Traversable
 
 
 def report_path(name: str) -> Traversable:
-    """A file of the page's own, such as its script."""
+    """A packaged file of the page, such as its script."""
     return files(__name__).joinpath(name)

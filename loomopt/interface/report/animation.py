@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 ENDINGS = (".html", ".gif", ".mp4")
 FILE = "a path that ends in .html, .gif or .mp4", "Name a file, or leave it out"
-"""What a moving picture may be written to, and what to do where it is none."""
+"""Allowed files of an animation, and the remedy for others."""
 EVERY, RATE = 3, 20
 """Of GIF and MP4: every so many poses a frame; frames a second."""
 SIZE, FINE = 640, 2
@@ -54,15 +54,15 @@ class MovingPicture:
 
     @property
     def widget(self) -> str:
-        """The moving picture as markup."""
+        """The animation as markup."""
         labels = list(self.stages) if len(self.stages) > 1 else ()
         return machine.widget(list(self.stages.values()), self.ghost, self.angle, self.unit, 0, labels)
 
     @property
     def page(self) -> str:
-        """The moving picture as a page of its own."""
+        """The animation as a page."""
         part = Part("The mechanism through its turn", (Markup(self.widget),))
-        return page([Chapter(self.title, "", Status("open", "A moving picture"), [part])])
+        return page([Chapter(self.title, "", Status("open", "Animation"), [part])])
 
     def _repr_html_(self) -> str:
         frame = html.escape(self.page, quote=True)
@@ -75,7 +75,7 @@ class MovingPicture:
 
 
 def check_file(path: Path) -> None:
-    """Raise BadInput, before anything is computed, where no moving picture can be written as this file."""
+    """Raise BadInput, before any computation, if no animation can be written to this file."""
     if suffix(path, ENDINGS) == ".mp4" and not shutil.which("ffmpeg"):
         remedy = "Install ffmpeg, or end the name in .gif or .html"
         raise refusal(
@@ -88,7 +88,7 @@ def check_file(path: Path) -> None:
 def animate(
     scene: Scene, design: Design, path: Path | None = None, subject: outputs.DrawnSubject | None = None
 ) -> MovingPicture:
-    """A design's mechanism as it moves, today's behind it. Raises BadInput.
+    """Animation of a design's mechanism, with today's behind it. Raises BadInput.
 
     path: a file to write it to as well; subject: the design in words, for the title.
     """
@@ -112,7 +112,7 @@ def animate(
 
 @working()
 def morph(study: SceneStudy, rows: Sequence[Row], path: Path | None = None) -> MovingPicture:
-    """Certified designs among rows of a study as one moving picture. Raises BadInput."""
+    """Animation through the certified designs of a study. Raises BadInput."""
     from loomopt.interface.report.study import stages
 
     if path:
@@ -147,7 +147,7 @@ def _gif(picture: MovingPicture, path: Path) -> None:
 
 
 def _mp4(picture: MovingPicture, path: Path) -> None:
-    """Have ffmpeg write what it is given frame by frame."""
+    """Write frames to a file by ffmpeg."""
     import subprocess
 
     check_file(path)
@@ -173,7 +173,7 @@ def _mp4(picture: MovingPicture, path: Path) -> None:
 
 
 WRITERS: dict[str, Callable[[MovingPicture, Path], None]] = {".html": _page, ".gif": _gif, ".mp4": _mp4}
-"""Ending of a file → what writes a moving picture to it."""
+"""Ending of a file → function that writes an animation."""
 
 
 def frames(picture: MovingPicture) -> Iterator["Image"]:

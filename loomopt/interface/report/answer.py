@@ -22,7 +22,7 @@ from loomopt.solving.certificate.certificate import COMPLEMENTARY
 
 
 class Status(NamedTuple):
-    """What a design truly is: level is "ok", "open" or "bad"; verdict in a few words; sentences: what follows.
+    """Verdict on a design: level is "ok", "open" or "bad"; verdict in a few words; sentences: details.
 
     exit: the status that a command ends with.
     """
@@ -63,14 +63,14 @@ class Subject:
 
 NOT_CERTIFIED = 4
 EXIT = {"infeasible": 3, "interrupted": 130}
-"""Status of a solve → what a command ends with, where that is not `NOT_CERTIFIED`."""
+"""Status of a solve → exit status, except `NOT_CERTIFIED`."""
 VERDICTS = {
     "infeasible": "NO ADMISSIBLE DESIGN EXISTS near any start",
     "uncertified": "NOT CERTIFIED",
     "failed": "FAILED: no design was found",
     "interrupted": "INTERRUPTED: not solved to its end",
 }
-"""Status of a solve that is no optimum → what the page says first."""
+"""Status of a solve without an optimum → first line of the page."""
 
 
 def status(subject: Subject) -> Status:
@@ -112,7 +112,7 @@ def _certified_status(solution: Solution, scene: Scene) -> Status:
         opened += [] if solution.global_bound.proven else ["NOT PROVEN best of all admissible designs"]
         proofs.append(answers.global_summary(solution.global_bound, scene) + ".")
     else:
-        proofs.append("No admissible design nearby is better; that none anywhere is was not asked (--global).")
+        proofs.append("No admissible design nearby is better; global optimality was not checked (--global).")
     verdict_text = (
         solution.message
         if solution.terms or not solution.target
@@ -184,7 +184,7 @@ def _certificate(subject: Subject) -> Iterator[Part]:
         (
             f"whole-cycle values between the points, {certificate.whole_cycle}",
             f"{certificate.violation:.1e}",
-            "the accuracy asked",
+            "the accuracy",
         ),
     ]
     for place, level in enumerate((*certificate.levels, *([certificate.change] if certificate.change else [])), 1):
@@ -225,7 +225,7 @@ def _curves(subject: Subject) -> Iterator[Part]:
 
 
 def _forces(subject: Subject) -> Iterator[Part]:
-    """Tell what each joint carries, where an effect that is on says so."""
+    """Forces in joints, if an active effect computes them."""
     scene, design = subject.scene, flat(subject.evaluated.design)
     if forces.tells(scene):
         yield Part("Forces in the joints", tuple(scenes.forces(scene, tables.curves(scene, design), design)))
@@ -243,7 +243,7 @@ def _remarks(subject: Subject) -> Iterator[Part]:
 
 
 def _sketch(subject: Subject) -> Iterator[Part]:
-    """Draw the mechanism at scale with its dimensions, where the scene gives what a drawing needs."""
+    """Drawing of the mechanism at scale, if the scene has all numbers that it needs."""
     from loomopt.interface.text import notebook
 
     if not registry.of(subject.scene).views.missing(subject.scene):
@@ -253,7 +253,7 @@ def _sketch(subject: Subject) -> Iterator[Part]:
 
 
 def _scene(subject: Subject) -> Iterator[Part]:
-    """Tell the scene as it was read, with where its numbers come from, and its equations."""
+    """The scene as read, the sources of its numbers, and its equations."""
     shown = scenes.parts(subject.scene)
     yield Part("The scene", tuple(shown))
     scene = subject.scene
@@ -270,7 +270,7 @@ def _search(subject: Subject) -> Iterator[Part]:
             f"IPOPT said {solution.solver.get('status', 'nothing')}; {time.get('total_s', 0.0):.3f} s in all."
         )
         sentences.append(answers.design_text(solution, subject.scene))
-        yield Part("How it was found", tuple(sentences))
+        yield Part("How it was solved", tuple(sentences))
 
 
 PARTS: tuple[Callable[[Subject], Iterator[Part]], ...] = (
@@ -288,6 +288,6 @@ PARTS: tuple[Callable[[Subject], Iterator[Part]], ...] = (
     _search,
     _scene,
 )
-"""What a page on a design shows, in order; one more part is one more function."""
+"""Parts of a page on a design, in order."""
 ONE_MACHINE = (_moving, _curves, _forces, _remarks, _sketch)
 """Of them those on a machine by itself, which a family has for each of its members."""

@@ -69,7 +69,7 @@ def _curves(chart: Chart) -> str:
 
 @dataclass(frozen=True)
 class _Frame:
-    """Where values stand in a chart."""
+    """Positions of values in a chart."""
 
     across: Axis
     upright: Axis
@@ -107,7 +107,7 @@ def _curve(series: Series, frame: _Frame) -> str:
 
 
 def _bars(chart: Bars) -> str:
-    """Bars in rows; what is not known has none."""
+    """Bars in rows; an unknown value has none."""
     axis = chart.x
     left = LETTER * max((len(name) for name, _ in chart.rows), default=0) + 8
     numbers = chart.numbers or [[""] * len(values) for _, values in chart.rows]

@@ -1,4 +1,4 @@
-"""What a page is made of: answers and studies, each a chapter of its own, others as parts of one."""
+"""Pages of answers and studies: a chapter for each, further studies as parts of a chapter."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +21,7 @@ ALLOWED = "fronts, sweeps, effects, sensitivities, tolerances, torque budgets, a
 
 @runtime_checkable
 class Reported(Protocol):
-    """What was computed beside an answer, and says itself what a page shows of it."""
+    """Study of an answer that gives its parts of a page."""
 
     def report_parts(self) -> list[Part]:
         """Parts of a page."""
@@ -32,11 +32,11 @@ class Judged(Protocol):
 
     @property
     def result(self) -> Evaluated:
-        """What is known of it."""
+        """Record of the result."""
 
     @property
     def scene(self) -> Scene:
-        """What it holds in."""
+        """Scene of the result."""
 
     @property
     def target(self) -> str:
@@ -44,7 +44,7 @@ class Judged(Protocol):
 
     @property
     def sought(self) -> str:
-        """What it answers."""
+        """Target, or a summary of the task."""
 
 
 def of_answer(judged: Judged, results: Sequence[object] = (), doubts: Sequence[str] = ()) -> list[Chapter]:

@@ -86,7 +86,7 @@ def widget(
     first: int = 0,
     labels: Sequence[str] = (),
 ) -> str:
-    """A moving picture with its slider: of one design, or of several stages, such as points of a front.
+    """Animation with a slider: of one design, or of several stages, such as points of a front.
 
     ghost: the machine behind it; angle, unit: what phi is and in which unit it is told; first: the pose that is shown
     at first, and that remains where no script runs; labels: one for each stage.

@@ -8,14 +8,14 @@ from html import escape
 from loomopt.picture.table import JOINED, TextTable, restore_spaces
 
 NUMBER = re.compile(r"[-+]?\d")
-"""How a cell begins that stands to the right."""
+"""First characters of a cell that is aligned to the right."""
 DENSE, DENSER = 8, 13
 """Columns from which on a table is set smaller, so that paper takes it."""
 
 
 @dataclass(frozen=True)
 class Markup:
-    """What is markup already: a picture, an equation."""
+    """Ready markup: a picture, an equation."""
 
     html: str
 

@@ -11,7 +11,7 @@ from loomopt.picture.equations import Equation, Expression, name_parts, sympy
 LONG = {" longest": 260, " longer": 170, " long": 115}
 """Classes of style of equations whose text has more than so many characters: on paper they are set smaller."""
 ENTITY = re.compile("&(?!(?:lt|gt|amp|quot);)[A-Za-z]+;")
-"""What HTML has a name for, and other XML has not."""
+"""Named entities of HTML that XML lacks."""
 SIGNS = {"<=": "≤", ">=": "≥", "=": "="}
 
 

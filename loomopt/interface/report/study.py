@@ -15,7 +15,7 @@ from loomopt.picture.motion import MechanismMotion, crank_angles
 from loomopt.studies.run.rows import Row, SceneStudy
 
 STAGES = 12
-"""Designs along a study that its moving picture goes through at most."""
+"""Largest number of designs in the animation of a study."""
 
 
 def status(study: SceneStudy, solved: Sequence[Row]) -> Status:
@@ -57,7 +57,7 @@ def parts(study: SceneStudy, solved: Sequence[Row]) -> list[Part]:
 
 @working()
 def _stages(study: SceneStudy, rows: Sequence[Row]) -> Part | None:
-    """Show the designs along a study as one moving picture, whose second slider goes from one to the next."""
+    """Animate the designs along a study; a second slider selects the design."""
     motions = stages(study, rows)
     if not motions:
         return None

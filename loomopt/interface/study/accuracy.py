@@ -1,4 +1,4 @@
-"""What accuracy costs in time, to work with: a table of runs, error over time, the advice."""
+"""Work–precision study: a table of runs, error over time, the advice."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -24,7 +24,7 @@ LEAST = 1e-17
 
 
 class AccuracyStudy(StudyResult[AccuracyResult]):
-    """What accuracy costs in time, method by method; in Jupyter it shows itself."""
+    """Error and time of each numerical method; it shows itself in Jupyter."""
 
     heading = "What accuracy costs"
 
@@ -70,7 +70,7 @@ class AccuracyStudy(StudyResult[AccuracyResult]):
 
 
 def run_accuracy(scene: Scene, full: bool, on_step: Callable[[str], None] | None) -> AccuracyStudy:
-    """Measure what accuracy costs for a scene; on_step(what): called before each step. Raises BadInput."""
+    """Measure error and time for a scene; on_step(text): called before each step. Raises BadInput."""
     if on_step is not None:
         arguments.called(on_step, "on_step", "a function of a text", "Give a function, or leave it out")
     with cell_progress() as say:
@@ -100,7 +100,7 @@ def _where(first: Sequence[bool], names: Sequence[str]) -> list[str]:
 
 
 def _status(row: LadderRow) -> str:
-    """Status of a row; the usual one is not said."""
+    """Status of a row; empty for the usual one."""
     return "" if row.status in ("done", "optimal") else row.status.removeprefix("Solve_Succeeded, ")
 
 
@@ -130,5 +130,5 @@ def _chart(result: AccuracyResult, quantity: str, ladders: Sequence[Sequence[Lad
 
 
 def _place(row: LadderRow, alike: bool) -> float:
-    """Where a row stands: its setting, or the time that it takes, s."""
+    """Abscissa of a row: its setting, or its time, s."""
     return float(row.setting if alike else row.seconds or 0.0)

@@ -33,7 +33,7 @@ MOTOR = {
 
 
 class Budget(StudyResult[BudgetResult]):
-    """Where the crank torque of a design comes from, and what it asks of motor and flywheel; SI and rad."""
+    """Shares of the effects in the crank torque of a design, motor and flywheel; SI and rad."""
 
     heading = "Where the crank torque comes from"
 

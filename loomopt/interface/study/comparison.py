@@ -1,4 +1,4 @@
-"""Designs side by side in one unit: dimensions, figures, limits, curves laid over each other, what differs marked."""
+"""Comparison of designs: dimensions, figures, limits and curves in common units, with marked differences."""
 
 import functools
 import math
@@ -36,7 +36,7 @@ TODAY = "today"
 
 
 class Named(NamedTuple):
-    """A design with what it is called beside others, judged in a scene."""
+    """A named design, evaluated in a scene."""
 
     name: str
     evaluation: Evaluation
@@ -165,7 +165,7 @@ def _row(
 
 
 def _clean(rows: Sequence[ComparedRow]) -> list[ComparedRow]:
-    """Rows in which what is only rounding beside the largest of its unit is 0, and does not differ."""
+    """Rows with 0 for values that are rounding relative to the largest of their unit."""
     sizes: dict[str, float] = {}
     for row in rows:
         sizes[row.unit] = max(sizes.get(row.unit, 0.0), *(abs(value or 0.0) for value in row.values))

@@ -1,4 +1,4 @@
-"""What each effect is worth, to work with: tables, bars of shift and regret, a sentence on what may be left out."""
+"""Influence of effects: tables, bars of shift and regret, a sentence on the effects that may be left out."""
 
 import math
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ ROOMY = 1.3
 
 
 class EffectsStudy(StudyResult[EffectsResult]):
-    """What each effect of a scene is worth for a target; shares of natural sizes inside, units for a reader."""
+    """Influence of each effect of a scene on a target; shares of scales inside, units in tables."""
 
     heading = "What each effect is worth"
 
@@ -48,7 +48,7 @@ class EffectsStudy(StudyResult[EffectsResult]):
         first = f"{result.scene.name}, {result.target}, with {list_text(reference.effects) or 'no effect'} on: "
         lines = [first + (values if reference.status == "optimal" else f"{reference.status}, {reference.why}")]
         sizes = ", ".join(f"{name} {Words(result.scene).shown(name, size)}" for name, size in reference.scales.items())
-        lines += [f"Shares are of natural sizes: {sizes}"] if sizes else []
+        lines += [f"Shares are relative to the scales: {sizes}"] if sizes else []
         table: list[str | TextTable] = []
         if result.rows:
             base = EffectImpact("nothing", {}, {}, None, True, reference.status, **reference.cost)
@@ -96,7 +96,7 @@ def run_effects(
 
 
 def summarise_effects(study: Effects, rows: Sequence[Row]) -> EffectsStudy:
-    """What rows of a study show, not all of which need be there. Raises BadInput where solve takes nothing."""
+    """Result of the finished rows of a study. Raises BadInput if the target has no effect to leave out."""
     return EffectsStudy(summarise(study, rows))
 
 
@@ -177,7 +177,7 @@ def _bars_of(
     known, tolerance = [end for row in rows for end in row if end is not None], 100 * result.tolerance
     least, most = min([-tolerance * signed, *known]), max([tolerance, *known])
     linear = max(tolerance / 10, max(most, -least) / 10**DECADES)
-    axis = both_sides(ROOMY * least, ROOMY * most, linear, "share of the natural size [%]")
+    axis = both_sides(ROOMY * least, ROOMY * most, linear, "share of the scale [%]")
     numbers = [[_number(share) for share in row] for row in shares]
     places = [tolerance, -tolerance] if signed else [tolerance]
     lines = list(zip(names, rows, strict=True))
@@ -185,7 +185,7 @@ def _bars_of(
 
 
 def _end(share: float | None, signed: bool) -> float | None:
-    """Where a bar ends, %: at 0 where all is rounding, and where limits hold."""
+    """End of a bar, %: 0 for rounding and for limits that hold."""
     if share is None or not math.isfinite(share):
         return None
     return 0.0 if abs(share) <= SHOWN_AS_ZERO or (share < 0.0 and not signed) else 100 * share
@@ -204,7 +204,7 @@ def list_text(names: Sequence[str]) -> str:
 
 
 def verdict(result: EffectsResult) -> list[str]:
-    """Sentences on what may be left out, how that was verified, and what else to know."""
+    """Sentences on the effects that may be left out, their verification, and remarks."""
     share, solve = f"{100 * result.tolerance:g} %", call(result.command or "")
     if not result.finished:
         return ["Not finished: what may be left out is not known."]
@@ -274,7 +274,7 @@ def _only_figures(row: EffectImpact, tolerance: float) -> bool:
 
 
 def _notes(result: EffectsResult) -> list[str]:
-    """Sentences on why rows are not what one would think, and what was not measured."""
+    """Sentences on unexpected rows and on effects that were not measured."""
     lines = [f"{row.effect}: {row.why}" for row in result.rows if row.why]
     lines += [f"{name} is not measured: {why}" for name, why in result.out.items()]
     return lines + [f"{name}: {why}" for name, why in result.unknown.items()]

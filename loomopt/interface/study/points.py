@@ -38,7 +38,7 @@ class StudyTable(Presentation):
 
     @lazy
     def findings(self) -> Findings:
-        """What the rows come to."""
+        """Findings of the rows."""
         return self.study.read(self.solved)
 
     @property
@@ -53,7 +53,7 @@ class StudyTable(Presentation):
 
     @property
     def heading(self) -> str:
-        """What was varied of which scene."""
+        """Scene and varied quantities."""
         return f"{self.study.name} of {self.study.heading}"
 
     @property
@@ -70,7 +70,7 @@ class StudyTable(Presentation):
         return study_table.tables(self.study, self.solved, si)
 
     def charts(self) -> Charts:
-        """What the study is about over the first number that varies."""
+        """Charts of the quantities of the study over the first number that varies."""
         return study_table.charts(self.study, self.findings)
 
     def answer(self, point: "int | str | Mapping[str, str | float]") -> Answer:
@@ -152,7 +152,7 @@ def run_study(
     resume: bool = False,
     on_row: run.OnRow | None = None,
 ) -> StudyTable:
-    """Run what is left of a front or a sweep.
+    """Run the remaining rows of a front or a sweep.
 
     count: of worker processes, where there is no executor; store: file that each row is written to as it comes; resume:
     whether rows that are there are taken. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
@@ -168,7 +168,7 @@ def run_study(
 
 
 def study_identity(study: SceneStudy) -> Mapping[str, object]:
-    """What a store says of a study: what its key is made of, and the scene that makes it again."""
+    """Identity of a study for its store: the parts of its key, and the scene that rebuilds it."""
     from loomopt.scenes.document import copied
 
     return {**study.settings, "name": study.scene.name, "document": copied(study.scene.document, study.scene.origin)}

@@ -1,4 +1,4 @@
-"""How an optimum moves with the numbers of its scene, to work with: tables, a tornado, and how far prices hold."""
+"""Sensitivity of an optimum to the numbers of its scene: tables, a tornado chart, ranges of prices."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -24,7 +24,7 @@ MOST = 20
 
 
 class SensitivityStudy(StudyResult[SensitivityResult]):
-    """How an optimum moves with every number of its scene, and how far its prices hold; SI inside."""
+    """Derivatives of an optimum by every number of its scene, and ranges of its prices; SI inside."""
 
     heading = "How the optimum moves with each number"
 
@@ -36,7 +36,7 @@ class SensitivityStudy(StudyResult[SensitivityResult]):
         return frame(_columns(self.result, self.result.rows, si=arguments.flag(si, "si")), attrs)
 
     def tables(self) -> list[str | TextTable]:
-        """What moves each figure that is sought, and prices with their ranges."""
+        """Derivatives of the objectives, and prices with their ranges."""
         result = self.result
         head = f"{result.scene.name}, {result.target}: how the optimum moves with each number"
         if result.refused:

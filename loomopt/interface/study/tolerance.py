@@ -1,4 +1,4 @@
-"""Machines as they are made, to work with: how figures spread, how often limits hold, what to tighten first."""
+"""Tolerance study: spread of figures, yield of limits, tolerances to tighten first."""
 
 import contextlib
 import math
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LEAST_SHARE = 0.005
-"""Of a figure's variance: what is not told in a terminal."""
+"""Share of a figure's variance below which a terminal omits a number."""
 MOST_TOLD = 3
-"""Numbers whose shares are told."""
+"""Number of shares that a terminal shows."""
 
 
 class ToleranceStudy(StudyResult[ToleranceResult]):
@@ -56,7 +56,7 @@ class ToleranceStudy(StudyResult[ToleranceResult]):
         return [f"{head}; {lost}", spreads, _yields(result), *worst, *_advice(result)]
 
     def charts(self) -> Charts:
-        """How each figure spreads that judges machines or is sought."""
+        """Histograms of the criteria and of the objectives."""
         plan = self.result.plan
         names = dict.fromkeys(
             [
@@ -161,7 +161,7 @@ def _yields(result: ToleranceResult) -> TextTable:
 
 
 def _histogram(result: ToleranceResult, name: str, spread: Spread) -> Chart:
-    """How one figure spreads; what no machine may have is shaded."""
+    """Histogram of one figure, with the rejected range shaded."""
     units, judged = (
         Words(result.plan.scene),
         next((criterion for criterion in result.plan.criteria if criterion.name == name), None),

@@ -206,7 +206,7 @@ def certificate(answer: Solution) -> list[str]:
 
 
 COMPARED = re.compile("[<>=]")
-"""What stands in a limit that is a comparison and no sentence."""
+"""Pattern of a limit that is a comparison and not a sentence."""
 BEYOND = {-1: "below", 1: "above"}
 
 

@@ -69,7 +69,7 @@ KINDS = {unit: kind for kind, unit in SI_UNIT.items() if kind != "angular speed"
 LONGEST_SYMBOL = 5
 """Letters beyond which a name is made of words."""
 DRAWN = "x"
-"""What marks a symbol that the sketch shows."""
+"""Mark of a symbol that the sketch shows."""
 
 
 class Symbol(NamedTuple):

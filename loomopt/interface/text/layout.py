@@ -98,7 +98,7 @@ def narrow(grid: TextTable, columns: int) -> tuple[TextTable, str]:
 
 
 def _enough(grid: TextTable, columns: int) -> int:
-    """How wide a terminal is, wider than `columns`, that shows all columns of a table."""
+    """Width of a terminal, larger than `columns`, that shows all columns of a table."""
     return next(wide for wide in itertools.count(columns + 1) if _total(_least(grid, wide)) <= wide)
 
 
@@ -130,7 +130,7 @@ def _total(widths: Iterable[int]) -> int:
 
 
 def _widths(grid: TextTable, columns: int) -> list[int]:
-    """How wide columns are where not all words stand on one line: the widest that may wrap gives way first."""
+    """Widths of columns with wrapped words: the widest column that may wrap is reduced first."""
     least = _least(grid, columns)
     widths = [
         max(len(line) for cell in column for line in cell.split("\n"))

@@ -1,4 +1,4 @@
-"""How things show themselves in Jupyter: what the terminal shows, as self-contained HTML, and the mechanism drawn."""
+"""Display in Jupyter: the text of the terminal as self-contained HTML, and a drawing of the mechanism."""
 
 import re
 from collections.abc import Sequence

@@ -152,7 +152,7 @@ def curves(scene: Scene, design: Design, width: int | None) -> list[str | TextTa
 
 
 def beside(scene: Scene, frame: "pd.DataFrame") -> TextTable:
-    """How far curves, SI, lie off what was measured, in the scene's display units."""
+    """Difference of curves, SI, from measured ones, in the scene's display units."""
     lines = []
     for column in frame.columns:
         name, _, unit = column.removesuffix("]").partition("_measured [")
