@@ -322,8 +322,8 @@ def budget(scene: Given, design: Design | Evaluation | None = None, *, fluctuati
 
     Examples
     --------
-    >>> [row.effect for row in budget("beatup-light").rows]
-    ['inertia', 'resistance']
+    >>> len(budget("beatup-light").rows)
+    2
     """
     from loomopt.interface.study.budget import compute
 
@@ -415,8 +415,8 @@ def effects(
 
     Examples
     --------
-    >>> effects("beatup-light").left_out
-    ('bearing_friction', 'centrifugal')
+    >>> print(*effects("beatup-light").left_out)
+    bearing_friction centrifugal
     """
     from loomopt.interface.study.effects import run_effects
     from loomopt.studies.effects.study import plan_effects
@@ -618,8 +618,8 @@ def problems() -> "tuple[Head, ...]":
 
     Examples
     --------
-    >>> [head.name for head in problems()][:3]
-    ['beatup', 'beatup-heavy', 'beatup-light']
+    >>> "beatup-light" in [head.name for head in problems()]
+    True
     """
     from loomopt.interface import listing
 
@@ -646,7 +646,7 @@ def new(job: str, path: str | os.PathLike[str]) -> "Path":
     --------
     >>> import tempfile
     >>> folder = tempfile.mkdtemp()
-    >>> new("beatup", f"{folder}/my-loom.toml").name
+    >>> new("beatup-light", f"{folder}/my-loom.toml").name
     'my-loom.toml'
     """
     from loomopt.interface import listing
@@ -659,7 +659,7 @@ def schema(job: str) -> dict[str, object]:
 
     Parameters
     ----------
-    job : name of a job, such as "beatup".
+    job : name of a job, such as that of `Scene.job`.
 
     Returns
     -------
@@ -671,7 +671,8 @@ def schema(job: str) -> dict[str, object]:
 
     Examples
     --------
-    >>> "bounds" in schema("beatup")["properties"]
+    >>> job = load("beatup-light").job
+    >>> "bounds" in schema(job)["properties"]
     True
     """
     from loomopt.interface.text import json_schema
