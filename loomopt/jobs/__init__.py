@@ -1,1 +1,1 @@
-"""The loom jobs: a folder each, found by name (registry.py); what they share stands in base.py."""
+"""The loom jobs: one folder per job (registry.py finds them by name); base.py has their common part."""

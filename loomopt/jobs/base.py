@@ -162,7 +162,7 @@ class Task(abc.ABC):
     def variables(self) -> tuple[Variable, ...]:
         """The variables, no less than limits on their figures ask for. Raises BadInput.
 
-        One without room, or one that is not there yet, stands at the most that is asked.
+        One without room, or one that does not exist yet, stands at the largest minimum.
         """
         variables = {v.name: v for v in self.bounded}
         for name, pairs in self.minima.items():
@@ -306,7 +306,7 @@ class Task(abc.ABC):
         ]
 
     def move(self, name: str, along: str, wishes: Sequence[Preference] = (Preference("today", LEAST_CHANGE),)) -> Move:
-        """Move along one number; it would stay nearest to today's where no other wish is told."""
+        """Move along one number; without a preference it stays nearest to today's."""
         return AxisMove(name, (along,), tuple(wishes), {along: self.known[along]}, {along: self.limited[along]})
 
     def scale_move(self, name: str, along: tuple[str, ...]) -> Move:
@@ -472,7 +472,7 @@ EVERY = Every()
 
 
 class Job(abc.ABC):
-    """A loom mechanism and what can be asked of it; all numbers SI."""
+    """A loom mechanism and its computations; all numbers SI."""
 
     name: str
     at_once: tuple[str, ...] = ()
@@ -505,7 +505,7 @@ class Job(abc.ABC):
     def say_together(self, members: "Sequence[tuple[Scene, Numbers, Figures]]", member_numbers: frozenset[str]) -> str:
         """Sentences on why members of a family cannot all reach their goal, "" where physics says nothing.
 
-        members: the scene, design and figures of each, SI; own: numbers of a design of which each has its own.
+        members: scene, design and figures, SI; member_numbers: numbers of a design that differ between members.
         """
         return ""
 
@@ -530,7 +530,7 @@ class Job(abc.ABC):
 
     @property
     def views(self) -> JobViews:
-        """The job's own pictures, equations and remarks: VIEWS of its views.py, imported when it is first asked for."""
+        """Pictures, equations and remarks of the job: VIEWS of its views.py, imported at the first use."""
         views: JobViews = importlib.import_module(f"{self.package}.views").VIEWS
         return views
 
@@ -601,7 +601,7 @@ class Job(abc.ABC):
     def figures(self, scene: Scene, design: Numbers) -> Figures:
         """Every figure of the job; None for one whose numbers the scene does not have.
 
-        Those over the cycle that nothing has asked for yet are computed when they are read.
+        Figures over the cycle that were not computed yet are computed when they are read.
         """
         sampled = self.sampler(scene, design)
         late = self.over_cycle(sampled.model)
@@ -623,7 +623,7 @@ class Job(abc.ABC):
     ) -> dict[str, Number]:
         """Every figure of a machine, or of many at once, SI; None for one whose numbers the scene does not have.
 
-        asked: which of those `over_cycle`, every one without it; the others are None or there too. What a motion of its
+        names: figures of `over_cycle`, all by default; the others are None or there too. What a motion of its
         own tells is not among those of many (`machines.at_once`).
         """
         figures = static_figures(scene, sampled, names)

@@ -1,4 +1,4 @@
-"""Jobs by name: a folder each, or another distribution's by entry point; only the one asked for is imported.
+"""Jobs by name: a folder each, or another distribution's by entry point; only the requested one is imported.
 
 Entry points `loomopt.jobs` (name = job) and `loomopt.effects` (name = "job.effect") are scanned only for a name that is
 not of this package, and where all are listed. What this package brings itself wins: its names cannot be taken.
@@ -257,7 +257,7 @@ def answer_path(given: object) -> Path | None:
 
 
 def answered(path: Path) -> "tuple[Scene, DesignGiven]":
-    """Scene that an answer in a JSON file was found in, and what it brings. Raises BadInput."""
+    """Scene of an answer in a JSON file, and the contents of the file. Raises BadInput."""
     from loomopt.scenes import designs
 
     return designs.read_answer(path, REGISTERED)

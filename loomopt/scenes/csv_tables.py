@@ -28,7 +28,7 @@ UNITS = {
 }
 """Units of a column that messages name, by kind of quantity; any unit of the kind is read."""
 ALIASES = {"angle": ("phi", "theta"), "phi1": ("phi", "angle"), "phi": ("phi1", "angle")}
-"""Column → other names under which it is found too: curves that are written have their angles under phi."""
+"""Column → alternative names: curves that are written have their angles under phi."""
 MARKS = {"": 0.0, "0": 0.0, "1": 1.0, "x": 1.0}
 """Cells of a column of marks."""
 TURN = 2 * math.pi + 1e-4

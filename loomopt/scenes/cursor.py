@@ -1,4 +1,4 @@
-"""Cursor on the raw tables of a scene: a value, the key under which it stands, and the mistakes found so far.
+"""Cursor on the raw tables of a scene: a value, the key under which it stands, and the list of mistakes.
 
 Whoever reads a table gets a cursor. A mistake is built here, so that every message names file and key in one way.
 """

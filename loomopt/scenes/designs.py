@@ -231,7 +231,7 @@ def _fits(quantity: Quantity, value: float) -> bool:
 
 
 MOST_TOLD, LONGEST_TOLD = 8, 200
-"""Changes that are told one by one: more are another scene altogether, and their number says so; characters of one."""
+"""Changes that are listed one by one, the others are counted; characters of one change."""
 PIPE = "-"
 """Name in messages of a design that comes through a pipe."""
 
@@ -340,7 +340,7 @@ def check_job(job: object, scene: Scene, origin: str) -> None:
 def scene_changes(scene: Scene, given: DesignGiven, origin: str, besides: Call) -> list[str]:
     """Sentences on the differences between a scene and an answer's scene; empty where both are the same.
 
-    origin: what the answer's file is called; besides: what a call has changed in the scene, which is not told.
+    origin: what the answer's file is called; besides: changes of the scene by the call, which are left out.
     """
     if given.document is None:
         return []
@@ -385,9 +385,9 @@ def _on(document: Mapping[str, Any], scene: Scene) -> list[str]:
 
 
 def remark(scene: Scene, given: DesignGiven, later: Call, changes: Sequence[str], origin: str) -> str:
-    """Sentence on the values that an answer brings to a scene besides its design, and on those it does not; or "".
+    """Sentence on the values that an answer adds to a scene besides its design, and on those it does not add; or "".
 
-    later: what this call changes, which is not told; changes: what `scene_changes` tells.
+    later: changes of this call, which are left out; changes: from `scene_changes`.
     """
     current = given.call.then(later).said
     lasting = [text for text in given.call.said if text in current]

@@ -91,7 +91,7 @@ def linkage(
 ) -> Drawing:
     """Crank-rocker of a design in both dead centres, at full scale. Raises BadInput.
 
-    forces: in its joints at some crank angles, each with its size as it is told.
+    forces: in its joints at some crank angles, each labelled with its size.
     """
     drawing = of(design)
     strokes = [*drawing.skeleton.strokes(drawing.height), *_angles(drawing)]

@@ -103,7 +103,7 @@ class Beatup(Job):
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
         """NLP's variables, SI, of a design; a counterweight without mass stands at its largest radius.
 
-        Where m4e = 0 the radius says nothing, unless it is asked for, and r4e = 0 would hide how s = m4e r4e² can grow.
+        Where m4e = 0 the radius has no effect, unless it is limited, and r4e = 0 would hide how s = m4e r4e² can grow.
         """
         numbers = {**design, "s": design["m4e"] * design["r4e"] ** 2}
         rows = {row for objective in program.objectives for row in objective.rows}

@@ -199,7 +199,7 @@ def model(
     pulse: Where,
     changing: tuple[str, ...] = (),
 ) -> JobModel:
-    """Crank-rocker with effects; changing: the design variables of the retrofit's norm, if that is asked.
+    """Crank-rocker with effects; changing: the design variables of the retrofit's norm, if the target reads it.
 
     pulse: the pieces of the cycle in which the cloth resists, which the figure pulse_rms is of.
     """

@@ -135,7 +135,7 @@ def event_of(sampler: Sampler) -> tuple[str, ...]:
 def linkage(
     sampler: Sampler, title: str, units: Units = METRIC, forces: Mapping[ForceArrow, str] | None = None
 ) -> Drawing:
-    """Design at its events, at full scale; forces: in its joints, each with its size as it is told."""
+    """Design at its events, at full scale; forces: in its joints, each labelled with its size."""
     drawing = LinkageDrawing(sampler)
     skeleton, height = drawing.skeleton, drawing.height
     labels, legend, event = (

@@ -1,4 +1,4 @@
-"""The linkage job: whatever a planar linkage of one degree of freedom is asked for."""
+"""The linkage job: planar linkages of one degree of freedom."""
 
 import math
 from collections.abc import Container, Mapping

@@ -809,7 +809,7 @@ def _square_distance(path: Path, at: Instant) -> Number:
 
 
 def _mean_square_distance(path: Path, at: Instant) -> Number:
-    """Mean square of the distances at crank angles of the design's own, m²."""
+    """Mean square of the distances at crank angles that follow from the design, m²."""
     total = 0
     for name, x, y in zip(path.times, path.x, path.y, strict=True):
         pose = _linkage(at).at_place(at.maths, at.given, name)

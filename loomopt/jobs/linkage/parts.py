@@ -1,4 +1,4 @@
-"""The table [parts] of a linkage scene: read into parts in an order in which each hangs on those before it.
+"""The table [parts] of a linkage scene: read into parts, so that a part depends only on those before it.
 
 A number of a part is the name of one in [mechanism], its opposite ("-d"), or a literal with its unit; what kind of
 quantity a name stands for follows from its uses.
@@ -197,7 +197,7 @@ class Sort(NamedTuple):
 
 
 NAME_SCHEMA: Json = {"type": "string", "pattern": rf"^[^\s!-@\[-`{{-~][^\s!-/:-@\[-^`{{-~]{{0,{LONGEST_NAME - 1}}}$"}
-"""A name of the scene's own, as `check_name` reads it."""
+"""A new name of the scene, as `check_name` reads it."""
 
 
 def text_of(raw: object) -> str:
@@ -498,7 +498,7 @@ def _key_of(part: Part, name: str) -> str:
 
 
 def _chain(cursor: Cursor, parts: Sequence[Part]) -> Chain:
-    """Parts in an order in which each hangs on those before it, otherwise in that given. Raises BadInput."""
+    """Parts in an order in which a part depends only on those before it, else in the given order. Raises BadInput."""
     waiting, known, order = list(parts), set[str](), list[Part]()
     while waiting:
         ready = next((part for part in waiting if known.issuperset(chain.wants(part))), None)
@@ -511,7 +511,7 @@ def _chain(cursor: Cursor, parts: Sequence[Part]) -> Chain:
 
 
 def _cycle_fault(cursor: Cursor, waiting: Sequence[Part], known: Collection[str]) -> BadInput:
-    """Mistake of parts that wait for each other, without those that only wait for them."""
+    """Mistake of parts that depend on each other, without those that only depend on them."""
     while True:
         wanted = {name for part in waiting for name in chain.wants(part)}
         ring = [part for part in waiting if wanted.intersection(chain.provides(part))]

@@ -75,7 +75,7 @@ class LinkageTask(Task):
 
     @property
     def table(self) -> LinkageTarget:
-        """The target's own table."""
+        """Table of the target."""
         table = self.scene.targets[self.target]
         assert isinstance(table, LinkageTarget)
         return table

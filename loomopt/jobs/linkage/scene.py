@@ -53,7 +53,7 @@ class Operation(Table):
 
 
 class LinkageTarget(TargetTable):
-    """A target of the scene's own: figures that are sought one after the other, or a path."""
+    """A target of the scene: figures that are optimised in order, or a path."""
 
     least: tuple[Name, ...] = Field((), description="figures or numbers of which the least is sought, in order")
     most: tuple[Name, ...] = Field((), description="figures or numbers of which the most is sought, after those")
@@ -71,7 +71,7 @@ class LinkageTarget(TargetTable):
 
 
 DEFAULT = {"torque": {"least": ["peak_torque"]}}
-"""The target of a scene that has none of its own."""
+"""The target of a scene that names none."""
 REACHES = ("x_max", "x_min", "y_max", "y_min")
 FEWEST = 2
 """Points of a path."""
@@ -130,12 +130,12 @@ TABLES: Mapping[str, tuple[str, Callable[[], Json]]] = {
     "events": ("named crank angles: extremes of the output, travels from them, or angles", _events_schema),
     "windows": ("stretches of crank angles after an event", _windows_schema),
 }
-"""The scene's own tables: what each holds, and its JSON Schema."""
+"""Tables that only linkage scenes have: their description and JSON Schema."""
 OWN = ("mechanism", *TABLES)
 
 
 def _table_schema(name: str) -> Json:
-    """JSON Schema of one of the scene's own tables."""
+    """JSON Schema of one of these tables."""
     text, schema = TABLES[name]
     return {"description": text, **schema()}
 

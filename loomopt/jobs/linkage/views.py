@@ -1,4 +1,4 @@
-"""The linkage's own views; what draws and prints is imported when it is first asked for.
+"""Views of the linkage; the modules that draw and print are imported at their first use.
 
 In its equations each link's angle is a symbol of its own name, its derivatives with respect to φ have primes; a part
 that slides has the place along its guide under its own name.
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from loomopt.picture.shapes import Drawing, Floats
 
 LITERAL, FINEST = 1e-14, 720
-"""Share to which a literal is told as a fraction, and parts of a half turn up to which it is one of pi."""
+"""Relative error up to which a literal is shown as a fraction, and largest denominator of a fraction of pi."""
 
 
 @dataclass
@@ -50,7 +50,7 @@ class _SymbolicParts:
     pose: chain.ChainPose
     taken: Collection[str] = ()
     angles: dict[str, Angle] = field(default_factory=dict)
-    found: list[Equation] = field(default_factory=list)
+    equations: list[Equation] = field(default_factory=list)
 
     def angle(self, name: str) -> str:
         """Symbol of the angle of a link, or of the position of a slider; it differs from the names of all numbers."""
@@ -77,7 +77,7 @@ class _SymbolicParts:
         pairs = [(sp.sympify(left), sp.sympify(right)) for left, right in sides]
         symbols = {free for pair in pairs for side in pair for free in side.free_symbols}
         known = [angle for name, angle in self.angles.items() if name not in unknown and angle.symbol in symbols]
-        self.found += loop(pairs, symbol("phi"), [self.angles[name] for name in unknown], known, f"{part.name}: ")
+        self.equations += loop(pairs, symbol("phi"), [self.angles[name] for name in unknown], known, f"{part.name}: ")
 
 
 def symbolic(linked: Chain, taken: Collection[str] = ()) -> _SymbolicParts:
@@ -106,7 +106,7 @@ def _crank(written: _SymbolicParts, part: Part) -> None:
     turned = part.ratio * symbol("phi")
     angle = Angle(written.angle(part.name), sympy().Integer(part.ratio), sympy().Integer(0))
     link = written.link(part.name, written.pose.joints[part.word("at")], angle)
-    written.found.append(equation(f"{part.name}: crank", angle.symbol, total(turned, start)))
+    written.equations.append(equation(f"{part.name}: crank", angle.symbol, total(turned, start)))
     written.pin(part, link, "length")
 
 
@@ -118,7 +118,7 @@ def _gear(written: _SymbolicParts, part: Part) -> None:
     if carrier and carrier != FRAME_NAME:
         right += (1 - ratio) * symbol(written.angle(carrier))
     link = written.link(part.name, pose.joints[part.word("at")], moving(written.angle(part.name)))
-    written.found.append(
+    written.equations.append(
         equation(f"{part.name}: gear", symbol(written.angle(part.name)), right if start is None else right + start)
     )
     written.pin(part, link, "length")
@@ -129,7 +129,7 @@ def _cam(written: _SymbolicParts, part: Part) -> None:
     lift, start = pose.number(part, "lift"), pose.number(part, "start")
     risen = lift * sp.Function(f"s_{part.word('law')}")(symbol("phi"))
     link = written.link(part.name, pose.joints[part.word("at")], moving(written.angle(part.name)))
-    written.found.append(
+    written.equations.append(
         equation(f"{part.name}: cam", symbol(written.angle(part.name)), risen if start is None else risen + start)
     )
     written.pin(part, link, "length")
@@ -220,7 +220,7 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
     numbers |= {event_value(place.name): symbol(f"phi_{place.name}") for place in linkage.places}
     known = Given(numbers, {effect.name: _own_values(model, effect) for effect in model.effects})
     letter = "F" if out.slides else "M"
-    kinematics = (*written.found, equation("output", symbol("q"), _output(out, written)))
+    kinematics = (*written.equations, equation("output", symbol("q"), _output(out, written)))
     return (*kinematics, *effect_equations.forces(model, at, known, "Q", letter))
 
 

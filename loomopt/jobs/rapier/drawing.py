@@ -119,7 +119,7 @@ def linkage(
 ) -> Drawing:
     """Drive in both dead centres of the sley and at the hand-over, at full scale. Raises BadInput.
 
-    forces: in its joints at some crank angles, each with its size as it is told.
+    forces: in its joints at some crank angles, each labelled with its size.
     """
     drive = of(design)
     strokes = [*drive.skeleton.strokes(drive.height), *_angles(drive)]

@@ -121,7 +121,7 @@ class RapierTask(Task):
 
     @property
     def dwell_numbers(self) -> Collection[str]:
-        """Numbers that are known or asked for, dwells among them."""
+        """Numbers that are known or demanded, dwells among them."""
         return {*self.known, *self.minima}
 
     @lazy

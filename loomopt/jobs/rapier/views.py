@@ -1,4 +1,4 @@
-"""The rapier's own views; what draws and prints is imported when it is first asked for."""
+"""Views of the rapier; the modules that draw and print are imported at their first use."""
 
 from collections.abc import Mapping
 from types import SimpleNamespace

@@ -431,7 +431,7 @@ SIZES = ("arm", "centre_distance", "base_radius", "roller_radius")
 
 
 def settled(least: float, most: float) -> float:
-    """Least cam force, N, as it is told: what is only rounding is 0."""
+    """Least cam force, N, as it is shown: rounding counts as 0."""
     return 0.0 if abs(least) <= SHOWN_AS_ZERO * abs(most) else least
 
 

@@ -75,7 +75,7 @@ SAME = 1e-12
 MOVES = " The moves, where not every force is known, are not judged."
 LIMIT = "law_acceleration"
 PROBES = ((RISE, 0.25, 0.125, 0.0, 0.0), (RISE, 0.75, 0.5, 1.5, -2.0), (RETURN, 0.125, 0.375, 2.0, 3.0))
-"""Segment, s, u, s' and s'' at which the sum of the loads is asked whether it is that of the closed form."""
+"""Segment, s, u, s' and s'' at which the sum of the loads is compared with the closed form."""
 ALIKE = 1e-30
 """Share of the forces by which it may differ: rounding in these digits."""
 Force = Callable[[int, float, float, float, float], Number]

@@ -424,7 +424,7 @@ class SheddingTask(Task):
         limit = self.row_limit("N_min", -1, row, least, size, relaxable=least > 0.0)
         speed_limits = [replace(limit, row=other_row, hidden=True) for other_row in self.speed_rows if other_row != row]
         if least > 0.0:
-            # What is asked beyond contact may give way; contact itself may not.
+            # A demanded force beyond contact may give way; contact itself may not.
             return [limit, replace(limit, name="contact", value=0.0, relaxable=False, hidden=True), *speed_limits]
         return [limit, *speed_limits]
 
