@@ -143,10 +143,10 @@ def spike_peaks(heights: Callable[[Floats], Floats], centre: float) -> list[floa
     if not np.all(np.isfinite(values)):
         return []
     inner = np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:])) + 1
-    return [sectioned(heights, float(angles[k - 1]), float(angles[k + 1])) for k in inner]
+    return [golden_section(heights, float(angles[k - 1]), float(angles[k + 1])) for k in inner]
 
 
-def sectioned(heights: Callable[[Floats], Floats], low: float, high: float) -> float:
+def golden_section(heights: Callable[[Floats], Floats], low: float, high: float) -> float:
     """Maximiser of a function with one maximum between low and high, by golden sections."""
     for _ in range(SPIKE_SECTIONS):
         left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)

@@ -83,7 +83,7 @@ class TorqueBudget:
 
 def budget(sampler: Sampler, fluctuation: float | None = None) -> TorqueBudget:
     """Torque budget of a sampled design; a load acts on its crank over the whole turn."""
-    loads = shared(sampler.model.loads)
+    loads = loads_with_share(sampler.model.loads)
     names = tuple(f"share of {load.name}" for load in loads)
     shares = dict(zip(names, loads, strict=True))
     parted = Sampler(_with_shares(sampler.model, shares), sampler.values, sampler.samples)
@@ -120,7 +120,7 @@ def _with_shares(model: JobModel, shares: Mapping[str, Acting]) -> JobModel:
     return replace(model, own_quantities={**model.own_quantities, **quantities})
 
 
-def shared(loads: Sequence[Acting]) -> tuple[Acting, ...]:
+def loads_with_share(loads: Sequence[Acting]) -> tuple[Acting, ...]:
     """Loads with a share of their own: all but those of a state that does not declare its inertia."""
     silent = [load for load in loads if isinstance(load, State) and not load.moved]
     gone = balance.carried(silent)

@@ -68,7 +68,7 @@ def _tops(squares: Callable[[Floats], Sequence[Floats]]) -> Iterator[tuple[float
 
         top = int(np.argmax(sampled))
         if sampled[top] > 1 - WORTH_A_LOOK * NEARLY_SINGULAR:
-            place = turning_points.sectioned(height, float(angles[top]) - step, float(angles[top]) + step)
+            place = turning_points.golden_section(height, float(angles[top]) - step, float(angles[top]) + step)
             yield place, float(height(np.array([place]))[0])
 
 

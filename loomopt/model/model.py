@@ -225,7 +225,7 @@ FRAME = "frame"
 """Name of the frame among the parts between which a force acts."""
 
 
-def jointed(check: Check[Any], known: Collection[str]) -> dict[str, CycleQuantity]:
+def joint_quantities(check: Check[Any], known: Collection[str]) -> dict[str, CycleQuantity]:
     """Values that a check reads of the forces in the joints; known: names of scene numbers that are given."""
     quantities: dict[str, CycleQuantity] = {}
     lacked = lacking(check, known)
@@ -319,7 +319,7 @@ def read_at(state: State, at: Instant) -> StateInstant:
     """Values of a state at an instant."""
 
     def coordinate() -> Number:
-        reply = balance.replied(at.maths, state, at.model.loads, at.pose, at.given, at.node.switch)
+        reply = balance.reply_to_corners(at.maths, state, at.model.loads, at.pose, at.given, at.node.switch)
         return state.coordinate(at.inputs(state), reply)
 
     return StateInstant(at.pose, coordinate, lambda: at.force)
@@ -449,7 +449,7 @@ class JobModel:
         for check in self.checks:
             for name in check.quantities:
                 quantities[name] = CycleQuantity(functools.partial(check_value, check, name))
-            quantities |= jointed(check, self.known) if check.joints else {}
+            quantities |= joint_quantities(check, self.known) if check.joints else {}
         if not self.states:
             return quantities
 

@@ -70,7 +70,7 @@ def terms(
             continue
         at = given.inputs(maths, load, pose, switch)
         if isinstance(load, State):
-            yield load, load.force(at, replied(maths, load, loads, pose, given, switch))
+            yield load, load.force(at, reply_to_corners(maths, load, loads, pose, given, switch))
         elif load.upon:
             others = [acting for acting in loads if acting is not load]
             yield load, load.upon(at, Loaded(maths, others, pose, given, switch))
@@ -78,7 +78,7 @@ def terms(
             yield load, load.force(at)
 
 
-def replied(
+def reply_to_corners(
     maths: Maths, state: State, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values
 ) -> tuple[Number, Number]:
     """z and z˙ in answer to the loads with corners that a state carries."""
@@ -154,7 +154,7 @@ class Loaded:
         if state is None or state.moved is None:
             return self.pose
         at = self.given.inputs(self.maths, state, self.pose)
-        reply = replied(self.maths, state, self.loads, self.pose, self.given, self.switch)
+        reply = reply_to_corners(self.maths, state, self.loads, self.pose, self.given, self.switch)
         coordinate = state.coordinate(at, reply)
         moving = [(load, term) for load, term in self.terms if load.name in state.carries and isinstance(load, Load)]
         inertia = total([load.moved(self.given.inputs(self.maths, load)) for load, _ in moving if load.moved])

@@ -11,7 +11,7 @@ from loomopt.base.errors import BadInput
 from loomopt.maths import systems
 from loomopt.physics.effects.kinds import Applied
 from loomopt.physics.mechanisms.chain import Chain
-from loomopt.physics.mechanisms.chain_forces import walked
+from loomopt.physics.mechanisms.chain_forces import solve_forces
 from loomopt.physics.mechanisms.dyad import Dyad, Vector, cross
 from loomopt.physics.mechanisms.joint_forces import Wrench, link_and_slider, slotted_lever, two_links
 
@@ -123,8 +123,8 @@ def test_a_whole_chain_in_line_says_so():
     """Folded at crank angle 0: l4 - l1 = l2 - l3, where coordinates are exact."""
     folded = four_bar(1.0, 5.0, 2.0, 4.0)
     with pytest.raises(ZeroDivisionError, match="singular position"):
-        walked(folded, folded.pose(systems.FLOAT, {}, 0.0), [Applied("C", Vector(10.0, 5.0))])
-    beside = walked(folded, folded.pose(systems.FLOAT, {}, 1e-3), [Applied("C", Vector(10.0, 5.0))])
+        solve_forces(folded, folded.pose(systems.FLOAT, {}, 0.0), [Applied("C", Vector(10.0, 5.0))])
+    beside = solve_forces(folded, folded.pose(systems.FLOAT, {}, 1e-3), [Applied("C", Vector(10.0, 5.0))])
     assert all(math.isfinite(force.x) and math.isfinite(force.y) for force in beside.forces.values())
 
 
@@ -135,8 +135,8 @@ def test_a_crank_that_turns_the_other_way_has_the_same_forces():
     other = Chain(tuple(parts))
     for phi in (0.4, 2.0, 5.0):
         load = [Applied("C", Vector(30.0, -70.0))]
-        one = walked(own, own.pose(systems.FLOAT, {}, phi), load)
-        two = walked(other, other.pose(systems.FLOAT, {}, -phi), load)
+        one = solve_forces(own, own.pose(systems.FLOAT, {}, phi), load)
+        two = solve_forces(other, other.pose(systems.FLOAT, {}, -phi), load)
         for place, force in one.forces.items():
             assert two.forces[place] == pytest.approx(force, rel=1e-12)
         assert two.torque == pytest.approx(-one.torque, rel=1e-12)

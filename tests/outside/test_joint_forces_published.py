@@ -16,7 +16,7 @@ from test_linkages import four_bar, rows, stephenson, watt
 
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.effects.kinds import Applied
-from loomopt.physics.mechanisms.chain_forces import walked
+from loomopt.physics.mechanisms.chain_forces import solve_forces
 from loomopt.physics.mechanisms.dyad import Vector
 
 SPEED, G = 10 * math.pi / 30, 9.81
@@ -74,7 +74,7 @@ def test_pmks_torque_and_every_pin(name, gravity):
         linked = chain(LINKAGES[name](row, published[0]))
         pose, speed = linked.pose(FLOAT, {}, row["input_angle_rad"]), row["direction"] * SPEED
         applied, power = loads(pose, name, speed, gravity)
-        walk = walked(linked, pose, applied)
+        walk = solve_forces(linked, pose, applied)
         assert walk.torque * speed == pytest.approx(-power, rel=1e-11)
         size = max(abs(row[f"{kind} {joint}_f{axis}"]) for joint in SIGNS[name] for axis in "xy")
         assert walk.torque == pytest.approx(row[f"{kind} torque"], rel=close)
@@ -88,7 +88,7 @@ def test_pmks_first_row_of_watt_i():
     row = rows("pmks_watt_i_forces")[0]
     linked = chain(watt(row, row))
     pose = linked.pose(FLOAT, {}, row["input_angle_rad"])
-    plain, heavy = (walked(linked, pose, loads(pose, "watt_i", SPEED, gravity)[0]) for gravity in (False, True))
+    plain, heavy = (solve_forces(linked, pose, loads(pose, "watt_i", SPEED, gravity)[0]) for gravity in (False, True))
     assert plain.torque == pytest.approx(1474.5549914, rel=3e-7)
     assert heavy.torque == pytest.approx(1844.3174730, rel=3e-7)
     assert tuple(heavy.forces["A", "AB"]) == pytest.approx((-617.288707, -176.534838), rel=3e-7)
@@ -127,19 +127,19 @@ def bars(pose, speed, inertias=None, left_out=()):
 def test_static_four_bar_and_its_equation_of_motion():
     linked = chain(FOUR_BAR)
     pose = linked.pose(FLOAT, {}, math.radians(30))
-    still = walked(linked, pose, bars(pose, 0.0)[0])
+    still = solve_forces(linked, pose, bars(pose, 0.0)[0])
     assert still.torque == pytest.approx(21.085597076442, rel=1e-12)
     # Printed as the frame feels them.
     assert tuple(still.forces["A", "crank"]) == pytest.approx((5.552977629, 37.363563425), rel=1e-9)
     assert tuple(still.forces["D", "drive"]) == pytest.approx((-5.552977629, 31.306436575), rel=1e-9)
     applied, power = bars(pose, 1.0)
-    moving = walked(linked, pose, applied)
+    moving = solve_forces(linked, pose, applied)
     assert moving.torque == pytest.approx(-power, rel=1e-12)
     assert moving.torque != pytest.approx(still.torque, rel=1e-2)
     # Printed at 1 rad/s to seven digits, right and as the program has it.
     inertias = {"crank": 0.0, "rod": 0.05, "rocker": 0.02}
     for left_out, torque in (((), 21.4194636), (("rod",), 21.4074709), (tuple(BARS), 21.4074709)):
-        found = walked(linked, pose, bars(pose, 1.0, inertias, left_out)[0])
+        found = solve_forces(linked, pose, bars(pose, 1.0, inertias, left_out)[0])
         assert found.torque == pytest.approx(torque, abs=5e-8)
 
 
@@ -161,5 +161,5 @@ def test_the_teaching_four_bar_with_uniform_bars_takes_the_power_that_it_gives(s
             couple = -2 * length**3 / 12 * rates[1] * speed**2
             applied.append(Applied(link, force, centre, couple))
             power += (force.x * velocity.x + force.y * velocity.y + couple * rates[0]) * speed
-        walk = walked(linked, pose, applied)
+        walk = solve_forces(linked, pose, applied)
         assert walk.torque * speed == pytest.approx(-power, rel=1e-11, abs=1e-11)

@@ -473,7 +473,7 @@ def _top(heights: "Callable[[Floats], Floats]") -> tuple[float, float]:
     """Highest of heights(angles) over one turn, between samples too where it nears 1, and its angle, rad."""
     import numpy as np
 
-    from loomopt.maths.turning_points import sectioned
+    from loomopt.maths.turning_points import golden_section
 
     step = 2 * math.pi / SAMPLES
     angles: Floats = step * np.arange(SAMPLES, dtype=np.float64)
@@ -484,7 +484,7 @@ def _top(heights: "Callable[[Floats], Floats]") -> tuple[float, float]:
         return candidates[0]
     tops = (values >= np.roll(values, 1)) & (values >= np.roll(values, -1)) & (values > WORTH_A_LOOK)
     for angle in angles[tops]:
-        at = sectioned(heights, float(angle) - step, float(angle) + step)
+        at = golden_section(heights, float(angle) - step, float(angle) + step)
         candidates.append((float(heights(np.array([at]))[0]), at % (2 * math.pi)))
     return max(candidates, key=lambda candidate: math.inf if math.isnan(candidate[0]) else candidate[0])
 

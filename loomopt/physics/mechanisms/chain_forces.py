@@ -79,12 +79,12 @@ def names(linked: Chain) -> dict[tuple[str, str], str]:
     return {place: place[0] if shared.count(place[0]) == 1 else f"{place[0]}_{place[1]}" for place in places}
 
 
-def pinned(linked: Chain) -> dict[tuple[str, str], str]:
+def pin_forces(linked: Chain) -> dict[tuple[str, str], str]:
     """Forces in pins: all but those of guides."""
     return {place: name for place, name in names(linked).items() if place[0] != place[1]}
 
 
-def joined(linked: Chain, place: tuple[str, str]) -> tuple[str, str]:
+def body_pair(linked: Chain, place: tuple[str, str]) -> tuple[str, str]:
     """Bodies that a force is between: of the first on the second one."""
     joint, name = place
     part = next(candidate for candidate in linked.parts if candidate.name == name)
@@ -107,14 +107,14 @@ def guides(linked: Chain) -> dict[str, str]:
     return {slider_of(part.name): part.word("guide") or FRAME_NAME for part in sliders}
 
 
-def turned(linked: Chain, pose: ChainPose, place: tuple[str, str]) -> Number:
+def pin_rotation(linked: Chain, pose: ChainPose, place: tuple[str, str]) -> Number:
     """Rotation of the second body of a pin relative to the first one, per rad of the crank."""
     with_it = guides(linked)
-    first, second = (pose.links[with_it.get(body, body)].rates(1) for body in joined(linked, place))
+    first, second = (pose.links[with_it.get(body, body)].rates(1) for body in body_pair(linked, place))
     return known(total(second, less(first)))
 
 
-def geared(linked: Chain) -> tuple[str, ...]:
+def meshing_gears(linked: Chain) -> tuple[str, ...]:
     """Gears that touch their mates at their pitch circles."""
     joints = origins(linked)
     gears = (part for part in linked.parts if part.kind == "gear" and part.ratio != 1)
@@ -222,7 +222,7 @@ class Walk:
         joint, mate = part.word("at"), part.word("with")
         wrench = self.acting(part.name, joint) or Wrench(Vector(0, 0), 0)
         torque, here = -wrench.moment, self.at(joint)
-        if part.name not in geared(self.linked):
+        if part.name not in meshing_gears(self.linked):
             # On one axis, or side by side with the same speed: a couple, and what is left of it on the carrier.
             self.push(mate, None, here, -part.ratio * torque)
             self.push(part.word("carrier") or FRAME_NAME, None, here, (part.ratio - 1) * torque)
@@ -237,7 +237,7 @@ class Walk:
         self.given(joint, part, minus(plus(wrench.force, push)))
 
 
-def walked(linked: Chain, pose: ChainPose, applied: Sequence[Applied]) -> Walk:
+def solve_forces(linked: Chain, pose: ChainPose, applied: Sequence[Applied]) -> Walk:
     """Chain with the forces in all its joints, N, and what the main shaft must give."""
     walk = Walk(linked, pose)
     for load in applied:

@@ -188,7 +188,7 @@ def enough(weigh: Weigh, maths: Maths, begun: int = FEWEST) -> int:
     return count
 
 
-def answered(oscillator: Oscillator, force: FourierSeries) -> tuple[FourierSeries, FourierSeries]:
+def response(oscillator: Oscillator, force: FourierSeries) -> tuple[FourierSeries, FourierSeries]:
     """Harmonics of z and of k z + c z˙ in answer to those of a force."""
     of = oscillator.of
     positions: list[Pair] = []

@@ -10,7 +10,7 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.physics.effects.kinds import Applied
-from loomopt.physics.mechanisms.chain_forces import names, walked
+from loomopt.physics.mechanisms.chain_forces import names, solve_forces
 from loomopt.physics.mechanisms.dyad import Vector
 
 SCENES = ("sixbar-sley", "knuckle-press", "shaper")
@@ -112,7 +112,7 @@ def test_teeth_hand_on_what_both_cranks_take():
     linked = chain(GEARED)
     for phi in (0.3, 2.0, 4.4):
         pose = linked.pose(systems.FLOAT, {}, phi)
-        walk = walked(linked, pose, [Applied("C", Vector(30.0, -70.0))])
+        walk = solve_forces(linked, pose, [Applied("C", Vector(30.0, -70.0))])
         rate = pose.joints["C"].at(1)
         assert walk.torque == pytest.approx(-(30.0 * rate.x - 70.0 * rate.y), rel=1e-12)
         # Pitch radii 0.1 and 0.2 m; the teeth push across the line of centres.

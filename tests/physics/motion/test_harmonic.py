@@ -168,7 +168,7 @@ def answered(damped):
     """Return an oscillator, the load's harmonics, and those of z and of k z + c z˙."""
     of = oscillator(systems.FLOAT, damped)
     force = harmonic.harmonics(systems.FLOAT, 64, weighed)
-    return of, force, *harmonic.answered(of, force)
+    return of, force, *harmonic.response(of, force)
 
 
 def slopes(series):
@@ -214,7 +214,7 @@ def test_a_stiff_shaft_hands_its_load_on_and_a_soft_one_only_its_mean():
 
     def missing(k, wanted):
         constants = harmonic.constants(systems.FLOAT, "under", J, 1e-6 * k, k, OMEGA)
-        torque = harmonic.answered(harmonic.Oscillator(systems.FLOAT, "under", constants), force)[1]
+        torque = harmonic.response(harmonic.Oscillator(systems.FLOAT, "under", constants), force)[1]
         return max(abs(torque.at(systems.FLOAT, phi) - wanted(phi)) for phi in (0.0, 1.0, 2.5, 4.0))
 
     stiff = [missing(k, periodic) for k in (1e9, 1e10)]

@@ -75,7 +75,7 @@ def derived(at: Inputs[object], carried: "Carried") -> dict[str, Number]:
         at.maths, regime, carried.inertia, at.table["damping"], at.table["stiffness"], at.values["speed"]
     )
     force = harmonic.harmonics(at.maths, count, carried.weigh)
-    twist, torque = harmonic.answered(harmonic.Oscillator(at.maths, regime, constants), force)
+    twist, torque = harmonic.response(harmonic.Oscillator(at.maths, regime, constants), force)
     return harmonic.named(NAME, constants) | harmonic.named(TWIST, twist) | harmonic.named(TORQUE, torque)
 
 

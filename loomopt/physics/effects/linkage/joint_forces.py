@@ -78,7 +78,7 @@ class LinkageForces:
         from loomopt.physics.mechanisms import chain_forces
 
         loads = [*self.loading.applied, *self.output(-self.loading.force)]
-        return chain_forces.walked(self.linked, self.pose.joints, loads)
+        return chain_forces.solve_forces(self.linked, self.pose.joints, loads)
 
     @lazy
     def _called(self) -> dict[str, tuple[str, str]]:
@@ -107,8 +107,8 @@ class LinkageForces:
         from loomopt.physics.mechanisms import chain_forces
 
         turned = {
-            name: (f"force_{name}", chain_forces.turned(self.linked, self.pose.joints, place))
-            for place, name in chain_forces.pinned(self.linked).items()
+            name: (f"force_{name}", chain_forces.pin_rotation(self.linked, self.pose.joints, place))
+            for place, name in chain_forces.pin_forces(self.linked).items()
         }
         return pins.works(self.at, turned)
 
@@ -136,7 +136,7 @@ def fitted(linked: "Chain") -> Check[LinkagePose]:
     """Check of a linkage, with a figure for every force that it has."""
     from loomopt.physics.mechanisms import chain_forces
 
-    vectors, teeth = {}, {f"teeth_{gear}": gear for gear in chain_forces.geared(linked)}
+    vectors, teeth = {}, {f"teeth_{gear}": gear for gear in chain_forces.meshing_gears(linked)}
     parts, places = {part.name: part for part in linked.parts}, chain_forces.names(linked)
     for (joint, part), name in places.items():
         where = f"in joint {joint}" if joint != part else f"in the guide of {part}"
@@ -147,12 +147,12 @@ def fitted(linked: "Chain") -> Check[LinkagePose]:
     forces += [
         Figure(name, "force", f"peak force of the teeth of {gear}", sides=("max",)) for name, gear in teeth.items()
     ]
-    rubbed = {name: f"joint {joint}" for (joint, _), name in chain_forces.pinned(linked).items()}
+    rubbed = {name: f"joint {joint}" for (joint, _), name in chain_forces.pin_forces(linked).items()}
     moment = "peak moment of all moving masses about the crank shaft"
     return replace(
         EFFECT,
         table=pins.parameters(rubbed),
-        sides={f"force_{name}": chain_forces.joined(linked, place) for place, name in places.items()},
+        sides={f"force_{name}": chain_forces.body_pair(linked, place) for place, name in places.items()},
         worked={pins.LOSS: "friction_work"},
         wanted={pins.LOSS: ("operation.speed", *pins.read("joint_forces", rubbed))},
         joints=functools.partial(LinkageForces, linked),
