@@ -153,7 +153,7 @@ def test_the_true_status_stands_first(answers):
         altered(good, limits=broken),
     ):  # the word of its status alone makes no optimum
         assert (status(found).verdict, status(found).level) == ("NOT CERTIFIED", "bad")
-    assert "stationarity 0.1" in " ".join(status(altered(good, certificate=bad)).told)
+    assert "stationarity 0.1" in " ".join(status(altered(good, certificate=bad)).sentences)
 
 
 def test_what_is_not_proven_or_not_reached_is_no_plain_optimum(answers):
