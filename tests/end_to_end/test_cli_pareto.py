@@ -125,7 +125,7 @@ def test_axes_that_do_not_conflict_are_one_point(cli):
 )
 def test_the_most_of_an_axis(cli, monkeypatch, arguments, axes):
     asked: dict[str, Trade] = {}
-    monkeypatch.setattr(studies, "carried_out", lambda study, how: len(asked.setdefault("study", study).axes))
+    monkeypatch.setattr(studies, "run", lambda study, how: len(asked.setdefault("study", study).axes))
     assert cli("beatup", *arguments)[0] == 2
     trade = asked["study"]
     assert dict(zip(trade.axes, trade.senses, strict=True)) == axes

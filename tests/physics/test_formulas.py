@@ -22,6 +22,8 @@ FORBIDDEN_NAMES = {
 }
 NOT_FORMULAS = {"crank_rocker.py": {"curves", "fault", "_where_it_stops", "_angle_at"}}
 """Parts of the crank-rocker that talk to people or fill arrays: they run on plain floats only."""
+IN_FLOATS = {"fixed", "remark", "samples"}
+"""Functions of an effect that run on plain floats only: before the formulas, or beside them."""
 EFFECT_FILES = sorted(
     f"{path.parent.name}/{path.name}" for path in PACKAGE.glob("effects/*/*.py") if path.name != "__init__.py"
 )
@@ -52,7 +54,7 @@ def read(*path):
 
 
 def asks_the_scene(test):
-    """Say whether a condition asks how the scene is built: `X is None`, `"table" in own`, `X == "word"`, or several."""
+    """Say whether a condition asks how the scene is built: `X is None`, `"table" in at.table`, `X == "word"`, or several."""
     if isinstance(test, ast.BoolOp):
         return all(map(asks_the_scene, test.values))
     if not isinstance(test, ast.Compare) or len(test.ops) != 1:
@@ -60,11 +62,17 @@ def asks_the_scene(test):
     (kind,), (right,), left = test.ops, test.comparators, test.left
     if isinstance(kind, ast.Is | ast.IsNot):
         return ast.unparse(right) == "None"
-    if isinstance(kind, ast.In | ast.NotIn) and ast.unparse(right) == "own":
+    if isinstance(kind, ast.In | ast.NotIn) and ast.unparse(right) in ("own", "at.table"):
         return True
     word = left if isinstance(kind, ast.In | ast.NotIn) else right
     asked = isinstance(kind, ast.In | ast.NotIn | ast.Eq | ast.NotEq)
     return asked and isinstance(getattr(word, "value", None), str)
+
+
+def reads_inputs(function):
+    """Whether a function reads the inputs of an effect, as its argument or as `self.at`."""
+    arguments = {argument.arg for argument in function.args.args}
+    return bool(arguments & {"maths", "at"}) or "self.at" in ast.unparse(function)
 
 
 def without_structure(node):
@@ -143,7 +151,7 @@ def test_formulas_of_an_oscillator_hold_no_branch(name):
 @pytest.mark.parametrize("file", EFFECT_FILES)
 def test_formulas_of_an_effect_hold_no_branch(file):
     found = functions(read("effects", file))
-    formulas = {name: node for name, node in found.items() if any(a.arg == "maths" for a in node.args.args)}
+    formulas = {name: node for name, node in found.items() if name not in IN_FLOATS and reads_inputs(node)}
     assert formulas or file == "shedding/separation.py", "flight is followed in floats alone"
     for name, node in formulas.items():
         assert not offences(without_structure(node)), name

@@ -1,4 +1,4 @@
-"""Stretch of the tape: the head's overrun, its limit, and where quasi-static is too rough."""
+"""Stretch of the tape: the head's overrun, its limit, and where the quasi-static value is inaccurate."""
 
 import math
 
@@ -55,7 +55,7 @@ def test_it_needs_the_heads_inertia():
 def test_a_head_that_swings_too_slowly_is_remarked_upon(stiffness, remarked):
     """sqrt(k/m) = 20 ω at 5526.98 N/m."""
     scene = ON.set("effects.tape_stretch.stiffness", stiffness)
-    assert any("too rough" in text for text in JOB.views.remarks(scene, {})) == remarked
+    assert any("head_overrun, a quasi-static value, is inaccurate" in text for text in JOB.views.remarks(scene, {})) == remarked
 
 
 def test_its_equation_is_written():

@@ -114,14 +114,14 @@ def test_a_missing_front_or_column_is_named(shedding, copy, monkeypatch):
     path.write_text(path.read_text(encoding="utf-8").replace("K1 per X0", "K1 by X0"), encoding="utf-8")
     assert len(differences(copy, shedding)) == 10
     path.unlink()
-    monkeypatch.setattr(study, "served", lambda scene: [])
+    monkeypatch.setattr(study, "available_targets", lambda scene: [])
     (outcome,) = study.check(["shedding"], copy)
     assert (outcome.target, outcome.differences) == ("K1 against X0", (f"no reference table {NAME}",))
 
 
 def test_the_check_names_front_point_and_column(copy, monkeypatch):
     edited(copy, -1, "K1", larger(-1e-6))
-    monkeypatch.setattr(study, "served", lambda scene: [])
+    monkeypatch.setattr(study, "available_targets", lambda scene: [])
     said: list[str] = []
     (outcome,) = study.check(["shedding"], copy, said.append)
     assert said == ["solving shedding, K1 against X0"]
@@ -130,7 +130,7 @@ def test_the_check_names_front_point_and_column(copy, monkeypatch):
 
 
 def test_a_front_is_written_beside_the_other_references(tmp_path, monkeypatch):
-    monkeypatch.setattr(study, "served", lambda scene: [])
+    monkeypatch.setattr(study, "available_targets", lambda scene: [])
     assert study.write(tmp_path, ["shedding", "shedding-printed-travel"]) == [tmp_path / NAME]
     head = [line for line in (tmp_path / NAME).read_text(encoding="utf-8").splitlines() if line.startswith("# ")]
     told = dict(line[2:].split(": ", 1) for line in head)
