@@ -54,14 +54,14 @@ def read(*path):
 
 
 def asks_the_scene(test):
-    """Say whether a condition asks how the scene is built: `X is None`, `"table" in at.table`, `X == "word"`, or several."""
+    """Say whether a condition asks how the scene is built: `X is Y`, `"table" in at.table`, `X == "word"`, or several."""
     if isinstance(test, ast.BoolOp):
         return all(map(asks_the_scene, test.values))
     if not isinstance(test, ast.Compare) or len(test.ops) != 1:
         return False
     (kind,), (right,), left = test.ops, test.comparators, test.left
     if isinstance(kind, ast.Is | ast.IsNot):
-        return ast.unparse(right) == "None"
+        return True
     if isinstance(kind, ast.In | ast.NotIn) and ast.unparse(right) in ("own", "at.table"):
         return True
     word = left if isinstance(kind, ast.In | ast.NotIn) else right
