@@ -54,9 +54,13 @@ def read(*path):
 
 
 def asks_the_scene(test):
-    """Say whether a condition asks how the scene is built: `X is Y`, `"table" in at.table`, `X == "word"`, or several."""
+    """Whether a condition asks how the scene is built: `X is Y`, `"table" in at.table`, `X == "word"`, or several."""
     if isinstance(test, ast.BoolOp):
         return all(map(asks_the_scene, test.values))
+    if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+        return asks_the_scene(test.operand)
+    if isinstance(test, ast.Call) and ast.unparse(test.func) == "any" and isinstance(test.args[0], ast.GeneratorExp):
+        return asks_the_scene(test.args[0].elt)
     if not isinstance(test, ast.Compare) or len(test.ops) != 1:
         return False
     (kind,), (right,), left = test.ops, test.comparators, test.left
