@@ -3,6 +3,7 @@
 import dataclasses
 import inspect
 import os
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -344,9 +345,15 @@ class Answer(Evaluation):
     result: solution.Solution
 
     @lazy
-    def before(self) -> Evaluation | None:
+    def today(self) -> Evaluation | None:
         """Today's machine, evaluated when it is first read."""
-        return _to_evaluation(self.result.before, self.scene, self.target) if self.result.before else None
+        return _to_evaluation(self.result.today, self.scene, self.target) if self.result.today else None
+
+    @property
+    def before(self) -> Evaluation | None:
+        """Former name of `today`."""
+        warnings.warn("before is now today; the old name goes in the next version", DeprecationWarning, stacklevel=2)
+        return self.today
 
     def __str__(self) -> str:
         from loomopt.interface.text import answers, layout

@@ -56,7 +56,7 @@ def rows(solution: Evaluated, scene: Scene, before: Evaluated | None = None) -> 
     A figure the scene cannot have is left out.
     """
     words = Words(scene)
-    before = before or (solution.before if isinstance(solution, Solution) else None)
+    before = before or (solution.today if isinstance(solution, Solution) else None)
     limits = {limit.name: limit for limit in solution.limits}
     prices = solution.binding if isinstance(solution, Solution) else ()
     binding = {price.limit: price.side for price in prices}

@@ -51,7 +51,7 @@ def test_an_answer_says_what_was_found(answer):
     assert answer.figures["M3_fdc"] == pytest.approx(-76.9811021, rel=1e-8)
     assert {price.limit for price in answer.binding} >= {"l1", "l4"}
     assert answer.table().loc["l1", "design"] == pytest.approx(30, rel=1e-9)
-    assert answer.before.design["l1"] == 0.031
+    assert answer.today.design["l1"] == 0.031
 
 
 def test_curves_are_those_of_the_design(answer):
@@ -202,7 +202,19 @@ METHODS = {
             "solver",
             "sought",
         ),
-        *("beside", "outcome", "status", "table", "target", "terms", "time", "to_frame", "today", "units"),
+        *(
+            "beside",
+            "outcome",
+            "status",
+            "table",
+            "target",
+            "terms",
+            "time",
+            "to_frame",
+            "evaluate_today",
+            "today",
+            "units",
+        ),
         *(
             "report",
             "result",

@@ -168,9 +168,11 @@ def test_everything_shows_itself_in_jupyter(answer, evaluation):
 
 
 def test_today_beside_an_answer_is_an_evaluation_of_its_scene(answer):
-    assert isinstance(answer.before, lo.Evaluation)
-    assert (answer.before.scene, answer.before.target) == (answer.scene, "balance")
-    assert answer.before.figures == lo.evaluate("beatup-light").figures
+    assert isinstance(answer.today, lo.Evaluation)
+    assert (answer.today.scene, answer.today.target) == (answer.scene, "balance")
+    assert answer.today.figures == lo.evaluate("beatup-light").figures
+    with pytest.warns(DeprecationWarning, match="before is now today"):
+        assert answer.before is answer.today
 
 
 def test_an_evaluation_goes_on_in_its_own_scene_and_target(evaluation):

@@ -36,7 +36,7 @@ def test_a_solved_toy_says_how():
     ]  # fmt: skip
     assert all(seconds >= 0.0 for seconds in answer.time.values())
     assert answer.time["total_s"] >= sum(seconds for name, seconds in answer.time.items() if name != "total_s")
-    assert answer.before.design == {"x": 0.5, "y": 0.5}
+    assert answer.today.design == {"x": 0.5, "y": 0.5}
     assert answer.optima == (({"f": pytest.approx(0.0, abs=1e-12)}, 1),)
 
 
@@ -144,6 +144,6 @@ def test_todays_machine_is_evaluated_when_it_is_asked_for(monkeypatch):
     asked = []
     monkeypatch.setattr(report, "evaluation", lambda *_: asked.append(1))
     assert asked == []
-    assert answer.before is None
-    assert answer.before is None
+    assert answer.today is None
+    assert answer.today is None
     assert asked == [1]

@@ -80,7 +80,7 @@ def _answer(document: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -
         time={str(name): float(value) for name, value in document.get("time", {}).items()},
         proofs=_proofs(document["proofs"], evaluation) if document.get("proofs") else None,
         global_bound=bound,
-        today=functools.partial(report.evaluate, scene, None, evaluation.target or None),
+        evaluate_today=functools.partial(report.evaluate, scene, None, evaluation.target or None),
     )
     return Answer(record, record.target)
 

@@ -55,7 +55,7 @@ class Subject:
     def before(self) -> Evaluated | None:
         """Today's machine; None where the design is that."""
         if isinstance(self.evaluated, Solution):
-            return self.evaluated.before
+            return self.evaluated.today
         now = registry.of(self.scene).today(self.scene)
         is_now = flat(self.evaluated.design).items() <= now.items()
         return None if is_now else report.evaluate(self.scene, None, self.target or None)

@@ -37,7 +37,7 @@ def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
         parts.append(answer.message)
         explanation = ""  # the message ends with it
     parts += [text for text in (explanation, Words(scene).worse(answer.worse)) if text]
-    parts += [comparison(answer, scene, answer.before, heading)] if answer.design else []
+    parts += [comparison(answer, scene, answer.today, heading)] if answer.design else []
     parts += lists(answer, scene)
     parts += [members(answer, scene)] if answer.members else []
     if answer.certificate:

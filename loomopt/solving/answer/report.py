@@ -364,7 +364,7 @@ def with_optimum(
         bind_together=together,
         certificate=certificate,
         solver=solver,
-        today=today,
+        evaluate_today=today,
     )
 
 
@@ -458,7 +458,7 @@ def without_optimum(
         relaxation=tuple(each for remedy in remedies(found.relaxations) for each in remedy),
         clash=tuple(found.limits),
         solver=solver,
-        today=today,
+        evaluate_today=today,
     )
 
 

@@ -525,7 +525,7 @@ class Solution(Evaluated):
     """How limits were backed off, where that was asked for."""
     rounded: Rounded | None = None
     """How numbers were put to sizes, where that was asked for."""
-    today: Callable[[], Evaluated] | None = None
+    evaluate_today: Callable[[], Evaluated] | None = None
     """Evaluates today's machine."""
     point: Any = field(default=None, repr=False)
     """Where the solver stood: what a neighbour's solve can start from."""
@@ -560,17 +560,17 @@ class Solution(Evaluated):
         return f"{self.status} but {missed}" if missed else self.status
 
     @lazy
-    def before(self) -> Evaluated | None:
+    def today(self) -> Evaluated | None:
         """Today's machine, evaluated when it is first read."""
-        return self.today() if self.today else None
+        return self.evaluate_today() if self.evaluate_today else None
 
     @lazy
     def worse(self) -> tuple[Worse, ...]:
         """Figures with a good end that it makes worse than today's by more than `WORSE`, beside what it seeks."""
-        if self.scene is None or self.status not in ("optimal", "uncertified") or self.before is None:
+        if self.scene is None or self.status not in ("optimal", "uncertified") or self.today is None:
             return ()
         sought = {level.objective for level in self.certificate.levels} if self.certificate else set[str]()
-        known, old = self.scene.schema.figures, self.before.figures
+        known, old = self.scene.schema.figures, self.today.figures
         ends = {name: each.sides[0] for name, each in known.items() if len(each.sides) == 1 and name not in sought}
         pairs = {name: (old.get(name), self.figures.get(name)) for name in ends}
         found = [Worse(name, a, b) for name, (a, b) in pairs.items() if a is not None and b is not None]

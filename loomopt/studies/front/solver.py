@@ -536,7 +536,7 @@ def _certified(
         bind_together=joint,
         certificate=certificate,
         solver={"accuracy": solver.accuracy},
-        today=functools.partial(terms.evaluation, {}),
+        evaluate_today=functools.partial(terms.evaluation, {}),
     )
 
 

@@ -75,7 +75,7 @@ def test_the_optimum_never_lifts_off():
     assert answer.design["K1"] == pytest.approx(102602.60942536, rel=1e-10)
     names = [figure.name for figure in separation.EFFECT.figures]
     assert [answer.figures[name] for name in names] == [None] * 7
-    assert answer.before.figures["landing_energy"] == pytest.approx(303.3409301778, rel=1e-10)
+    assert answer.today.figures["landing_energy"] == pytest.approx(303.3409301778, rel=1e-10)
     assert figures(ON.set("mechanism.K1", "102602.60942536 N/m"))["period"] is None, "nor does it as printed"
     assert figures(SOFT)["landings"] > 0
 

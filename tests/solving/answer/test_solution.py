@@ -37,7 +37,7 @@ def test_a_design_is_admissible_where_every_limit_holds(limits, admissible):
 
 def test_a_solution_that_says_nothing_failed():
     answer = solution()
-    assert (answer.status, answer.message, answer.before, answer.point) == ("failed", "", None, None)
+    assert (answer.status, answer.message, answer.today, answer.point) == ("failed", "", None, None)
     assert list(answer.as_dict())[:4] == ["problem", "target", "status", "message"]
 
 
