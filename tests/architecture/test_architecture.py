@@ -190,6 +190,7 @@ def mentions_casadi(source):
     return False
 
 
+@pytest.mark.slow
 def test_only_maths_and_the_solver_rooms_use_casadi():
     users = {room(name) for name, path in modules().items() if mentions_casadi(path.read_text(encoding="utf-8"))}
     assert users == {"maths", "solving"}

@@ -240,6 +240,7 @@ def test_misreadings_are_refused_by_name(text, kind, problem, remedy):
     assert caught.value.remedy
 
 
+@pytest.mark.slow
 @given(st.text(max_size=40) | st.from_regex(r"[0-9]{1,3} ?[ a-zµ°·²*/^().0-9+-]{1,12}", fullmatch=True))
 @settings(deadline=None, derandomize=True, max_examples=400)
 def test_any_text_is_a_finite_number_or_refused(text):

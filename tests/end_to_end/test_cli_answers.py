@@ -158,6 +158,7 @@ def test_a_design_comes_through_a_pipe(cli, solved, monkeypatch):
         assert err.startswith("loomopt: standard input: nothing came through the pipe.")
 
 
+@pytest.mark.slow
 def test_an_answer_stands_in_place_of_a_problem(cli, solved, file, tmp_path):
     answer = solved(file(), *GRAVITY, "--target", "torque")
     (tmp_path / "my.toml").unlink()

@@ -74,6 +74,7 @@ def test_the_command_repeats_what_was_set(cli, static):
     assert ("damping" in data["kept"]) == ("effects.damping.C=40 N*s/m" in words)
 
 
+@pytest.mark.slow
 def test_the_table_says_in_a_sentence_what_may_be_left_out(cli, static, tmp_path):
     status, out, err = cli("effects", "static.toml", "--figure", "bars.png", "--figure", "bars.svg")
     assert status == 0

@@ -22,6 +22,7 @@ def test_a_proven_answer_says_so_and_exits_with_0(capsys):
     assert "above the best, none has peak_torque below 82.2548 N*m" in text
 
 
+@pytest.mark.slow
 def test_a_vanishing_level_is_told_as_such(capsys):
     _, out, _ = solve(capsys, "beatup", "--global", "--gap", "1e-2")
     assert "Proven best, gap 1 %: |M3_fdc| is 0, less than which there is none" in " ".join(out.split())

@@ -72,6 +72,7 @@ def test_tables_and_figures_are_written_with_their_provenance(cli, tmp_path):
     assert "peak_torque against m4e" in (tmp_path / "f.svg").read_text()
 
 
+@pytest.mark.slow
 def test_a_store_is_resumed_only_when_asked(cli):
     first = cli("beatup", *FEW, "--store", "s.db", "--json")
     status, out, err = cli("beatup", *FEW, "--store", "s.db")
@@ -82,6 +83,7 @@ def test_a_store_is_resumed_only_when_asked(cli):
     assert json.loads(again[1])["rows"] == json.loads(first[1])["rows"], "their seconds too: nothing was solved"
 
 
+@pytest.mark.slow
 def test_ctrl_c_prints_what_is_finished_and_keeps_it(cli, monkeypatch):
     solved = Trade.solved
 
@@ -100,6 +102,7 @@ def test_ctrl_c_prints_what_is_finished_and_keeps_it(cli, monkeypatch):
     assert (status, len(json.loads(out)["rows"])) == (0, 3)
 
 
+@pytest.mark.slow
 def test_axes_that_do_not_conflict_are_one_point(cli):
     status, out, _ = cli("beatup", *MASS, "--target", "none")
     assert status == 0
@@ -132,6 +135,7 @@ def test_the_most_of_an_axis(cli, monkeypatch, arguments, axes):
     assert list(trade.axes) == list(axes)
 
 
+@pytest.mark.slow
 def test_no_admissible_design_is_exit_3(cli):
     status, out, _ = cli("beatup", *MASS, "--set", "operation.M0=500 N*m", "--target", "torque", "--json")
     data = json.loads(out)

@@ -50,6 +50,7 @@ def proved(cli, *arguments, status=0):
     return json.loads(out, parse_constant=pytest.fail)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", DEFAULTS)
 def test_an_answers_file_is_proven_and_the_json_has_these_keys_and_no_other(cli, files, name):
     data = proved(cli, name, "--design", str(files[name]))

@@ -86,6 +86,7 @@ def test_prices_carry_the_units_of_the_objective_per_limit(cli):
     assert prices["l3p"]["text"] == "l3p <= 260 mm"
 
 
+@pytest.mark.slow
 def test_a_stroke_out_of_reach_exits_with_3_and_says_what_would_help(cli):
     data = answered(cli, *OUT_OF_REACH, status=3)
     check_contract(data)

@@ -85,6 +85,7 @@ def test_a_scene_without_follower_is_one_message_and_no_file(cli, no_follower, t
     assert [path.name for path in tmp_path.iterdir()] == ["bare.toml"]
 
 
+@pytest.mark.slow
 def test_without_follower_everything_but_the_cam_is_there(cli, no_follower, tmp_path):
     cli("show", no_follower, "--figure", "cam.png", status=2)
     assert "base_radius" not in cli("show", no_follower, "--equations")[0]
@@ -132,6 +133,7 @@ def test_a_free_law_is_one_short_line(answer):
         assert answers.lists(lo.evaluate(lo.load(name)).result, lo.load(name)) == []
 
 
+@pytest.mark.slow
 def test_a_free_law_goes_from_answer_to_workshop_and_figure(cli, answer, tmp_path):
     (tmp_path / "answer.json").write_text(json.dumps({"design": dict(answer.design)}))
     for command, file in (("export", "law.csv"), ("export", "law.dxf"), ("simulate", "law.png"), ("simulate", "c.csv")):

@@ -60,6 +60,7 @@ def test_tables_and_figures_are_written_with_their_provenance(cli, tmp_path):
     assert "l2 [m]" in (tmp_path / "si.csv").read_text()
 
 
+@pytest.mark.slow
 def test_a_store_is_resumed_only_when_asked(cli, tmp_path):
     first = cli("beatup", *M0, "--store", "s.db", "--json")
     status, out, err = cli("beatup", *M0, "--store", "s.db")
@@ -69,6 +70,7 @@ def test_a_store_is_resumed_only_when_asked(cli, tmp_path):
     assert json.loads(again[1])["rows"] == json.loads(first[1])["rows"], "their seconds too: nothing was solved"
 
 
+@pytest.mark.slow
 def test_two_workers_print_the_same_rows(cli):
     here, there = (json.loads(cli("beatup", *M0, *more, "--json")[1])["rows"] for more in ((), ("--workers", "2")))
     assert [row | {"seconds": 0} for row in here] == [row | {"seconds": 0} for row in there]
@@ -89,6 +91,7 @@ def test_ctrl_c_prints_what_is_finished(cli, monkeypatch):
     assert err == "loomopt: stopped; nothing was left half-written.\n"
 
 
+@pytest.mark.slow
 def test_what_is_finished_by_ctrl_c_is_written_too(cli, tmp_path, monkeypatch):
     solved = Sweep.solved
 

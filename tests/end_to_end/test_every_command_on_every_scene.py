@@ -107,7 +107,7 @@ def place(tmp_path, monkeypatch):
     return written
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("name", "on"), SUBJECTS)
 def test_cheap_commands(name, on, place, capsys):
     where = place(name)

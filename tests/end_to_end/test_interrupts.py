@@ -88,6 +88,7 @@ def test_ctrl_c_stops_whatever_a_library_makes_of_it(what):
     assert is_stopped(called(sys.executable, "-c", SWALLOWED.format(what=what)))
 
 
+@pytest.mark.slow
 def test_sigterm_stops_as_ctrl_c_does_and_workers_leave_nothing_behind(tmp_path):
     script = tmp_path / "study.py"
     script.write_text(ENDED)
@@ -176,6 +177,7 @@ def test_ctrl_c_stays_ignored_where_it_was():
     assert "beatup" in done.stdout
 
 
+@pytest.mark.slow
 def test_ctrl_c_at_any_moment_of_a_start_leaves_no_traceback():
     """By the clock, from where the interpreter itself has started."""
     for wait in (0.05, 0.1, 0.2, 0.3, 0.45):

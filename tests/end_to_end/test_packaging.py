@@ -135,6 +135,7 @@ def imported(tree):
             yield from (each.value for each in node.args if by_name and isinstance(each, ast.Constant))
 
 
+@pytest.mark.slow
 def test_every_package_the_code_imports_is_a_declared_dependency():
     declared = {re.split(r"[<>=\[; ]", entry)[0].replace("-", "_") for entry in PROJECT["project"]["dependencies"]}
     code = [ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / "loomopt").rglob("*.py")]
@@ -148,6 +149,7 @@ def test_every_package_the_code_imports_is_a_declared_dependency():
     assert {named.get(name, name) for name in outside} - {"pydantic_core"} - extra <= declared
 
 
+@pytest.mark.slow
 @wheel_needed
 def test_the_wheel_holds_scenes_results_types_and_nothing_else(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
@@ -161,6 +163,7 @@ def test_the_wheel_holds_scenes_results_types_and_nothing_else(wheel):
     assert not [name for name in names if "test" in name.lower() or "__pycache__" in name]
 
 
+@pytest.mark.slow
 @wheel_needed
 def test_wheel_and_source_pass_twine(wheel, tmp_path):
     pytest.importorskip("twine", reason="twine is not installed")
@@ -194,6 +197,7 @@ def test_the_wheel_names_its_licence_and_command(wheel):
     assert "licenses/LICENSE" in names
 
 
+@pytest.mark.slow
 @wheel_needed
 def test_the_installed_command_works_from_any_folder(installed, tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(installed), "COLUMNS": "300"}
@@ -238,6 +242,7 @@ def test_packaged_scenes_are_found_by_name_and_paths_stay_paths(tmp_path, monkey
             load(path)
 
 
+@pytest.mark.slow
 def test_no_tracked_file_speaks_of_a_machine_or_a_registry():
     found = []
     for path in tracked():

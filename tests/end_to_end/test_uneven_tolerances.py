@@ -43,6 +43,7 @@ def test_robust_keeps_the_mean_machine_clear_by_its_sigmas(capsys):
     assert found["yield"]["theta"]["value"] == pytest.approx((1 + math.erf(math.sqrt(2))) / 2, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_yield_is_what_sampled_machines_of_the_design_have(capsys, tmp_path):
     found = solved(capsys, *UNEVEN, "--yield", "0.95")
     assert found["yield"]["all"]["value"] == pytest.approx(0.95, abs=1e-3)
@@ -53,6 +54,7 @@ def test_yield_is_what_sampled_machines_of_the_design_have(capsys, tmp_path):
     assert sampled["value"] == pytest.approx(0.95, abs=4 * math.hypot(sampled["se"], found["yield"]["all"]["se"]))
 
 
+@pytest.mark.slow
 def test_a_family_is_solved_at_its_nominal_sizes_and_its_members_are_backed_off_one_by_one(capsys):
     found = solved(capsys, *FAMILY, *UNEVEN)
     assert found["design"] == solved(capsys, *FAMILY)["design"]

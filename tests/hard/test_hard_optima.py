@@ -48,7 +48,7 @@ SAID_TWICE = {
 
 
 @pytest.mark.parametrize("name", SAID_TWICE)
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_a_limit_said_twice_or_for_nothing_changes_nothing(name):
     """Design and figures to 1e-9; the price may stand with either of the two."""
     problem, changes = SAID_TWICE[name]

@@ -388,6 +388,7 @@ def test_an_effect_is_in_the_equations_while_it_is_on():
 EQUATED = "import sys, loomopt as lo; s = lo.load('beatup'); a = 'sympy' in sys.modules; s.equations(); print(a)"
 
 
+@pytest.mark.slow
 def test_sympy_waits_until_equations_are_asked_for():
     done = subprocess.run([sys.executable, "-c", EQUATED], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"

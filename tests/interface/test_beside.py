@@ -91,7 +91,7 @@ def test_what_is_no_file_is_refused(wrong):
 @pytest.mark.parametrize("comma", [False, True])
 @pytest.mark.parametrize("name", ["p.csv", "p.xlsx"])
 @pytest.mark.parametrize("problem", ["beatup", "rapier", "shedding"])
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 def test_own_curves_are_read_as_measured_ones(tmp_path, problem, name, comma):
     path = tmp_path / name
     words = ["simulate", problem, "--out", str(path), *(["--decimal", "comma"] if comma else [])]

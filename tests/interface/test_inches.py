@@ -72,6 +72,7 @@ def pair(request):
     return tuple(lo.solve(scene, target, starts=1) for scene in (lo.load(name), in_inches(name)))
 
 
+@pytest.mark.slow
 def test_an_answer_has_the_same_numbers(pair):
     one, other = (answer.as_dict() for answer in pair)
     assert pair[0].status == "optimal"
@@ -272,6 +273,7 @@ def test_a_unit_that_is_none_exits_with_2_and_one_line(capsys, given):
     assert "display" in err
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
 def test_a_table_of_an_inch_scene_has_no_metric_length(name):
     """Whatever a unit is composed of: m/rad beside in/rad^2 would be of two systems."""

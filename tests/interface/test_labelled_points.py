@@ -27,6 +27,7 @@ def test_a_row_of_a_sweep_by_its_label(travels, label):
     assert travels.answer(label).scene.mechanism["travel"] == pytest.approx(0.065)
 
 
+@pytest.mark.slow
 def test_every_row_of_a_front_by_every_number_that_is_printed(front):
     table = front.table()
     for row, (point, cells) in zip(front.rows, table.iterrows(), strict=True):

@@ -98,6 +98,7 @@ def test_a_study_prints_its_table(capsys):
     assert repr(study).startswith("<StudyTable")
 
 
+@pytest.mark.slow
 def test_a_study_of_one_answer_prints_what_its_command_prints(capsys):
     source = packaged.problems()["shedding-static"].read_text(encoding="utf-8")
     Path("made.toml").write_text(f'{source}\n[tolerances]\nN_min = "1 N"\n', encoding="utf-8")

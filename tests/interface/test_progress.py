@@ -121,6 +121,7 @@ raise SystemExit(app.run(["sweep", "beatup", "--over", "operation.M0=700:720:10 
 """
 
 
+@pytest.mark.slow
 def test_a_long_command_in_a_pipe_is_heard_on_stderr_alone():
     done = subprocess.run([sys.executable, "-c", LONG_COMMAND], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0
@@ -147,6 +148,7 @@ def cells(monkeypatch, *sources):
     return notebook.cells, received
 
 
+@pytest.mark.slow
 def test_in_jupyter_progress_stands_below_the_cell_and_a_wrong_unit_is_one_sentence(monkeypatch):
     (_, wrong), messages = cells(
         monkeypatch,

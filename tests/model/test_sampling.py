@@ -64,6 +64,7 @@ def test_the_peak_is_that_of_a_scan_of_a_million_points(name):
         assert sampled.peak(quantity) == pytest.approx(best, rel=1e-10)
 
 
+@pytest.mark.slow
 def test_peaks_of_other_machines_too_down_to_transmission_angles_of_a_few_degrees():
     rng, every = np.random.default_rng(5), scene("rod_inertia", "bearing_friction")
     for _ in range(12):

@@ -262,6 +262,7 @@ def test_recordings_go_with_their_model(monkeypatch):
     assert gone() is None
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
 def test_an_answer_does_not_hang_on_what_was_recorded(name, monkeypatch):
     """Nothing recorded, everything from the first evaluation on, and whatever this process has recorded so far."""

@@ -65,6 +65,7 @@ def drawings(job):
             continue
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", NAMES)
 def test_drawings_of_packaged_scenes_are_clear_today_and_solved(name):
     scene, solved = lo.load(name), references.design(name)
@@ -79,6 +80,7 @@ def test_drawings_of_inch_machines_are_clear(job):
     assert clear.faults_of(outputs.drawing(scene, {})) == []
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("job", RANDOM)
 def test_drawings_of_random_machines_are_clear(job):
     for drawn in drawings(job):
@@ -139,6 +141,7 @@ def test_a_text_moved_onto_a_link_of_a_real_drawing_is_found():
         )
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
 def test_a_text_is_no_wider_than_its_box_in_the_font_of_the_pictures(name):
     from matplotlib.font_manager import FontProperties

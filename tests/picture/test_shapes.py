@@ -104,6 +104,7 @@ def test_a_box_is_no_narrower_than_the_letters_that_matplotlib_draws():
         assert box.right >= drawn.x1, text
 
 
+@pytest.mark.few(1)
 @given(st.floats(1e-9, 1.0))
 @pytest.mark.parametrize("unit", ["mm", "in"])
 def test_a_tolerance_is_told_in_one_digit_that_is_kept(unit, metres):

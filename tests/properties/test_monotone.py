@@ -183,7 +183,7 @@ def worse(one, other, names):
 
 
 @pytest.mark.parametrize(("job", "target"), TASKS)
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 def test_a_looser_limit_never_makes_an_optimum_worse(job, target):
     limits, figures = TASKS[job, target]
 

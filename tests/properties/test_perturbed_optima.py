@@ -52,7 +52,7 @@ def objectives(program, x):
 
 
 @pytest.mark.parametrize("name", OPTIMA)
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_an_optimum_moved_in_any_direction_is_refused(name):
     """By 1e-6 to 1e-2 of the variables' sizes; variables without room stay."""
     program, x = optimum(name)

@@ -387,6 +387,7 @@ def test_one_mistake_is_told_once():
     assert [fault.key for fault in caught(scene, tables).faults] == ["mechnism"]
 
 
+@pytest.mark.slow
 def test_many_mistakes_are_told_in_part_and_soon():
     many = {f"x{n}": "1 mm" for n in range(20_000)}
     error = caught(scene, changed("mechanism", {**BEATUP.document["mechanism"], **many}))

@@ -123,6 +123,7 @@ def every(job):
     return [(path, name) for path in paths(document(job)) for name in VALUES]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("job", JOBS)
 def test_values_of_a_wrong_shape_are_read_or_refused(job):
     raw, cases = document(job), every(job)

@@ -110,6 +110,7 @@ def kept(answer, accuracy, truth):
 # Optima -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(13)
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 @pytest.mark.parametrize("name", JOBS)
 def test_every_figure_of_an_optimum_is_as_accurate_as_asked(name, accuracy):

@@ -67,6 +67,7 @@ def test_a_limit_on_one_dwell_is_as_if_the_operation_asked_for_it(rapier):
     assert limited.reached == {"stroke": True, "dwell_after": True, "dwell_before": True}
 
 
+@pytest.mark.slow
 def test_the_worth_of_both_dwells_is_the_slope_of_their_front(rapier):
     answer = lo.solve(rapier.set("limits.dwell.min", "35 deg"), starts=1)
     trade = front.trade(rapier, ("peak_acceleration", "dwell"), "stroke-dwell", maximise=("dwell",))
@@ -94,6 +95,7 @@ def test_what_two_limits_ask_of_one_dwell_stands_by_both_names(rapier):
     assert values == pytest.approx({"dwell_after": 35.0, "dwell_before": 32.0})
 
 
+@pytest.mark.slow
 def test_rms_jerk_and_peak_acceleration_limit_each_other_alike(rapier):
     """Least peak with the jerk limited is least jerk with that peak: one point of one front, its slope read twice."""
     gentle = lo.solve(rapier.set("limits.rms_jerk.max", "0.6168 m/rad^3"), starts=1)
@@ -122,6 +124,7 @@ def test_a_limit_that_the_stroke_keeps_anyway_changes_nothing(rapier):
     assert program.limits == plain.limits
 
 
+@pytest.mark.slow
 def test_a_stroke_apart_from_the_operations_clashes_with_it(rapier):
     answer = lo.solve(rapier.set("limits.stroke.min", "860 mm"), starts=1)
     assert answer.status == "infeasible"

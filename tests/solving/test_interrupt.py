@@ -79,6 +79,7 @@ def test_a_hook_that_only_watches_changes_nothing():
     assert watched.design == lo.solve(lo.load("beatup")).design
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("options", [("--json",), ()], ids=["json", "table"])
 def test_the_command_exits_130_and_prints_nothing_half(options):
     done = interrupted("solve", "beatup", *options)
@@ -88,6 +89,7 @@ def test_the_command_exits_130_and_prints_nothing_half(options):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_the_folder_asked_for_holds_no_partial_files(tmp_path):
     folder = tmp_path / "answer"
     done = interrupted("solve", "beatup", "--out", str(folder))
@@ -95,6 +97,7 @@ def test_the_folder_asked_for_holds_no_partial_files(tmp_path):
     assert not folder.exists() or not list(folder.iterdir())
 
 
+@pytest.mark.slow
 def test_files_of_an_earlier_answer_stay_as_they_were(tmp_path):
     code = "from loomopt.interface.cli.app import main; main()"
     command = [sys.executable, "-c", code, "solve", "beatup", "--out", str(tmp_path)]
@@ -105,6 +108,7 @@ def test_files_of_an_earlier_answer_stay_as_they_were(tmp_path):
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+@pytest.mark.slow
 def test_a_certificate_is_not_spoilt_by_a_late_interrupt():
     """Past the last iteration there is nothing to hit: the answer comes."""
     done = interrupted("solve", "beatup", "--json", at=100_000)

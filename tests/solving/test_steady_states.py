@@ -46,6 +46,7 @@ def test_the_whole_search_finds_the_best_of_the_optima():
     assert answer().figures["M3_fdc"] == pytest.approx(found.figures["M3_fdc"], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_prices_are_those_of_solving_again():
     price = next(each for each in answer().binding if each.limit == "l1")
     low, high = (answer(bounds__l1={"min": f"{30 + h} mm", "max": "35 mm"}) for h in (-1e-3, 1e-3))
@@ -61,6 +62,7 @@ def test_a_neighbour_s_answer_is_solved_again_warm():
     assert warm.figures["M3_fdc"] == pytest.approx(cold.figures["M3_fdc"], abs=1e-9)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("target", ["balance", "pulse", "torque", "retrofit"])
 def test_every_target_of_the_job_is_served(target):
     """At 800 N·m the reed can be balanced on the shaft; what each target is about is met, and read again apart."""
@@ -92,6 +94,7 @@ def test_its_figures_can_be_limited(limit, side):
     assert [each.limit for each in found.binding if each.limit == limit] == [limit]
 
 
+@pytest.mark.slow
 def test_a_shaft_s_stiffness_may_be_chosen():
     found = answer(bounds__stiffness={"min": "1 MN*m/rad", "max": "4 MN*m/rad"})
     assert (found.status, found.certificate.passed) == ("optimal", True)

@@ -131,6 +131,7 @@ def test_a_missing_table_or_column_and_a_new_column_are_named(copy):
     assert differences(copy) == [f"no reference table {BALANCE}"]
 
 
+@pytest.mark.slow
 def test_an_infeasible_target_is_compared_by_what_would_help(copy):
     path = copy / f"{NAME}.retrofit.csv"
     assert differences(copy, "retrofit") == []

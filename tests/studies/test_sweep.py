@@ -102,6 +102,7 @@ def test_a_dask_cluster_of_which_a_worker_is_killed_has_the_same_digest(serial):
     assert result.digest == serial.digest
 
 
+@pytest.mark.slow
 def test_threads_of_one_process_solve_one_at_a_time(serial):
     with ThreadPoolExecutor(3) as threads:
         assert lo.sweep("beatup", OVER, executor=threads).digest == serial.digest

@@ -68,7 +68,7 @@ def curves_of(axes):
 
 
 @pytest.mark.parametrize(("name", "kind"), CASES)
-@pytest.mark.few(12)
+@pytest.mark.few(6)
 def test_nothing_runs_into_anything_and_all_panels_show_the_turn(name, kind):
     figure = drawn(name, kind)
     assert overlaps.found(figure) == []
@@ -88,6 +88,7 @@ def test_nothing_runs_into_anything_at_any_size(name, kind):
     assert overlaps.found_at_every_size(drawn(name, kind)) == []
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(("name", "kind"), [case for case in CASES if case[1] not in ("today", "inch")])
 def test_today_stands_dashed_in_every_panel_beside_a_design(name, kind):
     figure = drawn(name, kind)
@@ -136,6 +137,7 @@ def test_peaks_stand_where_the_figures_say_and_limits_are_levels():
         assert flat == levels
 
 
+@pytest.mark.slow
 def test_a_limit_on_the_heads_acceleration_per_radian_stands_at_that_in_metres_per_second():
     scene = lo.load("rapier").set("limits.peak_acceleration.max", "0.8 m/rad^2")
     axes = titled(outputs.plot_curves(tables.curves(scene, {}), scene, {}))["head acceleration S_tt [m/s^2]"]
@@ -252,6 +254,7 @@ def test_a_table_without_curves_is_refused(tmp_path, frame):
             curves.curves(empty, tmp_path / "a.png", "t")
 
 
+@pytest.mark.slow
 def test_crank_angles_are_in_the_unit_of_all_angles():
     scene = lo.load("beatup").set("display.angle", "rad")
     figure = outputs.plot_curves(tables.curves(scene, {}), scene, {})

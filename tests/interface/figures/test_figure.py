@@ -26,6 +26,7 @@ def frame():
     return pd.DataFrame(columns | {"Md [N*m]": 90 * np.sin(2 * phi), "piece": 0 * phi})
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("ending", figure.SUFFIXES)
 def test_drawing_and_curves_are_written_in_the_format_asked_for(tmp_path, frame, ending):
     for name, write in (
@@ -65,6 +66,7 @@ def test_another_ending_is_bad_input(tmp_path, frame):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_users_settings_do_not_change_a_figure_and_stay(tmp_path, frame):
     curves.curves(frame, tmp_path / "a.png", "t", MARKS)
     with matplotlib.rc_context({"axes.facecolor": "black", "font.size": 30}):

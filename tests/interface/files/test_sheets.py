@@ -31,6 +31,7 @@ def body(path, sign=";"):
     return list(csv.reader([line for line in lines if not line.startswith("#")], delimiter=sign))
 
 
+@pytest.mark.slow
 def test_an_answer_is_a_workbook_of_its_design_figures_limits_and_curves(capsys):
     assert run(["solve", "shedding", "--starts", "1", "--json", "--out", "answer.xlsx"]) == 0
     told = json.loads(capsys.readouterr().out)

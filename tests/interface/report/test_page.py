@@ -239,6 +239,7 @@ def test_a_report_is_a_file_of_what_is_beside_too(answers, tmp_path):
         assert not path.exists()
 
 
+@pytest.mark.slow
 def test_the_command_reports_scenes_and_answers_on_one_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert run(["solve", "shedding", "--json"]) == 0

@@ -219,6 +219,7 @@ def test_curves_fit_the_width_and_show_both_sides_of_a_jump():
     assert "-0.0 " not in wide
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["beatup-light", "rapier", "shedding", "shedding-static"])
 def test_the_design_to_retype_is_the_design_to_the_last_digit(name):
     found = api.solve(name)
@@ -265,6 +266,7 @@ def test_the_proofs_stand_in_the_json_as_prove_prints_them():
     assert "proofs" not in api.solve(SCENE).as_dict()
 
 
+@pytest.mark.slow
 def test_points_that_narrow_a_change_down_are_marked_and_counted_apart():
     from loomopt.interface import study_table
 

@@ -102,6 +102,7 @@ def test_labels_carry_lengths_in_mm_and_angles_in_degrees():
     assert {"A", "B", "C", "D", "B'", "C'"} <= {text.text for text in texts(crank_rocker_drawing.linkage(PAPER, ""))}
 
 
+@pytest.mark.slow
 @few
 @given(design=designs())
 def test_labels_are_clear_of_links_and_of_each_other(design):

@@ -126,6 +126,7 @@ def test_the_same_scene_gives_the_same_digits_twice(problem, target):
     assert told(lo.solve(lo.load(problem), target)) == first
 
 
+@pytest.mark.slow
 def test_another_process_gives_the_same_digits():
     """Whatever this one has solved before, and whatever its hash seed."""
     command = [sys.executable, "-c", "from loomopt.interface.cli.app import main; main()", "solve", "beatup", "--json"]

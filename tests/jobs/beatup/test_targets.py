@@ -63,6 +63,7 @@ def test_pulse_is_the_best_slsqp_finds(answer_of, M0):
     assert machine.excess(ours.design) <= 1e-9
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("M0", [745, 800])
 def test_torque_is_the_best_slsqp_finds(answer_of, M0):
     machine, ours, room = Machine(scene_of(M0)), answer_of(M0, "torque"), 0.01 * M0
@@ -76,6 +77,7 @@ def test_torque_is_the_best_slsqp_finds(answer_of, M0):
     assert machine.excess(ours.design) <= 1e-9
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("weights", "M0"), slow.grid([{}, {"l1": 50.0, "m4e": 0.1}], [745, 800]))
 def test_retrofit_is_the_best_slsqp_finds(weights, M0):
     scene = scene_of(M0).update({f"targets.retrofit.weights.{name}": value for name, value in weights.items()})

@@ -117,6 +117,7 @@ def test_what_is_sought_may_be_a_transmission_angle():
     assert found.figures["mu.beat"] > lo.evaluate(scene).figures["mu.beat"]
 
 
+@pytest.mark.slow
 def test_a_sweep_and_the_effects_study_serve_it():
     rows = lo.sweep(four_bar(), {"effects.resistance.torque": ["700 N*m", "745 N*m"]}, target="torque")
     assert [row.status for row in rows.rows] == ["optimal", "optimal"]

@@ -40,6 +40,7 @@ def solved(M0):
     return lo.solve(BEATUP.set("operation.M0", f"{M0} N*m")), lo.solve(chain)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("M0", TORQUES)
 def test_the_optimum_is_that_of_the_beat_up(M0):
     beatup, chain = solved(M0)

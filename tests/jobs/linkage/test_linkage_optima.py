@@ -130,6 +130,7 @@ def test_parts_may_stand_in_any_order():
     assert least(scene) == pytest.approx(reference(), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_mirrored_linkage_turns_the_other_way():
     parts = {"crank": {"ratio": -1}, "beat": {"side": "right"}}
     assert least(four_bar(parts=parts, output={"sense": "counter-clockwise"})) == pytest.approx(reference(), rel=1e-12)

@@ -86,6 +86,7 @@ def test_table_of_dwells_is_what_cold_solves_give(scene, table):
         assert cold.figures["peak_acceleration"] == pytest.approx(table[place].figures["peak_acceleration"], rel=1e-8)
 
 
+@pytest.mark.slow
 def test_table_of_dwells_needs_one_built_nlp(table):
     """What is left of building is the task's own numbers; writing down an NLP takes most of a call."""
     assert max(answer.time["build_s"] / answer.time["total_s"] for answer in table[1:]) <= 0.3

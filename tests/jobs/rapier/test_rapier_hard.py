@@ -51,6 +51,7 @@ def numbers(answer):
     return [*answer.design.values(), *(v for v in answer.figures.values() if v is not None)]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", slow.after(5, HARD))
 def test_what_cannot_be_had_is_said_with_relaxations_that_help(name):
     scene = lo.load("rapier").update(HARD[name])
@@ -82,6 +83,7 @@ def test_a_transmission_angle_of_80_degrees_is_bought_with_acceleration():
     assert steep.figures["peak_acceleration"] > plain.figures["peak_acceleration"]
 
 
+@pytest.mark.slow
 def test_a_drive_that_is_fixed_altogether_is_told_its_own_stroke():
     scene = lo.load("rapier")
     fixed = {f"bounds.{name}": scene.given(f"mechanism.{name}") for name in scene.bounds if scene.bounds[name].free}
@@ -144,6 +146,7 @@ def test_a_drives_own_travel_is_recovered(tmp_path, every):
     assert answer.figures["match_rms"] < 1e-7
 
 
+@pytest.mark.slow
 def test_a_second_table_is_matched_and_not_the_first(tmp_path):
     for every in (20, 24):
         answer = lo.solve(wished(tmp_path, travels(lo.load("rapier"), every)), "match", starts=1)

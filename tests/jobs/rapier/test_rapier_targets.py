@@ -74,6 +74,7 @@ def test_each_target_is_best_in_its_own_objective(scene, best):
     assert_held(scene, chosen["smooth"])
 
 
+@pytest.mark.slow
 def test_every_worth_is_confirmed_by_solving_again(scene, best):
     prices = {price.limit: price for price in best.binding}
     assert set(prices) >= set(PRICED)
@@ -172,6 +173,7 @@ def test_the_neighbours_answer_is_no_trap(scene, best):
     assert warm.figures["peak_acceleration"] == pytest.approx(cold.figures["peak_acceleration"], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_freed_sley_is_better_and_keeps_its_limits(scene, best):
     freed = scene.free("sley")
     answer = lo.solve(freed, starts=1)
@@ -199,7 +201,7 @@ def test_a_machine_of_another_size_has_the_scaled_optimum(scene, best, factor):
 
 
 @pytest.mark.parametrize(("stroke", "dwell"), [(700, 20), (700, 40), (780, 35), (850, 22), (900, 20), (900, 40)])
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 def test_other_strokes_and_dwells_are_optimal_and_certified(scene, stroke, dwell):
     asked = scene.update(
         {

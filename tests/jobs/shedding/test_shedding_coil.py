@@ -160,6 +160,7 @@ def test_at_600_rpm_and_the_long_travel_no_coil_will_do_and_the_reason_is_said()
     assert all(word in answer.explanation for word in ("lower speed", "less travel", "softer cam law"))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "changes"), [("shedding", {}), ("shedding-printed-travel", {"bounds__wire": "6 mm"})])
 def test_the_least_relaxations_help_when_granted_and_not_when_cut_short(name, changes):
     answer = coiled(name, **changes)
@@ -232,6 +233,7 @@ def test_prices_of_the_coils_are_those_of_solving_again(name):
     assert price.worth["K1"] == pytest.approx(-loosen * slope, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_with_the_law_freed_the_coils_are_softer_and_the_softest_of_that_law():
     answer = coiled(target="law", targets__law__intervals=8)
     assert (answer.status, answer.certificate.whole_cycle) == ("optimal", "bounded")
@@ -302,6 +304,7 @@ def machine(seed):
     )
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", slow.after(4, range(12)))
 def test_coils_of_random_machines_are_the_softest_and_then_the_lightest_that_are_sold(seed):
     case = machine(seed)

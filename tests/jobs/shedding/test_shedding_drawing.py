@@ -92,6 +92,7 @@ def promised(texts):
     return float(found[1])
 
 
+@pytest.mark.slow
 def test_the_dxf_is_within_the_chord_tolerance_that_it_states_of_the_true_profile(made, tmp_path):
     scene, design, law = made
     document = drawn(scene, design, tmp_path)

@@ -37,6 +37,7 @@ def said(axes):
     return [text.get_text() for text in legend.get_texts()] if legend else []
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", PACKAGED)
 def test_what_a_designer_of_a_shed_looks_for_has_panels(name):
     panels = axes_of(lo.load(name), {})
@@ -106,6 +107,7 @@ def test_the_force_has_gaps_where_the_warps_pull_is_not_known():
     assert np.isfinite(named(panels["forces by effect [N]"])["return spring"].get_ydata()).all()
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", PACKAGED)
 def test_no_curve_runs_back_across_the_figure(name):
     for axes in axes_of(lo.load(name), {}).values():

@@ -64,6 +64,7 @@ def test_a_tighter_accuracy_and_more_starts_give_the_same_spring(seed):
     assert closely.figures["K1"] == pytest.approx(plainly.figures["K1"], rel=1e-11)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "most"), [("rpm", 900.0), ("M", 80.0), ("N_min", 500.0)])
 @given(st.tuples(st.floats(0, 1), st.floats(0, 1)), st.sampled_from(plain.LAWS))
 @settings(deadline=None, max_examples=8, derandomize=True)

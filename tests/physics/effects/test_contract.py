@@ -71,7 +71,7 @@ def test_figures_are_told_of_today_and_of_an_answer(job):
 
 @every_job
 @pytest.mark.parametrize("key", KEYS)
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 def test_a_demand_binds_and_its_price_is_that_of_solving_again(job, key):
     value, scene_at = tightened(job, key)
     answer = solve(scene_at(value))
@@ -247,6 +247,7 @@ def test_numbers_of_an_effect_are_chosen_the_least_made_so_and_what_nothing_read
     assert solve(scene).figures["plate"] == pytest.approx(0.003, rel=1e-8)
 
 
+@pytest.mark.slow
 @every_job
 def test_every_target_still_certifies_with_made_up_effects_on(job):
     scene = scene_of(job)

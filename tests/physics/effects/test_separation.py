@@ -12,6 +12,7 @@ from loomopt.physics.effects.shedding import inertia, separation
 from reference.flight import MP, Frame, flown, landed
 
 
+@pytest.mark.slow
 @every
 def test_the_first_flight_is_that_of_the_reference(case):
     scene, _, lift, landing, speed, gap = CASES[case]

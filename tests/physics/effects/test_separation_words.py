@@ -159,6 +159,7 @@ def test_the_scenes_own_equations_have_flight_and_landing():
     }
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("words", "flown"), [([], False), (["--with", "separation"], True)])
 def test_flight_is_imported_only_where_a_scene_needs_it(words, flown):
     code = (

@@ -179,6 +179,7 @@ def test_two_intervals_cannot_start():
         cycloid_like(2)
 
 
+@pytest.mark.slow
 @given(uneven_rises())
 @REPEATABLE
 def test_the_table_is_the_clamped_cubic_of_scipy(points):
@@ -220,6 +221,7 @@ def test_a_table_tends_to_its_law_at_fourth_order(lean):
     assert (np.log2(np.array(errors[:-1]) / errors[1:]) > 3.9).all()
 
 
+@pytest.mark.slow
 @given(uneven_rises())
 @REPEATABLE
 def test_every_number_system_reads_the_same_table(points):

@@ -55,6 +55,7 @@ def test_links_have_their_lengths_and_meet_at_one_point(triangle):
     assert found.link1.y - found.link2.y == pytest.approx(base.y, rel=0, abs=2 * EPS * size)
 
 
+@pytest.mark.slow
 @given(triangles())
 @REPEATABLE
 def test_the_area_is_exact_to_four_ulp_times_its_condition(triangle):

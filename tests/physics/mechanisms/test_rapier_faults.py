@@ -125,6 +125,7 @@ def test_a_five_bar_that_locks_for_part_of_the_turn_names_the_stretches(changes,
     assert_stretches_are_where_it_opens(d, message)
 
 
+@pytest.mark.slow
 @given(drives(0.3))
 @REPEATABLE
 def test_stretches_named_are_those_without_a_position(d):

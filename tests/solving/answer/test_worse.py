@@ -49,6 +49,7 @@ def test_it_is_one_line_in_the_terminal_and_a_list_in_json():
     assert "\n" not in line
 
 
+@pytest.mark.slow
 def test_where_nothing_is_worse_nothing_is_said():
     found = answer("sixbar-sley")
     assert Words(found.scene).worse(()) == ""

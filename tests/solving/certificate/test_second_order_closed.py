@@ -125,6 +125,7 @@ ROOMY = {
 }
 
 
+@pytest.mark.slow
 def test_a_reed_torque_that_curves_and_leaves_the_scale_open_has_no_price_without_measure():
     """Two limits bind and |M3| curves along what is left of the shape; the rod's inertia then asks for a small one."""
     answer = lo.solve(lo.load("beatup-light").update(ROOMY).with_effect("rod_inertia"))

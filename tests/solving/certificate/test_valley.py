@@ -58,6 +58,7 @@ def test_third_derivatives_of_a_peak_are_those_of_its_top_wherever_it_moves(deri
     assert errors[row] < 1e-8
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("effect", [None, "shaft_torsion"])
 def test_third_derivatives_in_floats_are_those_of_40_digits_to_their_own_error(effect):
     scene = lo.load("beatup").with_effect(effect) if effect else lo.load("beatup")

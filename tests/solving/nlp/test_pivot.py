@@ -276,6 +276,7 @@ def test_the_objective_s_curvature_has_weight_1(monkeypatch):
     assert found.x == pytest.approx([0.5, 0.5], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_answers_followed_over_changes_of_what_binds_are_those_found_afresh():
     near = lo.solve(lo.load("beatup").set("operation.M0", "640 N*m"))
     limits = set()

@@ -32,6 +32,7 @@ def run(name, target, *changes, gap=1e-4):
     return outcome, time.process_time() - began
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "target"), KNOWN)
 def test_the_best_known_balances_are_proven_in_few_boxes(name, target):
     solved(name, target)
@@ -50,6 +51,7 @@ def test_the_best_known_balances_are_proven_in_few_boxes(name, target):
         assert level.proven
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("name", "target", "changes", "gap"),
     [
@@ -117,6 +119,7 @@ def test_a_much_worse_claim_turns_up_a_better_design():
     assert set(better) == {v.name for v in level.task.program.variables}
 
 
+@pytest.mark.slow
 def test_a_timeout_has_a_true_gap_that_shrinks():
     found = solved("beatup", "torque")
     (level,) = Levels(found.program, found.job, found.x, 1e-5)._levels
@@ -133,6 +136,7 @@ def test_a_timeout_has_a_true_gap_that_shrinks():
     assert "gap" in level.why()
 
 
+@pytest.mark.slow
 def test_a_vanishing_magnitude_needs_no_boxes_and_leaves_a_band_that_is_told():
     outcome, _ = run("beatup", "balance")
     first, second = outcome.levels
@@ -143,6 +147,7 @@ def test_a_vanishing_magnitude_needs_no_boxes_and_leaves_a_band_that_is_told():
     assert second.bound > 88.0
 
 
+@pytest.mark.slow
 def test_what_cannot_be_bounded_says_why():
     for name, target, word in (
         ("rapier", "stroke-dwell", "no global claim"),

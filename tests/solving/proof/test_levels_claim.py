@@ -16,6 +16,7 @@ from loomopt.solving.search.multistart import run_search
 from loomopt.solving.search.search import Search, objectives
 
 
+@pytest.mark.slow
 def test_a_search_that_stands_elsewhere_is_led_to_the_optimum():
     """The best of narrower bounds, taken for the best of all: its certificate there passes by itself."""
     wide = solved("beatup", "torque")
@@ -55,6 +56,7 @@ def test_a_better_design_that_leads_to_no_certified_optimum_is_told():
     assert "no certified optimum was reached" in bound.why
 
 
+@pytest.mark.slow
 def test_time_that_is_up_leaves_the_gap_and_the_answer(monkeypatch):
     ticks = itertools.count(0.0, 0.01)
     clock = SimpleNamespace(perf_counter=lambda: next(ticks))  # a machine that is busy elsewhere changes nothing
@@ -85,6 +87,7 @@ def test_nothing_is_claimed_without_a_certified_answer_or_where_it_is_refused():
         assert (said["gap"], said["bound"], said["boxes"], said["band"]) == (None, {}, 0, {})
 
 
+@pytest.mark.slow
 def test_a_proof_says_all_that_scripts_read():
     found = solved("beatup-light", "balance")
     _, bound = claimed(found.search, GlobalProof(1e-3))

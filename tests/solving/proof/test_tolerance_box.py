@@ -75,6 +75,7 @@ def test_a_value_of_the_design_alone():
             assert not tolerance_box.at_most(read, far - 1e-6 * width, 600).proven, row
 
 
+@pytest.mark.slow
 def test_what_stands_alone_in_its_box_is_read_like_the_machine():
     scene = registry.load("beatup")
     job = registry.of(scene)

@@ -103,6 +103,7 @@ def test_the_margin_of_the_counterweights_mass_is_a_mass():
     assert proof.margin == pytest.approx(12.4 - answer.design["m4e"])
 
 
+@pytest.mark.slow
 def test_proofs_take_no_longer_than_the_solves_they_follow():
     """The rapier's solve is about a third of a second on the machine where every proof was to take less than one.
 

@@ -101,6 +101,7 @@ def beyond(job, figure, angle):
     return None
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("job", JOBS)
 def test_peaks_are_proven_and_limits_a_millionth_tighter_refuted(job):
     scene = LOADED[job]

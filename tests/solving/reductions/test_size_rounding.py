@@ -103,6 +103,7 @@ def test_a_lattice_without_an_admissible_point():
     assert "the design told is the optimum without sizes" in found.message
 
 
+@pytest.mark.slow
 def test_sizes_that_leave_a_goal_out_of_reach_ask_for_a_band():
     links = {"bounds.l1": "30 mm", "bounds.l2": "75.5 mm", "bounds.l3": "149 mm", "bounds.l4": "167 mm"}
     steps = {"m4e": "2 kg", "r4e": "40 mm"}

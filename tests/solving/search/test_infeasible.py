@@ -175,6 +175,7 @@ def test_a_scene_with_nothing_to_choose_is_judged_as_it_stands():
     assert free.design == pytest.approx({name: scene.mechanism[name] for name in DESIGN}, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_infeasible_is_said_where_balance_stays_beyond_the_tolerance():
     """One fact seen twice: torque is infeasible exactly where the least |M3| is more than its tolerance."""
     for M0, feasible in ((640, False), (680, True), (860, True), (900, False)):

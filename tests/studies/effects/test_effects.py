@@ -64,6 +64,7 @@ def without_times(result):
     return json.dumps(data)
 
 
+@pytest.mark.slow
 def test_the_reference_has_all_effects_on_that_combine(beatup):
     assert set(TABLE) <= set(beatup.reference.effects)
     assert beatup.reference.figures["M3_fdc"] == pytest.approx(-4.130151, abs=6e-7)
@@ -170,6 +171,7 @@ def test_inches_change_units_and_nothing_else(shedding):
     assert result.table(si=True).loc["damping", "K1 regret [N/m]"] == pytest.approx(regret, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_of_effects_that_may_go_only_separately_the_largest_comes_back_first():
     result = lo.effects(made_up.scene(push=4.0, pull=5.0))
     for name, torque in (("push", 4.0), ("pull", 5.0)):
@@ -202,6 +204,7 @@ def test_a_target_of_geometry_needs_no_effect():
     assert result.command == "loomopt solve rapier --target dwell"
 
 
+@pytest.mark.slow
 def test_a_variant_without_an_admissible_design_stays_as_a_row_with_its_reason():
     result = lo.effects(made_up.scene(), "retrofit")
     assert result.reference.status == "optimal"
@@ -219,6 +222,7 @@ def test_more_speed_is_no_regret():
     assert row_of(result, "inertia").why == "target speed needs the effect inertia"
 
 
+@pytest.mark.slow
 def test_an_effect_that_another_one_needs_goes_or_stays_with_it():
     result = lo.effects(made_up.scene(push=100, leaning=100))
     push, leaning = row_of(result, "push"), row_of(result, "leaning")
@@ -243,6 +247,7 @@ def refusing(monkeypatch):
     monkeypatch.setattr(study, "YIELDING", (made_up.Moving,))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("torque", "may_go"), [(3.0, True), (30.0, False)])
 def test_an_effect_that_solve_does_not_accept_is_measured_at_the_reference(refusing, torque, may_go):
     result = lo.effects(made_up.scene(motor=torque))
@@ -328,6 +333,7 @@ def kinematic():
     return lo.effects(lo.load("rapier").update({f"bounds.{name}.free": False for name in fixed}))
 
 
+@pytest.mark.slow
 def test_figures_that_need_an_omitted_effect_are_named_even_if_the_target_reads_none(kinematic):
     assert kinematic.left_out == ("head_inertia", "tape_friction", "tape_stretch")
     inertia, friction, stretch = kinematic.rows

@@ -189,6 +189,7 @@ def test_slopes_against_reed_torque(torque):
     assert slopes == pytest.approx([-0.119, -0.096, -0.042, -0.0416], abs=6e-4)
 
 
+@pytest.mark.slow
 def test_the_counterweight_that_is_used_up_is_told():
     trade = front.trade(lo.load("beatup"), ("peak_torque", "M3_fdc"), ranges={"M3_fdc": (45.0, 46.0)}, points=5)
     found = read_front(trade, run.run(trade))
@@ -228,6 +229,7 @@ def test_dwells_of_the_rapier():
 STIFFNESS = {0.080: 102602.609425, 0.060: 119901.395181, 0.040: 144270.372242, 0.020: 181234.597037}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("preload_", "stiffness"), STIFFNESS.items())
 def test_stiffness_against_preload(preload, preload_, stiffness):
     trade, rows = preload
@@ -270,6 +272,7 @@ def test_the_end_of_an_axis_that_has_one_need_not_be_named():
     assert front.trade(lo.load("shedding"), ("K1", "X0"), ranges={"X0": (0.02, 0.08)}).senses == ("least", "least")
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("axis", "low", "high", "reached"),
     slow.after(
@@ -289,6 +292,7 @@ def test_a_range_that_no_point_lies_in_is_told(axis, low, high, reached):
     assert error.value.key == axis
 
 
+@pytest.mark.slow
 def test_the_moment_of_inertia_costs_what_its_counterweight_does(mass):
     """Of a counterweight at its largest radius J4 = J4⁰ + m4e r4e²: both fronts are one."""
     trade = front.trade(lo.load("beatup"), ("peak_torque", "J4"), "balance", points=4)
@@ -300,6 +304,7 @@ def test_the_moment_of_inertia_costs_what_its_counterweight_does(mass):
         assert read(row, "peak_torque") == pytest.approx(read(same, "peak_torque"), rel=CLOSE)
 
 
+@pytest.mark.slow
 def test_what_the_least_change_from_today_buys():
     """Today's machine has no counterweight: its radius counts as a change, its largest does not stand for none."""
     trade = front.trade(lo.load("beatup"), ("peak_torque", "change"), points=3)
@@ -318,12 +323,14 @@ def loose():
     return registry.scene({**document, "bounds": bounds})
 
 
+@pytest.mark.slow
 def test_an_end_without_a_least_asks_for_a_range():
     trade = front.trade(loose(), ("K1", "X0"), points=3)
     with pytest.raises(BadInput, match=r"the least X0 is not reached: K1 grows without end.*--range of X0 or of K1"):
         trade.batch(ends(trade))
 
 
+@pytest.mark.slow
 def test_a_free_law_whose_middle_counts_is_traded_against_the_speed_that_keeps_contact():
     """Today's machine has no such law: what follows from one is read from the law that the task begins with."""
     scene = lo.load("shedding").set("effects.warp_tension.shape", "step")

@@ -43,6 +43,7 @@ def test_a_design_above_its_limit_is_uncertified_and_does_not_say_that_there_is_
     assert (above.status, above.reason) == ("uncertified", "m4e comes out above what was asked")
 
 
+@pytest.mark.slow
 def test_of_designs_of_the_least_power_an_end_has_the_least_radius():
     """A counterweight on the rocking shaft costs no power and shifts the centre of mass: r4 = m4 r4⁰/(m4 + m4e)."""
     scene = lo.load("beatup")
@@ -74,6 +75,7 @@ def test_an_axis_that_a_limit_alone_stops_is_certified_after_the_other():
     assert plan.values(found.rows, "l3") == pytest.approx([0.147938261848])
 
 
+@pytest.mark.slow
 def test_stiffness_against_the_speed_up_to_which_contact_holds():
     ranges = {"contact_speed": (10 * RPM, 900 * RPM)}
     trade = front.trade(lo.load("shedding"), ("K1", "contact_speed"), ranges=ranges, points=3)

@@ -77,6 +77,7 @@ def test_backed_off_beatup(sigmas, peak, share, se):
     assert found.certificate.passed
 
 
+@pytest.mark.slow
 def test_limits_and_backoff_stay_apart():
     found = of_beatup(3.0)
     swing = next(each for each in found.limits if each.name == "swing")
@@ -127,6 +128,7 @@ def test_yield_of_the_beatup(least, sigmas, peak):
     assert solved(beatup(), robust.linear).figures["peak_torque"] == pytest.approx(peak, abs=6e-10)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("standard", "peak"), [("IT7", 88.698245993), ("ISO 2768-f", 88.781426524), ("ISO 2768-m", 88.920745742)]
 )
@@ -218,6 +220,7 @@ def test_what_cannot_be_asked_is_refused_in_one_line():
         lo.solve(registry.load("beatup").update({"tolerances": {"M0": "5 %"}}), robust=3)
 
 
+@pytest.mark.slow
 def test_from_python():
     found = lo.solve(beatup(), robust=1)
     assert found.figures["peak_torque"] == of_beatup(1.0).figures["peak_torque"]
@@ -313,6 +316,7 @@ def test_backed_off_spring(problem, made, stiffness):
         assert found.robust.nominal.figures["K1"] == pytest.approx(102746.793970, abs=6e-7)
 
 
+@pytest.mark.slow
 def test_a_number_that_is_its_own_limit_is_not_backed_off():
     found = solved(registry.load("shedding").update({"tolerances": {"K1": "5 %", "speed": "1 %"}}), 3.0)
     speed = next(each for each in found.limits if each.name == "speed")
@@ -320,6 +324,7 @@ def test_a_number_that_is_its_own_limit_is_not_backed_off():
     assert "backed off" not in next(price.text for price in found.binding if price.limit == "speed")
 
 
+@pytest.mark.slow
 def test_a_limit_of_a_target_is_backed_off():
     # |M3| at front dead centre within 1 % of M0: the target's own demand, which no table of limits holds.
     found = solved(beatup(), 2.0, target="torque")

@@ -83,6 +83,7 @@ def test_a_worker_that_dies_costs_a_new_pool_and_no_row(chain):
     assert dying.solves().count(2) == dying.solves().count(13) == 2
 
 
+@pytest.mark.slow
 def test_a_point_that_kills_three_workers_is_a_failed_row(chain):
     lethal = replace(chain, kills=(5,))
     rows = run.run(lethal, run.workers(2))
@@ -130,6 +131,7 @@ def test_a_worker_that_is_killed_while_it_starts_costs_a_new_pool(tmp_path, deat
     assert len((tmp_path / "log").read_text()) >= min(deaths, 2) + 1
 
 
+@pytest.mark.slow
 def test_a_call_that_the_script_itself_repeats_is_bad_input(tmp_path):
     script = tmp_path / "bare.py"
     script.write_text("from loomopt.studies.run import run\nrun.workers(2)()\n")

@@ -217,6 +217,7 @@ sys.exit(stoppable(run))
 """
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_what_sqlite_is_at(tmp_path):
     done = subprocess.run([sys.executable, "-c", SLOW, tmp_path / "s.db"], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr) == (130, "loomopt: stopped; nothing was left half-written.\n")

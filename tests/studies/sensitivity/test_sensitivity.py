@@ -84,6 +84,7 @@ def test_price_ranges_of_the_beatup_and_their_ends(limit, low, high, ends):
     assert price.ends == ends
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("number", "value"),
     [
@@ -111,6 +112,7 @@ def test_range_of_the_cloth_resistance_in_which_the_same_limits_bind():
     assert sensitivity("shedding").holds == ()
 
 
+@pytest.mark.slow
 def test_a_weight_that_has_its_mass_and_a_spring_that_has_one():
     """The weight has the mass M = G/g; a third of the spring's mass moves with the lever."""
     assert derivative("shedding", "effects.weight.G", "K1").value + derivative(
@@ -173,6 +175,7 @@ def rams(target):
     return study.run(study.plan_sensitivity(lo.load(RAMS), answer.result))
 
 
+@pytest.mark.slow
 def test_bounds_that_bind_only_together_have_different_derivatives_on_both_sides():
     """One bound loosened alone changes nothing; tightened it costs the price of both together."""
     rows = {(row.number, row.side): row.value for row in rams("torque").rows if row.of == "peak_torque"}
@@ -185,6 +188,7 @@ def test_bounds_that_bind_only_together_have_different_derivatives_on_both_sides
         assert price.ends[0] == "the price is 0.000198 N*m per mm there"
 
 
+@pytest.mark.slow
 def test_a_price_follows_the_objective_that_it_belongs_to():
     """Two angles are maximised, one after the other: cos mu = r / rod."""
     rows = {(row.number, row.of): row.value for row in rams("angles").rows}
@@ -206,6 +210,7 @@ def test_resolving_confirms_a_derivative():
     assert row.value == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_free_cam_law_with_more_active_rows_than_knots():
     """Repeated solves on both sides confirm it; N_min can only increase, and acts like the weight."""
     scene = registry.load("shedding")

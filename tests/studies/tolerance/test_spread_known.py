@@ -72,6 +72,7 @@ def test_lengths_of_the_rapier_and_those_of_its_sley(made, stroke, after, before
         assert sigmas["peak_acceleration"] == pytest.approx(peak, rel=FREE_DIRECTION)
 
 
+@pytest.mark.slow
 def test_a_rapier_frame_at_a_fixed_place_while_its_sley_angle_changes():
     """phi30 is adjusted on the machine; with a fixed frame it follows from the lengths of the sley."""
     plan = make_plan("rapier", DRIVE | SLEY | {"phi30": "0.03 deg"})

@@ -93,6 +93,7 @@ def test_uniform_links():
     assert linear("beatup", dict.fromkeys(LINKS, made))[0]["M3_fdc"] == pytest.approx(0.947148, abs=6e-7)
 
 
+@pytest.mark.slow
 def test_linear_spread_of_the_rapier():
     sigmas, shares = linear("rapier", DRIVE)
     assert 1e3 * sigmas["stroke"] == pytest.approx(0.3171858877, rel=FREE_DIRECTION)
@@ -148,6 +149,7 @@ def test_yield_of_all_limits_without_a_band():
     assert "M3_fdc" not in result.yields
 
 
+@pytest.mark.slow
 def test_yields_of_shedding_and_rapier():
     shedding = study.run(make_plan("shedding", {"K1": "5 %", "X0": "1 mm"}, samples=4000))
     assert close(shedding.yields["N_min"], 0.49987, 1e-4)
@@ -258,6 +260,7 @@ def test_yields_of_many_machines(problem, made, accept, expected):
         assert close(result.yields[name], value, 2.2e-4 if problem == "rapier" else 6e-5), name
 
 
+@pytest.mark.slow
 def test_a_store_keeps_scrambles_and_a_study_resumes_from_it(tmp_path):
     scene = registry.load("shedding").update({"tolerances": {"K1": "5 %"}})
     path = tmp_path / "machines.db"

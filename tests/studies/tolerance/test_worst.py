@@ -96,6 +96,7 @@ def test_the_range_of_a_number_is_its_tolerance():
     )
 
 
+@pytest.mark.slow
 def test_a_model_without_boxes_is_undecided_and_names_the_reason():
     scene = registry.load("beatup").with_effect("speed_fluctuation")
     fluctuation = dict(worst.find_worst_cases(plan_tolerance(scene.update({"tolerances": LINKS}), samples=160)))
