@@ -18,7 +18,7 @@ from loomopt.solving.search.search import Clock, Search
 
 
 def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> neighbour_newton.NeighbourTask | None:
-    """Return a target between two optima; None where more than a search makes its answer, or they are of another one.
+    """Target between two optima; None where more than a search makes its answer, or they are of another one.
 
     beside: both optima as JSON data, and how far the target lies from the first to the second.
     """
@@ -34,7 +34,7 @@ def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> 
 
 
 def told_peaks(scene: Scene, job: Job, program: Program) -> tuple[str, ...]:
-    """Return the quantities whose extremes are figures, where a program reads the very model that figures are of.
+    """Quantities whose extremes are figures, where a program reads the very model that figures are of.
 
     Of a check that reads numbers which the program solves in another form there is none: only the design has them.
     """
@@ -48,16 +48,16 @@ def told_peaks(scene: Scene, job: Job, program: Program) -> tuple[str, ...]:
 
 @working()
 def evaluated(scene: Scene, search: Search) -> Evaluated | None:
-    """Return the figures of a search that ended beside its neighbours; None where they do not show it admissible."""
+    """Figures of a search that ended beside its neighbours; None where they do not show it admissible."""
     best = search.best
     assert best is not None
-    found = report.evaluation(scene, search.job, search.program, search.job.design(search.program, best.x), every=True)
-    return found if found.admissible else None
+    result = report.evaluation(scene, search.job, search.program, search.job.design(search.program, best.x), every=True)
+    return result if result.admissible else None
 
 
 @working()
 def told(scene: Scene, target: str, search: Search) -> Solution:
-    """Return the answer of a search that ended beside its neighbours."""
+    """Answer of a search that ended beside its neighbours."""
     clock = Clock()
     with clock.measure("report"):
         answer = report.answer(scene, target, search, Clash())
@@ -65,7 +65,7 @@ def told(scene: Scene, target: str, search: Search) -> Solution:
 
 
 def optimum(scene: Scene, program: Program, answer: Solution) -> Optimum | None:
-    """Return an answer's optimum; None where none can begin from it, as where what it adds was weighed."""
+    """Optimum of an answer; None where none can begin from it, as where what it adds was weighed."""
     if answer.status != "optimal" or answer.certificate is None or answer.beside is not None or answer.members:
         return None
     full = {scene.full(name): value for name, value in designs.flat(answer.design).items()}

@@ -18,7 +18,7 @@ Evaluation = Callable[[Scene, Job, Program, Mapping[str, float]], Evaluated]
 
 
 def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float], alone: Evaluation) -> Evaluated:
-    """Return a family's design with every member by itself; alone: evaluates one machine.
+    """A family's design with every member by itself; alone: evaluates one machine.
 
     A figure of the family is the one that all members have, else each has its own; of one that is sought there is that
     of the member that decides it beside these.
@@ -52,14 +52,14 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
 
 
 def _labelled(name: str, labels: Mapping[str, str]) -> str:
-    """Return a number of the whole by what a designer calls it."""
+    """A number of the whole by what a designer calls it."""
     of = name.of if isinstance(name, Alias) else name
     label = labels.get(of, of)
     return Alias(f"{label}{name.removeprefix(of)}", label) if isinstance(name, Alias) else label
 
 
 def said(scene: Scene, job: Job, found: Evaluated, priced: Collection[str]) -> str:
-    """Return who decides each level, which members reach their goals, and what physics says of those that do not.
+    """Who decides each level, which members reach their goals, and what physics says of those that do not.
 
     priced: names of the limits that bind; of what all members share those decide it whose own limits do.
     """
@@ -109,7 +109,7 @@ def _counted(names: Sequence[str], one: str, many: str) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return names as a list in words."""
+    """Names as a list in words."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
@@ -133,6 +133,6 @@ def _limits(job: FamilyJob, members: tuple[Evaluated, ...]) -> tuple[Finding, ..
 
 
 def _room(limit: Finding) -> float:
-    """Return how far a value is from the nearer end."""
+    """How far a value is from the nearer end."""
     low = limit.value - limit.min if limit.min is not None else math.inf
     return min(low, limit.max - limit.value if limit.max is not None else math.inf)

@@ -41,7 +41,7 @@ from loomopt.solving.search.search import Candidate, Search, compare
 
 @working()
 def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: str | None = None) -> Evaluated:
-    """Return figures and limits of a design (SI; today's without one), nothing optimised.
+    """Figures and limits of a design (SI; today's without one), nothing optimised.
 
     target: whose limits, the job's default without one. A limit that is exceeded by less than the rounding of the
     digits given says so. Raises BadInput for a design that does not assemble.
@@ -57,13 +57,13 @@ def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: st
 
 @working()
 def evaluated(scene: Scene, job: Job, target: str, design: Mapping[str, float]) -> Evaluated:
-    """Return figures and limits of a design (full names, SI; what it does not name stays today's)."""
+    """Figures and limits of a design (full names, SI; what it does not name stays today's)."""
     return evaluation(scene, job, job.program(scene, target), {**job.today(scene), **design})
 
 
 @working()
 def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float], every: bool = False) -> Evaluated:
-    """Return a design's figures and limits, each limit judged from the figures alone.
+    """A design's figures and limits, each limit judged from the figures alone.
 
     every: whether all extremes that are figures are looked for at once, as where all figures are read.
     """
@@ -99,7 +99,7 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
 def _findings(
     program: Program, figures: Mapping[str, float | None], design: Mapping[str, float], sampler: Sampler
 ) -> tuple[Finding, ...]:
-    """Return every limit beside its value, the tightest of each side; held to 1e-9 of its natural size."""
+    """Every limit beside its value, the tightest of each side; held to 1e-9 of its natural size."""
     sides: dict[tuple[str, bool], dict[int, float]] = {}
     sizes: dict[tuple[str, bool], float] = {}
     peaks: dict[str, float] = {}
@@ -142,7 +142,7 @@ Evaluate = Callable[[Mapping[str, float]], Evaluated]
 
 
 def _with_rounding(found: Evaluated, scene: Scene, design: Mapping[str, float], evaluate: Evaluate) -> Evaluated:
-    """Return an evaluation that is not admissible with limits that say whether rounding alone exceeds them.
+    """An evaluation that is not admissible with limits that say whether rounding alone exceeds them.
 
     design: all of it by full names, SI; evaluate(design): the same evaluation of another design.
     The reach of rounding is the sum of what half a unit of each number's last digit moves, the worst case.
@@ -159,7 +159,7 @@ def _with_rounding(found: Evaluated, scene: Scene, design: Mapping[str, float], 
 
 
 def roundings(scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
-    """Return half a unit of each number's last digit, SI: all numbers have as many as the one that has the most.
+    """Half a unit of each number's last digit, SI: all numbers have as many as the one that has the most.
 
     Empty where no rounding shows: in nominal numbers and in a computer's own. Lists of numbers are never typed.
     """
@@ -177,13 +177,13 @@ def roundings(scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
 
 
 def digits(value: float) -> int:
-    """Return with how many significant digits a number was written, whatever zeros ended it; 17 for any float."""
+    """Number of significant digits of a number without trailing zeros; 17 for any float."""
     few = range(1, MOST_DIGITS + 1)
     return next((n for n in few if abs(float(f"{value:.{n}g}") - value) <= CONVERTED * abs(value)), 17)
 
 
 def _half(value: float, count: int) -> float:
-    """Return half a unit of the last of `count` significant digits."""
+    """Half a unit of the last of `count` significant digits."""
     return 0.5 * 10.0 ** (math.floor(math.log10(abs(value))) - count + 1)
 
 
@@ -209,7 +209,7 @@ NOT_SOLVED = {"status": "Not_Assembled", "iterations": 0}
 
 
 def answer(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
-    """Return the answer of a search: of the best design that was reached, or why there is none.
+    """Answer of a search: of the best design that was reached, or why there is none.
 
     clash: the limits that cannot all be kept, where that is the reason.
     """
@@ -219,7 +219,7 @@ def answer(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
 
 
 def _with(scene: Scene, target: str, search: Search, best: Candidate) -> Solution:
-    """Return the answer of the best design that was reached."""
+    """Answer of the best design that was reached."""
     job, program, point = search.job, search.program, best.point
     solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search), "status": point.status, "iterations": point.iterations}
     today = functools.partial(evaluated, scene, job, target, {})
@@ -241,7 +241,7 @@ def explained(answer: Solution, *more: str) -> Sentences:
 
 
 def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
-    """Return the answer where no design was reached."""
+    """Answer where no design was reached."""
     job, program, points = search.job, search.program, [each.point for each in search.candidates]
     solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search)}
     if points:
@@ -265,12 +265,12 @@ def _stopped(search: Search) -> Mapping[str, float]:
 
 
 def nowhere(scene: Scene) -> Evaluated:
-    """Return an evaluation of no design, where no solve led to any."""
+    """An evaluation of no design, where no solve led to any."""
     return Evaluated(scene.name, tuple(scene.effects), {}, {}, {}, (), scene=scene)
 
 
 def _counts(search: Search) -> dict[str, Any]:
-    """Return how many starts there were, how many ended at the best, and the accuracy asked for."""
+    """How many starts there were, how many ended at the best, and the accuracy asked for."""
     best = search.best
     same = [c for c in search.candidates if _is_there(c, best)] if best else []
     accuracy = search.settings.accuracy
@@ -283,7 +283,7 @@ def _counts(search: Search) -> dict[str, Any]:
 
 
 def _optima(search: Search) -> tuple[tuple[Mapping[str, float | None], int], ...]:
-    """Return figures of the distinct optima the starts ended in, best first, with how many starts did."""
+    """Figures of the distinct optima the starts ended in, best first, with how many starts did."""
     groups: list[list[Candidate]] = []
     for candidate in search.ranked:
         if groups and compare(groups[-1][0], candidate) == 0:
@@ -294,7 +294,7 @@ def _optima(search: Search) -> tuple[tuple[Mapping[str, float | None], int], ...
 
 
 def _figures(search: Search, candidate: Candidate) -> dict[str, float | None]:
-    """Return the figures of the objectives at a candidate, SI."""
+    """Figures of the objectives at a candidate, SI."""
     sampler = sampler_at(search.program, candidate.point.x)
     if sampler is None:
         return {}
@@ -302,14 +302,14 @@ def _figures(search: Search, candidate: Candidate) -> dict[str, float | None]:
 
 
 def _is_there(candidate: Candidate, best: Candidate) -> bool:
-    """Say whether a solve ended in the best, or was left where it could only have ended there."""
+    """Whether a solve ended in the best, or was left where it could only have ended there."""
     if candidate.point.usable:
         return compare(candidate, best) == 0
     return abs(candidate.point.value - best.value) <= SAME_OBJECTIVE
 
 
 def _sought(search: Search) -> str:
-    """Return how far the best was sought, as a sentence that claims no more than was done."""
+    """How far the best was sought, as a sentence that claims no more than was done."""
     if search.stayed:
         return "Solved again near the answer given; other basins were not looked at."
     if search.program.single:
@@ -322,7 +322,7 @@ def _sought(search: Search) -> str:
 
 
 def _substituted(search: Search, best: Candidate) -> str:
-    """Return which known design stands in place of what solves ended in, as a sentence."""
+    """Which known design stands in place of what solves ended in, as a sentence."""
     apart = max(abs(best.x[v.name] - search.today.get(v.name, math.inf)) / v.scale for v in search.program.variables)
     name = "today's machine" if apart <= FEASIBLE else "where one of the solves ended"
     return f"No solve ended in a better design that is certified; this is the best admissible design known, {name}."
@@ -339,7 +339,7 @@ def with_optimum(
     searched: str,
     substitute: bool = False,
 ) -> Solution:
-    """Return the answer of a design that was reached: optimal if certified, else uncertified.
+    """Answer of a design that was reached: optimal if certified, else uncertified.
 
     searched: how far the best was sought, as a sentence; substitute: whether it is a known design that no solve ended
     in certified.
@@ -409,12 +409,12 @@ def prices(words: Words, certificate: Certificate) -> tuple[Price, ...]:
 
 
 def joint_prices(words: Words, certificate: Certificate) -> tuple[JointPrice, ...]:
-    """Return the prices of limits that are worth more together than alone."""
+    """Prices of limits that are worth more together than alone."""
     return tuple(map(words.joint_price, certificate.bind_together))
 
 
 def stops(binding: tuple[Price, ...], together: tuple[JointPrice, ...] = ()) -> str:
-    """Return the sentence that names the limits which stop the first objective they move."""
+    """Sentence that names the limits which stop the first objective they move."""
     if not binding:
         return "No limit binds."
     figure = next(iter(binding[0].worth))
@@ -441,7 +441,7 @@ def without_optimum(
     today: Today,
     explanation: str = "",
 ) -> Solution:
-    """Return the answer where no design was reached: infeasible with the least relaxations, else failed."""
+    """Answer where no design was reached: infeasible with the least relaxations, else failed."""
     if found.relaxations:
         result = (
             f"No admissible design exists near any start. Limits that clash: {', '.join(found.limits)}. "
@@ -463,7 +463,7 @@ def without_optimum(
 
 
 def completed(answer: Solution, bound: GlobalBound | None, evaluations: int, seconds: Mapping[str, float]) -> Solution:
-    """Return an answer with what is proven of all designs, and what it cost: positions evaluated, and seconds."""
+    """An answer with what is proven of all designs, and what it cost: positions evaluated, and seconds."""
     solver = {**answer.solver, "evaluations": evaluations}
     if answer.certificate:
         solver["error_estimate"] = answer.certificate.error

@@ -83,7 +83,7 @@ class Proofs(Shown):
         return f"<Proofs {self.problem}, {self.target}: {self.said}>"
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the object `prove --json` prints."""
+        """Object `prove --json` prints."""
         proofs = [proof.as_dict() for proof in self.proofs]
         found = {"problem": self.problem, "target": self.target, "proofs": proofs}
         return found | ({"uncovered": list(self.uncovered)} if self.uncovered else {})
@@ -180,7 +180,7 @@ class JointPrice(NamedTuple):
 
 
 def named(names: Sequence[str]) -> str:
-    """Return names as a list in a sentence: "a, b and c"."""
+    """Names as a list in a sentence: "a, b and c"."""
     *first, last = names
     return f"{', '.join(first)} and {last}" if first else last
 
@@ -232,10 +232,10 @@ class Terms(Protocol):
         """The figures that are sought."""
 
     def evaluation(self, design: Mapping[str, float]) -> "Evaluated":
-        """Return figures and limits of a design, SI."""
+        """Figures and limits of a design, SI."""
 
     def proofs(self, design: Mapping[str, float], slack: float) -> "Proofs":
-        """Return proofs of its limits. Raises BadInput."""
+        """Proofs of its limits. Raises BadInput."""
 
 
 @dataclass(frozen=True)
@@ -290,7 +290,7 @@ class Evaluated:
 
 
 def _tables(scene: Scene, target: str) -> list[dict[str, object]]:
-    """Return precision and misfit of each table that was read, as JSON data; none of one that is gone since."""
+    """Precision and misfit of each table that was read, as JSON data; none of one that is gone since."""
     from loomopt.jobs import registry
 
     with contextlib.suppress(BadInput):
@@ -592,7 +592,7 @@ class Solution(Evaluated):
         return self.terms.said if self.terms else self.target
 
     def as_dict(self, target: str = "") -> dict[str, Any]:
-        """Return the object `solve --json` prints."""
+        """Object `solve --json` prints."""
         base = super().as_dict(self.target or target)
         head: dict[str, Any] = {
             "problem": self.problem,
@@ -637,7 +637,7 @@ class Solution(Evaluated):
 
 
 def certificate_dict(certificate: Certificate) -> dict[str, Any]:
-    """Return the certificate as JSON data."""
+    """Certificate as JSON data."""
     told = {
         "passed": certificate.passed,
         "by": certificate.by,
@@ -662,7 +662,7 @@ def certificate_dict(certificate: Certificate) -> dict[str, Any]:
 
 
 def _scene_dict(scene: "Scene", target: str | None) -> dict[str, Any]:
-    """Return a scene as JSON data from which it can be made again, its tables with it; target: as the call named it."""
+    """A scene as JSON data from which it can be made again, its tables with it; target: as the call named it."""
     from loomopt.scenes.numbers import tables
 
     call, files = scene.call.as_dict() | {"target": target}, tables(scene)
@@ -684,7 +684,7 @@ UNKNOWN = "number"
 
 
 def outward(value: float, side: int) -> float:
-    """Return a value rounded to six significant digits so that it gives no less room: up for a maximum."""
+    """A value rounded to six significant digits so that it gives no less room: up for a maximum."""
     if value == 0.0:
         return value
     step = 10.0 ** (math.floor(math.log10(abs(value))) - 5)
@@ -692,7 +692,7 @@ def outward(value: float, side: int) -> float:
 
 
 def grouped(unit: str) -> str:
-    """Return a unit that may stand after a stroke."""
+    """A unit that may stand after a stroke."""
     return f"({unit})" if "/" in unit else unit
 
 
@@ -729,7 +729,7 @@ class Words:
         return found.kind if found else UNKNOWN
 
     def unit(self, name: str) -> str:
-        """Return the unit a designer reads it in."""
+        """Unit a designer reads it in."""
         return self.scene.shown_in(self.kind(name))
 
     def si(self, name: str) -> str:
@@ -737,16 +737,16 @@ class Words:
         return SI_UNIT[self.kind(name)]
 
     def shown(self, name: str, value: float, digits: int = 6) -> str:
-        """Return an SI value with its unit, as the designer writes it."""
+        """An SI value with its unit, as the designer writes it."""
         return show(value, self.unit(name), digits)
 
     def outward(self, name: str, value: float, side: int) -> str:
-        """Return an SI value that something never passes on a side, rounded outward, with its unit."""
+        """An SI value that something never passes on a side, rounded outward, with its unit."""
         unit = self.unit(name)
         return show(outward(value / factor(unit), side) * factor(unit), unit)
 
     def limit(self, limit: Limit) -> str:
-        """Return a limit as a phrase: "l1 >= 30 mm"."""
+        """A limit as a phrase: "l1 >= 30 mm"."""
         if limit.name in self.scene.schema.margins:
             return limit.name
         return f"{limit.name} {SIGNS[limit.sign]} {self.shown(limit.name, limit.value)}"
@@ -762,7 +762,7 @@ class Words:
         return f"Worse than today's machine: {', '.join(told)}." if told else ""
 
     def price(self, bindings: Sequence[Binding]) -> Price:
-        """Return a limit's price: what all its rows together are worth."""
+        """A limit's price: what all its rows together are worth."""
         first = bindings[0]
         limit, figure = first.limit, first.objective.figure
         worth = worth_of(bindings)
@@ -777,12 +777,12 @@ class Words:
         )
 
     def price_reading(self, figure: str, limit: str, worth: float) -> str:
-        """Return a price, SI, in the designer's own units, as a phrase: "0.2 N*m per mm"."""
+        """A price, SI, in the designer's own units, as a phrase: "0.2 N*m per mm"."""
         per = self.unit(limit)
         return f"{self._amount(figure, worth * factor(per))} per {per if per != '1' else 'unit'}"
 
     def _amount(self, figure: str, value: float) -> str:
-        """Return an SI value of a figure with three digits and its unit, if it has one."""
+        """An SI value of a figure with three digits and its unit, if it has one."""
         unit = self.unit(figure)
         return f"{value / factor(unit):.3g}{f' {unit}' if unit != '1' else ''}"
 
@@ -811,7 +811,7 @@ class Words:
         return JointPrice(tuple(names), sides, {figure: worth}, {figure: unit}, tuple(alone), f"{reading}; {rest}")
 
     def relaxation(self, limit: Limit, need: float, alone: bool) -> Relaxation:
-        """Return how far a limit must give way, SI and as a phrase."""
+        """How far a limit must give way, SI and as a phrase."""
         side = limit.sign or (1 if need > 0 else -1)
         needed = limit.value + side * abs(need)
         if abs(needed) <= SHOWN_AS_ZERO * max(abs(limit.value), abs(need)):

@@ -55,8 +55,8 @@ class EventBox:
             zone = self._zone(event, Given(whole, {}), Given(middle, {}))
             self.zones[event.value] = zone
             middle[event.value] = self._root(event, Given(middle, {}), zone)
-            own = self._followed(event, Given(whole, {}), Given(middle, {}), zone, self.half)
-            whole[event.value], narrow[event.value] = own, own.v
+            enclosure = self._followed(event, Given(whole, {}), Given(middle, {}), zone, self.half)
+            whole[event.value], narrow[event.value] = enclosure, enclosure.v
         at = [
             self._followed(t, Given(whole, {}), Given(middle, {}), zone, self.half)
             for t, zone in zip(self.following.turns, turns, strict=True)
@@ -67,44 +67,44 @@ class EventBox:
             self.following.sure(self.system, Given(middle, {}), there),
             strict=True,
         )
-        for (said, row), (_, here) in rows:
+        for (problem, row), (_, here) in rows:
             if not (self.meant(row, here, self.half).low > 0).all():
-                raise OpenError(f"on some machines within the tolerances {said}")
+                raise OpenError(f"on some machines within the tolerances {problem}")
         for begins, event in self.following.paths:
             self._first(begins, event, Given(whole, {}), Given(middle, {}))
         self.zones = narrow  # no event lies outside; each part of the box begins from there
 
     def given(self, values: Values, middle: Values, half: Floats) -> dict[str, Number]:
-        """Return the events of parts of the box, with their slopes where the values have any."""
-        whole, centre, found = dict(values), dict(middle), dict[str, Number]()
+        """Events of parts of the box, with their slopes where the values have any."""
+        whole, centre, events = dict(values), dict(middle), dict[str, Number]()
         for event in self.following.events:
             zone = self.zones[event.value]
             centre[event.value] = self._root(event, Given(centre, {}), zone)
             whole[event.value] = self._followed(event, Given(whole, {}), Given(centre, {}), zone, half)
-            found[event.value] = whole[event.value]
-        return found
+            events[event.value] = whole[event.value]
+        return events
 
     def points(self, values: Values) -> dict[str, Number]:
-        """Return the events of single designs."""
-        whole, found = dict(values), dict[str, Number]()
+        """Events of single designs."""
+        whole, events = dict(values), dict[str, Number]()
         for event in self.following.events:
-            found[event.value] = whole[event.value] = self._root(event, Given(whole, {}), self.zones[event.value])
-        return found
+            events[event.value] = whole[event.value] = self._root(event, Given(whole, {}), self.zones[event.value])
+        return events
 
     def _root(self, event: Followed, given: Given, zone: Interval) -> Interval:
-        """Return where an event lies on single designs."""
+        """Crank angle of an event on single designs."""
         at = zone
         for _ in range(STEPS):
             middle = interval((at.low + at.high) / 2)
             value, slope = (
-                _plain(each)
-                for each in (event.rates(self.system, given, middle)[0], event.rates(self.system, given, at)[1])
+                _plain(number)
+                for number in (event.rates(self.system, given, middle)[0], event.rates(self.system, given, at)[1])
             )
             at = at.meet(middle - value / slope)
         return at
 
     def _step(self, event: Followed, given: Given, middle: Given, at: Interval, half: Floats) -> Interval:
-        """Return Newton's step of all designs of parts from an enclosure."""
+        """Newton step from an enclosure, for all designs of parts."""
         centre = interval((at.low + at.high) / 2)
         value = self.meant(
             event.rates(self.system, given, centre)[0], event.rates(self.system, middle, centre)[0], half
@@ -114,7 +114,7 @@ class EventBox:
         return step
 
     def _followed(self, event: Followed, given: Given, middle: Given, zone: Interval, half: Floats) -> Enclosure:
-        """Return where an event lies on all designs of parts, and how it moves with them."""
+        """Crank angle of an event on all designs of parts, with its slopes."""
         at = zone
         for _ in range(STEPS):
             at = at.meet(self._step(event, given, middle, at, half))
@@ -124,7 +124,7 @@ class EventBox:
         return Enclosure(at, -(moved / _plain(slope)))
 
     def _zone(self, event: Followed, given: Given, middle: Given) -> Interval:
-        """Return crank angles between which an event lies on every design of the box, once on each."""
+        """Range of crank angles in which an event lies exactly once on every design of the box."""
         here = interval(np.array([[event.angle]]))
         value = event.rates(self.system, given, here)[0]
         steep = _plain(event.rates(self.system, middle, here)[1])
@@ -168,8 +168,8 @@ class EventBox:
             (float(zone.low.min()), float(zone.high.max())) for zone in (self.zones[begins], self.zones[event.value])
         )
         gap = (begin, low) if begin < low else (high, end)
-        said = f"reaches {event.name} earlier"
-        self._clear(gap, lambda own, phi: event.rates(self.system, own, phi)[0], given, middle, said, 1)
+        claim = f"reaches {event.name} earlier"
+        self._clear(gap, lambda numbers, phi: event.rates(self.system, numbers, phi)[0], given, middle, claim, 1)
 
     def _clear(
         self,
@@ -177,7 +177,7 @@ class EventBox:
         formula: Callable[[Given, Interval], Number],
         given: Given,
         middle: Given,
-        said: str,
+        claim: str,
         sign: int,
     ) -> None:
         """Prove that a formula has no root over crank angles, rad; sign 1: that it is positive there."""
@@ -195,7 +195,7 @@ class EventBox:
                 return
             low, high = low[open_], high[open_]
             if read > MOST or (high - low).min() < FINEST:
-                raise OpenError(f"it is not excluded that the output {said} on some machines within the tolerances")
+                raise OpenError(f"it is not excluded that the output {claim} on some machines within the tolerances")
             centre = (low + high) / 2
             low, high = np.concatenate([low, centre]), np.concatenate([centre, high])
 

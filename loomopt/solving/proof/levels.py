@@ -92,7 +92,7 @@ class Levels:
 def loosening(job: Job, program: Program) -> tuple[str, ...]:
     """Variables of a program that only loosen limits, by its job."""
     names = {v.name for v in program.variables}
-    return tuple(name for name, other in job.loosening.items() if {name, other} <= names)
+    return tuple(name for name, partner in job.loosening.items() if {name, partner} <= names)
 
 
 def _unserved(program: Program, sampler: Sampler) -> str:

@@ -52,23 +52,23 @@ class Spots:
         return len(self.sign)
 
     def angle(self, corners: Sequence[Number]) -> Number:
-        """Return crank angles over boxes, rad."""
+        """Crank angles over boxes, rad."""
         angle: Number = PI * (2 * self.turns)
         for share, corner in zip(self.shares, corners, strict=True):
             angle = corner * interval(share) + angle
         return angle
 
-    def beside(self, other: "Spots", boxes: int) -> "Spots":
-        """Return these nodes and then others, of so many boxes."""
+    def beside(self, spots: "Spots", boxes: int) -> "Spots":
+        """Both groups of nodes, one after the other, over boxes."""
 
-        def both(one: Floats, two: Floats) -> Floats:
-            return np.vstack([np.broadcast_to(each, (len(each), boxes)) for each in (one, two)])
+        def both(first: Floats, second: Floats) -> Floats:
+            return np.vstack([np.broadcast_to(nodes, (len(nodes), boxes)) for nodes in (first, second)])
 
         return Spots(
-            both(self.turns, other.turns),
-            tuple(both(one, two) for one, two in zip(self.shares, other.shares, strict=True)),
-            {name: both(one, other.switches[name]) for name, one in self.switches.items()},
-            both(self.sign, other.sign),
+            both(self.turns, spots.turns),
+            tuple(both(first, second) for first, second in zip(self.shares, spots.shares, strict=True)),
+            {name: both(first, spots.switches[name]) for name, first in self.switches.items()},
+            both(self.sign, spots.sign),
         )
 
 
@@ -84,7 +84,7 @@ class NodeLayout:
         return pieces, self.spots([Extreme(int(p), float(v), 1.0) for p, v in zip(pieces, u, strict=True)])
 
     def spots(self, extremes: Sequence[Extreme]) -> Spots:
-        """Return extremes of a design of this order as nodes of boxes."""
+        """Extremes of a design of this order as nodes of boxes."""
         count = self.sampler.corner_count
         parts = [self.cycle.shares(e.piece, e.u, count) for e in extremes]
         switches = self.cycle.switch(np.array([e.piece for e in extremes], dtype=np.intp))
@@ -96,7 +96,7 @@ class NodeLayout:
         )
 
     def worst(self, task: BoxTask, name: str, middles: Floats, where: Where | None = None) -> Spots:
-        """Return the node of each box at which its middle's quantity is largest; middles: (names, boxes)."""
+        """Node of each box at which its middle's quantity is largest; middles: (names, boxes)."""
         model, system = task.program.model, systems.numpy()
         pieces, grid = self._grid
         on = self.sampler.on(name, where)[pieces]
@@ -119,7 +119,7 @@ class NodeLayout:
         )
 
     def certain(self, corners: Sequence[Number], events: Mapping[str, Number], boxes: int) -> NDArray[np.bool_]:
-        """Say of each box whether all its designs have this order of corners, and events in the same pieces."""
+        """Whether all designs of a box have this order of corners, and events in the same pieces, (boxes,)."""
         sure = np.ones(boxes, dtype=bool)
         starts = self.cycle.begins(corners, PI)
         if self.cycle.order:
@@ -132,7 +132,7 @@ class NodeLayout:
     def _stands(
         self, name: str, angle: Number, corners: Sequence[Number], starts: Sequence[Number]
     ) -> NDArray[np.bool_]:
-        """Say of each box whether an event stays in the piece that ends at, or holds, it in the sampled design."""
+        """Whether an event stays in the piece that ends at it, or holds it, in the sampled design, (boxes,)."""
         here = float(self.sampler.model.event(systems.FLOAT, self.sampler.given, name))
         piece = self.cycle.piece_before(here)
         following = self.cycle.order[(piece + 1) % self.cycle.pieces][0]
@@ -145,7 +145,7 @@ class NodeLayout:
 
 
 def _before(first: Number, second: Number) -> NDArray[np.bool_]:
-    """Say of each box whether one angle does not pass another."""
+    """Whether one angle does not pass another, (boxes,)."""
     return np.asarray(_value(first).high <= _value(second).low).reshape(-1)
 
 
@@ -171,8 +171,8 @@ def layouts(
         turns = -np.floor((angles - angles[0]) / TURN)
         keys = np.vstack([np.argsort(angles + TURN * turns, axis=0), np.where(np.isfinite(turns), turns, 0)]).T
         keys[~np.isfinite(angles).all(axis=0)] = -1.0
-    found, which = np.unique(keys, axis=0, return_inverse=True)
-    for place, key in enumerate(found):
+    orders, which = np.unique(keys, axis=0, return_inverse=True)
+    for place, key in enumerate(orders):
         boxes_here = np.flatnonzero(which.ravel() == place)
         name = key.tobytes()
         if name not in known:
@@ -271,7 +271,7 @@ class Reader:
                 yield BoxRow(place, row, 1.0, objective.scale, True, extremes=near)
 
     def _stands(self, row: str) -> bool:
-        """Say whether a row depends on the order of corners: one at an event of the motion, a mean over the cycle."""
+        """Whether a row depends on the order of corners: one at an event of the motion, a mean over the cycle."""
         if any(row in (mean.name, mean.root) for mean in self.task.program.model.integrals):
             return True
         try:
@@ -281,7 +281,7 @@ class Reader:
         return False
 
     def read(self, low: Floats, high: Floats, until: float = math.inf) -> Read:
-        """Return all rows over boxes (names, boxes); until: the clock's time, looked at between parts.
+        """Rows of the program over boxes (names, boxes); until: end of the reading by the clock, checked between parts.
 
         Raises LateError where it is past.
         """
@@ -295,8 +295,8 @@ class Reader:
                 if done and time.perf_counter() >= until:
                     raise LateError
                 here = places[first : first + AT_ONCE]
-                found = self._alike(layout, low[:, here], high[:, here], middles[:, here], count)
-                for whole, part in zip((value, middle, slope), found, strict=True):
+                parts = self._alike(layout, low[:, here], high[:, here], middles[:, here], count)
+                for whole, part in zip((value, middle, slope), parts, strict=True):
                     whole.low[..., here], whole.high[..., here] = part.low, part.high
                 done += len(here)
         return Read(value, middle, slope, self.of)
@@ -304,7 +304,7 @@ class Reader:
     def _alike(
         self, layout: NodeLayout | None, low: Floats, high: Floats, middles: Floats, count: int
     ) -> tuple[Interval, Interval, Interval]:
-        """Return value, middle and slopes of boxes whose middles have one order of corners; count: strips of a mean."""
+        """Value, middle and slopes of boxes whose middles have one order of corners; count: strips of a mean."""
         names, boxes = low.shape
         with np.errstate(all="ignore"):
             spots = self._spots(layout, middles) if layout else {}
@@ -315,20 +315,20 @@ class Reader:
         return value, middle, slope
 
     def _spots(self, layout: NodeLayout, middles: Floats) -> dict[int, Spots]:
-        """Return the nodes of every whole-cycle row, by its place."""
-        found = {}
+        """Nodes of every whole-cycle row, by its place."""
+        spots = {}
         for place, line in enumerate(self._lines):
             if line.single is None:
                 worst = layout.worst(self.task, line.row, middles, line.where)
                 if line.extremes and layout is self._own:
                     worst = layout.spots(line.extremes).beside(worst, middles.shape[1])
-                found[place] = worst
-        return found
+                spots[place] = worst
+        return spots
 
     def _rows(
         self, layout: NodeLayout | None, numbers: dict[str, Number], spots: dict[int, Spots], boxes: int, count: int
     ) -> tuple[list[Number], list[Mask]]:
-        """Return all rows, each (nodes, boxes), and of which boxes each is sure; None for what nothing is known of."""
+        """Rows, (nodes, boxes), and the boxes for which each is certain; layout: None for an unknown order."""
         model, system = self.task.program.model, systems.boxes()
         given = model.given(system, numbers)
         corners = model.corners(system, given) if layout else ()
@@ -336,23 +336,23 @@ class Reader:
         rows = BoxRows(model, system, given, stills, cycle, corners, count)
         events = {name: model.event(system, given, name) for name in model.events_read} if layout else {}
         ordered = layout.certain(corners, events, boxes) if layout else np.zeros(boxes, dtype=bool)
-        found = self._ratios(numbers)
-        sure = [np.ones(boxes, dtype=bool)] * len(found)
+        values = self._ratios(numbers)
+        sure = [np.ones(boxes, dtype=bool)] * len(values)
         for place, line in enumerate(self._lines):
             sure += [ordered if line.placed else np.ones(boxes, dtype=bool)] * line.rows
             if line.placed and layout is None:
-                found.append(_unknown((line.rows, boxes)))
+                values.append(_unknown((line.rows, boxes)))
             elif line.single is None:
                 value = rows.quantity(line.row, spots[place].angle(corners), spots[place].switches)
                 value = value * interval(spots[place].sign) - line.bound
                 lacking = line.rows - spots[place].count
-                found += [_unknown((lacking, boxes)), value / line.scale] if lacking else [value / line.scale]
+                values += [_unknown((lacking, boxes)), value / line.scale] if lacking else [value / line.scale]
             else:
-                found.append(line.single(rows) * line.sign / line.scale)
-        return found, sure
+                values.append(line.single(rows) * line.sign / line.scale)
+        return values, sure
 
     def _ratios(self, numbers: dict[str, Number]) -> list[Number]:
-        """Return the rows that keep the ratios of lengths: they hold whatever the order of corners."""
+        """Rows that keep the ratios of lengths: they hold whatever the order of corners."""
         scale = self.task.scale
         return [(numbers[a] - numbers[b] * share) / scale.bounds[a][1] for a, b, share in scale.pairs] if scale else []
 
@@ -365,19 +365,19 @@ class _Nowhere(dict[str, Values]):
     """Switches of no event: a row that asks for those of one raises _EventError."""
 
     def get(self, event: str, default: Values) -> Values:  # type: ignore[override]
-        """Return the default for rows of the design alone."""
+        """Default for rows of the design alone."""
         if event:
             raise _EventError
         return default
 
 
 def _unknown(shape: tuple[int, ...]) -> Interval:
-    """Return what may be anything."""
+    """Intervals without ends."""
     return Interval(np.full(shape, -np.inf), np.full(shape, np.inf))
 
 
 def _stacked(rows: Sequence[Number], sure: Sequence[Mask], names: int, boxes: int) -> tuple[Interval, Interval]:
-    """Return values (rows, boxes) and slopes (names, rows, boxes): anything where rows are not sure of a box."""
+    """Values (rows, boxes) and slopes (names, rows, boxes); without ends where a row is not certain for a box."""
     known = np.array(sure).reshape(-1, boxes)
     values = [row.v if isinstance(row, Enclosure) else interval(row) for row in rows]
     nodes = [value.shape[0] if len(value.shape) > 1 else 1 for value in values]

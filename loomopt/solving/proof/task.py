@@ -25,7 +25,7 @@ falls with the cube of their width (0.04 % of pulse_rms from 32), and does not c
 
 
 def strips(widths: Floats) -> int:
-    """Return how many strips are enough for boxes of such widths, shares of the whole box."""
+    """Number of strips that is enough for boxes of such widths, shares of the whole box."""
     usual = float(np.median(widths.max(axis=0)))
     return next(count for least, count in STRIPS if usual >= least)
 
@@ -54,7 +54,7 @@ class BoxRows(Rows):
         self._cycle, self._corners, self._strips = cycle, corners, strips
 
     def mean(self, integral: Integral) -> Number:
-        """Return a mean at its own angles, or over its pieces, SI. Raises OpenError without a cycle."""
+        """Mean of a quantity at its own angles, or over its pieces, SI. Raises OpenError without a cycle."""
         if integral.angles:
             if self.model.kinematics.arcs:
                 raise OpenError(
@@ -75,7 +75,7 @@ class BoxRows(Rows):
         return total([width * mean for width, mean in zip(widths, means, strict=True)]) / total(widths)
 
     def _mean(self, name: str, cycle: Cycle, starts: Sequence[Number], piece: int) -> Number:
-        """Return a quantity's mean over one piece: its value at the middle of each strip, and its bend over it."""
+        """Mean of a quantity over one piece: its value at the middle of each strip, and its bend over it."""
         count = self._strips
         half = 0.5 / count
         middles: Floats = ((2 * np.arange(count, dtype=np.float64) + 1) * half)[:, None]
@@ -83,24 +83,24 @@ class BoxRows(Rows):
         values = self.quantity(name, begin + interval(middles) * width, switch)
         whole = along(middles - half, middles + half)
         series = Quantities(self.model, (self.maths, systems.box_series()), self.given)
-        found = series((name,), Node(begin + whole * width, switch))[0]
-        bends = found.terms.bend if isinstance(found, IntervalSeries) else interval(0.0)
+        expansion = series((name,), Node(begin + whole * width, switch))[0]
+        bends = expansion.terms.bend if isinstance(expansion, IntervalSeries) else interval(0.0)
         return _summed(values * (2 * half), count) + _summed(bends * (interval(half) ** 3 * 2.0 / 3.0), count)
 
 
 def _summed(number: Number, count: int) -> Number:
-    """Return the sum over so many nodes, the last axis but one."""
+    """Sum over nodes, the last axis but one."""
     if isinstance(number, Enclosure):
         return Enclosure(_added(number.v, count), _added(number.g, count))
     return _added(interval(number), count)
 
 
 def _added(values: Interval, count: int) -> Interval:
-    """Return the sum of nodes: floats add up with an error of so many roundings of their magnitudes."""
+    """Sum of nodes, widened by the rounding errors of the float addition."""
     room = 2 * count * float(np.finfo(float).eps)
 
-    def end(each: Floats, side: float) -> Number:
-        spread = np.broadcast_to(each, (*each.shape[:-2], count, each.shape[-1]))
+    def end(terms: Floats, side: float) -> Number:
+        spread = np.broadcast_to(terms, (*terms.shape[:-2], count, terms.shape[-1]))
         return spread.sum(axis=-2, keepdims=True) + side * room * np.abs(spread).sum(axis=-2, keepdims=True)
 
     with np.errstate(invalid="ignore"):
@@ -147,12 +147,12 @@ class Scale:
         ]
 
     def taken_out(self, x: Mapping[str, float]) -> dict[str, float]:
-        """Return a design, SI, of the size at which the one stands."""
+        """A design, SI, of the size at which the one stands."""
         factor = self.bounds[self.still][1] / x[self.still]
         return {name: value * factor if name in self.bounds else value for name, value in x.items()}
 
     def inside(self, x: Mapping[str, float]) -> dict[str, float]:
-        """Return a design, SI, of a size that bounds allow: the middle one."""
+        """A design, SI, of a size that bounds allow: the middle one."""
         least = max(x[name] / high for name, (_, high) in self.bounds.items())
         most = min(x[name] / low for name, (low, _) in self.bounds.items())
         factor = 2 / (least + most)
@@ -187,48 +187,48 @@ class BoxTask:
         return list(self.program.row_limits)
 
     def numbers(self, low: Floats, high: Floats) -> dict[str, Number]:
-        """Return all numbers over boxes: variables with their slopes; low, high: (names, boxes), SI."""
+        """All numbers over boxes: variables with their slopes; low, high: (names, boxes), SI."""
         count = len(self.names)
-        own = {name: intervals.variable(k, count, low[k], high[k]) for k, name in enumerate(self.names)}
-        return {**self.fixed, **own}
+        variables = {name: intervals.variable(k, count, low[k], high[k]) for k, name in enumerate(self.names)}
+        return {**self.fixed, **variables}
 
     def points(self, at: Floats) -> dict[str, Number]:
-        """Return all numbers at points (names, boxes), SI, as intervals without slopes."""
+        """All numbers at points (names, boxes), SI, as intervals without slopes."""
         return {**self.fixed, **{name: intervals.interval(at[k][None]) for k, name in enumerate(self.names)}}
 
     def floats(self, at: Floats) -> dict[str, Number]:
-        """Return all numbers at points (names, boxes), SI, as plain arrays."""
+        """All numbers at points (names, boxes), SI, as plain arrays."""
         known = {**self.program.parameters, **{v.name: v.lower for v in self.program.variables}, **self.loosening}
         if self.scale:
             known |= self.scale.held
         return {**known, **{name: at[k][None] for k, name in enumerate(self.names)}}
 
     def values(self, at: Floats) -> dict[str, float]:
-        """Return all numbers at one point (names,), SI, as floats: its scale is left as the boxes have it."""
+        """All numbers at one point (names,), SI, as floats; the scale is that of the boxes."""
         return {name: float(np.asarray(value).ravel()[0]) for name, value in self.floats(at[:, None]).items()}
 
     def design(self, at: Floats) -> dict[str, float]:
-        """Return the program's variables at one point (names,), SI, at a scale that its bounds allow."""
+        """The program's variables at one point (names,), SI, at a scale that its bounds allow."""
         values = self.values(at)
-        found = {v.name: values[v.name] for v in self.program.variables}
-        return self.scale.inside(found) if self.scale else found
+        design = {v.name: values[v.name] for v in self.program.variables}
+        return self.scale.inside(design) if self.scale else design
 
     def place(self, x: Mapping[str, float]) -> Floats:
-        """Return the point (names,) of the program's variables, SI, moved inside the box."""
+        """Point (names,) of the program's variables, SI, moved inside the box."""
         values = self.scale.taken_out(x) if self.scale else x
         at = np.array([values[name] for name in self.names])
         return np.asarray(np.clip(at, self.low, self.high))
 
 
 def reduced(program: Program, loosening: tuple[str, ...], scale: Scale | None, most: Mapping[str, float]) -> BoxTask:
-    """Return the task of a program.
+    """Task of a program.
 
     loosening: variables that no row but a limit's reads, and that only loosen it; most: values, SI, that variables
     without a bound of their own need not exceed. Raises OpenError where a variable has no end.
     """
     maths: Maths = box_system()
-    held = dict(scale.held) if scale else {}
-    fixed = {name: maths.number(value) for name, value in {**program.parameters, **held}.items()}
+    lengths = dict(scale.held) if scale else {}
+    fixed = {name: maths.number(value) for name, value in {**program.parameters, **lengths}.items()}
     for v in program.variables:
         if v.name in loosening or v.lower == v.upper:
             fixed.setdefault(v.name, Interval(v.lower, v.upper))
@@ -245,7 +245,7 @@ def reduced(program: Program, loosening: tuple[str, ...], scale: Scale | None, m
 
 
 def _implied(program: Program, values: Mapping[str, Interval], name: str) -> tuple[float, float]:
-    """Return the ends of a variable that its limits imply: value · weight, all that the weight may be."""
+    """Ends of a variable that its limits imply: value · weight, all that the weight may be."""
     maths: Maths = box_system()
     rows = BoxRows(program.model, maths, program.model.given(maths, values), {})
     ends = values[name]
@@ -276,7 +276,7 @@ PLACES = 0.11, 0.35, 0.62, 0.87
 
 
 def silent(program: Program) -> Scale | None:
-    """Return the common scale of a program's lengths where it changes no row, None without one."""
+    """Common scale of a program's lengths where it changes no row, None without one."""
     ends = {v.name: (v.lower, v.upper) for v in program.variables}
     for move in program.moves:
         known = all(name in ends and ends[name][0] > 0 and math.isfinite(ends[name][1]) for name in move.along)
@@ -287,12 +287,12 @@ def silent(program: Program) -> Scale | None:
 
 
 def _changes_nothing(program: Program, move: Move) -> bool:
-    """Say whether rows of designs of two sizes agree: a limit at 0 keeps its sign, all else its value."""
+    """Whether rows of designs of two sizes agree: a limit at 0 keeps its sign, all else its value."""
     read = 0
     for x in _designs(program):
         try:
             sizes = x, {**x, **{name: 2.0 * x[name] for name in move.along}}
-            pairs = list(zip(*(_rows(program, Sampler(program.model, each)) for each in sizes), strict=True))
+            pairs = list(zip(*(_rows(program, Sampler(program.model, size)) for size in sizes), strict=True))
         except (ArithmeticError, TypeError, ValueError):
             continue
         if not all(_agree(small, large, at_zero) for (small, at_zero), (large, _) in pairs):
@@ -304,7 +304,7 @@ def _changes_nothing(program: Program, move: Move) -> bool:
 
 
 def _agree(small: Number, large: Number, at_zero: bool) -> bool:
-    """Say whether a row is the same at twice the size; of a limit at 0 it may grow with a power of the size."""
+    """Whether a row is the same at twice the size; of a limit at 0 it may grow with a power of the size."""
     powers = (1, 2, 4) if at_zero else (1,)
     return any(abs(large - power * small) <= AGREE * max(abs(large), abs(small)) for power in powers)
 

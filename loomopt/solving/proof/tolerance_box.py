@@ -83,28 +83,28 @@ class NumberBox:
                 raise OpenError("corners of the cycle may change places within the tolerances")
 
     def given(self, low: Floats, high: Floats) -> Given:
-        """Return the numbers of parts, ends (numbers, parts), SI, with what follows from them, and slopes."""
+        """Numbers of parts, ends (numbers, parts), SI, with what follows from them, and slopes."""
         count = len(self.names)
-        own = {name: intervals.variable(k, count, low[k], high[k]) for k, name in enumerate(self.names)}
-        values = {**self.fixed, **own}
+        variables = {name: intervals.variable(k, count, low[k], high[k]) for k, name in enumerate(self.names)}
+        values = {**self.fixed, **variables}
         if self.followed:
             middle = low + (high - low) / 2
             values |= self.followed.given(values, self._numbers(middle), _half(low, high))
         return self.model.given(self.system, values)
 
     def points(self, at: Floats) -> Given:
-        """Return the numbers at points (numbers, parts), SI."""
+        """Numbers at points (numbers, parts), SI."""
         values = self._numbers(at)
         if self.followed:
             values |= self.followed.points(values)
         return self.model.given(self.system, values)
 
     def _numbers(self, at: Floats) -> dict[str, Number]:
-        """Return the numbers at points (numbers, parts), SI."""
+        """Numbers at points (numbers, parts), SI."""
         return self.fixed | {name: interval(at[k][None]) for k, name in enumerate(self.names)}
 
     def _followed(self) -> EventBox:
-        """Return the events that hints lead to, enclosed over the box. Raises OpenError."""
+        """Events that hints lead to, enclosed over the box. Raises OpenError."""
         kinematics = self.model.kinematics
         following = kinematics.following(self.sampler.given) if isinstance(kinematics, Follows) else None
         if following is None:
@@ -112,26 +112,26 @@ class NumberBox:
         hints = {name: hint for name, hint in self.sampler.hints.items() if name not in following.hints}
         self.fixed |= {name: self.system.number(hint) for name, hint in hints.items()}
         low, high = self.low[:, None], self.high[:, None]
-        own = {n: intervals.variable(k, len(low), low[k], high[k]) for k, n in enumerate(self.names)}
+        variables = {n: intervals.variable(k, len(low), low[k], high[k]) for k, n in enumerate(self.names)}
         half, middle = _half(low, high), low + (high - low) / 2
 
         def meant(whole: Number, there: Number, half: Floats) -> Interval:
             return _meant(_whole(whole, half), _whole(there, half).v, half)
 
         with np.errstate(all="ignore"):
-            return EventBox(self.system, following, {**self.fixed, **own}, self._numbers(middle), half, meant)
+            return EventBox(self.system, following, {**self.fixed, **variables}, self._numbers(middle), half, meant)
 
     def rows(self, given: Given) -> BoxRows:
-        """Return what reads single values."""
+        """Rows that read single values."""
         corners = self.model.corners(self.system, given)
         return BoxRows(self.model, self.system, given, self.layout.stills, self.layout.cycle, corners)
 
     def starts(self, given: Given) -> Sequence[Number]:
-        """Return the crank angles, rad, where the pieces begin."""
+        """Crank angles, rad, where the pieces begin."""
         return self.layout.cycle.begins(self.model.corners(self.system, given), PI)
 
     def pieces(self, quantity: str, where: Where | None) -> list[int]:
-        """Return the pieces on which a quantity counts."""
+        """Pieces on which a quantity counts."""
         return [int(k) for k in np.flatnonzero(self.model.counted(self.layout.cycle, quantity, where))]
 
 
@@ -142,11 +142,11 @@ class Function(abc.ABC):
 
     @abc.abstractmethod
     def parts(self) -> tuple[Floats, Floats]:
-        """Return the parts to begin with, each (variables, parts)."""
+        """First parts, each (variables, parts)."""
 
     @abc.abstractmethod
     def bounds(self, low: Floats, high: Floats) -> Bounds:
-        """Return what it is over parts, ends (variables, parts)."""
+        """Bounds of the function over parts, ends (variables, parts)."""
 
 
 class Single(Function):
@@ -156,11 +156,11 @@ class Single(Function):
         self.box, self.read = box, read
 
     def parts(self) -> tuple[Floats, Floats]:
-        """Return the whole box."""
+        """The whole box."""
         return self.box.low[:, None], self.box.high[:, None]
 
     def bounds(self, low: Floats, high: Floats) -> Bounds:
-        """Return what it is over parts: by its value, and by its middle and slopes."""
+        """Bounds over parts: from the value, and from the middle and slopes."""
         value = _whole(self.read(self.box.rows(self.box.given(low, high))), low)
         middle = low + (high - low) / 2
         there = _whole(self.read(self.box.rows(self.box.points(middle))), low).v
@@ -195,7 +195,7 @@ class OverPiece(Function):
         self._both = systems.boxes(), systems.box_series()
 
     def parts(self) -> tuple[Floats, Floats]:
-        """Return the box over parts of the stretch."""
+        """The box, over parts of the range of angles."""
         cuts = np.linspace(0.0, 1.0, FIRST_PARTS + 1)
         ones = np.ones(FIRST_PARTS)
         low, high = (
@@ -204,7 +204,7 @@ class OverPiece(Function):
         return low, high
 
     def bounds(self, low: Floats, high: Floats) -> Bounds:
-        """Return what it is over parts: by its value, and by a parabola in the angle with slopes in the numbers."""
+        """Bounds over parts: from the value, and from a parabola in the angle with slopes in the numbers."""
         given = self.box.given(low[1:], high[1:])
         whole = self._series(given, low[:1], high[:1])
         centre, half = low[:1] + (high[:1] - low[:1]) / 2, _half(low, high)
@@ -219,7 +219,7 @@ class OverPiece(Function):
         along_u = _whole(whole.slope, flat).v
         steep = np.maximum(np.abs(along_u.low), np.abs(along_u.high))
         lows, highs = (
-            np.vstack([own, g[:, 0]]) for own, g in ((along_u.low, value.g.low), (along_u.high, value.g.high))
+            np.vstack([u_slope, g[:, 0]]) for u_slope, g in ((along_u.low, value.g.low), (along_u.high, value.g.high))
         )
         moves = np.vstack([np.where(np.isfinite(steep), steep, STEEP) * half[:1], here.moves])
         return Bounds(np.minimum(value.v.high[0], most.high), here.here, lows, highs, moves)
@@ -227,8 +227,8 @@ class OverPiece(Function):
     def _series(self, given: Given, low: Floats, high: Floats) -> "_Terms":
         begin, width = self.ends(given)
         quantities = Quantities(self.box.model, self._both, given)
-        found = quantities((self.quantity,), Node(begin + along(low, high) * width, self.switch))[0] * self.sign
-        terms = found.terms if isinstance(found, IntervalSeries) else (found, interval(0.0), interval(0.0))
+        value = quantities((self.quantity,), Node(begin + along(low, high) * width, self.switch))[0] * self.sign
+        terms = value.terms if isinstance(value, IntervalSeries) else (value, interval(0.0), interval(0.0))
         return _Terms(*terms)
 
 
@@ -239,7 +239,7 @@ class _Terms(NamedTuple):
 
 
 def over_cycle(box: NumberBox, quantity: str, sign: float, where: Where | None = None) -> list[OverPiece]:
-    """Return a whole-cycle quantity times a sign over each piece on which it counts."""
+    """A whole-cycle quantity times a sign over each piece on which it counts."""
 
     def stretch(piece: int) -> Callable[[Given], tuple[Number, Number]]:
         def ends(given: Given) -> tuple[Number, Number]:
@@ -255,7 +255,7 @@ def over_cycle(box: NumberBox, quantity: str, sign: float, where: Where | None =
 
 
 def over_angles(box: NumberBox, quantity: str, sign: float, angle: float) -> OverPiece:
-    """Return a quantity that no switch changes, times a sign, from crank angle 0 to one angle, rad, of either sign."""
+    """A quantity that no switch changes, times a sign, from crank angle 0 to one angle, rad, of either sign."""
     switch = box.layout.cycle.switch(box.layout.cycle.place(0.0)[0])
     return OverPiece(box, quantity, sign, lambda given: (interval(0.0), interval(angle)), switch)
 
@@ -273,19 +273,19 @@ class Peak(Function):
         self.spots = box.layout.spots(spots)
         count = len(nodes)
         rows = list(np.eye(count))
-        for one, other in itertools.combinations(range(count), 2):
+        for first, second in itertools.combinations(range(count), 2):
             for share in np.arange(1, SHARES) / SHARES:
                 row = np.zeros(count)
-                row[one], row[other] = share, 1 - share
+                row[first], row[second] = share, 1 - share
                 rows.append(row)
         self.weights = np.array(rows)
 
     def parts(self) -> tuple[Floats, Floats]:
-        """Return the whole box."""
+        """The whole box."""
         return self.box.low[:, None], self.box.high[:, None]
 
     def bounds(self, low: Floats, high: Floats) -> Bounds:
-        """Return what it is over parts, by their middles and slopes; no number stands at an end, for nodes differ."""
+        """Bounds over parts from their middles and slopes; no number is moved to an end, because nodes differ."""
         half, middle = _half(low, high), low + (high - low) / 2
         whole = self._at(self.box.given(low, high), low)
         there = self._at(self.box.points(middle), low).v
@@ -309,21 +309,21 @@ class Peak(Function):
 
     def _at(self, given: Given, like: Floats) -> Enclosure:
         corners = self.box.model.corners(self.box.system, given)
-        found = self.box.rows(given).quantity(self.quantity, self.spots.angle(corners), self.spots.switches)
-        return _whole(found * interval(self.spots.sign), like, self.spots.count)
+        value = self.box.rows(given).quantity(self.quantity, self.spots.angle(corners), self.spots.switches)
+        return _whole(value * interval(self.spots.sign), like, self.spots.count)
 
 
 # Parts of a box.
 
 
 def _half(low: Floats, high: Floats) -> Floats:
-    """Return how far parts reach from their middles, rounded upward."""
+    """Distances from the middles of parts to their ends, rounded upward."""
     middle = low + (high - low) / 2
     return np.asarray(np.nextafter(np.maximum(high - middle, middle - low), math.inf))
 
 
 def _whole(number: Number, like: Floats, nodes: int = 1) -> Enclosure:
-    """Return a number as an enclosure of full shape: value (nodes, parts), slopes (numbers, nodes, parts)."""
+    """Number as an enclosure of full shape: value (nodes, parts), slopes (numbers, nodes, parts)."""
     count, parts = like.shape
     flat = interval(np.zeros((count, 1, 1)))
     value, slopes = (number.v, number.g) if isinstance(number, Enclosure) else (interval(number), flat)
@@ -340,7 +340,7 @@ def _whole(number: Number, like: Floats, nodes: int = 1) -> Enclosure:
 
 
 def _meant(whole: Enclosure, middle: Interval, half: Floats) -> Interval:
-    """Return what a number is over parts, (1, parts): by its value, and by its middle and slopes."""
+    """Bounds of a number over parts, (1, parts): from the value, and from the middle and slopes."""
     steps = Interval(-half[:, None], half[:, None])
     off = whole.g * steps
     total = Interval(np.zeros_like(middle.low), np.zeros_like(middle.high))
@@ -358,7 +358,7 @@ def _bounded(whole: Enclosure, middle: Interval, half: Floats) -> Bounds:
 
 
 def _risen(slope: Interval, bend: Interval, half: Floats) -> Interval:
-    """Return what s h + k h² is at most for |h| ≤ half, (parts,): at an end, or at the parabola's own top."""
+    """Largest s h + k h² for |h| ≤ half, (parts,): at an end, or at the vertex of the parabola."""
     steep = interval(np.maximum(np.abs(slope.low), np.abs(slope.high))[0])
     high = bend.high[0]
     ends = steep * interval(half) + interval(high) * interval(half).square()
@@ -383,40 +383,40 @@ class Outcome(NamedTuple):
 
 
 def at_most(function: Function, bound: float, work: int = MOST_PARTS) -> Outcome:
-    """Say whether a function is no more than a bound all over its parts; work: parts that may be read."""
+    """Whether a function is at most a bound on all of its parts; work: parts that may be read."""
     low, high = function.parts()
     numbers, read = slice(len(low) - len(function.box.names), None), 0
     with np.errstate(all="ignore"):
         while low.shape[1]:
             take = slice(max(low.shape[1] - BATCH, 0), None)
-            own_low, own_high = low[:, take].copy(), high[:, take].copy()
+            batch_low, batch_high = low[:, take].copy(), high[:, take].copy()
             low, high = low[:, : take.start], high[:, : take.start]
-            read += own_low.shape[1]
+            read += batch_low.shape[1]
             if read > work:
-                return Outcome(False, read, (own_low[numbers, 0] + own_high[numbers, 0]) / 2)
-            own = function.bounds(own_low, own_high)
-            if (own.here > bound).any():
-                place = int(np.argmax(own.here > bound))
-                return Outcome(False, read, (own_low[numbers, place] + own_high[numbers, place]) / 2)
+                return Outcome(False, read, (batch_low[numbers, 0] + batch_high[numbers, 0]) / 2)
+            bounds = function.bounds(batch_low, batch_high)
+            if (bounds.here > bound).any():
+                place = int(np.argmax(bounds.here > bound))
+                return Outcome(False, read, (batch_low[numbers, place] + batch_high[numbers, place]) / 2)
             # Written so that what is no number proves nothing.
-            alive = ~(own.most <= bound)
-            own_low, own_high = own_low[:, alive], own_high[:, alive]
-            rising, falling = own.least_slope[:, alive] >= 0, own.most_slope[:, alive] <= 0
-            wide = own_high > own_low
-            own_low = np.where(rising & wide, own_high, own_low)
-            own_high = np.where(falling & ~rising & wide, own_low, own_high)
+            alive = ~(bounds.most <= bound)
+            batch_low, batch_high = batch_low[:, alive], batch_high[:, alive]
+            rising, falling = bounds.least_slope[:, alive] >= 0, bounds.most_slope[:, alive] <= 0
+            wide = batch_high > batch_low
+            batch_low = np.where(rising & wide, batch_high, batch_low)
+            batch_high = np.where(falling & ~rising & wide, batch_low, batch_high)
             changed = ((rising | falling) & wide).any(axis=0)
-            stuck = ~changed & ~(own_high > own_low).any(axis=0)
+            stuck = ~changed & ~(batch_high > batch_low).any(axis=0)
             if stuck.any():
-                return Outcome(False, read, own_low[numbers, int(np.argmax(stuck))])
-            halves = _halved(own_low[:, ~changed], own_high[:, ~changed], own.moves[:, alive][:, ~changed])
-            low = np.hstack([low, own_low[:, changed], *halves[0]])
-            high = np.hstack([high, own_high[:, changed], *halves[1]])
+                return Outcome(False, read, batch_low[numbers, int(np.argmax(stuck))])
+            halves = _halved(batch_low[:, ~changed], batch_high[:, ~changed], bounds.moves[:, alive][:, ~changed])
+            low = np.hstack([low, batch_low[:, changed], *halves[0]])
+            high = np.hstack([high, batch_high[:, changed], *halves[1]])
     return Outcome(True, read)
 
 
 def _halved(low: Floats, high: Floats, moves: Floats) -> tuple[list[Floats], list[Floats]]:
-    """Return parts halved along the variable that moves the function most."""
+    """Parts halved along the variable that moves the function most."""
     side, place = np.where(high > low, moves, -1.0).argmax(axis=0), np.arange(low.shape[1])
     middle = low[side, place] + (high[side, place] - low[side, place]) / 2
     first, second = high.copy(), low.copy()
@@ -425,11 +425,11 @@ def _halved(low: Floats, high: Floats, moves: Floats) -> tuple[list[Floats], lis
 
 
 def all_at_most(functions: Sequence[Function], bound: float, work: int = MOST_PARTS) -> Outcome:
-    """Say whether functions are no more than a bound, all of them within the same work."""
+    """Whether all functions are at most a bound, within the same work."""
     read = 0
     for function in functions:
-        found = at_most(function, bound, work - read)
-        read += found.parts
-        if not found.proven:
-            return found._replace(parts=read)
+        outcome = at_most(function, bound, work - read)
+        read += outcome.parts
+        if not outcome.proven:
+            return outcome._replace(parts=read)
     return Outcome(True, read)

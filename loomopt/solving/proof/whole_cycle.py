@@ -42,7 +42,7 @@ def prove(
     slack: float = SLACK,
     judged_by: Program | None = None,
 ) -> Proofs:
-    """Return the proofs of a design's limits (SI; what it does not name is today's).
+    """Proofs of a design's limits (SI; numbers that it does not name are today's).
 
     slack: what is left open, relative to each quantity's largest magnitude over the cycle; judged_by: a program whose
     limits they are, the target's own without one. Raises BadInput.
@@ -54,13 +54,13 @@ def prove(
     check_sought(scene, "prove")
     job.demand(scene, name)
     full = {**job.today(scene), **design}
-    own, asked = (scene, name) if judged_by else job.adopted(scene, full, name)
-    program = judged_by or job.program(own, asked)
-    reads = _readings(own, job, program, full, slack)
-    words = Words(own)
-    found = tuple(each._replace(unit=words.si(each.name)) for each in _merged(_decided(program, job, words, reads)))
+    program_scene, program_target = (scene, name) if judged_by else job.adopted(scene, full, name)
+    program = judged_by or job.program(program_scene, program_target)
+    reads = _readings(program_scene, job, program, full, slack)
+    words = Words(program_scene)
+    proofs = tuple(proof._replace(unit=words.si(proof.name)) for proof in _merged(_decided(program, job, words, reads)))
     whole = reads[1].sampler
-    return Proofs(scene.name, name, found, scene, model.uncovered(whole.model.effects, whole.given.tables))
+    return Proofs(scene.name, name, proofs, scene, model.uncovered(whole.model.effects, whole.given.tables))
 
 
 FIRST_BOXES, SECONDS = 2000, 5.0
@@ -122,31 +122,31 @@ class _Claim:
 def _readings(
     scene: Scene, job: Job, program: Program, design: Mapping[str, float], slack: float
 ) -> tuple[_Read, _Read]:
-    """Return the design read by the target's program, and by the job as a whole."""
+    """Design read by the target's program, and by the job as a whole."""
     # What has no room in the program stands where the program holds it: limits may ask for more than the scene's own.
     known = {name: value for name, value in job.numbers(scene).items() if name not in program.fixed}
     chosen = {scene.full(name): value for name, value in design.items()}
     # What the target's program does not choose is the design's own too, and today's where it names nothing.
     parameters = {n: chosen.get(n, value) for n, value in program.parameters.items()}
-    asked = replace(program, parameters=parameters)
-    values = {**parameters, **job.values(asked, {**known, **chosen})}
+    design_program = replace(program, parameters=parameters)
+    values = {**parameters, **job.values(design_program, {**known, **chosen})}
     samplers = Sampler(program.model, values), job.sampler(scene, design)
-    own, whole = (_Read(sampler, Boxes(sampler), slack) for sampler in samplers)
-    return own, whole
+    target_read, whole = (_Read(sampler, Boxes(sampler), slack) for sampler in samplers)
+    return target_read, whole
 
 
 def _claims(
-    program: Program, job: Job, words: Words, own: _Read, whole: _Read
+    program: Program, job: Job, words: Words, target_read: _Read, whole: _Read
 ) -> "Iterator[Proof | tuple[_Read, _Claim]]":
     """Yield what is to be proven: limits of the cycle, assembly, claimed peaks; of single values their proofs."""
     for limit in program.row_limits:
         hidden = limit.row if limit.name in program.named_limits else limit.name
         text = hidden if limit.hidden else words.limit(limit)
         if isinstance(limit, CycleLimit):
-            peak = own.sampler.peak(limit.row, limit.where)
-            yield own, _Claim(limit.name, text, limit.row, limit.bound, peak, limit.where)
+            peak = target_read.sampler.peak(limit.row, limit.where)
+            yield target_read, _Claim(limit.name, text, limit.row, limit.bound, peak, limit.where)
         else:
-            yield _single(own, limit, text)
+            yield _single(target_read, limit, text)
     for name, (quantity, most) in whole.sampler.model.assembly.items():
         yield whole, _Claim(name, name, quantity, most, whole.sampler.peak(quantity), kind="assembly")
     for figure, quantity in job.peaks(whole.sampler.model).items():
@@ -159,9 +159,9 @@ def _over_cycle(read: _Read, claim: _Claim, stop: Callable[[int], bool]) -> Proo
     """Bound one quantity on boxes; both signs where its magnitude counts; stop(boxes): whether to leave it open."""
     slack = read.slack * _largest(read.sampler, claim.quantity)
     signs = (1.0,) if claim.quantity in read.sampler.model.signed else (1.0, -1.0)
-    found = [read.boxes.bound(claim.quantity, sign, claim.bound + slack, claim.where, stop) for sign in signs]
-    worst = max(found, key=lambda each: RANK[each.status])
-    count = sum(each.boxes for each in found)
+    outcomes = [read.boxes.bound(claim.quantity, sign, claim.bound + slack, claim.where, stop) for sign in signs]
+    worst = max(outcomes, key=lambda outcome: RANK[outcome.status])
+    count = sum(outcome.boxes for outcome in outcomes)
     most, angle = claim.peak, None
     if worst.angle is not None:
         most, angle = _highest(read.sampler, claim, worst.angle)
@@ -170,12 +170,12 @@ def _over_cycle(read: _Read, claim: _Claim, stop: Callable[[int], bool]) -> Proo
 
 
 def _highest(sampler: Sampler, claim: _Claim, angle: float) -> tuple[float, float]:
-    """Return where a quantity exceeds its bound most, as far as is known: how high it is there, and the angle, rad.
+    """Largest known value of a quantity over the cycle, and its angle, rad.
 
     angle: where the boxes ended, which may be anywhere beyond the bound, or at a peak that the samples miss.
     """
     height = float(sampler.heights(claim.quantity, sampler.at_angles(claim.quantity, np.array([angle])))[0])
-    known = max(sampler.extremes(claim.quantity, claim.where), key=lambda each: each.height, default=None)
+    known = max(sampler.extremes(claim.quantity, claim.where), key=lambda extreme: extreme.height, default=None)
     if known is not None and not height > known.height:
         height, angle = known.height, sampler.angle(known)
     return height, angle % (2 * math.pi)
@@ -195,19 +195,19 @@ def _single(read: _Read, limit: Limit, text: str) -> Proof:
 
 
 def _largest(sampler: Sampler, quantity: str) -> float:
-    """Return a quantity's largest magnitude over the cycle, as sampled."""
+    """Largest magnitude of a quantity over the cycle, as sampled."""
     pieces, u = sampler.grid()
     return float(np.abs(sampler.at(quantity, pieces, u)).max())
 
 
 def proven(scene: Scene, target: str, answer: Solution) -> Solution:
-    """Return an answer whose certificate says that everything is proven, or why it is not."""
-    found = prove(scene, designs.flat(answer.design), target)
-    answer = replace(answer, proofs=found)
+    """Answer whose certificate says that everything is proven, or why it is not."""
+    proofs = prove(scene, designs.flat(answer.design), target)
+    answer = replace(answer, proofs=proofs)
     assert answer.certificate is not None
-    if found.passed:
+    if proofs.passed:
         return replace(answer, certificate=replace(answer.certificate, whole_cycle="proven"))
-    reasons = tuple(f"{each.text} is {each.status}" for each in found.proofs if each.status != "proven")
+    reasons = tuple(f"{proof.text} is {proof.status}" for proof in proofs.proofs if proof.status != "proven")
     certificate = replace(answer.certificate, passed=False, reasons=(*answer.certificate.reasons, *reasons))
     sentences = Sentences(f"A design was reached but not proven: {'; '.join(reasons)}.")
     return replace(answer, certificate=certificate, status="uncertified", sentences=sentences)

@@ -132,36 +132,38 @@ def read_sizes(scene: Scene, given: Mapping[str, object] | None) -> dict[str, tu
     """
     # A pattern speaks of what is free, a name of itself: the refusal of one that is not tells it.
     loose = [key for key, bound in scene.bounds.items() if bound.free or key in (given or ())]
-    own = scene.update({f"steps.{key}": step for key, step in sizes.named(given, loose).items()}) if given else scene
-    steps, stock = numbers.sizes(own)
+    source = scene.update({f"steps.{key}": step for key, step in sizes.named(given, loose).items()}) if given else scene
+    steps, stock = numbers.sizes(source)
     if not steps and not stock:
         remedy = "Write --round l1=0.5mm, or add [steps] to the scene"
-        raise refusal("nothing says which sizes there are", own.origin, "round_to", remedy=remedy)
-    found: dict[str, tuple[float, ...]] = {}
-    own_steps = numbers.sizes(scene).steps
+        raise refusal("nothing says which sizes there are", source.origin, "round_to", remedy=remedy)
+    grids: dict[str, tuple[float, ...]] = {}
+    scene_steps = numbers.sizes(scene).steps
     for number in dict.fromkeys((*steps, *stock)):
         if number in stock and number in steps:
             problem = f"{number} has a step and sizes in stock, of which only one can count"
             remedy = f"Take steps.{number} or stock.{number} out of the file"
-            if number not in own_steps:
+            if number not in scene_steps:
                 remedy = f"Leave {number} out of --round, or take stock.{number} out of the file"
-            raise refusal(problem, own.origin, f"stock.{number}", own.document["stock"].get(number, ""), remedy=remedy)
-        table = "stock" if number in stock else "steps" if number in own_steps else "bounds"
+            raise refusal(
+                problem, source.origin, f"stock.{number}", source.document["stock"].get(number, ""), remedy=remedy
+            )
+        table = "stock" if number in stock else "steps" if number in scene_steps else "bounds"
         key = f"{table}.{number}"
         bound = scene.bounds.get(number)
         if bound is None or not bound.free or bound.min == bound.max:
             problem = f"{number} is not free, so that there is nothing to round"
-            raise refusal(problem, own.origin, key, remedy="Give it min and max in [bounds], or take it out")
+            raise refusal(problem, source.origin, key, remedy="Give it min and max in [bounds], or take it out")
         if math.isinf(bound.max - bound.min):
-            raise refusal(f"{number} has no end", own.origin, key, remedy="Give it min and max in [bounds]")
+            raise refusal(f"{number} has no end", source.origin, key, remedy="Give it min and max in [bounds]")
         known = stock.get(number) or sizes.multiples(steps[number], bound.min, bound.max)
         inside = tuple(size for size in known if bound.min <= size <= bound.max)
         if not inside:
             problem = f"no size of {number} lies within its bounds"
             remedy = f"Take {'a smaller step' if number in steps else 'other sizes'}, or wider bounds"
-            raise refusal(problem, own.origin, key, remedy=remedy)
-        found[number] = inside
-    return found
+            raise refusal(problem, source.origin, key, remedy=remedy)
+        grids[number] = inside
+    return grids
 
 
 class Best(NamedTuple):
@@ -186,8 +188,8 @@ def _check_goals(lattice: Lattice, nominal: Solution, answer: Solution) -> None:
         name, value = goal.figure, answer.figures.get(goal.figure)
         lost = nominal.reached.get(name) and not answer.reached.get(name)
         if lost and not (name in bands and value is not None and abs(value) <= bands[name] + abs(goal.high)):
-            told = Words(scene).shown(name, value or 0.0)
-            problem = f"no sizes meet {name} exactly: the nearest found leave {told}"
+            residual = Words(scene).shown(name, value or 0.0)
+            problem = f"no sizes meet {name} exactly: the nearest found leave {residual}"
             near = Words(scene).shown(name, abs(value or 0.0), 3)
             remedy = f'Leave a number that moves it free, or say within what it is met: [accept] {name} = "{near}"'
             raise refusal(problem, scene.origin, f"accept.{name}", remedy=remedy)
@@ -196,8 +198,8 @@ def _check_goals(lattice: Lattice, nominal: Solution, answer: Solution) -> None:
 def _agree(lattice: Lattice, answer: Solution, best: Best) -> bool:
     """Whether the levels of an answer agree with those read at its point."""
     x = lattice.job.values(lattice.program, {lattice.scene.full(k): v for k, v in answer.design.items()})
-    found = objectives(lattice.program, x)
-    return all(abs(a - b) <= AGREES for a, b in zip(found, best.levels, strict=True))
+    levels = objectives(lattice.program, x)
+    return all(abs(a - b) <= AGREES for a, b in zip(levels, best.levels, strict=True))
 
 
 # The whole lattice.
@@ -207,7 +209,7 @@ def _read_lattice(lattice: Lattice, nominal: Solution) -> Best | None:
     """Best point of the whole lattice; None where more than one number is free beside the sizes."""
     program, job = lattice.program, lattice.job
     assert nominal.point is not None
-    names = {lattice.scene.full(name): own for name, own in lattice.sizes.items()}
+    names = {lattice.scene.full(name): grid for name, grid in lattice.sizes.items()}
     known = {v.name: v for v in program.variables}
     if not names.keys() <= known.keys() or program.tops:
         return None
@@ -220,33 +222,33 @@ def _read_lattice(lattice: Lattice, nominal: Solution) -> Best | None:
     base = {**program.parameters, **fixed, **loose}
     like = sampled(program.model, {**program.parameters, **nominal.point.x})
     reader = _Reader(program, base, like, chosen[0] if chosen else "")
-    kept: list[dict[str, Floats]] = []
+    blocks: list[dict[str, Floats]] = []
     grids = list(names.values())
     for first in range(0, lattice.points, BLOCK):
         lattice.task.settings.at(f"reading {lattice.points} points of sizes, {100 * first // lattice.points} %")
-        places = np.unravel_index(np.arange(first, min(first + BLOCK, lattice.points)), [len(own) for own in grids])
-        point = {name: np.array(own)[at] for (name, own), at in zip(names.items(), places, strict=True)}
+        places = np.unravel_index(np.arange(first, min(first + BLOCK, lattice.points)), [len(grid) for grid in grids])
+        point = {name: np.array(grid)[at] for (name, grid), at in zip(names.items(), places, strict=True)}
         part = reader.admissible(point)
         if part is None:
             return None
-        kept.append(part)
-    every = {name: np.concatenate([each[name] for each in kept]) for name in kept[0]}
+        blocks.append(part)
+    every = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
     levels = reader.levels(every)
     well = np.all(np.isfinite(levels), axis=1)
     count = int(np.sum(well))
     rests = f"all {lattice.points} points were read, at each the extremes of the whole cycle refined"
     bounds = lattice.scene.bounds.items()
-    loosely = [name for name, own in bounds if own.free and own.min != own.max and name not in lattice.sizes]
+    loosely = [name for name, bound in bounds if bound.free and bound.min != bound.max and name not in lattice.sizes]
     rests += f" and {', '.join(loosely)} chosen so that {program.objectives[0].figure} is least" if chosen else ""
     if not count:
         return Best(None, 0, 0, 0.0, rests)
-    left = np.flatnonzero(well)
+    ties = np.flatnonzero(well)
     for level in levels.T:
-        left = left[level[left] <= level[left].min() + SAME_OBJECTIVE]
-    at = int(left[0])
-    found = {name: float(every[lattice.scene.full(name)][at]) for name in lattice.sizes}
+        ties = ties[level[ties] <= level[ties].min() + SAME_OBJECTIVE]
+    at = int(ties[0])
+    best_point = {name: float(every[lattice.scene.full(name)][at]) for name in lattice.sizes}
     reaching = int(np.sum(well & (levels[:, 0] <= SAME_OBJECTIVE))) if chosen else count
-    return Best(found, count, 0, 0.0, rests, tuple(map(float, levels[at])), reaching)
+    return Best(best_point, count, 0, 0.0, rests, tuple(map(float, levels[at])), reaching)
 
 
 class _Reader:
@@ -254,9 +256,9 @@ class _Reader:
 
     def __init__(self, program: Program, base: Mapping[str, float], like: Sampler, chosen: str) -> None:
         self.program, self.base, self.like, self.chosen = program, base, like, chosen
-        own = [limit for limit in program.limits if isinstance(limit, SingleLimit) and not limit.is_of_variable]
-        self.single = own
-        self.ratios = [each for each in program.limits if isinstance(each, RatioLimit)]
+        singles = [limit for limit in program.limits if isinstance(limit, SingleLimit) and not limit.is_of_variable]
+        self.single = singles
+        self.ratios = [limit for limit in program.limits if isinstance(limit, RatioLimit)]
         self.cycles = [limit for limit in program.limits if isinstance(limit, CycleLimit)]
 
     def reading(self, point: Mapping[str, Floats]) -> BatchReading:
@@ -270,10 +272,10 @@ class _Reader:
         with np.errstate(all="ignore"):
             full = dict(point)
             if self.chosen:
-                found = self._zero(point, count)
-                if found is None:
+                zeros = self._zero(point, count)
+                if zeros is None:
                     return None
-                full[self.chosen] = found
+                full[self.chosen] = zeros
             reading = self.reading(full)
             well = np.ones(count, dtype=bool)
             for limit in self.single:
@@ -284,8 +286,8 @@ class _Reader:
     def _zero(self, point: Mapping[str, Floats], count: int) -> Floats | None:
         """Number at which the first level is least, (points,); None where the level is not linear in it."""
         level, name = self.program.objectives[0], self.chosen
-        own = next(v for v in self.program.variables if v.name == name)
-        low, high = np.full(count, own.lower), np.full(count, own.upper)
+        variable = next(v for v in self.program.variables if v.name == name)
+        low, high = np.full(count, variable.lower), np.full(count, variable.upper)
         probe = self.reading({**point, name: np.zeros(count)})
         for limit in self.ratios:
             if limit.row == name:
@@ -301,19 +303,19 @@ class _Reader:
 
         below, above = at(low), at(high)
         share = np.clip(np.where(above != below, below / (below - above), 0.0), 0.0, 1.0)
-        found = low + share * (high - low)
+        zeros = low + share * (high - low)
         straight = below + share * (above - below)
         known = np.isfinite(straight)
-        if np.abs(at(found)[known] - straight[known]).max(initial=0.0) > AFFINE * level.scale:
+        if np.abs(at(zeros)[known] - straight[known]).max(initial=0.0) > AFFINE * level.scale:
             return None
-        return np.asarray(found)
+        return np.asarray(zeros)
 
     def levels(self, points: Mapping[str, Floats]) -> Floats:
         """Levels of points, (points, levels), in their scales; infinite where a limit of the cycle is exceeded."""
         program = self.program
         if not len(next(iter(points.values()))):
             return np.zeros((0, len(program.objectives)))
-        quantities = [row for each in program.objectives for row in each.quantities]
+        quantities = [row for objective in program.objectives for row in objective.quantities]
         keys = [str(k) for k in range(len(program.objectives))]
 
         def many(machines: Machines) -> dict[str, Floats]:
@@ -322,24 +324,24 @@ class _Reader:
             for limit in self.cycles:
                 peak = machines.peak(limit.row, limit.where)
                 broken |= ~((peak - limit.bound) / limit.scale <= FEASIBLE)
-            told = {}
-            for key, each in zip(keys, program.objectives, strict=True):
-                sides = [sign * machines.single(row) for row, sign in each.sides]
-                worth = functools.reduce(np.maximum, [*sides, *map(machines.peak, each.quantities)])
-                told[key] = np.where(broken, np.inf, worth / each.scale)
-            return told
+            level_values = {}
+            for key, objective in zip(keys, program.objectives, strict=True):
+                sides = [sign * machines.single(row) for row, sign in objective.sides]
+                worth = functools.reduce(np.maximum, [*sides, *map(machines.peak, objective.quantities)])
+                level_values[key] = np.where(broken, np.inf, worth / objective.scale)
+            return level_values
 
         def alone(values: Mapping[str, float]) -> dict[str, float]:
             try:
                 sampler = sampled(program.model, values)
-                kept = all(each.violation(sampler) <= FEASIBLE for each in self.cycles)
-                worths = [each.merit(sampler) / each.scale for each in program.objectives]
+                is_admissible = all(limit.violation(sampler) <= FEASIBLE for limit in self.cycles)
+                worths = [objective.merit(sampler) / objective.scale for objective in program.objectives]
             except (ArithmeticError, ValueError):
                 return dict.fromkeys(keys, math.inf)
-            return {key: worth if kept else math.inf for key, worth in zip(keys, worths, strict=True)}
+            return {key: worth if is_admissible else math.inf for key, worth in zip(keys, worths, strict=True)}
 
-        found = read_all(program.model, {**self.base, **points}, self.like, many, alone)
-        return np.column_stack([found[key] for key in keys])
+        columns = read_all(program.model, {**self.base, **points}, self.like, many, alone)
+        return np.column_stack([columns[key] for key in keys])
 
 
 # Branch and bound.
@@ -350,22 +352,22 @@ Ends = Mapping[str, tuple[int, int]]
 def _branch(lattice: Lattice, nominal: Solution, solve: Solve) -> Best:
     """Best point by branch and bound over boxes of sizes; the box with the best bound is split first."""
     order = itertools.count()
-    whole: Ends = {name: (0, len(own) - 1) for name, own in lattice.sizes.items()}
+    whole: Ends = {name: (0, len(grid) - 1) for name, grid in lattice.sizes.items()}
     queue: list[tuple[tuple[float, ...], int, Ends, Solution]] = []
     best: tuple[float, ...] | None = None
     point: Mapping[str, float] | None = None
-    found: Solution | None = None
+    best_answer: Solution | None = None
     boxes, rests = (
         0,
         "each box of sizes was solved without them from its neighbour, to an optimum nearby",
     )
 
     def take(ends: Ends, near: Solution) -> None:
-        nonlocal best, point, boxes, found
+        nonlocal best, point, boxes, best_answer
         boxes += 1
         scene = lattice.within({k: (lattice.sizes[k][a], lattice.sizes[k][b]) for k, (a, b) in ends.items()})
         start = [near.point] if near.point else []
-        step = f"box {boxes} of sizes, {MOST_BOXES} at most; {_progress(lattice, found, near)}"
+        step = f"box {boxes} of sizes, {MOST_BOXES} at most; {_progress(lattice, best_answer, near)}"
         answer = solve(replace(lattice.task.at(step), scene=scene, near=start))
         if answer.status != "optimal" or answer.point is None:
             return
@@ -378,7 +380,7 @@ def _branch(lattice: Lattice, nominal: Solution, solve: Solve) -> Best:
             return
         if all(_distance(lattice, k, float(answer.design[k])) is None for k in lattice.sizes):
             best, point = worth, {k: _nearest(lattice.sizes[k], float(answer.design[k])) for k in lattice.sizes}
-            found = answer
+            best_answer = answer
             return
         heapq.heappush(queue, (worth, next(order), ends, answer))
 
@@ -402,33 +404,33 @@ def _progress(lattice: Lattice, best: Solution | None, bound: Solution) -> str:
 
     bound: the answer of the most promising box that is open.
     """
-    words, names = Words(lattice.scene), list(dict.fromkeys(each.figure for each in lattice.program.objectives))
+    words, names = Words(lattice.scene), list(dict.fromkeys(level.figure for level in lattice.program.objectives))
     if best is None:
         return "no sizes found yet"
-    told = ", ".join(f"{name} {words.shown(name, best.figures[name] or 0.0, 6)}" for name in names)
+    figures = ", ".join(f"{name} {words.shown(name, best.figures[name] or 0.0, 6)}" for name in names)
     gaps = {name: abs((best.figures[name] or 0.0) - (bound.figures[name] or 0.0)) for name in names}
-    sizes = {each.figure: each.scale ** (1 / each.power) for each in lattice.program.objectives}
+    sizes = {level.figure: level.scale ** (1 / level.power) for level in lattice.program.objectives}
     open_ones = [f"{name} {words.shown(name, gap, 2)}" for name, gap in gaps.items() if gap > AGREES * sizes[name]]
-    return f"best {told}; gap {', '.join(open_ones) or '0'}"
+    return f"best {figures}; gap {', '.join(open_ones) or '0'}"
 
 
 def _distance(lattice: Lattice, name: str, value: float) -> float | None:
     """Distance of a number from its nearest size, in mean widths between sizes; None where it is a size."""
     near = _nearest(lattice.sizes[name], value)
-    own = lattice.sizes[name]
-    width = (own[-1] - own[0]) / max(len(own) - 1, 1) or abs(near) or 1.0
+    grid = lattice.sizes[name]
+    width = (grid[-1] - grid[0]) / max(len(grid) - 1, 1) or abs(near) or 1.0
     off = abs(value - near) / width
     return None if off <= sizes.WITHIN else off
 
 
-def _nearest(own: tuple[float, ...], value: float) -> float:
-    return min(own, key=lambda size: abs(size - value))
+def _nearest(grid: tuple[float, ...], value: float) -> float:
+    return min(grid, key=lambda size: abs(size - value))
 
 
 def _split(lattice: Lattice, ends: Ends, answer: Solution) -> tuple[str, int]:
     """Number that is farthest from a size, and the place of the size below it."""
     open_ones = [name for name, (low, high) in ends.items() if low < high]
-    name = max(open_ones, key=lambda each: _distance(lattice, each, float(answer.design[each])) or 0.0)
+    name = max(open_ones, key=lambda number: _distance(lattice, number, float(answer.design[number])) or 0.0)
     low, high = ends[name]
     value = float(answer.design[name])
     below = max((k for k in range(low, high) if lattice.sizes[name][k] <= value), default=low)
@@ -441,27 +443,27 @@ def _split(lattice: Lattice, ends: Ends, answer: Solution) -> tuple[str, int]:
 def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) -> Solution:
     """Answer with the cost of its sizes, and the evidence that no other sizes are better."""
     scene, words = lattice.scene, Words(lattice.scene)
-    ends = {name: (own[0], own[-1], len(own)) for name, own in lattice.sizes.items()}
+    ends = {name: (grid[0], grid[-1], len(grid)) for name, grid in lattice.sizes.items()}
     rounded = Rounded(ends, lattice.points, best.admissible, best.reaching, best.boxes, best.gap, nominal, best.rests)
     chosen = ", ".join(f"{name} {words.shown(name, value)}" for name, value in (best.point or {}).items())
-    said = [f"Sizes: {chosen}.", report.cost_sentence("They cost", answer, nominal, words, AGREES)]
+    texts = [f"Sizes: {chosen}.", report.cost_sentence("They cost", answer, nominal, words, AGREES)]
     if best.boxes and best.gap:
-        said.append(f"Others on the lattice of {lattice.points} points may be better by {best.gap:.2g} natural sizes")
-        said[-1] += f": {best.boxes} boxes were solved."
+        texts.append(f"Others on the lattice of {lattice.points} points may be better by {best.gap:.2g} natural sizes")
+        texts[-1] += f": {best.boxes} boxes were solved."
     else:
-        kept = "" if best.admissible is None else f", {best.admissible} of which keep all limits"
-        kept += f" and {best.reaching} reach the goal" if best.reaching != best.admissible else ""
-        said.append(f"None of the {lattice.points} points of the lattice is better{kept}: {best.rests}.")
-    own = {scene.full(name): value for name, value in designs.flat(answer.design).items()}
-    here = report.evaluated(scene, lattice.job, lattice.task.target, own)
+        counts = "" if best.admissible is None else f", {best.admissible} of which keep all limits"
+        counts += f" and {best.reaching} reach the goal" if best.reaching != best.admissible else ""
+        texts.append(f"None of the {lattice.points} points of the lattice is better{counts}: {best.rests}.")
+    design = {scene.full(name): value for name, value in designs.flat(answer.design).items()}
+    here = report.evaluated(scene, lattice.job, lattice.task.target, design)
     # A size is what was chosen and no limit; and how far today's machine is goes by the widths of the scene's bounds.
     binding = tuple(price for price in answer.binding if price.limit not in lattice.sizes)
     together = tuple(price for price in answer.bind_together if not {*price.limits} & {*lattice.sizes})
     figures = {**answer.figures, **{name: here.figures[name] for name in ("change",) if name in answer.figures}}
     stops = report.stops(binding, together) if binding else "No limit binds beside the sizes."
-    sentences = report.explained(answer, *said)._replace(limits=stops)
-    found = replace(answer, scene=scene, limits=here.limits, binding=binding, bind_together=together, figures=figures)
-    return replace(found, sentences=sentences, rounded=rounded)
+    sentences = report.explained(answer, *texts)._replace(limits=stops)
+    result = replace(answer, scene=scene, limits=here.limits, binding=binding, bind_together=together, figures=figures)
+    return replace(result, sentences=sentences, rounded=rounded)
 
 
 def _without_sizes(lattice: Lattice, nominal: Solution, best: Best) -> Solution:

@@ -34,9 +34,9 @@ class StockSizes:
             return answer
         step = task.at(f"trying sizes of {', '.join(stock)}")
         local = replace(step, starts=task.starts or 1, near=(), mass_tradeoff=True, global_proof=None)
-        found = fitted(task.scene, answer, stock, lambda scene: solve(replace(local, scene=scene)))
-        solver = {**found.solver, "evaluations": answer.solver["evaluations"]}
-        return replace(found, solver=solver, global_bound=answer.global_bound)
+        best = fitted(task.scene, answer, stock, lambda scene: solve(replace(local, scene=scene)))
+        solver = {**best.solver, "evaluations": answer.solver["evaluations"]}
+        return replace(best, solver=solver, global_bound=answer.global_bound)
 
 
 def fitted(scene: Scene, ideal: Solution, stock: Stock, solve: SolveScene) -> Solution:
@@ -56,28 +56,28 @@ def _at_a_size(scene: Scene, ideal: Solution, name: str, stock: Stock, solve: So
     Where there is none, `ideal` with sentences that say so, as no answer to build.
     """
     value, sizes = ideal.design[name], stock[name]
-    rest = {other: own for other, own in stock.items() if other != name}
+    rest = {number: values for number, values in stock.items() if number != name}
 
-    def at_size(own: Scene) -> Solution:
-        return fitted(own, solve(own), rest, solve)
+    def at_size(bounded: Scene) -> Solution:
+        return fitted(bounded, solve(bounded), rest, solve)
 
-    found, tried = [], []
+    answers, trials = [], []
     for side in (reversed([size for size in sizes if size < value]), (size for size in sizes if size > value)):
         for size, answer in _until_admissible(scene, name, side, at_size):
-            tried.append(scene.show(size, "length"))
-            found += [answer] if answer.status == "optimal" else []
-    said = f"Any size would have {name} {scene.show(value, 'length')}"
-    if not found:
-        problem = f"No {name} that is sold gives an admissible design (tried {', '.join(tried) or 'none in bounds'})."
-        sentences = Sentences(problem, explanations=(f"{said}.",))
+            trials.append(scene.show(size, "length"))
+            answers += [answer] if answer.status == "optimal" else []
+    phrase = f"Any size would have {name} {scene.show(value, 'length')}"
+    if not answers:
+        problem = f"No {name} that is sold gives an admissible design (tried {', '.join(trials) or 'none in bounds'})."
+        sentences = Sentences(problem, explanations=(f"{phrase}.",))
         return replace(ideal, status="infeasible", sentences=sentences, certificate=None, binding=(), bind_together=())
-    best = found[0]
-    for answer in found[1:]:
+    best = answers[0]
+    for answer in answers[1:]:
         best = answer if _better(answer, best) else best
     first = next(iter(best.certificate.levels)).objective if best.certificate else ""
     reached = ideal.figures.get(first)
     figure = f" and {first} {scene.show(reached, Words(scene).kind(first), 9)}" if reached is not None else ""
-    explanation = f"{said}{figure}; of those sold, tried {', '.join(tried)}."
+    explanation = f"{phrase}{figure}; of those sold, tried {', '.join(trials)}."
     return replace(best, sentences=report.explained(best, explanation))
 
 
@@ -93,10 +93,10 @@ def _until_admissible(scene: Scene, name: str, sizes: Iterator[float], solve: So
             return
 
 
-def _better(one: Solution, other: Solution) -> bool:
+def _better(first: Solution, second: Solution) -> bool:
     """Whether one answer's objectives are less, level by level."""
-    for level in one.certificate.levels if one.certificate else ():
-        a, b = one.figures.get(level.objective) or 0.0, other.figures.get(level.objective) or 0.0
+    for level in first.certificate.levels if first.certificate else ():
+        a, b = first.figures.get(level.objective) or 0.0, second.figures.get(level.objective) or 0.0
         if abs(a - b) > SAME_SIZE * max(abs(a), abs(b)):
             return a < b
     return False

@@ -35,7 +35,7 @@ Given = Mapping[str, str | Sequence[float]]
 
 
 def demanding(scene: Scene, target: str | None) -> str | None:
-    """Return the target whose demands a front holds: the job's default without one, None for "none". Raises BadInput.
+    """Target whose demands a front holds: the job's default without one, None for "none". Raises BadInput.
 
     A target's demands on what is traded fall away.
     """
@@ -60,7 +60,7 @@ def trade(
     points: int | None = None,
     accuracy: float = ACCURACY,
 ) -> Trade:
-    """Return the front of two axes as a plan, the first one sought, the second one what it costs.
+    """Front of two axes as a plan, the first one sought, the second one what it costs.
 
     target: whose demands hold, None for none; maximise, minimise: axes of which the most, the least is sought; of any
     other the end that it offers alone or first, or the least. ranges: axis → from, to, SI: of a number that the scene
@@ -113,7 +113,7 @@ def trade(
 
 
 def _lifted(scene: Scene, senses: Mapping[str, Sense]) -> tuple[Scene, tuple[str, ...]]:
-    """Return the scene without its limits that stand in the way of an end that is sought, and these in words.
+    """Scene without its limits that stand in the way of an end that is sought, and these in words.
 
     Of an axis of which the least is sought that is a minimum, of one of which the most is sought a maximum; a limit to
     one value stands in the way of both ends.
@@ -134,7 +134,7 @@ def _lifted(scene: Scene, senses: Mapping[str, Sense]) -> tuple[Scene, tuple[str
 
 
 def _sense(scene: Scene, name: str, minimise: Sequence[str], maximise: Sequence[str]) -> Sense:
-    """Return the end of an axis that is sought."""
+    """End of an axis that is sought."""
     if name in maximise:
         return "most"
     own = scene.schema.axes.get(name)
@@ -142,13 +142,13 @@ def _sense(scene: Scene, name: str, minimise: Sequence[str], maximise: Sequence[
 
 
 def si(scene: Scene, given: Given) -> dict[str, tuple[float, float]]:
-    """Return ranges that are given as text with units, or as SI numbers, in SI, rad. Raises BadInput."""
+    """Ranges that are given as text with units, or as SI numbers, in SI, rad. Raises BadInput."""
     table = arguments.table(given, "ranges", f"axis → {ENDS}", 'Write {"m4e": "0:5 kg"}')
     return {name: _ends(scene, current(name, scene.schema.former_names), ends) for name, ends in table.items()}
 
 
 def _ends(scene: Scene, name: str, given: str | Sequence[float]) -> tuple[float, float]:
-    """Return both ends of a range, SI. Raises BadInput."""
+    """Both ends of a range, SI. Raises BadInput."""
     if not isinstance(given, str):
         remedy = 'Write "0:5 kg", or (0.0, 5.0)'
         two = arguments.listed(given, name, ENDS, remedy)
@@ -170,7 +170,7 @@ def _read(text: str, kind: str, name: str) -> float:
 
 
 def _two(scene: Scene, axes: Sequence[str]) -> tuple[str, str]:
-    """Return two axes that differ. Raises BadInput."""
+    """Two axes that differ. Raises BadInput."""
     allowed, remedy = ", ".join(scene.schema.axes), 'Write ("A", "B"): the axis that is sought, and the one that pays'
     given = arguments.texts(axes, "axes", allowed, remedy)
     named = tuple(current(name, scene.schema.former_names) for name in given)
@@ -181,14 +181,14 @@ def _two(scene: Scene, axes: Sequence[str]) -> tuple[str, str]:
 
 
 def _named(given: str | Sequence[str], key: str, axes: Sequence[str]) -> tuple[str, ...]:
-    """Return the axes that an argument names, one or several. Raises BadInput."""
+    """Axes that an argument names, one or several. Raises BadInput."""
     if isinstance(given, str):
         return (str(given),)
     return arguments.texts(given, key, ", ".join(axes), "Name one of the axes, or both in a list")
 
 
 def _bounded(scene: Scene, ranges: Ranges) -> Scene:
-    """Return the scene with ranges as bounds of the numbers that are no axes of their own and not bounded."""
+    """Scene with ranges as bounds of the numbers that are no axes of their own and not bounded."""
     words = Words(scene)
     changes: dict[str, object] = {}
     for name, (low, high) in ranges.items():
@@ -201,6 +201,6 @@ def _bounded(scene: Scene, ranges: Ranges) -> Scene:
 
 
 def _freed(scene: Scene, axes: Sequence[str]) -> Scene:
-    """Return the scene with those of the axes free that it holds between bounds."""
+    """Scene with those of the axes free that it holds between bounds."""
     held = [name for name in axes if (b := scene.bounds.get(name)) and not b.free and b.min < b.max]
     return scene.free(held) if held else scene

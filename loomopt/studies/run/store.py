@@ -36,7 +36,7 @@ _OTHER = "Name another file"
 
 
 def _is_number(value: object) -> bool:
-    """Say whether a value is a number as rows have them."""
+    """Whether a value is a number as rows have them."""
     return isinstance(value, float) or (_is_whole(value) and abs(value) <= LARGEST_WHOLE)
 
 
@@ -45,17 +45,17 @@ def _is_whole(value: object) -> TypeGuard[int]:
 
 
 def _is_place(value: object) -> bool:
-    """Say whether a value can be the number of a point."""
+    """Whether a value can be the number of a point."""
     return _is_whole(value) and 0 <= value <= LARGEST_WHOLE
 
 
 def _is_text(value: object) -> bool:
-    """Say whether a value is text without anything that a terminal would obey."""
+    """Whether a value is text without anything that a terminal would obey."""
     return isinstance(value, str) and value.isprintable()
 
 
 def _named(kind: Callable[[object], bool]) -> Callable[[object], bool]:
-    """Return a test for a table of values of a kind."""
+    """A test for a table of values of a kind."""
     return lambda value: isinstance(value, dict) and all(_is_text(name) and kind(each) for name, each in value.items())
 
 
@@ -158,14 +158,14 @@ class Store:
         return read
 
     def rows(self, key: str) -> list[Row]:
-        """Return the rows of a study that are there. Raises BadInput for one that was damaged."""
+        """Rows of a study that are there. Raises BadInput for one that was damaged."""
         with self._told():
             query = f"SELECT {', '.join(COLUMNS)}, checksum FROM row WHERE study = ? ORDER BY point"
             found = self._file.execute(query, (key,)).fetchall()
         return [self._row(key, cells) for cells in found]
 
     def _row(self, key: str, cells: Sequence[object]) -> Row:
-        """Return the row of a study that cells hold. Raises BadInput where they are not as they were written."""
+        """Row of a study that cells hold. Raises BadInput where they are not as they were written."""
         *own, checksum = cells
         known: dict[str, Any] = {}
         if checksum == _checksum(key, own):
@@ -196,7 +196,7 @@ def _read_told(told: object) -> dict[str, Any]:
 
 
 def _checksum(key: str, cells: Sequence[object]) -> str:
-    """Return 64 hex digits of what a row of a study holds, cell by cell."""
+    """64 hex digits of what a row of a study holds, cell by cell."""
     return hashlib.sha256(repr((key, *cells)).encode(errors="surrogatepass")).hexdigest()
 
 
