@@ -47,19 +47,19 @@ class Scenario(NamedTuple):
 
     def given(self, maths: Maths, values: Values) -> Given:
         """Its numbers and those that follow from them, SI; values: of the whole."""
-        return self.model.given(maths, {own: values[name] for own, name in self.values.items() if name in values})
+        return self.model.given(maths, {key: values[name] for key, name in self.values.items() if name in values})
 
     def node(self, node: Node) -> Node:
         """Node of the whole as its own."""
-        switch = {own: node.switch[name] for own, name in self.switches.items() if name in node.switch}
+        switch = {key: node.switch[name] for key, name in self.switches.items() if name in node.switch}
         return Node(node.phi, switch | {name: node.switch[name] for name in (DATUM,) if name in node.switch})
 
 
 def members_of(given: Given) -> tuple[Given, ...]:
     """Numbers of each member."""
-    found = given.linkage
-    assert isinstance(found, tuple)
-    return found
+    members = given.linkage
+    assert isinstance(members, tuple)
+    return members
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,12 +84,12 @@ class FamilyKinematics:
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
         """Angles of each member's events that no formula gives."""
         pairs = zip(self.scenarios, members_of(given), strict=True)
-        return {each.values[name]: at for each, own in pairs for name, at in each.model.hints(own).items()}
+        return {part.values[name]: at for part, numbers in pairs for name, at in part.model.hints(numbers).items()}
 
     def pose(self, maths: Maths, given: Given, node: Node) -> Number:
         """Every member at a node; unread quantities are not computed."""
         pairs = zip(self.scenarios, members_of(given), strict=True)
-        return tuple(each.model.instant(maths, own, each.node(node)) for each, own in pairs)
+        return tuple(part.model.instant(maths, numbers, part.node(node)) for part, numbers in pairs)
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> Number:
         """Every member at an event of one of them."""
@@ -97,9 +97,9 @@ class FamilyKinematics:
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
         """Crank angles, rad, of members' events."""
-        own = members_of(given)
+        members = members_of(given)
         return {
-            name: self.scenarios[k].model.event(maths, own[k], event) for name, (k, event) in self.occurring.items()
+            name: self.scenarios[k].model.event(maths, members[k], event) for name, (k, event) in self.occurring.items()
         }
 
 
@@ -175,11 +175,11 @@ class Roots:
         mean = next((mean for mean in self.model.integrals if name in (mean.name, mean.root)), None)
         if mean or self.model.has_quantity(name):
             node = Node(self.tape.input(), self.switches)
-            found = self.model.quantity(self.there, self.given, mean.quantity if mean else name, node)
+            value = self.model.quantity(self.there, self.given, mean.quantity if mean else name, node)
             # The pieces that a mean is taken over move with their corners.
-            return (found, *(self.model.corners(self.maths, self.given) if mean and not mean.angles else ()))
-        known = self.model.static(self.maths, self.given, {}, (name,))
-        return (known[name] if name in known else self.given.values[name],)
+            return (value, *(self.model.corners(self.maths, self.given) if mean and not mean.angles else ()))
+        rows = self.model.static(self.maths, self.given, {}, (name,))
+        return (rows[name] if name in rows else self.given.values[name],)
 
     def _of(self, read: Callable[[], tuple[Number, ...]]) -> frozenset[str]:
         try:
@@ -188,8 +188,8 @@ class Roots:
             return frozenset(self.inputs)
         needed = self.tape.needed(outputs, len(self.tape.operations))
         turned = [place for place, name in enumerate(self.model.switches) if self.switches[name].place in needed]
-        own = frozenset(name for name, value in self.inputs.items() if value.place in needed)
-        return own.union(*(self.of_switch(place) for place in turned))
+        roots = frozenset(name for name, value in self.inputs.items() if value.place in needed)
+        return roots.union(*(self.of_switch(place) for place in turned))
 
 
 # What is sought of the members together.
@@ -205,17 +205,17 @@ class WorstOf(Objective):
     @property
     def rows(self) -> tuple[str, ...]:
         """All rows and quantities that they read."""
-        return tuple(row for each in self.of for row in each.rows)
+        return tuple(row for objective in self.of for row in objective.rows)
 
     @property
     def sides(self) -> tuple[tuple[str, float], ...]:
         """Their rows, with their signs."""
-        return tuple(side for each in self.of for side in each.sides)
+        return tuple(side for objective in self.of for side in objective.sides)
 
     @property
     def quantities(self) -> tuple[str, ...]:
         """Their quantities."""
-        return tuple(name for each in self.of for name in each.quantities)
+        return tuple(name for objective in self.of for name in objective.quantities)
 
     @property
     def sought(self) -> Sought:
@@ -228,11 +228,11 @@ class WorstOf(Objective):
 
     def pieces(self, sampler: Sampler) -> list[Piece]:
         """Smooth functions of all of them."""
-        return [piece for each in self.of for piece in each.pieces(sampler)]
+        return [piece for objective in self.of for piece in objective.pieces(sampler)]
 
     def limits(self, name: str, most: float) -> list[Limit]:
         """Limits that keep every one of them at `most`, SI."""
-        return [limit for each in self.of for limit in each.limits(name, most)]
+        return [limit for objective in self.of for limit in objective.limits(name, most)]
 
 
 class WorstMagnitude(WorstOf):
@@ -277,15 +277,15 @@ def standing_for(program: Program, name: str) -> frozenset[str]:
     return frozenset(limit.row for limit in program.limits if limit.name == name and limit.is_of_variable)
 
 
-def together(programs: Sequence[Program], own: Collection[str], combine: Combine) -> Family:
-    """Program of a family; own: variables of which each member has its own.
+def together(programs: Sequence[Program], separate: Collection[str], combine: Combine) -> Family:
+    """Program of a family; separate: variables of which each member has its own.
 
     The members' programs are of one structure: they differ in numbers only.
     """
     if len(programs) == 1:
         names = {variable.name: variable.name for variable in programs[0].variables}
         return Family(programs[0], (MemberShare(programs[0], names, {}),))
-    return _Combining(programs, own, combine).family()
+    return _Combining(programs, separate, combine).family()
 
 
 UNLIKE = 1e-3
@@ -295,13 +295,13 @@ UNLIKE = 1e-3
 class _Combining:
     """The members' programs on the way to one."""
 
-    def __init__(self, programs: Sequence[Program], own: Collection[str], combine: Combine) -> None:
+    def __init__(self, programs: Sequence[Program], separate: Collection[str], combine: Combine) -> None:
         self.programs, self.combine = tuple(programs), combine
         self.first, self.model = programs[0], programs[0].model
         self.variables = [variable.name for variable in self.first.variables]
-        self.hinted = self._hinted(own)
+        self.hinted = self._hinted(separate)
         self.roots = Roots(self.model, [*self.first.parameters, *self.variables, *self.hinted])
-        self.apart = self._apart(own)
+        self.apart = self._apart(separate)
         self.rows: dict[str, DesignRow] = {}
         self.quantities: dict[str, CycleQuantity] = {}
         self.integrals: dict[str, Integral] = {}
@@ -310,30 +310,30 @@ class _Combining:
         self.extra_limits: list[Limit] = []
         self.measured: dict[str, tuple[int, Objective]] = {}
 
-    def _hinted(self, own: Collection[str]) -> dict[str, bool]:
+    def _hinted(self, separate: Collection[str]) -> dict[str, bool]:
         """Events that no formula gives, by name of value, and whether any number of a member's own moves it.
 
         They are found by iteration: that is seen at the first start, at which each member's own variables differ.
         """
-        found = list[Mapping[str, float]]()
+        hints = list[Mapping[str, float]]()
         for k, program in enumerate(self.programs):
             start = dict(self.first.starts[0])
             for v in self.first.variables:
-                if v.name in own and math.isfinite(v.upper - v.lower):
+                if v.name in separate and math.isfinite(v.upper - v.lower):
                     start[v.name] += (k + 1) * UNLIKE * (v.upper - v.lower)
             try:
-                found.append(sampled(program.model, {**program.parameters, **program.completed(start)}).hints)
+                hints.append(sampled(program.model, {**program.parameters, **program.completed(start)}).hints)
             except (ValueError, ArithmeticError):
-                found.append({})
-        return {name: any(each.get(name) != value for each in found) for name, value in found[0].items()}
+                hints.append({})
+        return {name: any(angles.get(name) != value for angles in hints) for name, value in hints[0].items()}
 
-    def _apart(self, own: Collection[str]) -> frozenset[str]:
+    def _apart(self, separate: Collection[str]) -> frozenset[str]:
         """Numbers that are not the same for all members, and variables that hang on them by an equality."""
         numbers = [program.parameters for program in self.programs]
-        found = {*own} | {name for name in numbers[0] if any(each[name] != numbers[0][name] for each in numbers)}
-        found |= {name for name, moves in self.hinted.items() if moves}
-        for each in zip(*(program.variables for program in self.programs), strict=True):
-            found |= {each[0].name} if max(v.lower for v in each) > min(v.upper for v in each) else set()
+        names = {*separate} | {name for name in numbers[0] if any(table[name] != numbers[0][name] for table in numbers)}
+        names |= {name for name, moves in self.hinted.items() if moves}
+        for same in zip(*(program.variables for program in self.programs), strict=True):
+            names |= {same[0].name} if max(v.lower for v in same) > min(v.upper for v in same) else set()
         tied = [(limit.reads, limit.value) for limit in self.first.limits if limit.sign == 0]
         sides = [[limit.value for limit in program.limits if limit.sign == 0] for program in self.programs]
         while True:
@@ -341,13 +341,13 @@ class _Combining:
             for place, (reads, _) in enumerate(tied):
                 read = frozenset[str]().union(*map(self.roots.of, reads))
                 differs = any(values[place : place + 1] != sides[0][place : place + 1] for values in sides)
-                if differs or read & found:
+                if differs or read & names:
                     more |= {name for name in read if name in self.variables and name not in self.known}
             for name, quantity in self.first.tops.items():
-                more |= {name} if self.roots.of(quantity) & found else set()
-            if more <= found:
-                return frozenset(found)
-            found |= more
+                more |= {name} if self.roots.of(quantity) & names else set()
+            if more <= names:
+                return frozenset(names)
+            names |= more
 
     @lazy
     def known(self) -> frozenset[str]:
@@ -425,19 +425,19 @@ class _Combining:
 
     def arcs(self) -> list[tuple[bool, Arcs]]:
         """Switches of the whole, and whether each changes a formula."""
-        model, found = self.model, dict[str, tuple[bool, Arcs]]()
+        model, arcs = self.model, dict[str, tuple[bool, Arcs]]()
         loads = [load for load in model.loads if isinstance(load, Load) and load.corners]
         reads = [arc.switch for arc in (*model.kinematics.arcs, *model.arcs)] + [load.switch for load in loads]
         for k, scenario in enumerate(self.scenarios):
-            for place, (own, switch) in enumerate(zip(model.switches, reads, strict=True)):
-                if (name := scenario.switches[own]) not in found:
+            for place, (key, switch) in enumerate(zip(model.switches, reads, strict=True)):
+                if (name := scenario.switches[key]) not in arcs:
                     corners, parting = (functools.partial(of, scenario, k, place) for of in (_corners, _parting))
-                    found[name] = own in model.formula_switches, Arcs(name, corners, switch, parting=parting)
-        return list(found.values())
+                    arcs[name] = key in model.formula_switches, Arcs(name, corners, switch, parting=parting)
+        return list(arcs.values())
 
     def closing(self) -> tuple[dict[str, Group], dict[str, tuple[str, float]]]:
         """Rows by which members assemble: those of groups of links, and the others."""
-        closes, beside = dict[str, str](), dict[str, tuple[str, float]]()
+        closes, conditions = dict[str, str](), dict[str, tuple[str, float]]()
         groups = self.model.kinematics.groups
         for k in range(len(self.programs)):
             for prefix, group in groups.items():
@@ -446,17 +446,17 @@ class _Combining:
                     closes[phrase if read == prefix + name else of_member(phrase, k)] = read
             for phrase, (name, most) in self.model.assembled.items():
                 read = self.read(k, name)
-                beside[phrase if read == name else of_member(phrase, k)] = read, most
+                conditions[phrase if read == name else of_member(phrase, k)] = read, most
         angles = [group.closest for group in groups.values()]
-        closest = tuple(dict.fromkeys(angle for each in angles for angle in each)) if all(angles) else ()
-        return {"": Group({}, closes, closest=closest)}, beside
+        closest = tuple(dict.fromkeys(angle for names in angles for angle in names)) if all(angles) else ()
+        return {"": Group({}, closes, closest=closest)}, conditions
 
     def whole(self) -> JobModel:
         """Model of all members, with what was read of it."""
-        groups, beside = self.closing()
+        groups, conditions = self.closing()
         arcs = self.arcs()
         scenarios = tuple(
-            (each.model.key, tuple(each.values.items()), tuple(each.switches.items())) for each in self.scenarios
+            (part.model.key, tuple(part.values.items()), tuple(part.switches.items())) for part in self.scenarios
         )
         motion = FamilyKinematics(
             self.scenarios,
@@ -471,73 +471,73 @@ class _Combining:
             own_rows=dict(self.rows),
             arcs=tuple(arc for changes, arc in arcs if not changes),
             integrals=tuple({mean.name: mean for mean in self.integrals.values()}.values()),
-            assembled=beside,
+            assembled=conditions,
         )
 
     # Variables, limits, objectives.
 
     def variable(self, member: int, place: int) -> Variable:
         """Variable of a member as one of the whole."""
-        each = [program.variables[place] for program in self.programs]
-        own = each[member]
-        if own.name in self.apart:
-            return own._replace(name=of_member(own.name, member), label=of_member(own.called, member))
-        lower, upper = max(v.lower for v in each), min(v.upper for v in each)
-        return own._replace(lower=lower, upper=max(lower, upper))
+        variables = [program.variables[place] for program in self.programs]
+        variable = variables[member]
+        if variable.name in self.apart:
+            return variable._replace(name=of_member(variable.name, member), label=of_member(variable.called, member))
+        lower, upper = max(v.lower for v in variables), min(v.upper for v in variables)
+        return variable._replace(lower=lower, upper=max(lower, upper))
 
     def limit(self, member: int, limit: Limit) -> Limit:
         """Limit of a member as one of the whole."""
-        found: Limit = replace(limit, row=self.read(member, limit.row))
-        if isinstance(found, RatioLimit):
-            found = replace(found, weight=self.read(member, found.weight))
-        if isinstance(found, CycleLimit):
-            found = replace(found, where=self.where(member, found.where))
-        same = found.reads == limit.reads and getattr(found, "where", None) == getattr(limit, "where", None)
-        return found if same else replace(found, name=of_member(limit.name, member))
+        whole: Limit = replace(limit, row=self.read(member, limit.row))
+        if isinstance(whole, RatioLimit):
+            whole = replace(whole, weight=self.read(member, whole.weight))
+        if isinstance(whole, CycleLimit):
+            whole = replace(whole, where=self.where(member, whole.where))
+        same = whole.reads == limit.reads and getattr(whole, "where", None) == getattr(limit, "where", None)
+        return whole if same else replace(whole, name=of_member(limit.name, member))
 
     def limits(self) -> list[Limit]:
         """Limits of all members, those that are the same once."""
-        found: dict[Hashable, Limit] = {}
+        limits: dict[Hashable, Limit] = {}
         for k, program in enumerate(self.programs):
             for limit in program.limits:
                 whole = self.limit(k, limit)
-                found.setdefault(replace(whole, scale=1.0), whole)
-        return list(found.values())
+                limits.setdefault(replace(whole, scale=1.0), whole)
+        return list(limits.values())
 
     def objective(self, member: int, objective: Objective) -> Objective:
         """Objective of a member as a part of that of the whole."""
-        found = replace(objective, row=self.read(member, objective.row))
-        if isinstance(found, Worst):
-            found = replace(found, others=tuple(self.read(member, row) for row in found.others))
-        return found
+        whole = replace(objective, row=self.read(member, objective.row))
+        if isinstance(whole, Worst):
+            whole = replace(whole, others=tuple(self.read(member, row) for row in whole.others))
+        return whole
 
     def objectives(self) -> tuple[Objective, ...]:
         """Levels: of each of the members' the worst or the sum.
 
         Of a magnitude the sum too, after the worst: who does not decide the worst comes as near as can be.
         """
-        found: list[Objective] = []
+        levels: list[Objective] = []
         for level in zip(*(program.objectives for program in self.programs), strict=True):
-            each = [self.objective(k, own) for k, own in enumerate(level)]
-            scale = max(own.scale for own in each)
-            each = [replace(own, scale=scale) for own in each]
-            first = each[0]
-            if all(own == first for own in each):
-                found.append(first)
+            objectives = [self.objective(k, objective) for k, objective in enumerate(level)]
+            scale = max(objective.scale for objective in objectives)
+            objectives = [replace(objective, scale=scale) for objective in objectives]
+            first = objectives[0]
+            if all(objective == first for objective in objectives):
+                levels.append(first)
                 continue
             if self.combine == "worst":
                 kind = WorstMagnitude if first.is_magnitude else WorstOf
-                found.append(kind(first.figure, first.row, scale, power=first.power, of=tuple(each)))
+                levels.append(kind(first.figure, first.row, scale, power=first.power, of=tuple(objectives)))
             if self.combine == "sum" or first.is_magnitude:
-                found.append(self.summed(each))
-        return tuple(found)
+                levels.append(self.summed(objectives))
+        return tuple(levels)
 
-    def summed(self, each: Sequence[Objective]) -> Objective:
+    def summed(self, parts: Sequence[Objective]) -> Objective:
         """Sum of what members seek: of what is not smooth, of variables that are no less."""
-        first = each[0]
+        first = parts[0]
         figure = Alias(sum_name(first.figure, first.is_magnitude, first.power), first.figure)
-        direct = first.is_smooth and not any(own.row in self.integrals or self.stands(own.row) for own in each)
-        rows = [own.row if direct else self.least(k, own) for k, own in enumerate(each)]
+        direct = first.is_smooth and not any(part.row in self.integrals or self.stands(part.row) for part in parts)
+        rows = [part.row if direct else self.least(k, part) for k, part in enumerate(parts)]
         terms = [self.rows[row].formula if row in self.rows else functools.partial(_number, row) for row in rows]
         self.rows[figure] = DesignRow(functools.partial(_sum, terms))
         return Value(figure, figure, first.scale, power=first.power)
@@ -546,32 +546,32 @@ class _Combining:
         """Whether a row stands at an event; a sum has no events."""
         return row in self.rows and bool(self.rows[row].event)
 
-    def least(self, member: int, own: Objective) -> str:
+    def least(self, member: int, part: Objective) -> str:
         """Variable that is no less than what a member seeks, with the limits that say so."""
-        name = of_member(f"most {own.figure}", member)
-        self.extra.append(Variable(name, -math.inf, math.inf, own.scale, (0.0, 2 * own.scale)))
-        self.measured[name] = member, self.programs[member].objectives[self.place(own)]
-        for place, (row, sign) in enumerate(own.sides):
+        name = of_member(f"most {part.figure}", member)
+        self.extra.append(Variable(name, -math.inf, math.inf, part.scale, (0.0, 2 * part.scale)))
+        self.measured[name] = member, self.programs[member].objectives[self.place(part)]
+        for place, (row, sign) in enumerate(part.sides):
             called, of = f"{name} {place}", self.rows.get(row)
             firm = {"relaxable": False, "hidden": True}
             if of is None:
-                self.extra_limits.append(RatioLimit(called, 1, row, 1.0, own.scale, name, **firm))
+                self.extra_limits.append(RatioLimit(called, 1, row, 1.0, part.scale, name, **firm))
                 continue
             formula = functools.partial(_beyond, of.formula, sign, name)
             self.rows[called] = DesignRow(formula, event=of.event, loaded=False)
-            self.extra_limits.append(DesignLimit(called, 1, called, 0.0, own.scale, **firm))
-        for row in own.quantities:
+            self.extra_limits.append(DesignLimit(called, 1, called, 0.0, part.scale, **firm))
+        for row in part.quantities:
             signs = (1.0,) if row in self.signed else (1.0, -1.0)
             for sign in signs:
                 called = f"{name} {row} {sign:+g}"
                 formula = functools.partial(_beyond, self.quantities[row].formula, sign, name)
                 self.quantities[called] = CycleQuantity(formula, signed=True)
-                self.extra_limits.append(CycleLimit(called, 1, called, 0.0, own.scale, relaxable=False, hidden=True))
+                self.extra_limits.append(CycleLimit(called, 1, called, 0.0, part.scale, relaxable=False, hidden=True))
         return name
 
-    def place(self, own: Objective) -> int:
+    def place(self, objective: Objective) -> int:
         """Place of a level among the members' own."""
-        return next(k for k, level in enumerate(self.first.objectives) if level.figure == own.figure)
+        return next(k for k, level in enumerate(self.first.objectives) if level.figure == objective.figure)
 
     @property
     def signed(self) -> frozenset[str]:
@@ -608,61 +608,61 @@ class _Combining:
             tuple(self.moves()),
             functools.partial(_followed, parts, dict(self.measured)),
             tops,
-            {self.name(k, name): value for k, each in enumerate(self.programs) for name, value in each.today.items()},
+            {self.name(k, name): value for k, case in enumerate(self.programs) for name, value in case.today.items()},
             any_numbers=self.first.any_numbers,
         )
         return Family(replace(whole, starts=self.starts(whole)), parts)
 
     def part(self, member: int) -> MemberShare:
         """Member's share."""
-        own = {limit.name: self.limit(member, limit).name for limit in self.programs[member].limits}
+        limits = {limit.name: self.limit(member, limit).name for limit in self.programs[member].limits}
         return MemberShare(
             self.programs[member],
             {name: self.name(member, name) for name in self.variables},
-            {name: whole for name, whole in own.items() if name != whole},
+            {name: whole for name, whole in limits.items() if name != whole},
         )
 
     def starts(self, whole: Program) -> tuple[dict[str, float], ...]:
         """Members' own starts: those of one place together, what is shared from each member in turn."""
-        found: list[dict[str, float]] = []
+        starts: list[dict[str, float]] = []
         for place in range(max(len(program.starts) for program in self.programs)):
-            each = [program.starts[min(place, len(program.starts) - 1)] for program in self.programs]
-            own = {self.name(k, name): value for k, start in enumerate(each) for name, value in start.items()}
-            for start in each:
+            group = [program.starts[min(place, len(program.starts) - 1)] for program in self.programs]
+            values = {self.name(k, name): value for k, start in enumerate(group) for name, value in start.items()}
+            for start in group:
                 shared = {name: value for name, value in start.items() if name not in self.apart}
-                given = {**own, **shared}
+                given = {**values, **shared}
                 inside = {v.name: min(max(given[v.name], v.lower), v.upper) for v in whole.variables if v.name in given}
                 completed = whole.completed(inside)
-                if completed not in found:
-                    found.append(completed)
-        return tuple(found)
+                if completed not in starts:
+                    starts.append(completed)
+        return tuple(starts)
 
     def moves(self) -> list[Move]:
         """Members' moves, those along shared variables once, with what all members wish."""
-        found: dict[Hashable, Move] = {}
+        moves: dict[Hashable, Move] = {}
         for k, program in enumerate(self.programs):
             for move in program.moves:
                 along = tuple(self.name(k, name) for name in move.along)
                 wishes = tuple(wish._replace(when=self.name(k, wish.when) if wish.when else "") for wish in move.wishes)
                 today = {self.name(k, name): value for name, value in move.today.items()}
                 bounds = {self.name(k, name): ends for name, ends in move.bounds.items()}
-                own = along != move.along
+                is_separate = along != move.along
                 key = move.name, along
-                if key in found:  # wishes that always hold are the last
-                    wishes = tuple(sorted(dict.fromkeys((*found[key].wishes, *wishes)), key=lambda wish: not wish.when))
-                named = of_member(move.name, k) if own else move.name
-                found[key] = replace(move, name=named, along=along, wishes=wishes, today=today, bounds=bounds)
-        return list(found.values())
+                if key in moves:  # wishes that always hold are the last
+                    wishes = tuple(sorted(dict.fromkeys((*moves[key].wishes, *wishes)), key=lambda wish: not wish.when))
+                named = of_member(move.name, k) if is_separate else move.name
+                moves[key] = replace(move, name=named, along=along, wishes=wishes, today=today, bounds=bounds)
+        return list(moves.values())
 
 
 def _followed(
     parts: Sequence[MemberShare], measured: Mapping[str, tuple[int, Objective]], model: JobModel, values: Numbers
 ) -> dict[str, float]:
     """Variables that follow from the others: the members' own, and what is no less than what they seek."""
-    found: dict[str, float] = {}
+    variables: dict[str, float] = {}
     for part in parts:
-        own = part.program.follow(part.program.model, {**part.program.parameters, **part.own(values)})
-        found |= {part.names[name]: value for name, value in own.items() if name in part.names}
+        results = part.program.follow(part.program.model, {**part.program.parameters, **part.own(values)})
+        variables |= {part.names[name]: value for name, value in results.items() if name in part.names}
     for name, (member, objective) in measured.items():
-        found[name] = objective.merit(parts[member].sampler({**values, **found}))
-    return found
+        variables[name] = objective.merit(parts[member].sampler({**values, **variables}))
+    return variables

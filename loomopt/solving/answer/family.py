@@ -1,4 +1,4 @@
-"""What an answer for several machines says: each by itself, and of all of them who decides."""
+"""Answer for several machines: the evaluation of each, and who decides the objectives of all."""
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -18,23 +18,23 @@ Evaluation = Callable[[Scene, Job, Program, Mapping[str, float]], Evaluated]
 
 
 def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float], alone: Evaluation) -> Evaluated:
-    """A family's design with every member by itself; alone: evaluates one machine.
+    """Evaluation of a family's design, with each member by itself; alone: evaluates one machine.
 
-    A figure of the family is the one that all members have, else each has its own; of one that is sought there is that
-    of the member that decides it beside these.
+    A figure that is equal for all members is the family's; otherwise each member has its own. An objective has also the
+    value of the member that decides it.
     """
     assert isinstance(job, FamilyJob)
-    own = zip(job.members, job.parts, job.own_designs(design), strict=True)
-    found = [alone(member, job.job, part.program, each) for member, part, each in own]
-    members = tuple(replace(each, change=change) for each, change in zip(found, family.changes(scene), strict=True))
-    sought = {level.figure: level.power for level in job.parts[0].program.objectives}
+    machines = zip(job.members, job.parts, job.own_designs(design), strict=True)
+    results = [alone(member, job.job, part.program, point) for member, part, point in machines]
+    members = tuple(replace(item, change=change) for item, change in zip(results, family.changes(scene), strict=True))
+    powers = {level.figure: level.power for level in job.parts[0].program.objectives}
     figures = {
-        name: _together([member.figures[name] for member in members], sought.get(name)) for name in members[0].figures
+        name: _together([member.figures[name] for member in members], powers.get(name)) for name in members[0].figures
     }
     for name in members[0].figures:
-        each = [member.figures[name] for member in members]
-        if any(value != each[0] for value in each):
-            figures |= {of_member(name, k): value for k, value in enumerate(each)}
+        values = [member.figures[name] for member in members]
+        if any(value != values[0] for value in values):
+            figures |= {of_member(name, k): value for k, value in enumerate(values)}
     words, labels = Words(scene), numbers.labels(scene)
     shown = {_labelled(name, labels): value for name, value in design.items()}
     return Evaluated(
@@ -52,19 +52,19 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
 
 
 def _labelled(name: str, labels: Mapping[str, str]) -> str:
-    """A number of the whole by what a designer calls it."""
+    """Designer's name of a number of the whole."""
     of = name.of if isinstance(name, Alias) else name
     label = labels.get(of, of)
     return Alias(f"{label}{name.removeprefix(of)}", label) if isinstance(name, Alias) else label
 
 
-def said(scene: Scene, job: Job, found: Evaluated, priced: Collection[str]) -> str:
-    """Who decides each level, which members reach their goals, and what physics says of those that do not.
+def said(scene: Scene, job: Job, here: Evaluated, priced: Collection[str]) -> str:
+    """Sentences: who decides each level, which members reach their goals, and what physics says of the others.
 
     priced: names of the limits that bind; of what all members share those decide it whose own limits do.
     """
     assert isinstance(job, FamilyJob)
-    words, members, summed = Words(scene), found.members, family.table(scene).combine == "sum"
+    words, members, summed = Words(scene), here.members, family.table(scene).combine == "sum"
     called = [f"member {k + 1} ({changed(member)})" for k, member in enumerate(members)]
     sentences = []
     for level in job.parts[0].program.objectives:
@@ -78,34 +78,34 @@ def said(scene: Scene, job: Job, found: Evaluated, priced: Collection[str]) -> s
         name = f"|{level.figure}|" if level.is_magnitude else level.figure
         if nothing or len(set(values)) == 1:
             asking = [called[k] for k, part in enumerate(job.parts) if not {*part.limits.values()}.isdisjoint(priced)]
-            wanted = f": {listed(asking)} ask{'s' if len(asking) == 1 else ''} for it" if asking and not nothing else ""
-            sentences.append(f"The least {name} that serves all members is {shown}{wanted}.")
+            demand = f": {listed(asking)} ask{'s' if len(asking) == 1 else ''} for it" if asking and not nothing else ""
+            sentences.append(f"The least {name} that serves all members is {shown}{demand}.")
             continue
         deciding = [called[k] for k, size in enumerate(sizes) if abs(size - worst) <= SAME_OBJECTIVE * level.scale]
         if summed:
             total = words.shown(level.figure, sum(size**level.power for size in sizes) ** (1 / level.power))
-            what = family.sum_name(level.figure, level.is_magnitude, level.power)
-            sentences.append(f"The least {what} is {total}; the worst {name} is {shown}, of {listed(deciding)}.")
+            total_name = family.sum_name(level.figure, level.is_magnitude, level.power)
+            sentences.append(f"The least {total_name} is {total}; the worst {name} is {shown}, of {listed(deciding)}.")
         else:
             decide = f"{listed(deciding)} decide{'s' if len(deciding) == 1 else ''} it"
             sentences.append(f"The least worst {name} is {shown}: {decide}.")
-    sentences += [_reached(goal, members) for goal in found.reached]
-    if all(found.reached.values()):
+    sentences += [_reached(goal, members) for goal in here.reached]
+    if all(here.reached.values()):
         return " ".join(sentences)
-    each = [(scene, member.design, member.figures) for scene, member in zip(job.members, members, strict=True)]
-    return " ".join([*sentences, job.job.say_together(each, job.own)]).strip()
+    machines = [(scene, member.design, member.figures) for scene, member in zip(job.members, members, strict=True)]
+    return " ".join([*sentences, job.job.say_together(machines, job.own)]).strip()
 
 
 def _reached(goal: str, members: Sequence[Evaluated]) -> str:
-    met = [str(k + 1) for k, member in enumerate(members) if member.reached[goal]]
-    rest = [str(k + 1) for k, member in enumerate(members) if not member.reached[goal]]
-    if not met or not rest:
-        return f"{'All members reach' if met else 'No member reaches'} {goal}."
-    return f"{_counted(met, 'reaches', 'reach')} {goal}, {_counted(rest, 'does', 'do').lower()} not."
+    successes = [str(k + 1) for k, member in enumerate(members) if member.reached[goal]]
+    failures = [str(k + 1) for k, member in enumerate(members) if not member.reached[goal]]
+    if not successes or not failures:
+        return f"{'All members reach' if successes else 'No member reaches'} {goal}."
+    return f"{_counted(successes, 'reaches', 'reach')} {goal}, {_counted(failures, 'does', 'do').lower()} not."
 
 
-def _counted(names: Sequence[str], one: str, many: str) -> str:
-    return f"Member {names[0]} {one}" if len(names) == 1 else f"Members {listed(names)} {many}"
+def _counted(names: Sequence[str], singular: str, plural: str) -> str:
+    return f"Member {names[0]} {singular}" if len(names) == 1 else f"Members {listed(names)} {plural}"
 
 
 def listed(names: Sequence[str]) -> str:
@@ -114,25 +114,25 @@ def listed(names: Sequence[str]) -> str:
 
 
 def _together(values: list[float | None], power: int | None) -> float | None:
-    known = [value for value in values if value is not None]
-    if len(known) < len(values):
+    numbers = [value for value in values if value is not None]
+    if len(numbers) < len(values):
         return None
     if power is None:
-        return known[0] if len(set(known)) == 1 else None
-    return max(known, key=abs) if power > 0 else min(known, key=abs)
+        return numbers[0] if len(set(numbers)) == 1 else None
+    return max(numbers, key=abs) if power > 0 else min(numbers, key=abs)
 
 
 def _limits(job: FamilyJob, members: tuple[Evaluated, ...]) -> tuple[Finding, ...]:
-    found: dict[str, Finding] = {}
+    limits: dict[str, Finding] = {}
     for member, part in zip(members, job.parts, strict=True):
         for limit in member.limits:
             name = part.limits.get(limit.name, limit.name)
-            if name not in found or _room(limit) < _room(found[name]):
-                found[name] = limit._replace(name=name)
-    return tuple(found.values())
+            if name not in limits or _room(limit) < _room(limits[name]):
+                limits[name] = limit._replace(name=name)
+    return tuple(limits.values())
 
 
 def _room(limit: Finding) -> float:
-    """How far a value is from the nearer end."""
+    """Distance of a value from the nearer end."""
     low = limit.value - limit.min if limit.min is not None else math.inf
     return min(low, limit.max - limit.value if limit.max is not None else math.inf)

@@ -51,8 +51,8 @@ def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: st
         job.demand(scene, name)
     full = {**job.today(scene), **{scene.full(of): value for of, value in (design or {}).items()}}
     of_target = functools.partial(evaluated, scene, job, name)
-    found = of_target(full)
-    return found if found.admissible else _with_rounding(found, scene, full, of_target)
+    result = of_target(full)
+    return result if result.admissible else _with_rounding(result, scene, full, of_target)
 
 
 @working()
@@ -74,10 +74,10 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
     sampler = job.sampler(scene, design)
     # The certificate has just looked for most of what is told.
     sampler.share()
-    told = [limit.row for limit in program.cycle_limits.values() if not limit.hidden]
-    told += [name for objective in program.objectives for name in objective.quantities]
-    told += job.peaks(sampler.model).values() if every else []
-    sampler.search(name for name in told if sampler.model.has_quantity(name))
+    quantities = [limit.row for limit in program.cycle_limits.values() if not limit.hidden]
+    quantities += [name for objective in program.objectives for name in objective.quantities]
+    quantities += job.peaks(sampler.model).values() if every else []
+    sampler.search(name for name in quantities if sampler.model.has_quantity(name))
     figures = job.figures(scene, design)
     words = Words(scene)
     labels = numbers.labels(scene)
@@ -99,12 +99,12 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
 def _findings(
     program: Program, figures: Mapping[str, float | None], design: Mapping[str, float], sampler: Sampler
 ) -> tuple[Finding, ...]:
-    """Every limit beside its value, the tightest of each side; held to 1e-9 of its natural size."""
+    """All limits with their values, the tightest of each side, judged to 1e-9 of their scales."""
     sides: dict[tuple[str, bool], dict[int, float]] = {}
     sizes: dict[tuple[str, bool], float] = {}
     peaks: dict[str, float] = {}
     # Figures that no limit speaks of are left to whoever reads them.
-    known = (peaks, sampler.static, figures, design)
+    sources = (peaks, sampler.static, figures, design)
     for limit in program.limits:
         if limit.hidden:
             continue
@@ -113,23 +113,23 @@ def _findings(
                 # A row of the program alone: what it limits is told by the figure that it is read for.
                 continue
             peaks[limit.name] = limit.figure(sampler)
-        elif not any(limit.name in values for values in known):
+        elif not any(limit.name in values for values in sources):
             continue
-        chosen = limit.name in design and limit.is_of_variable
-        key = limit.name, chosen
+        is_variable = limit.name in design and limit.is_of_variable
+        key = limit.name, is_variable
         for sign in (limit.sign,) if limit.sign else (-1, 1):
-            other = sides.setdefault(key, {}).setdefault(sign, limit.value)
-            sides[key][sign] = min(other, limit.value) if sign > 0 else max(other, limit.value)
-        size = abs(limit.value) if chosen and limit.value else limit.named_scale
+            end = sides.setdefault(key, {}).setdefault(sign, limit.value)
+            sides[key][sign] = min(end, limit.value) if sign > 0 else max(end, limit.value)
+        size = abs(limit.value) if is_variable and limit.value else limit.named_scale
         sizes[key] = max(sizes.get(key, 0.0), size)
-    found = []
-    for (name, chosen), ends in sides.items():
-        values = design if chosen else next(values for values in known if name in values)
-        value, slack = values[name], FEASIBLE * sizes[name, chosen]
+    findings = []
+    for (name, is_variable), ends in sides.items():
+        values = design if is_variable else next(values for values in sources if name in values)
+        value, slack = values[name], FEASIBLE * sizes[name, is_variable]
         low, high = ends.get(-1), ends.get(1)
         ok = value is not None and (low is None or value >= low - slack) and (high is None or value <= high + slack)
-        found.append(Finding(name, value if value is not None else float("nan"), low, high, ok))
-    return tuple(found)
+        findings.append(Finding(name, value if value is not None else float("nan"), low, high, ok))
+    return tuple(findings)
 
 
 LEAST_DIGITS, MOST_DIGITS = 4, 14
@@ -141,34 +141,34 @@ CONVERTED = 1e-15
 Evaluate = Callable[[Mapping[str, float]], Evaluated]
 
 
-def _with_rounding(found: Evaluated, scene: Scene, design: Mapping[str, float], evaluate: Evaluate) -> Evaluated:
-    """An evaluation that is not admissible with limits that say whether rounding alone exceeds them.
+def _with_rounding(evaluation: Evaluated, scene: Scene, design: Mapping[str, float], evaluate: Evaluate) -> Evaluated:
+    """Evaluation that is not admissible, with limits that say whether rounding alone exceeds them.
 
     design: all of it by full names, SI; evaluate(design): the same evaluation of another design.
     The reach of rounding is the sum of what half a unit of each number's last digit moves, the worst case.
     """
-    reach = [0.0] * len(found.limits)
+    reach = [0.0] * len(evaluation.limits)
     for name, step in roundings(scene, design).items():
         moved = [_values(evaluate, {**design, name: design[name] + side * step}) for side in (1.0, -1.0)]
-        for k, limit in enumerate(found.limits):
+        for k, limit in enumerate(evaluation.limits):
             changes = [abs(values[k] - limit.value) for values in moved if values]
             reach[k] += max((change for change in changes if math.isfinite(change)), default=0.0)
-    pairs = zip(found.limits, reach, strict=True)
-    limits = tuple(each._replace(rounding=not each.ok and _excess(each) <= most) for each, most in pairs)
-    return replace(found, limits=limits)
+    pairs = zip(evaluation.limits, reach, strict=True)
+    limits = tuple(limit._replace(rounding=not limit.ok and _excess(limit) <= most) for limit, most in pairs)
+    return replace(evaluation, limits=limits)
 
 
 def roundings(scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
-    """Half a unit of each number's last digit, SI: all numbers have as many as the one that has the most.
+    """Half a unit of each number's last digit, SI: all numbers have as many digits as the longest one.
 
     Empty where no rounding shows: in nominal numbers and in a computer's own. Lists of numbers are never typed.
     """
     words, labels = Words(scene), numbers.labels(scene)
-    known = {
+    kinds = {
         name: words.kind(labels.get(name, name)) for name in design if not designs.in_list(name, scene.schema.lists)
     }
-    sizes = {name: (1.0, factor(scene.shown_in(kind))) for name, kind in known.items()}
-    given = {name: min((digits(design[name] / size), size) for size in sizes[name]) for name in known if design[name]}
+    sizes = {name: (1.0, factor(scene.shown_in(kind))) for name, kind in kinds.items()}
+    given = {name: min((digits(design[name] / size), size) for size in sizes[name]) for name in kinds if design[name]}
     most = max((count for count, _ in given.values()), default=0)
     if most > MOST_DIGITS:
         return {}
@@ -188,7 +188,7 @@ def _half(value: float, count: int) -> float:
 
 
 def _values(evaluate: Evaluate, design: Mapping[str, float]) -> list[float]:
-    """Return each limit's value of a design; none where it cannot move."""
+    """Values of all limits at a design; empty if it cannot move."""
     try:
         return [limit.value for limit in evaluate(design).limits]
     except (ValueError, ZeroDivisionError, FloatingPointError):
@@ -196,7 +196,7 @@ def _values(evaluate: Evaluate, design: Mapping[str, float]) -> list[float]:
 
 
 def _excess(limit: Finding) -> float:
-    """Return by how much a limit is exceeded, SI; infinite where it has no value."""
+    """Excess over a limit, SI; infinite where it has no value."""
     low = -math.inf if limit.min is None else limit.min
     high = math.inf if limit.max is None else limit.max
     return max(low - limit.value, limit.value - high) if math.isfinite(limit.value) else math.inf
@@ -224,15 +224,15 @@ def _with(scene: Scene, target: str, search: Search, best: Candidate) -> Solutio
     solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search), "status": point.status, "iterations": point.iterations}
     today = functools.partial(evaluated, scene, job, target, {})
     here = evaluation(scene, job, program, job.design(program, best.x))
-    found = _substituted(search, best) if search.substitute else _sought(search)
-    made = with_optimum(job, scene, target, here, best.certificate, solver, today, found, search.substitute)
-    made = replace(made, point=point, optima=_optima(search))
+    extent = _substituted(search, best) if search.substitute else _sought(search)
+    solution = with_optimum(job, scene, target, here, best.certificate, solver, today, extent, search.substitute)
+    solution = replace(solution, point=point, optima=_optima(search))
     if search.tradeoff is None:
-        return made
-    other = evaluation(scene, job, program, job.design(program, search.tradeoff.alternative))
-    beside = Beside(search.tradeoff.added.least.figure, search.tradeoff.share, search.tradeoff.chosen, other)
-    said = _little(Words(scene), beside, made)
-    return replace(made, beside=beside, sentences=explained(made, said))
+        return solution
+    alternative = evaluation(scene, job, program, job.design(program, search.tradeoff.alternative))
+    beside = Beside(search.tradeoff.added.least.figure, search.tradeoff.share, search.tradeoff.chosen, alternative)
+    sentence = _little(Words(scene), beside, solution)
+    return replace(solution, beside=beside, sentences=explained(solution, sentence))
 
 
 def explained(answer: Solution, *more: str) -> Sentences:
@@ -242,7 +242,7 @@ def explained(answer: Solution, *more: str) -> Sentences:
 
 def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
     """Answer where no design was reached."""
-    job, program, points = search.job, search.program, [each.point for each in search.candidates]
+    job, program, points = search.job, search.program, [candidate.point for candidate in search.candidates]
     solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search)}
     if points:
         solver |= {"status": points[0].status, "iterations": sum(point.iterations for point in points)}
@@ -257,20 +257,20 @@ NO_SOLVE = frozenset({"Not_Assembled", "Not_Enough_Degrees_Of_Freedom", BEATEN})
 
 
 def _stopped(search: Search) -> Mapping[str, float]:
-    """Return where a solve stopped, SI, that exceeds its limits least; nothing where none did."""
-    ends = [each.point.x for each in search.candidates if each.point.status not in NO_SOLVE]
+    """Variables, SI, at which a solve stopped with the least excess over its limits; empty if none did."""
+    ends = [candidate.point.x for candidate in search.candidates if candidate.point.status not in NO_SOLVE]
     ends += [search.nearest.x] if search.nearest else []
     pairs = [(excess(search.program, x), x) for x in ends]
     return min((pair for pair in pairs if math.isfinite(pair[0])), key=lambda pair: pair[0], default=(0.0, {}))[1]
 
 
 def nowhere(scene: Scene) -> Evaluated:
-    """An evaluation of no design, where no solve led to any."""
+    """Evaluation of no design, for a search that reached none."""
     return Evaluated(scene.name, tuple(scene.effects), {}, {}, {}, (), scene=scene)
 
 
 def _counts(search: Search) -> dict[str, Any]:
-    """How many starts there were, how many ended at the best, and the accuracy asked for."""
+    """Number of starts, of starts that ended at the best, and of basins, with the requested accuracy."""
     best = search.best
     same = [c for c in search.candidates if _is_there(c, best)] if best else []
     accuracy = search.settings.accuracy
@@ -283,7 +283,7 @@ def _counts(search: Search) -> dict[str, Any]:
 
 
 def _optima(search: Search) -> tuple[tuple[Mapping[str, float | None], int], ...]:
-    """Figures of the distinct optima the starts ended in, best first, with how many starts did."""
+    """Figures of the distinct optima, best first, with the number of starts that ended in each."""
     groups: list[list[Candidate]] = []
     for candidate in search.ranked:
         if groups and compare(groups[-1][0], candidate) == 0:
@@ -302,27 +302,27 @@ def _figures(search: Search, candidate: Candidate) -> dict[str, float | None]:
 
 
 def _is_there(candidate: Candidate, best: Candidate) -> bool:
-    """Whether a solve ended in the best, or was left where it could only have ended there."""
+    """Whether a solve ended in the best, or was abandoned where it could only have ended there."""
     if candidate.point.usable:
         return compare(candidate, best) == 0
     return abs(candidate.point.value - best.value) <= SAME_OBJECTIVE
 
 
 def _sought(search: Search) -> str:
-    """How far the best was sought, as a sentence that claims no more than was done."""
+    """Extent of the search, as a sentence that claims no more than was done."""
     if search.stayed:
         return "Solved again near the answer given; other basins were not looked at."
     if search.program.single:
         return f"No other basin was looked for: {search.program.single}."
-    solves, found = len(search.candidates), len(_optima(search))
+    solves, optima = len(search.candidates), len(_optima(search))
     reached = f"{solves} solve{'s' if solves > 1 else ''}"
-    ended = f"Best of {found} optima" if found > 1 else "The only optimum"
+    ended = f"Best of {optima} optima" if optima > 1 else "The only optimum"
     looked = f", {search.screened} designs sampled" if search.screened else ""
     return f"{ended} reached by {reached}{looked}."
 
 
 def _substituted(search: Search, best: Candidate) -> str:
-    """Which known design stands in place of what solves ended in, as a sentence."""
+    """Sentence that names the known design which stands in place of the ends of all solves."""
     apart = max(abs(best.x[v.name] - search.today.get(v.name, math.inf)) / v.scale for v in search.program.variables)
     name = "today's machine" if apart <= FEASIBLE else "where one of the solves ended"
     return f"No solve ended in a better design that is certified; this is the best admissible design known, {name}."
@@ -369,7 +369,7 @@ def with_optimum(
 
 
 def _headline(job: Job, scene: Scene, target: str, here: Evaluated, priced: Collection[str]) -> str:
-    """Return what an optimum is worth, in words; priced: names of the limits that bind."""
+    """Sentence on the objectives of an optimum; priced: names of the limits that bind."""
     if not job.members:
         return job.say(scene, target, here.figures)
     from loomopt.solving.answer import family
@@ -378,33 +378,33 @@ def _headline(job: Job, scene: Scene, target: str, here: Evaluated, priced: Coll
 
 
 def _little(words: Words, beside: Beside, answer: Solution) -> str:
-    """Say what another design of more or less added mass would change, and that it is little."""
+    """Sentence on the small changes that another design of more or less added mass would bring."""
     name = beside.added
-    told = []
+    texts = []
     for figure, change in beside.changes(answer).items():
         alike = [
-            abs(value or 0.0) for each, value in answer.figures.items() if answer.units[each] == answer.units[figure]
+            abs(value or 0.0) for key, value in answer.figures.items() if answer.units[key] == answer.units[figure]
         ]
         if abs(change) > SHOWN_AS_ZERO * max(alike, default=0.0):
             text = words.shown(figure, change, 3)
-            told.append(f"{figure} {'' if text.startswith('-') else '+'}{text}")
-    changes = ", ".join(told) or "nothing that is sought changes"
-    other = words.shown(name, beside.other.design[name])
+            texts.append(f"{figure} {'' if text.startswith('-') else '+'}{text}")
+    changes = ", ".join(texts) or "nothing that is sought changes"
+    amount = words.shown(name, beside.other.design[name])
     little = f"{100 * beside.share:g} %"
     if not beside.chosen:
-        return f"The {name} is worth less than {little} of each figure; {other}: {changes}."
+        return f"The {name} is worth less than {little} of each figure; {amount}: {changes}."
     none = answer.design[name] == 0.0
     head = f"No {name}, for it is worth less than" if none else f"As little {name} as may cost"
-    return f"{head} {little} of each figure; {other}: {changes}."
+    return f"{head} {little} of each figure; {amount}: {changes}."
 
 
 def _left_open(certificate: Certificate) -> str:
-    """Say which variables could be others as well, where no rule has settled them; "" for none."""
+    """Sentence that names the variables of which other values are as good; "" for none."""
     return f"Left open, for others are as good: {', '.join(certificate.open)}." if certificate.open else ""
 
 
 def prices(words: Words, certificate: Certificate) -> tuple[Price, ...]:
-    """Return one price per limit and side."""
+    """Prices, one per limit and side."""
     return tuple(map(words.price, certificate.binding_groups))
 
 
@@ -424,28 +424,28 @@ def stops(binding: tuple[Price, ...], together: tuple[JointPrice, ...] = ()) -> 
 
 
 def _helps(relaxations: Sequence[Relaxation]) -> str:
-    """Return what helps as sentences, the first one begun already."""
-    first, *others = remedies(relaxations)
-    said = ", ".join(each.text for each in first) + "."
-    alone = "; ".join(each.text for remedy in others for each in remedy if each.alone)
-    together = ", ".join(each.text for remedy in others for each in remedy if not each.alone)
-    said += f" By itself, any one of these would do{' too' if first[0].alone else ''}: {alone}." if alone else ""
-    return said + (f" So would all of these together: {together}." if together else "")
+    """Remedies as sentences, of which the caller writes the first words."""
+    first, *more = remedies(relaxations)
+    sentence = ", ".join(relaxation.text for relaxation in first) + "."
+    alone = "; ".join(relaxation.text for remedy in more for relaxation in remedy if relaxation.alone)
+    together = ", ".join(relaxation.text for remedy in more for relaxation in remedy if not relaxation.alone)
+    sentence += f" By itself, any one of these would do{' too' if first[0].alone else ''}: {alone}." if alone else ""
+    return sentence + (f" So would all of these together: {together}." if together else "")
 
 
 def without_optimum(
     target: str,
     here: Evaluated,
-    found: Clash,
+    clash: Clash,
     solver: Mapping[str, Any],
     today: Today,
     explanation: str = "",
 ) -> Solution:
     """Answer where no design was reached: infeasible with the least relaxations, else failed."""
-    if found.relaxations:
+    if clash.relaxations:
         result = (
-            f"No admissible design exists near any start. Limits that clash: {', '.join(found.limits)}. "
-            f"The least relaxation that helps: {_helps(found.relaxations)}"
+            f"No admissible design exists near any start. Limits that clash: {', '.join(clash.limits)}. "
+            f"The least relaxation that helps: {_helps(clash.relaxations)}"
         )
     else:
         status, explanation = str(solver["status"]), ""
@@ -453,17 +453,17 @@ def without_optimum(
     return Solution(
         **vars(here),
         target=target,
-        status="infeasible" if found.relaxations else "failed",
+        status="infeasible" if clash.relaxations else "failed",
         sentences=Sentences(result, explanations=(explanation,) if explanation else ()),
-        relaxation=tuple(each for remedy in remedies(found.relaxations) for each in remedy),
-        clash=tuple(found.limits),
+        relaxation=tuple(relaxation for remedy in remedies(clash.relaxations) for relaxation in remedy),
+        clash=tuple(clash.limits),
         solver=solver,
         evaluate_today=today,
     )
 
 
 def completed(answer: Solution, bound: GlobalBound | None, evaluations: int, seconds: Mapping[str, float]) -> Solution:
-    """An answer with what is proven of all designs, and what it cost: positions evaluated, and seconds."""
+    """Answer with the bound on all designs and the effort: positions evaluated, and seconds."""
     solver = {**answer.solver, "evaluations": evaluations}
     if answer.certificate:
         solver["error_estimate"] = answer.certificate.error

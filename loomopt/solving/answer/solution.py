@@ -21,7 +21,7 @@ from loomopt.solving.certificate.records import Binding, Certificate, GlobalBoun
 
 
 class Proof(NamedTuple):
-    """What is shown of one limit, SI.
+    """Evidence on one limit, SI.
 
     name: of the limit, or of the figure whose claimed peak it is. margin: by how much the refined value stays clear of
     the limit, negative where it exceeds it; slack: what is left open; boxes: how many it took; angle: the crank angle,
@@ -42,16 +42,16 @@ class Proof(NamedTuple):
 
     @property
     def limit(self) -> str:
-        """What JSON data call it."""
+        """Name in JSON data."""
         return f"peak {self.name}" if self.kind == "peak" else self.name
 
     @property
     def said(self) -> str:
-        """What it is of, in a few words."""
+        """Name of the limit or of the peak, for people."""
         return self.name if self.kind == "peak" else self.text
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """The record as JSON data."""
         return {"limit": self.limit} | {
             key: value for key, value in self._asdict().items() if key not in ("name", "kind")
         }
@@ -75,7 +75,7 @@ class Proofs(Shown):
 
     @property
     def said(self) -> str:
-        """What came of them, in one sentence."""
+        """Summary in one sentence."""
         missed = dict.fromkeys(proof.limit for proof in self.proofs if proof.status != "proven")
         return f"NOT proven: {', '.join(missed)}" if missed else "every limit holds at every crank angle"
 
@@ -83,10 +83,10 @@ class Proofs(Shown):
         return f"<Proofs {self.problem}, {self.target}: {self.said}>"
 
     def as_dict(self) -> dict[str, Any]:
-        """Object `prove --json` prints."""
+        """Object that `prove --json` prints."""
         proofs = [proof.as_dict() for proof in self.proofs]
-        found = {"problem": self.problem, "target": self.target, "proofs": proofs}
-        return found | ({"uncovered": list(self.uncovered)} if self.uncovered else {})
+        data = {"problem": self.problem, "target": self.target, "proofs": proofs}
+        return data | ({"uncovered": list(self.uncovered)} if self.uncovered else {})
 
 
 ADVICE = {
@@ -120,7 +120,7 @@ class Finding(NamedTuple):
     backed_off: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON data; what is not exceeded says nothing of rounding, nor a limit as it stands of more."""
+        """The record as JSON data, without rounding and back-off where they say nothing."""
         return {
             name: value for name, value in self._asdict().items() if value or name not in ("rounding", "backed_off")
         }
@@ -143,9 +143,9 @@ class Price(NamedTuple):
     backed_off: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON data; a limit that binds where it stands says no more."""
-        told = {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in self._asdict().items() if k != "reading"}
-        return {k: v for k, v in told.items() if v or k != "backed_off"}
+        """The record as JSON data; backed_off only where it is not zero."""
+        data = {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in self._asdict().items() if k != "reading"}
+        return {k: v for k, v in data.items() if v or k != "backed_off"}
 
 
 class JointPrice(NamedTuple):
@@ -173,10 +173,10 @@ class JointPrice(NamedTuple):
         return f"{named(self.limits)} together: {self.reading}"
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON data."""
-        alone = [{self.figure: each} for each in self.alone]
-        told = {"limits": list(self.limits), "sides": list(self.sides), "worth": dict(self.worth)}
-        return told | {"unit": dict(self.unit), "alone": alone, "text": self.text, "reading": self.reading}
+        """The record as JSON data."""
+        alone = [{self.figure: worth} for worth in self.alone]
+        data = {"limits": list(self.limits), "sides": list(self.sides), "worth": dict(self.worth)}
+        return data | {"unit": dict(self.unit), "alone": alone, "text": self.text, "reading": self.reading}
 
 
 def named(names: Sequence[str]) -> str:
@@ -201,11 +201,11 @@ class Relaxation(NamedTuple):
 
 
 def remedies(relaxations: Sequence[Relaxation]) -> list[tuple[Relaxation, ...]]:
-    """Return what helps, each by itself: limits that give way together, or one alone; out of proportion last."""
-    together = tuple(each for each in relaxations if not each.alone)
-    found = [together] if together else []
-    found += [(each,) for each in relaxations if each.alone]
-    return sorted(found, key=lambda remedy: not all(each.in_proportion for each in remedy))
+    """Remedies: limits that give way together, or one alone; those out of proportion come last."""
+    together = tuple(relaxation for relaxation in relaxations if not relaxation.alone)
+    groups = [together] if together else []
+    groups += [(relaxation,) for relaxation in relaxations if relaxation.alone]
+    return sorted(groups, key=lambda remedy: not all(relaxation.in_proportion for relaxation in remedy))
 
 
 @dataclass(frozen=True)
@@ -225,11 +225,11 @@ class Terms(Protocol):
 
     @property
     def said(self) -> str:
-        """What is sought, in a few words."""
+        """Objectives in a few words."""
 
     @property
     def axes(self) -> Sequence[str]:
-        """The figures that are sought."""
+        """Figures of the objectives."""
 
     def evaluation(self, design: Mapping[str, float]) -> "Evaluated":
         """Figures and limits of a design, SI."""
@@ -272,7 +272,7 @@ class Evaluated:
 
     def as_dict(self, target: str = "") -> dict[str, Any]:
         """Object that `evaluate --json` prints; target: whose tables it tells."""
-        found = {
+        data = {
             "problem": self.problem,
             "effects": list(self.effects),
             "design": dict(self.design),
@@ -281,16 +281,16 @@ class Evaluated:
             "limits": [limit.as_dict() for limit in self.limits],
             "reached": dict(self.reached),
         }
-        found |= {"undefined": dict(self.undefined)} if self.undefined else {}
+        data |= {"undefined": dict(self.undefined)} if self.undefined else {}
         tables = _tables(self.scene, target) if self.scene and not self.members else []
-        found |= {"tables": tables} if tables else {}
-        return found | (
+        data |= {"tables": tables} if tables else {}
+        return data | (
             {"members": [_member_dict(member, self.scene) for member in self.members]} if self.members else {}
         )
 
 
 def _tables(scene: Scene, target: str) -> list[dict[str, object]]:
-    """Precision and misfit of each table that was read, as JSON data; none of one that is gone since."""
+    """Precision and misfit of each table that was read, as JSON data, without tables that are gone since."""
     from loomopt.jobs import registry
 
     with contextlib.suppress(BadInput):
@@ -299,14 +299,14 @@ def _tables(scene: Scene, target: str) -> list[dict[str, object]]:
 
 
 def changed(member: Evaluated) -> str:
-    """Return what a member of a family changes of the scene, in words: "M0 600 N*m"."""
+    """Changes of the scene by a member of a family, in words: "M0 600 N*m"."""
     return ", ".join(f"{key.split('.', 1)[-1]} {value}" for key, value in member.change.items())
 
 
-def demand_single(found: Evaluated, what: str) -> None:
-    """Raise BadInput for a family, of which each member has its own; what: is asked for."""
-    if found.members:
-        origin = found.scene.origin if found.scene else ""
+def demand_single(evaluation: Evaluated, what: str) -> None:
+    """Raise BadInput for a family, whose members each have their own; what: the requested data."""
+    if evaluation.members:
+        origin = evaluation.scene.origin if evaluation.scene else ""
         remedy = "Take one member: answer.members[0], or its numbers set and its own target"
         raise refusal(f"a family has no {what}: each of its members has", origin, "target", FAMILY, remedy=remedy)
 
@@ -316,8 +316,8 @@ def _member_dict(member: Evaluated, whole: Scene | None) -> dict[str, Any]:
     from loomopt.scenes import family
 
     target = family.of_target(whole) if whole else ""
-    told = {key: value for key, value in member.as_dict(target).items() if key not in ("problem", "effects", "units")}
-    return {"change": dict(member.change), **told}
+    data = {key: value for key, value in member.as_dict(target).items() if key not in ("problem", "effects", "units")}
+    return {"change": dict(member.change), **data}
 
 
 class Beside(NamedTuple):
@@ -332,17 +332,17 @@ class Beside(NamedTuple):
     other: Evaluated
 
     def changes(self, answer: "Solution") -> dict[str, float]:
-        """Return what the other design changes of each figure that is sought, SI."""
+        """Change of each objective in the other design, SI."""
         levels = answer.certificate.levels if answer.certificate else ()
         names = dict.fromkeys(level.objective for level in levels if level.objective != self.added)
         pairs = {name: (self.other.figures.get(name), answer.figures.get(name)) for name in names}
         return {name: then - now for name, (then, now) in pairs.items() if then is not None and now is not None}
 
     def as_dict(self, answer: "Solution") -> dict[str, Any]:
-        """Return it as JSON data."""
-        other = self.other.as_dict()
-        told = {"added": self.added, "share": self.share, "chosen": self.chosen, "changes": self.changes(answer)}
-        return told | {"design": other["design"], "figures": other["figures"]}
+        """The record as JSON data."""
+        alternative = self.other.as_dict()
+        data = {"added": self.added, "share": self.share, "chosen": self.chosen, "changes": self.changes(answer)}
+        return data | {"design": alternative["design"], "figures": alternative["figures"]}
 
 
 class Worse(NamedTuple):
@@ -358,7 +358,7 @@ class Worse(NamedTuple):
         return (self.design - self.today) / abs(self.today) if self.today else None
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """The record as JSON data."""
         return {**self._asdict(), "share": self.share}
 
 
@@ -394,11 +394,11 @@ class Robust(NamedTuple):
     shifted: bool = False
 
     def cost(self, answer: "Solution") -> dict[str, float]:
-        """Return what each figure that is sought has risen by, SI."""
+        """Rise of each objective, SI."""
         return risen(answer, self.nominal)
 
     def as_dict(self, answer: "Solution") -> dict[str, Any]:
-        """Return it as JSON data."""
+        """The record as JSON data."""
         nominal = self.nominal.as_dict()
         return {
             "sigmas": self.sigmas,
@@ -410,7 +410,7 @@ class Robust(NamedTuple):
             "nominal": {
                 "design": nominal["design"],
                 "figures": nominal["figures"],
-                "yield": {name: each._asdict() for name, each in self.nominal_yields.items()},
+                "yield": {name: share._asdict() for name, share in self.nominal_yields.items()},
             },
             "passes": self.passes,
             "samples": self.samples,
@@ -438,23 +438,23 @@ class Rounded(NamedTuple):
     rests: str
 
     def cost(self, answer: "Solution") -> dict[str, float]:
-        """Return what each figure that is sought has risen by, SI."""
+        """Rise of each objective, SI."""
         return risen(answer, self.nominal)
 
     def as_dict(self, answer: "Solution") -> dict[str, Any]:
-        """Return it as JSON data."""
+        """The record as JSON data."""
         nominal = self.nominal.as_dict()
         sizes = {name: {"least": low, "most": high, "count": n} for name, (low, high, n) in self.sizes.items()}
-        told = {"sizes": sizes, "points": self.points, "admissible": self.admissible, "reaching": self.reaching}
-        told |= {"boxes": self.boxes, "gap": _finite(self.gap), "rests": self.rests, "cost": self.cost(answer)}
-        return told | {"nominal": {"design": nominal["design"], "figures": nominal["figures"]}}
+        data = {"sizes": sizes, "points": self.points, "admissible": self.admissible, "reaching": self.reaching}
+        data |= {"boxes": self.boxes, "gap": _finite(self.gap), "rests": self.rests, "cost": self.cost(answer)}
+        return data | {"nominal": {"design": nominal["design"], "figures": nominal["figures"]}}
 
 
 def risen(answer: "Solution", nominal: Evaluated) -> dict[str, float]:
-    """Return what each figure that an answer seeks has risen by beside another design's, SI."""
+    """Rise of each objective of an answer above that of another design, SI."""
     levels = answer.certificate.levels if answer.certificate else ()
     pairs = {
-        each.objective: (answer.figures.get(each.objective), nominal.figures.get(each.objective)) for each in levels
+        level.objective: (answer.figures.get(level.objective), nominal.figures.get(level.objective)) for level in levels
     }
     return {name: now - then for name, (now, then) in pairs.items() if now is not None and then is not None}
 
@@ -536,26 +536,26 @@ class Solution(Evaluated):
 
     @property
     def message(self) -> str:
-        """What it says, in sentences."""
-        said = self.sentences
-        return joined(said.result, said.limits, said.open, said.search, *said.explanations)
+        """Sentences of the answer."""
+        sentences = self.sentences
+        return joined(sentences.result, sentences.limits, sentences.open, sentences.search, *sentences.explanations)
 
     @property
     def explanation(self) -> str:
-        """What else than figures and limits explains it; of a family also who decides."""
-        own = self.sentences.result if self.members and self.status == "optimal" else ""
-        return joined(own, *self.sentences.explanations)
+        """Explanation beyond figures and limits; for a family also who decides."""
+        result = self.sentences.result if self.members and self.status == "optimal" else ""
+        return joined(result, *self.sentences.explanations)
 
     @property
     def design_is(self) -> str:
-        """What its design is: an optimum only where it is certified."""
+        """Kind of its design: an optimum only where it is certified."""
         if self.status in ("infeasible", "failed") and not self.relaxation and self.point is not None:
             return "optimum without sizes"
         return DESIGN_IS[self.status]
 
     @property
     def outcome(self) -> str:
-        """What came of it, for people: its status, and of an optimum the goals that it misses."""
+        """Outcome for people: the status, and for an optimum the goals that it misses."""
         missed = shortfall(self.reached) if self.status == "optimal" else ""
         return f"{self.status} but {missed}" if missed else self.status
 
@@ -569,22 +569,22 @@ class Solution(Evaluated):
         """Figures with a good end that it makes worse than today's by more than `WORSE`, beside what it seeks."""
         if self.scene is None or self.status not in ("optimal", "uncertified") or self.today is None:
             return ()
-        sought = {level.objective for level in self.certificate.levels} if self.certificate else set[str]()
-        known, old = self.scene.schema.figures, self.today.figures
-        ends = {name: each.sides[0] for name, each in known.items() if len(each.sides) == 1 and name not in sought}
+        goals = {level.objective for level in self.certificate.levels} if self.certificate else set[str]()
+        figures, old = self.scene.schema.figures, self.today.figures
+        ends = {name: item.sides[0] for name, item in figures.items() if len(item.sides) == 1 and name not in goals}
         pairs = {name: (old.get(name), self.figures.get(name)) for name in ends}
-        found = [Worse(name, a, b) for name, (a, b) in pairs.items() if a is not None and b is not None]
+        changes = [Worse(name, a, b) for name, (a, b) in pairs.items() if a is not None and b is not None]
         units = self.units
         sizes = {
-            unit: max(abs(each.today) for each in found if units.get(each.figure) == unit)
-            for unit in {units.get(each.figure) for each in found}
+            unit: max(abs(change.today) for change in changes if units.get(change.figure) == unit)
+            for unit in {units.get(change.figure) for change in changes}
         }
 
-        def falls(each: Worse) -> bool:
-            by = each.design - each.today if ends[each.figure] == "max" else each.today - each.design
-            return by > max(WORSE * abs(each.today), SHOWN_AS_ZERO * sizes[units.get(each.figure)])
+        def falls(change: Worse) -> bool:
+            by = change.design - change.today if ends[change.figure] == "max" else change.today - change.design
+            return by > max(WORSE * abs(change.today), SHOWN_AS_ZERO * sizes[units.get(change.figure)])
 
-        return tuple(each for each in found if falls(each))
+        return tuple(change for change in changes if falls(change))
 
     @property
     def sought(self) -> str:
@@ -592,7 +592,7 @@ class Solution(Evaluated):
         return self.terms.said if self.terms else self.target
 
     def as_dict(self, target: str = "") -> dict[str, Any]:
-        """Object `solve --json` prints."""
+        """Object that `solve --json` prints."""
         base = super().as_dict(self.target or target)
         head: dict[str, Any] = {
             "problem": self.problem,
@@ -616,11 +616,11 @@ class Solution(Evaluated):
         if "tables" in base:
             tail["tables"] = base.pop("tables")
         if self.worse:
-            tail["worse"] = [each.as_dict() for each in self.worse]
+            tail["worse"] = [entry.as_dict() for entry in self.worse]
         if self.proofs:
             tail["proofs"] = self.proofs.as_dict()["proofs"]
         if self.robust:
-            tail["yield"] = {name: each._asdict() for name, each in self.robust.yields.items()}
+            tail["yield"] = {name: entry._asdict() for name, entry in self.robust.yields.items()}
             tail["robust"] = self.robust.as_dict(self)
         if self.rounded:
             tail["rounded"] = self.rounded.as_dict(self)
@@ -638,7 +638,7 @@ class Solution(Evaluated):
 
 def certificate_dict(certificate: Certificate) -> dict[str, Any]:
     """Certificate as JSON data."""
-    told = {
+    data = {
         "passed": certificate.passed,
         "by": certificate.by,
         "reasons": list(certificate.reasons),
@@ -657,21 +657,21 @@ def certificate_dict(certificate: Certificate) -> dict[str, Any]:
         "settled": list(certificate.choices),
     }
     if certificate.prices_unique:
-        return told
-    return told | {"design_unique": certificate.unique, "prices_unique": False}
+        return data
+    return data | {"design_unique": certificate.unique, "prices_unique": False}
 
 
 def _scene_dict(scene: "Scene", target: str | None) -> dict[str, Any]:
-    """A scene as JSON data from which it can be made again, its tables with it; target: as the call named it."""
+    """Scene and tables as JSON data from which it can be made again; target: as the call named it."""
     from loomopt.scenes.numbers import tables
 
     call, files = scene.call.as_dict() | {"target": target}, tables(scene)
-    told = {"hash": scene.hash, "document": copied(scene.document, scene.origin), "call": call}
-    return told | ({"files": files} if files else {})
+    data = {"hash": scene.hash, "document": copied(scene.document, scene.origin), "call": call}
+    return data | ({"files": files} if files else {})
 
 
 def _finite(value: float | None) -> float | None:
-    """Return None for what JSON cannot say."""
+    """The number, or None for one that JSON cannot hold."""
     return value if value is not None and math.isfinite(value) else None
 
 
@@ -684,7 +684,7 @@ UNKNOWN = "number"
 
 
 def outward(value: float, side: int) -> float:
-    """A value rounded to six significant digits so that it gives no less room: up for a maximum."""
+    """Value rounded to six significant digits so that it gives no less room: up for a maximum."""
     if value == 0.0:
         return value
     step = 10.0 ** (math.floor(math.log10(abs(value))) - 5)
@@ -692,7 +692,7 @@ def outward(value: float, side: int) -> float:
 
 
 def grouped(unit: str) -> str:
-    """A unit that may stand after a stroke."""
+    """Unit that may stand after a stroke."""
     return f"({unit})" if "/" in unit else unit
 
 
@@ -712,7 +712,7 @@ class Words:
         return family.called(self.scene)
 
     def kind(self, name: str) -> str:
-        """Return what kind of quantity a variable, figure or limit is."""
+        """Kind of quantity of a variable, figure or limit."""
         name = name.of if isinstance(name, Alias) else self.aliases.get(name, name)
         schema = self.scene.schema
         if name in schema.figures and name not in schema.variables:
@@ -721,19 +721,19 @@ class Words:
             if name in kinds:
                 return kinds[name]
         for model in (schema.operation, schema.mechanism):
-            known = quantities_of(model)
-            if name in known:
-                return known[name].kind
+            quantities = quantities_of(model)
+            if name in quantities:
+                return quantities[name].kind
         places = [(e.table, key, label(e, key)) for e in self.scene.active for key in e.table.model_fields]
-        found = next((quantity_of(model, key) for model, key, called in places if called == name), None)
-        return found.kind if found else UNKNOWN
+        quantity = next((quantity_of(model, key) for model, key, called in places if called == name), None)
+        return quantity.kind if quantity else UNKNOWN
 
     def unit(self, name: str) -> str:
-        """Unit a designer reads it in."""
+        """Unit in which a designer reads it."""
         return self.scene.shown_in(self.kind(name))
 
     def si(self, name: str) -> str:
-        """Return its SI unit."""
+        """SI unit."""
         return SI_UNIT[self.kind(name)]
 
     def shown(self, name: str, value: float, digits: int = 6) -> str:
@@ -741,7 +741,7 @@ class Words:
         return show(value, self.unit(name), digits)
 
     def outward(self, name: str, value: float, side: int) -> str:
-        """An SI value that something never passes on a side, rounded outward, with its unit."""
+        """SI value that something never passes on a side, rounded outward, with its unit."""
         unit = self.unit(name)
         return show(outward(value / factor(unit), side) * factor(unit), unit)
 
@@ -751,18 +751,18 @@ class Words:
             return limit.name
         return f"{limit.name} {SIGNS[limit.sign]} {self.shown(limit.name, limit.value)}"
 
-    def worse(self, found: Sequence[Worse]) -> str:
-        """Return what becomes worse than today's machine has it, in one line; "" for nothing."""
-        told = []
-        for each in found:
-            share = 100 * (each.share or 0.0)
-            change = f" ({share:+.{0 if abs(share) > 10 else 1}f} %)" if each.share is not None else ""
-            then = f"{each.today / factor(self.unit(each.figure)):.4g}"
-            told.append(f"{each.figure} {then} -> {self.shown(each.figure, each.design, 4)}{change}")
-        return f"Worse than today's machine: {', '.join(told)}." if told else ""
+    def worse(self, records: Sequence[Worse]) -> str:
+        """Line of the figures that are worse than those of today's machine; "" for none."""
+        texts = []
+        for record in records:
+            share = 100 * (record.share or 0.0)
+            change = f" ({share:+.{0 if abs(share) > 10 else 1}f} %)" if record.share is not None else ""
+            then = f"{record.today / factor(self.unit(record.figure)):.4g}"
+            texts.append(f"{record.figure} {then} -> {self.shown(record.figure, record.design, 4)}{change}")
+        return f"Worse than today's machine: {', '.join(texts)}." if texts else ""
 
     def price(self, bindings: Sequence[Binding]) -> Price:
-        """A limit's price: what all its rows together are worth."""
+        """Price of a limit, with all its rows together."""
         first = bindings[0]
         limit, figure = first.limit, first.objective.figure
         worth = worth_of(bindings)
@@ -787,9 +787,9 @@ class Words:
         return f"{value / factor(unit):.3g}{f' {unit}' if unit != '1' else ''}"
 
     def joint_price(self, joint: JointBinding) -> JointPrice:
-        """Return what limits are worth together."""
+        """Joint price of limits."""
         first = joint.bindings[0]
-        figure, names = first.objective.figure, [each.limit.name for each in joint.bindings]
+        figure, names = first.objective.figure, [binding.limit.name for binding in joint.bindings]
         units = list(dict.fromkeys(map(self.unit, names)))
         worth = joint.worth([1.0] * len(names))
         if len(units) == 1:
@@ -800,13 +800,13 @@ class Words:
             amount = joint.worth([factor(self.unit(name)) for name in names])
             reading = f"{self._amount(figure, amount)} for {named([f'1 {unit}' for unit in units])}"
             per = f"({', '.join(dict.fromkeys(map(self.si, names)))})"
-        alone = [each.worth for each in joint.bindings]
-        each_alone = [
+        alone = [binding.worth for binding in joint.bindings]
+        prices_alone = [
             f"{name} {self.price_reading(figure, name, price) if price else 0}"
             for name, price in zip(names, alone, strict=True)
         ]
-        rest = f"alone: {', '.join(each_alone)}" if any(alone) else "each alone: 0"
-        sides = tuple(SIDES[each.side] for each in joint.bindings)
+        rest = f"alone: {', '.join(prices_alone)}" if any(alone) else "each alone: 0"
+        sides = tuple(SIDES[binding.side] for binding in joint.bindings)
         unit = f"{self.si(figure)}/{per}"
         return JointPrice(tuple(names), sides, {figure: worth}, {figure: unit}, tuple(alone), f"{reading}; {rest}")
 
@@ -822,7 +822,7 @@ class Words:
         return Relaxation(limit.name, SIDES[side], limit.value, needed, alone, text, fair)
 
     def _width(self, limit: Limit) -> float:
-        """Return what a relaxation is measured by, SI: the width of its bounds, else itself, else its natural size."""
+        """Reference of a relaxation, SI: the width of its bounds, else itself, else its scale."""
         bound = self.scene.bounds.get(limit.name) if not isinstance(limit, CycleLimit) else None
         width = bound.max - bound.min if bound else 0.0
         return (width if 0.0 < width < math.inf else abs(limit.value)) or limit.scale

@@ -82,9 +82,9 @@ def trade(
         remedy = "Name one of them, or trade it."
         raise BadInput(f"{stray[0]} is none of both axes", key=stray[0], allowed=", ".join(axes), remedy=remedy)
     allowed = f"a whole number from {FEWEST} to {numbers.MOST_VALUES}"
-    wanted = POINTS if points is None else arguments.whole(points, "points", allowed, "Correct the number")
-    if not FEWEST <= wanted <= numbers.MOST_VALUES:
-        problem = "a front needs more points" if wanted < FEWEST else "a front has no such number of points"
+    count = POINTS if points is None else arguments.whole(points, "points", allowed, "Correct the number")
+    if not FEWEST <= count <= numbers.MOST_VALUES:
+        problem = "a front needs more points" if count < FEWEST else "a front has no such number of points"
         raise BadInput(problem, key="points", value=shown(points), allowed=allowed, remedy="Correct the number.")
     for name, (low, high) in ranges.items():
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
@@ -98,47 +98,47 @@ def trade(
             )
     senses = _sense(scene, first, minimise, maximise), _sense(scene, second, minimise, maximise)
     open_ended, lifted = _lifted(scene, dict(zip((first, second), senses, strict=True)))
-    found = Trade(
+    result = Trade(
         _freed(_bounded(open_ended, ranges), axes),
         (first, second),
         senses,
         target,
         tuple(ranges.items()),
-        wanted,
+        count,
         float(accuracy),
         lifted,
     )
-    _ = found.solver
-    return found
+    _ = result.solver
+    return result
 
 
 def _lifted(scene: Scene, senses: Mapping[str, Sense]) -> tuple[Scene, tuple[str, ...]]:
-    """Scene without its limits that stand in the way of an end that is sought, and these in words.
+    """Scene without the limits that stand in the way of an end that is sought, and those limits in words.
 
     Of an axis of which the least is sought that is a minimum, of one of which the most is sought a maximum; a limit to
     one value stands in the way of both ends.
     """
-    words, said = Words(scene), []
+    words, texts = Words(scene), []
     for name, sense in senses.items():
         axis, limit = scene.schema.axes.get(name), scene.limits.get(name)
         if limit is None or axis is None or (axis.form and FORMS[axis.form].is_magnitude):
             continue
         ends = {"min": limit.min, "max": limit.max}
-        one = limit.min is not None and limit.min == limit.max
-        sides = [side for side in ends if ends[side] is not None and (one or side == SOUGHT[sense])]
+        is_equality = limit.min is not None and limit.min == limit.max
+        sides = [side for side in ends if ends[side] is not None and (is_equality or side == SOUGHT[sense])]
         if sides:
             scene = scene.without_limit(name, sides)
-            most = "" if one else " at least" if sides == ["min"] else " at most"
-            said.append(f"{name}{most} {words.shown(name, ends[sides[0]] or 0.0)}")
-    return scene, tuple(said)
+            most = "" if is_equality else " at least" if sides == ["min"] else " at most"
+            texts.append(f"{name}{most} {words.shown(name, ends[sides[0]] or 0.0)}")
+    return scene, tuple(texts)
 
 
 def _sense(scene: Scene, name: str, minimise: Sequence[str], maximise: Sequence[str]) -> Sense:
     """End of an axis that is sought."""
     if name in maximise:
         return "most"
-    own = scene.schema.axes.get(name)
-    return own.senses[0] if own and name not in minimise else "least"
+    axis = scene.schema.axes.get(name)
+    return axis.senses[0] if axis and name not in minimise else "least"
 
 
 def si(scene: Scene, given: Given) -> dict[str, tuple[float, float]]:
@@ -162,7 +162,7 @@ def _ends(scene: Scene, name: str, given: str | Sequence[float]) -> tuple[float,
 
 
 def _read(text: str, kind: str, name: str) -> float:
-    """Return one end of a range, SI. Raises BadInput."""
+    """One end of a range, SI. Raises BadInput."""
     try:
         return read_quantity(text, kind)
     except QuantityError as error:
@@ -201,6 +201,6 @@ def _bounded(scene: Scene, ranges: Ranges) -> Scene:
 
 
 def _freed(scene: Scene, axes: Sequence[str]) -> Scene:
-    """Scene with those of the axes free that it holds between bounds."""
-    held = [name for name in axes if (b := scene.bounds.get(name)) and not b.free and b.min < b.max]
-    return scene.free(held) if held else scene
+    """Scene in which axes that it fixes between bounds are free."""
+    fixed = [name for name in axes if (b := scene.bounds.get(name)) and not b.free and b.min < b.max]
+    return scene.free(fixed) if fixed else scene

@@ -143,9 +143,9 @@ class Request:
     def plan(self, answer: Solution, frozen: "Mapping[str, Band]") -> Plan:
         """Study of an answer's machines; frozen: bands, m, of numbers whose class would flip."""
         given = self.scene.document["tolerances"]
-        own = {name: {k: value for k, value in given[name].items() if k not in ("class", "fit")} for name in frozen}
+        entries = {name: {k: value for k, value in given[name].items() if k not in ("class", "fit")} for name in frozen}
         made = {
-            f"tolerances.{name}": {**own[name], "plus": f"{high!r} m", "minus": f"{-low!r} m"}
+            f"tolerances.{name}": {**entries[name], "plus": f"{high!r} m", "minus": f"{-low!r} m"}
             for name, (low, high) in frozen.items()
         }
         scene = self.scene.update(made) if made else self.scene
@@ -178,10 +178,10 @@ def _search(request: Request, start: Pass, sigmas: Sigmas) -> Pass | Solution:
     return _not_converged(request, here)
 
 
-def _same(one: Solution, other: Solution) -> bool:
+def _same(first: Solution, second: Solution) -> bool:
     """Whether the objectives of two answers agree to the certificate's accuracy."""
-    names = [level.objective for level in one.certificate.levels] if one.certificate else []
-    pairs = [(one.figures.get(name) or 0.0, other.figures.get(name) or 0.0) for name in names]
+    names = [level.objective for level in first.certificate.levels] if first.certificate else []
+    pairs = [(first.figures.get(name) or 0.0, second.figures.get(name) or 0.0) for name in names]
     size = max((abs(value) for pair in pairs for value in pair), default=0.0)
     return all(abs(a - b) <= SAME * size for a, b in pairs)
 
@@ -215,11 +215,11 @@ def _converge(request: Request, here: Pass, sigmas: Sigmas) -> Pass | Solution:
         plan, frozen = request.plan(answer, here.frozen), dict(here.frozen)
         for name, made in plan.tolerances.items():
             if made.standard:
-                known, band = bands.setdefault(made.number, []), made.band(plan.nominal[name])
-                if band in known[:-1] and band != known[-1]:
+                history, band = bands.setdefault(made.number, []), made.band(plan.nominal[name])
+                if band in history[:-1] and band != history[-1]:
                     # A class that flips back and forth stays at its widest band.
-                    frozen[made.number] = max(known, key=lambda each: each[1] - each[0])
-                known.append(band)
+                    frozen[made.number] = max(history, key=lambda ends: ends[1] - ends[0])
+                history.append(band)
         plan = request.plan(answer, frozen) if frozen != here.frozen else plan
         here = here._replace(answer=answer, plan=plan, margins=margins(plan), frozen=Frozen(frozen))
         here, before = here._replace(passes=here.passes + 1, applied=off), off
@@ -228,7 +228,7 @@ def _converge(request: Request, here: Pass, sigmas: Sigmas) -> Pass | Solution:
 
 def tightened(here: Pass) -> dict[tuple[str, int], float]:
     """Margins by which each side is tightened, SI, by name and sign."""
-    return {each.key: each.back_off(here.sigmas, here.caps) for each in here.margins if not each.fixed}
+    return {margin.key: margin.back_off(here.sigmas, here.caps) for margin in here.margins if not margin.fixed}
 
 
 # A required yield.
@@ -287,52 +287,52 @@ def _try(request: Request, trials: Trials) -> Trials:
         top = share(start.margins, MOST_SIGMAS, start.applied, start.caps)
         following = max(linear(start, top * (1 - 1 / SAMPLES)), trials.low[0])
         trials = trials._replace(edge=following, obstacle=trials.obstacle or _fixed(start))
-        tried = _reach(request, start, lambda at: following)
+        attempt = _reach(request, start, lambda at: following)
     else:
-        tried = _reach(request, start, lambda at: linear(at, least))
-        tried = tried._replace(linear=tried.sigmas) if isinstance(tried, Pass) else tried
-    following = tried.sigmas if isinstance(tried, Pass) else following
+        attempt = _reach(request, start, lambda at: linear(at, least))
+        attempt = attempt._replace(linear=attempt.sigmas) if isinstance(attempt, Pass) else attempt
+    following = attempt.sigmas if isinstance(attempt, Pass) else following
     for _ in range(TRIALS):
-        if isinstance(tried, Obstacle):
-            trials = trials._replace(edge=following, obstacle=tried.why, narrow=tried.limits)
+        if isinstance(attempt, Obstacle):
+            trials = trials._replace(edge=following, obstacle=attempt.why, narrow=attempt.limits)
             following = (trials.low[0] + following) / 2
         else:
-            request.say(f"drawing machines at {tried.sigmas:.6g} sigma")
-            found, point = _yields(tried.plan)[ALL], tried.sigmas
-            if found.value > trials.best[0].value:
-                trials = trials._replace(best=(found, tried))
-            if found.value >= least:
-                trials = trials._replace(enough=tried, high=min(trials.high, (point, found.value)))
+            request.say(f"drawing machines at {attempt.sigmas:.6g} sigma")
+            estimate, point = _yields(attempt.plan)[ALL], attempt.sigmas
+            if estimate.value > trials.best[0].value:
+                trials = trials._replace(best=(estimate, attempt))
+            if estimate.value >= least:
+                trials = trials._replace(enough=attempt, high=min(trials.high, (point, estimate.value)))
             else:
-                trials = trials._replace(low=max(trials.low, (point, found.value)))
-            grain = max(MOST_BESIDE * found.se, 2.0 / request.back_off.samples)
-            if 0.0 <= found.value - least <= grain or trials.high[0] - trials.low[0] <= CONVERGED:
+                trials = trials._replace(low=max(trials.low, (point, estimate.value)))
+            grain = max(MOST_BESIDE * estimate.se, 2.0 / request.back_off.samples)
+            if 0.0 <= estimate.value - least <= grain or trials.high[0] - trials.low[0] <= CONVERGED:
                 return trials
-            following = _between(tried, trials.low, trials.high, found.value, least)
+            following = _between(attempt, trials.low, trials.high, estimate.value, least)
         if not trials.enough and trials.edge - trials.low[0] <= EDGE:
             return trials
         if not trials.enough and following >= trials.edge:
             following = (trials.low[0] + trials.edge) / 2
         start = trials.enough or trials.best[1]
-        tried = _reach(request, start, lambda at, k=following: k)  # type: ignore[misc]
+        attempt = _reach(request, start, lambda at, k=following: k)  # type: ignore[misc]
     return trials
 
 
 def _reach(request: Request, start: Pass, sigmas: Sigmas) -> Pass | Obstacle:
     """Pass at a back-off, or why there is no design with it."""
     try:
-        found = _converge(request, start, sigmas)
+        result = _converge(request, start, sigmas)
     except BadInput as error:
         return Obstacle(error.problem)
-    return found if isinstance(found, Pass) else Obstacle(found.message.rstrip("."), found.clash)
+    return result if isinstance(result, Pass) else Obstacle(result.message.rstrip("."), result.clash)
 
 
-def _between(at: Pass, low: tuple[float, float], high: tuple[float, float], found: float, least: float) -> float:
+def _between(at: Pass, low: tuple[float, float], high: tuple[float, float], estimate: float, least: float) -> float:
     """Next back-off to try: Newton's step on the yield with the slope of the linear one, within the known bracket."""
     step = 1e-4
     sides = [_quantile(share(at.margins, at.sigmas + shift, at.applied, at.caps)) for shift in (0.0, step)]
     # A little beyond it, for what is found must be no less.
-    following = at.sigmas + (_quantile(least) - _quantile(found)) / ((sides[1] - sides[0]) / step or 1.0) * 1.02
+    following = at.sigmas + (_quantile(least) - _quantile(estimate)) / ((sides[1] - sides[0]) / step or 1.0) * 1.02
     if low[0] < following < high[0]:
         return following
     return (low[0] + high[0]) / 2 if math.isfinite(high[0]) else low[0] + 0.1
@@ -387,7 +387,7 @@ def _explain(
     scene, answer, off = request.scene, ended.answer, tightened(ended)
     words = Words(scene)
     here = report.evaluated(scene, registry.of(scene), request.task.target, ended.plan.full)
-    corners = dict.fromkeys(each.name for each in ended.margins if each.corner and not each.fixed)
+    corners = dict.fromkeys(margin.name for margin in ended.margins if margin.corner and not margin.fixed)
     robust = Robust(
         ended.sigmas,
         request.back_off.share,
@@ -403,11 +403,11 @@ def _explain(
         any(ended.plan.shifts.values()),
     )
     by_name = {name: by for (name, _), by in off.items()}
-    limits = tuple(each._replace(backed_off=by_name.get(each.name, 0.0)) for each in here.limits)
+    limits = tuple(limit._replace(backed_off=by_name.get(limit.name, 0.0)) for limit in here.limits)
     binding = tuple(_priced(words, price, off) for price in answer.binding)
-    found = replace(answer, limits=limits, reached=here.reached, scene=scene, binding=binding, robust=robust)
-    sentences = report.explained(found, *_sentences(scene, ended, found, robust))
-    return replace(found, sentences=sentences._replace(limits=report.stops(binding, answer.bind_together)))
+    result = replace(answer, limits=limits, reached=here.reached, scene=scene, binding=binding, robust=robust)
+    sentences = report.explained(result, *_sentences(scene, ended, result, robust))
+    return replace(result, sentences=sentences._replace(limits=report.stops(binding, answer.bind_together)))
 
 
 def _priced(words: Words, price: Price, off: Mapping[tuple[str, int], float]) -> Price:
@@ -426,20 +426,20 @@ def _priced(words: Words, price: Price, off: Mapping[tuple[str, int], float]) ->
 def _sentences(scene: Scene, ended: Pass, answer: Solution, robust: Robust) -> list[str]:
     """Sentences on the cost of the back-off and on the yield."""
     now, was = robust.yields[ALL], robust.nominal_yields[ALL]
-    found = [
+    sentences = [
         f"That is with {_backed(ended)}{_from(robust)}.",
         report.cost_sentence("It costs", answer, robust.nominal, Words(scene), SAME),
         f"All limits hold on {_percent(now)} of the machines instead of {100 * was.value:.4g} %.",
     ]
     if robust.kept:
-        found.append(f"Nothing backs off {', '.join(robust.kept)}: an equality or a goal, kept as it is.")
+        sentences.append(f"Nothing backs off {', '.join(robust.kept)}: an equality or a goal, kept as it is.")
     if robust.corners:
         holds = ", ".join(f"{name} on {_percent(robust.yields[name])}" for name in robust.corners)
-        found.append(
+        sentences.append(
             f"At the design {', '.join(robust.corners)} bends: its sigma is of the steeper slope in each number. "
             f"With that back-off the limit holds: {holds} of the machines."
         )
-    return found
+    return sentences
 
 
 def _from(robust: Robust) -> str:
@@ -450,7 +450,7 @@ def _from(robust: Robust) -> str:
 def _backed(here: Pass) -> str:
     """How far limits are backed off, as a phrase."""
     less = [f"{name} by {sigmas:.6g} sigma" for name, sigmas in here.caps.items() if sigmas < here.sigmas]
-    return f"each limit backed off by {here.sigmas:.6g} sigma of its own figure{''.join(f', {each}' for each in less)}"
+    return f"each limit backed off by {here.sigmas:.6g} sigma of its own figure{''.join(f', {text}' for text in less)}"
 
 
 def _percent(share_of: Yield) -> str:
@@ -487,30 +487,30 @@ def _uncertified(request: Request, answer: Solution, status: str, problem: str) 
 
 def _limits(request: Request, answer: Solution) -> tuple[Finding, ...]:
     """Limits of the scene, judged at an answer's design."""
-    own = {request.scene.full(name): value for name, value in designs.flat(answer.design).items()}
-    return report.evaluated(request.scene, registry.of(request.scene), request.task.target, own).limits
+    design = {request.scene.full(name): value for name, value in designs.flat(answer.design).items()}
+    return report.evaluated(request.scene, registry.of(request.scene), request.task.target, design).limits
 
 
 def _narrow(request: Request, here: Pass, name: str, width: float, needed: float) -> Solution:
     """Answer without a certificate: the band of a limit has no room for the back-off of both sides."""
     words = Words(request.scene)
     why = f"the band of {name}, {words.shown(name, width, 4)}, is no wider than {words.shown(name, needed, 4)}"
-    found = _infeasible(request, here.answer, f"{why} on both sides: {here.sigmas:.6g} sigma each")
-    return replace(found, clash=(name,))
+    result = _infeasible(request, here.answer, f"{why} on both sides: {here.sigmas:.6g} sigma each")
+    return replace(result, clash=(name,))
 
 
 def _fixed(here: Pass) -> str:
     """Phrase of the sides that no back-off can move."""
-    fixed = ", ".join(dict.fromkeys(each.name for each in here.margins if each.fixed))
+    fixed = ", ".join(dict.fromkeys(margin.name for margin in here.margins if margin.fixed))
     return f"nothing backs off {fixed}" if fixed else f"no more than {MOST_SIGMAS:g} sigma are tried"
 
 
-def _most(request: Request, found: Yield, here: Pass, obstacle: str) -> Solution:
+def _most(request: Request, largest: Yield, here: Pass, obstacle: str) -> Solution:
     """Answer with the largest yield, which is less than the required one, and the obstacle to a larger one."""
     least = 100 * (request.back_off.share or 0.0)
     problem = (
         f"{least:.6g} % of the machines cannot hold all limits: the most that was found is "
-        f"{_percent(found)}, the yield of the design shown, with {_backed(here)}. In the way of more: "
+        f"{_percent(largest)}, the yield of the design shown, with {_backed(here)}. In the way of more: "
         f"{obstacle or f'{TRIALS} back-offs were tried'}. Tighten the tolerances, widen the limits or ask for less."
     )
     return _uncertified(request, here.answer, "infeasible", problem)

@@ -57,29 +57,29 @@ class Margin(NamedTuple):
 
 def margins(plan: Plan) -> tuple[Margin, ...]:
     """Margins of all sides of the criteria of a design's machines. Raises BadInput for a figure without a value."""
-    found, own = list[Margin](), slopes(plan)
+    sides, by_criterion = list[Margin](), slopes(plan)
     values = plan.read({name: np.full(1, plan.nominal[name]) for name in plan.tolerances})
     bands = {goal.figure for goal in plan.goals}
-    for each in plan.criteria:
-        value = float(values[each.name][0]) if each.name in values else math.nan
-        if not math.isfinite(value) or not all(map(math.isfinite, own[each.name].by_number.values())):
-            problem = f"the spread of {each.name} is unknown, so that it cannot be backed off"
-            raise refusal(problem, plan.scene.origin, f"limits.{each.name}", remedy="Take the limit out")
-        for sign, end, side in ((-1, each.low, "low"), (1, each.high, "high")):
+    for criterion in plan.criteria:
+        value = float(values[criterion.name][0]) if criterion.name in values else math.nan
+        if not math.isfinite(value) or not all(map(math.isfinite, by_criterion[criterion.name].by_number.values())):
+            problem = f"the spread of {criterion.name} is unknown, so that it cannot be backed off"
+            raise refusal(problem, plan.scene.origin, f"limits.{criterion.name}", remedy="Take the limit out")
+        for sign, end, side in ((-1, criterion.low, "low"), (1, criterion.high, "high")):
             if end is not None and math.isfinite(end):
-                way = _way(plan, each, own[each.name], side)
-                fixed = each.name in bands
-                left = _left(plan, each, own[each.name], side)
+                way = _way(plan, criterion, by_criterion[criterion.name], side)
+                fixed = criterion.name in bands
+                left = _left(plan, criterion, by_criterion[criterion.name], side)
                 shift = sign * math.fsum(left[name] * plan.shifts[name] for name in plan.tolerances)
                 room = sign * (end - value) - shift
-                found.append(Margin(each.name, sign, room, way, fixed, own[each.name].corner, shift))
-    return tuple(found)
+                sides.append(Margin(criterion.name, sign, room, way, fixed, by_criterion[criterion.name].corner, shift))
+    return tuple(sides)
 
 
-def _way(plan: Plan, judged: Criterion, slope: Slopes, side: str) -> Floats:
+def _way(plan: Plan, criterion: Criterion, slope: Slopes, side: str) -> Floats:
     """Change of a side's room by one standard deviation of each independent number, (numbers,), SI."""
-    left = _left(plan, judged, slope, side)
-    groups = sorted({each.group for each in plan.tolerances.values() if each.group})
+    left = _left(plan, criterion, slope, side)
+    groups = sorted({tolerance.group for tolerance in plan.tolerances.values() if tolerance.group})
     way = np.zeros(len(plan.tolerances) + len(groups))
     for k, (name, made) in enumerate(plan.tolerances.items()):
         moved = left[name] * plan.sigmas[name]
@@ -89,53 +89,53 @@ def _way(plan: Plan, judged: Criterion, slope: Slopes, side: str) -> Floats:
     return way
 
 
-def _left(plan: Plan, judged: Criterion, slope: Slopes, side: str) -> dict[str, float]:
+def _left(plan: Plan, criterion: Criterion, slope: Slopes, side: str) -> dict[str, float]:
     """Slopes of a side's figure, less those of its own end where that is one of the numbers."""
-    end = plan.scene.full(judged.name) if side in judged.follows else None
+    end = plan.scene.full(criterion.name) if side in criterion.follows else None
     left = {name: slope.steeper[name] - (name == end) for name in plan.tolerances}
     # A figure that is its own limit's number moves with it, and what is left of its slope is rounding.
     return {name: 0.0 if name == end and abs(value) <= MET else value for name, value in left.items()}
 
 
 def share(
-    found: Sequence[Margin], sigmas: float, applied: Mapping[tuple[str, int], float], caps: Mapping[str, float]
+    sides: Sequence[Margin], sigmas: float, applied: Mapping[tuple[str, int], float], caps: Mapping[str, float]
 ) -> float:
     """Linear share of machines that hold all sides, were each back-off that is met one of `sigmas`.
 
     applied: the back-off that the design was solved with, SI, by name and sign of a side; caps: the most standard
     deviations that a limit has room for.
     """
-    if not found:
+    if not sides:
         return 1.0
     rooms = [
-        each.room if each.fixed else _room(each, each.back_off(sigmas, caps), applied.get(each.key, 0.0))
-        for each in found
+        side.room if side.fixed else _room(side, side.back_off(sigmas, caps), applied.get(side.key, 0.0))
+        for side in sides
     ]
-    ways = np.array([each.way for each in found])
-    high = np.array([room * sign for room, sign in zip(rooms, (each.sign for each in found), strict=True)])
-    low = np.where([each.sign < 0 for each in found], high, -np.inf)
-    high = np.where([each.sign > 0 for each in found], high, np.inf)
+    ways = np.array([side.way for side in sides])
+    high = np.array([room * sign for room, sign in zip(rooms, (side.sign for side in sides), strict=True)])
+    low = np.where([side.sign < 0 for side in sides], high, -np.inf)
+    high = np.where([side.sign > 0 for side in sides], high, np.inf)
     return joint_normal.within(ways, low, high)
 
 
-def _room(margin: Margin, wanted: float, applied: float) -> float:
+def _room(margin: Margin, back_off: float, applied: float) -> float:
     """What a side leaves to the mean machine with another back-off, SI; one that stopped the design goes along."""
-    met = margin.room + margin.shift <= applied * (1 + MET) + MET * margin.sigma
-    return wanted - margin.shift if met else max(margin.room, wanted - margin.shift)
+    is_active = margin.room + margin.shift <= applied * (1 + MET) + MET * margin.sigma
+    return back_off - margin.shift if is_active else max(margin.room, back_off - margin.shift)
 
 
 def check_crossings(plan: Plan, sigmas: float) -> None:
     """Raise BadInput where a travel turns so near the level whose crossing a limit reads that some machines' jumps."""
-    judged, words = {each.name for each in plan.criteria}, Words(plan.scene)
+    names, words = {criterion.name for criterion in plan.criteria}, Words(plan.scene)
     for name, crossings in registry.of(plan.scene).crossings(plan.scene).items():
-        for crossing in crossings if name in judged else ():
+        for crossing in crossings if name in names else ():
             level = plan.nominal[crossing.level]
             for angle, height, sigma in _tops(plan, crossing):
                 if not abs(height - level) > sigmas * sigma:
-                    beside, reach = (words.shown(crossing.level, size, 3) for size in (abs(height - level), sigma))
+                    distance, reach = (words.shown(crossing.level, size, 3) for size in (abs(height - level), sigma))
                     problem = (
                         f"{name} jumps on some machines: at {plan.scene.show(angle, 'angle', 4)} the travel turns "
-                        f"{beside} from {crossing.level}, which {sigmas:.3g} sigma of {reach} each reach"
+                        f"{distance} from {crossing.level}, which {sigmas:.3g} sigma of {reach} each reach"
                     )
                     key, remedy = f"operation.{name}", "Tighten the tolerances, or ask for fewer sigmas"
                     raise refusal(problem, plan.scene.origin, key, remedy=remedy)
@@ -144,10 +144,10 @@ def check_crossings(plan: Plan, sigmas: float) -> None:
 def _tops(plan: Plan, crossing: Crossing) -> Iterator[tuple[float, float, float]]:
     """Angle, size and its standard deviation, SI, of the extremes of a travel up to the first past a crossing."""
     quantity, side, dwell = crossing.quantity, crossing.side, plan.figures[crossing.figure]
-    found = _extremes(plan.nominal_sampler, quantity, side)
-    inside = [angle for angle in found if 0.0 < angle < dwell]
-    beyond = [angle for angle in found if angle >= dwell][:1]
-    here = {angle: found[angle] for angle in (*inside, *beyond)}
+    heights = _extremes(plan.nominal_sampler, quantity, side)
+    inside = [angle for angle in heights if 0.0 < angle < dwell]
+    beyond = [angle for angle in heights if angle >= dwell][:1]
+    here = {angle: heights[angle] for angle in (*inside, *beyond)}
     for angle, height in here.items():
         # To first order an extreme is as high as the curve at its angle.
         sides = [
@@ -166,20 +166,20 @@ def _extremes(sampler: Sampler, quantity: str, side: int) -> dict[float, float]:
     """Extremes of |quantity| by the crank's turn from angle 0 to one side, in order."""
     turn = 2 * math.pi
     # What is highest at an end of a piece only turns with the cycle's pieces.
-    inside = [each for each in sampler.extremes(quantity) if 0.0 < each.u < 1.0]
-    return dict(sorted(((side * sampler.angle(each)) % turn, abs(each.value)) for each in inside))
+    inside = [extreme for extreme in sampler.extremes(quantity) if 0.0 < extreme.u < 1.0]
+    return dict(sorted(((side * sampler.angle(extreme)) % turn, abs(extreme.value)) for extreme in inside))
 
 
-def narrow_band(found: Sequence[Margin], sigmas: float, caps: Mapping[str, float]) -> tuple[str, float, float] | None:
+def narrow_band(margins: Sequence[Margin], sigmas: float, caps: Mapping[str, float]) -> tuple[str, float, float] | None:
     """Limit whose band is narrower than back-off on both sides takes, with both widths, SI; None for none."""
     sides: dict[str, dict[int, Margin]] = {}
-    for each in found:
-        if not each.fixed:
-            sides.setdefault(each.name, {})[each.sign] = each
-    for name, own in sides.items():
-        if len(own) < len(SIDES):
+    for margin in margins:
+        if not margin.fixed:
+            sides.setdefault(margin.name, {})[margin.sign] = margin
+    for name, ends in sides.items():
+        if len(ends) < len(SIDES):
             continue
-        width, needed = own[-1].room + own[1].room, sum(each.reach(sigmas, caps) for each in own.values())
+        width, needed = ends[-1].room + ends[1].room, sum(margin.reach(sigmas, caps) for margin in ends.values())
         if width <= needed:
             return name, width, needed
     return None

@@ -50,13 +50,13 @@ def _is_place(value: object) -> bool:
 
 
 def _is_text(value: object) -> bool:
-    """Whether a value is text without anything that a terminal would obey."""
+    """Whether a value is text without characters that a terminal would obey."""
     return isinstance(value, str) and value.isprintable()
 
 
 def _named(kind: Callable[[object], bool]) -> Callable[[object], bool]:
-    """A test for a table of values of a kind."""
-    return lambda value: isinstance(value, dict) and all(_is_text(name) and kind(each) for name, each in value.items())
+    """Test of a table whose values are of a kind."""
+    return lambda value: isinstance(value, dict) and all(_is_text(name) and kind(item) for name, item in value.items())
 
 
 KINDS: dict[str, Callable[[object], bool]] = {
@@ -143,41 +143,41 @@ class Store:
     def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
         self._file.close()
 
-    def begin(self, key: str, told: Mapping[str, object]) -> None:
-        """Enter a study, if it is not there yet; told: what its key is made of, for whoever reads the file."""
+    def begin(self, key: str, description: Mapping[str, object]) -> None:
+        """Enter a study, unless it is there; description: the content of its key, for readers of the file."""
         with self._told(), self._transaction():
-            self._file.execute("INSERT OR IGNORE INTO study VALUES (?, ?)", (key, json.dumps(told)))
+            self._file.execute("INSERT OR IGNORE INTO study VALUES (?, ?)", (key, json.dumps(description)))
 
     def studies(self) -> dict[str, dict[str, Any]]:
-        """Return what is said of each study that is there, by key. Raises BadInput for one that was damaged."""
+        """Descriptions of all studies by key. Raises BadInput for a damaged one."""
         with self._told():
-            found = self._file.execute("SELECT key, told FROM study ORDER BY rowid").fetchall()
-        read = {key: _read_told(told) for key, told in found}
+            records = self._file.execute("SELECT key, told FROM study ORDER BY rowid").fetchall()
+        read = {key: _read_told(description) for key, description in records}
         if not all(read.values()):
             raise BadInput("what it says of a study is damaged", file=str(self.path), key="store", remedy=_OTHER)
         return read
 
     def rows(self, key: str) -> list[Row]:
-        """Rows of a study that are there. Raises BadInput for one that was damaged."""
+        """Rows of a study. Raises BadInput for a damaged one."""
         with self._told():
             query = f"SELECT {', '.join(COLUMNS)}, checksum FROM row WHERE study = ? ORDER BY point"
-            found = self._file.execute(query, (key,)).fetchall()
-        return [self._row(key, cells) for cells in found]
+            records = self._file.execute(query, (key,)).fetchall()
+        return [self._row(key, cells) for cells in records]
 
     def _row(self, key: str, cells: Sequence[object]) -> Row:
-        """Row of a study that cells hold. Raises BadInput where they are not as they were written."""
-        *own, checksum = cells
-        known: dict[str, Any] = {}
-        if checksum == _checksum(key, own):
+        """Row of a study from its cells. Raises BadInput where they are not as they were written."""
+        *values, checksum = cells
+        record: dict[str, Any] = {}
+        if checksum == _checksum(key, values):
             with contextlib.suppress(ValueError, RecursionError):
-                known = {name: _read(cell) for name, cell in zip(COLUMNS, own, strict=True)}
-        if not known or not all(holds(known[name]) for name, holds in KINDS.items()):
-            problem = f"the row of point {shown(own[0])} is damaged: it is not as it was written"
+                record = {name: _read(cell) for name, cell in zip(COLUMNS, values, strict=True)}
+        if not record or not all(holds(record[name]) for name, holds in KINDS.items()):
+            problem = f"the row of point {shown(values[0])} is damaged: it is not as it was written"
             remedy = (
-                f"{_OTHER}, or take the row out (DELETE FROM row WHERE point = {shown(own[0])}): it is solved again"
+                f"{_OTHER}, or take the row out (DELETE FROM row WHERE point = {shown(values[0])}): it is solved again"
             )
             raise BadInput(problem, file=str(self.path), key="store", remedy=remedy)
-        return Row.from_dict(known)
+        return Row.from_dict(record)
 
     def add(self, key: str, row: Row) -> None:
         """Write a finished row; it is there for good when this returns."""
@@ -187,16 +187,16 @@ class Store:
             self._file.execute(f"INSERT INTO row VALUES ({marks})", (key, *values, _checksum(key, values)))
 
 
-def _read_told(told: object) -> dict[str, Any]:
-    """Return what a store says of a study; {} where it is not as it was written."""
+def _read_told(text: object) -> dict[str, Any]:
+    """Description of a study; {} where it is not as it was written."""
     with contextlib.suppress(ValueError, RecursionError):
-        found = json.loads(told) if isinstance(told, str) else {}
-        return found if isinstance(found, dict) else {}
+        content = json.loads(text) if isinstance(text, str) else {}
+        return content if isinstance(content, dict) else {}
     return {}
 
 
 def _checksum(key: str, cells: Sequence[object]) -> str:
-    """64 hex digits of what a row of a study holds, cell by cell."""
+    """Checksum of a row of a study, cell by cell, 64 hex digits."""
     return hashlib.sha256(repr((key, *cells)).encode(errors="surrogatepass")).hexdigest()
 
 
