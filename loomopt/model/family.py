@@ -27,7 +27,7 @@ from loomopt.physics.schema import Values
 from loomopt.scenes.family import member_name, sum_name
 
 Combine = Literal["worst", "sum"]
-"""What of the members' figures is sought the least of."""
+"""Combination of the members' figures that is minimised."""
 
 
 def of_member(name: str, member: int) -> Alias:
@@ -46,7 +46,7 @@ class Scenario(NamedTuple):
     switches: Mapping[str, str]
 
     def given(self, maths: Maths, values: Values) -> Given:
-        """Its numbers and those that follow from them, SI; values: of the whole."""
+        """Numbers of the member and those that follow from them, SI; values: of the whole."""
         return self.model.given(maths, {key: values[name] for key, name in self.values.items() if name in values})
 
     def node(self, node: Node) -> Node:
@@ -64,7 +64,7 @@ def members_of(given: Given) -> tuple[Given, ...]:
 
 @dataclass(frozen=True, eq=False)
 class FamilyKinematics:
-    """The motions of all members; events: of which (member, name) each event of the whole is."""
+    """The motions of all members; events: the member and the name of each event of the whole."""
 
     scenarios: tuple[Scenario, ...]
     structure: Hashable
@@ -141,7 +141,7 @@ def _parting(scenario: Scenario, member: int, place: int, maths: Maths, given: G
 
 
 class Roots:
-    """Which numbers of a model its values follow from; known: their names. None where a formula cannot be recorded."""
+    """Numbers of a model that its values follow from; known: their names. None where a formula cannot be recorded."""
 
     def __init__(self, model: JobModel, known: Collection[str]) -> None:
         self.model, self.tape = model, Tape()
@@ -151,12 +151,12 @@ class Roots:
 
     @lazy
     def given(self) -> Given:
-        """The numbers, not known yet. Raises what a formula raises that cannot be recorded."""
+        """Inputs for the numbers. Raises what a formula raises that cannot be recorded."""
         return self.model.given(self.maths, self.inputs)
 
     @lazy
     def switches(self) -> dict[str, Number]:
-        """What a node tells beside its angle, not known yet."""
+        """Inputs for the numbers of a node beside its angle."""
         return {name: self.tape.input() for name in (*self.model.switches, DATUM)}
 
     def of(self, name: str) -> frozenset[str]:
@@ -197,29 +197,29 @@ class Roots:
 
 @dataclass(frozen=True)
 class WorstOf(Objective):
-    """The least of the worst of what members seek; of: theirs."""
+    """The least of the worst value over members; of: the members' objectives."""
 
     _: KW_ONLY
     of: tuple[Objective, ...]
 
     @property
     def rows(self) -> tuple[str, ...]:
-        """All rows and quantities that they read."""
+        """All rows and quantities of the members' objectives."""
         return tuple(row for objective in self.of for row in objective.rows)
 
     @property
     def sides(self) -> tuple[tuple[str, float], ...]:
-        """Their rows, with their signs."""
+        """Rows of the members' objectives, with their signs."""
         return tuple(side for objective in self.of for side in objective.sides)
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Their quantities."""
+        """Quantities of the members' objectives."""
         return tuple(name for objective in self.of for name in objective.quantities)
 
     @property
     def sought(self) -> Sought:
-        """Which end of the figure each of them seeks."""
+        """End of the figure that the members' objectives seek."""
         return self.of[0].sought
 
     def worsening(self, now: float, then: float, most: bool) -> float:
@@ -227,11 +227,11 @@ class WorstOf(Objective):
         return self.of[0].worsening(now, then, most)
 
     def pieces(self, sampler: Sampler) -> list[Piece]:
-        """Smooth functions of all of them."""
+        """Smooth functions of the members' objectives."""
         return [piece for objective in self.of for piece in objective.pieces(sampler)]
 
     def limits(self, name: str, most: float) -> list[Limit]:
-        """Limits that keep every one of them at `most`, SI."""
+        """Limits that keep every objective of the members at `most`, SI."""
         return [limit for objective in self.of for limit in objective.limits(name, most)]
 
 
@@ -255,11 +255,11 @@ class MemberShare(NamedTuple):
     limits: Mapping[str, str]
 
     def own(self, x: Numbers) -> dict[str, float]:
-        """Its variables, SI, from those of the whole."""
+        """Variables of the member, SI, from those of the whole."""
         return {name: x[whole] for name, whole in self.names.items()}
 
     def sampler(self, x: Numbers) -> Sampler:
-        """Its design, SI, from the variables of the whole."""
+        """Design of the member, SI, from the variables of the whole."""
         return sampled(self.program.model, {**self.program.parameters, **self.own(x)})
 
 

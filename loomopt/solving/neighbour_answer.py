@@ -1,4 +1,4 @@
-"""A scene's target beside answers of its neighbours: how it begins, what is told of it, what the next begins from."""
+"""A scene's target between answers of its neighbours: its task, its answer, and the optimum for the next one."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -41,9 +41,9 @@ def told_peaks(scene: Scene, job: Job, program: Program) -> tuple[str, ...]:
     model = program.model
     if job.model(scene) is not model:
         return ()
-    known = {*program.parameters, *(v.name for v in program.variables)}
-    others = {name for check in model.checks if not known.issuperset(check.reads) for name in check.over_cycle}
-    return tuple(name for name in job.peaks(model).values() if model.has_quantity(name) and name not in others)
+    numbers = {*program.parameters, *(v.name for v in program.variables)}
+    checked = {name for check in model.checks if not numbers.issuperset(check.reads) for name in check.over_cycle}
+    return tuple(name for name in job.peaks(model).values() if model.has_quantity(name) and name not in checked)
 
 
 @working()

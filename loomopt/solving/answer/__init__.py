@@ -1,1 +1,1 @@
-"""What a solve says: plain data, and words."""
+"""Answers of solves: plain data, and their sentences."""

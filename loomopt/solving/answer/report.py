@@ -1,4 +1,4 @@
-"""From a search to what a person and a script read: what was reached, what stops it, what stands in the way."""
+"""From a search to the answer that people and scripts read: the design, the limits that stop it, and clashes."""
 
 import functools
 import math
@@ -205,7 +205,7 @@ def _excess(limit: Finding) -> float:
 Today = Callable[[], Evaluated]
 """Evaluates today's machine."""
 NOT_SOLVED = {"status": "Not_Assembled", "iterations": 0}
-"""What is said of the solver where no start assembles."""
+"""Solver's record where no start assembles."""
 
 
 def answer(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
@@ -230,9 +230,9 @@ def _with(scene: Scene, target: str, search: Search, best: Candidate) -> Solutio
     if search.tradeoff is None:
         return solution
     alternative = evaluation(scene, job, program, job.design(program, search.tradeoff.alternative))
-    beside = Beside(search.tradeoff.added.least.figure, search.tradeoff.share, search.tradeoff.chosen, alternative)
-    sentence = _little(Words(scene), beside, solution)
-    return replace(solution, beside=beside, sentences=explained(solution, sentence))
+    comparison = Beside(search.tradeoff.added.least.figure, search.tradeoff.share, search.tradeoff.chosen, alternative)
+    sentence = _little(Words(scene), comparison, solution)
+    return replace(solution, beside=comparison, sentences=explained(solution, sentence))
 
 
 def explained(answer: Solution, *more: str) -> Sentences:
@@ -341,8 +341,8 @@ def with_optimum(
 ) -> Solution:
     """Answer of a design that was reached: optimal if certified, else uncertified.
 
-    searched: how far the best was sought, as a sentence; substitute: whether it is a known design that no solve ended
-    in certified.
+    searched: extent of the search, as a sentence; substitute: whether it is a known design in which no certified solve
+    ended.
     """
     words = Words(scene)
     binding, together = prices(words, certificate), joint_prices(words, certificate)
@@ -377,11 +377,11 @@ def _headline(job: Job, scene: Scene, target: str, here: Evaluated, priced: Coll
     return family.said(scene, job, here, priced)
 
 
-def _little(words: Words, beside: Beside, answer: Solution) -> str:
+def _little(words: Words, comparison: Beside, answer: Solution) -> str:
     """Sentence on the small changes that another design of more or less added mass would bring."""
-    name = beside.added
+    name = comparison.added
     texts = []
-    for figure, change in beside.changes(answer).items():
+    for figure, change in comparison.changes(answer).items():
         alike = [
             abs(value or 0.0) for key, value in answer.figures.items() if answer.units[key] == answer.units[figure]
         ]
@@ -389,9 +389,9 @@ def _little(words: Words, beside: Beside, answer: Solution) -> str:
             text = words.shown(figure, change, 3)
             texts.append(f"{figure} {'' if text.startswith('-') else '+'}{text}")
     changes = ", ".join(texts) or "nothing that is sought changes"
-    amount = words.shown(name, beside.other.design[name])
-    little = f"{100 * beside.share:g} %"
-    if not beside.chosen:
+    amount = words.shown(name, comparison.other.design[name])
+    little = f"{100 * comparison.share:g} %"
+    if not comparison.chosen:
         return f"The {name} is worth less than {little} of each figure; {amount}: {changes}."
     none = answer.design[name] == 0.0
     head = f"No {name}, for it is worth less than" if none else f"As little {name} as may cost"

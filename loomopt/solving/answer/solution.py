@@ -1,4 +1,4 @@
-"""What a solve or an evaluation says: plain data, ready for JSON."""
+"""Data of a solve or an evaluation, ready for JSON."""
 
 import contextlib
 import math
@@ -66,7 +66,7 @@ class Proofs(Shown):
     proofs: tuple[Proof, ...]
     scene: Scene = field(compare=False)
     uncovered: tuple[str, ...] = ()
-    """What the proofs rest on and do not cover, each a sentence without its full stop."""
+    """Assumptions that the proofs do not cover, each a sentence without its full stop."""
 
     @property
     def passed(self) -> bool:
@@ -108,7 +108,7 @@ class Finding(NamedTuple):
     """One limit beside its figure, SI; min or max is None where the limit has no such side.
 
     rounding: of one that is exceeded, whether by less than the rounding of the digits in which the design was given.
-    backed_off: by how much a nominal design was asked to keep clear of it, SI.
+    backed_off: required distance of a nominal design from it, SI.
     """
 
     name: str
@@ -186,7 +186,7 @@ def named(names: Sequence[str]) -> str:
 
 
 class Relaxation(NamedTuple):
-    """How far a limit must be loosened to make a design possible, SI.
+    """Amount by which a limit must be loosened to make a design possible, SI.
 
     alone: this one limit suffices; in_proportion: it gives way by no more than a designer may think of.
     """
@@ -221,7 +221,7 @@ class Clash:
 
 
 class Terms(Protocol):
-    """What a design is judged by where that is not a target alone, such as the limits on the axes of a front."""
+    """Judgement of a design beyond a target alone, such as by the limits on the axes of a front."""
 
     @property
     def said(self) -> str:
@@ -249,17 +249,17 @@ class Evaluated:
     units: Mapping[str, str]
     limits: tuple[Finding, ...]
     reached: Mapping[str, bool] = field(default_factory=dict, kw_only=True)
-    """Of each figure of which the target asks what may be out of reach, whether the design reaches it."""
+    """Whether the design reaches each goal of the target, by figure."""
     undefined: Mapping[str, str] = field(default_factory=dict, kw_only=True)
     """Why figures of effects that are on have no value, each a sentence without its full stop."""
     scene: "Scene | None" = field(default=None, kw_only=True, repr=False, compare=False)
-    """What it holds in: the scene as it was asked for, with all that was set, put on and taken off."""
+    """The scene of the request, with all numbers set, and effects switched on and off."""
     terms: Terms | None = field(default=None, kw_only=True, repr=False, compare=False)
-    """What it is judged by; None for its target alone."""
+    """Terms of its judgement; None for its target alone."""
     members: tuple["Evaluated", ...] = field(default=(), kw_only=True, repr=False)
-    """Of a family each machine by itself."""
+    """Machines of a family, each by itself."""
     change: Mapping[str, Any] = field(default_factory=dict, kw_only=True, repr=False)
-    """Of a member of a family what it changes of the scene: dotted key → its value."""
+    """Changes of the scene by a member of a family: dotted key → value."""
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
@@ -323,7 +323,7 @@ def _member_dict(member: Evaluated, whole: Scene | None) -> dict[str, Any]:
 class Beside(NamedTuple):
     """Another design, with more or less added mass, beside which an answer makes little difference.
 
-    added: what differs; share: of each figure, what counts as little; chosen: whether the answer is the one with less.
+    added: name of the mass; share: of each figure that counts as little; chosen: whether the answer has less of it.
     """
 
     added: str
@@ -354,7 +354,7 @@ class Worse(NamedTuple):
 
     @property
     def share(self) -> float | None:
-        """Its change as a share of today's; None where today has none of it."""
+        """Change as a share of today's value; None where that is zero."""
         return (self.design - self.today) / abs(self.today) if self.today else None
 
     def as_dict(self) -> dict[str, Any]:
@@ -370,10 +370,10 @@ class Yield(NamedTuple):
 
 
 class Robust(NamedTuple):
-    """How limits were backed off, so that machines hold them as they are made.
+    """Back-off of limits, so that machines hold them as they are made.
 
-    sigmas: standard deviations of its own figure by which each keeps clear; asked: the yield that was asked for, if
-    any; linear: standard deviations that the joint normal distribution asks for then, from which sampling set out;
+    sigmas: standard deviations of its own figure by which each keeps clear; asked: the requested yield, if any;
+    linear: standard deviations for it by the joint normal distribution, with which sampling begins;
     yields: share of machines that hold, by limit and of "all"; nominal, nominal_yields: the optimum without back-off,
     and its machines; kept: equalities and goals, which nothing backs off; corners: figures that bend at the design, of
     whose two slopes in each number the steeper was taken; passes: solves until standard deviations were those of the
@@ -419,7 +419,7 @@ class Robust(NamedTuple):
 
 
 class Rounded(NamedTuple):
-    """How numbers were put to sizes that can be ordered.
+    """Rounding of numbers to sizes that can be ordered.
 
     sizes: least and largest of each number's sizes, SI, and how many; points: of the lattice; admissible: those that
     keep every limit, reaching: those of them that reach the goals, where all were looked at; boxes: solves of a branch
@@ -501,7 +501,7 @@ class Solution(Evaluated):
     target: str = ""
     status: str = "failed"
     sentences: Sentences = NO_SENTENCES
-    """What it says, part by part: `message` joins them."""
+    """Sentences, part by part: `message` joins them."""
     binding: tuple[Price, ...] = ()
     bind_together: tuple[JointPrice, ...] = ()
     """Limits that are worth more together than each alone."""
@@ -512,23 +512,23 @@ class Solution(Evaluated):
     solver: Mapping[str, Any] = field(default_factory=dict)
     time: Mapping[str, float] = field(default_factory=dict)
     optima: tuple[tuple[Mapping[str, float | None], int], ...] = ()
-    """Figures of the distinct optima the starts ended in, best first, and how many starts did."""
+    """Figures of the distinct optima, best first, with the number of starts that ended in each."""
     proofs: "Proofs | None" = None
-    """What was proven at every crank angle, where that was asked for."""
+    """Proofs at every crank angle, if requested."""
     global_bound: GlobalBound | None = None
-    """What is proven of all admissible designs, where that was asked for."""
+    """Bound on all admissible designs, if requested."""
     asked: str | None = None
     """The target as the call named it; None where it is the default."""
     beside: Beside | None = None
     """The design with, or without, what makes little difference."""
     robust: Robust | None = None
-    """How limits were backed off, where that was asked for."""
+    """Back-off of the limits, if requested."""
     rounded: Rounded | None = None
-    """How numbers were put to sizes, where that was asked for."""
+    """Rounding of numbers to sizes, if requested."""
     evaluate_today: Callable[[], Evaluated] | None = None
     """Evaluates today's machine."""
     point: Any = field(default=None, repr=False)
-    """Where the solver stood: what a neighbour's solve can start from."""
+    """Point of the solver, from which a neighbour's solve can start."""
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
@@ -588,7 +588,7 @@ class Solution(Evaluated):
 
     @property
     def sought(self) -> str:
-        """What it answers: its target, or what its terms say."""
+        """Its target, or the objectives of its terms."""
         return self.terms.said if self.terms else self.target
 
     def as_dict(self, target: str = "") -> dict[str, Any]:
@@ -704,7 +704,7 @@ class Words:
 
     @lazy
     def aliases(self) -> Mapping[str, str]:
-        """What is one member's of a family, where the scene has one, and what a member calls it."""
+        """Names of one member's numbers, if the scene is a family's, with the names that the member uses."""
         if FAMILY not in self.scene.schema.targets:
             return {}
         from loomopt.scenes import family
@@ -811,7 +811,7 @@ class Words:
         return JointPrice(tuple(names), sides, {figure: worth}, {figure: unit}, tuple(alone), f"{reading}; {rest}")
 
     def relaxation(self, limit: Limit, need: float, alone: bool) -> Relaxation:
-        """How far a limit must give way, SI and as a phrase."""
+        """Least relaxation of a limit, SI and as a phrase."""
         side = limit.sign or (1 if need > 0 else -1)
         needed = limit.value + side * abs(need)
         if abs(needed) <= SHOWN_AS_ZERO * max(abs(limit.value), abs(need)):

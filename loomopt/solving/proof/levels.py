@@ -35,7 +35,7 @@ LOOKED_AT = 16
 
 @dataclass(frozen=True)
 class LevelOutcome:
-    """What is shown of all levels so far; why: why not more; better: a better design, if one turned up.
+    """Result of the levels so far; why: reason why no more is shown; better: a better design, if one turned up.
 
     lowest: the middle of an open box that could be the best; both the program's variables, SI.
     """

@@ -48,7 +48,7 @@ class Spots:
 
     @property
     def count(self) -> int:
-        """How many nodes each box has."""
+        """Number of nodes of each box."""
         return len(self.sign)
 
     def angle(self, corners: Sequence[Number]) -> Number:
@@ -288,17 +288,17 @@ class Reader:
         middles, boxes = low + (high - low) / 2, low.shape[1]
         rows, names = len(self.of), len(self.task.names)
         value, middle = (_unknown((rows, boxes)) for _ in range(2))
-        slope, done = _unknown((names, rows, boxes)), 0
+        slope, boxes_read = _unknown((names, rows, boxes)), 0
         for layout, places in layouts(self.task, middles, self._known):
             count = strips((high[:, places] - low[:, places]) / self.task.sizes[:, None])
             for first in range(0, len(places), AT_ONCE):
-                if done and time.perf_counter() >= until:
+                if boxes_read and time.perf_counter() >= until:
                     raise LateError
                 here = places[first : first + AT_ONCE]
                 parts = self._alike(layout, low[:, here], high[:, here], middles[:, here], count)
                 for whole, part in zip((value, middle, slope), parts, strict=True):
                     whole.low[..., here], whole.high[..., here] = part.low, part.high
-                done += len(here)
+                boxes_read += len(here)
         return Read(value, middle, slope, self.of)
 
     def _alike(

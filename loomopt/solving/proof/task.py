@@ -1,4 +1,4 @@
-"""A program as branch and bound sees it: rows in intervals, variables with finite ends, what stands for others."""
+"""A program for branch and bound: rows in intervals, variables with finite ends, and variables that follow."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -125,15 +125,15 @@ class Scale:
 
     @property
     def most(self) -> float:
-        """How many times larger than itself a design may be taken."""
+        """Largest factor by which a design may be enlarged."""
         low, high = self.bounds[self.still]
         return float(np.nextafter(high / low, math.inf))
 
     @property
     def ends(self) -> dict[str, tuple[float, float]]:
-        """The other lengths' ends where the one stands, SI."""
-        others = {name: ends for name, ends in self.bounds.items() if name != self.still}
-        return {name: (low, float(np.nextafter(high * self.most, math.inf))) for name, (low, high) in others.items()}
+        """Ends of the other lengths for the fixed one, SI."""
+        bounds = {name: ends for name, ends in self.bounds.items() if name != self.still}
+        return {name: (low, float(np.nextafter(high * self.most, math.inf))) for name, (low, high) in bounds.items()}
 
     @property
     def pairs(self) -> list[tuple[str, str, float]]:
@@ -161,7 +161,7 @@ class Scale:
 
 @dataclass(frozen=True)
 class BoxTask:
-    """What is searched for a better design.
+    """Variables and rows of the search for a better design.
 
     names: of the variables, in order; low, high: their ends, (names,), SI; fixed: numbers all designs share, of
     variables that only loosen limits all that they may be; scale: a common scale that is left out, if there is one.

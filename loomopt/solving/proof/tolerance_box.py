@@ -1,4 +1,4 @@
-"""What figures of all machines in one box of numbers are at most: claims proven by branch and bound.
+"""Largest values of figures of all machines in a box of numbers: claims proven by branch and bound.
 
 A claim is that a function is no more than a bound all over the box. Of a whole-cycle quantity the crank angle is one
 more variable: on a part of the cycle f(c + h) ≤ f(c) + f'(c) h + k h², each term enclosed over the box [as
@@ -45,7 +45,7 @@ Ends = Mapping[str, tuple[float, float]]
 
 
 class Bounds(NamedTuple):
-    """What a function is over parts of a box: at most `most`, in their middles at least `here`, (parts,).
+    """Bounds of a function over parts of a box: at most `most`, in their middles at least `here`, (parts,).
 
     least_slope, most_slope, moves: what its slopes are, and how much each variable moves it, (variables, parts).
     """
@@ -136,7 +136,7 @@ class NumberBox:
 
 
 class Function(abc.ABC):
-    """What a claim is of: its variables are those of the parts that it is asked of."""
+    """Subject of a claim: a function of the variables of the parts."""
 
     box: NumberBox
 
@@ -372,7 +372,7 @@ def _risen(slope: Interval, bend: Interval, half: Floats) -> Interval:
 
 
 class Outcome(NamedTuple):
-    """What became of a claim: proven, or not; parts: how many were read.
+    """Outcome of a claim: proven, or not; parts: number of parts that were read.
 
     open: the middle of a part left open, or a machine that breaks the claim, SI.
     """

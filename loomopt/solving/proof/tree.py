@@ -92,7 +92,7 @@ ROOM = 1e-14
 
 @dataclass
 class Tree:
-    """How far a search has come.
+    """State of a search.
 
     low, high: (names, boxes) of open boxes; least: what the objective is at least in each, natural size; boxes: how
     many were read; stuck: the least of those that are too small to halve.
@@ -135,8 +135,8 @@ class Tree:
         """Take out the boxes with the least bounds."""
         count = self.low.shape[1]
         order = np.argpartition(self.least, BATCH) if count > BATCH else np.arange(count)
-        taken, rest = order[:BATCH], order[BATCH:]
-        boxes = self.low[:, taken], self.high[:, taken], self.least[taken]
+        first, rest = order[:BATCH], order[BATCH:]
+        boxes = self.low[:, first], self.high[:, first], self.least[first]
         self.low, self.high, self.least = self.low[:, rest], self.high[:, rest], self.least[rest]
         self.boxes += boxes[0].shape[1]
         return boxes
@@ -233,17 +233,17 @@ def _narrowed(read: Read, bounds: Floats, low: Floats, high: Floats, half: Float
     """Boxes without the parts that a single row forbids: middle + slopes · step ≤ bound, one step at a time."""
     middle, falls = low + (high - low) / 2, _falls(read, half)
     zero = np.zeros_like(falls[:1])
-    others = np.concatenate([zero, np.cumsum(falls[:-1], axis=0)]) + np.concatenate(
+    fall = np.concatenate([zero, np.cumsum(falls[:-1], axis=0)]) + np.concatenate(
         [np.cumsum(falls[:0:-1], axis=0)[::-1], zero]
     )
     with np.errstate(all="ignore"):
-        left = bounds[:, None] - read.middle.low
-        rest = left - others
-        rest = np.nextafter(rest + ROOM * (np.abs(left) + np.abs(others) + np.abs(bounds[:, None])), math.inf)
+        room = bounds[:, None] - read.middle.low
+        slack = room - fall
+        slack = np.nextafter(slack + ROOM * (np.abs(room) + np.abs(fall) + np.abs(bounds[:, None])), math.inf)
         first, last = read.slope.low, read.slope.high
         # A row that rises with a variable bounds it from above, by its least slope where there is room left.
-        most = np.where(first > 0, np.where(rest >= 0, rest / first, rest / last), math.inf)
-        least = np.where(last < 0, np.where(rest >= 0, rest / last, rest / first), -math.inf)
+        most = np.where(first > 0, np.where(slack >= 0, slack / first, slack / last), math.inf)
+        least = np.where(last < 0, np.where(slack >= 0, slack / last, slack / first), -math.inf)
         most, least = np.where(np.isnan(most), math.inf, most), np.where(np.isnan(least), -math.inf, least)
         up = (interval(middle) + np.nextafter(most, math.inf).min(axis=1)).high
         down = (interval(middle) + np.nextafter(least, -math.inf).max(axis=1)).low

@@ -125,11 +125,11 @@ def _readings(
     """Design read by the target's program, and by the job as a whole."""
     # What has no room in the program stands where the program holds it: limits may ask for more than the scene's own.
     known = {name: value for name, value in job.numbers(scene).items() if name not in program.fixed}
-    chosen = {scene.full(name): value for name, value in design.items()}
+    design_numbers = {scene.full(name): value for name, value in design.items()}
     # What the target's program does not choose is the design's own too, and today's where it names nothing.
-    parameters = {n: chosen.get(n, value) for n, value in program.parameters.items()}
+    parameters = {n: design_numbers.get(n, value) for n, value in program.parameters.items()}
     design_program = replace(program, parameters=parameters)
-    values = {**parameters, **job.values(design_program, {**known, **chosen})}
+    values = {**parameters, **job.values(design_program, {**known, **design_numbers})}
     samplers = Sampler(program.model, values), job.sampler(scene, design)
     target_read, whole = (_Read(sampler, Boxes(sampler), slack) for sampler in samplers)
     return target_read, whole

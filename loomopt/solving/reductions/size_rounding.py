@@ -1,4 +1,4 @@
-"""Rounding: the best design whose numbers are sizes that can be ordered, what else is free chosen anew and certified.
+"""Rounding: the best design whose numbers are sizes that can be ordered; the other free numbers are optimised again.
 
 The whole lattice is read at once where it is small enough and at most one number is left to choose, which the first
 level then makes zero; else branch and bound over boxes of sizes, each solved without them.
@@ -445,8 +445,8 @@ def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) 
     scene, words = lattice.scene, Words(lattice.scene)
     ends = {name: (grid[0], grid[-1], len(grid)) for name, grid in lattice.sizes.items()}
     rounded = Rounded(ends, lattice.points, best.admissible, best.reaching, best.boxes, best.gap, nominal, best.rests)
-    chosen = ", ".join(f"{name} {words.shown(name, value)}" for name, value in (best.point or {}).items())
-    texts = [f"Sizes: {chosen}.", report.cost_sentence("They cost", answer, nominal, words, AGREES)]
+    size_text = ", ".join(f"{name} {words.shown(name, value)}" for name, value in (best.point or {}).items())
+    texts = [f"Sizes: {size_text}.", report.cost_sentence("They cost", answer, nominal, words, AGREES)]
     if best.boxes and best.gap:
         texts.append(f"Others on the lattice of {lattice.points} points may be better by {best.gap:.2g} natural sizes")
         texts[-1] += f": {best.boxes} boxes were solved."

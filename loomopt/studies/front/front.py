@@ -26,7 +26,7 @@ FEWEST = 3
 ENDS = "LO:HI UNIT as text, or both ends as numbers in SI"
 """How a range is given."""
 SOUGHT: Mapping[Sense, str] = {"least": "min", "most": "max"}
-"""Which end of an axis is sought → the side of a limit that stands in its way."""
+"""End of an axis to reach → side of a limit that stands in its way."""
 NONE = "none"
 """What is given in place of a target, where the scene's limits alone hold."""
 Ranges = Mapping[str, tuple[float, float]]
@@ -60,9 +60,9 @@ def trade(
     points: int | None = None,
     accuracy: float = ACCURACY,
 ) -> Trade:
-    """Front of two axes as a plan, the first one sought, the second one what it costs.
+    """Plan of the front of two axes: the first one is optimised, the second one limited.
 
-    target: whose demands hold, None for none; maximise, minimise: axes of which the most, the least is sought; of any
+    target: whose demands hold, None for none; maximise, minimise: axes of which the most, the least is wanted; of any
     other the end that it offers alone or first, or the least. ranges: axis → from, to, SI: of a number that the scene
     does not bound they bound it. A number that the scene holds is freed as an axis. Raises BadInput.
     """
@@ -134,7 +134,7 @@ def _lifted(scene: Scene, senses: Mapping[str, Sense]) -> tuple[Scene, tuple[str
 
 
 def _sense(scene: Scene, name: str, minimise: Sequence[str], maximise: Sequence[str]) -> Sense:
-    """End of an axis that is sought."""
+    """End of an axis that the front seeks."""
     if name in maximise:
         return "most"
     axis = scene.schema.axes.get(name)

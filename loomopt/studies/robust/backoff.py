@@ -1,4 +1,4 @@
-"""Back-off: an optimum whose limits are tightened by so many standard deviations of their own figures.
+"""Back-off: an optimum whose limits are tightened by a multiple of the standard deviations of their own figures.
 
 The standard deviations are those of the optimum that they lead to: a fixed point. What it buys is sampled: machines as
 they are made, judged by the limits as they stand.
@@ -35,7 +35,7 @@ PASSES, CONVERGED = 40, 1e-10
 SEARCHES = 3
 """Times that a search from scratch may lead to another optimum, with standard deviations of its own."""
 MOST_SIGMAS = 12.0
-"""Standard deviations that may be asked for; nothing is lost beyond 8."""
+"""Largest allowed number of standard deviations; nothing is lost beyond 8."""
 TRIALS, MOST_BESIDE = 12, 0.5
 """Sampled yields that are looked at on the way to one that is asked for, and how far beyond it one may be, in standard
 errors."""
@@ -235,7 +235,7 @@ def tightened(here: Pass) -> dict[tuple[str, int], float]:
 
 
 class Trials(NamedTuple):
-    """What back-offs have given.
+    """Results of the back-offs so far.
 
     low, high: standard deviations and sampled yield of the largest back-off that gives too little, and of the least
     that gives enough; enough: its pass. best: the pass of the most machines, with their share. edge: the standard
@@ -252,14 +252,14 @@ class Trials(NamedTuple):
 
 
 class Obstacle(NamedTuple):
-    """Why there is no design with a back-off, and the limits that have no room for it."""
+    """Reason why there is no design with a back-off, and the limits that have no room for it."""
 
     why: str
     limits: tuple[str, ...] = ()
 
 
 def _search_yield(request: Request, start: Pass, before: Mapping[str, Yield]) -> Pass | Solution:
-    """Back-off whose sampled yield is no less than asked for, and hardly more.
+    """Back-off whose sampled yield is no less than the requested one, and hardly more.
 
     Limits that have no room for so much are backed off as far as they can be, and the others farther. Where all that is
     too little, the answer says the most that was found, and what stands in the way of more.
@@ -448,7 +448,7 @@ def _from(robust: Robust) -> str:
 
 
 def _backed(here: Pass) -> str:
-    """How far limits are backed off, as a phrase."""
+    """Phrase of the back-off of limits."""
     less = [f"{name} by {sigmas:.6g} sigma" for name, sigmas in here.caps.items() if sigmas < here.sigmas]
     return f"each limit backed off by {here.sigmas:.6g} sigma of its own figure{''.join(f', {text}' for text in less)}"
 

@@ -1,4 +1,4 @@
-"""What a design's limits leave to its machines: each side's room in standard deviations of its own figure, linear."""
+"""Margins of a design's limits: each side's room in standard deviations of its own figure, linear."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -42,11 +42,11 @@ class Margin(NamedTuple):
         return float(np.linalg.norm(self.way))
 
     def reach(self, sigmas: float, caps: Mapping[str, float]) -> float:
-        """How far the mean machine must keep clear, SI; caps: the most sigmas that a limit has room for."""
+        """Required distance of the mean machine, SI; caps: the most sigmas that a limit has room for."""
         return min(sigmas, caps.get(self.name, math.inf)) * self.sigma
 
     def back_off(self, sigmas: float, caps: Mapping[str, float]) -> float:
-        """How far the nominal design must keep clear, SI: of so many sigmas from the mean, and never beyond its end."""
+        """Required distance of the nominal design, SI: a multiple of sigma from the mean, and never beyond its end."""
         return max(self.reach(sigmas, caps) + self.shift, 0.0)
 
     @property
@@ -69,8 +69,8 @@ def margins(plan: Plan) -> tuple[Margin, ...]:
             if end is not None and math.isfinite(end):
                 way = _way(plan, criterion, by_criterion[criterion.name], side)
                 fixed = criterion.name in bands
-                left = _left(plan, criterion, by_criterion[criterion.name], side)
-                shift = sign * math.fsum(left[name] * plan.shifts[name] for name in plan.tolerances)
+                slope = _left(plan, criterion, by_criterion[criterion.name], side)
+                shift = sign * math.fsum(slope[name] * plan.shifts[name] for name in plan.tolerances)
                 room = sign * (end - value) - shift
                 sides.append(Margin(criterion.name, sign, room, way, fixed, by_criterion[criterion.name].corner, shift))
     return tuple(sides)
@@ -78,14 +78,14 @@ def margins(plan: Plan) -> tuple[Margin, ...]:
 
 def _way(plan: Plan, criterion: Criterion, slope: Slopes, side: str) -> Floats:
     """Change of a side's room by one standard deviation of each independent number, (numbers,), SI."""
-    left = _left(plan, criterion, slope, side)
+    slopes = _left(plan, criterion, slope, side)
     groups = sorted({tolerance.group for tolerance in plan.tolerances.values() if tolerance.group})
     way = np.zeros(len(plan.tolerances) + len(groups))
     for k, (name, made) in enumerate(plan.tolerances.items()):
-        moved = left[name] * plan.sigmas[name]
-        way[k] = math.sqrt(1 - made.correlation) * moved
+        effect = slopes[name] * plan.sigmas[name]
+        way[k] = math.sqrt(1 - made.correlation) * effect
         if made.group:
-            way[len(plan.tolerances) + groups.index(made.group)] += math.sqrt(made.correlation) * moved
+            way[len(plan.tolerances) + groups.index(made.group)] += math.sqrt(made.correlation) * effect
     return way
 
 
@@ -119,7 +119,7 @@ def share(
 
 
 def _room(margin: Margin, back_off: float, applied: float) -> float:
-    """What a side leaves to the mean machine with another back-off, SI; one that stopped the design goes along."""
+    """Room of a side for the mean machine with another back-off, SI; a side that stopped the design moves with it."""
     is_active = margin.room + margin.shift <= applied * (1 + MET) + MET * margin.sigma
     return back_off - margin.shift if is_active else max(margin.room, back_off - margin.shift)
 

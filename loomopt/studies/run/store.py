@@ -101,17 +101,17 @@ class Store:
         """Make the tables in a new file, and check those of an old one."""
         head = tuple(self._file.execute(f"PRAGMA {name}").fetchone()[0] for name in ("application_id", "user_version"))
         query = "SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL"
-        made = dict(self._file.execute(query).fetchall())
-        if head == (0, 0) and not made:
+        stored = dict(self._file.execute(query).fetchall())
+        if head == (0, 0) and not stored:
             for table in TABLES.values():
                 self._file.execute(table)
             self._file.execute(f"PRAGMA application_id = {APPLICATION}")
             self._file.execute(f"PRAGMA user_version = {VERSION}")
         elif head != (APPLICATION, VERSION):
             raise BadInput("the file is no store of this version", file=str(self.path), key="store", remedy=_OTHER)
-        elif made != TABLES:  # a view or a trigger would be run whenever a row is read or written
-            others = sorted({*made, *TABLES} - {name for name, table in TABLES.items() if made.get(name) == table})
-            problem = f"it holds what no store holds: {', '.join(others)}"
+        elif stored != TABLES:  # a view or a trigger would be run whenever a row is read or written
+            names = sorted({*stored, *TABLES} - {name for name, table in TABLES.items() if stored.get(name) == table})
+            problem = f"it holds what no store holds: {', '.join(names)}"
             raise BadInput(problem, file=str(self.path), key="store", remedy=_OTHER)
 
     @contextlib.contextmanager
@@ -126,7 +126,7 @@ class Store:
 
     @contextlib.contextmanager
     def _told(self) -> Iterator[None]:
-        """Tell what SQLite says as one plain message."""
+        """Report SQLite's errors as plain messages."""
         try:
             yield
         except sqlite3.Error as error:
