@@ -146,7 +146,7 @@ class ByHand:
             said = solver(**arguments)
             took.append(time.perf_counter() - began)
             assert solver.stats()["return_status"] == "Solve_Succeeded", M0
-            scaled, extra = nlp.rows.parted(np.asarray(said["x"]).ravel())
+            scaled, extra = nlp.rows.split(np.asarray(said["x"]).ravel())
             x = {v.name: float(value) * v.scale for v, value in zip(program.variables, scaled, strict=True)}
             designs[M0] = plain_design(JOB.design(program, x)), extra[-1] * program.objectives[-1].scale
         return took, designs

@@ -32,6 +32,7 @@ def test_a_front_of_a_random_scene_is_certified(number):
 
 
 @pytest.mark.slow
+@pytest.mark.whole
 def test_fronts_of_random_scenes_end_certified_or_without_an_admissible_design():
     said, status = ended("--to", "21")
     (row,) = said["rows"]

@@ -132,13 +132,12 @@ def test_a_new_job_is_its_folders_its_scene_and_its_reference_rows(copy):
 
 COMMAND = '''"""The command that counts the effects of a scene."""
 
-from loomopt.interface.cli.options import Problem; from loomopt.interface.cli.options import Set
-from loomopt.interface.cli.shell import read_scene
+from loomopt.interface.cli.options import NO_CHANGES, Problem, SceneOptions
 
 
-def count(problem: Problem, sets: Set = None) -> None:
+def count(problem: Problem, changes: SceneOptions = NO_CHANGES) -> None:
     """Print how many effects are on."""
-    print(len(read_scene(problem, sets, None, None).effects))
+    print(len(changes.scene(problem).effects))
 '''
 FORMAT = '''"""Drawings as the number of their lines."""
 

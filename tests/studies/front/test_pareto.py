@@ -72,8 +72,8 @@ def test_killed_after_some_rows_and_resumed_by_two_processes_it_has_the_same_dig
     assert again.digest == serial.digest
     assert {row.point: row.seconds for row in kept}.items() <= {row.point: row.seconds for row in again.solved}.items()
     told = [json.loads(text) for text in stored(store)]
-    assert {data["study"] for data in told} == {"sweep 4", "pareto 6"}, "a sweep and a front share the file"
-    (own,) = (data for data in told if data["study"] == "pareto 6")
+    assert {data["study"] for data in told} == {"sweep 5", "pareto 7"}, "a sweep and a front share the file"
+    (own,) = (data for data in told if data["study"] == "pareto 7")
     assert made_again(own).key == serial.study.key
 
 
