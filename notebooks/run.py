@@ -64,6 +64,7 @@ def executed(path: Path) -> NotebookNode:
             timeout=LONGEST,
             kernel_name="python3",
             record_timing=False,
+            coalesce_streams=True,
             resources={"metadata": {"path": own}},
             extra_arguments=["--log-level=ERROR"],
         )
