@@ -231,13 +231,9 @@ class Sampler:
             sampler for sampler in self.session.latest(SAMPLERS) if isinstance(sampler, Sampler) and sampler is not self
         )
         for other in others:
-            if other._extremes and other._numbers <= self._numbers and self._holds(other):
+            if other._extremes and self._holds(other):
                 self._extremes = {**other._extremes, **self._extremes}
                 return
-
-    @lazy
-    def _numbers(self) -> frozenset[tuple[str, Number]]:
-        return frozenset(self.given.values.items())
 
     def _holds(self, other: "Sampler") -> bool:
         """Whether this sampler has all values of another sampler's design, and the same ones."""

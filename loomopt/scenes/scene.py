@@ -1,5 +1,6 @@
 """A scene: one loom job with its numbers, checked and in SI; every change of it is a new scene."""
 
+import functools
 import math
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -477,9 +478,20 @@ def _build_scene(
         active = dict(zip(last.active, last.effects.values(), strict=True))
     else:
         active = read.effects(top.at("effects"), schema)
-    available = read.effects(top.at("available"), schema)
-    read.check_needs(top, schema, tables, active)
-    known_places = list(read.places(schema, tables, active, available))
+
+    @functools.cache
+    def available() -> dict[Effect, Table]:
+        return read.effects(top.at("available"), schema)
+
+    if not stays("available"):
+        available()
+    same_keys = last is not None and _keys(tables) == _keys(last.tables)
+    if not (same_keys and stays("effects")):
+        read.check_needs(top, schema, tables, active)
+
+    def known_places() -> list[Place]:
+        return list(read.places(schema, tables, active, available()))
+
     targets = {name: target.own for name, target in schema.targets.items()}
     if isinstance(raw["targets"], Mapping):
         raw["targets"] = {**{name: {} for name in targets}, **raw["targets"]}
@@ -498,8 +510,8 @@ def _build_scene(
         effects={effect.name: table for effect, table in active.items()},
         active=tuple(active),
         bounds=last.bounds
-        if last and stays("bounds", "effects", "available") and _keys(tables) == _keys(last.tables)
-        else read.bounds(top.at("bounds"), schema, known_places),
+        if last and same_keys and stays("bounds", "effects", "available")
+        else read.bounds(top.at("bounds"), schema, known_places()),
         limits=last.limits if last and stays("limits", "effects") else read.limits(top.at("limits"), schema, active),
         targets=last.targets if last and stays("targets") else read.records(top.at("targets"), targets, "target"),
         paths=paths or Paths(),
@@ -508,12 +520,12 @@ def _build_scene(
     if raw["tolerances"] or raw["accept"]:
         from loomopt.scenes import tolerances
 
-        tolerances.read(top.at("tolerances"), schema, known_places)
+        tolerances.read(top.at("tolerances"), schema, known_places())
         tolerances.bands(top.at("accept"), schema)
     if raw["steps"] or raw["stock"]:
         from loomopt.scenes import sizes
 
-        sizes.read(top, schema, known_places)
+        sizes.read(top, schema, known_places())
     if _is_checkable(scene, faults):
         try:
             jobs.check(scene)

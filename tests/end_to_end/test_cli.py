@@ -116,7 +116,7 @@ def test_an_infeasible_target_exits_3_with_the_json_object_and_the_least_relaxat
 def test_an_answer_that_is_not_certified_exits_4_and_says_why(cli, monkeypatch):
     def failing(*arguments, **options):
         refused = dataclasses.replace(certify(*arguments, **options), passed=False, reasons=("the moon is wrong",))
-        return Draft(refused, lambda cycle: refused)
+        return Draft(lambda cycle: refused)
 
     monkeypatch.setattr(search, "draft_certificate", failing)
     data = answered(cli, "beatup", status=4)

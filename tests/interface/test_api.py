@@ -26,7 +26,7 @@ SCENE = lo.load("beatup-light")
 
 def failing(*arguments):
     refused = dataclasses.replace(certify(*arguments), passed=False, reasons=("the moon is wrong",))
-    return Draft(refused, lambda cycle: refused)
+    return Draft(lambda cycle: refused)
 
 
 @pytest.fixture(scope="module")

@@ -88,23 +88,23 @@ def certify_by(
 
 @dataclass(frozen=True)
 class Draft:
-    """A certificate without and with the check of the whole cycle; scan(): that check.
+    """A certificate without and with the check of the whole cycle.
 
-    partial: the certificate without the check; put(cycle): the certificate with the result of the check.
+    put(cycle): the certificate with the result of the check; scan(): the check, None where nothing can be checked.
     """
 
-    partial: Certificate
     put: Callable[[WholeCycle], Certificate]
     scan: Callable[[], WholeCycle] | None = None
 
     def with_rules(self, rules: tuple[str, ...]) -> "Draft":
         """The draft with the rules that chose among equally good designs."""
-        if not rules:
-            return self
         put = self.put
-        return Draft(
-            replace(self.partial, tie_breaks=rules), lambda cycle: replace(put(cycle), tie_breaks=rules), self.scan
-        )
+        return Draft(lambda cycle: replace(put(cycle), tie_breaks=rules), self.scan) if rules else self
+
+    @lazy
+    def partial(self) -> Certificate:
+        """The certificate without the check of the whole cycle."""
+        return self.put(WholeCycle(0.0, "proven"))
 
     @lazy
     def whole(self) -> Certificate:
@@ -127,7 +127,7 @@ def _draft(
         return draft_from(program, x, sampler, active, slopes, accuracy, shown)
     except NO_NUMBER as error:
         no_number = _no_number(error, derivatives.by, derivatives.last)
-        return Draft(no_number, lambda cycle: no_number)
+        return Draft(lambda cycle: no_number)
 
 
 def _no_number(error: Exception, by: str, clear: bool) -> Certificate:
@@ -172,7 +172,7 @@ def draft_from(
             scan_excess(sampler, rows, Settings(accuracy).check_count), peaks_verdict(sampler, rows, accuracy)
         )
 
-    return Draft(put(WholeCycle(0.0, "proven")), put, scan)
+    return Draft(put, scan)
 
 
 def certify_levels(local: Local) -> list[CertifiedLevel]:

@@ -37,7 +37,7 @@ def certified(monkeypatch):
         seen.append(x["x"])
         answer = answers.get(x["x"], answers.get("all", GOOD))
         judged = answer(len(seen)) if callable(answer) else answer
-        return Draft(judged, lambda cycle: judged)
+        return Draft(lambda cycle: judged)
 
     monkeypatch.setattr(searching, "draft_certificate", begun)
     return seen, answers
