@@ -598,15 +598,15 @@ class Job(abc.ABC):
         """Design a person reads, by full names, from the NLP's variables: these themselves."""
         return dict(x)
 
-    def figures(self, scene: Scene, design: Numbers, every: bool = False) -> Figures:
+    def figures(self, scene: Scene, design: Numbers) -> Figures:
         """Every figure of the job; None for one whose numbers the scene does not have.
 
-        Figures over the cycle that were not computed yet are computed when they are read; `every`: now.
+        Figures over the cycle are computed when they are read, where not all extremes are known already.
         """
         sampled = self.sampler(scene, design)
         late = self.over_cycle(sampled.model)
         known: Container[str] = EVERY
-        if not every:
+        if not all(sampled.knows(quantity) for quantity in late.values() if quantity):
             known = [*self.at_once, *(name for name, quantity in late.items() if sampled.knows(quantity))]
         figures = self.figures_of(scene, sampled, known)
 

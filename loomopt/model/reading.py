@@ -321,6 +321,22 @@ class BatchReading(Reading):
         return _total(widths * self.quantities((name,), self.node(pieces, u))[name]) / _total(widths)
 
 
+MOST_DESIGNS = 16
+"""Most designs of a batch: larger batches take as long per design and need more memory."""
+
+
+def group_equal(kinds: Sequence[object]) -> list[list[int]]:
+    """Places of equal kinds, at most `MOST_DESIGNS` in one group."""
+    groups: dict[object, list[int]] = {}
+    for k, key in enumerate(kinds):
+        groups.setdefault(key, []).append(k)
+    return [
+        places[begin : begin + MOST_DESIGNS]
+        for places in groups.values()
+        for begin in range(0, len(places), MOST_DESIGNS)
+    ]
+
+
 def plain(value: Number) -> Number:
     """Value of the number without its derivatives."""
     return value.v if isinstance(value, Jet) else value

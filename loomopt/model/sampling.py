@@ -4,7 +4,7 @@ import functools
 import itertools
 import math
 from array import array
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -97,6 +97,12 @@ class Sampler:
             piece = self.cycle.piece_before(float(self.model.event(systems.FLOAT, self.given, event)))
             switches[event] = {name: float(value) for name, value in self.cycle.switch(piece).items()}
         return switches
+
+    @lazy
+    def batch_key(self) -> Hashable:
+        """Key of designs that can be read in one batch: equal model, order of corners, and rules of means."""
+        rules = tuple(len(quadrature(self.cycle, mean)[1]) for mean in self.model.integrals if not mean.angles)
+        return id(self.model), self.cycle.order, self.cycle.switches.tobytes(), repr(self.stills), rules
 
     @lazy
     def static(self) -> dict[str, float]:

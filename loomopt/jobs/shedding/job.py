@@ -185,9 +185,9 @@ class Shedding(Job):
         changed = scene.update(changes) if changes else scene
         return changed, "stiffness" if target == "law" else target
 
-    def figures(self, scene: Scene, design: Numbers, every: bool = False) -> Figures:
+    def figures(self, scene: Scene, design: Numbers) -> Figures:
         """Every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
-        figures, parted = super().figures(scene, design, every), self.parted(scene, self.sampler(scene, design))
+        figures, parted = super().figures(scene, design), self.parted(scene, self.sampler(scene, design))
         return {**figures, **parted.figures} if parted else figures
 
     def figures_of(

@@ -65,7 +65,7 @@ def evaluated(scene: Scene, job: Job, target: str, design: Mapping[str, float]) 
 def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float], every: bool = False) -> Evaluated:
     """A design's figures and limits, each limit judged from the figures alone.
 
-    every: whether all figures are computed at once, as where all are read.
+    every: whether all extremes that are figures are looked for at once, as where all figures are read.
     """
     if job.members:
         from loomopt.solving.answer import family
@@ -78,7 +78,7 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
     quantities += [name for objective in program.objectives for name in objective.quantities]
     quantities += job.peaks(sampler.model).values() if every else []
     sampler.search(name for name in quantities if sampler.model.has_quantity(name))
-    figures = job.figures(scene, design, every)
+    figures = job.figures(scene, design)
     words = Words(scene)
     labels = numbers.labels(scene)
     named = {labels.get(name, name): value for name, value in design.items()}

@@ -17,7 +17,7 @@ from loomopt.maths.systems import Number
 from loomopt.model.limits import SingleLimit
 from loomopt.model.model import Integral, JobModel
 from loomopt.model.program import Program
-from loomopt.model.reading import Reading, fixed_nodes, quadrature
+from loomopt.model.reading import Reading, fixed_nodes, group_equal, quadrature
 from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Floats, Node, Pieces
@@ -26,9 +26,7 @@ from loomopt.solving.certificate.certificate import NO_NUMBER, certify, certify_
 from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet
 from loomopt.solving.certificate.records import Certificate
-
-MOST_DESIGNS = 16
-"""Most designs of a batch: larger batches take as long per design and need more memory."""
+from loomopt.solving.search import tie_break
 
 
 class DesignsReading(Reading):
@@ -148,10 +146,8 @@ class DesignAt:
     @lazy
     def batch_key(self) -> object:
         """Key of designs of one batch: equal structure, order of corners and rows."""
-        model, cycle = self.program.model, self.sampler.cycle
-        rules = tuple(len(quadrature(cycle, integral)[1]) for integral in model.integrals if not integral.angles)
-        fixed = frozenset(self.program.held), cycle.order, cycle.switches.tobytes(), rules
-        return id(model), self.program.structure, fixed, repr(self.sampler.stills), tuple(map(kind, self.rows))
+        fixed = frozenset(self.program.held)
+        return self.sampler.batch_key, self.program.structure, fixed, tuple(map(kind, self.rows))
 
     @lazy
     def corners(self) -> Floats:
@@ -315,18 +311,6 @@ def derivatives(designs: Sequence[DesignAt]) -> list[BatchDerivatives | None]:
     return results
 
 
-def group_equal(kinds: Sequence[object]) -> list[list[int]]:
-    """Places of equal kinds, at most `MOST` in one group."""
-    groups: dict[object, list[int]] = {}
-    for k, key in enumerate(kinds):
-        groups.setdefault(key, []).append(k)
-    return [
-        places[begin : begin + MOST_DESIGNS]
-        for places in groups.values()
-        for begin in range(0, len(places), MOST_DESIGNS)
-    ]
-
-
 def certify_batch(requests: Sequence[tuple[Program, Mapping[str, float]]], accuracy: float) -> list[Certificate]:
     """Certificates of variables (SI) of several programs.
 
@@ -340,6 +324,8 @@ def certify_batch(requests: Sequence[tuple[Program, Mapping[str, float]]], accur
         except NO_NUMBER:
             samplers.append(None)
     places = [k for k, pair in enumerate(samplers) if pair]
+    if len(places) > 1:
+        tie_break.measure_moves([requests[k] for k in places])
     designs = [DesignAt(*requests[k], pair[0], pair[1].rows) for k in places if (pair := samplers[k])]
     batch_derivatives = dict(zip(places, derivatives(designs), strict=True))
     return [_certify_one(*requests[k], samplers[k], batch_derivatives.get(k), accuracy) for k in range(len(requests))]

@@ -16,6 +16,7 @@ import numpy as np
 from loomopt.jobs.base import Job
 from loomopt.model.limits import Limit
 from loomopt.model.program import Program
+from loomopt.model.reading import group_equal
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE, POSITIVE, PRECISE, ROUNDING
@@ -24,7 +25,6 @@ from loomopt.solving.certificate.batch_certificate import (
     Designs,
     RowDerivatives,
     certify_batch,
-    group_equal,
     shares,
     without_extremes,
 )
@@ -296,7 +296,9 @@ def _certify_group(ends: Sequence[tuple[NeighbourTask, dict[str, float]]]) -> It
 
     searches = [request.search for request, _ in ends]
     tidy_designs = [search.job.tidy(search.program, x) for search, (_, x) in zip(searches, ends, strict=True)]
-    tie_breaks = [tie_break.apply_moves(search.program, x) for search, x in zip(searches, tidy_designs, strict=True)]
+    tie_breaks = tie_break.apply_moves_in_batch(
+        [(search.program, x) for search, x in zip(searches, tidy_designs, strict=True)]
+    )
     designs = [printed_design(search, x) for search, (x, _) in zip(searches, tie_breaks, strict=True)]
     places = [
         k for k, (request, _) in enumerate(ends) if _is_admissible(request.search.program, designs[k], request.peaks)

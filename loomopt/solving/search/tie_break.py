@@ -3,17 +3,21 @@
 It uses only moves that are flat at this design: the objectives change by at most 1e-10, and every limit still holds.
 """
 
+import contextlib
 import functools
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.maths import systems
-from loomopt.model.program import Move, Program
-from loomopt.model.reading import BatchReading, plain, wide
+from loomopt.maths.systems import Number
+from loomopt.model.limits import Limit, SingleLimit
+from loomopt.model.program import Move, Preference, Program
+from loomopt.model.reading import BatchReading, group_equal, plain, wide
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.model.session import current
 from loomopt.physics.cycle import Floats
@@ -36,21 +40,31 @@ Numbers = Mapping[str, float]
 
 def apply_moves(program: Program, x: Numbers) -> tuple[dict[str, float], tuple[str, ...]]:
     """Variables x (SI) after all moves without loss, and the rules that chose."""
-    rules = []
-    for move in program.moves:
-        preference = move.wished({**program.parameters, **x})
-        goal = move.goal(preference, x) if preference else {}
-        if preference is None or all(x[name] == end for name, end in goal.items()):
-            continue
-        move_reading = _read_move(program, x, [goal])
-        if move_reading.change > UNCHANGED:
-            continue
-        share = _share_between(program, x, goal, *move_reading.excesses)
-        sizes = [share * abs(goal[v.name] - x[v.name]) / v.scale for v in program.variables if v.name in goal]
-        if max(sizes, default=0.0) > MOVED:
-            rules.append(f"{move.name}: {preference.reason}")
-        x = part_way(x, goal, share)
-    return dict(x), tuple(rules)
+    return apply_moves_in_batch([(program, x)])[0]
+
+
+def apply_moves_in_batch(designs: Sequence[tuple[Program, Numbers]]) -> list[tuple[dict[str, float], tuple[str, ...]]]:
+    """Variables (SI) of each design (program, x) after all moves without loss, and the rules that chose."""
+    ends: list[dict[str, float]] = [dict(x) for _, x in designs]
+    rules = [list[str]() for _ in designs]
+    for turn in range(max((len(program.moves) for program, _ in designs), default=0)):
+        wishes, paths = list[tuple[int, Preference]](), list[_Paths]()
+        for k, (program, _) in enumerate(designs):
+            wish = program.moves[turn].wished({**program.parameters, **ends[k]}) if turn < len(program.moves) else None
+            goal = program.moves[turn].goal(wish, ends[k]) if wish else {}
+            if wish and any(ends[k][name] != end for name, end in goal.items()):
+                wishes.append((k, wish))
+                paths.append(_Paths(program, ends[k], (goal,)))
+        for (k, wish), path, reading in zip(wishes, paths, _read_paths(paths), strict=True):
+            if reading.change > UNCHANGED:
+                continue
+            program, x, (end,) = path
+            share = _share_between(program, x, end, *reading.excesses)
+            sizes = [share * abs(end[v.name] - x[v.name]) / v.scale for v in program.variables if v.name in end]
+            if max(sizes, default=0.0) > MOVED:
+                rules[k].append(f"{program.moves[turn].name}: {wish.reason}")
+            ends[k] = part_way(x, end, share)
+    return [(x, tuple(chosen)) for x, chosen in zip(ends, rules, strict=True)]
 
 
 def flat_directions(
@@ -61,42 +75,71 @@ def flat_directions(
     Neither an objective nor a touched limit changes, except the bounds of the moved variables. is_wanted: whether a
     direction is of interest, all without it; most: largest change, scaled, at most UNCHANGED.
     """
-    directions = (
-        (move, direction) for move in program.moves for direction in move.directions(x) if is_wanted(direction)
-    )
-    return [direction for move, direction in directions if _test_move(program, x, move, direction).change <= most]
+    directions = [direction for direction in _directions(program, x) if is_wanted(direction.way)]
+    changes = _changes_along(directions)
+    return [direction.way for direction, change in zip(directions, changes, strict=True) if change <= most]
 
 
-TESTED_MOVES, TESTED_MOST = "judged moves", 64
-"""Name of the tested moves in a session, and how many it keeps: curvature and least change test the same ones."""
+def measure_moves(designs: Sequence[tuple[Program, Numbers]]) -> None:
+    """Test the moves of several designs (program, x) in one pass, so that `flat_directions` finds the results.
+
+    Moves of a program with limits over the cycle are left out: extremes are not computed in a batch.
+    """
+    _changes_along([move for program, x in designs if not program.cycle_limits for move in _directions(program, x)])
 
 
-class _TestedMove(NamedTuple):
-    """Change along a move, scaled; ∞ for more than UNCHANGED.
+TESTED_MOVES, TESTED_MOST = "judged moves", 256
+"""Name of the tested moves in a session, and how many it keeps: curvature and least change test the same ones, and a
+batch of designs tests all of its moves at once."""
+
+
+class _Direction(NamedTuple):
+    """Direction (SI) of a move from a design x (SI)."""
+
+    program: Program
+    x: Numbers
+    move: Move
+    way: dict[str, float]
+
+
+@dataclass
+class _TestedMove:
+    """Change along a move, scaled; ∞ for more than UNCHANGED, None before the test.
 
     program: referenced while this record exists, so that no other program gets its id.
     """
 
     program: Program
-    change: float
+    change: float | None = None
 
 
-def _test_move(program: Program, x: Numbers, move: Move, way: Numbers) -> _TestedMove:
-    key = id(program), tuple(x.items()), tuple(way.items())
-    make = functools.partial(_change_along, program, x, list(move.ends(way, x)))
-    return current().cached(TESTED_MOVES, TESTED_MOST, key, lambda: _TestedMove(program, make()))
+def _directions(program: Program, x: Numbers) -> list[_Direction]:
+    """Directions of the moves that have room at x (SI)."""
+    return [_Direction(program, x, move, way) for move in program.moves for way in move.directions(x)]
 
 
-def _change_along(program: Program, x: Numbers, ends: Sequence[Numbers]) -> float:
-    """Change of objectives and touched limits on the way to either end, scaled."""
-    try:
-        move_reading = _read_move(program, x, ends)
-    except (ValueError, ZeroDivisionError):
+def _changes_along(directions: Sequence[_Direction]) -> list[float]:
+    """Change along each direction, scaled; directions that were not tested before are tested in one pass."""
+    keys = [(id(of.program), tuple(of.x.items()), tuple(of.way.items())) for of in directions]
+    tests = [
+        current().cached(TESTED_MOVES, TESTED_MOST, key, functools.partial(_TestedMove, of.program))
+        for key, of in zip(keys, directions, strict=True)
+    ]
+    new = [(test, of) for test, of in zip(tests, directions, strict=True) if test.change is None]
+    paths = [_Paths(of.program, of.x, tuple(of.move.ends(of.way, of.x))) for _, of in new]
+    for (test, _), path, reading in zip(new, paths, _read_paths(paths), strict=True):
+        test.change = _largest_change(path, reading)
+    return [math.inf if test.change is None else test.change for test in tests]
+
+
+def _largest_change(paths: "_Paths", reading: "_PathReading") -> float:
+    """Change of objectives and touched limits on the way to each goal, scaled; ∞ for more than UNCHANGED."""
+    if not reading.change <= UNCHANGED:
         return math.inf
-    start_excess, change = move_reading.excesses[0], move_reading.change
-    for end, end_excess in zip(ends, move_reading.excesses[1:], strict=True):
+    start_excess, change = reading.excesses[0], reading.change
+    for end, end_excess in zip(paths.goals, reading.excesses[1:], strict=True):
         # The bounds of the moved variables may be touched on the way.
-        bound_places = [k for k, limit in program.bound_limits.items() if limit.row in end]
+        bound_places = [k for k, limit in paths.program.bound_limits.items() if limit.row in end]
         touched = np.delete(np.abs(end_excess - start_excess), bound_places)[
             np.delete(start_excess, bound_places) >= -ACTIVE
         ]
@@ -112,8 +155,23 @@ def part_way(x: Numbers, goal: Numbers, share: float) -> dict[str, float]:
     return {**x, **{name: x[name] + share * (end - x[name]) for name, end in goal.items()}}
 
 
-class _MoveReading(NamedTuple):
-    """Values along a move: change of the objectives, scaled, ∞ for more than UNCHANGED.
+class _Paths(NamedTuple):
+    """Straight lines from a design x (SI) to goals (SI), which are all of the same variables."""
+
+    program: Program
+    x: Numbers
+    goals: tuple[Numbers, ...]
+
+    @property
+    def designs(self) -> list[Numbers]:
+        """x, the goals, the points half-way, and a design beyond x."""
+        nearby = {name: self.x[name] * (1 + BEYOND) for goal in self.goals for name in goal}
+        trials = [part_way(self.x, goal, share) for share in (1.0, 0.5) for goal in self.goals]
+        return [self.x, *trials, part_way(self.x, nearby, 1.0)]
+
+
+class _PathReading(NamedTuple):
+    """Values along paths: change of the objectives, scaled, ∞ for more than UNCHANGED.
 
     excesses: (1 + goals, limits), scaled excesses of the limits at the design and at each goal.
     """
@@ -122,46 +180,110 @@ class _MoveReading(NamedTuple):
     excesses: Floats
 
 
-def _read_move(program: Program, x: Numbers, goals: Sequence[Numbers]) -> _MoveReading:
-    """Values at x (SI), on the way to each goal (of the same variables), and beyond x, in one pass.
+UNREADABLE = _PathReading(math.inf, np.zeros((0, 0)))
+"""Reading where a formula has no value."""
+
+
+def _read_paths(paths: Sequence[_Paths]) -> list[_PathReading]:
+    """Values along paths; those of designs of one kind are read in one pass, and again one by one if that fails."""
+    readings = [UNREADABLE] * len(paths)
+    samplers = {k: sampler for k, path in enumerate(paths) if (sampler := _sampler(path))}
+    keys = [
+        (
+            sampler.batch_key,
+            sampler.grid(NODES)[0].tobytes(),
+            paths[k].program.structure,
+            tuple(map(tuple, paths[k].goals)),
+        )
+        for k, sampler in samplers.items()
+    ]
+    places = list(samplers)
+    for group in group_equal(keys):
+        batch = [places[k] for k in group]
+        for lanes in (batch, *([k] for k in batch)):
+            with contextlib.suppress(ValueError, ZeroDivisionError):
+                for k, reading in zip(lanes, _read_batch(samplers[batch[0]], [paths[k] for k in lanes]), strict=True):
+                    readings[k] = reading
+                if lanes is batch:
+                    break
+    return readings
+
+
+def _sampler(paths: _Paths) -> Sampler | None:
+    """Sampler of the design at which paths begin; None where it has no values."""
+    try:
+        return sampled(paths.program.model, {**paths.program.parameters, **paths.x})
+    except (ValueError, ZeroDivisionError):
+        return None
+
+
+def _read_batch(sampler: Sampler, batch: Sequence[_Paths]) -> list[_PathReading]:
+    """Values along the paths of designs of one kind, all in one pass; sampler: of one of them.
 
     The whole curve of a peak must stay, at nodes that move with the design.
     """
-    nearby = {name: x[name] * (1 + BEYOND) for goal in goals for name in goal}
-    trials = [part_way(x, goal, share) for share in (1.0, 0.5) for goal in goals] + [part_way(x, nearby, 1.0)]
-    sampler = sampled(program.model, {**program.parameters, **x})
-    designs = _read_batch(program, sampler, [x, *trials], nearby)
+    program, trials = batch[0].program, [paths.designs for paths in batch]
+    shape = len(trials), len(trials[0])
+    values = _batch_values(sampler, batch, trials)
+    designs = BatchReading(program.model, systems.numpy(), values, sampler.cycle, sampler.stills)
     with np.errstate(all="ignore"):
-        begins = np.array([wide(start, designs.count) for start in designs.starts])
+        begins = np.array([wide(start, designs.count) for start in designs.starts]).reshape(-1, *shape)
         designs.look([name for objective in program.objectives for name in objective.quantities], *sampler.grid(NODES))
-        curves = np.concatenate([objective.watched(designs) / objective.scale for objective in program.objectives])
-        change = float(np.abs(curves[:, 1:] - curves[:, :1]).max())
-        count = 1 + len(goals)
-        excesses = np.empty((count, len(program.limits)))
+        scales = np.array([[objective.scale for objective in paths.program.objectives] for paths in batch])
+        curves = np.concatenate(
+            [
+                objective.watched(designs).reshape(-1, *shape) / scales[:, k, None]
+                for k, objective in enumerate(program.objectives)
+            ]
+        )
+        changes = np.abs(curves[:, :, 1:] - curves[:, :, :1]).max(axis=(0, 2))
+        excesses = np.empty((*shape, len(program.limits)))
         for k, limit in enumerate(program.limits):
             if k not in program.cycle_limits:
-                excess = plain(limit.residual(designs)) / limit.scale
-                excesses[:, k] = np.broadcast_to(np.abs(excess) if limit.sign == 0 else excess, designs.count)[:count]
+                excess = _batch_excess(designs, [paths.program.limits[k] for paths in batch], shape[1])
+                excesses[:, :, k] = np.abs(excess) if limit.sign == 0 else excess
     cycle_places = list(program.cycle_limits)
-    for row, design in zip(excesses, [x, *trials] if cycle_places else (), strict=False):
-        row[cycle_places] = _excesses(program, design)[cycle_places]
+    for k, paths in enumerate(batch):
+        for row, design in zip(excesses[k], trials[k] if cycle_places else (), strict=False):
+            row[cycle_places] = _excesses(paths.program, design)[cycle_places]
     current().positions += curves.size
     # Where two corners of the cycle pass each other the nodes move: such a move counts as a change.
-    same = change <= UNCHANGED and bool(np.all(np.diff(begins, axis=0) >= 0.0))
-    return _MoveReading(change if same else math.inf, excesses)
+    same = (changes <= UNCHANGED) & np.all(np.diff(begins, axis=0) >= 0.0, axis=(0, 2))
+    count = 1 + len(batch[0].goals)
+    return [
+        _PathReading(change if is_same else math.inf, excess[:count])
+        for change, is_same, excess in zip(changes.tolist(), same.tolist(), excesses, strict=True)
+    ]
 
 
-def _read_batch(
-    program: Program, sampler: Sampler, designs: Sequence[Numbers], differ: Collection[str]
-) -> BatchReading:
-    """Reading of a batch of designs (SI); sampler: sampler of one; differ: names of the numbers that differ."""
-    columns = {name: np.array([x[name] for x in designs]) for name in differ}
+def _batch_values(sampler: Sampler, batch: Sequence[_Paths], trials: Sequence[Sequence[Numbers]]) -> dict[str, Number]:
+    """Numbers of all trials of a batch, (batch · trials,) where they differ."""
+    count, moved = len(trials[0]), {name for paths in batch for goal in paths.goals for name in goal}
+    values = {name: np.array([x[name] for designs in trials for x in designs]) for name in moved}
+    numbers = [{**paths.program.parameters, **paths.x} for paths in batch]
     if sampler.hints:
-        values_of_designs = [{**program.parameters, **x} for x in designs]
-        hints = [program.model.hints(program.model.given(systems.FLOAT, values)) for values in values_of_designs]
-        columns |= {name: np.array([design_hints[name] for design_hints in hints]) for name in sampler.hints}
-    values = {**program.parameters, **designs[0], **sampler.hints, **columns}
-    return BatchReading(program.model, systems.numpy(), values, sampler.cycle, sampler.stills)
+        model = sampler.model
+        full = [
+            {**paths.program.parameters, **x} for paths, designs in zip(batch, trials, strict=True) for x in designs
+        ]
+        hints = [model.hints(model.given(systems.FLOAT, design)) for design in full]
+        values |= {name: np.array([design_hints[name] for design_hints in hints]) for name in sampler.hints}
+    fixed = {name: [design[name] for design in numbers] for name in numbers[0] if name not in values}
+    return {
+        name: same[0] if all(value == same[0] for value in same) else np.repeat(same, count)
+        for name, same in fixed.items()
+    } | values
+
+
+def _batch_excess(designs: BatchReading, limits: Sequence[Limit], count: int) -> Floats:
+    """Scaled excess (batch, trials) of a limit of each design of a batch, each with `count` trials."""
+    limit, bounds = limits[0], [limit.value for limit in limits]
+    if isinstance(limit, SingleLimit) and any(bound != bounds[0] for bound in bounds):
+        residual = limit.residual(designs, np.repeat(bounds, count))
+    else:
+        residual = limit.residual(designs)
+    excess = np.broadcast_to(plain(residual), designs.count).reshape(len(limits), count)
+    return np.asarray(excess / np.array([limit.scale for limit in limits])[:, None])
 
 
 def reachable_share(program: Program, x: Numbers, goal: Numbers) -> float:

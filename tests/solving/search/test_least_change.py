@@ -176,13 +176,13 @@ def test_designs_that_change_share_one_model():
 
 
 def test_only_moves_along_the_level_are_looked_at(monkeypatch):
-    asked = []
+    asked: list[set[str]] = []
 
-    def counted(program, x, ends):
-        asked.append(set(ends[0]))
-        return 0.0
+    def counted(directions):
+        asked.extend(set(direction.way) for direction in directions)
+        return [0.0] * len(directions)
 
-    monkeypatch.setattr(tie_break, "_change_along", counted)
+    monkeypatch.setattr(tie_break, "_changes_along", counted)
     axes = [AxisMove(n, (n,), (Preference("today", "tidy"),), {n: 0.0}, {n: (-9.0, 9.0)}) for n in "xyz"]
     program = toy.program("xyz", {"f": lambda v: v["x"] ** 2 + (v["y"] - v["z"]) ** 2}, moves=tuple(axes))
     certificate = certify(program, {"x": 0.0, "y": 1.0, "z": 1.0}, 1e-8)

@@ -1,12 +1,22 @@
 """The silent levels: least added mass, then least change from today, and only along what costs nothing."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from support import toy
 
 import loomopt as lo
+from loomopt.jobs import registry
 from loomopt.model.program import AxisMove, Preference, ScaleMove
-from loomopt.solving.search.tie_break import apply_moves, flat_directions
+from loomopt.model.session import Session, current, working
+from loomopt.solving.search.tie_break import (
+    TESTED_MOVES,
+    apply_moves,
+    apply_moves_in_batch,
+    flat_directions,
+    measure_moves,
+)
 from reference.beatup import DESIGN, LENGTHS, Machine
 
 
@@ -299,3 +309,32 @@ def test_a_direction_ends_at_its_bounds_or_at_the_factors_they_allow():
     assert list(scale.directions({"x": 0.0, "y": 0.0})) == []
     endless = a_move(along=("x", "y"), bounds={"x": (0.0, np.inf), "y": (0.0, 1.0)})
     assert list(endless.directions({"x": 2.0, "y": 0.5})) == [{"y": 1.0}]
+
+
+def test_designs_moved_in_a_batch_are_those_moved_alone():
+    """Of one kind, of another kind, and one whose linkage does not assemble at the goal."""
+    job = registry.find("beatup")
+    scenes = [scene_of(M0) for M0 in (600, 620, 800)] + [scene_of(600).set("bounds.m4e.max", "0 kg")]
+    programs = [job.program(scene, "balance") for scene in scenes]
+    designs = [(program, program.completed(dict(program.starts[0]))) for program in programs]
+    with working(Session()):
+        alone = [apply_moves(*design) for design in designs]
+        flat = [flat_directions(*design) for design in designs]
+    with working(Session()):
+        assert apply_moves_in_batch(designs) == alone
+        measure_moves(designs)
+        tested = current().count(TESTED_MOVES)
+        assert tested > len(designs)
+        assert [flat_directions(*design) for design in designs] == flat
+        assert current().count(TESTED_MOVES) == tested, "all moves were tested before"
+    assert any(x != dict(design) for (x, _), (_, design) in zip(alone, designs, strict=True))
+
+
+def test_a_design_without_values_stays_and_spoils_no_other():
+    program = toy.program("xy", {"f": lambda v: v["x"] ** 2 / v["z"]}, moves=(slide(3.0),))
+    broken = dataclasses.replace(program, parameters={**program.parameters, "z": 0.0})
+    x = {"x": 0.0, "y": 1.0}
+    good = dataclasses.replace(program, parameters={**program.parameters, "z": 1.0})
+    (moved, _), (stayed, rules) = apply_moves_in_batch([(good, x), (broken, x)])
+    assert moved["y"] == 3.0
+    assert (stayed, rules) == (x, ())
