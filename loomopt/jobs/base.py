@@ -9,14 +9,14 @@ from collections.abc import Callable, Collection, Container, Iterator, Mapping, 
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from loomopt.base.errors import BadInput
+from loomopt.base.errors import BadInput, refusal
 from loomopt.base.records import Awaited, Frozen, lazy
 from loomopt.base.units import SI_UNIT
 from loomopt.maths.systems import Number
 from loomopt.model import drive, numbers
 from loomopt.model.curves import STEPS, Columns, curves, tops
 from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
-from loomopt.model.model import SLOWNESS, Integral, JobModel
+from loomopt.model.model import SLOWNESS, Integral, JobModel, with_words_fixed
 from loomopt.model.objectives import Objective, Value
 from loomopt.model.program import (
     LEAST_CHANGE,
@@ -35,7 +35,7 @@ from loomopt.model.program import (
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.model.session import working
 from loomopt.physics.cycle import Floats, Where
-from loomopt.physics.effects.kinds import Check, Event, label, owned
+from loomopt.physics.effects.kinds import Check, Event, UnsteadyError, label, owned
 from loomopt.physics.schema import Figure
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, START_ROOM
 from loomopt.picture.job_views import JobViews
@@ -711,6 +711,21 @@ class Job(abc.ABC):
         limited = numbers.bounds(scene, known)
         sentences = [check.explain(known, limited, table, clash, scene.show) for check, table in _checks(scene)]
         return " ".join(text for text in sentences if text)
+
+
+def steady(scene: Scene, model: JobModel, known: Numbers, design: Numbers | None = None) -> JobModel:
+    """Model as its states need it in their steady state at a design; itself without states. Raises BadInput.
+
+    known: the scene's numbers; design: what is not today's.
+    """
+    if not model.states:
+        return model
+    full = {scene.full(name): value for name, value in (design or {}).items()}
+    try:
+        return with_words_fixed(model, {**known, **full})
+    except UnsteadyError as error:
+        names = ", ".join(f"effects.{state.name}" for state in model.states)
+        raise refusal(error.problem, scene.origin, names, remedy=error.remedy) from None
 
 
 def static_figures(scene: Scene, sampled: "Sampler | Machines", names: Container[str]) -> dict[str, Number]:

@@ -334,7 +334,9 @@ def state_quantities(states: Sequence[State]) -> dict[str, CycleQuantity]:
     """Whole-cycle quantities of states; a least value is stored as its opposite, which is no figure."""
     return {
         name: CycleQuantity(
-            functools.partial(state_value, state, peak.read, -1 if peak.least else 1), not peak.least, signed=peak.least
+            functools.partial(state_value, state, peak.read, -1 if peak.least else 1),
+            not peak.least,
+            signed=peak.least or peak.signed,
         )
         for state in states
         for name, peak in state.peaks.items()
@@ -447,7 +449,7 @@ class JobModel:
             for name, formula in group.quantities.items():
                 quantities[prefix + name] = CycleQuantity(functools.partial(group_value, formula), figure=False)
         for check in self.checks:
-            for name in check.quantities:
+            for name in (name for name in check.quantities if name not in lacking(check, self.known)):
                 quantities[name] = CycleQuantity(functools.partial(check_value, check, name))
             quantities |= joint_quantities(check, self.known) if check.joints else {}
         if not self.states:
@@ -527,7 +529,7 @@ class JobModel:
         figures: dict[str, str] = {}
         for check in self.checks:
             lacked = lacking(check, self.known)
-            figures |= {name: name for name in check.quantities}
+            figures |= {name: name for name in check.quantities if name not in lacked}
             for name in (name for name in check.vectors if name not in lacked):
                 figures |= {f"{name}_{axis}": name for axis in COMPONENTS} | {name: name}
             for name in (name for name in check.scalars if name not in lacked):
@@ -678,6 +680,7 @@ def with_words_fixed(model: JobModel, values: Mapping[str, float]) -> JobModel:
     """
     if not model.states:
         return model
+    values = {**values, **model.hints(model.plain(FLOAT, values))}
     given = model.plain(FLOAT, values)
     words = {(effect, key): word for effect, key, word in model.words}
     for state in model.states:

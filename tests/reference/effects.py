@@ -7,10 +7,14 @@ Nothing of loomopt is in a value. `python tests/reference/effects.py` writes the
 import csv
 import functools
 import itertools
+import math
 from pathlib import Path
 
 import mpmath
+import numpy as np
 from mpmath.calculus.quadrature import GaussLegendre
+
+from reference import turn
 
 MP = mpmath.MPContext()
 MP.dps = 50
@@ -66,7 +70,56 @@ def slope(function, at, order=1):
     return (slope(function, at + h, order - 1) - slope(function, at - h, order - 1)) / (2 * h)
 
 
-class Reed:
+HARMONICS = 256
+"""Samples of a turn from which a motion's harmonics are read: of the six-bar the highest are 1e-14 of the first."""
+
+
+class Harmonics:
+    """A periodic function through equidistant samples, with its derivatives."""
+
+    def __init__(self, samples):
+        self.weights, self.orders = np.fft.rfft(samples) / len(samples), np.arange(len(samples) // 2 + 1)
+        self.weights[1:-1] *= 2
+
+    def __call__(self, phi, order):
+        return float(np.real(np.sum(self.weights * (1j * self.orders) ** order * np.exp(1j * self.orders * phi))))
+
+
+class Shaft:
+    """What a shaft that twists carries; speed: rad/s; carried: its inertia, kg·m²; acceleration(phi): q¨, rad/s²."""
+
+    speed = SPEED
+
+    def shaft_torsion(self, own, phi):
+        """Return k z + c z˙ by convolution: all that ever acted on the reed, faded and turned by e^(λ(t − s)).
+
+        phi: a multiple of STEP; own: underdamped.
+        """
+        k, c, J = own["stiffness"], own["damping"], self.carried
+        rate = -c / (2 * J) + 1j * MP.sqrt(k / J - (c / (2 * J)) ** 2)
+        turn, total = 2 * PI, MP.mpc(0)
+        for at, weight, force in self.acting():
+            back = (phi - at) % turn
+            total += weight * force * MP.exp(rate * back / self.speed) / self.speed
+        return ((k + c * rate) * total / (1 - MP.exp(rate * turn / self.speed)) / (J * rate.imag)).imag
+
+    def acting(self):
+        """Return nodes and weights of a turn with what acts on the reed there: Gauss's rule between borders."""
+        if not hasattr(self, "kept"):
+            pulse = {"pulse": number(REED["pulse"]), "torque": MP.mpf(M0)}
+            corners = [(self.front + side * pulse["pulse"] / 2) % (2 * PI) for side in (-1, 1)]
+            borders = sorted([*corners, *(k * STEP * PI / 180 for k in range(360 // STEP + 1))])
+            rule = GaussLegendre(MP).calc_nodes(4, MP.prec)
+            self.kept = []
+            for begin, end in itertools.pairwise(borders):
+                for x, weight in rule:
+                    at = (begin + end + (end - begin) * x) / 2
+                    force = self.carried * self.acceleration(at) + self.resistance(pulse, at)
+                    self.kept.append((at, weight * (end - begin) / 2, force))
+        return self.kept
+
+
+class Reed(Shaft):
     """The crank-rocker; design: what differs from today's."""
 
     def __init__(self, design):
@@ -90,6 +143,17 @@ class Reed:
         """Return q˙ and q¨, q = −ψ."""
         return tuple(-slope(lambda p: self.positions(p)[2], phi, order) * SPEED**order for order in (1, 2))
 
+    @property
+    def front(self):
+        return self.beta
+
+    @property
+    def carried(self):
+        return MP.mpf(REED["J4"]) + self.v["m4e"] * self.v["r4e"] ** 2
+
+    def acceleration(self, phi):
+        return self.motion(phi)[1]
+
     def unbalanced(self):
         return self.v["m4"] * self.v["r4"] - self.v["m4e"] * self.v["r4e"]
 
@@ -105,35 +169,6 @@ class Reed:
     def resistance(self, own, phi):
         away = phi - self.beta
         return M0 * MP.cos(PI * away / own["pulse"]) if abs(away) <= own["pulse"] / 2 else MP.mpf(0)
-
-    def shaft_torsion(self, own, phi):
-        """Return k z + c z˙ by convolution: all that ever acted on the reed, faded and turned by e^(λ(t − s)).
-
-        phi: a multiple of STEP; own: underdamped.
-        """
-        k, c = own["stiffness"], own["damping"]
-        J = MP.mpf(REED["J4"]) + self.v["m4e"] * self.v["r4e"] ** 2
-        rate = -c / (2 * J) + 1j * MP.sqrt(k / J - (c / (2 * J)) ** 2)
-        turn, total = 2 * PI, MP.mpc(0)
-        for at, weight, force in self.acting(J):
-            back = (phi - at) % turn
-            total += weight * force * MP.exp(rate * back / SPEED) / SPEED
-        return ((k + c * rate) * total / (1 - MP.exp(rate * turn / SPEED)) / (J * rate.imag)).imag
-
-    def acting(self, J):
-        """Return nodes and weights of a turn with what acts on the reed there: Gauss's rule between borders."""
-        if not hasattr(self, "kept"):
-            pulse = {"pulse": number(REED["pulse"])}
-            corners = [self.beta - pulse["pulse"] / 2, self.beta + pulse["pulse"] / 2]
-            borders = sorted([*corners, *(k * STEP * PI / 180 for k in range(360 // STEP + 1))])
-            rule = GaussLegendre(MP).calc_nodes(4, MP.prec)
-            self.kept = []
-            for begin, end in itertools.pairwise(borders):
-                for x, weight in rule:
-                    at = (begin + end + (end - begin) * x) / 2
-                    force = J * self.motion(at)[1] + self.resistance(pulse, at)
-                    self.kept.append((at, weight * (end - begin) / 2, force))
-        return self.kept
 
     def bearing_friction(self, own, phi):
         rate = self.motion(phi)[0]
@@ -386,8 +421,10 @@ class Frame:
         }
 
 
-class Linkage:
-    """The six-bar: q is the angle of the sley."""
+class Linkage(Shaft):
+    """The six-bar: q is the angle of the sley; its counterweight has no mass."""
+
+    speed, carried = MAIN, MP.mpf(REED["J4"])
 
     def __init__(self, design):
         known = {**SIXBAR, **(OTHER_SIXBAR if design == "other" else {})}
@@ -438,6 +475,47 @@ class Linkage:
         away = phi - self.front
         return own["torque"] * MP.cos(PI * away / own["pulse"]) if abs(away) <= own["pulse"] / 2 else MP.mpf(0)
 
+    def bearing_friction(self, own, phi):
+        rate = slope(self.q, phi) * MAIN
+        return own["coulomb"] * MP.sign(rate) + own["viscous"] * rate
+
+    def output_centrifugal(self, own, phi):
+        return MP.mpf(REED_MASS[1]) * MP.mpf(REED_MASS[2]) / 1000 * (slope(self.q, phi) * MAIN) ** 2
+
+    def height(self, down, phi):
+        """Return the height of all that weighs something times its mass, kg·m; down: where weights point, rad."""
+        return sum(
+            -MP.mpf(mass) * (self.centre(name, MP.mpf(along) / 1000, phi) * MP.expj(down).conjugate()).real
+            for name, mass, along in (*MASSES, REED_MASS)
+        )
+
+    def energy(self, phi):
+        """Return twice the kinetic energy over ω², kg·m²."""
+        total = MP.mpf(0)
+        for name, mass, along, inertia in self.bodies():
+            rate = slope(lambda p, name=name, along=along: self.centre(name, along, p), phi)
+            turned = slope(lambda p, name=name: MP.arg(self.link(name, p)[1]), phi)
+            total += mass * abs(rate) ** 2 + inertia * turned**2
+        return total
+
+    def speed_fluctuation(self, own):
+        """Return figures of the crank's own motion: energy, height and q as series of harmonics, then by shooting."""
+        inertia, height, travel = (
+            Harmonics([float(function(2 * PI * k / HARMONICS)) for k in range(HARMONICS)])
+            for function in (self.energy, lambda phi: self.height(-PI / 3, phi), self.q)
+        )
+        front, width, cloth = float(self.front), float(number(REED["pulse"])), float(M0)
+
+        def changed(motor, no_load, phi, omega):
+            away = (phi - front + math.pi) % (2 * math.pi) - math.pi
+            pushed = cloth * math.cos(math.pi * away / width) if abs(away) <= width / 2 else 0.0
+            taken = pushed * travel(phi, 1) + 9.80665 * height(phi, 1) + inertia(phi, 1) * omega**2 / 2
+            return (motor[0] * (no_load - omega) - taken) / (motor[1] + inertia(phi, 0))
+
+        machine = turn.Machine(float(MAIN), (front - width / 2, front + width / 2), changed)
+        motor = float(own["motor_torque"] / (own["slip"] * MAIN)), float(own["flywheel"])
+        return turn.turn(motor, machine).figures(motor)
+
     def forming(self, own, phi):
         """Return the torque from the rear over 0 to the front."""
         return MP.mpf(0) if self.front <= phi < self.rear else own["torque"]
@@ -458,15 +536,7 @@ class Linkage:
 
     def gravity(self, own, phi):
         """Return the rise of what the packaged scene's links and its reed weigh."""
-        down = MP.expj(own["down"])
-
-        def height(at):
-            return sum(
-                -MP.mpf(mass) * (self.centre(name, MP.mpf(along) / 1000, at) * down.conjugate()).real
-                for name, mass, along in (*MASSES, REED_MASS)
-            )
-
-        return MP.mpf("9.80665") * slope(height, phi)
+        return MP.mpf("9.80665") * slope(lambda p: self.height(own["down"], p), phi)
 
     def bodies(self):
         """Return link, mass, kg, where its centre lies along the link, m, and inertia about that, of what moves."""
@@ -586,6 +656,13 @@ CASES = {
     ("linkage", "joint_forces", "shaking_moment"): "100",
     ("linkage", "load", "term"): "30 100 300",
     ("linkage", "spring", "term"): "30 200",
+    ("linkage", "bearing_friction", "term"): "30 200",
+    ("linkage", "shaft_torsion", "term"): "30 75 195",
+    ("linkage", "centrifugal", "output_centrifugal"): "30",
+    **{
+        ("linkage", "speed_fluctuation", name): ""
+        for name in ("fluctuation", "no_load_speed", "motor_torque_max")
+    },
     ("shedding", "weight", "term"): "30",
     ("shedding", "warp_tension", "term"): "30 90 150 200 290 330",
     ("shedding", "inertia", "term"): "30 200",
@@ -597,7 +674,7 @@ CASES = {
 
 def rows(examples):
     """Yield rows of the reference file; examples: job → effect → its examples."""
-    cases = {case: angles.split() for case, angles in CASES.items()}
+    cases = {case: angles.split() or [""] for case, angles in CASES.items()}
     coil = {key: number(text) for key, text in examples["shedding"]["coil"][0].items()}
     cases |= {("shedding", "coil", what): [""] for what in Frame("today").coil(coil)}
     cases |= {("rapier", "tape_stretch", "head_overrun"): [""]}

@@ -4,22 +4,21 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple, final
 
-from loomopt.base.errors import BadInput
 from loomopt.base.records import Frozen, lazy
-from loomopt.jobs.base import Ends, Task, bound_limits, distinct, ends, size_read
+from loomopt.jobs.base import Ends, Task, bound_limits, distinct, ends, size_read, steady
 from loomopt.jobs.beatup import model as beatup
 from loomopt.jobs.beatup.model import LENGTHS, today
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, BeatupTarget, RetrofitTarget, TorqueTarget
 from loomopt.maths.systems import FLOAT
 from loomopt.model.drive import TORQUE
 from loomopt.model.limits import Limit, RatioLimit
-from loomopt.model.model import JobModel, with_words_fixed
+from loomopt.model.model import JobModel
 from loomopt.model.numbers import curves, numbers, words
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value
 from loomopt.model.program import Added, Goal, Move, Numbers, Preference, Variable, goals
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Where
-from loomopt.physics.effects.kinds import Check, Load, UnsteadyError, model_of
+from loomopt.physics.effects.kinds import Check, Load, model_of
 from loomopt.physics.tolerances import INDIFFERENT, NO_MASS, SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
 
@@ -78,15 +77,7 @@ def model(scene: Scene, known: Numbers, design: Numbers | None = None, changes: 
     """
     changing = tuple(VARIABLES) if changes else ()
     physics = beatup.model(scene.active, words(scene), frozenset(known), resisted(scene), changing)
-    if not physics.states:
-        return physics
-    try:
-        return with_words_fixed(
-            physics, {**known, **{scene.full(name): value for name, value in (design or {}).items()}}
-        )
-    except UnsteadyError as error:
-        names = ", ".join(f"effects.{state.name}" for state in physics.states)
-        raise BadInput(error.problem, file=scene.origin, key=names, remedy=f"{error.remedy}.") from None
+    return steady(scene, physics, known, design)
 
 
 @final

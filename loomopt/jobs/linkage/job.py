@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, final
 from loomopt.jobs import base
 from loomopt.jobs.base import EVERY, Figures, InBox, Job, Studied
 from loomopt.jobs.linkage import scene as scenes
-from loomopt.jobs.linkage.model import OBLIQUITY
-from loomopt.jobs.linkage.program import LinkageTask, linkage_of, model
+from loomopt.jobs.linkage.model import OBLIQUITY, linkage_of
+from loomopt.jobs.linkage.program import LinkageTask, model
 from loomopt.maths import periodic_cubic
 from loomopt.maths.periodic_cubic import TURN
 from loomopt.maths.systems import Number
@@ -45,7 +45,7 @@ class LinkageJob(Job):
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Linkage with the effects the scene calls for."""
-        return model(scene)
+        return model(scene, design=design)
 
     def figures_of(
         self, scene: Scene, sampled: "Sampler | Machines", names: Container[str] = EVERY

@@ -4,6 +4,7 @@ q = the output that the scene names (an angle, a slide, a coordinate of a joint)
 """
 
 import functools
+import itertools
 import math
 import operator
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
@@ -20,6 +21,7 @@ from loomopt.model.kinematics import Arcs, Followed, Following, Group, Kinematic
 from loomopt.model.model import CycleQuantity, DesignRow, Instant, Integral, JobModel
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Floats, Node
+from loomopt.physics.effects.coulomb import TURNS
 from loomopt.physics.effects.kinds import Effect, Load, Motion
 from loomopt.physics.mechanisms import chain
 from loomopt.physics.mechanisms.cam_laws import LAWS
@@ -116,6 +118,11 @@ def event_value(event: str) -> str:
 
 OUTPUT_PLACES = "output at events"
 """Name by which loads request the position of the output at events."""
+
+
+def turn_rule(k: int, extreme: str = "") -> EventRule:
+    """Event at a turn of the output, the k-th of those that effects request; at the end of a rest where it rests."""
+    return EventRule(f"turn {k}", extreme, rest="ends")
 
 
 def output_value(event: str, axis: str) -> str:
@@ -383,6 +390,9 @@ class Linkage(Kinematics):
             elif place.hint in given.values:
                 here = given._replace(values={**given.values, **values})
                 values[place.value] = self._event_angle(maths, here, place)
+        if TURNS in called:
+            rules = itertools.takewhile(lambda turn: turn.hint in given.values, map(turn_rule, itertools.count()))
+            values[TURNS] = tuple(self._event_angle(maths, given, turn) for turn in rules)
         values |= self._mean_square_distance(maths, given)
         if OUTPUT_PLACES in called:
             for place in self.places:
@@ -447,9 +457,12 @@ class Linkage(Kinematics):
         """Crank angles of the events, rad, from a scan of the whole turn. Raises UnfoundError."""
         hints = self._times(given)
         angles = {name: hints[hint_of(name)] for name in self.path.times} if self.path else {}
-        if all(place.angle is not None for place in self.places) and not self.chain.cams:
+        read = TURNS in called or any(place.angle is None for place in self.places)
+        if not read and not self.chain.cams:
             return hints
-        turns = self.turns(given) if any(place.angle is None for place in self.places) else ()
+        turns = self.turns(given) if read else ()
+        for k, turn in enumerate(turns_in_order(turns) if TURNS in called else ()):
+            angles |= self._turn_hints(given, turn_rule(k, turn.extreme), turn, hints)
         for place in self.places:
             if place.angle is not None:
                 angles[place.name] = float(number(FLOAT, given.values, place.angle))
@@ -457,16 +470,7 @@ class Linkage(Kinematics):
             if not place.extreme:
                 angles[place.name] = hints[place.hint] = self._crossing(given, place, angles[place.beside])
                 continue
-            turn = extreme_turn(turns, place)
-            angles[place.name] = hints[place.hint] = turn.angle
-            if self.chain.cams:
-                corner, turns_beyond = end_of_rest(turn, place), 0
-                if corner is not None:
-                    corner_angle = float(self._corners(FLOAT, given)[corner.place])
-                    turns_beyond = round((turn.angle - corner_angle) / TURN)
-                    angles[place.name] = corner_angle + TURN * turns_beyond
-                hints[place.corner] = 0.0 if corner is None else corner.place + 1.0
-                hints[place.turned] = float(turns_beyond)
+            angles |= self._turn_hints(given, place, extreme_turn(turns, place), hints)
         high, low = extremes(self.places)
         if high and low:
             hints[SWEPT] = 0.0 if angles[low] > angles[high] else TURN
@@ -474,6 +478,19 @@ class Linkage(Kinematics):
             return hints
         beside = {name: self._at(given, angle).switch for name, angle in angles.items()}
         return hints | {f"{cam} at {name}": value for name, switch in beside.items() for cam, value in switch.items()}
+
+    def _turn_hints(self, given: Given, place: EventRule, turn: Turn, hints: dict[str, float]) -> dict[str, float]:
+        """Crank angle of an event at a turn of the output, rad, by its name; `hints` gains what it is followed from."""
+        angle = hints[place.hint] = turn.angle
+        if self.chain.cams:
+            corner, turns_beyond = end_of_rest(turn, place), 0
+            if corner is not None:
+                corner_angle = float(self._corners(FLOAT, given)[corner.place])
+                turns_beyond = round((turn.angle - corner_angle) / TURN)
+                angle = corner_angle + TURN * turns_beyond
+            hints[place.corner] = 0.0 if corner is None else corner.place + 1.0
+            hints[place.turned] = float(turns_beyond)
+        return {place.name: angle}
 
     def _times(self, given: Given) -> dict[str, float]:
         """Near which crank angles, rad, a point without timing is nearest to the places of its path."""
@@ -703,6 +720,12 @@ def extreme_turn(turns: tuple[Turn, ...], place: EventRule) -> Turn:
     return choice._replace(angle=place.near + angle_difference(angle, place.near))
 
 
+def turns_in_order(turns: Sequence[Turn]) -> list[Turn]:
+    """Turns of the output over one turn of the crank, from a minimum on: there the output sets out."""
+    first = next((k for k, turn in enumerate(turns) if turn.extreme == "min"), 0)
+    return [*turns[first:], *turns[:first]]
+
+
 def end_of_rest(turn: Turn, place: EventRule) -> Corner | None:
     """Corner of a cam at which an extreme stands, by the end of the rest that is meant; None at none."""
     if not turn.rest:
@@ -752,12 +775,14 @@ def _obliquity(group: str, m: Maths, given: Given, phi: Number, pose: Callable[[
 
 def _at(at: Instant, event: str) -> LinkageMotion:
     """Pose at an event."""
-    return _linkage(at).at_event(at.maths, at.given, event)
+    return linkage_of(at.model).at_event(at.maths, at.given, event)
 
 
-def _linkage(at: Instant) -> Linkage:
-    assert isinstance(at.model.kinematics, Linkage)
-    return at.model.kinematics
+def linkage_of(model: JobModel) -> Linkage:
+    """Linkage of a model, at whatever speed its crank turns."""
+    kinematics = getattr(model.kinematics, "steady", model.kinematics)
+    assert isinstance(kinematics, Linkage)
+    return kinematics
 
 
 def _swing(high: str, low: str, at: Instant) -> Number:
@@ -812,7 +837,7 @@ def _mean_square_distance(path: Path, at: Instant) -> Number:
     """Mean square of the distances at crank angles that follow from the design, m²."""
     total = 0
     for name, x, y in zip(path.times, path.x, path.y, strict=True):
-        pose = _linkage(at).at_place(at.maths, at.given, name)
+        pose = linkage_of(at.model).at_place(at.maths, at.given, name)
         total = total + _square(pose.joints.joints[path.point].place, at.maths.number(x), at.maths.number(y))
     return total / len(path.x)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from loomopt.base.errors import refusal
 from loomopt.base.records import lazy
-from loomopt.jobs.base import Ends, Task, distinct, ends, size_read
+from loomopt.jobs.base import Ends, Task, distinct, ends, size_read, steady
 from loomopt.jobs.linkage import model as linkages
 from loomopt.jobs.linkage.model import (
     OBLIQUITY,
@@ -18,8 +18,8 @@ from loomopt.jobs.linkage.model import (
     PATH_SQUARE,
     RMS_TORQUE,
     TORQUE_SQUARE,
-    Linkage,
     Path,
+    linkage_of,
 )
 from loomopt.jobs.linkage.scene import LinkageTarget, path, reaches, read_tables
 from loomopt.maths.systems import FLOAT
@@ -28,26 +28,24 @@ from loomopt.model.limits import CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
 from loomopt.model.numbers import bounds, numbers, words
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value, opposite
-from loomopt.model.program import Move
+from loomopt.model.program import Move, Numbers
 from loomopt.physics.cycle import Node
 from loomopt.scenes.scene import Scene
 
 
-def model(scene: Scene, target: str = "") -> JobModel:
-    """Linkage with the effects the scene calls for; target: whose path its point should follow."""
+def model(scene: Scene, target: str = "", design: Numbers | None = None) -> JobModel:
+    """Linkage with the effects the scene calls for, as its states need it. Raises BadInput.
+
+    target: whose path its point should follow; design: what is not today's.
+    """
     known = read_tables(scene.document)
     pathed = path(scene, target)
     linkage = replace(known.linkage, path=pathed) if pathed else known.linkage
-    names = frozenset(numbers(scene))
-    return linkages.model(
-        linkage, scene.active, words(scene), names, reaches(scene.document, linkage.chain), known.windows
+    values = numbers(scene)
+    physics = linkages.model(
+        linkage, scene.active, words(scene), frozenset(values), reaches(scene.document, linkage.chain), known.windows
     )
-
-
-def linkage_of(model: JobModel) -> Linkage:
-    """Model's linkage."""
-    assert isinstance(model.kinematics, Linkage)
-    return model.kinematics
+    return steady(scene, physics, values, design)
 
 
 @final

@@ -504,6 +504,15 @@ def check(scene: Scene) -> None:
         raise refusal(f"today's linkage does not turn all round: {reason}", scene.origin, "mechanism", remedy=remedy)
     _check_output(scene, known.linkage)
     _check_events(scene, known.linkage)
+    _check_states(scene, known.linkage)
+
+
+def _check_states(scene: Scene, linkage: Linkage) -> None:
+    """Raise BadInput for a steady state behind a cam, whose motion no series of harmonics follows."""
+    states = [effect.name for effect in scene.active if isinstance(effect, kinds.State)]
+    if states and linkage.chain.cams:
+        problem = f"{states[0]} cannot be on in a linkage with a cam: its steady state is a series of harmonics"
+        raise refusal(problem, scene.origin, f"effects.{states[0]}", remedy="Take it out, or replace the cam")
 
 
 def _check_names(scene: Scene, known: LinkageScene) -> None:

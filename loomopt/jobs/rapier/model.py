@@ -22,6 +22,7 @@ from loomopt.model.model import CycleQuantity, DesignRow, Instant, Integral, Job
 from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Floats, Node
+from loomopt.physics.effects.coulomb import TURNS
 from loomopt.physics.effects.kinds import Effect, Motion
 from loomopt.physics.mechanisms import crank_rocker, rapier_drive
 from loomopt.physics.mechanisms.dyad import Vector, dot
@@ -40,8 +41,6 @@ STROKE = "S''_stroke"
 """S'' at the hand-over, m/rad², which effects may call in."""
 HAND_OVER = "hand-over"
 """Name of the crank angle at which the head is farthest out, rad, where the program has no such number."""
-TURNS = "turns"
-"""The event of the head's turning, which effects may call in."""
 JERK_NODES = 64
 """Equidistant crank angles of the rms jerk: the mean of a smooth periodic function, right to rounding."""
 

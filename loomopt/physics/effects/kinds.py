@@ -421,10 +421,14 @@ class Check(Effect, Generic[Pose]):
 
 
 class StatePeak(NamedTuple):
-    """A figure of a state: the largest |value| over the cycle, or the least value, of what is read."""
+    """A figure of a state: the largest |value| over the cycle of what is read, or its least or its largest value.
+
+    least: whether the least value counts; signed: whether the largest one does, not the largest |value|.
+    """
 
     read: "Callable[[StateInstant], Number]"
     least: bool = False
+    signed: bool = False
 
 
 def no_oscillator(at: Inputs[None]) -> "SteadyOscillator":

@@ -77,3 +77,44 @@ def test_curves_are_those_of_the_beat_up(design):
         assert cycle_of.cycle.pieces == 2, name
     torque, chained = (each.at("peak_torque", *each.cycle.located(phi)) for each in (own, other))
     assert np.max(np.abs(torque - chained)) <= 1e-12 * np.max(np.abs(torque))
+
+
+EFFECTS = {
+    "bearing_friction": ({"coulomb": "2 N*m", "viscous": "0.05 N*m*s/rad"}, "bearing_friction"),
+    "speed_fluctuation": ({"motor_torque": "35 N*m", "slip": "0.08", "flywheel": "2 kg*m^2"}, "speed_fluctuation"),
+    "shaft_torsion": ({"stiffness": "2 MN*m/rad", "damping": "45 N*m*s/rad"}, "shaft_torsion"),
+    "soft shaft_torsion": ({"stiffness": "0.2 MN*m/rad", "damping": "90 N*m*s/rad"}, "shaft_torsion"),
+    "counterweight_inertia": ({"JS": "0.0106 kg*m^2"}, "counterweight"),
+}
+"""Effect of the beat-up with its table, and the effect of the chain that is the same."""
+OF_EFFECTS = ("fluctuation", "no_load_speed", "motor_torque_max", "shaft_peak", "twist_peak")
+DESIGNS = ({}, {"l1": 0.032, "l2": 0.083, "l3": 0.149, "l4": 0.161})
+
+
+def with_effect(name):
+    """Both jobs' scenes with an effect on."""
+    table, chained = EFFECTS[name]
+    effect = name.split()[-1]
+    table_of_chain = {"J": table["JS"]} if effect == "counterweight_inertia" else table
+    tables = {f"effects.{effect}.{key}": value for key, value in table.items()}
+    return BEATUP.update(tables), four_bar(effects={chained: table_of_chain})
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_effects_are_those_of_the_beat_up(effect, design):
+    beatup, chain = (lo.evaluate(scene, design).figures for scene in with_effect(effect))
+    pairs = SAME | {name: name for name in OF_EFFECTS if beatup.get(name) is not None}
+    assert len(pairs) > len(SAME) or effect in ("bearing_friction", "counterweight_inertia")
+    for name, other in pairs.items():
+        size = SIZES.get(name, abs(beatup[name]))
+        assert chain[other] == pytest.approx(beatup[name], rel=1e-11, abs=1e-12 * size), name
+
+
+@pytest.mark.few(2)
+@pytest.mark.parametrize("effect", [name for name in EFFECTS if name != "speed_fluctuation"])
+def test_the_optimum_with_an_effect_is_that_of_the_beat_up(effect):
+    beatup, chain = (lo.solve(scene) for scene in with_effect(effect))
+    assert (beatup.status, chain.status) == ("optimal", "optimal")
+    for name in ("M3_fdc", "peak_torque"):
+        assert chain.figures[SAME[name]] == pytest.approx(beatup.figures[name], rel=1e-8, abs=1e-8 * 745.0), name

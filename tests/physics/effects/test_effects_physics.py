@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from loomopt.jobs.beatup.model import ReedMotion
 from loomopt.maths import systems
 from loomopt.physics.balance import Given, Loaded, Pose
+from loomopt.physics.effects import pulse as pulse_load
 from loomopt.physics.effects.beatup import bearing_friction, centrifugal, gravity, resistance, rod_inertia
 from loomopt.physics.effects.kinds import Inputs
 from loomopt.physics.mechanisms import crank_rocker
@@ -149,10 +150,10 @@ def test_the_pulse_is_on_within_half_its_width_of_the_dead_centre_on_any_turn(be
     corners = resistance.corners(Inputs(systems.FLOAT, {"beta": beta}, {"pulse": pulse}, None))
     for turns in (-2, 0, 1):
         for share in (-0.499, -0.2, 0.0, 0.4, 0.499):
-            assert resistance.switch(beta + share * pulse + turns * TURN, corners) == 1.0
+            assert pulse_load.switch(beta + share * pulse + turns * TURN, corners) == 1.0
         for share in (0.001, 0.5, 0.999):
             outside = beta + pulse / 2 + share * (TURN - pulse) + turns * TURN
-            assert resistance.switch(outside, corners) == 0.0
+            assert pulse_load.switch(outside, corners) == 0.0
 
 
 def test_friction_always_opposes_the_motion():

@@ -1,10 +1,10 @@
-"""A counterweight of an output that turns: output term m r² q¨; it loads the joints, and is weighed, in its place."""
+"""A counterweight of an output that turns: output term (m r² + J) q¨; it loads the joints, and is weighed, in its place."""
 
 from dataclasses import replace
 
 from pydantic import Field
 
-from loomopt.base.quantities import Angle, Length, Mass
+from loomopt.base.quantities import Angle, Inertia, Length, Mass
 from loomopt.maths.systems import Number
 from loomopt.physics.effects.kinds import Applied, Inputs, inertia_load
 from loomopt.physics.effects.linkage import LinkagePose, opposite, resistance_of_mass
@@ -17,11 +17,13 @@ class Parameters(Table):
     mass: Mass = Field(description="mass of the counterweight")
     radius: Length = Field(description="its distance from the output's axis")
     angle: Angle | None = Field(None, description="its angle from the link's line; 180 deg, opposite, without it")
+    J: Inertia | None = Field(None, description="its inertia about its own centre of mass; 0 without it")
 
 
 def moved(at: Inputs[object]) -> Number:
-    """m r², kg·m²."""
-    return at.table["mass"] * at.table["radius"] ** 2
+    """m r² + J, kg·m²."""
+    about_axis = at.table["mass"] * at.table["radius"] ** 2
+    return about_axis + at.table["J"] if "J" in at.table else about_axis
 
 
 def applied(at: Inputs[LinkagePose]) -> list[Applied]:

@@ -5,16 +5,20 @@ M(φ − φ_event) through the samples of a table. The corners move with the eve
 """
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from pydantic import Field
 
 from loomopt.base.quantities import Force, PulseAngle, Torque
-from loomopt.maths.periodic_cubic import interval_at
 from loomopt.maths.systems import Number
-from loomopt.physics.cycle import TURN
+from loomopt.physics.effects import pulse
 from loomopt.physics.effects.kinds import Inputs, Load, LoadTable
 from loomopt.physics.effects.linkage import LinkagePose, event_angle
+from loomopt.physics.effects.pulse import Pulse
 from loomopt.physics.schema import DIGITS, Name, Table
+
+if TYPE_CHECKING:
+    from loomopt.physics.effects.kinds import SteadyOscillator
 
 PULSE, AT = "crank angle δ through which it acts, about the event", "event about which it acts"
 SAID = "CSV file of it instead: angle [deg] from the event, {}, corner"
@@ -42,36 +46,22 @@ class Sliding(Table):
 
 def corners(at: Inputs[object]) -> tuple[Number, ...]:
     """Angles where the pulse begins and ends, rad; of a table those where its intervals begin."""
-    middle = event_angle(at.values, at.table["at"])
-    if "table" in at.table:
-        return tuple(middle + at.maths.number(begin) for begin in at.table["table"].begins)
-    return middle - at.table["pulse"] / 2, middle + at.table["pulse"] / 2
+    return pulse.corners(at.maths, event_angle(at.values, at.table["at"]), at.table)
 
 
-def switch(angle: float, corners: tuple[float, ...]) -> float:
-    """1 inside the pulse and 0 outside, of a table the interval; angle in rad, anywhere on the turn."""
-    if len(corners) != 2:
-        return interval_at(angle, corners)
-    begin, end = corners
-    return 1.0 if (angle - begin) % TURN < end - begin else 0.0
+def _pulse(at: Inputs[LinkagePose]) -> Pulse:
+    largest = None if "table" in at.table else at.table["torque" if "torque" in at.table else "force"]
+    return Pulse(at.maths, largest, event_angle(at.values, at.table["at"]), at.pose.phi, at.table, at.switch)
 
 
 def force(at: Inputs[LinkagePose]) -> Number:
-    """Resistance, N·m or N, against q.
+    """Resistance, N·m or N, against q."""
+    return _pulse(at).load
 
-    The branch of the angle since the event jumps where the other formula holds: half a turn away inside the pulse, at
-    the event itself outside.
-    """
-    angle = at.pose.phi - event_angle(at.values, at.table["at"])
-    if "table" in at.table:
-        return at.table["table"].at(at.maths, angle, at.switch)
-    side = 2 * at.switch - 1
-    since = at.maths.atan2(side * at.maths.sin(angle), side * at.maths.cos(angle))
-    return (
-        at.switch
-        * at.table["torque" if "torque" in at.table else "force"]
-        * at.maths.cos(at.maths.pi * since / at.table["pulse"])
-    )
+
+def response(at: Inputs[LinkagePose], oscillator: "SteadyOscillator") -> tuple[Number, Number]:
+    """z, rad, and z˙ of an oscillator that carries the load."""
+    return _pulse(at).response(oscillator, at.pose.omega)
 
 
 EFFECT = Load(
@@ -83,7 +73,8 @@ EFFECT = Load(
     acts="output",
     force=force,
     corners=corners,
-    switch=switch,
+    response=response,
+    switch=pulse.switch,
     tabulated=LoadTable("M", "torque", "counted from the event", ("torque", "pulse")),
     examples=({"torque": "745 N*m", "pulse": "29.8 deg", "at": "front"},),
 )
