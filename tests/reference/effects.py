@@ -659,10 +659,7 @@ CASES = {
     ("linkage", "bearing_friction", "term"): "30 200",
     ("linkage", "shaft_torsion", "term"): "30 75 195",
     ("linkage", "centrifugal", "output_centrifugal"): "30",
-    **{
-        ("linkage", "speed_fluctuation", name): ""
-        for name in ("fluctuation", "no_load_speed", "motor_torque_max")
-    },
+    **{("linkage", "speed_fluctuation", name): "" for name in ("fluctuation", "no_load_speed", "motor_torque_max")},
     ("shedding", "weight", "term"): "30",
     ("shedding", "warp_tension", "term"): "30 90 150 200 290 330",
     ("shedding", "inertia", "term"): "30 200",

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt.jobs.linkage.model import Linkage
-from loomopt.jobs.linkage.model import linkage_of
+from loomopt.jobs.linkage.model import Linkage, linkage_of
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
 from loomopt.model.sampling import Sampler

@@ -10,8 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
-from loomopt.jobs.linkage.model import LinkageMotion, Output, end_of_rest, event_value
-from loomopt.jobs.linkage.model import linkage_of
+from loomopt.jobs.linkage.model import LinkageMotion, Output, end_of_rest, event_value, linkage_of
 from loomopt.jobs.linkage.scene import read_tables
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT, Number

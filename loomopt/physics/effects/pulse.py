@@ -64,9 +64,7 @@ class Pulse(NamedTuple):
         holds.
         """
         if "table" in self.table:
-            return _tabulated(
-                self.maths, oscillator, self.table["table"], self.phi - self.event, omega, self.switch
-            )
+            return _tabulated(self.maths, oscillator, self.table["table"], self.phi - self.event, omega, self.switch)
         width, inside = self.table["pulse"], self.switch
         frequency, half = self.maths.pi * omega / width, width / (2 * omega)
         along, across = (self.largest * share for share in oscillator.steady(frequency))

@@ -1,4 +1,4 @@
-"""A counterweight of an output that turns: output term (m r² + J) q¨; it loads the joints, and is weighed, in its place."""
+"""A counterweight of an output that turns: output term (m r² + J) q¨; it loads the joints, and is weighed there."""
 
 from dataclasses import replace
 

@@ -37,7 +37,9 @@ pulse has faded within 0.1 degrees there."""
 class Parameters(Table):
     """Values of the shaft between the output's link and what it carries."""
 
-    stiffness: PositiveRotaryStiffness = Field(description="torque that twists what the shaft carries against the output's link by a radian")
+    stiffness: PositiveRotaryStiffness = Field(
+        description="torque that twists what the shaft carries against the output's link by a radian"
+    )
     damping: PositiveRotaryDamping = Field(
         description="torque against the speed of the twist; without any the ringing would never end"
     )
