@@ -88,7 +88,13 @@ class Harmonics:
 class Shaft:
     """What a shaft that twists carries; speed: rad/s; carried: its inertia, kg·m²; acceleration(phi): q¨, rad/s²."""
 
-    speed = SPEED
+    speed, front, carried = SPEED, MP.mpf(0), MP.mpf(1)
+
+    def acceleration(self, phi):
+        raise NotImplementedError
+
+    def resistance(self, own, phi):
+        raise NotImplementedError
 
     def shaft_torsion(self, own, phi):
         """Return k z + c z˙ by convolution: all that ever acted on the reed, faded and turned by e^(λ(t − s)).
@@ -125,6 +131,7 @@ class Reed(Shaft):
     def __init__(self, design):
         mm = {**BEATUP, **(COUNTERWEIGHT if design == "other" else {})}
         self.v = {name: MP.mpf(value) / 1000 for name, value in mm.items()}
+        self.front, self.carried = self.beta, MP.mpf(REED["J4"]) + self.v["m4e"] * self.v["r4e"] ** 2
 
     def positions(self, phi):
         """Return B, C and ψ by the law of cosines."""
@@ -142,14 +149,6 @@ class Reed(Shaft):
     def motion(self, phi):
         """Return q˙ and q¨, q = −ψ."""
         return tuple(-slope(lambda p: self.positions(p)[2], phi, order) * SPEED**order for order in (1, 2))
-
-    @property
-    def front(self):
-        return self.beta
-
-    @property
-    def carried(self):
-        return MP.mpf(REED["J4"]) + self.v["m4e"] * self.v["r4e"] ** 2
 
     def acceleration(self, phi):
         return self.motion(phi)[1]
@@ -207,7 +206,7 @@ class Reed(Shaft):
 
     def shaking_moment(self, own, phi):
         """Return what turns the frame about A: of the reed's mass in its centre, and of its inertia about that."""
-        v, inertia = self.v, MP.mpf(REED["J4"]) + self.v["m4e"] * self.v["r4e"] ** 2
+        v, inertia = self.v, self.carried
 
         def centre(at):
             return v["l4"] + MP.expj(self.positions(at)[2])
@@ -221,8 +220,7 @@ class Reed(Shaft):
         Of the packaged scene: only the reed has mass, and the cloth pushes as a couple.
         """
         v, (B, C, _) = self.v, self.positions(phi)
-        inertia = MP.mpf(REED["J4"]) + v["m4e"] * v["r4e"] ** 2
-        couple = inertia * self.motion(phi)[1] + self.resistance({"pulse": number(REED["pulse"])}, phi)
+        couple = self.carried * self.motion(phi)[1] + self.resistance({"pulse": number(REED["pulse"])}, phi)
 
         def centre(at):
             return v["l4"] + MP.expj(self.positions(at)[2])

@@ -6,6 +6,7 @@ Of the beat-up: reed J4 alone on the rocker, resistance M0 over the pulse δ; SI
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -39,7 +40,7 @@ class Machine(NamedTuple):
 
     speed: float
     pulse: tuple
-    changed: object
+    changed: Callable[[tuple[float, float], float, float, float], float]
 
 
 class Turn(NamedTuple):

@@ -9,7 +9,7 @@ from support.linkage_scenes import four_bar
 import loomopt as lo
 from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
-from loomopt.jobs.linkage.program import linkage_of
+from loomopt.jobs.linkage.model import linkage_of
 from loomopt.maths.systems import FLOAT
 from loomopt.model.objectives import opposite
 from loomopt.picture.job_views import Span

@@ -88,7 +88,7 @@ EFFECTS = {
 }
 """Effect of the beat-up with its table, and the effect of the chain that is the same."""
 OF_EFFECTS = ("fluctuation", "no_load_speed", "motor_torque_max", "shaft_peak", "twist_peak")
-DESIGNS = ({}, {"l1": 0.032, "l2": 0.083, "l3": 0.149, "l4": 0.161})
+DESIGNS: tuple[dict[str, float], ...] = ({}, {"l1": 0.032, "l2": 0.083, "l3": 0.149, "l4": 0.161})
 
 
 def with_effect(name):

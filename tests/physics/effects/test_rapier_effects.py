@@ -13,6 +13,7 @@ from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.physics.balance import Pose
 from loomopt.physics.cycle import Node
+from loomopt.physics.effects import coulomb
 from loomopt.physics.effects.kinds import Inputs, Motion
 from loomopt.physics.effects.rapier import head_inertia, tape_friction
 
@@ -54,12 +55,12 @@ def test_the_direction_changes_at_every_turn_the_first_of_them_outward(corners):
         for k, begin in enumerate(turned):
             width = (turned[(k + 1) % len(turned)] - begin) % TURN
             for turns in (-1, 0, 2):
-                assert tape_friction.direction(begin + width / 2 + turns * TURN, turned) == (-1.0) ** k
+                assert coulomb.direction(begin + width / 2 + turns * TURN, turned) == (-1.0) ** k
 
 
 def test_a_head_that_never_turns_has_no_friction_and_no_corner():
-    assert tape_friction.direction(1.0, ()) == 0.0
-    assert tape_friction.corners(Inputs(systems.FLOAT, {"turns": ()}, {"force": 15.0}, None)) == ()
+    assert coulomb.direction(1.0, ()) == 0.0
+    assert coulomb.corners(Inputs(systems.FLOAT, {"turns": ()}, {"force": 15.0}, None)) == ()
 
 
 def paths(sampled):
