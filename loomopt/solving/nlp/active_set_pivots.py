@@ -17,6 +17,7 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CONVERGED, SAME_NODE
 from loomopt.solving.nlp.ipopt import Calls
+from loomopt.solving.nlp.newton import least_norm, newton_onto_rows
 from loomopt.solving.nlp.point import Point
 from loomopt.solving.nlp.rows import BindingRows, Flags, Multipliers
 
@@ -150,17 +151,19 @@ def _newton_onto_active(problem: _Problem, step: _Step | None) -> _Intersection 
     """Newton's method with least change onto the intersection of the active limits; None if there is none."""
     if step is None:
         return None
-    x, active = step
-    for _ in range(PIVOT_NEWTON_STEPS):
-        excess, slopes = _limits(problem, x)
-        if not np.all(np.isfinite(slopes)):
-            return None
-        change = _least_norm(slopes[active], -excess[active])
-        x, excess = x + change, excess + slopes @ change
-        if np.abs(change).max() <= PIVOT_STEP:
-            converged = np.abs(excess[active]).max(initial=0.0) <= PIVOT_RESIDUAL
-            return _Intersection(x, active, excess, slopes) if converged else None
-    return None
+    active, limits = step.active, list[tuple[Floats, Floats]]()
+
+    def read(x: Floats) -> tuple[Floats, Floats]:
+        limits.append(_limits(problem, x))
+        excess, slopes = limits[-1]
+        return excess[active], slopes[active]
+
+    end = newton_onto_rows(read, step.x, steps=PIVOT_NEWTON_STEPS, done=PIVOT_STEP, rank=PIVOT_RANK)
+    excess, slopes = limits[-1]
+    excess = excess + slopes @ end.step
+    if not (end.converged and np.all(np.isfinite(slopes)) and np.all(np.abs(excess[active]) <= PIVOT_RESIDUAL)):
+        return None
+    return _Intersection(end.x, active, excess, slopes)
 
 
 def _drop_slackest(problem: _Problem, step: _Step | None) -> _Step | None:
@@ -174,7 +177,7 @@ def _drop_slackest(problem: _Problem, step: _Step | None) -> _Step | None:
     active = step.active
     if not np.all(np.isfinite(slopes[active])):
         return None
-    room = excess + slopes @ _least_norm(slopes[active], -excess[active])
+    room = excess + slopes @ least_norm(slopes[active], -excess[active], PIVOT_RANK)
     slackest = int(np.argmin(np.where(active & ~problem.firm, room, np.inf)))
     if not active[slackest] or room[slackest] >= -PIVOT_RESIDUAL:
         return None
@@ -193,7 +196,7 @@ def _limits(problem: _Problem, x: Floats) -> tuple[Floats, Floats]:
 def _with_multipliers(problem: _Problem, intersection: _Intersection) -> _PricedIntersection:
     """The intersection with the least-squares multipliers of the active limits."""
     gradient = np.asarray(problem.nlp.gradient(intersection.x, problem.arguments["p"])[1]).ravel()
-    prices = _least_norm(intersection.slopes[intersection.places].T, -gradient)
+    prices = least_norm(intersection.slopes[intersection.places].T, -gradient, PIVOT_RANK)
     return _PricedIntersection(intersection, prices, gradient + prices @ intersection.slopes[intersection.places])
 
 
@@ -226,7 +229,7 @@ def _entering_step(problem: _Problem, priced: _PricedIntersection) -> _Step | No
     """Active set with the most violated limit, in place of the limit whose multiplier reaches zero first."""
     intersection, worst, active = priced.intersection, _worst(priced.intersection), priced.intersection.active.copy()
     slopes = intersection.slopes[intersection.places]
-    shares = _least_norm(slopes.T, intersection.slopes[worst])
+    shares = least_norm(slopes.T, intersection.slopes[worst], PIVOT_RANK)
     if np.abs(intersection.slopes[worst] - shares @ slopes).max() <= PIVOT_DEPENDENT:
         candidates = ~problem.firm[intersection.places] & (shares > PIVOT_SLOPE)
         if not candidates.any():
@@ -241,8 +244,8 @@ def _leaving_step(problem: _Problem, priced: _PricedIntersection) -> _Step | Non
     """Step away from the active limit with the most negative multiplier; None where nothing ends it."""
     intersection, active = priced.intersection, priced.intersection.active.copy()
     loosest = int(np.argmin(np.where(problem.firm[intersection.places], np.inf, priced.prices)))
-    direction = _least_norm(
-        intersection.slopes[intersection.places], -1.0 * (np.arange(len(intersection.places)) == loosest)
+    direction = least_norm(
+        intersection.slopes[intersection.places], -1.0 * (np.arange(len(intersection.places)) == loosest), PIVOT_RANK
     )
     curvature = direction @ _curvature(problem, priced) @ direction
     active[intersection.places[loosest]] = False
@@ -271,11 +274,6 @@ def _curvature(problem: _Problem, priced: _PricedIntersection) -> Floats:
     upper = np.asarray(problem.nlp.curvature(priced.intersection.x, problem.arguments["p"], 1.0, rows))
     full: Floats = upper + upper.T - np.diag(np.diag(upper))
     return full
-
-
-def _least_norm(matrix: Floats, target: Floats) -> Floats:
-    """Shortest vector that the matrix maps nearest to a target."""
-    return np.asarray(np.linalg.lstsq(matrix, target, rcond=PIVOT_RANK)[0], dtype=np.float64)
 
 
 FOLLOW_FARTHEST, FOLLOW_ROUNDS = 0.2, 24

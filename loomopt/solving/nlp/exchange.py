@@ -30,6 +30,7 @@ from loomopt.physics.tolerances import (
 )
 from loomopt.solving.nlp.active_set_pivots import follow_neighbour
 from loomopt.solving.nlp.ipopt import Calls, IpoptAnswer, run
+from loomopt.solving.nlp.newton import newton_onto_rows
 from loomopt.solving.nlp.point import BEATEN, SUCCESS, Elastic, Known, Point, Settings, sampler_at
 from loomopt.solving.nlp.rows import BindingRows, Multipliers, RowFamily, binding
 from loomopt.solving.nlp.transcribe import Transcription
@@ -115,15 +116,14 @@ def _newton_onto_rows(
 ) -> Floats:
     """Newton steps of least change from `start` (scaled) onto rows, along the free variables."""
     trial = start.copy()
-    for _ in range(POLISH_STEPS):
+
+    def read(moved: Floats) -> tuple[Floats, Floats]:
+        trial[free] = moved
         values, slopes = jacobian(trial, p)
-        residual = np.asarray(values).ravel()[rows]
-        if not residual.size or not free.any() or not np.all(np.isfinite(residual)):
-            break
-        step = np.linalg.lstsq(np.asarray(slopes)[np.ix_(rows, free)], -residual, rcond=POLISH_RANK)[0]
-        trial[free] += step
-        if np.abs(step).max() <= POLISH_DONE:
-            break
+        return np.asarray(values).ravel()[rows], np.asarray(slopes)[np.ix_(rows, free)]
+
+    end = newton_onto_rows(read, start[free], steps=POLISH_STEPS, done=POLISH_DONE, rank=POLISH_RANK)
+    trial[free] = end.x
     return trial
 
 
