@@ -134,6 +134,8 @@ class DesignRow(NamedTuple):
     event: str = ""
     loaded: bool = True
     """Whether one at an event reads the sum of the loads on the output: without any there is none."""
+    structure: Hashable = None
+    """Key that distinguishes formulas of one name."""
 
 
 class Integral(NamedTuple):
@@ -388,7 +390,8 @@ class JobModel:
         """Key of the model's formulas: equal for models with the same formulas."""
         means = tuple((mean.name, len(mean.angles), mean.parts) for mean in self.integrals)
         arcs = tuple((arc.name, arc.structure) for arc in self.arcs)
-        structure = self.kinematics.structure, arcs, means, tuple(self.own_quantities), tuple(self.own_rows)
+        rows = tuple((name, row.structure) for name, row in self.own_rows.items())
+        structure = self.kinematics.structure, arcs, means, tuple(self.own_quantities), rows
         return structure, self.effects, self.words, self.known
 
     @lazy

@@ -18,6 +18,7 @@ from loomopt.model.session import current
 from loomopt.physics.balance import Given, total
 from loomopt.physics.cycle import Cycle, Floats, Node, Pieces, Where
 from loomopt.physics.schema import Values
+from loomopt.physics.tolerances import SAME_ANGLE
 
 GAUSS_NODES = 32
 """Nodes of a mean on each piece: of an analytic formula the error falls by a constant factor a node. Packaged means are
@@ -156,7 +157,8 @@ def fixed_nodes(cycle: Cycle, integral: Integral) -> Node:
 
 def quadrature(cycle: Cycle, integral: Integral) -> tuple[Pieces, Floats, Floats]:
     """Nodes (pieces, u) and weights in u of a mean over pieces of the cycle."""
-    active = np.flatnonzero(cycle.on(integral.where))
+    # Between two corners at one angle there is nothing, and which of them is first is rounding.
+    active = np.flatnonzero(cycle.on(integral.where) & (np.diff(cycle.starts) > SAME_ANGLE))
     if integral.where and isinstance(integral.where[1], tuple) and integral.parts == 1:
         rules = [gauss(_enough(width)) for width in np.diff(cycle.starts)[active].tolist()]
         pieces = np.concatenate([np.full(len(u), piece) for piece, (u, _) in zip(active, rules, strict=True)])

@@ -149,6 +149,14 @@ class SixBar:
         drive = drive - GRAVITY * (np.exp(-1j * down) * self.lifted.over(1)).real
         return output * self.q.over(1) + drive
 
+    @property
+    def pulse_rms(self):
+        """The rms torque of the sley over the pulse of the cloth, by Gauss's rule."""
+        nodes, weights = np.polynomial.legendre.leggauss(40)
+        bend = self.q.at(self.front + nodes * self.PULSE / 2, 2)
+        torque = self.inertia * bend * self.OMEGA**2 + self.CLOTH * np.cos(np.pi * nodes / 2)
+        return float(np.sqrt(weights @ torque**2 / 2))
+
     def travel(self, end):
         """Return how far from the rear the sley is from 132° after the front to `end` after it."""
         window = self.front + np.linspace(np.radians(132), end, WITHIN)

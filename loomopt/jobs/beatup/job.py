@@ -12,6 +12,8 @@ from loomopt.jobs.beatup.model import FRONT, LENGTHS
 from loomopt.jobs.beatup.program import BALANCE, BeatupTask, family_sentence, member_balance, model
 from loomopt.jobs.beatup.scene import RESISTED, SCHEMA, VARIABLES, RetrofitTarget, TorqueTarget, fault
 from loomopt.maths.systems import Number
+from loomopt.model import change
+from loomopt.model.change import CHANGE
 from loomopt.model.curves import Columns
 from loomopt.model.model import JobModel
 from loomopt.model.objectives import opposite
@@ -133,13 +135,7 @@ class Beatup(Job):
         sampled.search(called)
         figures |= {name: signs[name] * sampled.peak(name) for name in called}
         weights = scene.table(RetrofitTarget).weights
-        widths = {name: limited[name][1] - limited[name][0] for name in VARIABLES}
-        changes = [
-            weights.get(name, 1.0) * ((sampled.values[name] - old) / widths[name]) ** 2
-            for name, old in self.today(scene).items()
-            if widths.get(name, 0.0) > 0.0
-        ]
-        figures["change"] = sum(changes)
+        figures[CHANGE] = change.figure(VARIABLES, sampled.values, self.today(scene), limited, weights)
         return figures
 
     def peaks(self, model: JobModel) -> dict[str, str]:

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 from loomopt.base.records import lazy
 from loomopt.maths.systems import Maths, Number
-from loomopt.model import drive
+from loomopt.model import change, drive
+from loomopt.model.change import CHANGE
 from loomopt.model.kinematics import Arcs, Group, four_bar
 from loomopt.model.model import CycleQuantity, DesignRow, Instant, Integral, JobModel
 from loomopt.physics import balance
@@ -23,11 +24,6 @@ from loomopt.physics.schema import Values
 
 FRONT, REAR = "front dead centre", "rear dead centre"
 LENGTHS = ("l1", "l2", "l3", "l4")
-
-
-def today(name: str) -> str:
-    """Name of today's value of a number among the numbers of a scene."""
-    return f"today.{name}"
 
 
 @dataclass(frozen=True)
@@ -169,12 +165,6 @@ def inertia(at: Instant) -> Number:
     )
 
 
-def change(names: Collection[str], at: Instant) -> Number:
-    """Σ weight ((x − x_today)/bound width)², the retrofit's norm."""
-    v = at.values
-    return balance.total([v[f"weight.{x}"] * ((v[x] - v[today(x)]) / v[f"width.{x}"]) ** 2 for x in names])
-
-
 def _front(at: Instant) -> Motion:
     return at.model.kinematics.still(at.maths, at.given, FRONT, {})
 
@@ -205,7 +195,7 @@ def model(
     """
     reed = any("s" in effect.reads for effect in effects if isinstance(effect, Load) and effect.moved)
     rows = ROWS | ({"J4": DesignRow(inertia)} if reed else {})
-    rows |= {"change": DesignRow(functools.partial(change, changing))} if changing else {}
+    rows |= {CHANGE: change.row(changing)} if changing else {}
     square = {"M3_square": CycleQuantity(lambda at: at.force**2, figure=False)}
     resisted = any(effect.name == pulse[0] for effect in effects)
     means = (Integral("pulse_mean_square", "pulse_rms", "M3_square", pulse),) if resisted else ()

@@ -7,9 +7,11 @@ from typing import NamedTuple, final
 from loomopt.base.records import Frozen, lazy
 from loomopt.jobs.base import Ends, Task, bound_limits, distinct, ends, size_read, steady
 from loomopt.jobs.beatup import model as beatup
-from loomopt.jobs.beatup.model import LENGTHS, today
+from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, BeatupTarget, RetrofitTarget, TorqueTarget
 from loomopt.maths.systems import FLOAT
+from loomopt.model import change
+from loomopt.model.change import today
 from loomopt.model.drive import TORQUE
 from loomopt.model.limits import Limit, RatioLimit
 from loomopt.model.model import JobModel
@@ -147,13 +149,8 @@ class BeatupTask(Task):
         values = {name: value for name, value in self.known.items() if name not in taken}
         if not self.changes:
             return values
-        # Today's values, bound widths and weights of the retrofit's norm; a fixed variable weighs nothing.
         weights = self.scene.table(RetrofitTarget).weights
-        for name in VARIABLES:
-            width = self.limited[name][1] - self.limited[name][0]
-            values |= {today(name): self.known[name], f"width.{name}": width or 1.0}
-            values[f"weight.{name}"] = weights.get(name, 1.0) if width else 0.0
-        return values
+        return values | change.parameters(VARIABLES, self.known, self.limited, weights)
 
     # Limits.
 

@@ -5,10 +5,11 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
-from loomopt.jobs.beatup.model import FRONT, REAR, today
+from loomopt.jobs.beatup.model import FRONT, REAR
 from loomopt.jobs.beatup.scene import VARIABLES
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
+from loomopt.model.change import today
 from loomopt.model.curves import tops
 from loomopt.model.model import JobModel
 from loomopt.model.numbers import table_remarks

@@ -12,6 +12,8 @@ from loomopt.jobs.linkage.program import LinkageTask, model
 from loomopt.maths import periodic_cubic
 from loomopt.maths.periodic_cubic import TURN
 from loomopt.maths.systems import Number
+from loomopt.model import change
+from loomopt.model.change import CHANGE
 from loomopt.model.curves import Columns
 from loomopt.model.model import Formula, Instant, JobModel
 from loomopt.model.program import Numbers
@@ -54,6 +56,9 @@ class LinkageJob(Job):
         peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in names}
         sampled.search(tuple(peaks.values()))
         figures = base.static_figures(scene, sampled, names)
+        if CHANGE in figures:
+            task = LinkageTask(scene)
+            figures[CHANGE] = change.figure(task.changing, sampled.values, task.known, task.limited, task.weights)
         return figures | {name: self.read(name, sampled.peak(quantity)) for name, quantity in peaks.items()}
 
     def read(self, name: str, peak: Number) -> Number:

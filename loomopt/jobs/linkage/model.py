@@ -20,9 +20,9 @@ from loomopt.model import drive
 from loomopt.model.kinematics import Arcs, Followed, Following, Group, Kinematics
 from loomopt.model.model import CycleQuantity, DesignRow, Instant, Integral, JobModel
 from loomopt.physics.balance import Given
-from loomopt.physics.cycle import TURN, Floats, Node
+from loomopt.physics.cycle import TURN, Floats, Node, Where
 from loomopt.physics.effects.coulomb import TURNS
-from loomopt.physics.effects.kinds import Effect, Load, Motion
+from loomopt.physics.effects.kinds import Effect, Load, Motion, State
 from loomopt.physics.mechanisms import chain
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.chain import Chain, Part, Ref, cam_switch
@@ -819,6 +819,44 @@ def _window_travel(window: Window, at: Instant) -> Number:
     return at.node.switch[window.switch] * at.pose.since(_at(at, window.level))
 
 
+class Rms(NamedTuple):
+    """A figure that is the rms of the output's jerk, or of the force or moment there, over part of the cycle.
+
+    quantity: "jerk", "force" or "moment"; over: the window, or the load with a pulse, that is meant; where: its pieces.
+    """
+
+    quantity: str
+    over: str
+    where: Where
+
+    @property
+    def name(self) -> str:
+        """The figure's name."""
+        return f"{self.quantity}_rms.{self.over}"
+
+    @property
+    def mean(self) -> str:
+        """The name of the mean square."""
+        return f"{self.quantity}_mean_square.{self.over}"
+
+    @property
+    def square(self) -> str:
+        """The name of the square of which the mean is taken."""
+        return f"{self.quantity}_square"
+
+    def integral(self) -> Integral:
+        """Its mean square over the cycle."""
+        return Integral(self.mean, self.name, self.square, self.where, parts=SMOOTH)
+
+
+SQUARES = {
+    "jerk": CycleQuantity(lambda at: at.pose.q3**2, figure=False),
+    "force": CycleQuantity(lambda at: at.force**2, figure=False),
+}
+SQUARES["moment"] = SQUARES["force"]
+"""Quantities of which a mean square is taken, by name."""
+
+
 PATH_SQUARE, PATH = "path_mean_square", "path_rms"
 
 
@@ -864,8 +902,9 @@ def model(
     known: frozenset[str],
     reaches: tuple[Reach, ...] = (),
     windows: tuple[Window, ...] = (),
+    rms: tuple[Rms, ...] = (),
 ) -> JobModel:
-    """Linkage with effects; known: names of scene numbers that are given."""
+    """Linkage with effects; known: names of scene numbers that are given; reaches, rms: figures that are read."""
     quantities, rows, means = dict(MOTION), dict[str, DesignRow](), list[Integral]()
     driven = drive.quantities(effects, known)
     if driven:
@@ -874,6 +913,11 @@ def model(
         parted = linkage.chain.cams or any(isinstance(effect, Load) and effect.corners for effect in effects)
         means.append(Integral(TORQUE_SQUARE, RMS_TORQUE, "torque_square", parts=1 if parted else SMOOTH))
     quantities |= {reach.name: CycleQuantity(reach.value, figure=False, signed=True) for reach in reaches}
+    loaded = any(isinstance(effect, Load | State) and effect.acts == "output" for effect in effects)
+    switches = {effect.name for effect in effects} | {window.switch for window in windows}
+    rms = tuple(figure for figure in rms if (loaded or figure.quantity == "jerk") and figure.where[0] in switches)
+    quantities |= {figure.square: SQUARES[figure.quantity] for figure in rms}
+    means += [figure.integral() for figure in rms]
     for window in windows:
         quantities[f"travel.{window.name}"] = CycleQuantity(functools.partial(_window_travel, window))
     for name, event in linkage.loads.items():

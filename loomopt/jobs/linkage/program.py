@@ -16,19 +16,20 @@ from loomopt.jobs.linkage.model import (
     OBLIQUITY,
     PATH,
     PATH_SQUARE,
-    RMS_TORQUE,
-    TORQUE_SQUARE,
     Path,
     linkage_of,
 )
-from loomopt.jobs.linkage.scene import LinkageTarget, path, reaches, read_tables
+from loomopt.jobs.linkage.scene import PULSED, LinkageTarget, path, reaches, read_tables, rms_figures
 from loomopt.maths.systems import FLOAT
+from loomopt.model import change
 from loomopt.model.axes import opposing
+from loomopt.model.change import CHANGE
 from loomopt.model.limits import CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
-from loomopt.model.numbers import bounds, numbers, words
+from loomopt.model.numbers import bounds, curves, numbers, words
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value, opposite
 from loomopt.model.program import Move, Numbers
+from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Node
 from loomopt.scenes.scene import Scene
 
@@ -42,9 +43,10 @@ def model(scene: Scene, target: str = "", design: Numbers | None = None) -> JobM
     pathed = path(scene, target)
     linkage = replace(known.linkage, path=pathed) if pathed else known.linkage
     values = numbers(scene)
-    physics = linkages.model(
-        linkage, scene.active, words(scene), frozenset(values), reaches(scene.document, linkage.chain), known.windows
-    )
+    curve = next((pulse for (name, _), pulse in curves(scene).items() if name == PULSED), None)
+    rms = rms_figures(known, scene.document, curve.acting if curve else 1.0)
+    reached = reaches(scene.document, linkage.chain)
+    physics = linkages.model(linkage, scene.active, words(scene), frozenset(values), reached, known.windows, rms)
     return steady(scene, physics, values, design)
 
 
@@ -69,7 +71,38 @@ class LinkageTask(Task):
                 model = opposing(model, (full,))
             elif sense == "most" and model.has_row(name):
                 model = opposing(model, (name,))
+        if self.changes:
+            model = replace(model, own_rows={**model.own_rows, CHANGE: change.row(self.changing)})
         return model
+
+    @lazy
+    def sampler(self) -> Sampler:
+        """Today's linkage, without the change from it."""
+        return sampled(self.plain_model, self.known)
+
+    @property
+    def changes(self) -> bool:
+        """Whether the change from today is read."""
+        return CHANGE in {*self.traded, *(name for name, _ in self.levels)}
+
+    @lazy
+    def changing(self) -> tuple[str, ...]:
+        """Numbers whose change from today counts, by full name: those with bounds."""
+        return tuple(dict.fromkeys(self.scene.full(name) for name in self.scene.bounds))
+
+    @lazy
+    def weights(self) -> dict[str, float]:
+        """Weights of their changes, by full name."""
+        table = self.scene.targets.get(self.target)
+        given = table.weights if isinstance(table, LinkageTarget) else {}
+        return {self.scene.full(name): weight for name, weight in given.items()}
+
+    def parameters(self) -> dict[str, float]:
+        """Every known number that is no variable, and what the change from today reads."""
+        values = super().parameters()
+        if self.changes:
+            values |= change.parameters(self.changing, self.known, self.limited, self.weights)
+        return values
 
     @property
     def table(self) -> LinkageTarget:
@@ -161,10 +194,9 @@ class LinkageTask(Task):
         size = self.figure_size(name) if self._is_figure(name) else self.size(name)
         if name.startswith("mu."):
             return Peak(name, f"{name[3:]}.{OBLIQUITY}", 1.0)
-        if name == RMS_TORQUE:
-            return Value(name, TORQUE_SQUARE, size**2, power=2)
-        if name == PATH:
-            return Value(name, PATH_SQUARE, size**2, power=2)
+        squares = {mean.root: mean.name for mean in self.model.integrals} | {PATH: PATH_SQUARE}
+        if name in squares:
+            return Value(name, squares[name], size**2, power=2)
         if self.model.has_quantity(name):
             square = self.model.square(name)
             return Peak(name, square, size**2, power=2) if square else Peak(name, name, size)
@@ -196,7 +228,7 @@ class LinkageTask(Task):
 
         Where today's is only rounding, as of a machine that is balanced already, the largest figure of its kind.
         """
-        if name.startswith(("mu.", "angle.")):
+        if name == CHANGE or name.startswith(("mu.", "angle.")):
             return 1.0
         if name in self._loads:
             return self._force(self._loads[name])

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, create_model
 
 from loomopt.base.errors import Faults, refusal, unknown
-from loomopt.base.quantities import Angle, PositiveLength, PositiveNumber, Speed, read
+from loomopt.base.quantities import Angle, PositiveLength, PositiveNumber, PureNumber, Speed, read
 from loomopt.base.units import QuantityError, ShowValue, usual
 from loomopt.jobs.linkage import parts
 from loomopt.jobs.linkage.model import (
@@ -24,6 +24,7 @@ from loomopt.jobs.linkage.model import (
     Output,
     Path,
     Reach,
+    Rms,
     Turn,
     UnfoundError,
     Window,
@@ -34,8 +35,9 @@ from loomopt.jobs.linkage.model import (
 from loomopt.jobs.linkage.parts import KEYS, SENSES, Json, NumberKey, Numbers, WordKey
 from loomopt.maths import systems
 from loomopt.model import drive
+from loomopt.model.change import CHANGE
 from loomopt.physics.balance import Given
-from loomopt.physics.cycle import Node
+from loomopt.physics.cycle import Node, Where
 from loomopt.physics.effects import kinds
 from loomopt.physics.mechanisms import chain, chain_forces
 from loomopt.physics.mechanisms.chain import Chain
@@ -62,6 +64,7 @@ class LinkageTarget(TargetTable):
         None, description="CSV file of the path: x [mm], y [mm], and phi [deg] where its timing is given"
     )
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
+    weights: dict[str, PureNumber] = Field({}, description="number → weight of its change from today, 1 without it")
 
     @property
     def sought(self) -> tuple[tuple[str, str], ...]:
@@ -270,21 +273,37 @@ def read_tables(document: Mapping[str, Any]) -> LinkageScene:
 # Figures, targets and axes.
 
 
+def figures_read(document: Mapping[str, Any]) -> set[str]:
+    """Figures that limits or targets name, by their full names."""
+    names, limits = set(_target_names(document, "least", "most")), document.get("limits", {})
+    for name, limit in limits.items() if isinstance(limits, Mapping) else ():
+        inner = [f"{name}.{key}" for key in limit] if isinstance(limit, Mapping) else []
+        names |= {name, *inner}
+    return names
+
+
 def reaches(document: Mapping[str, Any], linked: Chain) -> tuple[Reach, ...]:
     """Reaches of joints that limits or targets name."""
-    limits = document.get("limits", {})
-    named = list(limits) if isinstance(limits, Mapping) else []
-    for name in REACHES:
-        joint_limits = limits.get(name) if isinstance(limits, Mapping) else None
-        named += [f"{name}.{joint}" for joint in joint_limits] if isinstance(joint_limits, Mapping) else []
-    named += _target_names(document, "least", "most")
     joints = parts.kinds_of(linked)[0]
-    possible = {
-        reach.name: reach
-        for joint in joints
-        for reach in (Reach(joint, name[0], 1 if name.endswith("max") else -1) for name in REACHES)
-    }
-    return tuple(possible[name] for name in dict.fromkeys(named) if name in possible)
+    possible = [Reach(joint, name[0], 1 if name.endswith("max") else -1) for joint in joints for name in REACHES]
+    names = figures_read(document)
+    return tuple(reach for reach in possible if reach.name in names)
+
+
+PULSED = "resistance"
+"""The effect over whose pulse a mean square may be taken."""
+
+
+def rms_figures(
+    known: LinkageScene, document: Mapping[str, Any], acting: tuple[float, ...] | float = 1.0
+) -> tuple[Rms, ...]:
+    """Figures of mean squares that limits or targets name; acting: the switches with which the resistance acts."""
+    load = "force" if known.linkage.output.slides else "moment"
+    places: dict[str, Where] = {window.name: (window.switch, 1.0) for window in known.windows}
+    places = {PULSED: (PULSED, acting)} | places
+    possible = [Rms(quantity, over, where) for over, where in places.items() for quantity in (load, "jerk")]
+    names = figures_read(document)
+    return tuple(rms for rms in possible if rms.name in names)
 
 
 def figures(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Figure]:
@@ -306,11 +325,16 @@ def figures(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Figur
     for window in known.windows:
         text = f"largest travel from {window.level} over window {window.name}"
         figure_list.append(Figure(f"travel.{window.name}", travel, text, sides=("max",)))
+    for rms in rms_figures(known, document):
+        text, kind = ("jerk", rates[2]) if rms.quantity == "jerk" else (load, load)
+        figure_list.append(Figure(rms.name, kind, f"rms {text} of the output over {rms.over}", sides=("max",)))
     for reach in reaches(document, linkage.chain):
         side, text = ("max", "largest") if reach.sign > 0 else ("min", "least")
         figure_list.append(Figure(reach.name, "length", f"{text} {reach.axis} of {reach.joint}", sides=(side,)))
     if _has_path(document):
         figure_list.append(Figure(PATH, "length", "rms distance of the point from its path", sides=("max",)))
+    if _reads_change(document):
+        figure_list.append(Figure(CHANGE, "number", "change from today, in bound widths squared", sides=()))
     return {figure.name: figure for figure in figure_list}
 
 
@@ -319,6 +343,11 @@ def _has_path(document: Mapping[str, Any]) -> bool:
     return isinstance(targets, Mapping) and any(
         isinstance(table, Mapping) and table.get("point") is not None for table in targets.values()
     )
+
+
+def _reads_change(document: Mapping[str, Any]) -> bool:
+    """Whether a target reads the change from today."""
+    return CHANGE in _target_names(document, "least")
 
 
 def axes(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Axis]:
@@ -336,6 +365,12 @@ def axes(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Axis]:
         ),
         *(Axis(name, load, form="magnitude", senses=("least",)) for name in known.linkage.loads),
     ]
+    jerk = "travel jerk" if known.linkage.output.slides else "number"
+    for rms in rms_figures(known, document):
+        kind = jerk if rms.quantity == "jerk" else load
+        axis_list.append(Axis(rms.name, kind, (rms.mean,), senses=("least",), power=2))
+    if _reads_change(document):
+        axis_list.append(Axis(CHANGE, "number", senses=("least",)))
     if _has_path(document):
         axis_list.append(Axis(PATH, "length", ("path_mean_square",), senses=("least",), power=2))
     # A number of which a target seeks the most is worth its most where it is traded, too.

@@ -32,7 +32,7 @@ from loomopt.solving.nlp.active_set_pivots import follow_neighbour
 from loomopt.solving.nlp.ipopt import Calls, IpoptAnswer, run
 from loomopt.solving.nlp.newton import newton_onto_rows
 from loomopt.solving.nlp.point import BEATEN, SUCCESS, Elastic, Known, Point, Settings, sampler_at
-from loomopt.solving.nlp.rows import BindingRows, Multipliers, RowFamily, binding
+from loomopt.solving.nlp.rows import BindingRows, Multipliers, RowFamily, binding, mean_nodes
 from loomopt.solving.nlp.transcribe import Transcription
 
 NodeRows = Sequence[Sequence[Extreme]]
@@ -384,6 +384,8 @@ def _events_moved(
     if sampler.hints == hints:
         return False
     if tuple(sampler.hints) != tuple(hints) or sampler.corner_count != place.sampler.corner_count:
+        return True
+    if mean_nodes(calls.program, sampler, nlp.structure.elastic) != nlp.structure.points:
         return True
     old_arguments = calls.arguments(nlp, place.sampler, answer.x, answer.extra, place.nodes)
     new_arguments = calls.arguments(nlp, sampler, answer.x, answer.extra, nodes)

@@ -628,10 +628,15 @@ def means(program: Program, elastic: bool) -> list[Integral]:
     return [mean for mean in program.model.integrals if {mean.name, mean.root} & read]
 
 
-def structure(program: Program, sampler: Sampler, slots: int, elastic: bool = False) -> Structure:
-    """Structure of the NLP of a program at a design."""
-    points = tuple(
+def mean_nodes(program: Program, sampler: Sampler, elastic: bool) -> tuple[tuple[str, int], ...]:
+    """Means that are read, each with the number of its nodes at a design."""
+    return tuple(
         (mean.name, len(mean.angles) or len(quadrature(sampler.cycle, mean)[0])) for mean in means(program, elastic)
     )
+
+
+def structure(program: Program, sampler: Sampler, slots: int, elastic: bool = False) -> Structure:
+    """Structure of the NLP of a program at a design."""
+    points = mean_nodes(program, sampler, elastic)
     corners = stations(program.model, sampler.given, [variable.name for variable in program.variables])
     return Structure(program, slots, elastic, tuple(sampler.hints), sampler.corner_count, points, corners)
