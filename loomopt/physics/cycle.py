@@ -52,7 +52,7 @@ class Cycle:
 
     def switch(self, pieces: Pieces | int) -> dict[str, Number]:
         """Switches on a piece, or on each of several, by name."""
-        return {name: column[pieces] for name, column in zip(self.names, self._columns, strict=True)}
+        return {name: column.take(pieces) for name, column in zip(self.names, self._columns, strict=True)}
 
     @lazy
     def _columns(self) -> Floats:
@@ -75,7 +75,7 @@ class Cycle:
 
     def angles(self, pieces: Pieces, u: Floats) -> Floats:
         """Crank angles, rad, of nodes (pieces, u)."""
-        return self.starts[pieces] * (1 - u) + self.starts[pieces + 1] * u
+        return self.starts[:-1].take(pieces) * (1 - u) + self.starts[1:].take(pieces) * u
 
     def coefficients(self, piece: int, u: float, corners: int) -> tuple[float, Floats]:
         """Offset, rad, and the coefficient of each declared corner in the node's angle."""

@@ -247,8 +247,9 @@ def replaceable_rows(gradients: Floats, system: System, multipliers: LevelMultip
     slopes, _, one_sided = _equations(gradients, system)
     lengths = np.linalg.norm(slopes, axis=0)
     _, sizes, turned = np.linalg.svd(slopes / np.where(lengths > 0.0, lengths, 1.0))
-    sizes = np.maximum(np.pad(sizes, (0, len(turned) - len(sizes))), sys.float_info.epsilon)
-    distances = lengths / np.linalg.norm(turned / sizes[:, None], axis=0)
+    rounded = np.full(len(turned), sys.float_info.epsilon)
+    rounded[: len(sizes)] = np.maximum(sizes, sys.float_info.epsilon)
+    distances = lengths / np.linalg.norm(turned / rounded[:, None], axis=0)
     reach = math.sqrt(len(slopes)) * (multipliers.residual + most)
     places = zip([*system.pieces, *system.inequalities], distances[:one_sided], strict=True)
     near = [
@@ -267,14 +268,16 @@ def multiplier_set(
     apart = [row.excess < -FEASIBLE and abs(multipliers.values[k]) <= POSITIVE for k, row in enumerate(active.rows)]
     rows = [k for k in (*system.pieces, *system.inequalities, *system.equalities) if not apart[k]]
     held_pieces = [int(np.argmax(row)) for row in system.higher_levels]
-    columns = np.vstack([gradients[[*rows, *held_pieces]].T, np.isin([*rows, *held_pieces], system.pieces)])
+    of_pieces = [float(k in system.pieces) for k in (*rows, *held_pieces)]
+    columns = np.vstack([gradients[[*rows, *held_pieces]].T, of_pieces])
     lengths = np.linalg.norm(columns, axis=0)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
     _, sizes, turned = np.linalg.svd(columns / lengths)
     null_space = turned[int(np.sum(sizes > RANK)) :].T / lengths[:, None]
     directions = np.zeros((len(active.rows), null_space.shape[1]))
     directions[[*rows, *held_pieces]] = null_space
-    signed = np.isin(np.arange(len(active.rows)), [*system.pieces, *system.inequalities])
+    signed = np.zeros(len(active.rows), dtype=bool)
+    signed[[*system.pieces, *system.inequalities]] = True
     return MultiplierSet(np.where(signed, np.maximum(multipliers.values, 0.0), multipliers.values), directions, signed)
 
 

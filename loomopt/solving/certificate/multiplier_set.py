@@ -72,8 +72,8 @@ class KnownMultipliers:
         `apart` of the larger of it and 1: then there is more than one price, and the least is exact.
         """
         row_places, ways = list(places), self.all_multipliers.ways
-        shortest = np.linalg.norm(ways, axis=0).min(initial=math.inf)
-        if np.abs(ways[row_places].sum(axis=0)).max(initial=0.0) <= linear_program.LEVEL * shortest:
+        shortest = np.linalg.norm(ways, axis=0).min(initial=math.inf) if ways.size else math.inf
+        if not ways.size or np.abs(ways[row_places].sum(axis=0)).max() <= linear_program.LEVEL * shortest:
             only = float(self.all_multipliers.start[row_places].sum())
             return only, only
         cost = np.isin(np.arange(len(self.all_multipliers.start)), places).astype(np.float64)

@@ -230,7 +230,8 @@ def scan_excess(sampler: Sampler, rows: Sequence[CycleRow], points: int) -> floa
     values = sampler.together(list(dict.fromkeys(name for name, _, _ in rows)), pieces, u)
     worst = 0.0
     for name, scale, where in rows:
-        on_piece = sampler.on(name, where)[pieces]
-        highest = float(sampler.heights(name, values[name][on_piece]).max(initial=-np.inf))
+        on = sampler.on(name, where)
+        known = values[name] if on.all() else values[name][on[pieces]]
+        highest = float(sampler.heights(name, known).max(initial=-np.inf))
         worst = max(worst, (highest - sampler.peak(name, where)) / scale)
     return worst
