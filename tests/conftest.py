@@ -37,13 +37,13 @@ def no_line_of_progress(monkeypatch):
 
 
 def pytest_collection_modifyitems(items):
-    """Sort the cases of a test marked `few` into quick, slow and whole ones.
+    """Sort the cases of a test marked `few` into quick, slow and whole ones; one that is marked slow itself stays so.
 
     The quick and the slow ones are spread over all, so that values of several columns change together.
     """
     tests: dict[str, list[pytest.Item]] = {}
     for item in items:
-        if item.get_closest_marker("few"):
+        if item.get_closest_marker("few") and not item.get_closest_marker("slow"):
             tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
     for cases in tests.values():
         marker, of = cases[0].get_closest_marker("few"), len(cases)

@@ -49,8 +49,13 @@ def room(name):
 tree_of = functools.cache(ast.parse)
 
 
+@functools.cache
+def text_of(path):
+    return path.read_text(encoding="utf-8")
+
+
 def parsed(path):
-    return tree_of(path.read_text(encoding="utf-8"))
+    return tree_of(text_of(path))
 
 
 @functools.cache
@@ -89,14 +94,14 @@ def test_the_library_imports_nothing_of_the_command_line():
     spots = [
         f"{name}:{line}"
         for name, path in outside.items()
-        for other, line in imports(path.read_text(encoding="utf-8"))
+        for other, line in imports(text_of(path))
         if other.startswith("interface.cli")
     ]
     assert spots == []
 
 
 def test_imports_run_one_way():
-    sources = {name: path.read_text(encoding="utf-8") for name, path in modules().items()}
+    sources = {name: text_of(path) for name, path in modules().items()}
     assert [line for name, source in sources.items() for line in climbing(name, source)] == []
 
 
@@ -123,7 +128,7 @@ def arrows():
     known = {name.removesuffix(".__init__"): path for name, path in modules().items()}
     found_ = {}
     for name, path in known.items():
-        named = [other for other, _ in imports(path.read_text(encoding="utf-8"))]
+        named = [other for other, _ in imports(text_of(path))]
         homes = {other if other in known else other.rpartition(".")[0] for other in named}
         found_[name] = {home for home in homes if home in known and home != name and known[home].stem != "__init__"}
     return found_
@@ -146,7 +151,7 @@ def test_no_file_reaches_itself():
 def test_what_people_see_never_solves_and_knows_no_job():
     for name, path in modules().items():
         if name.startswith("interface."):
-            taken = {other for other, _ in imports(path.read_text(encoding="utf-8"))}
+            taken = {other for other, _ in imports(text_of(path))}
             if name not in MAY_SOLVE:
                 assert not {other for other in taken if other.startswith(("solving.nlp", "solving.engine"))}, name
             assert not {other for other in taken if re.match(rf"jobs\.({'|'.join(JOBS)})\b", other)}, name
@@ -155,7 +160,7 @@ def test_what_people_see_never_solves_and_knows_no_job():
 @pytest.mark.parametrize("job", JOBS)
 def test_a_job_is_named_in_its_own_files_only(job):
     word = re.compile(rf"loomopt\.jobs\.{job}\b|[\"']{job}[\"']")
-    strangers = [n for n, path in modules().items() if job not in path.parts and word.search(path.read_text("utf-8"))]
+    strangers = [n for n, path in modules().items() if job not in path.parts and word.search(text_of(path))]
     assert strangers == []
 
 
@@ -164,8 +169,8 @@ def test_an_effect_is_named_in_its_own_file_only_and_where_a_target_needs_it(job
     for name in (
         set(kinds.of(f"loomopt.physics.effects.{job}")) - set(SI_UNIT) - COMMON
     ):  # "inertia" is a kind of quantity too
-        word = re.compile(rf"[\"']{name}[\"']")
-        strangers = [n for n, path in modules().items() if word.search(path.read_text("utf-8"))]
+        quoted = (f'"{name}"', f"'{name}'")
+        strangers = [n for n, path in modules().items() if any(word in text_of(path) for word in quoted)]
         assert set(strangers) <= {
             *(n for n in modules() if n.startswith("physics.effects")),
             *(f"jobs.{j}.scene" for j in JOBS),
@@ -192,7 +197,7 @@ def mentions_casadi(source):
 
 @pytest.mark.slow
 def test_only_maths_and_the_solver_rooms_use_casadi():
-    users = {room(name) for name, path in modules().items() if mentions_casadi(path.read_text(encoding="utf-8"))}
+    users = {room(name) for name, path in modules().items() if mentions_casadi(text_of(path))}
     assert users == {"maths", "solving"}
     assert mentions_casadi("from loomopt.maths import systems as maths\nmaths.casadi()")
     assert mentions_casadi("def f():\n    import casadi as ca")
@@ -211,7 +216,7 @@ def test_ranks_of_a_jobs_effects_differ():
 
 def test_rows_are_read_in_one_place_and_names_are_never_parted():
     for name, path in modules().items():
-        source = path.read_text(encoding="utf-8")
+        source = text_of(path)
         if room(name) != "model":
             assert not re.search(r"\b(limit|each)\.(weight|complement)\b", source), name
         assert not re.search(r"\.(family|form) [!=]=|__class__ =|\[case ", source), name
@@ -247,7 +252,7 @@ def counted(source):
 
 def test_the_order_of_an_nlps_rows_and_variables_is_known_in_one_file():
     files = {name: path for name, path in modules().items() if name.startswith(SEE_ROWS) and name not in ORDERED_IN}
-    found_ = {name: counted(path.read_text(encoding="utf-8")) for name, path in files.items()}
+    found_ = {name: counted(text_of(path)) for name, path in files.items()}
     assert {name: lines for name, lines in found_.items() if lines} == {}
 
 
@@ -284,7 +289,7 @@ def test_types_say_what_they_are():
     inside = {n: path for n, path in modules().items() if not n.startswith(tuple(WITHOUT_TYPES))}
     spots = {name: len(anything(path)) for name, path in inside.items() if anything(path)}
     assert sum(spots.values()) <= MOST_ANY, spots
-    scenes = [name for name, path in modules().items() if re.search(r"\bscene: Any\b", path.read_text("utf-8"))]
+    scenes = [name for name, path in modules().items() if re.search(r"\bscene: Any\b", text_of(path))]
     assert scenes == []
 
 
@@ -298,7 +303,7 @@ def test_tolerances_of_several_files_have_one_value_and_say_where_they_come_from
         said = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
         assert said, f"line {node.lineno}: nothing is said of it"
     others = {name: path for name, path in modules().items() if name != "physics.tolerances"}
-    words = {name: set(re.findall(r"\w+", path.read_text(encoding="utf-8"))) for name, path in others.items()}
+    words = {name: set(re.findall(r"\w+", text_of(path))) for name, path in others.items()}
     for _, node in assigned:
         group = [n.id for n in ast.walk(node.targets[0]) if isinstance(n, ast.Name)]
         readers = {name for name, known in words.items() if not known.isdisjoint(group)}

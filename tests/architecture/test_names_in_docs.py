@@ -51,33 +51,38 @@ def is_file(name):
 
 @cache
 def modules():
-    """Return the names that each module of the package and of the tests defines, by its last word."""
-    found: dict[str, set[str]] = {}
+    """Files of each module of the package, of the tests and of the benchmarks, by its last word."""
+    found: dict[str, list[Path]] = {}
     for path in [*PACKAGE.rglob("*.py"), *(ROOT / "tests").rglob("*.py"), *(ROOT / "benchmarks").rglob("*.py")]:
-        word = path.parent.name if path.stem == "__init__" else path.stem
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        names = found.setdefault(word, set())
-        for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef | ast.ClassDef):
-                names.add(node.name)
-            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-                names.add(node.id)
-            elif isinstance(node, ast.alias):
-                names.add((node.asname or node.name).split(".")[0])
-    for path in PACKAGE.rglob("__init__.py"):
-        found.setdefault(path.parent.name, set()).update(child.stem for child in path.parent.iterdir())
+        found.setdefault(path.parent.name if path.stem == "__init__" else path.stem, []).append(path)
     return found
+
+
+@cache
+def names_in(word):
+    """Names that the modules of one last word define, and the modules of a package of that name."""
+    found: set[str] = set()
+    for path in modules()[word]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                found.add(node.name)
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                found.add(node.id)
+            elif isinstance(node, ast.alias):
+                found.add((node.asname or node.name).split(".")[0])
+        if path.stem == "__init__" and path.is_relative_to(PACKAGE):
+            found.update(child.stem for child in path.parent.iterdir())
+    return frozenset(found)
 
 
 def called(name):
     """Return what is wrong with a dotted name whose first words are modules of this package; "" for nothing."""
     *words, last = name.split(".")
-    known = modules()
     if words[0] == "loomopt":
         words = words[1:]
-    if not words or words[-1] not in known:
+    if not words or words[-1] not in modules():
         return "" if set(words) <= all_words() else f"no word of {name}"
-    return "" if last in known[words[-1]] else f"{words[-1]} has no {last}"
+    return "" if last in names_in(words[-1]) else f"{words[-1]} has no {last}"
 
 
 @cache

@@ -162,7 +162,7 @@ def owners() -> dict[str, Any]:
 METHODS = {"": FUNCTIONS, "scene": OF_SCENE, "answer": OF_ANSWER, "study": OF_STUDY}
 
 
-@pytest.mark.few(9)
+@pytest.mark.few(5)
 @pytest.mark.parametrize(("owner", "name"), [(owner, name) for owner in METHODS for name in METHODS[owner]])
 def test_whatever_is_given_is_taken_or_told_in_one_line(monkeypatch, tmp_path, owners, owner, name):
     monkeypatch.chdir(tmp_path)

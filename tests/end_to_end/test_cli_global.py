@@ -32,8 +32,8 @@ def test_a_vanishing_level_is_told_as_such(capsys):
 @pytest.mark.parametrize(
     "words",
     [
-        ("rapier",),
         ("shedding", "--target", "speed"),
+        ("rapier",),
         ("beatup-light", "--with", "gravity", "--time", "0.2", "--gap", "1e-5"),
     ],
 )

@@ -57,6 +57,7 @@ def test_changes_are_told_in_the_json_and_in_words(cli):
     assert "K1 per X0 is the slope of the front." in said
 
 
+@pytest.mark.slow
 def test_tables_and_figures_are_written_with_their_provenance(cli, tmp_path):
     names = ("t.csv", "t.parquet", "f.png", "f.svg")
     files = [word for name in names for word in ("--figure" if name[0] == "f" else "--out", name)]

@@ -62,6 +62,7 @@ def check_contract(data, design=DESIGN):
         assert list(price["worth"]) == list(price["unit"])
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("target", OBJECTIVE)
 def test_solve_prints_one_object_by_the_contract(cli, target):
     data = answered(cli, *SOLVE, "--target", target)

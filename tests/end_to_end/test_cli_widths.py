@@ -70,7 +70,7 @@ def test_no_digit_is_cut_and_what_is_asked_for_is_there(printed, command, column
     assert [heading for heading in ASKED[command] if not re.search(rf"\b{re.escape(heading)}\b", text)] == []
 
 
-@pytest.mark.few(14)
+@pytest.mark.few(5)
 @pytest.mark.parametrize("columns", WIDTHS)
 @pytest.mark.parametrize("command", [command for command in ASKED if command[0] != "simulate"], ids=" ".join)
 def test_columns_that_have_gone_are_named_with_how_to_see_them(printed, command, columns):

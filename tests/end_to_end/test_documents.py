@@ -32,7 +32,10 @@ LONGEST_README = 120
 
 OWN_TESTS = ("docs/development/", "docs/hard-cases.md")
 """Pages whose code other tests run: test_extending.py, test_hard_chapter.py."""
-SLOW = ("docs/how-to/", "docs/ideas/effects.md")
+SLOW = (
+    *("docs/how-to/", "docs/ideas/effects.md", "docs/own-loom/linkage.md", "docs/own-loom/rapier.md"),
+    *("docs/own-loom/shedding.md", "docs/reference/linkages.md"),
+)
 CARRIED_OUT = [
     pytest.param(page, marks=[pytest.mark.slow] if page.startswith(SLOW) else [])
     for page, text in PAGES.items()

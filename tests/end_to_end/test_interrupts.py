@@ -67,6 +67,7 @@ def is_stopped(done):
         130, "", "loomopt: stopped; nothing was left half-written.\n")  # fmt: skip
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "module",
     slow.after(6, [

@@ -45,6 +45,7 @@ def packages(modules):
     return {top for top in tops if top not in sys.stdlib_module_names and not top.startswith(("swig", "cython"))}
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(
     ("arguments", "status", "more"),
     [
@@ -91,13 +92,15 @@ def test_only_commands_that_solve_import_casadi():
 
 @pytest.mark.parametrize("with_it", [False, True], ids=["algebraic", "with a state"])
 def test_motions_that_follow_from_forces_are_imported_by_scenes_that_have_them_only(with_it):
-    for command in (("evaluate", "beatup"), ("solve", "beatup", "--starts", "1"), ("show", "beatup", "--equations")):
-        code, modules = imported(*command, *(("--with", "shaft_torsion") if with_it else ()))
-        assert code == 0
-        motions = {module for module in modules if module.startswith("loomopt.physics.motion")}
-        assert motions == ({"loomopt.physics.motion", "loomopt.physics.motion.harmonic"} if with_it else set())
+    more = ("--with", "shaft_torsion") if with_it else ()
+    commands = (("evaluate", "beatup"), ("solve", "beatup", "--starts", "1"), ("show", "beatup", "--equations"))
+    code, modules = imported_together(*((*command, *more) for command in commands))
+    assert code == 0
+    motions = {module for module in modules if module.startswith("loomopt.physics.motion")}
+    assert motions == ({"loomopt.physics.motion", "loomopt.physics.motion.harmonic"} if with_it else set())
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", registry.builtin_names())
 def test_a_job_imports_no_module_of_another(name):
     others = set(registry.builtin_names()) - {name}

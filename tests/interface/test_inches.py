@@ -177,6 +177,7 @@ def seen(scene):
     yield [scene.shown_in(kind) for kind in SI_UNIT]
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("written", "name"), slow.grid(["own", "inches", "mixed"], packaged.problems()))
 def test_no_table_has_two_units_of_one_kind(written, name):
     """Effects that have values are on; two units of one dimension are two units of one kind: energy is no torque."""

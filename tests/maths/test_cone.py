@@ -22,6 +22,7 @@ def swept(hessian, slopes, count=40_000):
     return float(np.einsum("ni,ij,nj->n", inside, hessian, inside).min(initial=np.inf))
 
 
+@pytest.mark.few(30)
 @pytest.mark.parametrize("size", [2, 3])
 @pytest.mark.parametrize("seed", range(40))
 def test_nothing_less_is_found_by_a_sweep(size, seed):

@@ -60,6 +60,7 @@ def nodes(scene):
     return int(ca.Function("figures", inputs, [ca.vertcat(*values)]).n_nodes())
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("case", NODES, ids=lambda case: f"{case[0]} {len(case[1])}")
 def test_algebraic_scenes_have_not_one_node_more(case):
     scene = scene_of(*case)

@@ -55,6 +55,7 @@ def figures(scene, job, known, drawn, asked=None):
     return read_all(model, {**known, **drawn}, sampled(model, known), lambda of: read(scene, of), alone)
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("problem", "effects", "names", "share"), CASES)
 def test_every_figure_is_that_of_the_machine_alone(problem, effects, names, share):
     scene, job, known, values = drawn(problem, effects, names, share)

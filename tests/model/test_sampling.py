@@ -53,7 +53,7 @@ def vertex(values, k):
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_the_peak_is_that_of_a_scan_of_a_million_points(name):
     sampled = JOB.sampler(SCENES[name], {})
     for quantity in sampled.model.quantities:
@@ -76,6 +76,7 @@ def test_peaks_of_other_machines_too_down_to_transmission_angles_of_a_few_degree
         assert sampled.peak("peak_torque") == pytest.approx(best, rel=1e-10)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", ["the paper's", "every effect", "friction above all", "long crank"])
 def test_every_local_extreme_of_the_scan_is_found_with_its_sign(name):
     sampled = JOB.sampler(SCENES[name], {})

@@ -245,6 +245,7 @@ def loads_of(combination):
     return [effect for effect in effects_of(combination) if isinstance(effect, Load | State)]
 
 
+@pytest.mark.few(50)
 @every
 def test_curves_have_columns_of_the_active_effects_only(combination):
     job, loads = combination.job, loads_of(combination)
@@ -346,7 +347,7 @@ def test_the_motor_gives_what_the_crank_and_the_flywheel_take(combination):
 
 
 @every
-@pytest.mark.few(40)
+@pytest.mark.few(14)
 def test_an_absent_effect_leaves_no_symbol_in_the_graph(combination):
     """All numbers of all effects are offered as symbols; only those of active effects are taken up."""
     active = effects_of(combination)
@@ -368,6 +369,7 @@ def test_a_combination_reads_what_its_effects_read_alone_and_no_more(combination
         assert {key.split(".")[1] for key in effect.needs} <= read_by(one)
 
 
+@pytest.mark.few(50)
 @every
 def test_figures_of_absent_effects_are_undefined(combination):
     job, scene = registry.find(combination.job), scene_of(combination)

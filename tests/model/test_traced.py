@@ -101,6 +101,7 @@ def spread(node):
     return lambda value: value if isinstance(value, Jet) else np.broadcast_to(np.asarray(value, float), node.phi.shape)
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("name", NAMES)
 def test_arrays_of_all_pieces(name):
     sampler = samplers()[name]
@@ -141,6 +142,7 @@ def test_forty_digits(name):
         alike(sampler.model, (reading.maths, reading.maths), reading.given, node)
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("name", NAMES)
 def test_series_of_balls(name):
     """Narrow boxes, and wide ones that hold what no formula can."""
@@ -153,6 +155,7 @@ def test_series_of_balls(name):
         alike(sampler.model, (boxes.maths, boxes.maths), boxes.given, node, whole)
 
 
+@pytest.mark.few(16)
 @pytest.mark.parametrize("curved", [False, True])
 @pytest.mark.parametrize("name", NAMES)
 def test_jets(name, curved):

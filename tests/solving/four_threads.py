@@ -1,6 +1,6 @@
-"""Four problems solved in one thread after another, then so many times in four threads at once: the same, to the digit.
+"""Problems solved in one thread after another, then so many times in four threads at once: the same, to the digit.
 
-    python four_threads.py [TIMES]
+    python four_threads.py [TIMES [PROBLEM ...]]    all problems unless some are named
 
 Run by test_threads.py: where expressions of two threads meet, the process ends without a word.
 """
@@ -22,6 +22,7 @@ PROBLEMS = {
 }
 """Scene → target and effects that are put on."""
 USES = ("solve", "evaluate", "simulate", "prove")
+THREADS = 4
 
 
 def used(name, how):
@@ -40,12 +41,11 @@ def used(name, how):
     return lo.prove(scene, target=target).as_dict()
 
 
-def together(times, alone):
-    """Return which uses of a problem differ from those alone, of four threads that each begin with another problem."""
-    differing, begin = set[tuple[str, str]](), threading.Barrier(len(PROBLEMS))
+def together(times, names, alone):
+    """Uses of a problem that differ from those alone, of four threads that begin with one problem after another."""
+    differing, begin = set[tuple[str, str]](), threading.Barrier(THREADS)
 
     def work(first):
-        names = list(PROBLEMS)
         begin.wait()
         for k in range(times):
             if first == 0 and k % 3 == 0:
@@ -57,8 +57,8 @@ def together(times, alone):
                         differing.add((name, how))
             print(f"thread {first}: {k + 1} of {times}", file=sys.stderr, flush=True)
 
-    with ThreadPoolExecutor(len(PROBLEMS)) as pool:
-        list(pool.map(work, range(len(PROBLEMS))))
+    with ThreadPoolExecutor(THREADS) as pool:
+        list(pool.map(work, range(THREADS)))
     return differing
 
 
@@ -69,13 +69,14 @@ def collecting(stop):
 
 
 if __name__ == "__main__":
-    alone = {(name, how): repr(used(name, how)) for name in PROBLEMS for how in USES}
+    names = sys.argv[2:] or list(PROBLEMS)
+    alone = {(name, how): repr(used(name, how)) for name in names for how in USES}
     gc.freeze()
     stop = threading.Event()
     collector = threading.Thread(target=collecting, args=(stop,))
     collector.start()
     try:
-        differing = together(int(sys.argv[1]) if sys.argv[1:] else 1, alone)
+        differing = together(int(sys.argv[1]) if sys.argv[1:] else 1, names, alone)
     finally:
         stop.set()
     print("differing:", sorted(differing) or "none")

@@ -110,7 +110,7 @@ def kept(answer, accuracy, truth):
 # Optima -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(13)
+@pytest.mark.few(6)
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 @pytest.mark.parametrize("name", JOBS)
 def test_every_figure_of_an_optimum_is_as_accurate_as_asked(name, accuracy):
@@ -124,7 +124,7 @@ FLAT = {("match", 1e-10)}
     ("name", "accuracy"),
     known([(name, accuracy) for name in OTHERS for accuracy in ASKED], FLAT, "a flat optimum's figures"),
 )
-@pytest.mark.few(12)
+@pytest.mark.few(4)
 def test_the_promise_holds_for_other_machines_and_targets(name, accuracy):
     kept(solved(name, accuracy), accuracy, solved(name, BEST).figures)
 
@@ -210,6 +210,7 @@ def test_no_more_is_computed_than_it_takes(name):
     assert usual[1e-3] >= 1000, "positions of the mechanism, all of them"
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_machines_cost_more_where_more_is_asked(name):
     counts = [solved(name, accuracy).solver["evaluations"] for accuracy in (*ASKED, BEST)]
@@ -266,6 +267,7 @@ def highest(name):
 SPARSE = (1e-1, 1e-2, 1e-4, 1e-7, 1e-9)
 
 
+@pytest.mark.few(15)
 @pytest.mark.parametrize("accuracy", SPARSE)
 @pytest.mark.parametrize("name", CURVES)
 def test_every_column_of_sparse_curves_reaches_its_top(name, accuracy):

@@ -47,6 +47,7 @@ def told(found, name):
     return limit
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("degrees", "peak"), PEAKS.items())
 def test_a_limit_on_both_dwells_gives_the_known_drives(short, degrees, peak):
     answer = lo.solve(short.set("limits.dwell.min", f"{degrees} deg"), starts=1)
@@ -57,6 +58,7 @@ def test_a_limit_on_both_dwells_gives_the_known_drives(short, degrees, peak):
     assert (limit.min, limit.max, limit.ok) == (pytest.approx(degrees * DEGREE), None, True)
 
 
+@pytest.mark.slow
 def test_a_limit_on_one_dwell_is_as_if_the_operation_asked_for_it(rapier):
     asked, limited = (
         lo.solve(rapier.set(key, "35 deg"), starts=1) for key in ("operation.dwell_after", "limits.dwell_after.min")
@@ -132,6 +134,7 @@ def test_a_stroke_apart_from_the_operations_clashes_with_it(rapier):
     assert {each.limit for each in answer.relaxation} == {"stroke"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", slow.after(1, ["dwell", "stroke-dwell"]))
 def test_a_dwell_out_of_reach_tells_how_far_it_must_give_way(rapier, target):
     answer = lo.solve(rapier.set("limits.dwell.min", "55 deg"), target, starts=1)

@@ -136,6 +136,7 @@ cli.main()
 """Ctrl-C arrives so many seconds after the first solve began, whether or not the solver is at work."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", slow.after(1, [0.3, 0.05, 0.7]))
 def test_ctrl_c_is_told_in_one_line_without_the_solvers_own_warning(after):
     code = STOPPED_BY_THE_CLOCK.format(after=after)

@@ -18,9 +18,12 @@ from loomopt.solving.nlp.transcribe import NLPS
 HERE = Path(__file__).parent
 
 
-@pytest.mark.parametrize("times", [1, pytest.param(100, marks=pytest.mark.slow)])
-def test_four_threads_find_the_digits_of_one(times):
-    command = [sys.executable, str(HERE / "four_threads.py"), str(times)]
+@pytest.mark.parametrize(
+    ("times", "problems"),
+    [(1, ("beatup-light", "shedding-static")), pytest.param(100, (), marks=pytest.mark.slow)],
+)
+def test_four_threads_find_the_digits_of_one(times, problems):
+    command = [sys.executable, str(HERE / "four_threads.py"), str(times), *problems]
     done = subprocess.run(command, capture_output=True, text=True, timeout=1200)
     assert done.returncode == 0, (done.returncode, done.stdout, done.stderr)
     assert done.stdout == "differing: none\n"

@@ -68,7 +68,7 @@ def curves_of(axes):
 
 
 @pytest.mark.parametrize(("name", "kind"), CASES)
-@pytest.mark.few(6)
+@pytest.mark.few(4)
 def test_nothing_runs_into_anything_and_all_panels_show_the_turn(name, kind):
     figure = drawn(name, kind)
     assert overlaps.found(figure) == []
@@ -101,6 +101,7 @@ def test_today_stands_dashed_in_every_panel_beside_a_design(name, kind):
     assert [text.get_text() for text in legend.get_texts()] == ["design", "today, dashed"]
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("name", "kind"), [case for case in CASES if case[1] in ("today", "solved")])
 def test_titles_are_alike_and_names_plain(name, kind):
     figure = drawn(name, kind)
@@ -149,6 +150,7 @@ def test_a_limit_on_the_heads_acceleration_per_radian_stands_at_that_in_metres_p
     assert np.array(scale.get_ylim()) * 9.80665 == pytest.approx(axes.get_ylim())
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", JOBS)
 def test_a_scene_in_inches_is_drawn_in_its_own_units_with_the_same_curves(name):
     scene = inch.scene(name)

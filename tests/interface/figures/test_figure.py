@@ -46,6 +46,7 @@ def test_a_drawing_as_svg_is_the_one_at_full_scale(tmp_path):
     assert (tmp_path / "a.svg").read_text(encoding="utf-8") == svg.render(drawn)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
 def test_a_picture_has_the_same_size_for_any_machine(tmp_path, size):
     figure.draw(

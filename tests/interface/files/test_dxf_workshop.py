@@ -39,6 +39,7 @@ def test_both_versions_are_sound_and_tell_what_they_cover(tmp_path, version, cod
             assert high[axis] >= entity.dxf.center[axis] + entity.dxf.radius
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("version", ["r12", "r2010"])
 @pytest.mark.parametrize("tolerance", [0.005, 0.01, 0.1])
 def test_arcs_of_the_profile_lie_within_the_tolerance_of_it(tmp_path, version, tolerance):

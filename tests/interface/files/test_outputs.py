@@ -69,6 +69,7 @@ def test_solve_out_writes_answer_tables_and_drawing(here, capsys):
     assert ElementTree.parse(folder / "linkage.svg").getroot().tag.endswith("svg")
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("content", ["design", "answer"])
 def test_an_answer_evaluates_to_the_figures_it_claims(here, capsys, content):
     solved = json.loads(loom(capsys, "solve", "beatup", "--json"))

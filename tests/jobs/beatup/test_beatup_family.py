@@ -123,6 +123,7 @@ def test_the_order_of_members_changes_nothing(answer):
     assert own(turned, "m4e")[::-1] == pytest.approx(own(answer, "m4e"), rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("own_names", [(), ("m4e",)])
 def test_equal_members_are_the_plain_target(own_names):
     found = lo.solve(family((745, 745), own_names), "family", starts=1)
@@ -152,6 +153,7 @@ def test_the_sum_lets_one_member_go():
     assert "M3_fdc [N*m]" in grids[0].columns
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("combine", ["worst", "sum"])
 def test_peaks_of_other_targets_combine_too(combine):
     scene = family((700, 745), **{f"{KEY}.of": "torque", f"{KEY}.combine": combine})

@@ -403,7 +403,7 @@ def lesser(case, **keys):
     return scene, lo.solve(scene)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "most"), [("force_D", 2900.0), ("shaking_force", 1900.0)])
 def test_a_limit_on_a_force_binds_is_priced_and_proven(name, most):
     scene, answer = lesser("today", **{name: most})

@@ -65,6 +65,7 @@ def test_limits_that_bind_are_as_many_as_the_design_can_choose(answers, M0):
     assert answers[M0].certificate.minimum
 
 
+@pytest.mark.few(2)
 @each_resistance
 @pytest.mark.parametrize("count", [FEW, pytest.param(STARTS, marks=pytest.mark.slow)])
 def test_every_random_start_reaches_the_same_design(answers, M0, count, monkeypatch, record_property):
@@ -138,6 +139,7 @@ def test_accuracy_asked_for_is_accuracy_given(accuracy):
 # A limit that settles all but the radius of a counterweight of no mass --------------------------------------------
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("pulse", slow.after(3, [295, 302.5, 320, 300, 305, 310, 315, 318]))
 def test_a_pulse_that_settles_the_first_level_is_certified(pulse):
     scene = lo.load("beatup").set("limits.pulse_rms.max", f"{pulse} N*m")

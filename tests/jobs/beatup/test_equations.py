@@ -81,7 +81,7 @@ def setting(found, phi):
 
 @pytest.mark.parametrize("rod", ["lumped", "exact"])
 @pytest.mark.parametrize("phi", [0.3, 1.0, 1.15, 1.3, 2.0, 4.0, 4.5, 6.0])
-@pytest.mark.few(6)
+@pytest.mark.few(3)
 def test_printed_terms_are_the_balance(rod, phi):
     found = model(*OWN, rod=rod)
     given, pose, switches = setting(found, phi)

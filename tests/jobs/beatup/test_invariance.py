@@ -70,7 +70,7 @@ def same(one, other, rel=1e-9, scale=None):
 
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("length", ["m", "km", "inch", "ft"])
-@pytest.mark.few(6)
+@pytest.mark.few(3)
 def test_units_of_length_do_not_matter(target, length):
     scene = lo.load("beatup-heavy")
     same(lo.solve(scene, target, starts=1), lo.solve(changed(scene, in_units(length)), target, starts=1))
@@ -85,6 +85,7 @@ def test_units_of_mass_angle_and_speed_do_not_matter(target):
     )
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("M0", [600, 745, 800, 900])
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
 def test_a_machine_of_another_size_has_the_same_angles_and_torques(M0, factor):
@@ -119,6 +120,7 @@ def told(answer):
     return json.dumps(answer.as_dict() | {"time": None}, sort_keys=True)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("problem", "target"), slow.grid(["beatup", "beatup-light"], TARGETS))
 def test_the_same_scene_gives_the_same_digits_twice(problem, target):
     first = told(lo.solve(lo.load(problem), target))
@@ -144,6 +146,7 @@ def reversed_tables(table):
     }
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_the_order_in_which_a_scene_is_written_does_not_matter(target):
     scene = lo.load("beatup-heavy").with_effect("gravity").with_effect("rocker_inertia")
@@ -160,6 +163,7 @@ def test_what_is_off_does_not_matter():
     assert ours == theirs, "but for the scene itself, which is told"
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_limit_far_away_does_not_matter(target):
     scene = lo.load("beatup")
@@ -167,6 +171,7 @@ def test_a_limit_far_away_does_not_matter(target):
     same(lo.solve(scene, target, starts=1), lo.solve(more, target, starts=1))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("effect", ["rocker_inertia", "bearing_friction", "gravity", "rod_inertia"])
 def test_an_effect_of_nothing_is_as_good_as_none(effect):
     """Its smallest values change the answer by no more than they are."""

@@ -57,6 +57,7 @@ def assert_right(scene, answer):
     return machine
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_loom_in_inches_without_counterweight(target):
     answer = lo.solve(inch_scene(), target, starts=1)
@@ -65,6 +66,7 @@ def test_a_loom_in_inches_without_counterweight(target):
     assert "in" in answer.table()["unit"].to_list()
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("how", "target"), slow.grid(["one value", "equal ends", "left out", "not freed"], TARGETS))
 def test_a_frame_that_is_fixed_stays(how, target):
     scene, today = lo.load("beatup"), "165 mm"
@@ -83,6 +85,7 @@ def test_a_frame_that_is_fixed_stays(how, target):
     assert answer.design["l4"] == 0.165
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("changes", [{"m4e": "3 kg", "r4e": "50 mm"}, {"m4e": "0 kg", "r4e": "0 mm"}], ids=str)
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_counterweight_that_is_not_bounded_stays(changes, target):
@@ -109,7 +112,7 @@ FREED = {
 
 
 @pytest.mark.parametrize(("target", "name"), slow.grid(["balance", "torque"], FREED))
-@pytest.mark.few(10)
+@pytest.mark.few(2)
 def test_any_number_of_the_scene_may_be_bounded(name, target):
     scene = lo.load("beatup").with_effect("gravity").with_effect("rod_inertia").with_effect("bearing_friction")
     low, high = FREED[name]
@@ -137,6 +140,7 @@ def limited(scene, name, share):
     return scene.set(f"limits.{name}.max", f"{lo.evaluate(scene).figures[name] * share!r} {unit}")
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("limit", "target"),
     slow.grid(
@@ -163,6 +167,7 @@ def test_a_limit_on_the_reeds_eccentricity_parts_mass_and_radius(ends, target):
 EFFECTS = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("target", "effects"), slow.grid(["balance", "torque"], [*((name,) for name in EFFECTS), EFFECTS])
 )
@@ -173,12 +178,14 @@ def test_effects_of_the_balance(target, effects):
     assert_right(scene, lo.solve(scene, target, starts=1))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_the_rod_as_a_rigid_body(target):
     scene = lo.load("beatup").with_effect("rod_inertia").set("effects.rod_inertia.model", "exact")
     assert_right(scene, lo.solve(scene, target, starts=1))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     "changes",
     slow.after(
@@ -255,6 +262,7 @@ def random_scene(seed):
     return lo.scene(document)
 
 
+@pytest.mark.few(1)
 @each_draw
 def test_random_machines_are_optimal_and_slsqp_finds_nothing_better(seed):
     scene = random_scene(seed)
@@ -275,6 +283,7 @@ def test_random_machines_are_optimal_and_slsqp_finds_nothing_better(seed):
         assert answer.figures["peak_torque"] <= machine.peaks(end)["peak_torque"] * (1 + 1e-5)
 
 
+@pytest.mark.few(4)
 @each_draw
 @pytest.mark.parametrize("target", ["torque", "retrofit", "pulse"])
 def test_random_machines_are_optimal_or_honestly_infeasible(seed, target):

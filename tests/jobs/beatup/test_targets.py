@@ -52,6 +52,7 @@ def best(values):
     return min(found)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("M0", RESISTANCES)
 def test_pulse_is_the_best_slsqp_finds(answer_of, M0):
     machine, ours = Machine(scene_of(M0)), answer_of(M0, "pulse")
@@ -77,7 +78,7 @@ def test_torque_is_the_best_slsqp_finds(answer_of, M0):
     assert machine.excess(ours.design) <= 1e-9
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("weights", "M0"), slow.grid([{}, {"l1": 50.0, "m4e": 0.1}], [745, 800]))
 def test_retrofit_is_the_best_slsqp_finds(weights, M0):
     scene = scene_of(M0).update({f"targets.retrofit.weights.{name}": value for name, value in weights.items()})
@@ -157,7 +158,7 @@ def program_value(program, name, sign, value):
 
 
 @pytest.mark.parametrize(("M0", "target"), OPTIMAL)
-@pytest.mark.few(5)
+@pytest.mark.few(2)
 def test_every_worth_is_confirmed_by_solving_again(answer_of, M0, target):
     scene, answer = scene_of(M0), answer_of(M0, target)
     prices = [price for price in answer.binding if price.value != 0.0]

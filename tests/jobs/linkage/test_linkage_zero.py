@@ -156,6 +156,7 @@ def test_a_four_bar_is_balanced_by_the_places_of_two_masses():
     assert answer.design["rocker.along"] == pytest.approx(-0.080, abs=1e-10)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("name", "size", "on"),
     [

@@ -59,6 +59,7 @@ def travel(design, phi1):
     return d.travel * pose.phi63(front), d.travel * pose.phi63_1
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("layer", [FRONT, REAR, OVER])
 @pytest.mark.parametrize("design", [PAPER, WIDER])
 def test_links_are_drawn_at_full_scale_and_meet(design, layer):

@@ -51,7 +51,7 @@ def numbers(answer):
     return [*answer.design.values(), *(v for v in answer.figures.values() if v is not None)]
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow.after(5, HARD))
 def test_what_cannot_be_had_is_said_with_relaxations_that_help(name):
     scene = lo.load("rapier").update(HARD[name])

@@ -123,6 +123,7 @@ def read(design, s_dwell=None):
     return rapier_model.read(JOB.sampler(scene, design))
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("which", designs())
 def test_stroke_and_dwells_are_those_of_thirty_digits(which):
     found, exact = read(design_of(which)), drive(which)

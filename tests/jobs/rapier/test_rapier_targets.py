@@ -99,6 +99,7 @@ def test_gain_at_the_papers_own_stroke_dwells_and_transmission_angle_is_four_per
     assert Drive(scene, answer.design).peak(2) / PAPER_PEAK == pytest.approx(0.96, abs=0.005)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("effects", [["head_inertia"], ["tape_friction"], ["head_inertia", "tape_friction"]])
 def test_effects_change_the_load_and_not_the_optimum(scene, best, effects):
     loaded = scene
@@ -137,6 +138,7 @@ def test_a_limit_on_jerk_force_or_torque_is_held_and_priced(scene, best, name):
     assert price.worth["peak_acceleration"] == pytest.approx(slope, rel=1e-3)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("target", ["stroke-dwell", "dwell", "smooth", "match"])
 def test_starting_at_an_answer_gives_it_again(scene, target):
     """Objectives to 1e-9; designs to 1e-7, as an objective is flat at its optimum and its rounding shows as a root."""
@@ -152,6 +154,7 @@ def test_a_neighbours_answer_does_not_keep_an_optimum_from_its_certificate(scene
     assert lo.solve(scene.set("bounds.C0y.min", "173.2173 mm"), warm_start=best).status == "optimal"
 
 
+@pytest.mark.slow
 def test_a_limit_on_the_torque_of_the_head_alone_is_held_and_priced(scene, best):
     loaded, limit = scene.with_effect("head_inertia"), 2.95
     asked = [loaded.set("limits.peak_torque.max", f"{limit * share!r} N*m") for share in (1.0, 1 - 1e-5, 1 + 1e-5)]
@@ -190,6 +193,7 @@ def test_a_freed_sley_is_better_and_keeps_its_limits(scene, best):
         assert answer.figures[name] == pytest.approx(value, abs=1e-9)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("factor", [3.0, 0.1])
 def test_a_machine_of_another_size_has_the_scaled_optimum(scene, best, factor):
     answer = lo.solve(times(scene, factor), starts=1)

@@ -48,6 +48,7 @@ def loosened(answer, relaxation, more):
 # The softest coils -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_coils_of_the_printed_travel_are_the_softest_of_all_that_are_sold():
     """Every size by hand; the solver tries the neighbours of the ideal size only."""
     answer, contact = coiled(), Contact(plain.PRINTED)
@@ -62,7 +63,7 @@ def test_the_coils_of_the_printed_travel_are_the_softest_of_all_that_are_sold():
 
 
 @pytest.mark.parametrize("wire", [size for size in SOLD if size >= 0.0056])
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_every_size_by_itself_is_as_soft_as_by_hand(wire):
     known = softest(STEEL, Contact(plain.PRINTED), wire)
     answer = coiled(effects__coil__sizes="any", bounds__wire=f"{wire!r} m")
@@ -83,6 +84,7 @@ def test_any_size_is_a_little_softer_than_those_sold():
     assert f"Any size would have wire {1e3 * free.design['wire']:.6g} mm" in sold.message
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", ["sold", "any", "short", "slow"])
 def test_every_figure_of_the_coils_is_plain_arithmetic_and_every_demand_is_held(name):
     changes = {"any": {"effects__coil__sizes": "any"}, "short": {"effects__coil__spring_length": "200 mm"}}
@@ -174,6 +176,7 @@ def test_the_least_relaxations_help_when_granted_and_not_when_cut_short(name, ch
     assert lo.solve(loosened(answer, shortest, -1e-3), starts=1).status == "infeasible"
 
 
+@pytest.mark.slow
 def test_the_fastest_cam_that_any_coil_keeps_up_with_is_that_found_by_hand():
     """The thickest wire; by hand some diameter will do just below the speed, none just above it."""
     (relaxation,) = [each for each in coiled("shedding").relaxation if each.limit == "speed"]
@@ -183,6 +186,7 @@ def test_the_fastest_cam_that_any_coil_keeps_up_with_is_that_found_by_hand():
         assert any(softest(STEEL, contact, wire, 10_001) for wire in (0.009, 0.0094, 0.0095)) is kept
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("rpm", [100, 200, 300, 370])
 def test_slower_cams_of_the_long_travel_have_coils(rpm):
     answer, contact = coiled("shedding", operation__speed=f"{rpm} rpm"), Contact(replace(plain.PAPER, rpm=rpm))
@@ -199,6 +203,7 @@ def test_the_stress_bound_is_told_only_where_it_is_broken():
     assert "491.8 MPa" not in answer.message
 
 
+@pytest.mark.slow
 def test_sizes_that_are_not_sold_are_no_answer():
     answer = coiled(bounds__wire__min="8.6 mm", bounds__wire__max="8.9 mm")
     assert answer.status == "infeasible"
@@ -221,7 +226,7 @@ PRICED = {
 
 
 @pytest.mark.parametrize("name", PRICED)
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 def test_prices_of_the_coils_are_those_of_solving_again(name):
     changes, key, now, unit, loosen = PRICED[name]
     price = next(price for price in coiled(**changes).binding if price.limit == name)
@@ -259,6 +264,7 @@ TODAY = {"wire": "7.5 mm", "diameter": "45 mm", "turns": "8", "initial_tension":
 """Coils that keep every demand at 25 mm of preload."""
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("ratio", "stops"), [("13", "contact"), ("18", "surge")])
 def test_the_highest_speed_of_todays_coils_is_where_contact_ends_or_they_surge(ratio, stops):
     own = {f"effects__coil__{key}": value for key, value in TODAY.items()} | {"effects__coil__surge_ratio": ratio}
@@ -275,6 +281,7 @@ def test_the_highest_speed_of_todays_coils_is_where_contact_ends_or_they_surge(r
     )
 
 
+@pytest.mark.slow
 def test_at_too_great_a_stress_no_speed_will_do():
     """6 mm wire drawn by 94.5 mm: the hooks carry 1.9 GPa, whatever the speed."""
     answer = coiled(target="speed", effects__coil__initial_tension="200 N")

@@ -204,6 +204,7 @@ def test_an_angle_stands_twice_only_where_the_curvature_jumps():
     assert np.all(np.abs(np.diff(twice["curvature [1/mm]"])[::2]) > 1e-4)
 
 
+@pytest.mark.few(1)
 def test_straight_lines_from_row_to_row_are_within_the_tables_chord_tolerance(made):
     scene, design, law = made
     head, rows = table(scene, design)

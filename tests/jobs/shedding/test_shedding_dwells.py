@@ -19,7 +19,7 @@ def least(dwells, n_min):
 @pytest.mark.parametrize("n_min", [0.0, 5.0])
 @pytest.mark.parametrize("length", ["0", "1e-12", "5e-11", "3e-10", "1e-8", "1e-3"])
 @pytest.mark.parametrize("gone", ["near_dwell", "far_dwell"])
-@pytest.mark.few(8)
+@pytest.mark.few(4)
 def test_a_dwell_counts_from_the_least_length_that_floats_tell_from_none(gone, length, n_min):
     kept = "far_dwell" if gone == "near_dwell" else "near_dwell"
     turned = {f"mechanism.{gone}": f"{length} deg", "mechanism.return": f"{180 - float(length)!r} deg"}
@@ -61,6 +61,7 @@ def test_a_cam_without_the_dwells_in_which_a_load_is_known_is_refused():
         STATIC.update({f"mechanism.{name}": value for name, value in turned.items()})
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("effects", [(), ("inertia",), ("inertia", "damping")])
 def test_the_least_peak_force_is_that_of_the_dwells(effects):
     """In the far dwell N = K1 (X0 + h) − G + T2, K1 the least that holds in the near one: no speed comes into it."""

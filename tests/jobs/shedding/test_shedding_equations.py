@@ -61,7 +61,7 @@ def formulas(text):
 
 
 @pytest.mark.parametrize("name", LAWS)
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_every_named_law_is_printed_as_it_is_computed(name):
     scene = SCENE.set("mechanism.law", name)
     texts = printed(scene, f"cam law {name}")

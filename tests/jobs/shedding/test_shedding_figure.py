@@ -58,6 +58,7 @@ def test_what_a_designer_of_a_shed_looks_for_has_panels(name):
     assert width > 1.9 * panels["frame travel X [mm]"].get_position().width
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", PACKAGED)
 def test_the_least_cam_force_is_marked_where_it_is(name):
     scene = lo.load(name)
@@ -122,6 +123,7 @@ def test_a_scene_without_follower_has_no_panels_of_it():
     assert len(axes_of(lo.scene(document), {})) == 7
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", PACKAGED)
 def test_dwells_are_shaded_and_named(name):
     axes = axes_of(lo.load(name), {})["cam force N [N]"]
@@ -130,6 +132,7 @@ def test_dwells_are_shaded_and_named(name):
     assert {text.get_text() for text in axes.texts} == {"far dwell", "near dwell", "least cam force"}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("name", "ending"),
     [

@@ -71,7 +71,7 @@ def assert_helped(scene, answer, target="stiffness"):
 
 
 @pytest.mark.parametrize("name", HARD)
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_what_cannot_be_had_is_said_with_relaxations_that_help(name):
     scene = lo.load("shedding").update(HARD[name])
     with warnings.catch_warnings():
@@ -173,7 +173,7 @@ def test_the_highest_speed_is_found_from_far_away(rpm):
 
 @pytest.mark.parametrize("angles", [(180, 0, 180, 0), (150, 0, 150, 60), (120, 60, 120, 60)])
 @pytest.mark.parametrize("damping", [0, 35])
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 def test_dwells_that_may_vanish_do(angles, damping):
     """Undamped a half turn each is best, 46819.0998 N/m; damped the return takes a little more."""
     bounds = {f"bounds.{name}": {"min": "0 deg", "max": "350 deg"} for name in ("far_dwell", "near_dwell")}
@@ -189,6 +189,7 @@ def test_dwells_that_may_vanish_do(angles, damping):
     assert back >= rise - 1e-6
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("target", ["stiffness", "force"])
 @pytest.mark.parametrize("name", ["shedding", "shedding-printed-travel"])
 @pytest.mark.parametrize("share", [-1e-6, 1e-6])

@@ -60,7 +60,7 @@ EXACT = replace(systems.FLOAT, number=Fraction)
 
 
 @pytest.mark.parametrize(("travel", "n", "symmetric"), DIGITS)
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_the_least_spring_is_that_of_the_linear_programmes(travel, n, symmetric):
     case, known = TRAVELS[travel], DIGITS[travel, n, symmetric]
     answer = freed(case, n, symmetric)
@@ -71,6 +71,7 @@ def test_the_least_spring_is_that_of_the_linear_programmes(travel, n, symmetric)
     assert answer.design["X0"] == pytest.approx(0.080, rel=1e-12)
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("symmetric", [False, True])
 @pytest.mark.parametrize(("travel", "name"), slow.grid(TRAVELS, OTHERS))
 def test_it_is_so_with_every_effect_and_uneven_segments(travel, name, symmetric):
@@ -80,6 +81,7 @@ def test_it_is_so_with_every_effect_and_uneven_segments(travel, name, symmetric)
     assert answer.figures["K1"] == pytest.approx(programmed(case, 8, symmetric), rel=1e-9)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("travel", "name"), OTHER_DIGITS)
 def test_it_is_so_with_16_intervals(travel, name):
     answer = freed(replace(TRAVELS[travel], **OTHERS[name]), 16)
@@ -105,7 +107,7 @@ def test_laws_of_many_intervals_are_those_of_the_linear_programmes_too(travel, n
 
 
 @pytest.mark.parametrize("name", OTHERS)
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 def test_they_are_with_every_effect(name):
     case = replace(PRINTED, **OTHERS[name])
     answer = freed(case, 64)
@@ -120,6 +122,7 @@ def test_the_law_converges_with_the_intervals_at_first_order():
     assert K1[0] > K1[1] > K1[2]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("travel", TRAVELS)
 def test_how_much_softer_than_with_the_best_fixed_law(travel):
     """By the plain reference: 0.3138 and 0.2617 softer than the softest law of continuous s'' and no higher peak."""
@@ -182,6 +185,7 @@ def test_the_derivatives_of_the_found_law_are_derivatives(name):
             assert abs((high[order] - low[order]) / (2 * h) - mid[order + 1]) < 1e-12
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", FOUND)
 def test_contact_holds_between_the_knots(name):
     """A dense scan by the plain reference, then its least stiffness of this law in 30 digits."""

@@ -26,6 +26,7 @@ def small(**changes):
 # The bound of s'' -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("travel", TRAVELS)
 def test_the_spring_falls_as_the_bound_is_loosened_which_each_law_uses_to_the_full(travel):
     case, factors = TRAVELS[travel], (0.9, 1, 1.5, 2)
@@ -38,6 +39,7 @@ def test_the_spring_falls_as_the_bound_is_loosened_which_each_law_uses_to_the_fu
     assert springs[-1] < 0.8 * springs[1]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("travel", TRAVELS)
 def test_without_a_bound_there_is_no_least_spring(travel):
     """More intervals always use more: the peak grows without end, the spring falls to one that no law reaches.
@@ -85,6 +87,7 @@ PRICED = {
 }
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", PRICED)
 def test_prices_are_those_of_solving_again(name):
     """Central differences, of N_min one-sided to second order."""
@@ -174,6 +177,7 @@ def test_a_symmetric_law_has_an_even_number_of_intervals(cli):
     assert "even" in err
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("travel", TRAVELS)
 def test_with_the_angles_freed_rise_and_return_take_all_they_may(travel):
     """Dwells at their least, 50 deg each, rise and return alike: the linear programme of 130/50/130/50."""

@@ -130,7 +130,7 @@ def array(angle, switches):
     return Node(np.array([angle]), switches)
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_every_quantity_is_the_same_in_every_number_system(scene):
     physics, sampled = JOB.model(scene), JOB.sampler(scene, {})
     many, theta = in_system(scene, MANY, sampled), ca.SX.sym("theta")

@@ -44,6 +44,7 @@ def drawn(seed):
     )
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize("seed", slow.after(12, range(FRAMES)))
 def test_the_least_spring_of_any_frame_is_the_references(seed):
     reference = drawn(seed)

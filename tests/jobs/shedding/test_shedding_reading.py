@@ -56,7 +56,7 @@ def turned(scene, *degrees):
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_at_the_contact_speed_the_spring_is_the_least_one(name):
     reference, K1 = CASES[name]
     found = JOB.figures(product(reference), {"K1": float(K1)})["contact_speed"] / RPM
@@ -67,7 +67,7 @@ def test_at_the_contact_speed_the_spring_is_the_least_one(name):
     assert needed[0] <= K1 < needed[2]
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper", "printed travel"])
 def test_the_contact_speed_is_the_root_in_thirty_digits(name):
     """144.508702549280 and 177.459266813963 rpm."""

@@ -109,7 +109,7 @@ def test_equal_points_all_get_it_wrong():
 
 @pytest.mark.parametrize("law", plain.LAWS)
 @pytest.mark.parametrize("shape", ["linear", "step"])
-@pytest.mark.few(6)
+@pytest.mark.few(3)
 def test_every_law_with_uneven_rise_and_return(law, shape):
     more = {"C": 35, "F": 20, "N_min": 60} if shape == "linear" else {}
     assert_least(replace(PAPER, law=law, shape=shape, angles=(100, 70, 130, 60), **more))
@@ -119,7 +119,7 @@ def test_every_law_with_uneven_rise_and_return(law, shape):
 @pytest.mark.parametrize(
     "angles", [(120, 60, 5, 175), (10, 173.5, 120, 56.5)], ids=["return of 5 deg", "rise of 10 deg"]
 )
-@pytest.mark.few(6)
+@pytest.mark.few(3)
 def test_narrow_lobes(law, angles):
     assert_least(replace(PAPER, law=law, angles=angles))
 
@@ -130,12 +130,14 @@ def test_a_lobe_of_7_degrees_on_a_grid_of_72_points_is_two_orders_too_soft():
     assert answer.figures["K1"] > 100 * plain.uniform_grid(reference, 72)
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize("angles", [(180, 0, 180, 0), (150, 0, 150, 60), (150, 60, 150, 0), (100, 0, 260, 0)])
 @pytest.mark.parametrize("law", ["cycloidal", "harmonic", "modified_sine"])
 def test_without_dwells(angles, law):
     assert_least(replace(PAPER, law=law, angles=angles, C=35, F=20))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("intervals", [5, 8, 13])
 def test_a_spline_law_that_is_not_symmetric(intervals):
     for more in ({}, {"C": 90, "F": 20, "N_min": 60, "angles": (100, 70, 130, 60)}):

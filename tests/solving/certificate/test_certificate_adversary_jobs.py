@@ -56,12 +56,14 @@ def nudged(program, x, name, share):
     return x | {name: x[name] + share * (abs(x[name]) or size)}
 
 
+@pytest.mark.few(6)
 @each_optimum
 def test_the_optimum_itself_passes(name):
     program, x = optimum(name)
     assert certify(program, x, ACCURACY).passed
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(
     ("name", "share"),
     slow.after(
@@ -84,6 +86,7 @@ def test_one_variable_off_is_refused_or_no_better(name, share):
     assert set(passed) <= {"r4e"}
 
 
+@pytest.mark.few(8)
 @each_optimum
 @pytest.mark.parametrize("size", [1e-5, 1e-3])
 def test_an_optimum_stretched_in_all_variables_is_refused(name, size):

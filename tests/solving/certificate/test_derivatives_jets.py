@@ -63,7 +63,7 @@ def assert_alike(program, x):
 
 
 @pytest.mark.parametrize(("problem", "target"), OPTIMA)
-@pytest.mark.few(5)
+@pytest.mark.few(3)
 def test_slopes_and_curvatures_at_optima_are_those_of_40_digits(problem, target):
     assert_alike(*optimum(problem, target))
 

@@ -30,7 +30,7 @@ def start():
     return near["point"]["x"]
 
 
-@pytest.mark.few(1, slow=26)
+@pytest.mark.few(0, slow=27)
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("size", SIZES)
 def test_a_start_beside_the_least_ends_in_it(size, seed):

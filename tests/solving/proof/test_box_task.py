@@ -7,6 +7,7 @@ from machines_in_boxes import designs, solved
 from loomopt.solving.proof.task import OpenError, reduced
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("effects", [(), ("rod_inertia",), pytest.param(("gravity",), marks=pytest.mark.slow)])
 def test_every_design_has_a_point_in_the_box_and_the_same_figures_there(effects):
     found = solved("beatup", "balance", *effects)

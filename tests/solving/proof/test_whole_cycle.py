@@ -61,6 +61,7 @@ ROUNDS = 6
 # Every packaged scene ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(10)
 @each_pair
 def test_every_packaged_answer_is_proven_and_no_entry_is_missing(name, target):
     scene, answer = lo.load(name), solved(name, target)
@@ -126,6 +127,7 @@ def test_proofs_take_no_longer_than_the_solves_they_follow():
 # Slack, boxes -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("job", JOBS)
 def test_the_slack_is_a_share_of_each_quantitys_largest_magnitude(job):
     answer = solved(job)

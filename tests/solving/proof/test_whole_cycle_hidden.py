@@ -20,6 +20,7 @@ from reference.beatup import Machine
 # Effects, laws, coils ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("model", ["lumped", "exact"])
 def test_every_effect_of_the_beat_up_runs_on_balls(model):
     """Limits stand off the plain machine's own peaks by a millionth."""
@@ -77,6 +78,7 @@ def test_the_coils_of_an_answer_are_proven_and_a_wire_too_thin_is_not():
 # Where a false proof might hide ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(
     ("job", "number", "value", "limit"),
     [

@@ -79,6 +79,7 @@ def together(answer):
     return [one for one in answer.relaxation if not one.alone] or list(answer.relaxation[:1])
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", TIGHT)
 def test_it_is_called_infeasible_and_says_which_limits_clash(answer_of, name):
     answer = answer_of(name)
@@ -104,12 +105,14 @@ def test_what_it_prints_holds_a_design_and_no_nan(answer_of, name):
     assert any(not limit["ok"] for limit in printed["limits"]), "the design shown cannot keep every limit"
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", slow.after(4, TIGHT))
 def test_the_least_relaxation_helps_and_no_less_does(answer_of, name):
     scene, target = scene_of(name)
     assert_just_enough(scene, target, together(answer_of(name)))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", slow.after(4, TIGHT))
 def test_each_limit_that_would_do_by_itself_does_and_no_less_of_it(answer_of, name):
     (scene, target), answer = scene_of(name), answer_of(name)
@@ -119,7 +122,7 @@ def test_each_limit_that_would_do_by_itself_does_and_no_less_of_it(answer_of, na
 
 
 @pytest.mark.parametrize("name", TIGHT)
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_the_least_relaxation_helps_as_it_is_printed(answer_of, name):
     """Six digits are shown: they must be rounded to the side that helps."""
     printed = [as_printed(one) for one in together(answer_of(name))]
@@ -134,6 +137,7 @@ def as_printed(relaxation):
     return relaxation._replace(needed=float(value) * {"mm": 1e-3, "deg": math.radians(1)}.get(unit, 1.0))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     "changes",
     [

@@ -190,6 +190,7 @@ def scene_of(generator):
     return lo.load("beatup").update(dict(sorted(changes.items(), reverse=True)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", slow.after(1, [3, 6]))
 def test_random_beat_ups_are_as_good_as_from_sixteen_random_starts(count):
     generator, seen = random.Random(3), 0

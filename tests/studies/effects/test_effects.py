@@ -121,6 +121,7 @@ def test_a_regret_of_zero_does_not_let_an_effect_go(beatup):
     assert "resistance" in beatup.kept
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("off", "regret"),
     [
@@ -214,6 +215,7 @@ def test_a_variant_without_an_admissible_design_stays_as_a_row_with_its_reason()
     assert (result.left_out, result.together, result.largest_omission) == ((), None, None)
 
 
+@pytest.mark.slow
 def test_more_speed_is_no_regret():
     result = lo.effects(uncoiled.scene("shedding"), "speed")
     assert row_of(result, "warp_tension").regret["speed"] > 0.0, "the optimum without it is slower"
@@ -261,6 +263,7 @@ def test_an_effect_that_solve_does_not_accept_is_measured_at_the_reference(refus
     assert "motor" not in result.kept
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("motor", "left_out"), slow.after(1, [(6.0, ("push",)), (0.5, ("motor", "push")), (4.0, ("motor",))])
 )
@@ -361,6 +364,7 @@ def test_figures_that_need_an_omitted_effect_are_named_even_if_the_target_reads_
     assert kinematic.as_dict()["reference"]["reads"] == list(reads)
 
 
+@pytest.mark.slow
 def test_figures_of_the_target_that_need_an_omitted_effect_are_named(kinematic):
     row = dataclasses.replace(kinematic.rows[0], missing_figures=("stroke", "tape_force"))
     (sentence,) = effects_text.omission_sentences(dataclasses.replace(kinematic.result, rows=(row,)))

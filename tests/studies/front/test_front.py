@@ -202,6 +202,7 @@ def test_the_counterweight_that_is_used_up_is_told():
     assert all(c.between[1] - c.between[0] < 0.07 for c in (used, left))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("most", "low", "high"), [((), 600.0, 800.0), (("M0",), 700.0, 950.0)])
 def test_reed_torque_against_resistance_in_closed_form(most, low, high):
     trade = front.trade(lo.load("beatup"), ("M3_fdc", "M0"), maximise=most, ranges={"M0": (low, high)}, points=4)
@@ -272,7 +273,7 @@ def test_the_end_of_an_axis_that_has_one_need_not_be_named():
     assert front.trade(lo.load("shedding"), ("K1", "X0"), ranges={"X0": (0.02, 0.08)}).senses == ("least", "least")
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("axis", "low", "high", "reached"),
     slow.after(
@@ -357,6 +358,7 @@ def test_an_end_that_no_limit_stops_is_told(certified, angle, told):
         trade._refuse({0: row, 1: row})
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("ranges", "axis", "reached"),
     [

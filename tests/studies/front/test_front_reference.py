@@ -83,6 +83,7 @@ def larger(by):
     return lambda value: repr(float(value) * (1 + by))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("line", "column", "new", "named"),
     [
@@ -129,6 +130,7 @@ def test_the_check_names_front_point_and_column(copy, monkeypatch):
     assert outcome.differences[0].startswith("X0 80 mm: K1 [N/m]: ")
 
 
+@pytest.mark.slow
 def test_a_front_is_written_beside_the_other_references(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "available_targets", lambda scene: [])
     assert study.write(tmp_path, ["shedding", "shedding-printed-travel"]) == [tmp_path / NAME]

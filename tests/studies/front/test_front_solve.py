@@ -55,6 +55,7 @@ def test_of_designs_of_the_least_power_an_end_has_the_least_radius():
     assert plan.value(least, "r4") == pytest.approx(mass * radius / (mass + 12.4), rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "axes", [pytest.param(("l6", "peak_acceleration"), marks=pytest.mark.slow), ("peak_acceleration", "l6")]
 )
@@ -91,6 +92,7 @@ def test_stiffness_against_the_speed_up_to_which_contact_holds():
     assert found.changes[0].kind == "kink"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "axes",
     [

@@ -144,6 +144,7 @@ def test_a_band_under_twice_the_backoff_is_infeasible():
     assert found.certificate is None
 
 
+@pytest.mark.slow
 def test_a_goal_whose_band_loses_machines_leaves_a_yield_out_of_reach():
     found = solved(beatup().set("accept.M3_fdc", "1 N*m"), least=0.99)
     assert found.status == "infeasible"

@@ -84,7 +84,7 @@ def test_price_ranges_of_the_beatup_and_their_ends(limit, low, high, ends):
     assert price.ends == ends
 
 
-@pytest.mark.few(2)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "value"),
     [
@@ -135,6 +135,7 @@ def test_effects_at_zero_have_derivatives_on_one_side():
         assert rows[number].value == pytest.approx(value, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_price_ranges_of_the_shedding():
     ranges = {price.limit: price.range for price in sensitivity("shedding").prices}
     ends = {price.limit: price.ends for price in sensitivity("shedding").prices}
@@ -150,6 +151,7 @@ def test_price_ranges_of_the_shedding():
     assert ranges["speed"] == pytest.approx((-59.998 * rpm, 59.998 * rpm), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_another_angle_of_the_same_limit_ends_a_price():
     """Beyond 18 361.28 N the roller lifts off at the start of the cycle first, where the price is 12.5 (N/m)/N."""
     (price,) = [price for price in sensitivity("shedding").prices if price.limit == "N_min"]
@@ -163,6 +165,7 @@ def test_another_angle_ends_it_at_the_printed_travel_too():
     assert price.range == (0.0, pytest.approx(17442.74, abs=6e-3))
 
 
+@pytest.mark.slow
 def test_an_end_of_0_is_printed_as_0():
     grids = [part for part in SensitivityStudy(sensitivity("shedding")).tables() if isinstance(part, TextTable)]
     (line,) = [line for grid in grids for line in grid.lines if line[0] == "N_min min"]

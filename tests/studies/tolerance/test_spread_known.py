@@ -92,6 +92,7 @@ def test_a_rapier_frame_at_a_fixed_place_while_its_sley_angle_changes():
         )
 
 
+@pytest.mark.slow
 def test_correlations_of_figures_of_the_rapier():
     plan = make_plan("rapier", DRIVE)
     assert correlation(plan, "stroke", "mu_min") == pytest.approx(-0.852, abs=5e-4)

@@ -167,6 +167,7 @@ def test_the_same_bits_with_any_executor_and_others_with_another_seed():
     assert reseeded["figures"]["swing"]["sigma"] != serial.figures["swing"].sigma
 
 
+@pytest.mark.slow
 def test_the_same_bits_from_processes():
     plan = make_plan("shedding", {"K1": "5 %"}, samples=1600)
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as executor:
@@ -194,6 +195,7 @@ def test_a_demand_with_a_tolerance_follows_the_machine():
     assert result.yields["travel"].value == 1.0
 
 
+@pytest.mark.slow
 def test_machines_that_do_not_assemble_are_bad():
     result = study.run(make_plan("rapier", {"l4": "25 mm", "l5": "25 mm"}, samples=160))
     assert 0 < result.bad < 160

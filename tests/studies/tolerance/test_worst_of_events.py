@@ -26,6 +26,7 @@ def box(scene, half):
     return NumberBox(sampler.model, sampler.values, ends), sampler, ends
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     "events",
     [
