@@ -25,7 +25,7 @@ from loomopt.interface.tables import rows
 from loomopt.interface.text import glossary
 from loomopt.jobs import registry
 from loomopt.picture.table import TextTable
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import UnitFormatter
 
 DOCS = Path(__file__).parent
 GLOSSARY = DOCS / "reference" / "glossary.md"
@@ -142,9 +142,9 @@ def symbols(name: str) -> str:
     """Symbols of a scene's answer with their meaning, as Markdown."""
     scene = registry.load(name)
     meanings = {symbol.name: symbol.text for symbol in glossary.symbols(scene)}
-    words = Words(scene)
+    formatter = UnitFormatter(scene)
     shown = [row["name"] for row in rows(api.evaluate(scene).result, scene)]
-    lines = tuple((f"`{name}`", words.unit(name).removeprefix("1"), meanings[name]) for name in shown)
+    lines = tuple((f"`{name}`", formatter.unit(name).removeprefix("1"), meanings[name]) for name in shown)
     return table(TextTable("", ("symbol", "unit", "what it is"), lines))
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import loomopt as lo
 from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.studies.front import front, plan, trade
-from loomopt.studies.front.solver import Asking
+from loomopt.studies.front.solver import Subproblem
 from loomopt.studies.front.trade import POINTS, read_front
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import Findings, Row, StudyTask
@@ -153,7 +153,7 @@ def searched(trade: trade.Trade, found: Findings) -> None:
     sought = trade.solver.axes[0]
     for row in [row for row in found.rows if row.certified and row.place][::3]:
         cap = trade.solver.axes[1].value(row.place[trade.axes[1]])
-        cold = trade.solver.solve(Asking(0, (None, cap)), (), wide=True)
+        cold = trade.solver.solve(Subproblem(0, (None, cap)), (), wide=True)
         if not cold.certified:
             continue
         count += 1

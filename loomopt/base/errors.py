@@ -166,10 +166,10 @@ def blamed(error: BaseException) -> BaseException:
     return error
 
 
-def _is_of(module: str, brought: str) -> bool:
+def _is_of(module: str, package_name: str) -> bool:
     """Whether a module is that of an entry point, or of the same package."""
-    package = brought.partition(".")[0]
-    return module == brought or (package != __name__.partition(".")[0] and module.partition(".")[0] == package)
+    package = package_name.partition(".")[0]
+    return module == package_name or (package != __name__.partition(".")[0] and module.partition(".")[0] == package)
 
 
 @contextlib.contextmanager
@@ -228,7 +228,7 @@ def refusal(
 
 
 def unknown(
-    what: str,
+    noun: str,
     name: str,
     known: Iterable[str],
     origin: str,
@@ -236,16 +236,16 @@ def unknown(
     remedy: str = "Correct the name or take it out",
     given: Collection[str] = (),
 ) -> BadInput:
-    """Error for an unknown name, with the nearest known one; what: "key", "effect", …
+    """Error for an unknown name, with the nearest known one; noun: "key", "effect", …
 
     remedy: where none is near; given: names that are there too, and so are meant less likely.
     """
     names = list(known)
     near = nearest(name, names, given)
     remedy = f'Perhaps "{near}" is meant' if near else remedy
-    grade = WHOLE if what in ("table", "job", "effect", "target") else NAME
+    grade = WHOLE if noun in ("table", "job", "effect", "target") else NAME
     allowed = ", ".join(names) or "none"
-    return refusal(f"unknown {what} {shown(name)}", origin, key, allowed=allowed, remedy=remedy, grade=grade)
+    return refusal(f"unknown {noun} {shown(name)}", origin, key, allowed=allowed, remedy=remedy, grade=grade)
 
 
 def nearest(name: str, known: Iterable[str], given: Collection[str] = (), least: float = NEAR) -> str:
@@ -268,8 +268,8 @@ def _plain(name: str) -> str:
 def near_file(path: Path) -> str:
     """Path of the file beside one that is not there which is meant; "" where none is near."""
     with contextlib.suppress(OSError, ValueError):
-        beside = itertools.islice(path.parent.iterdir(), _MOST_FILES)
-        names = [entry.name for entry in beside if entry.suffix == path.suffix and entry.is_file()]
+        entries = itertools.islice(path.parent.iterdir(), _MOST_FILES)
+        names = [entry.name for entry in entries if entry.suffix == path.suffix and entry.is_file()]
         near = nearest(path.stem, [Path(name).stem for name in names], least=SAME)
         return str(path.with_name(near + path.suffix)) if near else ""
     return ""

@@ -40,10 +40,10 @@ def stoppable(run: Callable[[], int]) -> int:
         _came.append(number)
         raise KeyboardInterrupt
 
-    def swallowed(what: "sys.UnraisableHookArgs") -> None:
+    def swallowed(unraisable: "sys.UnraisableHookArgs") -> None:
         if _came:
             leave()
-        sys.__unraisablehook__(what)
+        sys.__unraisablehook__(unraisable)
 
     _handle(stop)
     sys.unraisablehook = swallowed

@@ -251,8 +251,8 @@ def _perhaps(unit: str) -> str:
 def misfit(unit_text: str, kind: str) -> str:
     """Kind of a unit that does not fit the kind of quantity, in words."""
     others = [other for other in SI_UNIT if other != "number" and fits(unit_text, other)]
-    what = f"a unit of {others[0]}, not of {kind}" if others else f"not a unit of {kind}"
-    return f'"{unit_text}" is {what}'
+    meaning = f"a unit of {others[0]}, not of {kind}" if others else f"not a unit of {kind}"
+    return f'"{unit_text}" is {meaning}'
 
 
 def _refusal(kind: str, problem: str, remedy: str = "") -> QuantityError:

@@ -33,17 +33,17 @@ class Awaited(Mapping[str, float | None]):
         later: Callable[[Sequence[str]], Mapping[str, float | None]],
     ) -> None:
         self._names, self._known, self._later = dict.fromkeys(names), dict(known), later
-        self._asked = False
+        self._was_read = False
 
     def __getitem__(self, name: str) -> float | None:
         if name in self._names and name not in self._known:
-            missing = [absent for absent in self._names if absent not in self._known] if self._asked else [name]
-            self._known, self._asked = {**self._known, **self._later(missing)}, True
+            missing = [absent for absent in self._names if absent not in self._known] if self._was_read else [name]
+            self._known, self._was_read = {**self._known, **self._later(missing)}, True
         return self._known[name]
 
     def items(self) -> ItemsView[str, float | None]:
         """Names with their values; missing values are computed together."""
-        self._asked = True
+        self._was_read = True
         return {name: self[name] for name in self._names}.items()
 
     def __iter__(self) -> Iterator[str]:

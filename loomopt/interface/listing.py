@@ -62,8 +62,8 @@ def copy_scene(name: str, path: Path) -> Path:
         raise packaged.unknown_problem(name, known)
     ending = suffix(path, (SCENE, ZIP))
     if ending == SCENE:
-        beside = {path.with_name(file): text for file, text in _named_files(known[name]).items()}
-        contents = {path: known[name].read_text(encoding="utf-8"), **beside}
+        named_files = {path.with_name(file): text for file, text in _named_files(known[name]).items()}
+        contents = {path: known[name].read_text(encoding="utf-8"), **named_files}
         for source in contents:
             _check_new(source)
         together({place: functools.partial(_put, text) for place, text in contents.items()})

@@ -293,7 +293,7 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
     @property
     def sought(self) -> str:
         """Target of the solve or of the evaluation, or the summary of its terms."""
-        return self.terms.said if self.terms else self.target
+        return self.terms.summary if self.terms else self.target
 
     @property
     def _outcome(self) -> str:
@@ -304,20 +304,20 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
     def _summary(self) -> str:
         """Figures that the target optimises, with values."""
         from loomopt.jobs import registry
-        from loomopt.solving.answer.solution import Words
+        from loomopt.solving.answer.solution import UnitFormatter
 
         sizes = dict[str, float]()
         if not self.terms and self.target:
             job = registry.of_target(self.scene, self.target)
             objectives = job.program(self.scene, self.target).objectives
             sizes = {objective.figure: objective.scale if objective.power == 1 else 0.0 for objective in objectives}
-        words, all_of = Words(self.scene), {**self.design, **self.figures}
+        formatter, all_of = UnitFormatter(self.scene), {**self.design, **self.figures}
         parts = list[str]()
         for name in self.terms.axes if self.terms else sizes:
             value = all_of.get(name)
             if value is not None:
                 value = 0.0 if abs(value) <= SHOWN_AS_ZERO * sizes.get(name, 0.0) else value
-                parts.append(f"{name} {words.shown(name, value)}")
+                parts.append(f"{name} {formatter.shown(name, value)}")
         return ", ".join(parts)
 
     def __str__(self) -> str:
@@ -398,7 +398,7 @@ def evaluate_design(scene: Scene, design: Mapping[str, float] | None, target: st
 
 def to_answer(record: solution.Solution, scene: Scene, target: str | None = None) -> Answer:
     """Answer of the record of a solve; target: as the call named it."""
-    return Answer(dataclasses.replace(record, scene=scene, asked=target), record.target)
+    return Answer(dataclasses.replace(record, scene=scene, named_target=target), record.target)
 
 
 def _to_evaluation(evaluated: solution.Evaluated, scene: Scene, target: str) -> Evaluation:

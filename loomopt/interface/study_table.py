@@ -18,7 +18,7 @@ from loomopt.picture.chart import COLOURS, Axis, Chart, Charts, Series, fit_axis
 from loomopt.picture.shapes import Floats
 from loomopt.picture.table import TextTable, unbroken
 from loomopt.scenes.provenance import provenance
-from loomopt.solving.answer.solution import Words, grouped
+from loomopt.solving.answer.solution import UnitFormatter, grouped
 from loomopt.studies.run.rows import Change, Findings, Multiplier, Row, SceneStudy, counted
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class ColumnUnits:
     """The units of a study's columns, those of its scene or SI."""
 
     def __init__(self, study: SceneStudy, si: bool) -> None:
-        self.study, self.si, self.words = study, si, Words(study.scene)
+        self.study, self.si, self.words = study, si, UnitFormatter(study.scene)
 
     def of(self, name: str) -> str:
         """Unit of a key that varies, a design variable or a figure."""
@@ -166,7 +166,7 @@ def _is_number(text: object) -> bool:
 
 
 def _kind(study: SceneStudy, name: str) -> str:
-    return study.kinds.get(name) or Words(study.scene).kind(name)
+    return study.kinds.get(name) or UnitFormatter(study.scene).kind(name)
 
 
 def _place_example(study: SceneStudy, rows: Sequence[Row]) -> str:

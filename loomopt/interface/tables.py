@@ -19,7 +19,7 @@ from loomopt.physics.tolerances import ACCURACY, SHOWN_AS_ZERO
 from loomopt.scenes import csv_tables, designs
 from loomopt.scenes.provenance import provenance
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluated, Solution, Words
+from loomopt.solving.answer.solution import Evaluated, Solution, UnitFormatter
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,7 +55,7 @@ def rows(solution: Evaluated, scene: Scene, before: Evaluated | None = None) -> 
 
     A figure the scene cannot have is left out.
     """
-    words = Words(scene)
+    formatter = UnitFormatter(scene)
     before = before or (solution.today if isinstance(solution, Solution) else None)
     limits = {limit.name: limit for limit in solution.limits}
     prices = solution.binding if isinstance(solution, Solution) else ()
@@ -64,7 +64,7 @@ def rows(solution: Evaluated, scene: Scene, before: Evaluated | None = None) -> 
     for name, value in {**solution.design, **solution.figures}.items():
         if value is None or getattr(name, "of", name) == "change" or name in scene.schema.lists:
             continue
-        unit = words.unit(name)
+        unit = formatter.unit(name)
         size, limit = factor(unit), limits.get(name)
         old = {**before.design, **before.figures}.get(name) if before else None
         low, high = (limit.min, limit.max) if limit else (None, None)
@@ -72,7 +72,7 @@ def rows(solution: Evaluated, scene: Scene, before: Evaluated | None = None) -> 
         shown = {column: None if number is None else _as_written(number, size) for column, number in numbers.items()}
         marks = {"binds": binding.get(name, ""), "reached": REACHED[solution.reached.get(name)]}
         table.append({"name": name, "unit": unit, **shown, "ok": limit.ok if limit else True, **marks})
-        table += _per_second(table[-1], words.kind(name), scene, solution.design.get("speed"))
+        table += _per_second(table[-1], formatter.kind(name), scene, solution.design.get("speed"))
     return _without_rounding(table)
 
 
@@ -132,11 +132,11 @@ def row(solution: Evaluated, scene: Scene, target: str, outcome: str, *, si: boo
 
     from loomopt.interface.table_frame import TableFrame
 
-    words, shown = Words(scene), {} if si else {row["name"]: row["design"] for row in rows(solution, scene)}
+    formatter, shown = UnitFormatter(scene), {} if si else {row["name"]: row["design"] for row in rows(solution, scene)}
     cells: dict[str, object] = {"problem": solution.problem, "target": target, "outcome": outcome}
     for name, value in {**solution.design, **solution.figures}.items():
         listed = name in scene.schema.lists
-        unit = words.si(name) if si or listed else words.unit(name)
+        unit = formatter.si(name) if si or listed else formatter.unit(name)
         if value is not None:
             cells[f"{name} [{unit}]"] = shown[name] if name in shown else value if listed else value / factor(unit)
     frame = TableFrame([cells])

@@ -485,7 +485,7 @@ class Job(abc.ABC):
     """The scenes of a family, where it is one."""
     open_boxes: str = ""
     """Why branch and bound does not close on its designs, "" where it does."""
-    loosening: Mapping[str, str] = MappingProxyType({})
+    monotone_slack: Mapping[str, str] = MappingProxyType({})
     """Variables that only limits read, and only looser as they grow, wherever the program has another variable too."""
 
     # What every job says.
@@ -613,9 +613,9 @@ class Job(abc.ABC):
         @working()
         def later(names: Sequence[str]) -> Figures:
             read = self.figures_of(scene, self.sampler(scene, design), names)
-            return {name: _own(read[name]) for name in names}
+            return {name: _float_or_none(read[name]) for name in names}
 
-        values = {name: _own(value) for name, value in figures.items()}
+        values = {name: _float_or_none(value) for name, value in figures.items()}
         return Awaited(
             figures, {k: v for k, v in values.items() if v is not None or k in known or k not in late}, later
         )
@@ -746,7 +746,7 @@ BENT = 20
 """Parts of each piece on which work that bends is summed: right to 2e-6, and no friction is known as closely."""
 
 
-def _own(value: Number) -> float | None:
+def _float_or_none(value: Number) -> float | None:
     return None if value is None else float(value)
 
 

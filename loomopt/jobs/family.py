@@ -41,7 +41,7 @@ class FamilyJob(Job):
         return self.family.parts
 
     @functools.cached_property
-    def own(self) -> frozenset[str]:
+    def separate(self) -> frozenset[str]:
         """Numbers of a design, by full name, of which each member has its own."""
         return frozenset(self.scene.full(name) for name in family.table(self.scene).own)
 
@@ -71,23 +71,23 @@ class FamilyJob(Job):
                 problem = f"member {place + 1} is another kind of machine than member 1: numbers alone may differ"
                 remedy = "Take what differs in effects, words and limits out of it"
                 raise refusal(problem, self.scene.origin, f"{key}.members[{place + 1}]", remedy=remedy)
-        states = [each.name for each in first.model.effects if isinstance(each, State | Speed | Event)]
+        states = [effect.name for effect in first.model.effects if isinstance(effect, State | Speed | Event)]
         if states or first.model.known_in:
             named = ", ".join(states) or "a load that is known in part of the cycle only"
             remedy = f"Take it off{f' (--without {states[0]})' if states else ''}, or solve each member by itself"
             raise refusal(f"a family of machines with {named} is not solved", self.scene.origin, key, remedy=remedy)
-        given, own = family.table(self.scene).own, set[str]()
+        given, separate = family.table(self.scene).own, set[str]()
         variables = [name for name in self.scene.bounds if standing_for(first, self.scene.full(name))]
         for place, name in enumerate(given):
             stands = standing_for(first, self.scene.full(name)) if name in variables else frozenset()
             if not stands:
                 raise unknown("design variable", name, variables, self.scene.origin, f"{key}.own[{place + 1}]")
-            own |= stands
+            separate |= stands
         if self.job.sizes(self.scene):
             named = ", ".join(self.job.sizes(self.scene))
             problem = "what comes in sizes only is not chosen for a family"
             raise refusal(problem, self.scene.origin, f"bounds.{named}", remedy="Give the sizes that are sold no list")
-        return together(programs, own, family.table(self.scene).combine)
+        return together(programs, separate, family.table(self.scene).combine)
 
     # Designs: what is shared under its own name, what is not under the member's.
 
@@ -101,7 +101,7 @@ class FamilyJob(Job):
 
     def designs(self, x: Numbers) -> list[dict[str, float]]:
         """Design, SI, of each member."""
-        return [self.job.design(part.program, part.own(x)) for part in self.parts]
+        return [self.job.design(part.program, part.member_values(x)) for part in self.parts]
 
     def own_designs(self, design: Numbers) -> list[dict[str, float]]:
         """Design, SI, of each member, of the whole's."""
@@ -113,34 +113,35 @@ class FamilyJob(Job):
         ]
 
     def _whole(self, designs: Sequence[Mapping[str, float]]) -> dict[str, float]:
-        found: dict[str, float] = {}
+        whole: dict[str, float] = {}
         for name in dict.fromkeys(name for design in designs for name in design):
-            each = {k: design[name] for k, design in enumerate(designs) if name in design}
-            values = list(each.values())
-            alike = len(each) == len(designs) and max(values) - min(values) <= FEASIBLE * max(map(abs, values))
-            shared = alike and name not in self.own
-            found |= {name: values[0]} if shared else {of_member(name, k): value for k, value in each.items()}
-        return found
+            by_member = {k: design[name] for k, design in enumerate(designs) if name in design}
+            values = list(by_member.values())
+            alike = len(by_member) == len(designs) and max(values) - min(values) <= FEASIBLE * max(map(abs, values))
+            shared = alike and name not in self.separate
+            whole |= {name: values[0]} if shared else {of_member(name, k): value for k, value in by_member.items()}
+        return whole
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
         """Variables of a design."""
-        own = zip(self.parts, self.own_designs(design), strict=True)
-        return program.completed(self._joined([self.job.values(part.program, each) for part, each in own], design))
+        pairs = zip(self.parts, self.own_designs(design), strict=True)
+        members = [self.job.values(part.program, member_design) for part, member_design in pairs]
+        return program.completed(self._joined(members, design))
 
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
         """Variables without what is only rounding."""
-        tidied = self._joined([self.job.tidy(part.program, part.own(x)) for part in self.parts], x)
+        tidied = self._joined([self.job.tidy(part.program, part.member_values(x)) for part in self.parts], x)
         return {**x, **tidied}
 
-    def _joined(self, each: Sequence[Mapping[str, float]], otherwise: Numbers) -> dict[str, float]:
+    def _joined(self, members: Sequence[Mapping[str, float]], otherwise: Numbers) -> dict[str, float]:
         """Members' variables as variables of the whole; `otherwise` for a shared one on which they do not agree."""
-        found: dict[str, float] = {}
+        joined: dict[str, float] = {}
         apart = set[str]()
-        for part, own in zip(self.parts, each, strict=True):
-            for name, value in own.items():
+        for part, member in zip(self.parts, members, strict=True):
+            for name, value in member.items():
                 whole = part.names[name]
-                apart |= {whole} if found.setdefault(whole, value) != value else set()
-        return found | {name: otherwise[name] for name in apart if name in otherwise}
+                apart |= {whole} if joined.setdefault(whole, value) != value else set()
+        return joined | {name: otherwise[name] for name in apart if name in otherwise}
 
     # What only members have.
 

@@ -43,34 +43,34 @@ def _distribution(point: "EntryPoint") -> str:
     return point.dist.name if point.dist else point.value
 
 
-def _single(group: str, name: str, what: str) -> "EntryPoint | None":
+def _single(group: str, name: str, noun: str) -> "EntryPoint | None":
     """One entry point of a name. Raises BadInput, naming the distributions, where several claim it."""
     points = [point for point in entry_points(group) if point.name == name]
     if len(points) > 1:
-        problem = f"{what} {name} is brought by {' and by '.join(map(_distribution, points))}"
+        problem = f"{noun} {name} is brought by {' and by '.join(map(_distribution, points))}"
         raise BadInput(problem, key=name, remedy="Uninstall all of them but one")
     return points[0] if points else None
 
 
-def _loaded(point: "EntryPoint", what: str, kind: type, name: str) -> Any:
+def _loaded(point: "EntryPoint", noun: str, kind: type, name: str) -> Any:
     """Object of an entry point. Raises BadInput with its distribution where loading fails or the type is another."""
-    BROUGHT[point.module] = f"{what} {point.name} of {_distribution(point)}"
+    BROUGHT[point.module] = f"{noun} {point.name} of {_distribution(point)}"
     try:
         thing = point.load()
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # SystemExit too, which would end the process without a word
         text = f"{type(error).__name__}: {error}"
-        raise _useless(point, what, "cannot be imported: " + " ".join(text.split())) from error
+        raise _useless(point, noun, "cannot be imported: " + " ".join(text.split())) from error
     if not isinstance(thing, kind):
-        raise _useless(point, what, f"is no {kind.__name__.lower()}")
+        raise _useless(point, noun, f"is no {kind.__name__.lower()}")
     if getattr(thing, "name", "") != name:
-        raise _useless(point, what, f"calls itself {getattr(thing, 'name', 'nothing')}")
+        raise _useless(point, noun, f"calls itself {getattr(thing, 'name', 'nothing')}")
     return thing
 
 
-def _useless(point: "EntryPoint", what: str, why: str) -> BadInput:
-    problem = f"{what} {point.name} of {_distribution(point)} {why}"
+def _useless(point: "EntryPoint", noun: str, why: str) -> BadInput:
+    problem = f"{noun} {point.name} of {_distribution(point)} {why}"
     return BadInput(problem, key=point.name, value=point.value, remedy="Repair or uninstall it")
 
 

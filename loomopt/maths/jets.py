@@ -225,9 +225,9 @@ def stacked(values: Sequence[Number]) -> Number:
     return Jet(np.array([jet.v for jet in jets], dtype=np.float64), np.array([jet.g for jet in jets]), h)
 
 
-def spread(numbers: Sequence[float], beside: Iterable[Number]) -> Floats:
+def spread(numbers: Sequence[float], pattern: Iterable[Number]) -> Floats:
     """Floats as an array of shape (count, 1 ...) that broadcasts with the other operands."""
-    axes = max((np.ndim(number.v if isinstance(number, Jet) else number) for number in beside), default=0)
+    axes = max((np.ndim(number.v if isinstance(number, Jet) else number) for number in pattern), default=0)
     return np.array(numbers, dtype=np.float64).reshape(-1, *(1,) * axes)
 
 

@@ -306,8 +306,8 @@ def recorded(tape: Tape, system: int = 0) -> Maths:
     def function(name: str) -> Callable[..., Number]:
         return functools.partial(tape.call, system, name)
 
-    def spread(numbers: Sequence[Number], beside: Iterable[Number]) -> Number:
-        return tape.call(system, "spread", tape.listed(numbers), tape.listed(beside))
+    def spread(numbers: Sequence[Number], pattern: Iterable[Number]) -> Number:
+        return tape.call(system, "spread", tape.listed(numbers), tape.listed(pattern))
 
     def weighted(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:
         result = tape.call(system, "weighted", tape.listed([tape.listed(row) for row in weights]), values)

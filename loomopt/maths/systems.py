@@ -35,7 +35,7 @@ class Maths:
     floor(x): the largest whole number up to x, which has no slope: of turns, away from where it jumps.
     choose(place, values): the value at a place that is data of a node (0, 1, 2 ... as numbers), never of the design.
     constant(x): a scalar in the form in which arithmetic with what varies is quickest; the results are the same bits.
-    spread(numbers, beside): numbers as one array, over which `arrays` runs a formula at once, beside numbers that may
+    spread(numbers, pattern): numbers as one array, over which `arrays` runs a formula at once, beside numbers that may
     be arrays themselves. weighted(weights, values): a list of the sums Σ weights[k][i] values[i] over such an array.
     """
 
@@ -58,10 +58,10 @@ def _chosen(place: Number, values: Sequence[Number]) -> Number:
     return values[int(place)]
 
 
-def _spread_floats(numbers: Sequence[Number], beside: Iterable[Number]) -> Number:
+def _spread_floats(numbers: Sequence[Number], pattern: Iterable[Number]) -> Number:
     import numpy as np
 
-    axes = max((np.ndim(number) for number in beside), default=0)
+    axes = max((np.ndim(number) for number in pattern), default=0)
     return np.array(numbers, dtype=np.float64).reshape(-1, *(1,) * axes)
 
 
@@ -72,7 +72,7 @@ def _weighted_floats(weights: Sequence[Sequence[Number]], values: Number) -> lis
     return sums.tolist() if sums.ndim == 1 else list(sums)
 
 
-def _spread_objects(numbers: Sequence[Number], beside: Iterable[Number]) -> Number:
+def _spread_objects(numbers: Sequence[Number], pattern: Iterable[Number]) -> Number:
     import numpy as np
 
     array = np.empty(len(numbers), dtype=object)
@@ -180,7 +180,7 @@ def casadi() -> Maths:
             return values[int(place)]
         return sum((place == k) * value for k, value in enumerate(values))
 
-    def spread(numbers: Sequence[Number], beside: Iterable[Number]) -> Number:
+    def spread(numbers: Sequence[Number], pattern: Iterable[Number]) -> Number:
         return ca.SX(ca.DM(numbers))
 
     def weighted(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:

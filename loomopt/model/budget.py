@@ -151,8 +151,8 @@ def _share(load: Acting, at: Instant) -> Number:
     ((_, term),) = terms
     if load.acts != "output":
         return term
-    beside = balance.inside(at.maths, load, at.pose, at.given)
-    return term * at.pose.q1 if beside is None else term * at.pose.q1 + beside
+    inner_term = balance.inside(at.maths, load, at.pose, at.given)
+    return term * at.pose.q1 if inner_term is None else term * at.pose.q1 + inner_term
 
 
 class _Quadrature(NamedTuple):

@@ -147,7 +147,7 @@ class Roots:
         self.model, self.tape = model, Tape()
         self.maths, self.there = (recorded(self.tape, system) for system in range(2))
         self.inputs = {name: self.tape.input() for name in sorted(known)}
-        self._found: dict[str, frozenset[str]] = {}
+        self._dependencies: dict[str, frozenset[str]] = {}
 
     @lazy
     def given(self) -> Given:
@@ -163,9 +163,9 @@ class Roots:
         """Numbers that a row, a whole-cycle quantity or a mean follows from."""
         if name in self.inputs:
             return frozenset({name})
-        if name not in self._found:
-            self._found[name] = self._of(lambda: self._read(name))
-        return self._found[name]
+        if name not in self._dependencies:
+            self._dependencies[name] = self._of(lambda: self._read(name))
+        return self._dependencies[name]
 
     def of_switch(self, place: int) -> frozenset[str]:
         """Numbers that the corners of a switch follow from, by its place in the model's."""
@@ -254,13 +254,13 @@ class MemberShare(NamedTuple):
     names: Mapping[str, str]
     limits: Mapping[str, str]
 
-    def own(self, x: Numbers) -> dict[str, float]:
+    def member_values(self, x: Numbers) -> dict[str, float]:
         """Variables of the member, SI, from those of the whole."""
         return {name: x[whole] for name, whole in self.names.items()}
 
     def sampler(self, x: Numbers) -> Sampler:
         """Design of the member, SI, from the variables of the whole."""
-        return sampled(self.program.model, {**self.program.parameters, **self.own(x)})
+        return sampled(self.program.model, {**self.program.parameters, **self.member_values(x)})
 
 
 class Family(NamedTuple):
@@ -661,7 +661,7 @@ def _followed(
     """Variables that follow from the others: the members' own, and what is no less than what they seek."""
     variables: dict[str, float] = {}
     for part in parts:
-        results = part.program.follow(part.program.model, {**part.program.parameters, **part.own(values)})
+        results = part.program.follow(part.program.model, {**part.program.parameters, **part.member_values(values)})
         variables |= {part.names[name]: value for name, value in results.items() if name in part.names}
     for name, (member, objective) in measured.items():
         variables[name] = objective.merit(parts[member].sampler({**values, **variables}))

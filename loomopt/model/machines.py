@@ -119,14 +119,16 @@ class Machines:
 
     def at(self, name: str, pieces: Pieces, u: Floats, machines: Places) -> Floats:
         """Quantity, SI, at nodes (pieces, u) of machines; u: (…, chosen), the others (chosen,)."""
-        return self._each((name,), machines, lambda rows, part: rows.own_node(pieces[part], u[..., part]), u.shape)[0]
+        return self._by_model((name,), machines, lambda rows, part: rows.own_node(pieces[part], u[..., part]), u.shape)[
+            0
+        ]
 
     def at_angles(self, names: Sequence[str], angles: Floats, machines: Places | None = None) -> list[Floats]:
         """Quantities that no switch changes, SI, at crank angles, rad, (…, chosen), of machines (chosen,)."""
         chosen = np.arange(self.count) if machines is None else machines
-        return self._each(names, chosen, lambda rows, part: Node(angles[..., part], {}), angles.shape)
+        return self._by_model(names, chosen, lambda rows, part: Node(angles[..., part], {}), angles.shape)
 
-    def _each(
+    def _by_model(
         self,
         names: Sequence[str],
         machines: Places,
@@ -259,13 +261,13 @@ class _Refined:
         self.sign = np.ones(len(nodes)) if signed else np.where(values[nodes, machines] < 0.0, -1.0, 1.0)
         self.sampled = self.sign * values[nodes, machines]
         self.size = np.abs(values).max(axis=0)
-        self.beside = self.sign * values[inner + SIDES, machines]
+        self.neighbours = self.sign * values[inner + SIDES, machines]
         self.centre, self.step = of.u[inner], of.u[inner + 1] - of.u[inner]
 
     @property
     def bend(self) -> Floats:
         """Second difference, of either sign."""
-        difference: Floats = np.abs(self.beside[0] - 2 * self.beside[1] + self.beside[2])
+        difference: Floats = np.abs(self.neighbours[0] - 2 * self.neighbours[1] + self.neighbours[2])
         return difference
 
     def highest(self, at: At) -> Tops:
@@ -282,7 +284,7 @@ class _Refined:
     def refined(self, at: At) -> tuple[Floats, Floats]:
         """u and height of each top: a parabola through samples, then a quartic; an end may stay the top."""
         step = CLOSER * self.step
-        centre = inside_samples(self.centre + self.step * vertex(self.beside), 2 * step)
+        centre = inside_samples(self.centre + self.step * vertex(self.neighbours), 2 * step)
         top, bent = np.empty_like(centre), np.empty(len(centre), dtype=bool)
         left = np.arange(len(centre))
         for _ in range(WINDOWS):

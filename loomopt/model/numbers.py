@@ -81,7 +81,7 @@ def _curve(scene: Scene, load: Load[Any], parameters: Table) -> tuple[Curve, csv
     marked = read.marks[CORNER]
     try:
         cubics = tuple(periodic_cubic.through(angles, samples, tuple(map(bool, marked))) for samples in values)
-        return (PeriodicCubics(cubics) if table.beside else cubics[0]), read
+        return (PeriodicCubics(cubics) if table.second_column else cubics[0]), read
     except ValueError as error:
         remedy = f"Correct the table: angles are {table.angle}; a column {CORNER} marks corners with 1"
         raise refusal(f"the table is no curve over one turn: {error}", read.file, remedy=remedy) from None
@@ -106,7 +106,7 @@ def labels(scene: Scene) -> dict[str, str]:
 
 def table_remarks(scene: Scene) -> tuple[str, ...]:
     """Remarks on the curves of the loads: sentences without full stop."""
-    return tuple(record.said for record in records(scene))
+    return tuple(record.summary for record in records(scene))
 
 
 def records(scene: Scene) -> tuple[csv_tables.Record, ...]:
@@ -122,10 +122,10 @@ def records(scene: Scene) -> tuple[csv_tables.Record, ...]:
             left = f"; left out one at a time, samples lie {scene.show(curve.spread, table.kind, 3)} rms off the curve "
             left += "of the others"
         unread = [number for number in table.needless if scene.given(number) is not None]
-        said = f"a cubic through {curve.samples} samples with {corners}, "
-        said += f"rms of the fit {scene.show(0.0, table.kind)}{left}"
+        summary = f"a cubic through {curve.samples} samples with {corners}, "
+        summary += f"rms of the fit {scene.show(0.0, table.kind)}{left}"
         parts = curve.curves if isinstance(curve, PeriodicCubics) else (curve,)
         columns = [column for column in table.columns if column != "angle"]
-        record = read.record(f"{name}.{key}", {n: part.spread for n, part in zip(columns, parts, strict=True)}, said)
-        remarks.append(record._replace(said=f"{record.said}{f'. {unread[0]} is not read' if unread else ''}"))
+        record = read.record(f"{name}.{key}", {n: part.spread for n, part in zip(columns, parts, strict=True)}, summary)
+        remarks.append(record._replace(summary=f"{record.summary}{f'. {unread[0]} is not read' if unread else ''}"))
     return tuple(remarks)

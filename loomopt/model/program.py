@@ -187,11 +187,11 @@ class Goal(NamedTuple):
     low: float
     high: float
     slack: float
-    beside: str = ""
+    size_figure: str = ""
 
     def reached(self, figures: Mapping[str, float | None]) -> bool:
         """Whether a design's figures, SI, satisfy it."""
-        value, size = figures.get(self.figure), figures.get(self.beside, 1.0)
+        value, size = figures.get(self.figure), figures.get(self.size_figure, 1.0)
         slack = self.slack * abs(size or 0.0)
         return value is not None and self.low - slack <= value <= self.high + slack
 
@@ -333,7 +333,7 @@ class Program:
         return frozenset(limit.name for limit in self.limits if not limit.hidden)
 
     @lazy
-    def held(self) -> frozenset[str]:
+    def constants(self) -> frozenset[str]:
         """Variables that are constant without a limit: their value is today's, not a choice."""
         limited = {limit.row for limit in self.bound_limits.values()}
         return frozenset(v.name for v in self.variables if v.lower == v.upper and v.name not in limited)

@@ -318,21 +318,21 @@ class Sampler:
         at = np.concatenate(list(peaks.values()))
         piece = pieces[at]
         inner = at + (u[at] == 0.0) - (u[at] == 1.0)
-        sampled, sign, beside = np.empty(len(at)), np.ones(len(at)), np.empty((3, len(at)))
+        sampled, sign, neighbours = np.empty(len(at)), np.ones(len(at)), np.empty((3, len(at)))
         for name, span in spans.items():
             sampled[span] = values[name][at[span]]
-            beside[:, span] = values[name][inner[span] + SIDES]
+            neighbours[:, span] = values[name][inner[span] + SIDES]
             if name not in self.model.signed:
                 sign[span] = np.sign(sampled[span])
         sampled *= sign
         step = u[inner + 1] - u[inner]
-        centre = u[inner] + step * vertex(sign * beside)
+        centre = u[inner] + step * vertex(sign * neighbours)
         step = CLOSER * step
         centre = inside_samples(centre, 2 * step)
         nodes = centre + step * np.arange(-2, 3)[:, None]
-        around = self._each_at(spans, np.broadcast_to(piece, nodes.shape), nodes)
+        around = self._values_at(spans, np.broadcast_to(piece, nodes.shape), nodes)
         top = inside_samples(centre + step * vertex(sign * around), np.zeros_like(step))
-        refined = sign * self._each_at(spans, piece, top)
+        refined = sign * self._values_at(spans, piece, top)
         # A level stretch's extreme is its beginning.
         bent = (around[0] != around[2]) | (around[4] != around[2])
         better = (refined >= sampled) & bent
@@ -341,7 +341,7 @@ class Sampler:
         signed = self.model.signed
         return {n: [Extreme(*extreme, signed=n in signed) for extreme in tops[span]] for n, span in spans.items()}
 
-    def _each_at(self, spans: Mapping[str, slice], pieces: Pieces, u: Floats) -> Floats:
+    def _values_at(self, spans: Mapping[str, slice], pieces: Pieces, u: Floats) -> Floats:
         """Values of quantities, SI, each at its columns of nodes (pieces, u)."""
         read = self.together(tuple(spans), pieces.ravel(), u.ravel())
         if len(spans) == 1:

@@ -211,8 +211,8 @@ class Parted:
         face = curves[output]
         flown = curves | (self._flown(curves, columns, stretch) if stretch.piece else {})
         gap = np.maximum(flown[output] - face, 0.0)
-        beside = {f"{HELD.format(name)} [{unit}]": face, f"{GAP} [{unit}]": gap}
-        first = {ANGLE: flown[ANGLE], output: flown[output], **beside}
+        contact_columns = {f"{HELD.format(name)} [{unit}]": face, f"{GAP} [{unit}]": gap}
+        first = {ANGLE: flown[ANGLE], output: flown[output], **contact_columns}
         return first | {column: values for column, values in flown.items() if column not in first}
 
     def _rows(self, whole: Rows, stretch: Stretch) -> Rows:

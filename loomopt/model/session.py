@@ -24,16 +24,16 @@ class Session:
 
     def __init__(self) -> None:
         self.positions = 0
-        self._kept: dict[str, OrderedDict[Hashable, object]] = {}
-        self._beside: weakref.WeakKeyDictionary[object, dict[Hashable, object]] = weakref.WeakKeyDictionary()
+        self._values: dict[str, OrderedDict[Hashable, object]] = {}
+        self._values_by_owner: weakref.WeakKeyDictionary[object, dict[Hashable, object]] = weakref.WeakKeyDictionary()
 
-    def cached(self, what: str, most: int, key: Hashable, make: Callable[[], Made]) -> Made:
+    def cached(self, kind: str, most: int, key: Hashable, make: Callable[[], Made]) -> Made:
         """Cached value of a key, made where it is missing; beyond `most` values the least recently used is dropped.
 
-        what: the kind of value, of which `most` are cached.
+        kind: the kind of value, of which `most` are cached.
         """
         with LOCK:
-            values = self._kept.setdefault(what, OrderedDict())
+            values = self._values.setdefault(kind, OrderedDict())
             if key in values:
                 values.move_to_end(key)
             else:
@@ -45,23 +45,23 @@ class Session:
     def cached_for(self, owner: object, key: Hashable, make: Callable[[], Made]) -> Made:
         """Cached value of an owner by a key, made where it is missing; it is dropped with its owner."""
         with LOCK:
-            values = self._beside.setdefault(owner, {})
+            values = self._values_by_owner.setdefault(owner, {})
             if key not in values:
                 values[key] = make()
             return cast(Made, values[key])
 
-    def latest(self, what: str) -> Iterator[object]:
+    def latest(self, kind: str) -> Iterator[object]:
         """Yield the cached values of one kind, the last used first."""
-        return reversed(self._kept.get(what, OrderedDict()).values())
+        return reversed(self._values.get(kind, OrderedDict()).values())
 
-    def count(self, what: str) -> int:
+    def count(self, kind: str) -> int:
         """Number of cached values."""
-        return len(self._kept.get(what, ()))
+        return len(self._values.get(kind, ()))
 
     def forget(self, *sorts: str) -> None:
         """Drop the cached values of these kinds."""
-        for what in sorts:
-            self._kept.pop(what, None)
+        for kind in sorts:
+            self._values.pop(kind, None)
 
 
 OF_PROCESS = Session()

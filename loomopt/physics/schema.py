@@ -41,14 +41,14 @@ class Figure(NamedTuple):
 
 
 class Target(NamedTuple):
-    """Target of a job; `own` models the values of its `[targets.NAME]` table.
+    """Target of a job; `table` models the values of its `[targets.NAME]` table.
 
     needs: numbers of [operation] it keeps; needs_effects: effects without which it says nothing.
     """
 
     name: str
     text: str
-    own: type[Table]
+    table: type[Table]
     needs: tuple[str, ...] = ()
     needs_effects: tuple[str, ...] = ()
 

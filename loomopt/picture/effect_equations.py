@@ -142,8 +142,8 @@ def term(load: Acting, pose: Motion, inputs: Given, letter: str) -> Equation:
     name = symbol(f"{letter}_{load.name}")
     if isinstance(load, Load) and load.tabulated and load.tabulated.key in inputs.tables[load.name]:
         return _table_equation(load, name, inputs)
-    if isinstance(load, Load) and load.told:
-        rows: list[Case] = [(force(load, pose, inputs, switch), where) for switch, where in load.told.items()]
+    if isinstance(load, Load) and load.cases:
+        rows: list[Case] = [(force(load, pose, inputs, switch), where) for switch, where in load.cases.items()]
         alike = len({formula for formula, _ in rows}) == 1
         return equation(load.name, name, rows[0][0]) if alike else cases(load.name, name, rows)
     *inner, (last, _) = pieces(load, pose, inputs)
@@ -232,8 +232,8 @@ def joint_equations(model: JobModel, pose: Motion, inputs: Given, total: Express
     equations: dict[str, Equation] = {}
     for check in checks:
         assert check.joints is not None
-        if check.said:
-            equations[check.name] = Equation(check.name, check.said, rf"\text{{{check.said}}}")
+        if check.sentence:
+            equations[check.name] = Equation(check.name, check.sentence, rf"\text{{{check.sentence}}}")
             continue
         joints = check.joints(inputs.inputs(system, check, pose), loading)
         for name in check.between:

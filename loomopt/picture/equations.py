@@ -168,17 +168,17 @@ def cases(name: str, left: Expression, rows: Sequence[Case]) -> Equation:
     """An equation whose right side is one formula after another; a single one needs no condition."""
     if len(rows) == 1:
         return equation(name, left, rows[0][0])
-    written = ", ".join(f"{_said(value, text)} {_where(when, text)}" for value, when in rows)
+    written = ", ".join(f"{_case_value(value, text)} {_where(when, text)}" for value, when in rows)
     sentence = f"{text(left)} = {written}"
     return Equation(name, sentence, functools.partial(_case_text, left, rows), ((left, "="), *rows))
 
 
 def _case_text(left: Expression, rows: Sequence[Case]) -> str:
-    lines = r" \\ ".join(f"{_said(value, latex)} & {_where(when, latex)}" for value, when in rows)
+    lines = r" \\ ".join(f"{_case_value(value, latex)} & {_where(when, latex)}" for value, when in rows)
     return rf"{latex(left)} = \begin{{cases}} {lines} \end{{cases}}"
 
 
-def _said(value: Expression | str, write: Callable[[Expression], str]) -> str:
+def _case_value(value: Expression | str, write: Callable[[Expression], str]) -> str:
     if not isinstance(value, str):
         return write(value)
     return value if write is text else rf"\text{{{value}}}"

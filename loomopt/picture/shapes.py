@@ -68,21 +68,21 @@ def place(wishes: Iterable[LabelWish], strokes: Floats, unit: float, leader: flo
     """
     taken: list[LabelSpot] = []
     for wish in wishes:
-        spot = _found(wish, strokes, taken, unit, leader)
+        spot = _label_spot(wish, strokes, taken, unit, leader)
         taken.append(spot)
         if _gap(spot) > leader * unit:
             strokes = np.concatenate([strokes, _between(spot, unit)])
     return taken
 
 
-def _found(wish: LabelWish, strokes: Floats, taken: Sequence[LabelSpot], unit: float, leader: float) -> LabelSpot:
+def _label_spot(wish: LabelWish, strokes: Floats, taken: Sequence[LabelSpot], unit: float, leader: float) -> LabelSpot:
     """Free spot of a wish that costs least, in text heights: of distance, turn and what lies between."""
     best, least = None, math.inf
     for ring in itertools.chain(RINGS, (RINGS[-1] * FARTHER**k for k in itertools.count(1))):
         if best and ring >= least:
             return best
         for which, near in enumerate(wish.near):
-            spots = [_beside(wish, near, ring * unit, wish.side + turn * math.pi / 8) for turn in TURNS]
+            spots = [_candidate(wish, near, ring * unit, wish.side + turn * math.pi / 8) for turn in TURNS]
             free = _free(np.array([spot.box for spot in spots]), strokes, taken, CLEAR * unit)
             for turn, spot in itertools.compress(zip(TURNS, spots, strict=True), free):
                 cost = ring + (abs(turn) + which) / 3
@@ -94,7 +94,7 @@ def _found(wish: LabelWish, strokes: Floats, taken: Sequence[LabelSpot], unit: f
     raise AssertionError("rings go on without end")
 
 
-def _beside(wish: LabelWish, near: tuple[float, float], gap: float, side: float) -> LabelSpot:
+def _candidate(wish: LabelWish, near: tuple[float, float], gap: float, side: float) -> LabelSpot:
     """Wish's box at a gap from a point in the direction of an angle, rad."""
     across, up = math.cos(side), math.sin(side)
     half_width, half_height = wish.width / 2, wish.height / 2
@@ -165,7 +165,7 @@ class Units(NamedTuple):
     stiffness: str = "N/m"
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Text of a legend on lengths."""
         return "lengths in inches" if self.length == "in" else "lengths in mm"
 

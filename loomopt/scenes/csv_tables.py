@@ -70,7 +70,7 @@ class Record(NamedTuple):
     key: under which the scene names it; rows: of numbers; precision: how far rounding may have moved a number of each
     column; misfit: rms by which samples, left out one at a time, lie off the curve of the others, by column; None where
     it has none. change: the largest change that smoothing made to a value; uncertainty: of the second derivative, as a
-    share of its peak; both None where nothing is smoothed. said: all of it in a sentence without its full stop.
+    share of its peak; both None where nothing is smoothed. summary: all of it in a sentence without its full stop.
     """
 
     key: str
@@ -78,13 +78,13 @@ class Record(NamedTuple):
     rows: int
     precision: Mapping[str, float]
     misfit: Mapping[str, float | None]
-    said: str
+    summary: str
     change: float | None = None
     uncertainty: float | None = None
 
     def as_dict(self) -> dict[str, object]:
         """JSON data; without the keys of smoothing where the table is not smoothed."""
-        fields = {name: value for name, value in self._asdict().items() if value is not None and name != "said"}
+        fields = {name: value for name, value in self._asdict().items() if value is not None and name != "summary"}
         return fields | {"precision": dict(self.precision), "misfit": dict(self.misfit)}
 
 
@@ -110,15 +110,15 @@ class Table(NamedTuple):
         return {name: max(halves) for name, halves in self.halves.items()}
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Sentence on the precision, such as "angle to ±0.5 deg, s to ±0.0005 mm", and remarks."""
         halves = {name: self.precision[name] / factor(unit) for name, unit in self.units.items()}
         accuracies = (f"{name} to \u00b1{half:.2g} {self.units[name]}" for name, half in halves.items() if half)
         return "; ".join((f"read {', '.join(accuracies)}", *self.remarks))
 
     def record(self, key: str, misfit: Mapping[str, float | None], use: str) -> Record:
-        """Remarks on the table; key: under which the scene names it; said: a sentence on its use."""
-        text = f"{key} {self.file}: {use}; {self.said}"
+        """Remarks on the table; key: under which the scene names it; summary: a sentence on its use."""
+        text = f"{key} {self.file}: {use}; {self.summary}"
         return Record(key, self.file, len(self.lines), self.precision, misfit, text)
 
 

@@ -71,10 +71,10 @@ def loaded(path: Path) -> object:
 def _file_bytes(path: Path) -> bytes:
     """Bytes of a file, one more than allowed at most. Raises BadInput for what is no file."""
     if not path.is_file():
-        what = "it is no ordinary file" if path.exists() else "there is no such file"
+        problem = "it is no ordinary file" if path.exists() else "there is no such file"
         near = near_file(path)
         remedy = f'Perhaps "{near}" is meant' if near else "Correct the path"
-        raise refusal(f"the design cannot be read: {what}", str(path), remedy=remedy)
+        raise refusal(f"the design cannot be read: {problem}", str(path), remedy=remedy)
     with path.open("rb") as file:
         return file.read(LARGEST_FILE + 1)
 
@@ -389,8 +389,8 @@ def remark(scene: Scene, given: DesignGiven, later: Call, changes: Sequence[str]
 
     later: changes of this call, which are left out; changes: from `scene_changes`.
     """
-    current = given.call.then(later).said
-    lasting = [text for text in given.call.said if text in current]
+    current = given.call.then(later).changes
+    lasting = [text for text in given.call.changes if text in current]
     sentences = [f"{origin} adds the changes of its call: {', '.join(_shorten(lasting))}"] if lasting else []
     sentences += (
         [f"the settings differ from those of {origin}; {scene.origin} is used: {', '.join(changes)}"] if changes else []

@@ -177,18 +177,19 @@ def removed(document: Mapping[str, Any], parts: Sequence[str]) -> dict[str, Any]
 
 @dataclass(frozen=True)
 class Paths:
-    """folder: of the scene's file, absolute; None where there is none. own: dotted keys that the caller has set.
+    """folder: of the scene's file, absolute; None where there is none. caller_keys: dotted keys that the caller has
+    set.
 
     texts: of files that came with the scene, by the dotted key under which it names them.
     """
 
     folder: Path | None = None
-    own: frozenset[str] = frozenset()
+    caller_keys: frozenset[str] = frozenset()
     texts: Mapping[str, str] = field(default_factory=Frozen)
 
     def set_by_caller(self, keys: Iterable[str]) -> "Paths":
         """The same paths with more keys that the caller has set."""
-        caller_keys = self.own | {_on(key) for key in keys}
+        caller_keys = self.caller_keys | {_on(key) for key in keys}
         return Paths(self.folder, caller_keys, self.texts)
 
     def text(self, key: str) -> str | None:
@@ -215,7 +216,7 @@ class Paths:
         return path
 
     def _is_own(self, key: str) -> bool:
-        return any(key == prefix or key.startswith(f"{prefix}.") for prefix in self.own)
+        return any(key == prefix or key.startswith(f"{prefix}.") for prefix in self.caller_keys)
 
 
 def _on(key: str) -> str:

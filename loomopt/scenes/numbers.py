@@ -51,7 +51,7 @@ def _quantities(scene: Scene) -> Iterator[tuple[str, Quantity]]:
             if getattr(scene.effects[effect.name], key) is not None:
                 labels.setdefault(label(effect, key), quantity)
     for name, target in schema.targets.items():
-        for key, quantity in _fields(target.own):
+        for key, quantity in _fields(target.table):
             yield f"targets.{name}.{key}", quantity
     for name in scene.bounds:
         for place in (f"bounds.{name}", f"bounds.{name}.min", f"bounds.{name}.max"):

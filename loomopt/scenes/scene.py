@@ -19,7 +19,7 @@ from loomopt.scenes.cursor import Cursor
 from loomopt.scenes.document import Paths, copied, looked_up, removed, replaced
 from loomopt.scenes.tables import Bound, JobNames, LimitRange, Place, SceneSchema
 
-_Own = TypeVar("_Own", bound=Table)
+_Table = TypeVar("_Table", bound=Table)
 _Made = TypeVar("_Made")
 
 TABLES = (
@@ -77,7 +77,7 @@ class Call:
     target: str | None = None
 
     @property
-    def said(self) -> list[str]:
+    def changes(self) -> list[str]:
         """Sentences on the changes."""
         changes = [*(f"{name} on" for name in self.on), *(f"{name} off" for name in self.off)]
         changes += [f"{key} = {value if isinstance(value, str) else shown(value)}" for key, value in self.set.items()]
@@ -156,7 +156,7 @@ class Scene(Shown):
         """The name of its job."""
         return self.schema.name
 
-    def own(self, model: type[_Own]) -> _Own | None:
+    def effect_table(self, model: type[_Table]) -> _Table | None:
         """Table of an effect that is on, by the model of its values; None where it is off."""
         return next((table for table in self.effects.values() if isinstance(table, model)), None)
 
@@ -170,7 +170,7 @@ class Scene(Shown):
         """Files that were read for it by now: they may change, where it does not."""
         return []
 
-    def table(self, model: type[_Own]) -> _Own:
+    def table(self, model: type[_Table]) -> _Table:
         """Table [operation], [mechanism] or that of a target, by its model."""
         return next(table for table in (*self.tables.values(), *self.targets.values()) if isinstance(table, model))
 
@@ -241,7 +241,7 @@ class Scene(Shown):
         return self if changed.document is self.document else changed
 
     def called(self, call: Call, caller_keys: Iterable[str] = ()) -> "Scene":
-        """Scene with what a call changes; own: keys whose paths are the caller's, not the scene's."""
+        """Scene with what a call changes; caller_keys: keys whose paths are the caller's, not the scene's."""
         keys = {key: former_names.current_key(key, self.schema.former_names) for key in call.set}
         values = Frozen({keys[key]: value for key, value in copied(call.set, self.origin).items()})
         document = self._off(self._on(self._set(values), call.on), call.off)
@@ -492,7 +492,7 @@ def _build_scene(
     def known_places() -> list[Place]:
         return list(read.places(schema, tables, active, available()))
 
-    targets = {name: target.own for name, target in schema.targets.items()}
+    targets = {name: target.table for name, target in schema.targets.items()}
     if isinstance(raw["targets"], Mapping):
         raw["targets"] = {**{name: {} for name in targets}, **raw["targets"]}
     display.read(top.at("display"))

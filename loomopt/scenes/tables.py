@@ -241,7 +241,7 @@ def check_needs(
             faults.add(place.at(key).fault(problem, remedy=f"Take {key} out, or {', '.join(given)}"))
     for effect, table in active.items():
         _check_model(scene.at("effects").at(effect.name), effect, table)
-    if any(effect.beside or effect.clashes for effect in active):
+    if any(effect.companions or effect.clashes for effect in active):
         _check_together(scene.at("effects"), active)
     for effect, table in active.items():
         if any(value != value for _, value in table):  # where it is known depends on a value that cannot be read

@@ -72,9 +72,9 @@ def solve(
         ]
 
         def solve_continuous(simplest: Task) -> Solution:
-            found = optimum.search(simplest)
-            seconds.update(found.time)
-            return found
+            search_result = optimum.search(simplest)
+            seconds.update(search_result.time)
+            return search_result
 
         answer = solve_reduced(task, pipeline, solve_continuous)
         return replace(answer, time={**seconds, "total_s": clock.total})

@@ -17,23 +17,25 @@ from loomopt.solving.search.neighbour_newton import Optimum
 from loomopt.solving.search.search import Clock, Search
 
 
-def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> neighbour_newton.NeighbourTask | None:
+def begun(
+    scene: Scene, target: str, accuracy: float, neighbours: Sequence[Any]
+) -> neighbour_newton.NeighbourTask | None:
     """Target between two optima; None where more than a search makes its answer, or they are of another one.
 
-    beside: both optima as JSON data, and how far the target lies from the first to the second.
+    neighbours: both optima as JSON data, and how far the target lies from the first to the second.
     """
     job = registry.of_target(scene, target)
     if job.sizes(scene):
         return None
     program = job.program(scene, target)
-    first, second = map(neighbour_newton.read_optimum, beside[:2])
+    first, second = map(neighbour_newton.read_optimum, neighbours[:2])
     if not (first.serves(program) and second.serves(program)):
         return None
     search = Search(job, program, Settings(accuracy), job.start(program, scene))
-    return neighbour_newton.NeighbourTask(search, first, second, beside[2], told_peaks(scene, job, program))
+    return neighbour_newton.NeighbourTask(search, first, second, neighbours[2], figure_peaks(scene, job, program))
 
 
-def told_peaks(scene: Scene, job: Job, program: Program) -> tuple[str, ...]:
+def figure_peaks(scene: Scene, job: Job, program: Program) -> tuple[str, ...]:
     """Quantities whose extremes are figures, where a program reads the very model that figures are of.
 
     Of a check that reads numbers which the program solves in another form there is none: only the design has them.
@@ -56,7 +58,7 @@ def evaluated(scene: Scene, search: Search) -> Evaluated | None:
 
 
 @working()
-def told(scene: Scene, target: str, search: Search) -> Solution:
+def answer_of_search(scene: Scene, target: str, search: Search) -> Solution:
     """Answer of a search that ended beside its neighbours."""
     clock = Clock()
     with clock.measure("report"):
@@ -66,7 +68,7 @@ def told(scene: Scene, target: str, search: Search) -> Solution:
 
 def optimum(scene: Scene, program: Program, answer: Solution) -> Optimum | None:
     """Optimum of an answer; None where none can begin from it, as where what it adds was weighed."""
-    if answer.status != "optimal" or answer.certificate is None or answer.beside is not None or answer.members:
+    if answer.status != "optimal" or answer.certificate is None or answer.alternative is not None or answer.members:
         return None
     full = {scene.full(name): value for name, value in designs.flat(answer.design).items()}
     job = registry.of(scene)

@@ -10,7 +10,7 @@ from loomopt.model.sampling import SAMPLERS
 from loomopt.model.session import current
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import Clash, Solution, Words
+from loomopt.solving.answer.solution import Clash, Solution, UnitFormatter
 from loomopt.solving.certificate.records import GlobalBound
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.options import GlobalProof
@@ -91,7 +91,7 @@ def search(task: Task) -> Solution:
         from loomopt.solving.search import elastic
 
         with clock.measure("solve"):
-            clash = elastic.clash(state, Words(scene))
+            clash = elastic.clash(state, UnitFormatter(scene))
     with clock.measure("report"):
         answer = report.answer(scene, task.target, state, clash)
     return report.completed(answer, bound, evaluations, clock.seconds(state))

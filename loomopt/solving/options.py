@@ -98,12 +98,14 @@ def _remedy(name: str, near: str) -> str:
     return f'Perhaps "{near}" is meant' if near else "Choose one of them"
 
 
-def check_sought(scene: Scene, what: str = "solve") -> None:
-    """Raise BadInput where an effect takes part only where a given design is evaluated; what: the command."""
+def check_sought(scene: Scene, command: str = "solve") -> None:
+    """Raise BadInput where an effect takes part only where a given design is evaluated; command: the command."""
     for effect in scene.active:
         if isinstance(effect, EVALUATED):
-            problem = f"{what} does not cover effect {effect.name}: with it, a design is evaluated and simulated only"
-            remedy = f"Take it off (--without {effect.name}): {what} without it, evaluate with it"
+            problem = (
+                f"{command} does not cover effect {effect.name}: with it, a design is evaluated and simulated only"
+            )
+            remedy = f"Take it off (--without {effect.name}): {command} without it, evaluate with it"
             raise refusal(problem, scene.origin, f"effects.{effect.name}", remedy=remedy)
 
 

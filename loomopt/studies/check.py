@@ -15,7 +15,7 @@ from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import designs, packaged, provenance
 from loomopt.scenes.scene import Scene
 from loomopt.solving import engine
-from loomopt.solving.answer.solution import Solution, Words, grouped
+from loomopt.solving.answer.solution import Solution, UnitFormatter, grouped
 from loomopt.studies.front import front, plan, trade
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import Row, StudyTask
@@ -98,7 +98,7 @@ def front_table(study: trade.Trade) -> "pd.DataFrame":
 
 def front_line(study: trade.Trade, row: Row) -> dict[str, object]:
     """Line of a certified design of a front, SI: requested value, axes, figures, slope, active limits."""
-    words, (first, second) = Words(study.scene), study.axes
+    words, (first, second) = UnitFormatter(study.scene), study.axes
     over, under = words.si(first), words.si(second)
     slope = row.multipliers.get(study.solver.slope, "")
     line: dict[str, object] = {"status": row.status, f"asked {second} [{under}]": row.place.get(second, "")}
@@ -118,8 +118,8 @@ def check_front(study: trade.Trade, then: "pd.DataFrame") -> Iterator[tuple[str,
     """
     import pandas as pd
 
-    words, second = Words(study.scene), study.axes[1]
-    request, figure = (f"{kind}{second} [{words.si(second)}]" for kind in ("asked ", ""))
+    formatter, second = UnitFormatter(study.scene), study.axes[1]
+    request, figure = (f"{kind}{second} [{formatter.si(second)}]" for kind in ("asked ", ""))
     values = [float(value) for value in then[figure]]
     ends = _front_ends(study, values)
     rows: dict[int, Row] = {}
@@ -133,7 +133,7 @@ def check_front(study: trade.Trade, then: "pd.DataFrame") -> Iterator[tuple[str,
             ask = {"also": near, "held": rows[ends[0]].warm.get("held", []), "wide": False}
             task = StudyTask(place, parent.point, {second: float(then[request].iloc[place])}, ask)
         rows[place] = row = study.solved(task, parent if parent and parent.certified else None)
-        spot = f"{second} {words.shown(second, values[place])}"
+        spot = f"{second} {formatter.shown(second, values[place])}"
         if not row.certified:
             yield row.status, [f"{spot}: {row.status}, {row.reason}"]
             continue

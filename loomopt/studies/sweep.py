@@ -222,8 +222,10 @@ class Sweep:
         if any(known[k].warm.get("basins", 1) > 1 for k in (parent, across) if k is not None):
             # With several optima at a neighbour, a different one may be best here.
             return StudyTask(point, None, place, {"beyond": []})
-        beside = [] if parent is None or across is None else self._optima_between(place, known[parent], known[across])
-        return StudyTask(point, parent, place, starts, beside=beside)
+        neighbours = (
+            [] if parent is None or across is None else self._optima_between(place, known[parent], known[across])
+        )
+        return StudyTask(point, parent, place, starts, neighbours=neighbours)
 
     def _optima_between(self, place: Mapping[str, float], parent: Row, across: Row) -> list[object]:
         """Optima of two rows, and the share of the way from the first to the second; empty without an optimum."""
@@ -242,7 +244,7 @@ class Sweep:
     def solve(self, task: StudyTask, parent: Row | None) -> Solution:
         """Answer of a task. Raises BadInput for an invalid combination."""
         (search,) = self._search_between([task])
-        answer = neighbour_answer.told(self.scene_at(task.point), self.target, search) if search else None
+        answer = neighbour_answer.answer_of_search(self.scene_at(task.point), self.target, search) if search else None
         return answer if answer and answer.status == "optimal" else self._solve_alone(task, parent)
 
     def _solve_alone(self, task: StudyTask, parent: Row | None) -> Solution:
@@ -256,7 +258,9 @@ class Sweep:
     def _search_between(self, tasks: Sequence[StudyTask]) -> list[Search | None]:
         """Searches between the optima of two neighbours; None for a task that must be solved alone."""
         searches: list[Search | None] = [None] * len(tasks)
-        starts = [(k, start) for k, task in enumerate(tasks) if task.beside and (start := self._start_between(task))]
+        starts = [
+            (k, start) for k, task in enumerate(tasks) if task.neighbours and (start := self._start_between(task))
+        ]
         for (k, _), search in zip(starts, neighbour_newton.solve_between([start for _, start in starts]), strict=True):
             searches[k] = search
         return searches
@@ -264,7 +268,7 @@ class Sweep:
     def _start_between(self, task: StudyTask) -> neighbour_newton.NeighbourTask | None:
         """Start of a search between two neighbours' optima; None for an invalid combination."""
         with contextlib.suppress(BadInput):
-            return neighbour_answer.begun(self.scene_at(task.point), self.target, self.accuracy, task.beside)
+            return neighbour_answer.begun(self.scene_at(task.point), self.target, self.accuracy, task.neighbours)
         return None
 
     def place(self, row: Row) -> Mapping[str, float]:

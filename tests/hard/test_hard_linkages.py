@@ -208,7 +208,7 @@ def test_peaks_of_a_machine_next_to_its_change_point_are_the_true_ones():
     near = np.geomspace(1e-9, 0.5, 20001)
     lengths = Lengths(l1, l2, l3, scene.mechanism["l4"])
     _, rate, bend = crank_rocker.curves(lengths, np.concatenate([math.pi - near, math.pi + near]))
-    steady = scene.own(inertia.Parameters).J4 * scene.operation["speed"] ** 2
+    steady = scene.effect_table(inertia.Parameters).J4 * scene.operation["speed"] ** 2
     assert lo.evaluate(scene).figures["peak_torque"] == pytest.approx(steady * np.abs(rate * bend).max(), rel=1e-4)
 
 
@@ -220,7 +220,7 @@ def test_peaks_are_right_as_near_to_a_change_point_as_designs_may_come(share):
     near = np.geomspace(1e-9, 0.5, 200_001)
     lengths = Lengths(l1, l2, l3, scene.mechanism["l4"])
     _, rate, bend = crank_rocker.curves(lengths, np.concatenate([math.pi - near, math.pi + near]))
-    steady = scene.own(inertia.Parameters).J4 * scene.operation["speed"] ** 2
+    steady = scene.effect_table(inertia.Parameters).J4 * scene.operation["speed"] ** 2
     assert lo.evaluate(scene).figures["peak_torque"] == pytest.approx(steady * np.abs(rate * bend).max(), rel=1e-7)
 
 

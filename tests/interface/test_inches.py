@@ -16,7 +16,7 @@ from loomopt.interface.text.scenes import curves, parts
 from loomopt.jobs import registry
 from loomopt.picture.table import TextTable
 from loomopt.scenes import packaged
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import UnitFormatter
 
 WISH = packaged.problems()["rapier"].parent / "rapier-wish.csv"
 TABLE = {"targets__match__table": str(WISH)}
@@ -119,13 +119,13 @@ def test_a_table_has_the_same_sizes(pair):
 def test_a_price_is_told_in_the_tables_units(pair):
     """The worth in words is the worth in SI."""
     for answer in pair:
-        words = Words(answer.scene)
+        formatter = UnitFormatter(answer.scene)
         for price in answer.binding:
             (figure, worth), *_ = price.worth.items()
-            size = factor(words.unit(figure)) / factor(words.unit(price.limit))
+            size = factor(formatter.unit(figure)) / factor(formatter.unit(price.limit))
             number, *unit = price.reading.split()
             assert float(number) == pytest.approx(worth / size, rel=5e-3)
-            assert " ".join(unit).endswith(f"per {words.unit(price.limit)}")
+            assert " ".join(unit).endswith(f"per {formatter.unit(price.limit)}")
 
 
 @pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])

@@ -115,7 +115,7 @@ class Combination(NamedTuple):
 def completed(combination):
     """Return a combination with the effects that its own need beside them, at their first example."""
     effects = packaged(combination.job).schema.effects
-    needed = {name for one in combination.ones for name in effects[one.effect].beside} - set(combination.names)
+    needed = {name for one in combination.ones for name in effects[one.effect].companions} - set(combination.names)
     ones = {one.effect: one for one in (*combination.ones, *(One(name, 0) for name in needed))}
     return combination._replace(ones=tuple(ones[name] for name in effects if name in ones))
 
@@ -253,8 +253,8 @@ def test_curves_have_columns_of_the_active_effects_only(combination):
     names = [*ALWAYS.get(job, []), *(COLUMN.get(load.name, load.name) for load in loads)]
     output = ALWAYS.get(job) or any(load.acts == "output" for load in loads)
     first, *others = MOTION[job].split(", ")
-    beside = [column for name in combination.names for column in PARTED.get(name, [])]
-    expected = ["phi [rad]", first, *beside, *others]
+    companions = [column for name in combination.names for column in PARTED.get(name, [])]
+    expected = ["phi [rad]", first, *companions, *others]
     known = "speed" in scene_of(combination).operation
     expected += IN_TIME[job].split(", ") if known else []
     expected += [column for load in loads if isinstance(load, State) for column in load.columns]

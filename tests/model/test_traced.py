@@ -258,7 +258,7 @@ def test_recordings_go_with_their_model(monkeypatch):
     monkeypatch.setattr(reading, "WORTH_IT", 0)
     model = yoke()
     Sampler(model, NUMBERS).at("torque", np.array([0]), np.array([0.5]))
-    assert model in current()._beside
+    assert model in current()._values_by_owner
     gone = weakref.ref(model)
     del model
     gc.collect()

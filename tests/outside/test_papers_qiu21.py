@@ -115,11 +115,11 @@ def test_the_packaged_scenes_are_what_is_printed():
         assert [math.degrees(scene.mechanism[name]) for name in ("rise", "far_dwell", "return", "near_dwell")] == [
             pytest.approx(angle, rel=1e-15) for angle in (120, 60, 120, 60)
         ]
-        assert scene.own(weight.Parameters).G == 369.55
-        assert pytest.approx(0.06 * ENDS, rel=1e-15) == scene.own(warp_tension.Parameters).T1
-        assert pytest.approx(0.04 * ENDS, rel=1e-15) == scene.own(warp_tension.Parameters).T2
+        assert scene.effect_table(weight.Parameters).G == 369.55
+        assert pytest.approx(0.06 * ENDS, rel=1e-15) == scene.effect_table(warp_tension.Parameters).T1
+        assert pytest.approx(0.04 * ENDS, rel=1e-15) == scene.effect_table(warp_tension.Parameters).T2
     for scene in (MOVING, SHORT):
-        assert pytest.approx(369.55 / 9.80665, rel=1e-15) == scene.own(inertia.Parameters).M
+        assert pytest.approx(369.55 / 9.80665, rel=1e-15) == scene.effect_table(inertia.Parameters).M
         assert scene.operation["speed"] == pytest.approx(20 * math.pi, rel=1e-15)
 
 

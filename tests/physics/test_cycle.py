@@ -207,7 +207,7 @@ def test_the_pulse_of_the_curves_is_right_across_the_ends_of_the_turn(name):
     phi = curves["phi [rad]"].to_numpy()
     assert (phi[0], phi[-1]) == (0.0, pytest.approx(TURN))
     assert np.all(np.diff(phi) >= 0)
-    pulse = scene.own(resistance.Parameters).pulse
+    pulse = scene.effect_table(resistance.Parameters).pulse
     away = np.abs((phi - given.values["beta"] + math.pi) % TURN - math.pi)
     expected = np.where(away < pulse / 2, 745.0 * np.cos(math.pi * away / pulse), 0.0)
     assert curves["M_R [N*m]"].to_numpy() == pytest.approx(expected, rel=0, abs=1e-9)

@@ -25,7 +25,7 @@ def test_other_quantities_are_told_as_the_scene_writes_them():
 
 def test_lengths_are_told_in_the_unit_without_its_name():
     assert (Units("mm").size(0.031), Units("in").size(0.0254)) == ("31", "1")
-    assert (Units("mm").said, Units("in").said) == ("lengths in mm", "lengths in inches")
+    assert (Units("mm").summary, Units("in").summary) == ("lengths in mm", "lengths in inches")
 
 
 @pytest.mark.parametrize(

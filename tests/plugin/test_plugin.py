@@ -123,8 +123,8 @@ def test_effects_come_by_entry_point_for_its_own_job_and_for_one_of_loomopt(loom
 def test_two_distributions_with_one_job_are_named_and_other_scenes_still_run(loomopt, distribution):
     other = [distribution("other-press", {"press": "other_press:JOB"})]
     for words in (("solve", "press"), ("new", "press", "x.toml"), ("check", "press")):
-        told = loomopt(*words, status=2, folders=other).stderr
-        assert "job press is brought by loomopt-press and by other-press" in told
+        cases = loomopt(*words, status=2, folders=other).stderr
+        assert "job press is brought by loomopt-press and by other-press" in cases
     assert json.loads(loomopt("solve", "beatup", "--json", folders=other).stdout)["status"] == "optimal"
     listed = loomopt("list", folders=other)
     assert "beatup-heavy" in listed.stdout
@@ -148,9 +148,9 @@ def test_a_job_that_is_none_is_named_with_its_distribution(loomopt, distribution
     broken = [distribution("broken-loom", {"knit": "broken_loom:JOB"}, code)]
     (tmp_path / "knit.toml").write_text('[problem]\nname = "knit"\njob = "knit"\ntitle = "x"\n')
     for words in (("show", "knit.toml"), ("solve", "knit"), ("new", "knit", "x.toml")):
-        told = loomopt(*words, status=2, folders=broken).stderr
-        assert f"job knit of broken-loom {said}" in told
-        assert len(told.strip().splitlines()) == 1
+        cases = loomopt(*words, status=2, folders=broken).stderr
+        assert f"job knit of broken-loom {said}" in cases
+        assert len(cases.strip().splitlines()) == 1
     assert loomopt("evaluate", "press", folders=broken).stderr == ""
     listed = loomopt("list", folders=broken)
     assert "job press; targets torque" in listed.stdout
@@ -168,8 +168,8 @@ def test_a_job_that_is_none_is_named_with_its_distribution(loomopt, distribution
 )
 def test_an_effect_that_is_none_is_named_with_its_distribution(loomopt, distribution, code, said):
     broken = [distribution("broken-effect", {"beatup.wind": "broken_effect:EFFECT"}, code, "loomopt.effects")]
-    told = loomopt("show", "beatup", "--set", "effects.wind.v=1 m", status=2, folders=broken).stderr
-    assert f"effect beatup.wind of broken-effect {said}" in told
+    cases = loomopt("show", "beatup", "--set", "effects.wind.v=1 m", status=2, folders=broken).stderr
+    assert f"effect beatup.wind of broken-effect {said}" in cases
     assert loomopt("evaluate", "beatup", folders=broken).stderr == ""
 
 
@@ -270,14 +270,14 @@ import dataclasses
 EFFECT = dataclasses.replace(KNOWN, name="wind")
 """
     same = [distribution("same-figure", {"beatup.wind": "same_figure:EFFECT"}, code, "loomopt.effects")]
-    told = loomopt("show", "beatup", "--set", "effects.wind.v=1 m", status=2, folders=same).stderr
-    assert "effect beatup.wind of same-figure brings reed_centrifugal, which exists already" in told
+    cases = loomopt("show", "beatup", "--set", "effects.wind.v=1 m", status=2, folders=same).stderr
+    assert "effect beatup.wind of same-figure brings reed_centrifugal, which exists already" in cases
 
 
 def test_an_effect_of_two_distributions_is_refused(loomopt, distribution):
     both = [distribution("other-bar", {"beatup.torsion_bar": "other_bar:EFFECT"}, group="loomopt.effects")]
-    told = loomopt("show", "beatup", "--set", "effects.torsion_bar.k=1 N*m/rad", status=2, folders=both).stderr
-    assert "effect beatup.torsion_bar is brought by loomopt-press and by other-bar" in told
+    cases = loomopt("show", "beatup", "--set", "effects.torsion_bar.k=1 N*m/rad", status=2, folders=both).stderr
+    assert "effect beatup.torsion_bar is brought by loomopt-press and by other-bar" in cases
 
 
 def test_a_name_of_loomopt_cannot_be_taken(loomopt, distribution):

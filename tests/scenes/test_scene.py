@@ -76,7 +76,7 @@ def test_packaged_scenes_are_complete(name):
     offered = set(found.document.get("available", {})) if found.schema.tables else set(found.schema.effects)
     for effect in {name for name in offered if not found.schema.effects[name].many} - set(found.effects):
         if (name, effect) != ("shedding-static", "separation"):  # its warp tension is known in the dwells only
-            assert effect in found.with_effect(*found.schema.effects[effect].beside, effect).effects
+            assert effect in found.with_effect(*found.schema.effects[effect].companions, effect).effects
 
 
 @pytest.mark.parametrize("name", packaged.problems())

@@ -156,7 +156,7 @@ def apart(name, own=Table, **declared):
 
 
 def test_an_effect_that_another_needs_is_asked_for():
-    needy = apart("needy", beside=("rocker_inertia",))
+    needy = apart("needy", companions=("rocker_inertia",))
     with pytest.raises(BadInput, match="effect needy needs the effect rocker_inertia") as error:
         built({"effects": {"needy": {}}}, needy)
     assert error.value.key == "effects.needy"
@@ -186,9 +186,9 @@ def test_effects_may_clash_only_by_a_word_of_the_other(shape, stands):
 
 
 def test_tables_are_found_by_their_models():
-    assert BEATUP.own(inertia.Parameters).J4 == 0.62
-    assert BEATUP.own(rocker_inertia.Parameters) is None
-    assert BEATUP.with_effect("rocker_inertia").own(rocker_inertia.Parameters).J3 == 0.05
+    assert BEATUP.effect_table(inertia.Parameters).J4 == 0.62
+    assert BEATUP.effect_table(rocker_inertia.Parameters) is None
+    assert BEATUP.with_effect("rocker_inertia").effect_table(rocker_inertia.Parameters).J3 == 0.05
     assert BEATUP.table(Operation).M0 == 745.0
     assert BEATUP.table(Mechanism).l1 == 0.031
     assert BEATUP.set("targets.torque.M3_tolerance", "5 N*m").table(TorqueTarget).M3_tolerance == 5.0
@@ -243,7 +243,7 @@ def test_of_several_changes_only_the_outcome_has_to_hold():
 
 def test_a_value_set_in_available_is_what_goes_on():
     changed = BEATUP.change({"available.rocker_inertia.J3": "0.07 kg*m^2"}, on=("rocker_inertia",))
-    assert changed.own(rocker_inertia.Parameters).J3 == 0.07
+    assert changed.effect_table(rocker_inertia.Parameters).J3 == 0.07
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ def last_round(study):
     rows: list[Row] = []
     while batch := study.batch(rows):
         known = {row.point: row for row in rows}
-        if any(task.beside for task in batch):
+        if any(task.neighbours for task in batch):
             return batch, known
         rows += [study.solved(task, None if task.parent is None else known[task.parent]) for task in batch]
     raise AssertionError("nothing is solved together")
@@ -54,7 +54,7 @@ def untimed(row):
 )
 def test_rows_are_the_same_bits_in_batches_of_any_size(study, count):
     batch, rows = last_round(study)
-    tasks = [task for task in batch if task.beside][:9]
+    tasks = [task for task in batch if task.neighbours][:9]
     whole = [untimed(row) for row in study.solved_together((tasks * count)[:count])]
     assert None not in whole
     for size in (1, 8):
@@ -80,9 +80,9 @@ def test_rows_are_the_same_bits_from_one_worker_and_from_two_and_of_separate_sol
 
 
 def test_few_tasks_are_solved_alone():
-    tasks = [StudyTask(k, 0, {}, beside=[{}, {}, 0.5]) for k in range(FEWEST)]
+    tasks = [StudyTask(k, 0, {}, neighbours=[{}, {}, 0.5]) for k in range(FEWEST)]
     assert enough_together(tasks) == tasks
-    assert not any(task.beside for task in enough_together(tasks[1:]))
+    assert not any(task.neighbours for task in enough_together(tasks[1:]))
 
 
 @pytest.mark.slow
@@ -90,8 +90,8 @@ def test_an_invalid_scene_does_not_change_the_other_rows():
     """A task with an invalid scene is left to its solve, which reports the error."""
     study = resistances(49)
     batch, _ = last_round(study)
-    tasks = [task for task in batch if task.beside][:3]
-    invalid = replace(tasks[1], beside=[{**tasks[1].beside[0], "x": {"l1": 0.03}}, *tasks[1].beside[1:]])
+    tasks = [task for task in batch if task.neighbours][:3]
+    invalid = replace(tasks[1], neighbours=[{**tasks[1].neighbours[0], "x": {"l1": 0.03}}, *tasks[1].neighbours[1:]])
     first, none, last = study.solved_together([tasks[0], invalid, tasks[2]])
     assert none is None
     assert [untimed(row) for row in (first, last)] == [

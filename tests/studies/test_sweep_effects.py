@@ -45,7 +45,7 @@ def choices(job):
     """Effects to put on, by name: every effect with those that it needs, and all that combine."""
     scene = machine(job)
     known = study.known_effects(scene)
-    single = {e.name: (*(b for b in e.beside if b not in scene.effects), e.name) for e in known}
+    single = {e.name: (*(b for b in e.companions if b not in scene.effects), e.name) for e in known}
     single = {name: effects for name, effects in single.items() if name not in scene.effects}
     together = study.combine_effects(known, uncoiled.scene(scene) if job == "shedding" else scene).effects
     return single | {ALL: tuple(e.name for e in together if e.name not in scene.effects and not isinstance(e, Speed))}

@@ -210,8 +210,9 @@ def simulate(
     accuracy: Annotated[
         str | None, typer.Option(metavar="R", help="Fewest rows that show each peak to R; with --out.")
     ] = None,
-    beside: Annotated[
-        Path | None, typer.Option(metavar="F.csv", help="Measured curves: phi [deg] and columns of the curves.")
+    measured: Annotated[
+        Path | None,
+        typer.Option("--beside", metavar="F.csv", help="Measured curves: phi [deg] and columns of the curves."),
     ] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Forces in joints; figures are polar diagrams.")] = False,
     decimal: Decimal = "point",
@@ -229,13 +230,13 @@ def simulate(
     if relative is not None:
         check_numbers(relative, 1)
     force_parts = scenes.forces(scene, api.simulate(scene, given, name), given) if forces else ()
-    compared = [scenes.beside(scene, api.simulate(scene, given, name, measured=beside))] if beside else []
+    compared = [scenes.comparison(scene, api.simulate(scene, given, name, measured=measured))] if measured else []
     subject = outputs.describe_design(api.evaluate(scene, given, name).result, name, status) if given and out else None
     for path in out or ():
         if forces and path.suffix.lower() in outputs.PICTURES:
             api.evaluate(scene, given, name).plot_forces(path)
         else:
-            outputs.curves(path, scene, given, relative, name, subject, beside, comma)
+            outputs.curves(path, scene, given, relative, name, subject, measured, comma)
         remark(f"Wrote {path}")
     if forces:
         layout.show(*force_parts, *compared)

@@ -87,9 +87,9 @@ def read_request(
     given = designs.checked(handed.design, scene, origin) if design or handed.design else {}
     name = target_name(scene, target)
     same_target = name == handed.target
-    as_found = same_target and not call.said and not changes
+    is_unchanged = same_target and not call.changes and not changes
     known = target or scene.call.target or same_target
-    return DesignRequest(scene, given, name if known else None, handed.status if as_found else None)
+    return DesignRequest(scene, given, name if known else None, handed.status if is_unchanged else None)
 
 
 def only(option: str, given: list[Path] | None) -> Path | None:

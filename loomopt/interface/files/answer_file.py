@@ -19,7 +19,16 @@ from loomopt.physics.tolerances import FEASIBLE, STATIONARY
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import JointPrice, Price, Proof, Proofs, Relaxation, Sentences, Solution, Words
+from loomopt.solving.answer.solution import (
+    JointPrice,
+    Price,
+    Proof,
+    Proofs,
+    Relaxation,
+    Sentences,
+    Solution,
+    UnitFormatter,
+)
 from loomopt.solving.certificate.records import Certificate, GlobalBound, GlobalLevel, Level
 
 AGREES = 1e-6
@@ -71,7 +80,7 @@ def _answer(document: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -
         target="" if target is None else evaluation.target,
         status=str(document["status"]),
         sentences=Sentences(str(document.get("message", ""))),
-        binding=tuple(_price(price, Words(scene)) for price in document.get("binding", ())),
+        binding=tuple(_price(price, UnitFormatter(scene)) for price in document.get("binding", ())),
         bind_together=tuple(map(_joint_price, document.get("bind_together", ()))),
         certificate=certificate,
         relaxation=tuple(_record(Relaxation, relaxation) for relaxation in document.get("relaxation", ())),
@@ -97,11 +106,11 @@ def _record(kind: Callable[..., Read], entries: Mapping[str, Any]) -> Read:
     return kind(**{str(name): value for name, value in entries.items()})
 
 
-def _price(record: Mapping[str, Any], words: Words) -> Price:
+def _price(record: Mapping[str, Any], formatter: UnitFormatter) -> Price:
     """A limit's price with its reading in the scene's units."""
     (figure, worth), *_ = record["worth"].items()
     limit, side = str(record["limit"]), str(record["side"])
-    reading = words.price_reading(figure, limit, float(worth))
+    reading = formatter.price_reading(figure, limit, float(worth))
     return Price(
         limit, side, float(record["value"]), str(record["text"]), {figure: float(worth)}, dict(record["unit"]), reading
     )
@@ -117,8 +126,8 @@ def _joint_price(record: Mapping[str, Any]) -> JointPrice:
 
 def _certificate(record: Mapping[str, Any]) -> Certificate:
     levels = tuple(
-        Level(str(each["objective"]), float(each["stationarity"]), float(each["complementarity"]), 0.0)
-        for each in record["levels"]
+        Level(str(level["objective"]), float(level["stationarity"]), float(level["complementarity"]), 0.0)
+        for level in record["levels"]
     )
     return Certificate(
         bool(record["passed"]),
@@ -179,7 +188,7 @@ def _doubts(document: Mapping[str, Any], answer: Answer) -> Iterator[str]:
         if not abs(printed - value) <= AGREES * max(abs(value), 1e-3 * sizes[answer.units.get(name, "1")]):
             differing += 1
             if differing <= MOST_TOLD:
-                now, then = (Words(answer.scene).shown(name, number, 9) for number in (value, float(printed)))
+                now, then = (UnitFormatter(answer.scene).shown(name, number, 9) for number in (value, float(printed)))
                 yield f"{name} is {now} for its design, the file says {then}."
     if differing > MOST_TOLD:
         yield f"So it is with {differing - MOST_TOLD} more of its figures."

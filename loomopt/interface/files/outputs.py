@@ -22,7 +22,7 @@ from loomopt.model.session import working
 from loomopt.scenes import provenance
 from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluated, Solution, Words
+from loomopt.solving.answer.solution import Evaluated, Solution, UnitFormatter
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -140,10 +140,10 @@ def answer_sheets(solution: Solution, scene: Scene) -> "dict[str, pd.DataFrame]"
 
     shown = tables.meaningful(tables.answer(solution, scene))
     is_design = [name in solution.design for name in shown.index]
-    words = Words(scene)
+    formatter = UnitFormatter(scene)
     rows = []
     for limit in solution.limits:
-        unit = words.unit(limit.name)
+        unit = formatter.unit(limit.name)
         ends = {"value": limit.value, "min": limit.min, "max": limit.max}
         record = {key: None if value is None else value / factor(unit) for key, value in ends.items()}
         rows.append({"name": limit.name, "unit": unit, **record, "held": limit.ok})

@@ -17,7 +17,7 @@ from loomopt.scenes import family as family_table
 from loomopt.scenes.designs import flat
 from loomopt.scenes.scene import Scene, cached
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import Evaluated, Solution, Words, changed
+from loomopt.solving.answer.solution import Evaluated, Solution, UnitFormatter, changed
 from loomopt.solving.certificate.certificate import COMPLEMENTARY
 
 
@@ -86,7 +86,7 @@ def status(subject: Subject) -> Status:
         verdict = "NOT ADMISSIBLE" if broken else "All limits held"
         return Status("bad" if broken else "open", f"{verdict}; evaluated, nothing was optimised", violations)
     if evaluated.status != "optimal":
-        sentences = (evaluated.message, Words(subject.scene).worse(evaluated.worse), *violations)
+        sentences = (evaluated.message, UnitFormatter(subject.scene).worse(evaluated.worse), *violations)
         verdict = VERDICTS.get(evaluated.status, evaluated.status.upper())
         return Status(
             "bad",
@@ -118,7 +118,7 @@ def _certified_status(solution: Solution, scene: Scene) -> Status:
         if solution.terms or not solution.target
         else registry.of(scene).say(scene, solution.target, solution.figures)
     )
-    proofs += [worse] if (worse := Words(scene).worse(solution.worse)) else []
+    proofs += [worse] if (worse := UnitFormatter(scene).worse(solution.worse)) else []
     verdict = "; ".join(["Optimal and certified", *opened])
     unproven = solution.global_bound is not None and not solution.global_bound.proven
     return Status("open" if opened else "ok", verdict, (verdict_text, *proofs), NOT_CERTIFIED if unproven else 0)

@@ -17,7 +17,7 @@ SIGNS = {"<=": "≤", ">=": "≥", "=": "="}
 
 def page(equations: Sequence[Equation]) -> str:
     """Equations, those of one name together."""
-    groups = itertools.groupby(equations, key=lambda each: each.name)
+    groups = itertools.groupby(equations, key=lambda equation: equation.name)
     return "".join(
         f'<div class="equations"><h4>{escape(name)}</h4>{"".join(map(markup, group))}</div>' for name, group in groups
     )
@@ -96,6 +96,6 @@ def _printer() -> Expression:
 
     def printed(expression: Expression) -> str:
         text = str(Printer()._print(expression).toxml()).replace("<mo>-</mo>", "<mo>−</mo>")
-        return ENTITY.sub(lambda each: unescape(each[0]), text)
+        return ENTITY.sub(lambda match: unescape(match[0]), text)
 
     return printed

@@ -44,7 +44,7 @@ def _turn(scene: Scene, full: Design, unit: str) -> DrawnTurn:
     return drawn_turn(tables.curves(scene, full), registry.of(scene).views.marks(scene, flat(full)), unit)
 
 
-def _key(shown: DrawnTurn, beside: bool) -> str:
+def _key(shown: DrawnTurn, with_today: bool) -> str:
     """Legend of vertical lines and shaded intervals."""
     sentences = []
     for name, mark in shown.marks.items():
@@ -55,7 +55,7 @@ def _key(shown: DrawnTurn, beside: bool) -> str:
             sentences.append(
                 f'<span class="k-place"><i></i>{text(f"{name} {shown.place_text(math.degrees(mark))}")}</span>'
             )
-    sentences += ['<span class="k-today"><i></i>today, dashed</span>'] if beside else []
+    sentences += ['<span class="k-today"><i></i>today, dashed</span>'] if with_today else []
     return " ".join(sentences)
 
 

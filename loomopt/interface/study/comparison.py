@@ -25,7 +25,7 @@ from loomopt.picture.table import Column, TextTable, text_table, words
 from loomopt.scenes import designs
 from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Finding, Words
+from loomopt.solving.answer.solution import Finding, UnitFormatter
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,7 +70,7 @@ class Comparison(Presentation):
     @functools.cached_property
     def rows(self) -> tuple[ComparedRow, ...]:
         """Dimensions, then figures, then limits on what is neither."""
-        words = Words(self.scene)
+        formatter = UnitFormatter(self.scene)
         parts = (
             [design.evaluation.design for design in self.designs],
             [design.evaluation.figures for design in self.designs],
@@ -81,14 +81,14 @@ class Comparison(Presentation):
             for name in dict.fromkeys(name for row in numbers for name in row):
                 values = [_number(row.get(name)) for row in numbers]
                 if name not in taken and any(value is not None for value in values):
-                    rows.append(_row(name, values, limits, words))
+                    rows.append(_row(name, values, limits, formatter))
                     taken.add(name)
         margins = self.scene.schema.margins
         for name in dict.fromkeys(
             name for design_limits in limits for name in design_limits if name not in taken and name not in margins
         ):
             limit_row = [design_limits.get(name) for design_limits in limits]
-            rows.append(_row(name, [limit.value if limit else None for limit in limit_row], limits, words))
+            rows.append(_row(name, [limit.value if limit else None for limit in limit_row], limits, formatter))
         return tuple(_clean(rows))
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
@@ -100,7 +100,7 @@ class Comparison(Presentation):
         return frame(self._columns(arguments.flag(si, "si")), attrs, "name")
 
     def _columns(self, si: bool = False) -> list[Column]:
-        rows, units = self.rows, Words(self.scene)
+        rows, units = self.rows, UnitFormatter(self.scene)
         shown = [units.si(row.name) if si else row.unit for row in rows]
         sizes = [factor(row.unit) if si else 1.0 for row in rows]
         columns = [words("name", [row.name for row in rows], ""), Column("unit", shown)]
@@ -152,10 +152,10 @@ def _number(value: object) -> float | None:
 
 
 def _row(
-    name: str, values: Sequence[float | None], limits: Sequence[Mapping[str, Finding]], words: Words
+    name: str, values: Sequence[float | None], limits: Sequence[Mapping[str, Finding]], formatter: UnitFormatter
 ) -> ComparedRow:
     """A row in the unit that a reader of the first design's scene sees it in."""
-    unit, known = words.unit(name), [abs(value) for value in values if value is not None]
+    unit, known = formatter.unit(name), [abs(value) for value in values if value is not None]
     size = max(known, default=0.0)
     first = next((value for value in values if value is not None), None)
     differs = any(value is None or abs(value - (first or 0.0)) > DIFFERS * size for value in values) and size > 0.0

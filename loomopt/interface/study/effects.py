@@ -12,7 +12,7 @@ from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.chart import Bars, Charts, both_sides
 from loomopt.picture.table import Column, TextTable, call, number_text, text_table, words
 from loomopt.scenes.provenance import provenance
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import UnitFormatter
 from loomopt.studies.effects.effect_impact import LIMITS, EffectImpact
 from loomopt.studies.effects.study import Effects, EffectsResult, summarise
 from loomopt.studies.run import run
@@ -47,7 +47,9 @@ class EffectsStudy(StudyResult[EffectsResult]):
         values = ", ".join(f"{name} {_reference_value(result, name)}" for name in reference.scales)
         first = f"{result.scene.name}, {result.target}, with {list_text(reference.effects) or 'no effect'} on: "
         lines = [first + (values if reference.status == "optimal" else f"{reference.status}, {reference.why}")]
-        sizes = ", ".join(f"{name} {Words(result.scene).shown(name, size)}" for name, size in reference.scales.items())
+        sizes = ", ".join(
+            f"{name} {UnitFormatter(result.scene).shown(name, size)}" for name, size in reference.scales.items()
+        )
         lines += [f"Shares are relative to the scales: {sizes}"] if sizes else []
         table: list[str | TextTable] = []
         if result.rows:
@@ -101,7 +103,7 @@ def summarise_effects(study: Effects, rows: Sequence[Row]) -> EffectsStudy:
 
 
 def _columns(result: EffectsResult, rows: Sequence[EffectImpact], timed: bool = True, si: bool = False) -> list[Column]:
-    units, columns = Words(result.scene), [words("without", [row.effect for row in rows])]
+    units, columns = UnitFormatter(result.scene), [words("without", [row.effect for row in rows])]
     for name, scale in result.reference.scales.items():
         unit = units.si(name) if si else units.unit(name)
         size = scale / factor(unit)
@@ -154,7 +156,7 @@ def _reference_value(result: EffectsResult, name: str) -> str:
     value, scale = result.reference.figures[name], result.reference.scales[name]
     if value is None:
         return "undefined"
-    return Words(result.scene).shown(name, 0.0 if abs(value) <= SHOWN_AS_ZERO * scale else value)
+    return UnitFormatter(result.scene).shown(name, 0.0 if abs(value) <= SHOWN_AS_ZERO * scale else value)
 
 
 def _bars(result: EffectsResult, name: str) -> Bars:

@@ -11,7 +11,7 @@ from loomopt.interface.study_result import StudyResult
 from loomopt.picture.chart import Bars, Charts, heading
 from loomopt.picture.table import Column, TextTable, text_table, words
 from loomopt.scenes.provenance import provenance
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import UnitFormatter
 from loomopt.studies.sensitivity import study as sensitivity
 from loomopt.studies.sensitivity.study import Row, SensitivityResult
 
@@ -49,7 +49,7 @@ class SensitivityStudy(StudyResult[SensitivityResult]):
         result = self.result
         shown = []
         for name in sought(result):
-            unit = Words(result.scene).unit(name)
+            unit = UnitFormatter(result.scene).unit(name)
             rows = sort_rows(result, name)[:MOST]
             bars = [(f"{row.number} {ARROWS[row.side]}".strip(), (effect(result, row) / factor(unit),)) for row in rows]
             shown.append(Bars(f"{heading(name, unit)}, by one sigma of a number or by 1 %", bars))
@@ -93,7 +93,7 @@ def sort_rows(result: SensitivityResult, name: str) -> list[Row]:
 
 def _columns(result: SensitivityResult, rows: Sequence[Row], name: str = "", si: bool = False) -> list[Column]:
     """Derivatives of figures; name: the one figure that people read of."""
-    units = Words(result.scene)
+    units = UnitFormatter(result.scene)
     numbers = [result.scene.shown_in(result.kinds[row.number]) for row in rows]
     sizes = [(factor(unit), factor(units.unit(row.of))) for row, unit in zip(rows, numbers, strict=True)]
     slopes = [row.value * size / of for row, (size, of) in zip(rows, sizes, strict=True)]
@@ -113,9 +113,9 @@ def _columns(result: SensitivityResult, rows: Sequence[Row], name: str = "", si:
 
 
 def _prices(result: SensitivityResult) -> TextTable:
-    words, lines = Words(result.scene), []
+    formatter, lines = UnitFormatter(result.scene), []
     for price in result.prices:
-        unit = words.unit(price.limit)
+        unit = formatter.unit(price.limit)
         ends = [(f"{x / factor(unit):+.6g}" if x else "0") if math.isfinite(x) else "" for x in price.range]
         lines.append((f"{price.limit} {price.side}", ends[0], price.ends[0], ends[1], price.ends[1], unit))
     heads = ("price of", "holds\nfrom", "for then", "to", "for then", "unit")

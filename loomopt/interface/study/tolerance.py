@@ -17,7 +17,7 @@ from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.chart import Axis, Chart, Charts, Series, heading, ticks
 from loomopt.picture.table import Column, TextTable, number_text, text_table, words
 from loomopt.scenes.provenance import provenance
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import UnitFormatter
 from loomopt.studies.run import run
 from loomopt.studies.tolerance import study
 from loomopt.studies.tolerance.plan import SCRAMBLES, Plan
@@ -109,7 +109,7 @@ def run_tolerance(
 
 
 def _spreads(result: ToleranceResult, si: bool = False) -> list[Column]:
-    units, figures = Words(result.plan.scene), result.figures
+    units, figures = UnitFormatter(result.plan.scene), result.figures
     shown = [units.si(name) if si else units.unit(name) for name in figures]
     pairs = [(spread, factor(unit)) for spread, unit in zip(figures.values(), shown, strict=True)]
     nominal, linear, sigma = (
@@ -163,7 +163,7 @@ def _yields(result: ToleranceResult) -> TextTable:
 def _histogram(result: ToleranceResult, name: str, spread: Spread) -> Chart:
     """Histogram of one figure, with the rejected range shaded."""
     units, judged = (
-        Words(result.plan.scene),
+        UnitFormatter(result.plan.scene),
         next((criterion for criterion in result.plan.criteria if criterion.name == name), None),
     )
     unit = units.unit(name)
@@ -188,9 +188,9 @@ def _histogram(result: ToleranceResult, name: str, spread: Spread) -> Chart:
 
 def _worst(result: ToleranceResult) -> TextTable:
     """Worst cases: the least and the most of each figure within the tolerances, and whether it is proven."""
-    words, lines = Words(result.plan.scene), []
+    formatter, lines = UnitFormatter(result.plan.scene), []
     for name, bounds in result.worst.items():
-        unit = words.unit(name)
+        unit = formatter.unit(name)
         size = factor(unit)
         sides = zip((bounds.min, bounds.max), bounds.farthest, (-1.0, 1.0), ("or less", "or more"), strict=True)
         shown = [_end(end, beyond, size, sign, more) for end, beyond, sign, more in sides]

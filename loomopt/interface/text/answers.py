@@ -12,7 +12,7 @@ from loomopt.model.program import Alias
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
 from loomopt.picture.table import TextTable, unbroken
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluated, Solution, Words, changed, named, remedies
+from loomopt.solving.answer.solution import Evaluated, Solution, UnitFormatter, changed, named, remedies
 from loomopt.solving.certificate.records import GlobalBound
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
     else:
         parts.append(answer.message)
         explanation = ""  # the message ends with it
-    parts += [text for text in (explanation, Words(scene).worse(answer.worse)) if text]
+    parts += [text for text in (explanation, UnitFormatter(scene).worse(answer.worse)) if text]
     parts += [comparison(answer, scene, answer.today, heading)] if answer.design else []
     parts += lists(answer, scene)
     parts += [members(answer, scene)] if answer.members else []
@@ -72,9 +72,9 @@ def comparison(evaluated: Evaluated, scene: Scene, before: Evaluated | None, hea
     table = [
         row for row in rows(evaluated, scene, before) if not (evaluated.members and _of_member(row["name"], evaluated))
     ]
-    words = Words(scene)
+    formatter = UnitFormatter(scene)
     apart = {
-        limit.name: f", {words.shown(limit.name, limit.backed_off, 4)} apart"
+        limit.name: f", {formatter.shown(limit.name, limit.backed_off, 4)} apart"
         for limit in evaluated.limits
         if limit.backed_off
     }
@@ -92,7 +92,7 @@ def comparison(evaluated: Evaluated, scene: Scene, before: Evaluated | None, hea
     for entry in evaluated.limits:
         # Of the margins that every design keeps, and that no scene can set, only those that are not held are told.
         if entry.name not in shown and (not entry.ok or entry.name not in scene.schema.margins):
-            unit = words.unit(entry.name)
+            unit = formatter.unit(entry.name)
             size = factor(unit)
             low, high = (None if end is None else end / size for end in (entry.min, entry.max))
             range_text = unbroken(_limit(low, high) + ("" if entry.ok else f"  <- {missed[entry.name]}"))
@@ -128,12 +128,12 @@ def lists(evaluated: Evaluated, scene: Scene) -> list[str]:
 
 def members(solution: Solution, scene: Scene) -> TextTable:
     """Members of a family: the scene numbers that each one changes, and its objectives."""
-    words, levels = Words(scene), solution.certificate.levels if solution.certificate else ()
+    formatter, levels = UnitFormatter(scene), solution.certificate.levels if solution.certificate else ()
     variables = [name for name in solution.members[0].design if name not in solution.design]
     # A sum of what members reach is named after their figure.
     sought = {word.strip("|") for level in levels for word in level.objective.split()}
     names = [*variables, *(name for name in solution.members[0].figures if name in sought)]
-    sizes = {name: factor(words.unit(name)) for name in names}
+    sizes = {name: factor(formatter.unit(name)) for name in names}
     values = [{name: {**member.design, **member.figures}[name] or 0.0 for name in names} for member in solution.members]
     least = {
         name: SHOWN_AS_ZERO * max(abs(row[other]) for row in values for other in names if sizes[other] == sizes[name])
@@ -144,17 +144,17 @@ def members(solution: Solution, scene: Scene) -> TextTable:
         cells = [f"{row[name] / sizes[name] if abs(row[name]) > least[name] else 0.0:.6g}" for name in names]
         missed = ", ".join(name for name, reached in member.reached.items() if not reached)
         lines.append((str(place + 1), unbroken(changed(member)), *cells, f"{missed} not" if missed else ""))
-    units = ["" if words.unit(name) == "1" else f" [{words.unit(name)}]" for name in names]
+    units = ["" if formatter.unit(name) == "1" else f" [{formatter.unit(name)}]" for name in names]
     head = ("member", "change", *(f"{name}{unit}" for name, unit in zip(names, units, strict=True)), "reached")
     return TextTable("Each member by itself", head, tuple(lines), right=tuple(range(2, 2 + len(names))))
 
 
 def design_text(evaluated: Evaluated, scene: Scene) -> str:
     """A design to type again, with the digits it takes to be the same: a JSON object, text with units."""
-    words, texts = Words(scene), []
+    formatter, texts = UnitFormatter(scene), []
     for name, value in evaluated.design.items():
         if name not in scene.schema.lists:
-            text, unit = shortest_text(value, words.unit(name), words.kind(name)), words.unit(name)
+            text, unit = shortest_text(value, formatter.unit(name), formatter.kind(name)), formatter.unit(name)
             texts.append(unbroken(f'"{name}": {text}' if unit == "1" else f'"{name}": "{text}"'))
     return f"to retype: {{{', '.join(texts)}}}"
 
@@ -212,7 +212,7 @@ BEYOND = {-1: "below", 1: "above"}
 
 def global_summary(bound: GlobalBound, scene: Scene) -> str:
     """Global bound of all admissible designs, in one line."""
-    words = Words(scene)
+    formatter = UnitFormatter(scene)
     sentences: list[str] = []
     remarks: list[str] = []
     for level in bound.levels:
@@ -222,8 +222,10 @@ def global_summary(bound: GlobalBound, scene: Scene) -> str:
         if level.bound == 0.0 and level.proven:
             sentences.append(f"{name} is 0, less than which there is none")
         elif math.isfinite(level.bound):
-            sentences.append(f"{among} has {name} {BEYOND[side]} {words.outward(level.objective, level.bound, side)}")
-        remarks.append(f"{name} at most {words.shown(level.objective, level.band, 2)} {BEYOND[-side]} the best")
+            sentences.append(
+                f"{among} has {name} {BEYOND[side]} {formatter.outward(level.objective, level.bound, side)}"
+            )
+        remarks.append(f"{name} at most {formatter.shown(level.objective, level.band, 2)} {BEYOND[-side]} the best")
     head = f"Proven best, gap {100 * bound.gap:.2g} %" if bound.proven else f"NOT proven best: {bound.why}"
     cost = f" ({bound.boxes} boxes, {bound.seconds:.1f} s)" if bound.boxes else ""
     return f"{head}{': ' if sentences else ''}{'; '.join(sentences)}{cost}"
@@ -231,7 +233,7 @@ def global_summary(bound: GlobalBound, scene: Scene) -> str:
 
 def starts(answer: Solution, scene: Scene) -> str:
     """Number of starts that reached the best optimum, and the other optima."""
-    solver, words = answer.solver, Words(scene)
+    solver, words = answer.solver, UnitFormatter(scene)
     if not solver["starts_at_best"]:
         return f"Starts: {solver['starts']}, none reached an admissible design"
     text = f"Starts: {solver['starts_at_best']} of {solver['starts']} reached the best"
@@ -247,7 +249,7 @@ def proof_summary(proofs: "Proofs") -> list[str]:
     """Proven limits and unproven limits, in a few lines."""
     groups = {"limit": "limits", "assembly": "assembly", "peak": "peaks as claimed"}
     shown = {
-        label: [unbroken(proof.said) for proof in proofs.proofs if proof.kind == kind and proof.status == "proven"]
+        label: [unbroken(proof.summary) for proof in proofs.proofs if proof.kind == kind and proof.status == "proven"]
         for kind, label in groups.items()
     }
     missed = [unbroken(f"{proof.text} ({proof.status})") for proof in proofs.proofs if proof.status != "proven"]
@@ -260,9 +262,9 @@ def proof_summary(proofs: "Proofs") -> list[str]:
 
 def proofs(proofs: "Proofs") -> list[str | TextTable]:
     """Parts of a proof: a sentence, and what was shown of each limit."""
-    words, angle, lines = Words(proofs.scene), proofs.scene.shown_in("angle"), []
+    formatter, angle, lines = UnitFormatter(proofs.scene), proofs.scene.shown_in("angle"), []
     for proof in proofs.proofs:
-        unit = words.unit(proof.name)
+        unit = formatter.unit(proof.name)
         sizes = (f"{proof.margin / factor(unit) + 0.0:.3g}", f"{proof.slack / factor(unit):.1g}")
         place = "" if proof.angle is None else f"{proof.angle / factor(angle):.4f}"
         text = unbroken(proof.text) if COMPARED.search(proof.text) else proof.text
@@ -270,10 +272,10 @@ def proofs(proofs: "Proofs") -> list[str | TextTable]:
     head = ("limit", "status", "margin", "up to", "unit", "boxes", f"fails at [{angle}]")
     table = TextTable("", head, tuple(lines), right=(2, 3, 5, 6), first=(0, 1, 2, 4, 6), more="--json")
     open_ = [
-        f"{unbroken(proof.said)} is left open from crank angle {proof.open / factor(angle):.4g} {angle} on, "
+        f"{unbroken(proof.summary)} is left open from crank angle {proof.open / factor(angle):.4g} {angle} on, "
         f"after {proof.boxes} boxes."
         for proof in proofs.proofs
         if proof.open is not None
     ]
     uncovered = (f"Not covered: {text}." for text in proofs.uncovered)
-    return [f"{proofs.problem}, {proofs.target}: {proofs.said}", table, *open_, *uncovered]
+    return [f"{proofs.problem}, {proofs.target}: {proofs.summary}", table, *open_, *uncovered]

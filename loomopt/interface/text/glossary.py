@@ -21,7 +21,7 @@ from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import Text
 from loomopt.picture.table import TextTable
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import UnitFormatter
 
 
 class Printed(NamedTuple):
@@ -94,7 +94,7 @@ def symbols(scene: Scene) -> list[Symbol]:
 
 def _tables(scene: Scene) -> dict[str, list[Symbol]]:
     """Symbols by what they are."""
-    schema, words = scene.schema, Words(scene)
+    schema, words = scene.schema, UnitFormatter(scene)
     return {
         "Operation": _numbers(scene, schema.operation),
         "Mechanism; what [bounds] frees of it is the design": _numbers(scene, schema.mechanism),
@@ -108,9 +108,9 @@ def _tables(scene: Scene) -> dict[str, list[Symbol]]:
     }
 
 
-def _figure(figure: Figure, scene: Scene, words: Words) -> Iterator[Symbol]:
+def _figure(figure: Figure, scene: Scene, formatter: UnitFormatter) -> Iterator[Symbol]:
     """Yield a figure and, with the speed known, what tables show of it in time."""
-    yield Symbol(figure.name, words.unit(figure.name), figure.text)
+    yield Symbol(figure.name, formatter.unit(figure.name), figure.text)
     if figure.kind in PER_SECOND and "speed" in scene.operation:
         yield Symbol(f"{figure.name}_t", scene.shown_in(PER_SECOND[figure.kind][0]), f"{figure.text}, in time")
 

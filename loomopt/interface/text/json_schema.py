@@ -54,7 +54,7 @@ def scene(schema: SceneSchema) -> Json:
         "stock": lambda of: _by_number(of, _stock),
         "display": display,
         "targets": lambda of: _closed_table(
-            {name: _model(target.own, target.text) for name, target in of.targets.items()}
+            {name: _model(target.table, target.text) for name, target in of.targets.items()}
         ),
     }
     tables = {name: makers[name](schema) for name in TABLES}
@@ -207,8 +207,8 @@ def _given(key: str, effect: Effect | None = None) -> Json:
 
 def _scene_targets(schema: SceneSchema) -> Json:
     """Schema of [targets] where the scene names them: a target follows one of the models of the job."""
-    models = _any([_model(target.own) for name, target in schema.targets.items() if name != FAMILY])
-    family = {FAMILY: _model(schema.targets[FAMILY].own)} if FAMILY in schema.targets else {}
+    models = _any([_model(target.table) for name, target in schema.targets.items() if name != FAMILY])
+    family = {FAMILY: _model(schema.targets[FAMILY].table)} if FAMILY in schema.targets else {}
     return {"type": "object", "properties": family, "additionalProperties": models}
 
 
@@ -233,7 +233,7 @@ def _model(model: type[Table], summary: str = "") -> Json:
     return table | ({"description": summary} if summary else {})
 
 
-def _each(part: Json, change: Callable[[Json], Json]) -> Json:
+def _map_values(part: Json, change: Callable[[Json], Json]) -> Json:
     """A schema with all schemas inside it changed."""
 
     def inner(value: object) -> object:
@@ -246,7 +246,9 @@ def _each(part: Json, change: Callable[[Json], Json]) -> Json:
 
 def _without_null(part: Json) -> Json:
     """A part of a schema without null, which no scene can say: a key is there or it is not."""
-    reduced = _each({key: value for key, value in part.items() if key != "default" or value is not None}, _without_null)
+    reduced = _map_values(
+        {key: value for key, value in part.items() if key != "default" or value is not None}, _without_null
+    )
     if "anyOf" in reduced:
         rest = [option for option in reduced.pop("anyOf") if option != {"type": "null"}]
         reduced = {**rest[0], **reduced} if len(rest) == 1 else {**reduced, "anyOf": rest}
@@ -265,7 +267,7 @@ def _hoist_quantities(whole: Json) -> Json:
             kinds.update({name: hoist(definition) for name, definition in part["$defs"].items()})
             part = {key: value for key, value in part.items() if key != "$defs"}
         if QUANTITY_PATTERN not in part:
-            return _each(part, hoist)
+            return _map_values(part, hoist)
         description: Json = {key: part[key] for key in ("description",) if key in part}
         name = re.sub(r"\W+", "_", part[QUANTITY_PATTERN])
         kinds.setdefault(

@@ -21,7 +21,7 @@ from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.display import KINDS
 from loomopt.scenes.scene import Scene, given
 from loomopt.scenes.tables import FAMILY
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import UnitFormatter
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,11 +32,11 @@ STEP = 15
 
 def parts(scene: Scene) -> list[str | TextTable]:
     """Tables of `loomopt show`."""
-    words = Words(scene)
+    formatter = UnitFormatter(scene)
     lines = []
     for key, name, value in _values(scene):
         number = isinstance(value, int | float)
-        unit = words.si(name) if number else "1"
+        unit = formatter.si(name) if number else "1"
         size = f"{value:.9g}" if isinstance(value, int | float) else list_text(value)
         lines.append((key, scene.given(key) or "(default)", size, "" if unit == "1" else unit))
     effects = tuple((effect.name, effect.summary) for effect in scene.active)
@@ -49,7 +49,7 @@ def parts(scene: Scene) -> list[str | TextTable]:
         f"Tables show {', '.join(f'{key} in {scene.shown_in(kind)}' for key, kind in _kinds(scene).items())}",
         TextTable("Numbers", ("key", "as given", "SI", ""), tuple(lines), right=(1, 2), units=(3,)),
         TextTable("Effects that are on", ("effect", "what it is"), effects) if effects else "No effect is on",
-        *(record.said for record in registry.of(scene).tables(scene, scene.schema.default_target)),
+        *(record.summary for record in registry.of(scene).tables(scene, scene.schema.default_target)),
         f"Effects that are off, and not in the equations: {', '.join(off) or 'none'}",
         TextTable("Targets", ("target", "what it asks", "expected"), tuple(_targets(scene))),
         *_family(scene),
@@ -151,7 +151,7 @@ def curves(scene: Scene, design: Design, width: int | None) -> list[str | TextTa
     return [f"{scene.title}: {marks}", *tables]
 
 
-def beside(scene: Scene, frame: "pd.DataFrame") -> TextTable:
+def comparison(scene: Scene, frame: "pd.DataFrame") -> TextTable:
     """Difference of curves, SI, from measured ones, in the scene's display units."""
     lines = []
     for column in frame.columns:

@@ -180,5 +180,5 @@ def _legend(drawing: CrankRockerDrawing, units: Units) -> tuple[tuple[str, str],
         (FRONT, f"A B C  {FRONT}, crank at {math.degrees(centres.beta):.2f}°"),
         (REAR, f"A B' C'  {REAR}, crank at {rear:.2f}°"),
         *((("masses", masses),) if masses else ()),
-        ("notes", f"θ = β − βr = {round(theta, 2) + 0.0:.2f}°; {units.said}"),
+        ("notes", f"θ = β − βr = {round(theta, 2) + 0.0:.2f}°; {units.summary}"),
     )

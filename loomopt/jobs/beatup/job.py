@@ -34,7 +34,7 @@ class Beatup(Job):
     name = "beatup"
     own_schema = SCHEMA
     task = BeatupTask
-    loosening = {"r4e": "s"}  # noqa: RUF012 (never changed)
+    monotone_slack = {"r4e": "s"}  # noqa: RUF012 (never changed)
 
     def check(self, scene: Scene) -> None:
         """Raise BadInput, with the inequality and the crank angle, when today's machine is no crank-rocker."""

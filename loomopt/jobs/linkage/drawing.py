@@ -166,4 +166,4 @@ def _legend(drawing: LinkageDrawing, skeleton: Skeleton, units: Units) -> tuple[
     for event, angle in drawing.events.items():
         names = " ".join(name + skeleton.primes[event] for name in next(iter(skeleton.joints.values())))
         rows.append((event, f"{names}  {event}, crank at {math.degrees(angle) % 360:.2f}°"))
-    return (*rows, ("notes", units.said))
+    return (*rows, ("notes", units.summary))

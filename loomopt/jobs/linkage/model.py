@@ -71,16 +71,16 @@ class Output(NamedTuple):
 class EventRule(NamedTuple):
     """An event: an extreme of q ("max", "min"), that nearest to a crank angle, rad, or the farthest of all without.
 
-    Or where q is `travel` short of its value at another event, `beside`, before (side −1) or after (+1) it; or a crank
-    angle of the scene's. rest: of an output that rests at its extreme, whether the event is where the rest "begins" or
-    "ends"; the end nearer to `near` without it, and where it begins without both.
+    Or where q is `travel` short of its value at another event, `reference`, before (side −1) or after (+1) it; or a
+    crank angle of the scene's. rest: of an output that rests at its extreme, whether the event is where the rest
+    "begins" or "ends"; the end nearer to `near` without it, and where it begins without both.
     """
 
     name: str
     extreme: str = ""
     near: float | None = None
     travel: Ref | None = None
-    beside: str = ""
+    reference: str = ""
     side: int = -1
     angle: Ref | None = None
     rest: str = ""
@@ -449,7 +449,7 @@ class Linkage(Kinematics):
         pose = self.pose(maths, given, self._there(given, place.name, phi))
         if place.travel is None:
             return pose.q1, pose.q2, pose.q3
-        there = self.at_event(maths, given, place.beside)
+        there = self.at_event(maths, given, place.reference)
         short = number(maths, given.values, place.travel)
         return pose.since(there) + short, pose.q1, pose.q2
 
@@ -468,7 +468,7 @@ class Linkage(Kinematics):
                 angles[place.name] = float(number(FLOAT, given.values, place.angle))
                 continue
             if not place.extreme:
-                angles[place.name] = hints[place.hint] = self._crossing(given, place, angles[place.beside])
+                angles[place.name] = hints[place.hint] = self._crossing(given, place, angles[place.reference])
                 continue
             angles |= self._turn_hints(given, place, extreme_turn(turns, place), hints)
         high, low = extremes(self.places)
@@ -476,8 +476,8 @@ class Linkage(Kinematics):
             hints[SWEPT] = 0.0 if angles[low] > angles[high] else TURN
         if not self.chain.cams:
             return hints
-        beside = {name: self._at(given, angle).switch for name, angle in angles.items()}
-        return hints | {f"{cam} at {name}": value for name, switch in beside.items() for cam, value in switch.items()}
+        switches = {name: self._at(given, angle).switch for name, angle in angles.items()}
+        return hints | {f"{cam} at {name}": value for name, switch in switches.items() for cam, value in switch.items()}
 
     def _turn_hints(self, given: Given, place: EventRule, turn: Turn, hints: dict[str, float]) -> dict[str, float]:
         """Crank angle of an event at a turn of the output, rad, by its name; `hints` gains what it is followed from."""
@@ -593,18 +593,18 @@ class Linkage(Kinematics):
                 break
         return angle
 
-    def _crossing(self, given: Given, place: EventRule, beside: float) -> float:
+    def _crossing(self, given: Given, place: EventRule, reference: float) -> float:
         """Crank angle at which q is `travel` short of its value at another event: the nearest before or after it."""
-        there = self.at(FLOAT, given, beside)
+        there = self.at(FLOAT, given, reference)
         assert place.travel is not None
         level = float(number(FLOAT, given.values, place.travel))
 
         def excess(turned: float) -> float:
-            pose = self.at(FLOAT, given, beside + place.side * turned)
+            pose = self.at(FLOAT, given, reference + place.side * turned)
             return -(float(pose.since(there)) + level)
 
         steps = np.linspace(0.0, TURN, SCAN + 1)
-        phi = beside + place.side * steps
+        phi = reference + place.side * steps
         with np.errstate(all="ignore"):
             pose = self.at(systems.numpy(), given, phi)
             travelled = np.asarray(pose.since(there), dtype=np.float64)
@@ -613,7 +613,7 @@ class Linkage(Kinematics):
             problem = f"the output never reaches the travel of event {place.name}"
             raise UnfoundError(place.name, problem)
         k = int(beyond[0])
-        return beside + place.side * turning_points.crossing(excess, float(steps[k - 1]), float(steps[k]))
+        return reference + place.side * turning_points.crossing(excess, float(steps[k - 1]), float(steps[k]))
 
     def following(self, given: Given) -> Following | None:
         """Events of a design in floats that are extremes and travels; None with cams, or a free timing."""
@@ -629,7 +629,7 @@ class Linkage(Kinematics):
         ]
         turning = functools.partial(_rates_of, self, EventRule("a turn", "max"))
         paths = [
-            (event_value(place.beside), event)
+            (event_value(place.reference), event)
             for place, event in zip(free, events, strict=True)
             if place.travel is not None
         ]
@@ -742,7 +742,9 @@ def _rates_of(linkage: Linkage, place: EventRule, maths: Maths, given: Given, ph
     pose = linkage.pose(maths, given, Node(phi, {}))
     if place.travel is None:
         return pose.q1, pose.q2
-    return pose.since(linkage.at_event(maths, given, place.beside)) + number(maths, given.values, place.travel), pose.q1
+    return pose.since(linkage.at_event(maths, given, place.reference)) + number(
+        maths, given.values, place.travel
+    ), pose.q1
 
 
 def _distance(at: Number, angle: float, near: float) -> Number:

@@ -229,11 +229,11 @@ def _travel(cursor: Cursor, name: str, read: parts.TableEntries, known: Known) -
     if len(sides) != 1:
         raise cursor.fault("a travel lies before or after another event", remedy='Such as before = "bottom"')
     side = cursor.at(sides[0])
-    beside = _one_of(side, known, "event above it")
-    if known[beside].extreme != "max":
-        problem = f"a travel counts from a maximum of the output, and {beside} is none"
+    reference = _one_of(side, known, "event above it")
+    if known[reference].extreme != "max":
+        problem = f"a travel counts from a maximum of the output, and {reference} is none"
         raise side.fault(problem, remedy="Name an event with extreme = max")
-    return EventRule(name, travel=read.numbers["travel"], beside=beside, side=-1 if sides[0] == "before" else 1)
+    return EventRule(name, travel=read.numbers["travel"], reference=reference, side=-1 if sides[0] == "before" else 1)
 
 
 def _windows(cursor: Cursor, numbers: Numbers, places: Sequence[EventRule]) -> tuple[Window, ...]:

@@ -213,7 +213,9 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
     out, written = linkage.output, symbolic(linkage.chain, model.known)
     at = SymbolicPose(written.pose, out, symbol("omega"))
     effect_symbols = {
-        f"{effect.name}.{key}": _own(effect, key) for effect in model.effects for key in effect.table.model_fields
+        f"{effect.name}.{key}": _effect_value(effect, key)
+        for effect in model.effects
+        for key in effect.table.model_fields
     }
     numbers = Symbols({name: index_symbol for name, index_symbol in effect_symbols.items() if name in model.known})
     numbers |= {event_value(place.name): symbol(f"phi_{place.name}") for place in linkage.places}
@@ -223,7 +225,7 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
     return (*kinematics, *effect_equations.forces(model, at, known, "Q", letter))
 
 
-def _own(effect: Effect, key: str) -> Expression:
+def _effect_value(effect: Effect, key: str) -> Expression:
     """Symbol of a number of an effect's table; of a named one with its name as index."""
     letter = effect.letters.get(key, key)
     return symbol(f"{letter}_{effect.instance}" if effect.instance else letter)
@@ -231,7 +233,9 @@ def _own(effect: Effect, key: str) -> Expression:
 
 def _own_values(model: JobModel, effect: Effect) -> Values:
     """Symbols and words of an effect's table, of those keys that are given."""
-    given = {key: _own(effect, key) for key in effect.table.model_fields if f"{effect.name}.{key}" in model.known}
+    given = {
+        key: _effect_value(effect, key) for key in effect.table.model_fields if f"{effect.name}.{key}" in model.known
+    }
     words = model.words_of(effect.name)
     return {**given, **words, **({"instance": effect.instance} if effect.instance else {})}
 

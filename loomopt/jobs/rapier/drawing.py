@@ -214,5 +214,5 @@ def _legend(drive: Drive, units: Units) -> tuple[tuple[str, str], ...]:
     return (
         *rows,
         ("notes", f"stroke = i1 i2 wheel/2 φ63 max = {stroke}; i1 i2 = {d.i1 * d.i2:.5g}, wheel {wheel}"),
-        ("notes", f"{stands}; {units.said}"),
+        ("notes", f"{stands}; {units.summary}"),
     )

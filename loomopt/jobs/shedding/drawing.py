@@ -152,10 +152,10 @@ class ReturnSpring:
     def labels(self, units: Units) -> list[Label]:
         """Name stiffness, preload, travel and both positions of the load."""
         h, (slack, top, bottom) = self.h, self.levels
-        beside = self.hung.part(top).towards(0.0, -COIL / 2 * h)
+        spot = self.hung.part(top).towards(0.0, -COIL / 2 * h)
         first, last = top.towards(0.0, 8 * h), bottom.towards(0.0, 8 * h)
         return [
-            Label(LAYER, beside, math.pi, f"K1 = {show(self.K1, units.stiffness)}"),
+            Label(LAYER, spot, math.pi, f"K1 = {show(self.K1, units.stiffness)}"),
             along("dimensions", slack.towards(0.0, 5 * h), top.towards(0.0, 5 * h), 0.0, f"X0 = {units.size(self.X0)}"),
             along("dimensions", first, last, 0.0, f"travel = {units.size(self.travel)}"),
             *(
@@ -375,7 +375,7 @@ def _forces(drawn: Picture) -> list[ForceArrow]:
             node = np.array([piece]), np.array([u])
             force, x, y = sampler.together(("cam_force", f"{name}_x", f"{name}_y"), *node).values()
             theta = sampler.cycle.angles(*node)
-            if settled(float(force[0]), sampler.peak("cam_force")) > 0.0:
+            if without_rounding(float(force[0]), sampler.peak("cam_force")) > 0.0:
                 ((x, y),) = _turned(np.column_stack((x, y)), -theta)
                 arrows.append(ForceArrow(PINS[name], float(theta[0]) % TURN, float(x), float(y), event))
     return arrows
@@ -430,7 +430,7 @@ def _labels(drawn: Picture, units: Units) -> list[Label]:
 SIZES = ("arm", "centre_distance", "base_radius", "roller_radius")
 
 
-def settled(least: float, most: float) -> float:
+def without_rounding(least: float, most: float) -> float:
     """Least cam force, N, as it is shown: rounding counts as 0."""
     return 0.0 if abs(least) <= SHOWN_AS_ZERO * abs(most) else least
 
@@ -438,7 +438,10 @@ def settled(least: float, most: float) -> float:
 def _legend(scene: Scene, drawn: Picture, figures: Figures, units: Units) -> tuple[tuple[str, str], ...]:
     """Lines below the drawing, each with its layer."""
     size, cam = {name: value or 0.0 for name, value in figures.items()}, drawn.cam
-    force, within = settled(size["contact_min"], size["contact_max"]), units.within(CURVE_PROMISED * allowed(cam))
+    force, within = (
+        without_rounding(size["contact_min"], size["contact_max"]),
+        units.within(CURVE_PROMISED * allowed(cam)),
+    )
     texts = OPEN | {LEAST: show(force, units.force)}
     rows = [
         (name, f"B{mark} C{mark}  {name}, {texts[name]}: cam at {math.degrees(drawn.theta[name]):.2f}°")
@@ -454,7 +457,7 @@ def _legend(scene: Scene, drawn: Picture, figures: Figures, units: Units) -> tup
         *cut,
         *drawn.spring.legend(units),
         ("notes", "the cam is shown still: it turns anticlockwise under an arm that stays"),
-        ("notes", f"chord tolerance of profile and pitch curve {within}; {units.said}"),
+        ("notes", f"chord tolerance of profile and pitch curve {within}; {units.summary}"),
     )
 
 

@@ -82,7 +82,7 @@ def _crossing_speed(at_rest: Sampler, unit: float, name: str, most: float, slack
     square, linear = (ahead + back) / 2 - rest, (ahead - back) / 2
     shares = _first_roots(square, linear, np.maximum(spare, 0.0), rounding)
     share = float(shares.min())
-    return math.inf if math.isinf(share) else _settled(at_rest, name, most, unit * share)
+    return math.inf if math.isinf(share) else _refined_speed(at_rest, name, most, unit * share)
 
 
 def _at_speeds(at_rest: Sampler, name: str, nodes: Node, speeds: Sequence[float]) -> Floats:
@@ -103,7 +103,7 @@ def _first_roots(square: Floats, linear: Floats, spare: Floats, rounding: float)
     return np.where(falls, root, np.inf)
 
 
-def _settled(at_rest: Sampler, name: str, most: float, speed: float) -> float:
+def _refined_speed(at_rest: Sampler, name: str, most: float, speed: float) -> float:
     """Speed, rad/s, where the refined largest value is `most`, from one nearby."""
     for _ in range(SPEED_STEPS):
         top = sampled(at_rest.model, {**at_rest.values, "speed": speed}).extremes(name)[0]

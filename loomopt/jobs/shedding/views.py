@@ -488,7 +488,7 @@ class SheddingViews(JobViews):
         sampler = job.sampler(scene, design)
         undercut = () if self.missing(scene) else _undercut(scene, design)
         parted = _parted(scene, job.parted(scene, sampler))
-        law = [record.said for record in job.tables(scene, "") if record.key == LAW_TABLE]
+        law = [record.summary for record in job.tables(scene, "") if record.key == LAW_TABLE]
         return (
             *law,
             *super().remarks(scene, design),

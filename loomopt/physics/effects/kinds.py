@@ -178,7 +178,7 @@ class Effect:
     name: the table in a scene that turns it on; an instance of one that there may be many of is "kind.instance".
     table: model of that table's values. rank: its place among the job's effects, the lowest first.
     reads: design variables it depends on beside the mechanism's lengths, and events of the motion that it calls in.
-    needs: scene keys that must be given; beside: effects that must be on; clashes: those that must not.
+    needs: scene keys that must be given; companions: effects that must be on; clashes: those that must not.
     examples: tables it may have, as a scene writes them, for tests and templates.
     letters: keys of its table → their symbols in equations, a key's own name without one.
     figures, margins: numbers a designer reads of it, and what every design keeps while it is on (phrase → kind).
@@ -196,7 +196,7 @@ class Effect:
     rank: int = 100
     reads: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
-    beside: tuple[str, ...] = ()
+    companions: tuple[str, ...] = ()
     clashes: tuple[EffectClash, ...] = ()
     examples: tuple[Mapping[str, str], ...] = ({},)
     letters: Mapping[str, str] = field(default_factory=dict)
@@ -222,7 +222,7 @@ class LoadTable(NamedTuple):
 
     column, kind: what of the file is the curve, and its kind of quantity; angle: what its angles count from, in words.
     instead: keys of the effect's table that it stands for; needless: of what the effect needs, what it does without.
-    beside: another column of the file, of the same kind, with which the first one makes a vector.
+    second_column: another column of the file, of the same kind, with which the first one makes a vector.
     Its words (`own[key]` of the formulas) are the curve itself, a `PeriodicCubic`, or the vector's `PeriodicCubics`.
     """
 
@@ -232,12 +232,14 @@ class LoadTable(NamedTuple):
     instead: tuple[str, ...]
     needless: tuple[str, ...] = ()
     key: str = "table"
-    beside: str = ""
+    second_column: str = ""
 
     @property
     def columns(self) -> dict[str, str]:
         """Columns of the file, with their kinds of quantity."""
-        return {"angle": "angle", self.column: self.kind} | ({self.beside: self.kind} if self.beside else {})
+        return {"angle": "angle", self.column: self.kind} | (
+            {self.second_column: self.kind} if self.second_column else {}
+        )
 
 
 def needed(effect: "Effect", parameters: Table) -> tuple[str, ...]:
@@ -273,7 +275,7 @@ class Load(Effect, Generic[Pose]):
     upon(at, loading): the term instead, where it depends on what all others do.
     moved(at): the inertia, kg·m² or kg, that it adds to what moves with the output.
     symbol: what its column of the curves is called, its name without one.
-    told: switch → where that formula holds, in words for its equation; by its corners without them.
+    cases: switch → where that formula holds, in words for its equation; by its corners without them.
     tabulated: the curve of one's own that it may be; None for none.
     mass(at): what it moves of one link; push(at, term): the force on the output's link, N, that its term is the moment
     or the work of, None where the table does not tell it; applied(at): its forces on links and joints, where those have
@@ -290,7 +292,7 @@ class Load(Effect, Generic[Pose]):
     moved: Callable[[Inputs[None]], Number] | None = None
     response: "Callable[[Inputs[Pose], SteadyOscillator], tuple[Number, Number]] | None" = None
     symbol: str = ""
-    told: Mapping[float, str] = field(default_factory=dict)
+    cases: Mapping[float, str] = field(default_factory=dict)
     tabulated: LoadTable | None = None
     mass: Callable[[Inputs[None]], LinkMass] | None = None
     push: "Callable[[Inputs[Pose], Number], Vector | None] | None" = None
@@ -370,7 +372,7 @@ class Check(Effect, Generic[Pose]):
     there. worked: figure, a mean power over a turn → what of them tells by each vector's name the work of
     its size, per rad of the crank.
     The same name in two checks is the same quantity. fitted(chain): the check of a linkage of one's own;
-    said: its equations in words, where the symbols of a pose do not tell its links.
+    sentence: its equations in words, where the symbols of a pose do not tell its links.
     remark(at, shown): what to know beside its figures, "" for nothing, in the reader's units.
     explain(known, bounds, own, clash, shown): what physics says of why limits (names) clash, in the reader's units.
     """
@@ -390,7 +392,7 @@ class Check(Effect, Generic[Pose]):
     wanted: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     fitted: "Callable[[Chain], Check[Any]] | None" = None
     between: tuple[str, ...] = ()
-    said: str = ""
+    sentence: str = ""
     remark: Callable[[Inputs[None], ShowValue], str] = nothing_remarked
     explain: Callable[
         [Mapping[str, float], Mapping[str, tuple[float, float]], Any, Collection[str], ShowValue], str
@@ -677,7 +679,7 @@ def faults(active: Mapping[Effect, Table]) -> Iterator[Fault]:
     """Yield what keeps effects from being on together; active: effects with their tables, in the order of the job."""
     tables = {effect.name: table for effect, table in active.items()}
     for effect in active:
-        for name in effect.beside:
+        for name in effect.companions:
             if name not in tables:
                 yield Fault(effect, name, True, f"effect {effect.name} needs the effect {name}")
         carried = effect.carries if isinstance(effect, State) else ()

@@ -154,7 +154,7 @@ class FourierSeries(NamedTuple):
 def harmonics(maths: Maths, count: int, weigh: Weigh) -> FourierSeries:
     """First `count` harmonics of a smooth force, by the trapezoidal rule on twice as many angles."""
     # What is recorded on a tape must not outlive it.
-    angles, weights = _made(maths, count) if maths.name == "recorded" else _kept(maths, count)
+    angles, weights = _made(maths, count) if maths.name == "recorded" else _cached(maths, count)
     sums = weigh(angles, weights)
     return FourierSeries(sums[:count], [0 * sums[0], *sums[count:]])
 
@@ -172,7 +172,7 @@ def _made(maths: Maths, count: int) -> tuple[Sequence[Number], Sequence[Sequence
     return angles, [row(n, 0) for n in range(count)] + [row(n, points // 4) for n in range(1, count)]
 
 
-_kept = functools.lru_cache(maxsize=16)(_made)
+_cached = functools.lru_cache(maxsize=16)(_made)
 
 
 def enough(weigh: Weigh, maths: Maths, begun: int = FEWEST) -> int:

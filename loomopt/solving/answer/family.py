@@ -12,7 +12,7 @@ from loomopt.model.program import Alias, Program
 from loomopt.physics.tolerances import SAME_OBJECTIVE, SHOWN_AS_ZERO
 from loomopt.scenes import family
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluated, Finding, Words, changed
+from loomopt.solving.answer.solution import Evaluated, Finding, UnitFormatter, changed
 
 Evaluation = Callable[[Scene, Job, Program, Mapping[str, float]], Evaluated]
 
@@ -35,14 +35,14 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
         values = [member.figures[name] for member in members]
         if any(value != values[0] for value in values):
             figures |= {of_member(name, k): value for k, value in enumerate(values)}
-    words, labels = Words(scene), numbers.labels(scene)
+    formatter, labels = UnitFormatter(scene), numbers.labels(scene)
     shown = {_labelled(name, labels): value for name, value in design.items()}
     return Evaluated(
         problem=scene.name,
         effects=members[0].effects,
         design=shown,
         figures=figures,
-        units={name: words.si(name) for name in (*shown, *figures)},
+        units={name: formatter.si(name) for name in (*shown, *figures)},
         limits=_limits(job, members),
         reached={name: all(member.reached[name] for member in members) for name in members[0].reached},
         scene=scene,
@@ -58,13 +58,13 @@ def _labelled(name: str, labels: Mapping[str, str]) -> str:
     return Alias(f"{label}{name.removeprefix(of)}", label) if isinstance(name, Alias) else label
 
 
-def said(scene: Scene, job: Job, here: Evaluated, priced: Collection[str]) -> str:
+def family_sentences(scene: Scene, job: Job, here: Evaluated, priced: Collection[str]) -> str:
     """Sentences: who decides each level, which members reach their goals, and what physics says of the others.
 
     priced: names of the limits that bind; of what all members share those decide it whose own limits do.
     """
     assert isinstance(job, FamilyJob)
-    words, members, summed = Words(scene), here.members, family.table(scene).combine == "sum"
+    formatter, members, summed = UnitFormatter(scene), here.members, family.table(scene).combine == "sum"
     called = [f"member {k + 1} ({changed(member)})" for k, member in enumerate(members)]
     sentences = []
     for level in job.parts[0].program.objectives:
@@ -74,7 +74,7 @@ def said(scene: Scene, job: Job, here: Evaluated, priced: Collection[str]) -> st
             continue
         worst = max(sizes) if level.power > 0 else min(sizes)
         nothing = worst <= SHOWN_AS_ZERO * level.scale
-        shown = words.shown(level.figure, 0.0 if nothing else worst)
+        shown = formatter.shown(level.figure, 0.0 if nothing else worst)
         name = f"|{level.figure}|" if level.is_magnitude else level.figure
         if nothing or len(set(values)) == 1:
             asking = [called[k] for k, part in enumerate(job.parts) if not {*part.limits.values()}.isdisjoint(priced)]
@@ -83,7 +83,7 @@ def said(scene: Scene, job: Job, here: Evaluated, priced: Collection[str]) -> st
             continue
         deciding = [called[k] for k, size in enumerate(sizes) if abs(size - worst) <= SAME_OBJECTIVE * level.scale]
         if summed:
-            total = words.shown(level.figure, sum(size**level.power for size in sizes) ** (1 / level.power))
+            total = formatter.shown(level.figure, sum(size**level.power for size in sizes) ** (1 / level.power))
             total_name = family.sum_name(level.figure, level.is_magnitude, level.power)
             sentences.append(f"The least {total_name} is {total}; the worst {name} is {shown}, of {listed(deciding)}.")
         else:
@@ -93,7 +93,7 @@ def said(scene: Scene, job: Job, here: Evaluated, priced: Collection[str]) -> st
     if all(here.reached.values()):
         return " ".join(sentences)
     machines = [(scene, member.design, member.figures) for scene, member in zip(job.members, members, strict=True)]
-    return " ".join([*sentences, job.job.say_together(machines, job.own)]).strip()
+    return " ".join([*sentences, job.job.say_together(machines, job.separate)]).strip()
 
 
 def _reached(goal: str, members: Sequence[Evaluated]) -> str:

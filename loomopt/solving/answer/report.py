@@ -19,7 +19,7 @@ from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import (
     ADVICE,
-    Beside,
+    Alternative,
     Clash,
     Evaluated,
     Finding,
@@ -28,7 +28,7 @@ from loomopt.solving.answer.solution import (
     Relaxation,
     Sentences,
     Solution,
-    Words,
+    UnitFormatter,
     joined,
     remedies,
     risen,
@@ -79,7 +79,7 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
     quantities += job.peaks(sampler.model).values() if every else []
     sampler.search(name for name in quantities if sampler.model.has_quantity(name))
     figures = job.figures(scene, design)
-    words = Words(scene)
+    formatter = UnitFormatter(scene)
     labels = numbers.labels(scene)
     named = {labels.get(name, name): value for name, value in design.items()}
     shown = designs.packed(named, scene.schema.lists)
@@ -88,7 +88,7 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
         effects=tuple(scene.effects),
         design=shown,
         figures=figures,
-        units={name: words.si(name) for name in (*shown, *figures)},
+        units={name: formatter.si(name) for name in (*shown, *figures)},
         limits=_findings(program, figures, named, sampler),
         reached={goal.figure: goal.reached(figures) for goal in program.goals},
         scene=scene,
@@ -163,9 +163,9 @@ def roundings(scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
 
     Empty where no rounding shows: in nominal numbers and in a computer's own. Lists of numbers are never typed.
     """
-    words, labels = Words(scene), numbers.labels(scene)
+    formatter, labels = UnitFormatter(scene), numbers.labels(scene)
     kinds = {
-        name: words.kind(labels.get(name, name)) for name in design if not designs.in_list(name, scene.schema.lists)
+        name: formatter.kind(labels.get(name, name)) for name in design if not designs.in_list(name, scene.schema.lists)
     }
     sizes = {name: (1.0, factor(scene.shown_in(kind))) for name, kind in kinds.items()}
     given = {name: min((digits(design[name] / size), size) for size in sizes[name]) for name in kinds if design[name]}
@@ -230,9 +230,11 @@ def _with(scene: Scene, target: str, search: Search, best: Candidate) -> Solutio
     if search.tradeoff is None:
         return solution
     alternative = evaluation(scene, job, program, job.design(program, search.tradeoff.alternative))
-    comparison = Beside(search.tradeoff.added.least.figure, search.tradeoff.share, search.tradeoff.chosen, alternative)
-    sentence = _little(Words(scene), comparison, solution)
-    return replace(solution, beside=comparison, sentences=explained(solution, sentence))
+    comparison = Alternative(
+        search.tradeoff.added.least.figure, search.tradeoff.share, search.tradeoff.chosen, alternative
+    )
+    sentence = _little(UnitFormatter(scene), comparison, solution)
+    return replace(solution, alternative=comparison, sentences=explained(solution, sentence))
 
 
 def explained(answer: Solution, *more: str) -> Sentences:
@@ -344,8 +346,8 @@ def with_optimum(
     searched: extent of the search, as a sentence; substitute: whether it is a known design in which no certified solve
     ended.
     """
-    words = Words(scene)
-    binding, together = prices(words, certificate), joint_prices(words, certificate)
+    formatter = UnitFormatter(scene)
+    binding, together = prices(formatter, certificate), joint_prices(formatter, certificate)
     passed = certificate.passed and here.admissible
     headline = _headline(job, scene, target, here, {price.limit for price in binding})
     if passed:
@@ -374,10 +376,10 @@ def _headline(job: Job, scene: Scene, target: str, here: Evaluated, priced: Coll
         return job.say(scene, target, here.figures)
     from loomopt.solving.answer import family
 
-    return family.said(scene, job, here, priced)
+    return family.family_sentences(scene, job, here, priced)
 
 
-def _little(words: Words, comparison: Beside, answer: Solution) -> str:
+def _little(formatter: UnitFormatter, comparison: Alternative, answer: Solution) -> str:
     """Sentence on the small changes that another design of more or less added mass would bring."""
     name = comparison.added
     texts = []
@@ -386,10 +388,10 @@ def _little(words: Words, comparison: Beside, answer: Solution) -> str:
             abs(value or 0.0) for key, value in answer.figures.items() if answer.units[key] == answer.units[figure]
         ]
         if abs(change) > SHOWN_AS_ZERO * max(alike, default=0.0):
-            text = words.shown(figure, change, 3)
+            text = formatter.shown(figure, change, 3)
             texts.append(f"{figure} {'' if text.startswith('-') else '+'}{text}")
     changes = ", ".join(texts) or "nothing that is sought changes"
-    amount = words.shown(name, comparison.other.design[name])
+    amount = formatter.shown(name, comparison.other.design[name])
     little = f"{100 * comparison.share:g} %"
     if not comparison.chosen:
         return f"The {name} is worth less than {little} of each figure; {amount}: {changes}."
@@ -403,14 +405,14 @@ def _left_open(certificate: Certificate) -> str:
     return f"Left open, for others are as good: {', '.join(certificate.open)}." if certificate.open else ""
 
 
-def prices(words: Words, certificate: Certificate) -> tuple[Price, ...]:
+def prices(formatter: UnitFormatter, certificate: Certificate) -> tuple[Price, ...]:
     """Prices, one per limit and side."""
-    return tuple(map(words.price, certificate.binding_groups))
+    return tuple(map(formatter.price, certificate.binding_groups))
 
 
-def joint_prices(words: Words, certificate: Certificate) -> tuple[JointPrice, ...]:
+def joint_prices(formatter: UnitFormatter, certificate: Certificate) -> tuple[JointPrice, ...]:
     """Prices of limits that are worth more together than alone."""
-    return tuple(map(words.joint_price, certificate.bind_together))
+    return tuple(map(formatter.joint_price, certificate.bind_together))
 
 
 def stops(binding: tuple[Price, ...], together: tuple[JointPrice, ...] = ()) -> str:
@@ -470,7 +472,9 @@ def completed(answer: Solution, bound: GlobalBound | None, evaluations: int, sec
     return replace(answer, solver=solver, time=seconds, global_bound=bound)
 
 
-def cost_sentence(subject: str, answer: Solution, nominal: Evaluated, words: Words, negligible: float) -> str:
+def cost_sentence(
+    subject: str, answer: Solution, nominal: Evaluated, formatter: UnitFormatter, negligible: float
+) -> str:
     """Sentence on the rise of an answer's objectives above those of a nominal one; subject: "It costs".
 
     negligible: share of the largest figure of the same unit that counts as no change.
@@ -478,8 +482,10 @@ def cost_sentence(subject: str, answer: Solution, nominal: Evaluated, words: Wor
     costs = []
     for name, change in risen(answer, nominal).items():
         then, now = nominal.figures[name] or 0.0, answer.figures[name] or 0.0
-        largest = max(abs(value or 0.0) for key, value in answer.figures.items() if words.si(key) == words.si(name))
+        largest = max(
+            abs(value or 0.0) for key, value in answer.figures.items() if formatter.si(key) == formatter.si(name)
+        )
         if abs(change) > negligible * largest:
             share = f" ({100 * change / abs(then):+.3g} %)" if abs(then) > negligible * largest else ""
-            costs.append(f"{name} {words.shown(name, now, 9)} instead of {words.shown(name, then, 9)}{share}")
+            costs.append(f"{name} {formatter.shown(name, now, 9)} instead of {formatter.shown(name, then, 9)}{share}")
     return f"{subject} {', '.join(costs) or 'nothing of what is sought'}."

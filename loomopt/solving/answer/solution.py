@@ -46,7 +46,7 @@ class Proof(NamedTuple):
         return f"peak {self.name}" if self.kind == "peak" else self.name
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Name of the limit or of the peak, for people."""
         return self.name if self.kind == "peak" else self.text
 
@@ -74,13 +74,13 @@ class Proofs(Shown):
         return all(proof.status == "proven" for proof in self.proofs)
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Summary in one sentence."""
         missed = dict.fromkeys(proof.limit for proof in self.proofs if proof.status != "proven")
         return f"NOT proven: {', '.join(missed)}" if missed else "every limit holds at every crank angle"
 
     def __repr__(self) -> str:
-        return f"<Proofs {self.problem}, {self.target}: {self.said}>"
+        return f"<Proofs {self.problem}, {self.target}: {self.summary}>"
 
     def as_dict(self) -> dict[str, Any]:
         """Object that `prove --json` prints."""
@@ -224,7 +224,7 @@ class Terms(Protocol):
     """Judgement of a design beyond a target alone, such as by the limits on the axes of a front."""
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Objectives in a few words."""
 
     @property
@@ -320,7 +320,7 @@ def _member_dict(member: Evaluated, whole: Scene | None) -> dict[str, Any]:
     return {"change": dict(member.change), **data}
 
 
-class Beside(NamedTuple):
+class Alternative(NamedTuple):
     """Another design, with more or less added mass, beside which an answer makes little difference.
 
     added: name of the mass; share: of each figure that counts as little; chosen: whether the answer has less of it.
@@ -372,21 +372,21 @@ class Yield(NamedTuple):
 class Robust(NamedTuple):
     """Back-off of limits, so that machines hold them as they are made.
 
-    sigmas: standard deviations of its own figure by which each keeps clear; asked: the requested yield, if any;
-    linear: standard deviations for it by the joint normal distribution, with which sampling begins;
-    yields: share of machines that hold, by limit and of "all"; nominal, nominal_yields: the optimum without back-off,
-    and its machines; kept: equalities and goals, which nothing backs off; corners: figures that bend at the design, of
-    whose two slopes in each number the steeper was taken; passes: solves until standard deviations were those of the
-    design; shifted: whether bands are not even, so that back-off counts from the mean machine.
+    sigmas: standard deviations of its own figure by which each keeps clear; requested_yield: the requested yield, if
+    any; linear: standard deviations for it by the joint normal distribution, with which sampling begins; yields: share
+    of machines that hold, by limit and of "all"; nominal, nominal_yields: the optimum without back-off, and its
+    machines; exempt: equalities and goals, which nothing backs off; corners: figures that bend at the design, of whose
+    two slopes in each number the steeper was taken; passes: solves until standard deviations were those of the design;
+    shifted: whether bands are not even, so that back-off counts from the mean machine.
     """
 
     sigmas: float
-    asked: float | None
+    requested_yield: float | None
     linear: float | None
     yields: Mapping[str, Yield]
     nominal: Evaluated
     nominal_yields: Mapping[str, Yield]
-    kept: tuple[str, ...]
+    exempt: tuple[str, ...]
     corners: tuple[str, ...]
     passes: int
     samples: int
@@ -402,10 +402,10 @@ class Robust(NamedTuple):
         nominal = self.nominal.as_dict()
         return {
             "sigmas": self.sigmas,
-            "asked": self.asked,
+            "asked": self.requested_yield,
             "linear_sigmas": self.linear,
             "cost": self.cost(answer),
-            "kept": list(self.kept),
+            "kept": list(self.exempt),
             "corners": list(self.corners),
             "nominal": {
                 "design": nominal["design"],
@@ -517,9 +517,9 @@ class Solution(Evaluated):
     """Proofs at every crank angle, if requested."""
     global_bound: GlobalBound | None = None
     """Bound on all admissible designs, if requested."""
-    asked: str | None = None
+    named_target: str | None = None
     """The target as the call named it; None where it is the default."""
-    beside: Beside | None = None
+    alternative: Alternative | None = None
     """The design with, or without, what makes little difference."""
     robust: Robust | None = None
     """Back-off of the limits, if requested."""
@@ -589,7 +589,7 @@ class Solution(Evaluated):
     @property
     def sought(self) -> str:
         """Its target, or the objectives of its terms."""
-        return self.terms.said if self.terms else self.target
+        return self.terms.summary if self.terms else self.target
 
     def as_dict(self, target: str = "") -> dict[str, Any]:
         """Object that `solve --json` prints."""
@@ -602,7 +602,7 @@ class Solution(Evaluated):
             "effects": base["effects"],
         }
         if self.scene:
-            head["scene"] = _scene_dict(self.scene, self.asked)
+            head["scene"] = _scene_dict(self.scene, self.named_target)
         head["reached"] = base["reached"]
         tail: dict[str, Any] = {
             "binding": [price.as_dict() for price in self.binding],
@@ -624,8 +624,8 @@ class Solution(Evaluated):
             tail["robust"] = self.robust.as_dict(self)
         if self.rounded:
             tail["rounded"] = self.rounded.as_dict(self)
-        if self.beside:
-            tail["indifference"] = self.beside.as_dict(self)
+        if self.alternative:
+            tail["indifference"] = self.alternative.as_dict(self)
         if self.relaxation:
             tail["clash"] = list(self.clash)
             tail["relaxation"] = [relaxation._asdict() for relaxation in self.relaxation]
@@ -696,7 +696,7 @@ def grouped(unit: str) -> str:
     return f"({unit})" if "/" in unit else unit
 
 
-class Words:
+class UnitFormatter:
     """The vocabulary of one scene: kinds and units of its variables and figures."""
 
     def __init__(self, scene: Scene) -> None:

@@ -141,12 +141,12 @@ class DesignAt:
     @lazy
     def names(self) -> tuple[str, ...]:
         """Names of the variables that are not fixed."""
-        return tuple(v.name for v in self.program.variables if v.name not in self.program.held)
+        return tuple(v.name for v in self.program.variables if v.name not in self.program.constants)
 
     @lazy
     def batch_key(self) -> object:
         """Key of designs of one batch: equal structure, order of corners and rows."""
-        fixed = frozenset(self.program.held)
+        fixed = frozenset(self.program.constants)
         return self.sampler.batch_key, self.program.structure, fixed, tuple(map(kind, self.rows))
 
     @lazy
@@ -179,7 +179,7 @@ class Designs:
         known_numbers = [
             {
                 **design.program.parameters,
-                **{name: design.x[name] for name in design.program.held},
+                **{name: design.x[name] for name in design.program.constants},
                 **design.sampler.hints,
             }
             for design in self.designs

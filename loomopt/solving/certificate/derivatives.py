@@ -34,9 +34,9 @@ class Derivatives(abc.ABC):
 
     def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[ActiveRow]) -> None:
         self.program, self.sampler, self.rows = program, sampler, tuple(rows)
-        self.names = [v.name for v in program.variables if v.name not in program.held]
+        self.names = [v.name for v in program.variables if v.name not in program.constants]
         self.x = {name: x[name] for name in self.names}
-        self.known = {**program.parameters, **{name: x[name] for name in program.held}, **sampler.hints}
+        self.known = {**program.parameters, **{name: x[name] for name in program.constants}, **sampler.hints}
         sizes = {v.name: v.scale for v in program.variables}
         self.sizes = [sizes[name] for name in self.names]
 

@@ -64,7 +64,7 @@ class Levels:
         if self.why:
             return
         try:
-            task = reduced(program, loosening(job, program), silent(program), _no_larger(program, self.merits))
+            task = reduced(program, monotone_slack(job, program), silent(program), _no_larger(program, self.merits))
             self._levels = [_Level(task, x, self.merits, place, gap) for place in range(len(self.merits))]
         except OpenError as error:
             self.why = str(error)
@@ -89,10 +89,10 @@ class Levels:
         return LevelOutcome(shown, sum(level.tree.boxes for level in self._levels), why, better, lowest)
 
 
-def loosening(job: Job, program: Program) -> tuple[str, ...]:
+def monotone_slack(job: Job, program: Program) -> tuple[str, ...]:
     """Variables of a program that only loosen limits, by its job."""
     names = {v.name for v in program.variables}
-    return tuple(name for name, partner in job.loosening.items() if {name, partner} <= names)
+    return tuple(name for name, partner in job.monotone_slack.items() if {name, partner} <= names)
 
 
 def _unserved(program: Program, sampler: Sampler) -> str:
@@ -180,7 +180,7 @@ class _Level:
                 merits = [objective.merit(sampler) / objective.scale for objective in program.objectives]
             except (ArithmeticError, TypeError, ValueError):
                 continue
-            same = all(merit <= bound for merit, bound in zip(merits, self.question.held, strict=False))
+            same = all(merit <= bound for merit, bound in zip(merits, self.question.higher_levels, strict=False))
             if is_admissible and same and merits[self.place] < self.question.cut:
                 return middles[:, k]
         return None

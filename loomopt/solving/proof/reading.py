@@ -58,7 +58,7 @@ class Spots:
             angle = corner * interval(share) + angle
         return angle
 
-    def beside(self, spots: "Spots", boxes: int) -> "Spots":
+    def joined(self, spots: "Spots", boxes: int) -> "Spots":
         """Both groups of nodes, one after the other, over boxes."""
 
         def both(first: Floats, second: Floats) -> Floats:
@@ -242,8 +242,8 @@ class Reader:
     def __init__(self, task: BoxTask, levels: int, answer: Floats) -> None:
         self.task = task
         self._known: dict[bytes, NodeLayout | None] = {}
-        ((self._own, _),) = layouts(task, answer[:, None], self._known)
-        if self._own is None:
+        ((self._answer_layout, _),) = layouts(task, answer[:, None], self._known)
+        if self._answer_layout is None:
             raise OpenError("the answer has no real cycle")
         self._sampler = Sampler(task.program.model, task.values(answer))
         pairs = len(task.scale.pairs) if task.scale else 0
@@ -320,8 +320,8 @@ class Reader:
         for place, line in enumerate(self._lines):
             if line.single is None:
                 worst = layout.worst(self.task, line.row, middles, line.where)
-                if line.extremes and layout is self._own:
-                    worst = layout.spots(line.extremes).beside(worst, middles.shape[1])
+                if line.extremes and layout is self._answer_layout:
+                    worst = layout.spots(line.extremes).joined(worst, middles.shape[1])
                 spots[place] = worst
         return spots
 

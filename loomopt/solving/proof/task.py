@@ -119,7 +119,7 @@ class Scale:
     still: str
 
     @property
-    def held(self) -> dict[str, float]:
+    def fixed_length(self) -> dict[str, float]:
         """The length that stands, SI."""
         return {self.still: self.bounds[self.still][1]}
 
@@ -172,7 +172,7 @@ class BoxTask:
     low: Floats
     high: Floats
     fixed: Mapping[str, Interval]
-    loosening: Mapping[str, float] = field(default_factory=dict)
+    monotone_slack: Mapping[str, float] = field(default_factory=dict)
     """Variables that only loosen limits, with the value that a design is given, SI."""
     scale: Scale | None = None
 
@@ -198,9 +198,9 @@ class BoxTask:
 
     def floats(self, at: Floats) -> dict[str, Number]:
         """All numbers at points (names, boxes), SI, as plain arrays."""
-        known = {**self.program.parameters, **{v.name: v.lower for v in self.program.variables}, **self.loosening}
+        known = {**self.program.parameters, **{v.name: v.lower for v in self.program.variables}, **self.monotone_slack}
         if self.scale:
-            known |= self.scale.held
+            known |= self.scale.fixed_length
         return {**known, **{name: at[k][None] for k, name in enumerate(self.names)}}
 
     def values(self, at: Floats) -> dict[str, float]:
@@ -220,17 +220,18 @@ class BoxTask:
         return np.asarray(np.clip(at, self.low, self.high))
 
 
-def reduced(program: Program, loosening: tuple[str, ...], scale: Scale | None, most: Mapping[str, float]) -> BoxTask:
+def reduced(program: Program, monotone_slack: tuple[str, ...], scale: Scale | None, most: Mapping[str, float]) ->
+BoxTask:
     """Task of a program.
 
-    loosening: variables that no row but a limit's reads, and that only loosen it; most: values, SI, that variables
+    monotone_slack: variables that no row but a limit's reads, and that only loosen it; most: values, SI, that variables
     without a bound of their own need not exceed. Raises OpenError where a variable has no end.
     """
     maths: Maths = box_system()
-    lengths = dict(scale.held) if scale else {}
+    lengths = dict(scale.fixed_length) if scale else {}
     fixed = {name: maths.number(value) for name, value in {**program.parameters, **lengths}.items()}
     for v in program.variables:
-        if v.name in loosening or v.lower == v.upper:
+        if v.name in monotone_slack or v.lower == v.upper:
             fixed.setdefault(v.name, Interval(v.lower, v.upper))
     inside: dict[str, tuple[float, float]] = {}
     for v in (v for v in program.variables if v.name not in fixed):
@@ -239,7 +240,7 @@ def reduced(program: Program, loosening: tuple[str, ...], scale: Scale | None, m
     for name in [name for name, ends in inside.items() if not np.all(np.isfinite(ends))]:
         inside[name] = _implied(program, fixed | {n: Interval(*ends) for n, ends in inside.items()}, name)
     _finite(program.variables, inside)
-    uppers = {v.name: v.upper for v in program.variables if v.name in loosening}
+    uppers = {v.name: v.upper for v in program.variables if v.name in monotone_slack}
     lows, highs = (np.array([ends[k] for ends in inside.values()]) for k in range(2))
     return BoxTask(program, tuple(inside), lows, highs, fixed, uppers, scale)
 

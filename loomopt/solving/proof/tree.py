@@ -156,21 +156,21 @@ class Tree:
 class Question:
     """The question whether a level's objective can be less than `cut`, scaled.
 
-    weights: of the rows, whose sum is one more; held: what earlier levels keep, by level; better(middles): a design
-    among the middles (names, boxes) that is admissible and better, if there is one.
+    weights: of the rows, whose sum is one more; higher_levels: what earlier levels keep, by level; better(middles): a
+    design among the middles (names, boxes) that is admissible and better, if there is one.
     """
 
     reader: Reader
     level: int
     cut: float
     weights: Floats
-    held: tuple[float, ...]
+    higher_levels: tuple[float, ...]
     better: Callable[[Floats], Floats | None]
 
     @property
     def bounds(self) -> Floats:
         """Bound of each row for a better design."""
-        ends = {LIMIT: 0.0, self.level: self.cut, **dict(enumerate(self.held))}
+        ends = {LIMIT: 0.0, self.level: self.cut, **dict(enumerate(self.higher_levels))}
         return np.array([ends.get(level, math.inf) for level in self.reader.of])
 
 

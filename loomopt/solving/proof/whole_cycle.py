@@ -25,7 +25,7 @@ from loomopt.physics.cycle import Where
 from loomopt.physics.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Proof, Proofs, Sentences, Solution, Words
+from loomopt.solving.answer.solution import Proof, Proofs, Sentences, Solution, UnitFormatter
 from loomopt.solving.certificate import taylor_bounds
 from loomopt.solving.certificate.taylor_bounds import Boxes
 from loomopt.solving.options import check_sought, target_name
@@ -57,8 +57,10 @@ def prove(
     program_scene, program_target = (scene, name) if judged_by else job.adopted(scene, full, name)
     program = judged_by or job.program(program_scene, program_target)
     reads = _readings(program_scene, job, program, full, slack)
-    words = Words(program_scene)
-    proofs = tuple(proof._replace(unit=words.si(proof.name)) for proof in _merged(_decided(program, job, words, reads)))
+    formatter = UnitFormatter(program_scene)
+    proofs = tuple(
+        proof._replace(unit=formatter.si(proof.name)) for proof in _merged(_decided(program, job, formatter, reads))
+    )
     whole = reads[1].sampler
     return Proofs(scene.name, name, proofs, scene, model.uncovered(whole.model.effects, whole.given.tables))
 
@@ -68,14 +70,14 @@ FIRST_BOXES, SECONDS = 2000, 5.0
 claim gets more."""
 
 
-def _decided(program: Program, job: Job, words: Words, reads: "tuple[_Read, _Read]") -> list[Proof]:
+def _decided(program: Program, job: Job, formatter: UnitFormatter, reads: "tuple[_Read, _Read]") -> list[Proof]:
     """Proofs: each claim gets a few boxes, then open claims get more, while time is left."""
     start_time = time.process_time()
 
     def late(boxes: int) -> bool:
         return boxes >= taylor_bounds.MOST_BOXES or time.process_time() - start_time > SECONDS
 
-    claims = list(_claims(program, job, words, *reads))
+    claims = list(_claims(program, job, formatter, *reads))
     few = min(FIRST_BOXES, taylor_bounds.MOST_BOXES)
     proofs = [
         claim if isinstance(claim, Proof) else _over_cycle(*claim, lambda boxes: boxes >= few) for claim in claims
@@ -136,12 +138,12 @@ def _readings(
 
 
 def _claims(
-    program: Program, job: Job, words: Words, target_read: _Read, whole: _Read
+    program: Program, job: Job, formatter: UnitFormatter, target_read: _Read, whole: _Read
 ) -> "Iterator[Proof | tuple[_Read, _Claim]]":
     """Yield what is to be proven: limits of the cycle, assembly, claimed peaks; of single values their proofs."""
     for limit in program.row_limits:
         hidden = limit.row if limit.name in program.named_limits else limit.name
-        text = hidden if limit.hidden else words.limit(limit)
+        text = hidden if limit.hidden else formatter.limit(limit)
         if isinstance(limit, CycleLimit):
             peak = target_read.sampler.peak(limit.row, limit.where)
             yield target_read, _Claim(limit.name, text, limit.row, limit.bound, peak, limit.where)

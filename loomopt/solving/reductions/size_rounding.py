@@ -31,7 +31,7 @@ from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
 from loomopt.scenes import designs, numbers, sizes
 from loomopt.scenes.scene import Scene, cursor
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import Rounded, Sentences, Solution, Words, joined
+from loomopt.solving.answer.solution import Rounded, Sentences, Solution, UnitFormatter, joined
 from loomopt.solving.optimum import Task
 from loomopt.solving.reductions.reduction import Solve
 from loomopt.solving.search.search import objectives
@@ -188,9 +188,9 @@ def _check_goals(lattice: Lattice, nominal: Solution, answer: Solution) -> None:
         name, value = goal.figure, answer.figures.get(goal.figure)
         lost = nominal.reached.get(name) and not answer.reached.get(name)
         if lost and not (name in bands and value is not None and abs(value) <= bands[name] + abs(goal.high)):
-            residual = Words(scene).shown(name, value or 0.0)
+            residual = UnitFormatter(scene).shown(name, value or 0.0)
             problem = f"no sizes meet {name} exactly: the nearest found leave {residual}"
-            near = Words(scene).shown(name, abs(value or 0.0), 3)
+            near = UnitFormatter(scene).shown(name, abs(value or 0.0), 3)
             remedy = f'Leave a number that moves it free, or say within what it is met: [accept] {name} = "{near}"'
             raise refusal(problem, scene.origin, f"accept.{name}", remedy=remedy)
 
@@ -214,7 +214,7 @@ def _read_lattice(lattice: Lattice, nominal: Solution) -> Best | None:
     if not names.keys() <= known.keys() or program.tops:
         return None
     free = [v for v in program.variables if v.lower < v.upper and v.name not in names]
-    loose = {v.name: v.upper for v in free if job.loosening.get(v.name) in known}
+    loose = {v.name: v.upper for v in free if job.monotone_slack.get(v.name) in known}
     chosen = [v.name for v in free if v.name not in loose]
     if len(chosen) > 1 or (chosen and not isinstance(program.objectives[0], Magnitude)):
         return None
@@ -404,13 +404,16 @@ def _progress(lattice: Lattice, best: Solution | None, bound: Solution) -> str:
 
     bound: the answer of the most promising box that is open.
     """
-    words, names = Words(lattice.scene), list(dict.fromkeys(level.figure for level in lattice.program.objectives))
+    formatter, names = (
+        UnitFormatter(lattice.scene),
+        list(dict.fromkeys(level.figure for level in lattice.program.objectives)),
+    )
     if best is None:
         return "no sizes found yet"
-    figures = ", ".join(f"{name} {words.shown(name, best.figures[name] or 0.0, 6)}" for name in names)
+    figures = ", ".join(f"{name} {formatter.shown(name, best.figures[name] or 0.0, 6)}" for name in names)
     gaps = {name: abs((best.figures[name] or 0.0) - (bound.figures[name] or 0.0)) for name in names}
     sizes = {level.figure: level.scale ** (1 / level.power) for level in lattice.program.objectives}
-    open_ones = [f"{name} {words.shown(name, gap, 2)}" for name, gap in gaps.items() if gap > AGREES * sizes[name]]
+    open_ones = [f"{name} {formatter.shown(name, gap, 2)}" for name, gap in gaps.items() if gap > AGREES * sizes[name]]
     return f"best {figures}; gap {', '.join(open_ones) or '0'}"
 
 
@@ -442,7 +445,7 @@ def _split(lattice: Lattice, ends: Ends, answer: Solution) -> tuple[str, int]:
 
 def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) -> Solution:
     """Answer with the cost of its sizes, and the evidence that no other sizes are better."""
-    scene, words = lattice.scene, Words(lattice.scene)
+    scene, words = lattice.scene, UnitFormatter(lattice.scene)
     ends = {name: (grid[0], grid[-1], len(grid)) for name, grid in lattice.sizes.items()}
     rounded = Rounded(ends, lattice.points, best.admissible, best.reaching, best.boxes, best.gap, nominal, best.rests)
     size_text = ", ".join(f"{name} {words.shown(name, value)}" for name, value in (best.point or {}).items())

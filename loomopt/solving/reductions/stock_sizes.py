@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import Sentences, Solution, Words
+from loomopt.solving.answer.solution import Sentences, Solution, UnitFormatter
 from loomopt.solving.optimum import Task
 from loomopt.solving.reductions.reduction import Solve
 
@@ -76,7 +76,7 @@ def _at_a_size(scene: Scene, ideal: Solution, name: str, stock: Stock, solve: So
         best = answer if _better(answer, best) else best
     first = next(iter(best.certificate.levels)).objective if best.certificate else ""
     reached = ideal.figures.get(first)
-    figure = f" and {first} {scene.show(reached, Words(scene).kind(first), 9)}" if reached is not None else ""
+    figure = f" and {first} {scene.show(reached, UnitFormatter(scene).kind(first), 9)}" if reached is not None else ""
     explanation = f"{phrase}{figure}; of those sold, tried {', '.join(trials)}."
     return replace(best, sentences=report.explained(best, explanation))
 

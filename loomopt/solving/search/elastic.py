@@ -12,7 +12,7 @@ import numpy as np
 
 from loomopt.model.program import Program
 from loomopt.physics.tolerances import CHEAP, NEEDED, PRICED, SCREENED
-from loomopt.solving.answer.solution import Clash, Words
+from loomopt.solving.answer.solution import Clash, UnitFormatter
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Elastic, Known, Point, Settings
 from loomopt.solving.nlp.rows import families
@@ -34,7 +34,7 @@ def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Set
     return best
 
 
-def clash(search: Search, words: Words) -> Clash:
+def clash(search: Search, formatter: UnitFormatter) -> Clash:
     """Limits that clash, and the least relaxations that make a design possible; empty if a design exists.
 
     First the limits of the least sum of all excesses; then each other limit whose relaxation alone suffices.
@@ -43,15 +43,17 @@ def clash(search: Search, words: Words) -> Clash:
     if search.best or nearest is None or not nearest.relaxation:
         return Clash()
     needs = _worst_rows(program, nearest.relaxation)
-    relaxations = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
+    relaxations = [formatter.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
     known = {program.excess_places[k] for k in needs} if len(needs) == 1 else set()
     single_ways = list(dict.fromkeys(way for way in program.excess_places.values() if way not in known))
     for place, ways in enumerate(single_ways, 1):
         step = settings.at(f"looking for the least relaxation {place} of {len(single_ways)}")
         single_needs = _single_relaxation(program, ways, nearest, step)
         if single_needs:
-            relaxations += [words.relaxation(program.limits[k], need, alone=True) for k, need in single_needs.items()]
-    return Clash(_clashing_limits(program, nearest, words), tuple(relaxations), nearest.x)
+            relaxations += [
+                formatter.relaxation(program.limits[k], need, alone=True) for k, need in single_needs.items()
+            ]
+    return Clash(_clashing_limits(program, nearest, formatter), tuple(relaxations), nearest.x)
 
 
 def _single_relaxation(
@@ -75,7 +77,7 @@ def _single_relaxation(
     return needs if len(needs) == 1 else None
 
 
-def _clashing_limits(program: Program, point: Point, words: Words) -> dict[str, str]:
+def _clashing_limits(program: Program, point: Point, formatter: UnitFormatter) -> dict[str, str]:
     """Limits, phrase → name, with a price in the least relaxation: without any of them it would be smaller."""
     prices, places = point.multipliers, [family.limit for family in families(program, elastic=True)]
     if not prices:
@@ -86,7 +88,7 @@ def _clashing_limits(program: Program, point: Point, words: Words) -> dict[str, 
             (place, float(np.abs(row_prices).max(initial=0.0))) for place, row_prices in zip(places, rows, strict=True)
         ]
     priced_limits = (program.limits[place] for place, price in price_list if abs(price) > PRICED)
-    return {words.limit(limit): limit.name for limit in priced_limits if limit.name in program.named_limits}
+    return {formatter.limit(limit): limit.name for limit in priced_limits if limit.name in program.named_limits}
 
 
 def _worst_rows(program: Program, relaxed: Mapping[int, float]) -> dict[int, float]:

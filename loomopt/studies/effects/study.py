@@ -22,7 +22,7 @@ from loomopt.scenes.provenance import versions
 from loomopt.scenes.scene import Scene, build, cursor
 from loomopt.scenes.tables import effects as read
 from loomopt.solving import engine
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import UnitFormatter
 from loomopt.solving.options import OMITTED, check_numbers, target_name
 from loomopt.studies.effects.effect_impact import NEEDED, EffectImpact, ReferenceDesign
 from loomopt.studies.run.rows import Row, StudyTask
@@ -318,7 +318,7 @@ class EffectsCourse:
     def _with_dependents(self, off: Collection[str]) -> Off:
         """Effects together with those that need them."""
         closed = Off(off)
-        while more := {name for name in self.study.combination if closed & set(self.effects[name].beside)} - closed:
+        while more := {name for name in self.study.combination if closed & set(self.effects[name].companions)} - closed:
             closed |= more
         return closed
 
@@ -344,7 +344,7 @@ class EffectsCourse:
             else:
                 missing.append(off)
         for name in self.unsolved:
-            scene = self.study.without(base - {name, *self.effects[name].beside})
+            scene = self.study.without(base - {name, *self.effects[name].companions})
             self.impacts[name] = design.measure_addition(name, scene, self.study.tolerance)
         return list(dict.fromkeys(missing))
 
@@ -379,7 +379,7 @@ class EffectsCourse:
         unsolved = self.unsolved & set(names)
         if not unsolved or not self._is_possible(off):
             return omission
-        needed = {effect for name in unsolved for effect in self.effects[name].beside}
+        needed = {effect for name in unsolved for effect in self.effects[name].companions}
         scene = self.study.without(base - unsolved - needed)
         return design.combine(omission, scene, self.rows[off], self.study.tolerance)
 
@@ -455,8 +455,8 @@ class EffectsResult:
     @property
     def units(self) -> dict[str, str]:
         """SI units of the objectives' figures."""
-        words = Words(self.scene)
-        return {name: words.si(name) for name in self.reference.scales}
+        formatter = UnitFormatter(self.scene)
+        return {name: formatter.si(name) for name in self.reference.scales}
 
     @property
     def statuses(self) -> list[str]:

@@ -17,7 +17,7 @@ from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import numbers
 from loomopt.scenes.former_names import current
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import UnitFormatter
 from loomopt.solving.options import check_numbers, check_sought, target_name
 from loomopt.studies.front.trade import POINTS, Trade
 
@@ -118,7 +118,7 @@ def _lifted(scene: Scene, senses: Mapping[str, Sense]) -> tuple[Scene, tuple[str
     Of an axis of which the least is sought that is a minimum, of one of which the most is sought a maximum; a limit to
     one value stands in the way of both ends.
     """
-    words, texts = Words(scene), []
+    formatter, texts = UnitFormatter(scene), []
     for name, sense in senses.items():
         axis, limit = scene.schema.axes.get(name), scene.limits.get(name)
         if limit is None or axis is None or (axis.form and FORMS[axis.form].is_magnitude):
@@ -129,7 +129,7 @@ def _lifted(scene: Scene, senses: Mapping[str, Sense]) -> tuple[Scene, tuple[str
         if sides:
             scene = scene.without_limit(name, sides)
             most = "" if is_equality else " at least" if sides == ["min"] else " at most"
-            texts.append(f"{name}{most} {words.shown(name, ends[sides[0]] or 0.0)}")
+            texts.append(f"{name}{most} {formatter.shown(name, ends[sides[0]] or 0.0)}")
     return scene, tuple(texts)
 
 
@@ -156,7 +156,7 @@ def _ends(scene: Scene, name: str, given: str | Sequence[float]) -> tuple[float,
             raise refusal("a range has two ends", "", name, given, ENDS, remedy)
         return arguments.number(two[0], name, ENDS, remedy), arguments.number(two[1], name, ENDS, remedy)
     axis = scene.schema.axes.get(name)
-    kind = (axis.kind if axis else "") or Words(scene).kind(name)
+    kind = (axis.kind if axis else "") or UnitFormatter(scene).kind(name)
     low, high = (_read(text, kind, name) for text in numbers.range_ends(given, name))
     return low, high
 
@@ -189,12 +189,12 @@ def _named(given: str | Sequence[str], key: str, axes: Sequence[str]) -> tuple[s
 
 def _bounded(scene: Scene, ranges: Ranges) -> Scene:
     """Scene with ranges as bounds of the numbers that are no axes of their own and not bounded."""
-    words = Words(scene)
+    formatter = UnitFormatter(scene)
     changes: dict[str, object] = {}
     for name, (low, high) in ranges.items():
         if name in scene.schema.axes or name in scene.bounds:
             continue
-        unit = words.si(name)
+        unit = formatter.si(name)
         for side, end in (("min", low), ("max", high)):
             changes[f"bounds.{name}.{side}"] = f"{end!r} {unit}" if unit != SI_UNIT["number"] else end
     return scene.update(changes) if changes else scene

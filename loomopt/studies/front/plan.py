@@ -92,8 +92,8 @@ class Next(NamedTuple):
     """A point to solve, at most at b.
 
     near: rows to start from, the first one is its parent; again: row that it redoes; fine: whether it locates a change;
-    spare: row of an admissible design, to start from if the others fail; end: end of the front, at any b; beside: the
-    rows on both sides, and the share of the way from the first to the second; steps: most steps in which the
+    spare: row of an admissible design, to start from if the others fail; end: end of the front, at any b; rows_around:
+    the rows on both sides, and the share of the way from the first to the second; steps: most steps in which the
     neighbour's design is moved to the row that it redoes, which stays if that is no better; 0 for no trial.
     """
 
@@ -103,7 +103,7 @@ class Next(NamedTuple):
     fine: bool = False
     spare: int | None = None
     end: int | None = None
-    beside: tuple[int, int, float] | None = None
+    rows_around: tuple[int, int, float] | None = None
     steps: int = 0
 
 
@@ -347,12 +347,12 @@ def _between(front: Sequence[Spot], b: float, apart: Collection[frozenset[int]])
     left = max((spot for spot in front if spot.b <= b), key=lambda spot: spot.b)
     right = min((spot for spot in front if spot.b > b), key=lambda spot: spot.b)
     near, farther = sorted((left, right), key=lambda spot: (abs(spot.b - b), spot.point))
-    beside = left.point, right.point, (b - left.b) / (right.b - left.b)
+    rows_around = left.point, right.point, (b - left.b) / (right.b - left.b)
     if _are_apart(left, right, apart):
         return Next(b, (near.point, farther.point))
     if near.active != farther.active:
-        return Next(b, (near.point, farther.point), beside=beside)
-    return Next(b, (near.point,), spare=None if near is left else left.point, beside=beside)
+        return Next(b, (near.point, farther.point), rows_around=rows_around)
+    return Next(b, (near.point,), spare=None if near is left else left.point, rows_around=rows_around)
 
 
 def crossing(left: Spot, right: Spot) -> float | None:

@@ -22,7 +22,7 @@ from loomopt.physics.tolerances import ACTIVE, FEASIBLE, SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
 from loomopt.solving import neighbour_answer
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import Clash, Evaluated, Finding, Sentences, Solution, Words
+from loomopt.solving.answer.solution import Clash, Evaluated, Finding, Sentences, Solution, UnitFormatter
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.kkt import ActiveRow, active_set
 from loomopt.solving.certificate.records import Binding, Certificate
@@ -48,7 +48,7 @@ def capped(axis: Traded) -> str:
     return f"{axis.axis.name} at most as asked"
 
 
-class Asking(NamedTuple):
+class Subproblem(NamedTuple):
     """One program of a front.
 
     first: the axis that is optimised first, 0 or 1; caps: largest value of each axis, None for no limit; levels: 1 for
@@ -86,15 +86,15 @@ class Moved(NamedTuple):
 
     point: Point
     figure: float
-    led: bool
+    same_basin: bool
 
 
 class Solver:
     """Programs of one front and their solves; axes: the first is optimised, the second is limited."""
 
-    def __init__(self, scene: Scene, target: str | None, asked: Requested, accuracy: float) -> None:
+    def __init__(self, scene: Scene, target: str | None, requested: Requested, accuracy: float) -> None:
         self.scene, self.accuracy, self.job = scene, accuracy, registry.of(scene)
-        self.base, axes = self.job.traded(scene, target, asked)
+        self.base, axes = self.job.traded(scene, target, requested)
         self.axes: tuple[Traded, Traded] = (axes[0], axes[1])
 
     @property
@@ -103,7 +103,7 @@ class Solver:
         return sloped((self.axes[0].axis.name, self.axes[1].axis.name))
 
     @property
-    def held(self) -> int:
+    def level_count(self) -> int:
         """Number of levels before the axes."""
         return len(self.base.objectives) - 2
 
@@ -121,7 +121,7 @@ class Solver:
                 return v.called
         return ""
 
-    def program(self, request: Asking) -> Program:
+    def program(self, request: Subproblem) -> Program:
         """A program of the front; caps are limits whose values are parameters of the built NLP."""
         levels = self.base.objectives
         pair = levels[-2:] if request.first == 0 else levels[:-3:-1]
@@ -139,7 +139,7 @@ class Solver:
 
     def solve(
         self,
-        request: Asking,
+        request: Subproblem,
         near: Sequence[Mapping[str, Any]],
         wide: bool | None,
         spare: Sequence[Mapping[str, Any]] = (),
@@ -163,9 +163,9 @@ class Solver:
                 next_search = search_starts(two_levels, None, 0, (), None)
             if next_search.passed:
                 search, request = next_search, request._replace(levels=2)
-        return self._told(least_change.with_least_change(search), request)
+        return self._result(least_change.with_least_change(search), request)
 
-    def solve_neighbours(self, requests: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Reached | None]:
+    def solve_neighbours(self, requests: Sequence[Subproblem], ends: Sequence[Sequence[Any]]) -> list[Reached | None]:
         """Results of programs of one level between two optima; None for a program that must be solved alone.
 
         ends: both optima as JSON data, and the share of the way from the first to the second.
@@ -176,13 +176,13 @@ class Solver:
             tasks.append(neighbour_newton.NeighbourTask(self._begun(request), first, second, share, self._peaks))
         searches = zip(requests, neighbour_newton.solve_between(tasks), strict=True)
         return [
-            self._told(search, request_of_search)
+            self._result(search, request_of_search)
             if search and self._priced(search, request_of_search) and fallback.is_no_worse_than_today(search)
             else None
             for request_of_search, search in searches
         ]
 
-    def moved(self, requests: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Moved | None]:
+    def moved(self, requests: Sequence[Subproblem], ends: Sequence[Sequence[Any]]) -> list[Moved | None]:
         """Neighbour's optimum moved to each program with its active rows; None where other rows stop it.
 
         ends: as in `solve_neighbours`, the neighbour's optimum first.
@@ -197,7 +197,12 @@ class Solver:
         ]
 
     def solved_from(
-        self, request: Asking, near: Mapping[str, Any], higher_levels: Sequence[float], begin: float | None, steps: int
+        self,
+        request: Subproblem,
+        near: Mapping[str, Any],
+        higher_levels: Sequence[float],
+        begin: float | None,
+        steps: int,
     ) -> Moved | None:
         """Neighbour's design moved to a program by solves on the way; None if one of them fails.
 
@@ -218,10 +223,10 @@ class Solver:
                 return None
             if any(
                 level > other_cap + ALIKE
-                for level, other_cap in zip(candidate.objectives[: self.held], higher_levels, strict=True)
+                for level, other_cap in zip(candidate.objectives[: self.level_count], higher_levels, strict=True)
             ):
                 return None
-            same_basin = not candidate.point.iterations and (result is None or result.led)
+            same_basin = not candidate.point.iterations and (result is None or result.same_basin)
             result, share = self._moved(candidate.point, search, request.first, same_basin), next_share
             near = {"point": rows.written(result.point, search.program)}
         return result
@@ -229,7 +234,7 @@ class Solver:
     def _moved(self, point: Point, search: Search, first: int, same_basin: bool) -> Moved:
         return Moved(point, self._figure(self.axes[first], search.program, point.x), same_basin)
 
-    def rests(self, request: Asking, point: Point) -> bool:
+    def rests(self, request: Subproblem, point: Point) -> bool:
         """Whether a point is a certified optimum of a program, even if others are better.
 
         Its cap on the other axis must have a price: otherwise it is the neighbour's design itself, or nothing moves it.
@@ -242,9 +247,9 @@ class Solver:
 
     @lazy
     def _peaks(self) -> tuple[str, ...]:
-        return neighbour_answer.told_peaks(self.scene, self.job, self.base)
+        return neighbour_answer.figure_peaks(self.scene, self.job, self.base)
 
-    def _begun(self, request: Asking) -> Search:
+    def _begun(self, request: Subproblem) -> Search:
         return Search(self.job, self.program(request), Settings(self.accuracy), self._today)
 
     @lazy
@@ -254,7 +259,7 @@ class Solver:
 
     def _searched(
         self,
-        request: Asking,
+        request: Subproblem,
         near: Sequence[Mapping[str, Any]],
         wide: bool | None,
         spare: Sequence[Mapping[str, Any]] = (),
@@ -263,14 +268,14 @@ class Solver:
         search = self._begun(request)
         for starts in (near, spare):
             if not search.passed:
-                search = self._beside(search, starts)
+                search = self._solve_near(search, starts)
         if wide and search.passed:
             search = self._spread(search)
         if not (search.passed or wide is None):
             search = search_without_inactive(search, None, 0, (), None) or search_starts(search, None, 0, (), None)
         return fallback.no_worse(search)
 
-    def _beside(self, search: Search, near: Sequence[Mapping[str, Any]]) -> Search:
+    def _solve_near(self, search: Search, near: Sequence[Mapping[str, Any]]) -> Search:
         """The search after solves from neighbours' rows, its best certified."""
         search = self._from(search, near)
         return certify_best(search) if search.usable else search
@@ -290,14 +295,14 @@ class Solver:
         """A passed search after a search of other basins, if there may be any."""
         return search if search.program.single else certify_best(search_basins(search, 0, None))
 
-    def _priced(self, search: Search, request: Asking) -> bool:
+    def _priced(self, search: Search, request: Subproblem) -> bool:
         """Whether the limit on the other axis has a price at the level of the first."""
         optimised, limited = self.axes[request.first], self.axes[1 - request.first]
         prices = search.best.certificate.binding if search.best else ()
         cap, figure = capped(limited), optimised.axis.name
         return any(price.limit.name == cap and price.objective.figure == figure for price in prices)
 
-    def _told(self, search: Search, request: Asking) -> Reached:
+    def _result(self, search: Search, request: Subproblem) -> Reached:
         best = search.best
         if best is None:
             status = "infeasible" if search.clashes else "failed"
@@ -305,7 +310,7 @@ class Solver:
             return Reached(status, "limits clash: no admissible design was found" if search.clashes else last)
         program = search.program
         evaluated = report.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x), every=True)
-        cap_reason = self._held(search, best, request)
+        cap_reason = self._cap_reason(search, best, request)
         certified = best.certificate.passed and evaluated.admissible and not cap_reason
         reason = cap_reason or "; ".join(best.certificate.reasons) or "a limit does not hold on independent evaluation"
         status = "optimal" if certified else "uncertified"
@@ -314,7 +319,7 @@ class Solver:
             "point": rows.written(replace(best.point, x=dict(best.x)), program),
             "active": self._active(program, best.x),
             "axes": axes,
-            "held": list(objectives(program, best.x)[: self.held]),
+            "held": list(objectives(program, best.x)[: self.level_count]),
         }
         optimum = None
         if request[::2] == (0, 1):
@@ -330,7 +335,7 @@ class Solver:
             warm,
         )
 
-    def _held(self, search: Search, best: Candidate, request: Asking) -> str:
+    def _cap_reason(self, search: Search, best: Candidate, request: Subproblem) -> str:
         """Reason why the point does not count, because an axis is above its cap; "" if it counts."""
         sampler = sampled(search.program.model, {**search.program.parameters, **best.x})
         for axis, cap in zip(self.axes, request.caps, strict=True):
@@ -343,7 +348,9 @@ class Solver:
         """An axis at variables x (SI); a magnitude has no sign."""
         return axis.figure(axis.objective.merit(sampled(program.model, {**program.parameters, **x})))
 
-    def _multipliers(self, best: Candidate, figures: Mapping[str, float], request: Asking) -> dict[Multiplier, float]:
+    def _multipliers(
+        self, best: Candidate, figures: Mapping[str, float], request: Subproblem
+    ) -> dict[Multiplier, float]:
         """Worth of each limit for the first objective that it moves, SI, and the slope along the front."""
         optimised, limited = self.axes
         multipliers: dict[Multiplier, float] = {}
@@ -402,7 +409,7 @@ class FrontTerms:
     caps: tuple[Cap, ...]
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Both axes in words."""
         return " against ".join(axis.called for axis in self.traded)
 
@@ -435,7 +442,7 @@ class FrontTerms:
         from loomopt.solving.proof import whole_cycle
 
         program = replace(self.program, limits=_named(self))
-        return replace(whole_cycle.prove(self.scene, design, self.target, slack, program), target=self.said)
+        return replace(whole_cycle.prove(self.scene, design, self.target, slack, program), target=self.summary)
 
     def _finding(self, cap: Cap, evaluated: Evaluated, design: Mapping[str, float]) -> Finding:
         """Limit on an axis, with its figure."""
@@ -475,7 +482,7 @@ def _is_figure(axis: Traded) -> bool:
     return axis.sign > 0 and axis.axis.power == 1 and axis.axis.offset == 0.0
 
 
-def whole_answer(solver: Solver, target: str | None, result: Reached, request: Asking, began: float) -> Solution:
+def whole_answer(solver: Solver, target: str | None, result: Reached, request: Subproblem, began: float) -> Solution:
     """Full answer of a point of a front; began: start of its solve, s.
 
     request: the program, except the number of levels.
@@ -513,20 +520,25 @@ def clashing(solver: Solver, program: Program) -> Clash:
     job, scene = solver.job, solver.scene
     today = job.start(program, scene)
     search = multistart.run_search(Search(job, program, Settings(solver.accuracy), today))
-    return elastic.clash(search, Words(scene))
+    return elastic.clash(search, UnitFormatter(scene))
 
 
 def _certified(
-    solver: Solver, terms: FrontTerms, evaluated: Evaluated, certificate: Certificate, result: Reached, request: Asking
+    solver: Solver,
+    terms: FrontTerms,
+    evaluated: Evaluated,
+    certificate: Certificate,
+    result: Reached,
+    request: Subproblem,
 ) -> Solution:
     """Answer of a point with a design."""
-    words = Words(solver.scene)
+    formatter = UnitFormatter(solver.scene)
     explicit = _explicit(terms, certificate)
-    prices, joint = report.prices(words, explicit), report.joint_prices(words, explicit)
+    prices, joint = report.prices(formatter, explicit), report.joint_prices(formatter, explicit)
     if result.reason:
         sentences = Sentences(f"A design was reached but not certified: {result.reason}.")
     else:
-        sentences = Sentences(_sought(words, terms, request), report.stops(prices, joint))
+        sentences = Sentences(_sought(formatter, terms, request), report.stops(prices, joint))
     return Solution(
         **vars(evaluated),
         target=terms.target or "",
@@ -576,11 +588,11 @@ def _explicit(terms: FrontTerms, certificate: Certificate) -> Certificate:
     )
 
 
-def _sought(words: Words, terms: FrontTerms, request: Asking) -> str:
+def _sought(formatter: UnitFormatter, terms: FrontTerms, request: Subproblem) -> str:
     """The optimised axis and the limits as a sentence."""
     optimised, other = terms.traded[request.first], terms.traded[1 - request.first]
     caps = [
-        f"{axis.called} at {'most' if axis.sign > 0 else 'least'} {words.shown(axis.axis.name, _end(axis, cap))}"
+        f"{axis.called} at {'most' if axis.sign > 0 else 'least'} {formatter.shown(axis.axis.name, _end(axis, cap))}"
         for axis, cap in terms.caps
     ]
     both = len(terms.program.objectives) == len(terms.base.objectives)

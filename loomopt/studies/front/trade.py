@@ -21,10 +21,10 @@ from loomopt.scenes import designs
 from loomopt.scenes.numbers import files
 from loomopt.scenes.provenance import versions
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Solution, Words
+from loomopt.solving.answer.solution import Solution, UnitFormatter
 from loomopt.studies.front import plan, solver
 from loomopt.studies.front.plan import ENDS, FrontScale, Next
-from loomopt.studies.front.solver import Asking, Moved, Reached, Solver
+from loomopt.studies.front.solver import Moved, Reached, Solver, Subproblem
 from loomopt.studies.run.rows import Findings, Row, StudyTask, enough_together, written
 
 PLAN = 7
@@ -38,11 +38,11 @@ DIVERGED = "Diverging_Iterates"
 """IPOPT's status for an objective that falls without end."""
 
 
-class Met(NamedTuple):
+class TaskResult(NamedTuple):
     """Result of a task: the point's result, its program, and the requested place, SI, by axis."""
 
-    found: Reached
-    asking: Asking
+    result: Reached
+    subproblem: Subproblem
     place: Mapping[str, float]
 
 
@@ -93,8 +93,8 @@ class Trade:
     @property
     def kinds(self) -> dict[str, str]:
         """Label of each axis → kind of quantity, the second axis first."""
-        words = Words(self.scene)
-        kinds = [axis.axis.kind or words.kind(axis.axis.name) for axis in self.solver.axes]
+        formatter = UnitFormatter(self.scene)
+        kinds = [axis.axis.kind or formatter.kind(axis.axis.name) for axis in self.solver.axes]
         return dict(zip(self.labels[::-1], kinds[::-1], strict=True))
 
     @property
@@ -109,13 +109,13 @@ class Trade:
     @property
     def conditions(self) -> dict[str, object]:
         """Conditions of every row, for people."""
-        words, sought = Words(self.scene), zip(self.senses, self.labels, strict=True)
+        formatter, sought = UnitFormatter(self.scene), zip(self.senses, self.labels, strict=True)
         conditions: dict[str, object] = {"axes": ", ".join(f"{sense} {label}" for sense, label in sought)}
         demanded, dropped = self.demands
         conditions["held"] = ", ".join(["the scene's limits", *demanded])
         conditions |= {"not held": ", ".join(dropped)} if dropped else {}
         for name, ends in self.ranges:
-            conditions[f"range of {name}"] = " ... ".join(words.shown(name, end) for end in ends)
+            conditions[f"range of {name}"] = " ... ".join(formatter.shown(name, end) for end in ends)
         return {**conditions, "points": self.points, "accuracy": self.accuracy}
 
     @functools.cached_property
@@ -124,15 +124,15 @@ class Trade:
 
         Without a target the second list has the demands of the job's default, besides the dropped limits on axes.
         """
-        base, job, words = self.solver.base, self.solver.job, Words(self.scene)
+        base, job, words = self.solver.base, self.solver.job, UnitFormatter(self.scene)
         target_name = self.target or self.scene.schema.default_target
-        first = {level.figure for level in base.objectives[: self.solver.held]}
+        first = {level.figure for level in base.objectives[: self.solver.level_count]}
         demanded = [
             f"{_demand(words, goal)}{' or as near as it comes' * (goal.figure in first)}" for goal in base.goals
         ]
         aimed = {goal.figure for goal in base.goals}
         demanded += [
-            f"least {level.figure}" for level in base.objectives[: self.solver.held] if level.figure not in aimed
+            f"least {level.figure}" for level in base.objectives[: self.solver.level_count] if level.figure not in aimed
         ]
         try:
             default_goals = job.program(self.scene, target_name).goals
@@ -215,14 +215,14 @@ class Trade:
         place = {self.axes[1]: scale.figure(1, next_point.b)}
         if next_point.steps and next_point.again is not None:
             optima = [rows[other].warm.get("optimum") for other in (next_point.near[0], next_point.again)]
-            beside = [*optima, 0.0] if all(optima) and next_point.steps == 1 else []
-            return StudyTask(point, next_point.near[0], dict(rows[next_point.again].place), ask, length, beside)
-        if wide or next_point.beside is None:
+            neighbours = [*optima, 0.0] if all(optima) and next_point.steps == 1 else []
+            return StudyTask(point, next_point.near[0], dict(rows[next_point.again].place), ask, length, neighbours)
+        if wide or next_point.rows_around is None:
             return StudyTask(point, next_point.near[0], place, ask, length)
-        *ends, share = next_point.beside
+        *ends, share = next_point.rows_around
         optima = [rows[end].warm.get("optimum") for end in ends]
-        beside = [*optima, share] if all(optima) else []
-        return StudyTask(point, next_point.near[0], place, ask, length, beside)
+        neighbours = [*optima, share] if all(optima) else []
+        return StudyTask(point, next_point.near[0], place, ask, length, neighbours)
 
     def _known(self, row: Row, neighbour: Row, next_point: Next, scale: FrontScale) -> dict[str, object]:
         """Data of a trial as JSON data: the axis of a row to beat, SI, the tolerance, and the neighbour's place.
@@ -272,23 +272,23 @@ class Trade:
         """Raise BadInput if an end lies outside a range: then no point of the front lies in the range."""
         for (name, (low, high)), row in itertools.product(self.ranges, ends):
             value = row.warm["axes"][name] if row.certified else low
-            words, tolerance = Words(self.scene), SAME_OBJECTIVE * max(abs(low), abs(high))
+            formatter, tolerance = UnitFormatter(self.scene), SAME_OBJECTIVE * max(abs(low), abs(high))
             if not low - tolerance <= value <= high + tolerance:
-                problem = f"no point of the front lies in the range; it comes to {words.shown(name, value)}"
-                range_text = f"{words.shown(name, low)} ... {words.shown(name, high)}"
+                problem = f"no point of the front lies in the range; it comes to {formatter.shown(name, value)}"
+                range_text = f"{formatter.shown(name, low)} ... {formatter.shown(name, high)}"
                 raise BadInput(
                     problem, file=self.scene.origin, key=name, value=range_text, remedy="Give another range."
                 )
 
     def place(self, row: Row) -> dict[str, float]:
         """Second axis of a row, SI: its value there, or the requested one."""
-        return self._told(row, 1)
+        return self._figures(row, 1)
 
     def sought(self, row: Row) -> dict[str, float]:
         """First axis of a row, SI."""
-        return self._told(row, 0)
+        return self._figures(row, 0)
 
-    def _told(self, row: Row, axis: int) -> dict[str, float]:
+    def _figures(self, row: Row, axis: int) -> dict[str, float]:
         known, name = row.warm.get("axes", row.place), self.axes[axis]
         return {self.labels[axis]: known[name]} if name in known else {}
 
@@ -321,7 +321,7 @@ class Trade:
     def solved_together(self, tasks: Sequence[StudyTask]) -> list[Row | None]:
         """Rows of tasks between two neighbours' optima, independent of the batch; None for the others."""
         began = time.perf_counter()
-        results = self._beside(tasks)
+        results = self._solve_between(tasks)
         shared = (time.perf_counter() - began) / max(1, sum(map(bool, results)))
         return [_row(task, result, shared) if result else None for task, result in zip(tasks, results, strict=True)]
 
@@ -331,26 +331,26 @@ class Trade:
         result = self._alone(task, parent)
         return _row(task, result, time.perf_counter() - began)
 
-    def reach(self, task: StudyTask, parent: Row | None) -> Met:
+    def reach(self, task: StudyTask, parent: Row | None) -> TaskResult:
         """Result of a task."""
-        (result,) = self._beside([task])
+        (result,) = self._solve_between([task])
         return result or self._alone(task, parent)
 
-    def _beside(self, tasks: Sequence[StudyTask]) -> list[Met | None]:
+    def _solve_between(self, tasks: Sequence[StudyTask]) -> list[TaskResult | None]:
         """Results of tasks between two neighbours' optima; None for a task that must be solved alone."""
-        results: list[Met | None] = [None] * len(tasks)
-        places = [k for k, task in enumerate(tasks) if task.beside and "trial" not in task.ask]
-        requests = [self.asking(tasks[k].place) for k in places]
+        results: list[TaskResult | None] = [None] * len(tasks)
+        places = [k for k, task in enumerate(tasks) if task.neighbours and "trial" not in task.ask]
+        requests = [self.subproblem(tasks[k].place) for k in places]
         for k, request, point_result in zip(
-            places, requests, self.solver.solve_neighbours(requests, [tasks[k].beside for k in places]), strict=True
+            places, requests, self.solver.solve_neighbours(requests, [tasks[k].neighbours for k in places]), strict=True
         ):
-            kept_result = point_result and _kept(point_result, tasks[k].ask["held"])
+            kept_result = point_result and _with_levels_checked(point_result, tasks[k].ask["held"])
             if kept_result and kept_result.certified:
                 marked_result = replace(kept_result, warm={**kept_result.warm, "between": True})
-                results[k] = Met(marked_result, request, dict(tasks[k].place))
-        places = [k for k, task in enumerate(tasks) if task.beside and "trial" in task.ask]
-        requests = [self.asking(tasks[k].place) for k in places]
-        moved_designs = self.solver.moved(requests, [tasks[k].beside for k in places])
+                results[k] = TaskResult(marked_result, request, dict(tasks[k].place))
+        places = [k for k, task in enumerate(tasks) if task.neighbours and "trial" in task.ask]
+        requests = [self.subproblem(tasks[k].place) for k in places]
+        moved_designs = self.solver.moved(requests, [tasks[k].neighbours for k in places])
         for k, request, moved_design in zip(places, requests, moved_designs, strict=True):
             if tasks[k].ask["trial"]["done"] or (
                 moved_design and self._excess(tasks[k], 0, moved_design.figure) >= 0.0
@@ -358,7 +358,7 @@ class Trade:
                 results[k] = self._stands(tasks[k], request, moved_design)
         return results
 
-    def _tried(self, task: StudyTask, request: Asking, near: Mapping[str, Any]) -> Moved | None:
+    def _tried(self, task: StudyTask, request: Subproblem, near: Mapping[str, Any]) -> Moved | None:
         """Neighbour's design at the place of a trial; None if a solve fails."""
         steps = int(task.ask["steps"])
         begin = self.solver.axes[1].value(task.ask["trial"]["begin"]) if steps > 1 else None
@@ -370,26 +370,28 @@ class Trade:
         excess = float(self.signs[axis] * (figure - known["best"]))
         return 0.0 if abs(excess) <= known["slack"] else excess
 
-    def _stands(self, task: StudyTask, request: Asking, end: Moved | None) -> Met:
+    def _stands(self, task: StudyTask, request: Subproblem, end: Moved | None) -> TaskResult:
         """Result of a trial after which the row stays; end: the moved design.
 
         A moved design that stayed in its basin, is worse, and is an optimum itself, is a different design.
         """
-        is_informative = end is not None and end.led and task.ask["trial"]["inner"]
+        is_informative = end is not None and end.same_basin and task.ask["trial"]["inner"]
         is_worse = is_informative and end is not None and self._excess(task, request.first, end.figure) > 0.0
         is_apart = is_worse and end is not None and self.solver.rests(request, end.point)
         warm = {"apart": list(task.ask["near"]) if is_apart else []}
-        return Met(Reached("uncertified", "a neighbour's design is no better there", warm=warm), request, task.place)
+        return TaskResult(
+            Reached("uncertified", "a neighbour's design is no better there", warm=warm), request, task.place
+        )
 
-    def asking(self, place: Mapping[str, float]) -> Asking:
+    def subproblem(self, place: Mapping[str, float]) -> Subproblem:
         """Program of a place: the second axis, SI, by its name."""
-        return Asking(0, (self._cap(0), self.solver.axes[1].value(place[self.axes[1]])))
+        return Subproblem(0, (self._cap(0), self.solver.axes[1].value(place[self.axes[1]])))
 
-    def _alone(self, task: StudyTask, parent: Row | None) -> Met:
+    def _alone(self, task: StudyTask, parent: Row | None) -> TaskResult:
         """Result of a task by separate solves."""
         near = [*([parent.warm] if parent else []), *task.ask.get("also", ())]
         end = task.ask.get("end")
-        request = self.asking(task.place) if end is None else self._asking_of_end(end)
+        request = self.subproblem(task.place) if end is None else self._subproblem_of_end(end)
         if "trial" in task.ask:
             moved_design = None if task.ask["trial"]["done"] else self._tried(task, request, near[0])
             if moved_design is None or self._excess(task, request.first, moved_design.figure) >= 0.0:
@@ -398,7 +400,7 @@ class Trade:
         if end is not None:
             return self._end(end, near)
         result = self.solver.solve(request, near, bool(task.ask["wide"]), task.ask.get("spare", ()))
-        return Met(_kept(result, task.ask["held"]), request, dict(task.place))
+        return TaskResult(_with_levels_checked(result, task.ask["held"]), request, dict(task.place))
 
     def _cap(self, axis: int, best: bool = False) -> float | None:
         """Largest value of an axis that its range allows, or the least with `best`; None without a range."""
@@ -408,44 +410,48 @@ class Trade:
         values = sorted(map(self.solver.axes[axis].value, ends))
         return values[0] if best else values[1]
 
-    def _asking_of_end(self, end: int) -> Asking:
+    def _subproblem_of_end(self, end: int) -> Subproblem:
         """Program of an end of the front, without its own range."""
-        return Asking(1, (self._cap(0), None)) if end else Asking(0, (None, self._cap(1)))
+        return Subproblem(1, (self._cap(0), None)) if end else Subproblem(0, (None, self._cap(1)))
 
-    def _end(self, end: int, near: Sequence[Mapping[str, Any]]) -> Met:
+    def _end(self, end: int, near: Sequence[Mapping[str, Any]]) -> TaskResult:
         """An end of the front, and its requested place: the axis' least within its range.
 
         near: rows to start from; without them it is searched.
         """
-        request = self._asking_of_end(end)
+        request = self._subproblem_of_end(end)
         result, axis = self.solver.solve(request, near, not near), self.solver.axes[end]
         end_value = axis.value(result.warm["axes"][self.axes[end]]) if result.certified else -math.inf
         least = self._cap(end, best=True)
         if result.status == "infeasible":
             result = replace(result, reason=self._clash(request) or result.reason)
         if least is None or end_value >= least:
-            return self._sloped(result) if end and result.certified else Met(result, request, {})
-        request = Asking(0, (request.caps[0], least)) if end else Asking(1, (least, request.caps[1]))
-        return Met(self.solver.solve(request, near, not near), request, {self.axes[end]: axis.figure(least)})
+            return self._sloped(result) if end and result.certified else TaskResult(result, request, {})
+        request = Subproblem(0, (request.caps[0], least)) if end else Subproblem(1, (least, request.caps[1]))
+        return TaskResult(self.solver.solve(request, near, not near), request, {self.axes[end]: axis.figure(least)})
 
-    def _clash(self, request: Asking) -> str:
+    def _clash(self, request: Subproblem) -> str:
         """Limits that clash, and why; "" if none are known."""
         limits = solver.clashing(self.solver, self.solver.program(request)).limits
         why = registry.of(self.scene).explain(self.scene, limits.values())
         return "; ".join([f"limits that clash: {', '.join(limits)}", *([why] if why else [])]) if limits else ""
 
-    def _sloped(self, end_result: Reached) -> Met:
+    def _sloped(self, end_result: Reached) -> TaskResult:
         """End of the second axis as a point like the others, with its slope, if that is certified."""
         cap = self.solver.axes[1].value(end_result.warm["axes"][self.axes[1]])
-        request = Asking(0, (self._cap(0), cap))
+        request = Subproblem(0, (self._cap(0), cap))
         sloped_result = self.solver.solve(request, [end_result.warm], None)
         sloped_axes = sloped_result.warm.get("axes", {}) if sloped_result.certified else {}
         differences = [abs(sloped_axes.get(name, math.inf) - end_result.warm["axes"][name]) for name in self.axes]
         same = all(a <= SAME_OBJECTIVE * size for a, size in zip(differences, self.sizes, strict=True))
-        return Met(sloped_result, request, {}) if same else Met(end_result, Asking(1, (self._cap(0), None)), {})
+        return (
+            TaskResult(sloped_result, request, {})
+            if same
+            else TaskResult(end_result, Subproblem(1, (self._cap(0), None)), {})
+        )
 
 
-def _row(task: StudyTask, task_result: Met, seconds: float) -> Row:
+def _row(task: StudyTask, task_result: TaskResult, seconds: float) -> Row:
     """Row of a task's result."""
     result, _, place = task_result
     warm = {**result.warm, **{name: task.ask.get(name) for name in ("again", "fine", "near", "end", "steps")}}
@@ -465,9 +471,9 @@ def _row(task: StudyTask, task_result: Met, seconds: float) -> Row:
     )
 
 
-def _demand(words: Words, goal: Goal) -> str:
+def _demand(formatter: UnitFormatter, goal: Goal) -> str:
     """Demand on a figure in words."""
-    low, high = (words.shown(goal.figure, end) if math.isfinite(end) else "" for end in (goal.low, goal.high))
+    low, high = (formatter.shown(goal.figure, end) if math.isfinite(end) else "" for end in (goal.low, goal.high))
     if low == high:
         return f"{goal.figure} {low}"
     if low and high:
@@ -475,7 +481,7 @@ def _demand(words: Words, goal: Goal) -> str:
     return f"{goal.figure} at {'least' if low else 'most'} {low or high}"
 
 
-def _kept(result: Reached, higher_levels: Sequence[float]) -> Reached:
+def _with_levels_checked(result: Reached, higher_levels: Sequence[float]) -> Reached:
     """The result; infeasible if the target's levels are not as good as along the front."""
     levels = result.warm.get("held", higher_levels)
     if result.certified and any(

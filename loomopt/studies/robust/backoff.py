@@ -21,7 +21,17 @@ from loomopt.maths import normal
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import SIDES, SIGNS, Finding, Price, Robust, Sentences, Solution, Words, Yield
+from loomopt.solving.answer.solution import (
+    SIDES,
+    SIGNS,
+    Finding,
+    Price,
+    Robust,
+    Sentences,
+    Solution,
+    UnitFormatter,
+    Yield,
+)
 from loomopt.solving.optimum import Task
 from loomopt.solving.reductions.reduction import Solve
 from loomopt.studies.robust.margins import Margin, check_crossings, margins, narrow_band, share
@@ -385,7 +395,7 @@ def _explain(
 ) -> Solution:
     """Answer with the limits of the scene, the back-off of each, and the sampled yields."""
     scene, answer, off = request.scene, ended.answer, tightened(ended)
-    words = Words(scene)
+    formatter = UnitFormatter(scene)
     here = report.evaluated(scene, registry.of(scene), request.task.target, ended.plan.full)
     corners = dict.fromkeys(margin.name for margin in ended.margins if margin.corner and not margin.fixed)
     robust = Robust(
@@ -404,13 +414,13 @@ def _explain(
     )
     by_name = {name: by for (name, _), by in off.items()}
     limits = tuple(limit._replace(backed_off=by_name.get(limit.name, 0.0)) for limit in here.limits)
-    binding = tuple(_priced(words, price, off) for price in answer.binding)
+    binding = tuple(_priced(formatter, price, off) for price in answer.binding)
     result = replace(answer, limits=limits, reached=here.reached, scene=scene, binding=binding, robust=robust)
     sentences = report.explained(result, *_sentences(scene, ended, result, robust))
     return replace(result, sentences=sentences._replace(limits=report.stops(binding, answer.bind_together)))
 
 
-def _priced(words: Words, price: Price, off: Mapping[tuple[str, int], float]) -> Price:
+def _priced(formatter: UnitFormatter, price: Price, off: Mapping[tuple[str, int], float]) -> Price:
     """Price of a limit at its value in the scene, with its back-off."""
     signs = {word: sign for sign, word in SIDES.items()}
     sign = signs[price.side]
@@ -418,8 +428,8 @@ def _priced(words: Words, price: Price, off: Mapping[tuple[str, int], float]) ->
     if not by:
         return price
     value = price.value + sign * by
-    stands = f"{price.limit} {SIGNS[sign]} {words.shown(price.limit, value)}"
-    text = f"{stands}, backed off by {words.shown(price.limit, by, 4)}"
+    stands = f"{price.limit} {SIGNS[sign]} {formatter.shown(price.limit, value)}"
+    text = f"{stands}, backed off by {formatter.shown(price.limit, by, 4)}"
     return price._replace(value=value, text=text, backed_off=by)
 
 
@@ -428,11 +438,11 @@ def _sentences(scene: Scene, ended: Pass, answer: Solution, robust: Robust) -> l
     now, was = robust.yields[ALL], robust.nominal_yields[ALL]
     sentences = [
         f"That is with {_backed(ended)}{_from(robust)}.",
-        report.cost_sentence("It costs", answer, robust.nominal, Words(scene), SAME),
+        report.cost_sentence("It costs", answer, robust.nominal, UnitFormatter(scene), SAME),
         f"All limits hold on {_percent(now)} of the machines instead of {100 * was.value:.4g} %.",
     ]
-    if robust.kept:
-        sentences.append(f"Nothing backs off {', '.join(robust.kept)}: an equality or a goal, kept as it is.")
+    if robust.exempt:
+        sentences.append(f"Nothing backs off {', '.join(robust.exempt)}: an equality or a goal, kept as it is.")
     if robust.corners:
         holds = ", ".join(f"{name} on {_percent(robust.yields[name])}" for name in robust.corners)
         sentences.append(
@@ -493,8 +503,8 @@ def _limits(request: Request, answer: Solution) -> tuple[Finding, ...]:
 
 def _narrow(request: Request, here: Pass, name: str, width: float, needed: float) -> Solution:
     """Answer without a certificate: the band of a limit has no room for the back-off of both sides."""
-    words = Words(request.scene)
-    why = f"the band of {name}, {words.shown(name, width, 4)}, is no wider than {words.shown(name, needed, 4)}"
+    formatter = UnitFormatter(request.scene)
+    why = f"the band of {name}, {formatter.shown(name, width, 4)}, is no wider than {formatter.shown(name, needed, 4)}"
     result = _infeasible(request, here.answer, f"{why} on both sides: {here.sigmas:.6g} sigma each")
     return replace(result, clash=(name,))
 

@@ -12,7 +12,7 @@ from loomopt.jobs.base import Crossing
 from loomopt.maths import joint_normal
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Floats
-from loomopt.solving.answer.solution import SIDES, Words
+from loomopt.solving.answer.solution import SIDES, UnitFormatter
 from loomopt.studies.tolerance.plan import Criterion, Plan
 from loomopt.studies.tolerance.study import Slopes, slopes
 
@@ -126,7 +126,7 @@ def _room(margin: Margin, back_off: float, applied: float) -> float:
 
 def check_crossings(plan: Plan, sigmas: float) -> None:
     """Raise BadInput where a travel turns so near the level whose crossing a limit reads that some machines' jumps."""
-    names, words = {criterion.name for criterion in plan.criteria}, Words(plan.scene)
+    names, words = {criterion.name for criterion in plan.criteria}, UnitFormatter(plan.scene)
     for name, crossings in registry.of(plan.scene).crossings(plan.scene).items():
         for crossing in crossings if name in names else ():
             level = plan.nominal[crossing.level]

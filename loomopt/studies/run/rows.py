@@ -155,9 +155,9 @@ class StudyTask:
     """One point to be solved.
 
     place: as of its row; parent: the point, of an earlier batch, of its warm start, None for a cold start; ask: further
-    requests as JSON data; length: approximate time relative to others of its batch; beside: optima of two neighbours as
-    JSON data and the share of the way from the first to the second, if it may be solved between them in a batch; the
-    row is the same as alone.
+    requests as JSON data; length: approximate time relative to others of its batch; neighbours: optima of two
+    neighbours as JSON data and the share of the way from the first to the second, if it may be solved between them in a
+    batch; the row is the same as alone.
     """
 
     point: int
@@ -165,13 +165,13 @@ class StudyTask:
     place: Mapping[str, float]
     ask: Mapping[str, Any] = field(default_factory=dict)
     length: int = 1
-    beside: Sequence[Any] = ()
+    neighbours: Sequence[Any] = ()
 
 
 def enough_together(tasks: Sequence[StudyTask]) -> list[StudyTask]:
     """The tasks; if fewer may be solved in a batch than pays off, each is solved alone."""
-    enough = sum(bool(task.beside) for task in tasks) >= FEWEST
-    return list(tasks) if enough else [replace(task, beside=()) for task in tasks]
+    enough = sum(bool(task.neighbours) for task in tasks) >= FEWEST
+    return list(tasks) if enough else [replace(task, neighbours=()) for task in tasks]
 
 
 FEWEST = 4

@@ -230,14 +230,14 @@ def run(
             remedy = "Name another file: this one was changed, or comes from a machine that computes otherwise"
             raise refusal(problem, str(store.path), "store", remedy=remedy)
 
-    with Crew(study, executor) as crew:
+    with WorkerPool(study, executor) as pool:
         while tasks := study.batch(list(rows.values())):
             stored = [stored_rows.pop(task.point) for task in tasks if task.point in stored_rows]
             for row in stored:
                 add(row, fresh=False)
             open_tasks = [task for task in tasks if task.point in checked or task.point not in rows]
             open_tasks.sort(key=lambda task: task.point not in checked)
-            crew.work([(task, None if task.parent is None else rows[task.parent]) for task in open_tasks], receive)
+            pool.work([(task, None if task.parent is None else rows[task.parent]) for task in open_tasks], receive)
             rows = dict(sorted(rows.items()))
     return tuple(rows.values())
 
@@ -319,7 +319,7 @@ TOGETHER = 32
 """Most tasks of a group: few enough to lose at Ctrl-C, and enough to share a batch."""
 
 
-class Crew:
+class WorkerPool:
     """Executor of a study's tasks, from the first task to the last.
 
     given: an executor of the caller, or a function that makes one; None for this process.
@@ -332,7 +332,7 @@ class Crew:
         self.running: dict[Future[list[str]], Group] = {}
         self.deaths: Counter[int] = Counter()
 
-    def __enter__(self) -> "Crew":
+    def __enter__(self) -> "WorkerPool":
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
@@ -429,8 +429,8 @@ class Crew:
 
 def _groups(works: "Sequence[Work]", most: int) -> "list[Group]":
     """Tasks in groups: at most `most` of those that may share a batch, the others one by one."""
-    several = [work for work in works if work[0].beside]
+    several = [work for work in works if work[0].neighbours]
     return [
-        *([work] for work in works if not work[0].beside),
+        *([work] for work in works if not work[0].neighbours),
         *(several[begin : begin + most] for begin in range(0, len(several), most)),
     ]

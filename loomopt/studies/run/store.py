@@ -21,7 +21,7 @@ from loomopt.studies.run.rows import Row
 
 APPLICATION, VERSION = 0x6C6F6F6D, 2
 """What the file's head says: "loom", and the version of its tables."""
-COLUMNS = tuple(each.name for each in fields(Row))
+COLUMNS = tuple(column.name for column in fields(Row))
 STATUSES = frozenset({"optimal", "infeasible", "uncertified", "failed", "interrupted"})
 LARGEST_WHOLE = 2**53
 """Whole number that a float holds."""
@@ -83,11 +83,11 @@ class Store:
         """Open the file, or make it. Raises BadInput where it is none of a study, cannot be written, or is in use."""
         self.path = path
         files.check(path)
-        with self._told():
+        with self._plain_errors():
             # An absolute path is never one of the names that keep nothing: ":memory:", "file:...".
             self._file = sqlite3.connect(path.absolute(), timeout=0.0, isolation_level=None, check_same_thread=False)
         try:
-            with self._told():
+            with self._plain_errors():
                 self._file.set_progress_handler(lambda: 0, STEPS)  # where Python sees to Ctrl-C
                 for setting in ("locking_mode = EXCLUSIVE", "journal_mode = DELETE", "synchronous = FULL"):
                     self._file.execute(f"PRAGMA {setting}")
@@ -125,7 +125,7 @@ class Store:
         self._file.execute("COMMIT")
 
     @contextlib.contextmanager
-    def _told(self) -> Iterator[None]:
+    def _plain_errors(self) -> Iterator[None]:
         """Report SQLite's errors as plain messages."""
         try:
             yield
@@ -145,21 +145,21 @@ class Store:
 
     def begin(self, key: str, description: Mapping[str, object]) -> None:
         """Enter a study, unless it is there; description: the content of its key, for readers of the file."""
-        with self._told(), self._transaction():
+        with self._plain_errors(), self._transaction():
             self._file.execute("INSERT OR IGNORE INTO study VALUES (?, ?)", (key, json.dumps(description)))
 
     def studies(self) -> dict[str, dict[str, Any]]:
         """Descriptions of all studies by key. Raises BadInput for a damaged one."""
-        with self._told():
+        with self._plain_errors():
             records = self._file.execute("SELECT key, told FROM study ORDER BY rowid").fetchall()
-        read = {key: _read_told(description) for key, description in records}
+        read = {key: _read_description(description) for key, description in records}
         if not all(read.values()):
             raise BadInput("what it says of a study is damaged", file=str(self.path), key="store", remedy=_OTHER)
         return read
 
     def rows(self, key: str) -> list[Row]:
         """Rows of a study. Raises BadInput for a damaged one."""
-        with self._told():
+        with self._plain_errors():
             query = f"SELECT {', '.join(COLUMNS)}, checksum FROM row WHERE study = ? ORDER BY point"
             records = self._file.execute(query, (key,)).fetchall()
         return [self._row(key, cells) for cells in records]
@@ -183,11 +183,11 @@ class Store:
         """Write a finished row; it is there for good when this returns."""
         values = [value if name == "point" else json.dumps(value) for name, value in row.as_dict().items()]
         marks = ", ".join("?" * (2 + len(COLUMNS)))
-        with self._told(), self._transaction():
+        with self._plain_errors(), self._transaction():
             self._file.execute(f"INSERT INTO row VALUES ({marks})", (key, *values, _checksum(key, values)))
 
 
-def _read_told(text: object) -> dict[str, Any]:
+def _read_description(text: object) -> dict[str, Any]:
     """Description of a study; {} where it is not as it was written."""
     with contextlib.suppress(ValueError, RecursionError):
         content = json.loads(text) if isinstance(text, str) else {}

@@ -22,7 +22,7 @@ from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ACTIVE, FEASIBLE, POSITIVE, SAME_NODE
 from loomopt.scenes import designs, numbers
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import SIDES, Price, Solution, Words, demand_single
+from loomopt.solving.answer.solution import SIDES, Price, Solution, UnitFormatter, demand_single
 from loomopt.solving.certificate import kkt
 from loomopt.solving.certificate.kkt import ActiveRow
 from loomopt.studies.sensitivity.active import (
@@ -183,7 +183,9 @@ class Study:
         scene, known = self.scene, dict[str, Number]()
         chosen = {v.called for v in self.program.variables if v.name not in self.program.fixed}
         chosen |= {name for name, bound in scene.bounds.items() if bound.min == bound.max}
-        chosen |= {*scene.schema.variables} - {v.called for v in self.program.variables if v.name in self.program.held}
+        chosen |= {*scene.schema.variables} - {
+            v.called for v in self.program.variables if v.name in self.program.constants
+        }
         touched = {(row.limit.name, row.limit.sign) for row in self.optimum.rows if row.limit}
         tables = [*scene.tables.items(), *((f"effects.{name}", effect) for name, effect in scene.effects.items())]
         for table, values in tables:
@@ -412,7 +414,7 @@ def _side_derivatives(study: Study, key: str, side: Side | None, direction: Dire
         for name in total:
             value = called.get(name, figures.get(name))
             total[name] += turn * weight * (value if value is not None else math.nan) / h
-    words, level = Words(study.scene), optimum.program.objectives[optimum.level]
+    formatter, level = UnitFormatter(study.scene), optimum.program.objectives[optimum.level]
     scales = {objective.figure: objective.scale for objective in optimum.program.objectives if objective.power == 1}
     merit = level.merit(optimum.build_sampler(optimum.program, optimum.x))
     # Some figures differ from the row that is minimised, such as an angle from its complement.
@@ -420,16 +422,16 @@ def _side_derivatives(study: Study, key: str, side: Side | None, direction: Dire
     is_row = figure is not None and abs(figure - merit) <= SAME_DERIVATIVE * max(abs(merit), level.scale)
     largest: dict[str, float] = {}
     for name, number in study.answer.figures.items():
-        largest[words.si(name)] = max(largest.get(words.si(name), 0.0), abs(number or 0.0))
+        largest[formatter.si(name)] = max(largest.get(formatter.si(name), 0.0), abs(number or 0.0))
     for name, difference in total.items():
         slope = difference
         if name == level.figure and is_row and level.power == 1 and not level.is_magnitude:
             slope = direction.objective * level.scale
         if math.isfinite(slope):
             kind = SI_UNIT[study.numbers[key].quantity.kind]
-            size = max(largest.get(words.si(name), 0.0), scales.get(name, 0.0)) / (abs(here) or 1.0)
+            size = max(largest.get(formatter.si(name), 0.0), scales.get(name, 0.0)) / (abs(here) or 1.0)
             slope = 0.0 if abs(slope) <= ZERO_DERIVATIVE * size else slope
-            yield Row(key, name, side, slope, f"{words.si(name)}/({kind})" if kind != "1" else words.si(name))
+            yield Row(key, name, side, slope, f"{formatter.si(name)}/({kind})" if kind != "1" else formatter.si(name))
 
 
 ZERO_DERIVATIVE = 1e-8
@@ -501,7 +503,7 @@ def _price_end(study: Study, working_set: WorkingSet | None, key: str, price: Pr
     size = worth or largest
     now = sign * _price(optimum, optimum.x, level, multipliers, optimum.rows, places)
     if abs(now - worth) > PRICE_CHANGE * size:
-        return 0.0, f"the price is {Words(study.scene).price_reading(figure, price.limit, now)} there"
+        return 0.0, f"the price is {UnitFormatter(study.scene).price_reading(figure, price.limit, now)} there"
     if working_set is None:
         return 0.0, "the optimum cannot be followed"
 

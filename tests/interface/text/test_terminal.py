@@ -16,7 +16,7 @@ from loomopt.interface.text import answers, layout, scenes
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import kinds
 from loomopt.picture.table import TextTable, call, restore_spaces, unbroken
-from loomopt.solving.answer.solution import Sentences, Words
+from loomopt.solving.answer.solution import Sentences, UnitFormatter
 
 SCENE = load("beatup-light")
 EFFECTS = kinds.of("loomopt.physics.effects.beatup")
@@ -225,12 +225,12 @@ def test_the_design_to_retype_is_the_design_to_the_last_digit(name):
     found = api.solve(name)
     shown = text(*answers.solution(found.result, found.scene))
     (line,) = re.findall(r"^to retype: (\{.*?\})", shown, re.MULTILINE | re.DOTALL)
-    words, typed = Words(found.scene), json.loads(line)
+    formatter, typed = UnitFormatter(found.scene), json.loads(line)
     assert list(typed) == list(found.design)
-    back = {k: read(v, words.kind(k)) if isinstance(v, str) else v for k, v in typed.items()}
+    back = {k: read(v, formatter.kind(k)) if isinstance(v, str) else v for k, v in typed.items()}
     assert back == found.design
     assert api.evaluate(found.scene, back, found.target).admissible
-    assert all(isinstance(v, str) == (words.unit(k) != "1") for k, v in typed.items())
+    assert all(isinstance(v, str) == (formatter.unit(k) != "1") for k, v in typed.items())
     assert max(map(len, shown.splitlines())) <= 80
     assert shown.index(f"\n{found.table().index[-1]} ") < shown.index("to retype: ") < shown.index("What binds")
 
@@ -245,7 +245,7 @@ def test_what_was_proven_is_told_in_a_few_lines_and_only_where_it_was_asked_for(
     boxes = sum(proof.boxes for proof in found.proofs.proofs)
     assert block[0].endswith(f"up to 1e-08 of each quantity's largest magnitude, in {boxes} boxes:")
     assert [line.split(":")[0].strip() for line in block[1:]] == ["limits", "assembly", "peaks as claimed"]
-    assert all(proof.said in shown for proof in found.proofs.proofs)
+    assert all(proof.summary in shown for proof in found.proofs.proofs)
     assert "NOT proven" not in shown
 
 

@@ -131,7 +131,7 @@ def test_events_of_the_motion_are_both_dead_centres():
 def test_static_figures_are_their_formulas():
     found = figures(FULL, DESIGN)
     s = 3.0 * 0.07**2
-    JS = FULL.own(counterweight_inertia.Parameters).JS
+    JS = FULL.effect_table(counterweight_inertia.Parameters).JS
     assert found["J4"] == pytest.approx(0.62 + s + JS, rel=1e-15)
     assert found["r4"] == pytest.approx((56.8 * 0.045 - 3.0 * 0.07) / 59.8, rel=1e-15)
     centres = shared_linkage(JOB.sampler(FULL, DESIGN).given).centres

@@ -168,13 +168,13 @@ def test_a_design_with_a_law_is_adopted_as_the_scenes_own():
 
 
 def test_a_spring_that_is_too_soft_is_not_asked_whether_it_just_holds(monkeypatch):
-    roots, settled = [], program._settled
+    roots, settled = [], program._refined_speed
 
     def counted(*asked):
         roots.append(settled(*asked))
         return roots[-1]
 
-    monkeypatch.setattr(program, "_settled", counted)
+    monkeypatch.setattr(program, "_refined_speed", counted)
     survived = JOB.figures(SCENE, JOB.today(SCENE))["contact_speed"]
     assert survived < SCENE.operation["speed"]
     assert roots == [survived]

@@ -18,7 +18,7 @@ CLASH = ("surge_ratio", "shear_share")
 
 
 def own(**values):
-    return SCENE.own(coil.Parameters).model_copy(update=values)
+    return SCENE.effect_table(coil.Parameters).model_copy(update=values)
 
 
 def test_it_takes_no_part_in_the_balance():

@@ -58,9 +58,9 @@ def scenes(job, folder):
     yield plain
     for effect in plain.schema.effects.values():
         for example in effect.examples:
-            beside = {f"effects.{n}": dict(plain.schema.effects[n].examples[0]) for n in effect.beside}
+            companions = {f"effects.{n}": dict(plain.schema.effects[n].examples[0]) for n in effect.companions}
             away = [each.effect for each in effect.clashes if not each.key and each.effect in plain.effects]
-            yield plain.change({**beside, f"effects.{effect.name}": dict(example)}, off=away)
+            yield plain.change({**companions, f"effects.{effect.name}": dict(example)}, off=away)
     if job == "beatup":
         yield plain.set("effects.resistance.table", tabled(folder, "M", "N*m", 300.0))
     if job == "shedding":
@@ -145,8 +145,8 @@ LATE = [pytest.param(degrees, marks=pytest.mark.slow) for degrees in (3.0, 210.0
 def test_a_load_of_nothing_changes_nothing_wherever_its_corner_lies(job, degrees, tmp_path, nothing):
     """The cycle begins at the first corner that is declared, and the others follow in the order they lie in."""
     for scene in scenes(job, tmp_path):
-        own, beside = registry.of(scene), scene.set("effects.nothing.at", math.radians(degrees))
-        before, after = (own.figures(each, own.today(each)) for each in (scene, beside))
+        own, companions = registry.of(scene), scene.set("effects.nothing.at", math.radians(degrees))
+        before, after = (own.figures(each, own.today(each)) for each in (scene, companions))
         for name, value in before.items():
             # A load is what a figure of torque or force is told for.
             assert value is None or after[name] == alike(value), (scene, name)

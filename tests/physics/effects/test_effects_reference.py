@@ -45,8 +45,8 @@ def sampled(job, effect, example, design):
 def scene_of(job, effect, example):
     """Return the packaged scene with the effect at its example, what it needs beside it, and what clashes off."""
     packaged = registry.load(packaged_of(job))
-    beside = [name for name in EFFECTS[job, effect].beside if name not in packaged.effects]
-    names = dict.fromkeys(beside, 0) | {effect: example}
+    companions = [name for name in EFFECTS[job, effect].companions if name not in packaged.effects]
+    names = dict.fromkeys(companions, 0) | {effect: example}
     tables = {f"effects.{called(job, n)}": dict(EFFECTS[job, n].examples[k]) for n, k in names.items()}
     clashes = [clash for clash in EFFECTS[job, effect].clashes if not clash.key]
     clashing = [clash.effect for clash in clashes if clash.effect in packaged.effects]

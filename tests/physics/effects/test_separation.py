@@ -21,7 +21,7 @@ def test_the_first_flight_is_that_of_the_reference(case):
     assert math.degrees(found["landing"]) == pytest.approx(landing, rel=1e-12)
     assert found["landing_speed"] == pytest.approx(speed, rel=1e-9)
     assert found["gap_max"] == pytest.approx(gap, rel=1e-9)
-    mass = scene.own(inertia.Parameters).M
+    mass = scene.effect_table(inertia.Parameters).M
     assert found["landing_energy"] == pytest.approx(mass * speed**2 / 2, rel=1e-9)
 
 

@@ -9,7 +9,7 @@ from loomopt.base.units import factor
 from loomopt.interface.text import layout
 from loomopt.interface.text.answers import evaluation
 from loomopt.solving.answer.report import LEAST_DIGITS, digits, roundings
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import UnitFormatter
 
 CASES = [("beatup", "retrofit"), ("beatup-heavy", "torque"), ("rapier", "stroke-dwell"), ("shedding", "speed")]
 LIGHT = lo.load("beatup-light")
@@ -23,8 +23,8 @@ def answers():
 def retyped(answer, count, **changed):
     """Return a design as it is typed from its table: so many digits in the scene's own units, then SI."""
     design = {**answer.design, **changed}
-    words = Words(answer.scene)
-    sizes = {name: factor(words.unit(name)) for name in answer.design}
+    formatter = UnitFormatter(answer.scene)
+    sizes = {name: factor(formatter.unit(name)) for name in answer.design}
     return {name: float(f"{value / sizes[name]:.{count}g}") * sizes[name] for name, value in design.items()}
 
 
@@ -73,9 +73,11 @@ def test_nominal_numbers_are_meant_as_they_stand():
 def test_numbers_typed_into_the_scene_count_as_well(answers):
     """The scene's own text, today's machine: the same verdict as of a design."""
     answer = answers["beatup-heavy", "torque"]
-    words = Words(answer.scene)
+    formatter = UnitFormatter(answer.scene)
     typed = {
-        f"mechanism.{n}": f"{v / factor(words.unit(n)):.5g} {words.unit(n)}" for n, v in answer.design.items() if v
+        f"mechanism.{n}": f"{v / factor(formatter.unit(n)):.5g} {formatter.unit(n)}"
+        for n, v in answer.design.items()
+        if v
     }
     by_scene = lo.evaluate(answer.scene.update(typed), None, answer.target)
     by_design = lo.evaluate(answer.scene, retyped(answer, 5), answer.target)

@@ -7,7 +7,7 @@ import pytest
 import loomopt as lo
 from loomopt.model.limits import BoundLimit
 from loomopt.model.objectives import Magnitude, Peak, Value
-from loomopt.solving.answer.solution import Relaxation, Words, outward, remedies
+from loomopt.solving.answer.solution import Relaxation, UnitFormatter, outward, remedies
 from loomopt.solving.certificate.records import Binding
 
 
@@ -31,7 +31,7 @@ def test_a_value_is_rounded_to_the_side_that_gives_no_less_room(value, side, exp
 
 @pytest.fixture
 def words():
-    return Words(lo.load("beatup"))
+    return UnitFormatter(lo.load("beatup"))
 
 
 @pytest.mark.parametrize(
@@ -52,19 +52,19 @@ def test_every_name_has_a_kind_and_a_unit(words, name, kind, unit):
 
 
 def test_a_number_of_an_effect_is_known_by_its_label():
-    words = Words(lo.load("shedding").with_effect("coil"))
-    assert words.kind("wire") == "length"
-    assert words.kind("initial_tension") == "force"
-    assert words.kind("law") == "number"
+    formatter = UnitFormatter(lo.load("shedding").with_effect("coil"))
+    assert formatter.kind("wire") == "length"
+    assert formatter.kind("initial_tension") == "force"
+    assert formatter.kind("law") == "number"
 
 
 def test_values_are_shown_as_the_scene_writes_them():
-    words = Words(lo.load("beatup").set("mechanism.l1", "3.15 cm"))
-    assert words.shown("l1", 0.0305) == "3.05 cm"
-    assert words.shown("theta", math.radians(2.2)) == "2.2 deg"
-    assert words.shown("peak_torque", 88.68941349, 3) == "88.7 N*m"
-    assert words.shown("peak_torque", 88.68941349) == "88.6894 N*m"
-    assert words.si("theta") == "rad"
+    formatter = UnitFormatter(lo.load("beatup").set("mechanism.l1", "3.15 cm"))
+    assert formatter.shown("l1", 0.0305) == "3.05 cm"
+    assert formatter.shown("theta", math.radians(2.2)) == "2.2 deg"
+    assert formatter.shown("peak_torque", 88.68941349, 3) == "88.7 N*m"
+    assert formatter.shown("peak_torque", 88.68941349) == "88.6894 N*m"
+    assert formatter.si("theta") == "rad"
 
 
 def limit(name="l1", sign=-1, value=0.03, scale=1.0):
@@ -95,9 +95,9 @@ def test_a_price_is_what_all_rows_of_a_limit_are_worth_together(words):
 
 
 def test_a_compound_unit_stands_in_brackets_after_the_stroke():
-    words = Words(lo.load("shedding"))
+    formatter = UnitFormatter(lo.load("shedding"))
     stiffness = Value("K1", "K1", 1.0)
-    price = words.price([Binding(limit("K1", 1, 9e4), 1, stiffness, 1.0)])
+    price = formatter.price([Binding(limit("K1", 1, 9e4), 1, stiffness, 1.0)])
     assert price.unit == {"K1": "N/m/(N/m)"}
 
 
@@ -139,7 +139,7 @@ def test_more_than_three_widths_are_out_of_proportion(words, name, sign, value, 
 
 @pytest.mark.parametrize(("noise", "text"), [(1e-9, "-> 0 N"), (-1e-9, "-> 0 N"), (0.5, "-> -0.5 N")])
 def test_a_relaxation_that_ends_at_rounding_ends_at_zero(noise, text):
-    found = Words(lo.load("shedding")).relaxation(limit("N_min", -1, 9000.0), 9000.0 + noise, alone=True)
+    found = UnitFormatter(lo.load("shedding")).relaxation(limit("N_min", -1, 9000.0), 9000.0 + noise, alone=True)
     assert text in found.text
     assert (found.needed == 0.0) == (abs(noise) < 0.1)
 
@@ -166,4 +166,4 @@ def test_what_is_out_of_proportion_is_told_last(relaxations, order):
 
 @pytest.mark.parametrize(("side", "text"), [(-1, "76.9041 N*m"), (1, "76.9042 N*m")])
 def test_what_is_never_passed_is_outward(side, text):
-    assert Words(lo.load("beatup")).outward("M3_fdc", 76.90412098, side) == text
+    assert UnitFormatter(lo.load("beatup")).outward("M3_fdc", 76.90412098, side) == text

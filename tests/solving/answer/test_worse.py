@@ -6,7 +6,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.interface.text import answers
-from loomopt.solving.answer.solution import WORSE, Words
+from loomopt.solving.answer.solution import WORSE, UnitFormatter
 
 
 @functools.cache
@@ -52,5 +52,5 @@ def test_it_is_one_line_in_the_terminal_and_a_list_in_json():
 @pytest.mark.slow
 def test_where_nothing_is_worse_nothing_is_said():
     found = answer("sixbar-sley")
-    assert Words(found.scene).worse(()) == ""
+    assert UnitFormatter(found.scene).worse(()) == ""
     assert ("worse" in found.as_dict()) == bool(found.worse)

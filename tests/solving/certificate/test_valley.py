@@ -12,7 +12,7 @@ from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import active_set
 from loomopt.solving.certificate.second_order import PROBES, FeasibleCurve, Lagrangian, Local
 from loomopt.studies.front import front
-from loomopt.studies.front.solver import Asking
+from loomopt.studies.front.solver import Subproblem
 
 both = pytest.mark.parametrize("derivatives", [JetDerivatives, MpmathDerivatives])
 
@@ -219,7 +219,7 @@ def test_a_common_scale_that_neither_level_sees_is_left_open(make):
     """Both levels are level along it; differences said that m4e rises, by 8e-6, and called the design unique."""
     scene = make("beatup-light").update(LIGHT).with_effect("shaft_torsion")
     study = front.trade(scene, ("pulse_rms", "m4e"), None, points=3)
-    program = study.solver.program(Asking(0, (None, None), 2))
+    program = study.solver.program(Subproblem(0, (None, None), 2))
     found = certify(program, LEAST, 1e-8)
     assert (found.reasons, found.minimum, found.unique) == ((), True, False)
     assert found.by == "jets"
@@ -252,5 +252,5 @@ def test_a_counterweight_of_which_only_its_inertia_counts_is_no_saddle(make):
     """Along m4e r4e² both levels are level, while either's straight line bends by 0.15: differences left −4e-5."""
     scene = make("beatup").update(WIDE).with_effect("shaft_torsion", "rod_inertia")
     study = front.trade(scene, ("pulse_rms", "peak_torque"), "pulse", points=3)
-    found = certify(study.solver.program(Asking(0, (None, None), 2)), TURNED, 1e-8)
+    found = certify(study.solver.program(Subproblem(0, (None, None), 2)), TURNED, 1e-8)
     assert (found.reasons, found.minimum, found.unique) == ((), True, False)

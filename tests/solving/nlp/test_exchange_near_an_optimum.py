@@ -7,7 +7,7 @@ import pytest
 
 from loomopt.jobs import registry
 from loomopt.studies import check
-from loomopt.studies.front.solver import Asking
+from loomopt.studies.front.solver import Subproblem
 
 LEAST = 0.46370233163691604
 """m/rad²; least peak acceleration of the packaged rapier front, the end of `results/`."""
@@ -37,6 +37,6 @@ def test_a_start_beside_the_least_ends_in_it(size, seed):
     draw = np.random.default_rng(seed)
     x = {name: value * (1 + size * draw.uniform(-1, 1)) for name, value in start().items()}
     near = [{"point": {"task": "", "x": x}}]
-    row = study().solver.solve(Asking(0, (None, None)), near, None)
+    row = study().solver.solve(Subproblem(0, (None, None)), near, None)
     assert row.status == "optimal", row.reason
     assert row.figures["peak_acceleration"] <= LEAST * (1 + ALIKE)

@@ -12,7 +12,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.proof import task
-from loomopt.solving.proof.levels import loosening
+from loomopt.solving.proof.levels import monotone_slack
 from loomopt.solving.proof.task import BoxTask, reduced
 from loomopt.solving.search.multistart import run_search
 from loomopt.solving.search.search import Search
@@ -30,7 +30,7 @@ class Solved(NamedTuple):
 
     @property
     def task(self) -> BoxTask:
-        return reduced(self.program, loosening(self.job, self.program), task.silent(self.program), {})
+        return reduced(self.program, monotone_slack(self.job, self.program), task.silent(self.program), {})
 
 
 @functools.cache

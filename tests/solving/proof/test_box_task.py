@@ -23,7 +23,7 @@ def test_every_design_has_a_point_in_the_box_and_the_same_figures_there(effects)
 def test_what_only_loosens_limits_is_no_variable_and_implied_ends_are_found():
     task = solved("beatup", "balance").task
     assert task.names == ("l1", "l2", "l3", "s")
-    assert task.loosening == {"r4e": 0.08}
+    assert task.monotone_slack == {"r4e": 0.08}
     assert (float(task.fixed["r4e"].low), float(task.fixed["r4e"].high)) == (0.0, 0.08)
     most = 12.4 * 0.08**2
     assert task.low[3] <= 0.0

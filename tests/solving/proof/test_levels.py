@@ -10,7 +10,7 @@ from support import kepler, toy
 
 from loomopt.maths.intervals import Enclosure
 from loomopt.model.sampling import Sampler
-from loomopt.solving.proof.levels import HELD, Levels, _Level, _read, loosening
+from loomopt.solving.proof.levels import HELD, Levels, _Level, _read, monotone_slack
 from loomopt.solving.proof.task import reduced, silent
 from loomopt.solving.proof.tree import grown
 
@@ -88,7 +88,7 @@ def test_the_most_is_bounded_from_above():
 def claimed(name, target, place, share):
     """Return the level of an answer whose objectives are said to be worse than they are by a share."""
     found = solved(name, target)
-    task = reduced(found.program, loosening(found.job, found.program), silent(found.program), {})
+    task = reduced(found.program, monotone_slack(found.job, found.program), silent(found.program), {})
     levels = Levels(found.program, found.job, found.x, 1e-6)
     merits = [merit * (1 + share * (k == place)) for k, merit in enumerate(levels.merits)]
     return _Level(task, found.x, merits, place, 1e-6)

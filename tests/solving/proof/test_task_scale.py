@@ -19,7 +19,7 @@ def test_a_scale_that_nothing_reads_is_left_out(given):
     found = silent(solved(*given).program)
     assert found is not None
     assert set(found.bounds) == {"l1", "l2", "l3", "l4"}
-    assert found.held == {"l4": 0.167}
+    assert found.fixed_length == {"l4": 0.167}
 
 
 @pytest.mark.parametrize("given", READ)

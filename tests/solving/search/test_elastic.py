@@ -7,7 +7,7 @@ import pytest
 from support import toy
 
 from loomopt.physics.tolerances import NEEDED
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import UnitFormatter
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.search import elastic
@@ -19,8 +19,8 @@ ROWS = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "p": lambda v: v["x"] + v["y"]
 
 def found(limits, sizes=None, waves=None):
     program = toy.program("xy", ROWS, waves, limits=limits, sizes=sizes)
-    words = Words(toy.scene_of(toy.ToyJob(program)))
-    return clash(Search(None, program, Settings(), nearest=least(program, [program.starts[0]], Settings())), words)
+    formatter = UnitFormatter(toy.scene_of(toy.ToyJob(program)))
+    return clash(Search(None, program, Settings(), nearest=least(program, [program.starts[0]], Settings())), formatter)
 
 
 def told(answer):

@@ -7,7 +7,7 @@ from support import toy
 
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import NEEDED, PRICED
-from loomopt.solving.answer.solution import Words
+from loomopt.solving.answer.solution import UnitFormatter
 from loomopt.solving.nlp.point import Point
 from loomopt.solving.nlp.rows import Multipliers, families, row_map
 from loomopt.solving.search import elastic
@@ -21,7 +21,7 @@ def program(limits=LIMITS):
 
 
 def priced(made, prices):
-    return tuple(elastic._clashing_limits(made, point_of(made, prices), Words(toy.scene_of(toy.ToyJob(made)))))
+    return tuple(elastic._clashing_limits(made, point_of(made, prices), UnitFormatter(toy.scene_of(toy.ToyJob(made)))))
 
 
 def point_of(made, prices):
@@ -59,7 +59,7 @@ def test_rows_at_corners_are_priced_with_their_limit():
     for place, named in ((0, True), (21, True), (22, False), (43, False), (44, True), (45, True), (46, False)):
         prices = np.zeros(len(single) + 2 * 22 + 2 * 2)
         prices[len(single) + place] = 1.0
-        found = elastic._clashing_limits(made, point_of(made, prices), Words(scene))
+        found = elastic._clashing_limits(made, point_of(made, prices), UnitFormatter(scene))
         assert found == ({"N_min >= 100 N": "N_min"} if named else {}), place
 
 

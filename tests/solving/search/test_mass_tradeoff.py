@@ -49,7 +49,7 @@ def test_what_is_worth_more_stays_and_nothing_is_told():
     answer = lo.solve("beatup")
     assert answer.figures["peak_torque"] == pytest.approx(88.6894134918, rel=1e-10)
     assert answer.design["m4e"] == pytest.approx(6.28603969, rel=1e-8)
-    assert (answer.beside, "indifference" in answer.as_dict()) == (None, False)
+    assert (answer.alternative, "indifference" in answer.as_dict()) == (None, False)
 
 
 @pytest.mark.slow

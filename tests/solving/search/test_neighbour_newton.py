@@ -84,7 +84,7 @@ def test_extremes_that_figures_read_are_found_with_the_certificates_and_not_agai
 def test_what_a_target_reads_in_a_model_of_its_own_tells_no_figures():
     scene = lo.load("rapier")
     job = registry.of(scene)
-    assert neighbour_answer.told_peaks(scene, job, job.program(scene, "stroke-dwell")) == ()
+    assert neighbour_answer.figure_peaks(scene, job, job.program(scene, "stroke-dwell")) == ()
 
 
 @pytest.mark.slow

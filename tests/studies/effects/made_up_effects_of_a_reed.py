@@ -37,11 +37,11 @@ def push(name, rank, kind=Load, sign=1, **declared):
 EFFECTS = (
     push("push", 201),
     push("pull", 202),
-    push("leaning", 203, sign=-1, beside=("push",)),
+    push("leaning", 203, sign=-1, companions=("push",)),
     push("lone", 204, clashes=(EffectClash("push", "both push"),)),
     push("shaft", 10, Moving, clashes=(EffectClash("push", "it bends"), EffectClash("motor", "it turns"))),
     push("motor", 11, Moving),
-    push("lost", 205, beside=("nowhere",)),
+    push("lost", 205, companions=("nowhere",)),
     push("blind", 206, needs=("mechanism.m4",)),
 )
 

@@ -14,7 +14,7 @@ import loomopt as lo
 from loomopt.solving.search.search import NOT_CERTIFIED, certify_best
 from loomopt.studies.front import front, plan
 from loomopt.studies.front import solver as solving
-from loomopt.studies.front.solver import Asking
+from loomopt.studies.front.solver import Subproblem
 
 CASES = Path(__file__).parent / "cases"
 
@@ -40,7 +40,7 @@ def test_between_points_very_close_together_a_price_rests_on_what_is_met_exactly
     trade = front.trade(scene, ("l4", "mu_min"), maximise=("mu_min",))
     rows = [trade.solved(task, None) for task in trade.batch(())]
     for angle in (1.1144963954250675, 1.1144964044438321, 1.114496390915685, 1.1144964089532143):
-        asking = Asking(0, (None, trade.solver.axes[1].value(angle)))
+        asking = Subproblem(0, (None, trade.solver.axes[1].value(angle)))
         found = trade.solver.solve(asking, [row.warm for row in rows], False)
         assert found.status == "optimal", found.reason
 
@@ -102,7 +102,7 @@ def test_a_point_whose_second_level_is_not_certified_keeps_what_the_first_came_t
         return replace(found, best=found.best._replace(certificate=NOT_CERTIFIED)) if found.best and two else found
 
     monkeypatch.setattr(solving, "certify_best", refused)
-    found = solver.solve(Asking(1, (None, None)), [], False)
+    found = solver.solve(Subproblem(1, (None, None)), [], False)
     assert found.status == "optimal"
     assert found.warm["axes"]["contact_max"] == pytest.approx(2327.2748160284, rel=1e-9)
 
@@ -133,6 +133,6 @@ def test_a_cap_far_beyond_its_natural_size_is_met_though_its_multiplier_is_small
     )
     solver = front.trade(scene, ("spring_stretch", "peak_torque"), "law").solver
     for torque in (4118.5, 15658.3, 61817.0):
-        found = solver.solve(Asking(0, (None, torque)), [], False)
+        found = solver.solve(Subproblem(0, (None, torque)), [], False)
         assert found.status == "optimal", found.reason
         assert found.warm["axes"]["peak_torque"] == pytest.approx(torque, rel=1e-6)

@@ -13,7 +13,7 @@ from loomopt.interface import results
 from loomopt.solving.search import fallback
 from loomopt.studies.front import front, plan
 from loomopt.studies.front import solver as solving
-from loomopt.studies.front.solver import Asking
+from loomopt.studies.front.solver import Subproblem
 from loomopt.studies.front.trade import read_front
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import StudyTask
@@ -35,7 +35,7 @@ def at(trade, value, parent):
 
 def test_a_design_above_its_limit_is_uncertified_and_does_not_say_that_there_is_none(monkeypatch):
     solver = front.trade(lo.load("beatup"), ("peak_torque", "m4e"), "balance").solver
-    asking = Asking(0, (None, 3.0))
+    asking = Subproblem(0, (None, 3.0))
     found = solver.solve(asking, [], False)
     assert found.status == "optimal"
     monkeypatch.setattr(solving, "FEASIBLE", -0.01)
@@ -144,19 +144,19 @@ def test_where_no_row_leads_on_a_point_is_solved_from_an_admissible_machine_of_t
     today = lo.evaluate(scene)
     assert all(limit.ok for limit in today.limits)
     solver = front.trade(scene, ("peak_torque", "mass")).solver
-    found = solver.solve(Asking(0, (None, None)), [], None)
+    found = solver.solve(Subproblem(0, (None, None)), [], None)
     assert found.status == "optimal", found.reason
     assert found.figures["peak_torque"] < today.figures["peak_torque"]
     below = 0.9 * found.figures["peak_torque"]
-    none = solver.solve(Asking(1, (below, None)), [], None)
+    none = solver.solve(Subproblem(1, (below, None)), [], None)
     assert (none.status, dict(none.design)) == ("failed", {}), "today's machine is not admissible there"
 
 
 def test_rows_between_two_optima_that_are_worse_than_today_are_solved_anew(monkeypatch):
     trade = front.trade(lo.load("beatup"), ("peak_torque", "m4e"), "balance")
-    low, high = (trade.solver.solve(Asking(0, (None, cap)), [], False) for cap in (3.0, 5.0))
+    low, high = (trade.solver.solve(Subproblem(0, (None, cap)), [], False) for cap in (3.0, 5.0))
     ends = [row.warm["optimum"] for row in (low, high)]
-    between = Asking(0, (None, 4.0))
+    between = Subproblem(0, (None, 4.0))
     (row,) = trade.solver.solve_neighbours([between], [[*ends, 0.5]])
     assert row is not None
     assert row.certified

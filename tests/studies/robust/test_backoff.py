@@ -255,7 +255,7 @@ def test_backed_off_rapier_keeps_its_stroke(sigmas, peak, share, se):
     assert found.figures["peak_acceleration"] == pytest.approx(peak, rel=OF_A_FREE_DIRECTION)
     assert found.figures["stroke"] == pytest.approx(0.85, rel=1e-12)
     assert close(found.robust.yields["all"], share, se)
-    assert found.robust.kept == ("stroke",)
+    assert found.robust.exempt == ("stroke",)
     dwell = next(each for each in found.limits if each.name == "dwell_after")
     assert dwell.min == pytest.approx(math.radians(30.0), rel=1e-14)
     assert dwell.value == pytest.approx(dwell.min + dwell.backed_off, abs=1e-9)
@@ -275,7 +275,7 @@ def test_stroke_as_a_limit_is_backed_off(sigmas, peak, stroke):
     assert found.figures["peak_acceleration"] == pytest.approx(peak, rel=OF_A_FREE_DIRECTION)
     assert 1e3 * found.figures["stroke"] == pytest.approx(stroke, abs=2e-7)
     assert close(found.robust.nominal_yields["all"], 0.0037, 5e-5)
-    assert found.robust.kept == ()
+    assert found.robust.exempt == ()
 
 
 @pytest.mark.slow
@@ -332,7 +332,7 @@ def test_a_limit_of_a_target_is_backed_off():
     force = next(each for each in found.limits if each.name == "M3_fdc")
     assert force.max == pytest.approx(7.45, rel=1e-12)
     assert abs(force.value) == pytest.approx(force.max - force.backed_off, rel=1e-9)
-    assert found.robust.kept == ()
+    assert found.robust.exempt == ()
 
 
 @pytest.mark.slow

@@ -209,7 +209,7 @@ from loomopt.studies.run.store import COLUMNS, Store, _checksum
 def run():
     with Store(Path(sys.argv[1])) as store:
         threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
-        with store._told():
+        with store._plain_errors():
             store._file.execute("WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT max(i) FROM n")
     return 0
 

@@ -46,7 +46,7 @@ EFFECT: Load[Motion] = Load(
     reads=(TURNS,),
     corners=corners,
     switch=direction,
-    told=SIDES,
+    cases=SIDES,
     examples=({"coulomb": "2 N*m", "viscous": "0.05 N*m*s/rad"},),
 )
 SLIDING = replace(

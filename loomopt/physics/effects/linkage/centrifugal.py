@@ -33,7 +33,7 @@ EFFECT: Check[Motion] = Check(
     rank=80,
     quantities={"output_centrifugal": output_centrifugal},
     needs=("operation.speed",),
-    beside=("inertia",),
+    companions=("inertia",),
     wanted={"output_centrifugal": ("effects.inertia.m",)},
     figures=(
         Figure(

@@ -48,7 +48,7 @@ EFFECT = Load(
     force=force,
     corners=corners,
     switch=between,
-    told={1.0: "from where it begins to where it ends", 0.0: "elsewhere"},
+    cases={1.0: "from where it begins to where it ends", 0.0: "elsewhere"},
     examples=({"torque": "50 N*m", "begins": "rear", "ends": "front"},),
 )
 SLIDING = replace(EFFECT, table=Sliding, examples=({"force": "500 kN", "begins": "touch", "ends": "bottom"},))

@@ -170,7 +170,7 @@ EFFECT: Check[LinkagePose] = Check(
     rank=90,
     joints=functools.partial(LinkageForces, None),
     fitted=fitted,
-    said=SAID,
+    sentence=SAID,
     examples=({},),
     of_masses="forces in the joints and on the frame",
 )

@@ -83,7 +83,7 @@ EFFECT = Load(
     applied=applied,
     corners=corners,
     switch=switch,
-    tabulated=LoadTable("x", "force", "counted from an event or from 0", (), beside="y"),
+    tabulated=LoadTable("x", "force", "counted from an event or from 0", (), second_column="y"),
     many=True,
     examples=({"x": "-200 N", "y": "50 N"}, {"y": "-500 N", "begins": "rear", "ends": "front"}),
 )

@@ -161,7 +161,7 @@ EFFECT = State(
     letters={"stiffness": "k", "damping": "c"},
     rank=85,
     needs=("operation.speed",),
-    beside=("inertia",),
+    companions=("inertia",),
     clashes=(
         EffectClash("gravity", WITHIN),
         EffectClash("bearing_friction", "it would act on the link or on what the shaft carries, which no source tells"),

@@ -32,7 +32,7 @@ EFFECT = Load(
     force=force,
     reads=(TURNS,),
     corners=corners,
-    told={1.0: "for S' > 0", -1.0: "for S' < 0"},
+    cases={1.0: "for S' > 0", -1.0: "for S' < 0"},
     switch=direction,
     examples=({"force": "15 N"},),
 )

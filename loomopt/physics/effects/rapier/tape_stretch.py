@@ -49,7 +49,7 @@ EFFECT: Check[Motion] = Check(
     rank=30,
     reads=(ACCELERATION,),
     needs=("operation.speed",),
-    beside=("head_inertia",),
+    companions=("head_inertia",),
     rows={"head_overrun": head_overrun},
     figures=(Figure("head_overrun", "length", "how far the head runs beyond its stroke", sides=("max",)),),
     remark=remark,

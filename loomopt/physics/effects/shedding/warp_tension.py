@@ -97,7 +97,7 @@ EFFECT = Load(
     force=force,
     reads=("half_open",),
     corners=corners,
-    told={0.0: "for 0 <= X <= travel/2", 1.0: "for travel/2 <= X <= travel"},
+    cases={0.0: "for 0 <= X <= travel/2", 1.0: "for travel/2 <= X <= travel"},
     switch=past_middle,
     known_in=known_in,
     tabulated=LoadTable("T", "force", "of the cam, 0 where its motion begins", ("T1", "T2", "shape")),

@@ -21,7 +21,7 @@ def linkage(known: Mapping[str, float], title: str, units: Units) -> Drawing:
         along(HALF, at["A"], at["B"], math.pi / 2, f"crank = {units.size(known['crank'])}"),
         along(HALF, at["B"], at["C"], 0.0, f"rod = {units.size(known['rod'])}"),
     ]
-    legend = (*((event, event) for event in drawn.joints), ("notes", units.said))
+    legend = (*((event, event) for event in drawn.joints), ("notes", units.summary))
     return Drawing(title, height, (*strokes, *place(labels, strokes, height)), legend, units.length)
 
 

@@ -42,6 +42,6 @@ EFFECT = Load(
     force=force,
     corners=corners,
     switch=switch,
-    told={1.0: "while the sheet is formed", 0.0: "elsewhere"},
+    cases={1.0: "while the sheet is formed", 0.0: "elsewhere"},
     examples=({"F": "500 kN", "height": "6 mm"},),
 )
