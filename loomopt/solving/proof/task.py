@@ -220,8 +220,9 @@ class BoxTask:
         return np.asarray(np.clip(at, self.low, self.high))
 
 
-def reduced(program: Program, monotone_slack: tuple[str, ...], scale: Scale | None, most: Mapping[str, float]) ->
-BoxTask:
+def reduced(
+    program: Program, monotone_slack: tuple[str, ...], scale: Scale | None, most: Mapping[str, float]
+) -> BoxTask:
     """Task of a program.
 
     monotone_slack: variables that no row but a limit's reads, and that only loosen it; most: values, SI, that variables

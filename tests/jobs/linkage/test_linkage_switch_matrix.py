@@ -28,7 +28,7 @@ def example(name):
 
 def completed(names):
     """Effects with those that they need beside them."""
-    needed = {other for name in names for other in EFFECTS[name].beside}
+    needed = {other for name in names for other in EFFECTS[name].companions}
     return tuple(name for name in EFFECTS if name in {*names, *needed})
 
 
