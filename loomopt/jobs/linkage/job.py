@@ -119,14 +119,25 @@ class LinkageJob(Job):
 
     def tables(self, scene: Scene, target: str) -> tuple[Record, ...]:
         """Remarks on the tables that are read, that of a path too."""
-        path_name = scenes.path_target(scene, target)
-        if path_name is None:
-            return super().tables(scene, target)
-        read = scenes.read_path(scene, path_name)
+        return (*super().tables(scene, target), *self._path_records(scene, target), *self._match_records(scene, target))
+
+    def _path_records(self, scene: Scene, target: str) -> list[Record]:
+        name = scenes.table_target(scene, target, "point")
+        if name is None:
+            return []
+        read = scenes.read_path(scene, name)
         count = len(read.lines)
         angles = read.columns.get("phi", tuple(TURN * k / count for k in range(count)))
-        misfit = {name: periodic_cubic.misfit(angles, read.columns[name]) for name in ("x", "y")}
-        return (*super().tables(scene, target), read.record(f"targets.{path_name}.table", misfit, "the path to follow"))
+        misfit = {column: periodic_cubic.misfit(angles, read.columns[column]) for column in ("x", "y")}
+        return [read.record(f"targets.{name}.table", misfit, "the path to follow")]
+
+    def _match_records(self, scene: Scene, target: str) -> list[Record]:
+        name = scenes.table_target(scene, target, "match")
+        if name is None:
+            return []
+        read = scenes.read_match(scene, name)
+        misfit = {"q": periodic_cubic.misfit(read.columns["phi"], read.columns["q"])}
+        return [read.record(f"targets.{name}.match", misfit, "the function of the output")]
 
     def studied(self, scene: Scene) -> Studied:
         """Quantities that studies show."""

@@ -3,6 +3,7 @@
 q = the output that the scene names (an angle, a slide, a coordinate of a joint); Q = force or torque there.
 """
 
+import dataclasses
 import functools
 import itertools
 import math
@@ -15,7 +16,7 @@ import numpy as np
 
 from loomopt.base.records import lazy
 from loomopt.maths import systems, turning_points
-from loomopt.maths.systems import FLOAT, Maths, Number
+from loomopt.maths.systems import FLOAT, Maths, Number, within_turn
 from loomopt.model import drive
 from loomopt.model.kinematics import Arcs, Followed, Following, Group, Kinematics
 from loomopt.model.model import CycleQuantity, DesignRow, Instant, Integral, JobModel
@@ -23,7 +24,7 @@ from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Floats, Node, Where
 from loomopt.physics.effects.coulomb import TURNS
 from loomopt.physics.effects.kinds import Effect, Load, Motion, State
-from loomopt.physics.mechanisms import chain
+from loomopt.physics.mechanisms import chain, chain_forces
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.chain import Chain, Part, Ref, cam_switch
 from loomopt.physics.mechanisms.dwell_cam import stretch
@@ -71,9 +72,10 @@ class Output(NamedTuple):
 class EventRule(NamedTuple):
     """An event: an extreme of q ("max", "min"), that nearest to a crank angle, rad, or the farthest of all without.
 
-    Or where q is `travel` short of its value at another event, `reference`, before (side −1) or after (+1) it; or a
-    crank angle of the scene's. rest: of an output that rests at its extreme, whether the event is where the rest
-    "begins" or "ends"; the end nearer to `near` without it, and where it begins without both.
+    Or where q is `travel` away from its value at another event, `reference`, before (side −1) or after (+1) it: short of a
+    maximum (rise 1), or beyond a minimum (−1); or a crank angle of the scene's. of: another link, or a slider or slot,
+    of which it is an extreme. rest: of an output that rests at its extreme, whether the event is where the rest "begins" or
+    "ends"; the end nearer to `near` without it, and where it begins without both.
     """
 
     name: str
@@ -84,6 +86,8 @@ class EventRule(NamedTuple):
     side: int = -1
     angle: Ref | None = None
     rest: str = ""
+    rise: int = 1
+    of: str = ""
 
     @property
     def corner(self) -> str:
@@ -131,13 +135,22 @@ def output_value(event: str, axis: str) -> str:
 
 
 class Window(NamedTuple):
-    """A stretch of crank angles after an event; what the output travels in it counts from its place at `level`."""
+    """A stretch of crank angles after an event; what the output travels in it counts from its place at `level`.
+
+    It begins and ends so far after the event, or it begins there and ends at the event `until`.
+    """
 
     name: str
     after: str
-    begins: Ref
-    ends: Ref
+    begins: Ref | None
+    ends: Ref | None
     level: str
+    until: str = ""
+
+    @property
+    def length(self) -> str:
+        """The name of the crank angle from its begin to its end."""
+        return f"length.{self.name}"
 
     @property
     def switch(self) -> str:
@@ -147,6 +160,8 @@ class Window(NamedTuple):
     def corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
         """Crank angles at which it begins and ends, rad."""
         start = given.values[event_value(self.after)]
+        if self.begins is None or self.ends is None:
+            return start, start + within_turn(maths, given.values[event_value(self.until)] - start, 0)
         return tuple(start + number(maths, given.values, end) for end in (self.begins, self.ends))
 
     def arcs(self) -> Arcs:
@@ -446,12 +461,11 @@ class Linkage(Kinematics):
 
     def _rates(self, maths: Maths, given: Given, place: EventRule, phi: Number) -> tuple[Number, Number, Number]:
         """Expression that is zero at an event, with its first two derivatives."""
-        pose = self.pose(maths, given, self._there(given, place.name, phi))
+        pose = self.of(place).pose(maths, given, self._there(given, place.name, phi))
         if place.travel is None:
             return pose.q1, pose.q2, pose.q3
         there = self.at_event(maths, given, place.reference)
-        short = number(maths, given.values, place.travel)
-        return pose.since(there) + short, pose.q1, pose.q2
+        return pose.since(there) + place.rise * number(maths, given.values, place.travel), pose.q1, pose.q2
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
         """Crank angles of the events, rad, from a scan of the whole turn. Raises UnfoundError."""
@@ -470,7 +484,7 @@ class Linkage(Kinematics):
             if not place.extreme:
                 angles[place.name] = hints[place.hint] = self._crossing(given, place, angles[place.reference])
                 continue
-            angles |= self._turn_hints(given, place, extreme_turn(turns, place), hints)
+            angles |= self._turn_hints(given, place, self.turn(given, place, turns), hints)
         high, low = extremes(self.places)
         if high and low:
             hints[SWEPT] = 0.0 if angles[low] > angles[high] else TURN
@@ -540,9 +554,17 @@ class Linkage(Kinematics):
             turns.append(Turn(angle, extreme, float(here.q), abs(float(here.q2)) / largest))
         return tuple(turns)
 
-    def turn(self, given: Given, place: EventRule) -> Turn:
-        """Turn of the output that an extreme means. Raises UnfoundError."""
-        return extreme_turn(self.turns(given), place)
+    def turn(self, given: Given, place: EventRule, turns: tuple[Turn, ...] | None = None) -> Turn:
+        """Turn that an extreme means; turns: those of the output, where they are known. Raises UnfoundError."""
+        known = None if place.of else turns
+        return extreme_turn(self.of(place).turns(given) if known is None else known, place)
+
+    def of(self, place: EventRule) -> "Linkage":
+        """Linkage whose output is what an event is an extreme of."""
+        if not place.of:
+            return self
+        measure = "angle" if place.of in chain_forces.origins(self.chain) else "slide"
+        return dataclasses.replace(self, output=Output(measure, place.of), places=(), path=None)
 
     def corner_words(self, corner: Corner) -> str:
         """Sentence on a corner of the cams, such as "the return of follower begins"."""
@@ -601,14 +623,14 @@ class Linkage(Kinematics):
 
         def excess(turned: float) -> float:
             pose = self.at(FLOAT, given, reference + place.side * turned)
-            return -(float(pose.since(there)) + level)
+            return -(place.rise * float(pose.since(there)) + level)
 
         steps = np.linspace(0.0, TURN, SCAN + 1)
         phi = reference + place.side * steps
         with np.errstate(all="ignore"):
             pose = self.at(systems.numpy(), given, phi)
             travelled = np.asarray(pose.since(there), dtype=np.float64)
-        beyond = np.flatnonzero(-(travelled + level) > 0.0)
+        beyond = np.flatnonzero(-(place.rise * travelled + level) > 0.0)
         if not beyond.size or beyond[0] == 0:
             problem = f"the output never reaches the travel of event {place.name}"
             raise UnfoundError(place.name, problem)
@@ -616,8 +638,11 @@ class Linkage(Kinematics):
         return reference + place.side * turning_points.crossing(excess, float(steps[k - 1]), float(steps[k]))
 
     def following(self, given: Given) -> Following | None:
-        """Events of a design in floats that are extremes and travels; None with cams, or a free timing."""
-        if self.chain.cams or (self.path and self.path.times):
+        """Events of a design in floats that are extremes and travels.
+
+        None with cams, a free timing, or events of another link.
+        """
+        if self.chain.cams or (self.path and self.path.times) or any(place.of for place in self.places):
             return None
         turns = self.turns(given)
         free = [place for place in self.places if place.angle is None]
@@ -742,9 +767,8 @@ def _rates_of(linkage: Linkage, place: EventRule, maths: Maths, given: Given, ph
     pose = linkage.pose(maths, given, Node(phi, {}))
     if place.travel is None:
         return pose.q1, pose.q2
-    return pose.since(linkage.at_event(maths, given, place.reference)) + number(
-        maths, given.values, place.travel
-    ), pose.q1
+    there = linkage.at_event(maths, given, place.reference)
+    return pose.since(there) + place.rise * number(maths, given.values, place.travel), pose.q1
 
 
 def _distance(at: Number, angle: float, near: float) -> Number:
@@ -761,7 +785,8 @@ def angle_difference(angle: float, reference: float) -> float:
 
 def extremes(places: tuple[EventRule, ...]) -> tuple[str, str]:
     """First event that is a maximum of q, and the first that is a minimum; "" without."""
-    return tuple(next((p.name for p in places if p.extreme == kind), "") for kind in ("max", "min"))  # type: ignore[return-value]
+    own = [place for place in places if not place.of]
+    return tuple(next((p.name for p in own if p.extreme == kind), "") for kind in ("max", "min"))  # type: ignore[return-value]
 
 
 def _span(group: str, name: str, m: Maths, given: Given, phi: Number, pose: Callable[[], Any]) -> Number:
@@ -821,6 +846,11 @@ def _window_travel(window: Window, at: Instant) -> Number:
     return at.node.switch[window.switch] * at.pose.since(_at(at, window.level))
 
 
+def _window_length(window: Window, at: Instant) -> Number:
+    begin, end = window.corners(at.maths, at.given)
+    return end - begin
+
+
 class Rms(NamedTuple):
     """A figure that is the rms of the output's jerk, or of the force or moment there, over part of the cycle.
 
@@ -860,6 +890,18 @@ SQUARES["moment"] = SQUARES["force"]
 
 
 PATH_SQUARE, PATH = "path_mean_square", "path_rms"
+MATCH_SQUARE, MATCH = "match_mean_square", "match_rms"
+
+
+class Match(NamedTuple):
+    """Function that the output should be of the crank angle; phi: crank angles, rad; q: the output there, rad or m."""
+
+    phi: tuple[float, ...]
+    q: tuple[float, ...]
+
+    def integral(self) -> Integral:
+        """Mean square of what the output misses it by."""
+        return Integral(MATCH_SQUARE, MATCH, "miss_square", angles=self.phi, data=self.q)
 
 
 def _square(a: Vector, x: Number, y: Number) -> Number:
@@ -905,8 +947,12 @@ def model(
     reaches: tuple[Reach, ...] = (),
     windows: tuple[Window, ...] = (),
     rms: tuple[Rms, ...] = (),
+    match: Match | None = None,
 ) -> JobModel:
-    """Linkage with effects; known: names of scene numbers that are given; reaches, rms: figures that are read."""
+    """Linkage with effects.
+
+    known: names of scene numbers that are given; reaches, rms: figures that are read; match: a function for the output.
+    """
     quantities, rows, means = dict(MOTION), dict[str, DesignRow](), list[Integral]()
     driven = drive.quantities(effects, known)
     if driven:
@@ -922,6 +968,8 @@ def model(
     means += [figure.integral() for figure in rms]
     for window in windows:
         quantities[f"travel.{window.name}"] = CycleQuantity(functools.partial(_window_travel, window))
+        if window.until:
+            rows[window.length] = DesignRow(functools.partial(_window_length, window))
     for name, event in linkage.loads.items():
         rows[f"angle.{event}"] = DesignRow(functools.partial(_angle, event))
         rows[name] = DesignRow(operator.attrgetter("force"), event=event)
@@ -929,6 +977,9 @@ def model(
     if high and low:
         rows["swing"] = DesignRow(functools.partial(_swing, high, low))
         rows["sweep"] = DesignRow(functools.partial(_sweep, high, low))
+    if match:
+        quantities["miss_square"] = CycleQuantity(lambda at: (at.pose.q - at.node.switch["datum"]) ** 2, figure=False)
+        means.append(match.integral())
     path = linkage.path
     if path and path.phi:
         quantities["path_square"] = CycleQuantity(functools.partial(_square_distance, path), figure=False)

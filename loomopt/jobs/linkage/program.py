@@ -19,7 +19,7 @@ from loomopt.jobs.linkage.model import (
     Path,
     linkage_of,
 )
-from loomopt.jobs.linkage.scene import PULSED, LinkageTarget, path, reaches, read_tables, rms_figures
+from loomopt.jobs.linkage.scene import PULSED, LinkageTarget, match, path, reaches, read_tables, rms_figures
 from loomopt.maths.systems import FLOAT
 from loomopt.model import change
 from loomopt.model.axes import opposing
@@ -46,7 +46,10 @@ def model(scene: Scene, target: str = "", design: Numbers | None = None) -> JobM
     curve = next((pulse for (name, _), pulse in curves(scene).items() if name == PULSED), None)
     rms = rms_figures(known, scene.document, curve.acting if curve else 1.0)
     reached = reaches(scene.document, linkage.chain)
-    physics = linkages.model(linkage, scene.active, words(scene), frozenset(values), reached, known.windows, rms)
+    function = match(scene, target)
+    physics = linkages.model(
+        linkage, scene.active, words(scene), frozenset(values), reached, known.windows, rms, function
+    )
     return steady(scene, physics, values, design)
 
 

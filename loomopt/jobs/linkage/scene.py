@@ -14,6 +14,8 @@ from loomopt.base.quantities import Angle, PositiveLength, PositiveNumber, PureN
 from loomopt.base.units import QuantityError, ShowValue, usual
 from loomopt.jobs.linkage import parts
 from loomopt.jobs.linkage.model import (
+    MATCH,
+    MATCH_SQUARE,
     OBLIQUITY,
     PATH,
     RMS_TORQUE,
@@ -21,6 +23,7 @@ from loomopt.jobs.linkage.model import (
     TORQUE_SQUARE,
     EventRule,
     Linkage,
+    Match,
     Output,
     Path,
     Reach,
@@ -63,6 +66,9 @@ class LinkageTarget(TargetTable):
     table: Name | None = Field(
         None, description="CSV file of the path: x [mm], y [mm], and phi [deg] where its timing is given"
     )
+    match: Name | None = Field(
+        None, description="CSV file of a function that the output should be: phi [deg], q in deg or mm"
+    )
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
     weights: dict[str, PureNumber] = Field({}, description="number → weight of its change from today, 1 without it")
 
@@ -70,7 +76,8 @@ class LinkageTarget(TargetTable):
     def sought(self) -> tuple[tuple[str, str], ...]:
         """Figures to optimise, in order, each with "least" or "most"."""
         path = ((PATH, "least"),) if self.point else ()
-        return (*path, *((name, "least") for name in self.least), *((name, "most") for name in self.most))
+        match = ((MATCH, "least"),) if self.match else ()
+        return (*path, *match, *((name, "least") for name in self.least), *((name, "most") for name in self.most))
 
 
 DEFAULT = {"torque": {"least": ["peak_torque"]}}
@@ -89,7 +96,12 @@ OUTPUT_KEYS: parts.Keys = {
     "zero": NumberKey(Angle, "direction from which the output counts"),
 }
 EVENT_KEYS: Mapping[str, parts.Keys] = {
-    "extreme": {"extreme": WordKey(parts.EXTREME, True), "near": WordKey(parts.ANGLE), "rest": WordKey(parts.REST)},
+    "extreme": {
+        "extreme": WordKey(parts.EXTREME, True),
+        "near": WordKey(parts.ANGLE),
+        "rest": WordKey(parts.REST),
+        "of": WordKey(parts.LINK),
+    },
     "travel": {
         "travel": NumberKey(parts.PositiveAngle, TRAVEL, True),
         "before": WordKey(parts.EVENT),
@@ -100,8 +112,9 @@ EVENT_KEYS: Mapping[str, parts.Keys] = {
 """Keys of an event, by the key that gives its kind."""
 WINDOW_KEYS: parts.Keys = {
     "after": WordKey(parts.EVENT, True),
-    "begins": NumberKey(Angle, "crank angle from {after} where window {} begins", True),
-    "ends": NumberKey(Angle, "crank angle from {after} where window {} ends", True),
+    "begins": NumberKey(Angle, "crank angle from {after} where window {} begins"),
+    "ends": NumberKey(Angle, "crank angle from {after} where window {} ends"),
+    "until": WordKey(parts.EVENT),
     "level": WordKey(parts.EVENT, True),
 }
 
@@ -203,7 +216,7 @@ def _scale(raw: object, form: str, names: Mapping[str, object]) -> tuple[Any, bo
     return PositiveLength, True
 
 
-def _places(cursor: Cursor, numbers: Numbers, output: Output) -> tuple[EventRule, ...]:
+def _places(cursor: Cursor, linked: Chain, numbers: Numbers, output: Output) -> tuple[EventRule, ...]:
     places: dict[str, EventRule] = {}
     travel = NumberKey(PositiveLength if output.slides else parts.PositiveAngle, TRAVEL, True)
     forms = {**EVENT_KEYS, "travel": {**EVENT_KEYS["travel"], "travel": travel}}
@@ -220,8 +233,18 @@ def _places(cursor: Cursor, numbers: Numbers, output: Output) -> tuple[EventRule
         else:
             extreme = read.words.get("extreme", "")
             rest, near = read.words.get("rest", ""), read.words.get("near")
-            places[name] = EventRule(name, extreme, near, angle=read.numbers.get("angle"), rest=rest)
+            of = _of(place, linked, near) if "of" in table else ""
+            places[name] = EventRule(name, extreme, near, angle=read.numbers.get("angle"), rest=rest, of=of)
     return tuple(places.values())
+
+
+def _of(cursor: Cursor, linked: Chain, near: float | None) -> str:
+    """Link, slider or slot of which an event is an extreme."""
+    if near is None:
+        problem = "an extreme of another link needs the crank angle near which it is"
+        raise cursor.at("of").fault(problem, remedy='Add near = "60 deg"')
+    _, links, slides = parts.kinds_of(linked)
+    return _one_of(cursor.at("of"), [*links, *slides], "link, slider or slot")
 
 
 def _travel(cursor: Cursor, name: str, read: parts.TableEntries, known: Known) -> EventRule:
@@ -230,10 +253,12 @@ def _travel(cursor: Cursor, name: str, read: parts.TableEntries, known: Known) -
         raise cursor.fault("a travel lies before or after another event", remedy='Such as before = "bottom"')
     side = cursor.at(sides[0])
     reference = _one_of(side, known, "event above it")
-    if known[reference].extreme != "max":
-        problem = f"a travel counts from a maximum of the output, and {reference} is none"
-        raise side.fault(problem, remedy="Name an event with extreme = max")
-    return EventRule(name, travel=read.numbers["travel"], reference=reference, side=-1 if sides[0] == "before" else 1)
+    if not known[reference].extreme or known[reference].of:
+        problem = f"a travel counts from an extreme of the output, and {reference} is none"
+        raise side.fault(problem, remedy='Name an event with extreme = "max" or "min"')
+    rise = 1 if known[reference].extreme == "max" else -1
+    before = -1 if sides[0] == "before" else 1
+    return EventRule(name, travel=read.numbers["travel"], reference=reference, side=before, rise=rise)
 
 
 def _windows(cursor: Cursor, numbers: Numbers, places: Sequence[EventRule]) -> tuple[Window, ...]:
@@ -243,7 +268,12 @@ def _windows(cursor: Cursor, numbers: Numbers, places: Sequence[EventRule]) -> t
         parts.check_name(place, name)
         read = parts.entries(place, WINDOW_KEYS, numbers, "a window", name)
         after, level = (_one_of(place.at(word), known, "event") for word in ("after", "level"))
-        windows.append(Window(name, after, read.numbers["begins"], read.numbers["ends"], level))
+        until = _one_of(place.at("until"), known, "event") if "until" in read.words else ""
+        ends = [read.numbers.get(key) for key in ("begins", "ends")]
+        if (until and any(ends)) or not (until or all(ends)):
+            problem = "a window has begins and ends, crank angles from the event, or the event until"
+            raise place.fault(problem, remedy='Such as begins = "130 deg", ends = "240 deg", or until = "leave"')
+        windows.append(Window(name, after, *ends, level, until))
     return tuple(windows)
 
 
@@ -255,7 +285,7 @@ def _read(text: str) -> LinkageScene:
     scene.at("parts").table()
     linked = parts.linked(scene.at("parts"), numbers)
     output = _output(scene.at("output"), linked, numbers)
-    places = _places(scene.at("events"), numbers, output)
+    places = _places(scene.at("events"), linked, numbers, output)
     windows = _windows(scene.at("windows"), numbers, places)
     for name in mechanism:
         place = scene.at("mechanism").at(name)
@@ -325,23 +355,29 @@ def figures(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Figur
     for window in known.windows:
         text = f"largest travel from {window.level} over window {window.name}"
         figure_list.append(Figure(f"travel.{window.name}", travel, text, sides=("max",)))
+        if window.until:
+            text = f"crank angle of window {window.name}, {window.after} to {window.until}"
+            figure_list.append(Figure(window.length, "angle", text))
     for rms in rms_figures(known, document):
         text, kind = ("jerk", rates[2]) if rms.quantity == "jerk" else (load, load)
         figure_list.append(Figure(rms.name, kind, f"rms {text} of the output over {rms.over}", sides=("max",)))
     for reach in reaches(document, linkage.chain):
         side, text = ("max", "largest") if reach.sign > 0 else ("min", "least")
         figure_list.append(Figure(reach.name, "length", f"{text} {reach.axis} of {reach.joint}", sides=(side,)))
-    if _has_path(document):
+    if _has(document, "point"):
         figure_list.append(Figure(PATH, "length", "rms distance of the point from its path", sides=("max",)))
+    if _has(document, "match"):
+        figure_list.append(Figure(MATCH, travel, "rms distance of the output from its function", sides=("max",)))
     if _reads_change(document):
         figure_list.append(Figure(CHANGE, "number", "change from today, in bound widths squared", sides=()))
     return {figure.name: figure for figure in figure_list}
 
 
-def _has_path(document: Mapping[str, Any]) -> bool:
+def _has(document: Mapping[str, Any], key: str) -> bool:
+    """Whether a target has a key."""
     targets = document.get("targets", {})
     return isinstance(targets, Mapping) and any(
-        isinstance(table, Mapping) and table.get("point") is not None for table in targets.values()
+        isinstance(table, Mapping) and table.get(key) is not None for table in targets.values()
     )
 
 
@@ -365,13 +401,17 @@ def axes(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Axis]:
         ),
         *(Axis(name, load, form="magnitude", senses=("least",)) for name in known.linkage.loads),
     ]
+    axis_list += [Axis(w.length, "angle", senses=("most", "least")) for w in known.windows if w.until]
     jerk = "travel jerk" if known.linkage.output.slides else "number"
     for rms in rms_figures(known, document):
         kind = jerk if rms.quantity == "jerk" else load
         axis_list.append(Axis(rms.name, kind, (rms.mean,), senses=("least",), power=2))
     if _reads_change(document):
         axis_list.append(Axis(CHANGE, "number", senses=("least",)))
-    if _has_path(document):
+    if _has(document, "match"):
+        travel = "length" if known.linkage.output.slides else "angle"
+        axis_list.append(Axis(MATCH, travel, (MATCH_SQUARE,), senses=("least",), power=2))
+    if _has(document, "point"):
         axis_list.append(Axis(PATH, "length", ("path_mean_square",), senses=("least",), power=2))
     # A number of which a target seeks the most is worth its most where it is traded, too.
     most = dict.fromkeys(name for name in _target_names(document, "most") if name in known.numbers)
@@ -400,6 +440,8 @@ def targets(document: Mapping[str, Any]) -> dict[str, Target]:
         entry, goals = place.table(), []
         if entry.get("point") is not None:
             goals.append(f"{entry['point']} on its path")
+        if entry.get("match") is not None:
+            goals.append("least distance of the output from its function")
         for key in ("least", "most"):
             names = entry.get(key, ())
             goals += [f"{key} {figure}" for figure in names] if isinstance(names, list | tuple) else []
@@ -460,9 +502,26 @@ def _linkage_effect(effect: kinds.Effect, linkage: Linkage) -> kinds.Effect:
     return effect.fitted(linkage.chain) if isinstance(effect, kinds.Check) and effect.fitted else effect
 
 
+def match(scene: Scene, target: str) -> Match | None:
+    """Function of a target, else of the first target that has one; None where none has. Raises BadInput."""
+    name = table_target(scene, target, "match")
+    if name is None:
+        return None
+    columns = read_match(scene, name).columns
+    return Match(columns["phi"], columns["q"])
+
+
+def read_match(scene: Scene, name: str) -> csv_tables.Table:
+    """Table of the function of a target, with its precision. Raises BadInput."""
+    table = scene.targets[name]
+    assert isinstance(table, LinkageTarget)
+    kinds = {"phi": "angle", "q": "length" if read_tables(scene.document).linkage.output.slides else "angle"}
+    return csv_tables.read(scene, str(table.match), f"targets.{name}.match", kinds, fewest=FEWEST, digits=table.digits)
+
+
 def path(scene: Scene, target: str) -> Path | None:
     """Path of a target, else of the first target that has one; None where none has. Raises BadInput."""
-    name = path_target(scene, target)
+    name = table_target(scene, target, "point")
     if name is None:
         return None
     columns = read_path(scene, name).columns
@@ -471,9 +530,12 @@ def path(scene: Scene, target: str) -> Path | None:
     return Path(str(table.point), columns.get("phi", ()), columns["x"], columns["y"])
 
 
-def path_target(scene: Scene, target: str) -> str | None:
-    """Target whose path is read for a target: its own, else the first that has one; None where none has."""
-    names = [name for name, table in scene.targets.items() if isinstance(table, LinkageTarget) and table.point]
+def table_target(scene: Scene, target: str, key: str) -> str | None:
+    """Target whose path or function is read for a target: its own, else the first that has one; None where none has.
+
+    key: "point" of a path, "match" of a function.
+    """
+    names = [name for name, table in scene.targets.items() if getattr(table, key, None)]
     return target if target in names else next(iter(names), None)
 
 
@@ -622,7 +684,7 @@ def _check_targets(scene: Scene, known: LinkageScene) -> None:
                 )
             )
         for figure, sense in dict.fromkeys(table.sought):
-            path_ = f"{key}.{'point' if figure == PATH else sense}"
+            path_ = f"{key}.{ {PATH: 'point', MATCH: 'match'}.get(figure, sense) }"
             axis = axes_.get(figure)
             if figure not in (*axes_, *bounded):
                 faults.add(unknown("figure or bounded number", figure, [*axes_, *bounded], scene.origin, path_))
@@ -640,6 +702,8 @@ def _check_targets(scene: Scene, known: LinkageScene) -> None:
 def _check_windows(scene: Scene, known: LinkageScene) -> None:
     """Raise BadInput for a window that ends before it begins, or is longer than a turn."""
     for window in known.windows:
+        if window.begins is None or window.ends is None:
+            continue
         ends = [scene.mechanism[ref.name] if ref.name else ref.value for ref in (window.begins, window.ends)]
         if not 0.0 < ends[1] - ends[0] < 2 * math.pi:
             span = " to ".join(scene.show(end, "angle") for end in ends)
@@ -684,7 +748,7 @@ def _check_events(scene: Scene, linkage: Linkage) -> None:
         turns = linkage.turns(given)
         for place in linkage.places:
             if place.extreme:
-                _check_extreme(scene, turns, place)
+                _check_extreme(scene, linkage.of(place).turns(given) if place.of else turns, place)
         linkage.hints(given, ())
     except UnfoundError as error:
         key = f"events.{error.event}" if error.event else "output"
@@ -695,6 +759,7 @@ def _check_events(scene: Scene, linkage: Linkage) -> None:
 def _check_extreme(scene: Scene, turns: Sequence[Turn], place: EventRule) -> None:
     """Raise BadInput for an extreme that is another, or that a small change of the design would exchange."""
     key, choice = f"events.{place.name}", extreme_turn(tuple(turns), place)
+    subject = place.of or "the output"
     candidates = [turn for turn in turns if turn.extreme == place.extreme]
     word = "highest" if place.extreme == "max" else "lowest"
 
@@ -713,5 +778,5 @@ def _check_extreme(scene: Scene, turns: Sequence[Turn], place: EventRule) -> Non
     distances = [turn.away(place.near) for turn in turns if turn.extreme != place.extreme]
     if min(distances) < min(turn.away(place.near) for turn in candidates):
         where = scene.show(place.near, "angle")
-        problem = f"near {where} the output has no {place.extreme}: it is {word} at {at(candidates)}"
+        problem = f"near {where} {subject} has no {place.extreme}: it is {word} at {at(candidates)}"
         raise refusal(problem, scene.origin, f"{key}.near", remedy="Correct near, or name the other extreme")
