@@ -74,8 +74,8 @@ class EventRule(NamedTuple):
 
     Or where q is `travel` away from its value at another event, `reference`, before (side −1) or after (+1) it: short of a
     maximum (rise 1), or beyond a minimum (−1); or a crank angle of the scene's. of: another link, or a slider or slot,
-    of which it is an extreme. rest: of an output that rests at its extreme, whether the event is where the rest "begins" or
-    "ends"; the end nearer to `near` without it, and where it begins without both.
+    of which it is an extreme. rest: of an output that rests at its extreme, whether the event is where the rest
+    "begins" or "ends"; the end nearer to `near` without it, and where it begins without both.
     """
 
     name: str
@@ -851,6 +851,10 @@ def _window_length(window: Window, at: Instant) -> Number:
     return end - begin
 
 
+RMS = {"jerk": "jerk_rms", "force": "force_rms", "moment": "moment_rms"}
+"""First part of the name of a figure that is an rms, by the quantity of which it is one."""
+
+
 class Rms(NamedTuple):
     """A figure that is the rms of the output's jerk, or of the force or moment there, over part of the cycle.
 
@@ -864,7 +868,7 @@ class Rms(NamedTuple):
     @property
     def name(self) -> str:
         """The figure's name."""
-        return f"{self.quantity}_rms.{self.over}"
+        return f"{RMS[self.quantity]}.{self.over}"
 
     @property
     def mean(self) -> str:

@@ -103,7 +103,7 @@ def test_axes_and_ranges_of_a_front_and_keys_of_a_sweep_take_the_former_name():
 def test_the_command_line_remarks_once_upon_a_former_name(tmp_path, capsys):
     file = tmp_path / "old.toml"
     now = registry.problems()["sixbar-sley"].read_text(encoding="utf-8")
-    assert now.count("moment.front") == 2
+    assert now.count("moment.front") == 4
     file.write_text(now.replace("moment.front", "force.front"), encoding="utf-8")
     for _ in range(2):
         assert run(["evaluate", str(file), "--set", "limits.force.front.max=9 kN*m", "--json"]) == 0
