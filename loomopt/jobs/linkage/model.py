@@ -72,7 +72,7 @@ class Output(NamedTuple):
 class EventRule(NamedTuple):
     """An event: an extreme of q ("max", "min"), that nearest to a crank angle, rad, or the farthest of all without.
 
-    Or where q is `travel` away from its value at another event, `reference`, before (side −1) or after (+1) it: short of a
+    Or where q is `travel` away from its value at another event, `reference`, before (side −1) or after (+1): short of a
     maximum (rise 1), or beyond a minimum (−1); or a crank angle of the scene's. of: another link, or a slider or slot,
     of which it is an extreme. rest: of an output that rests at its extreme, whether the event is where the rest
     "begins" or "ends"; the end nearer to `near` without it, and where it begins without both.
