@@ -269,11 +269,11 @@ def _windows(cursor: Cursor, numbers: Numbers, places: Sequence[EventRule]) -> t
         read = parts.entries(place, WINDOW_KEYS, numbers, "a window", name)
         after, level = (_one_of(place.at(word), known, "event") for word in ("after", "level"))
         until = _one_of(place.at("until"), known, "event") if "until" in read.words else ""
-        ends = [read.numbers.get(key) for key in ("begins", "ends")]
-        if (until and any(ends)) or not (until or all(ends)):
+        begins, ends = read.numbers.get("begins"), read.numbers.get("ends")
+        if (until and (begins or ends)) or not (until or (begins and ends)):
             problem = "a window has begins and ends, crank angles from the event, or the event until"
             raise place.fault(problem, remedy='Such as begins = "130 deg", ends = "240 deg", or until = "leave"')
-        windows.append(Window(name, after, *ends, level, until))
+        windows.append(Window(name, after, begins, ends, level, until))
     return tuple(windows)
 
 

@@ -9,6 +9,7 @@ from support.linkage_scenes import changed, four_bar
 
 import loomopt as lo
 from loomopt.jobs import registry
+from loomopt.jobs.linkage.model import linkage_of
 from loomopt.maths.systems import FLOAT
 
 BAND = math.radians(1)
@@ -59,7 +60,7 @@ def test_an_event_may_be_an_extreme_of_another_link():
     sampler = registry.find("linkage").sampler(scene, {})
     for step in (-1e-4, 1e-4):
         place, beside = (
-            sampler.model.kinematics.at(FLOAT, sampler.given, phi).joints.vector("rocker")
+            linkage_of(sampler.model).at(FLOAT, sampler.given, phi).joints.vector("rocker")
             for phi in (angle, angle + step)
         )
         turned = math.atan2(place.x * beside.y - place.y * beside.x, place.x * beside.x + place.y * beside.y)

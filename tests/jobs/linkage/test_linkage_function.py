@@ -51,7 +51,8 @@ def test_a_function_that_it_does_not_have_is_missed_least(tmp_path):
     low, high = np.transpose(bounds)
 
     def missed(lengths):
-        return rocker(*lengths, 0.167, PHI) - wanted
+        l1, l2, l3 = lengths
+        return rocker(l1, l2, l3, 0.167, PHI) - wanted
 
     best = min(
         (
