@@ -1,11 +1,11 @@
 """Attack answers from outside: random scenes of all jobs, physics in plain NumPy, SLSQP, evolution, linear programmes.
 
 A certified answer is beaten where an admissible design (every limit held to 1e-9 on a fine grid) is better by more than
-1e-6 in natural sizes, the first objective first; broken where it breaks a limit or states another figure than it has;
-matched where the attack, not knowing it, ends within 1e-6 of it, which measures the attack. `infeasible` is refuted
-where an admissible design is found. Whatever is not certified is told with its reasons. Lost is a scene whose referee
-died. Each failure is printed with its scene and design. Any of them but "second order open" ends in exit status 1, and
-so do many lost ones.
+1e-6 in units of the scale, the first objective first; broken where it breaks a limit or states another figure than it
+has; matched where the attack, not knowing it, ends within 1e-6 of it, which measures the attack. `infeasible` is
+refuted where an admissible design is found. Whatever is not certified is told with its reasons. Lost is a scene whose
+referee died. Each failure is printed with its scene and design. Any of them but "second order open" ends in exit status
+1, and so do many lost ones.
 
     python benchmarks/adversarial/attack.py [--count N] [--seed S] [--jobs rapier,beatup,shedding,linkage] [--seconds T]
                                 [--only K] [--compare] [--json]
@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 from benchmarks import harness
 
 BETTER = 1e-6
-"""What counts as better, in natural sizes; an earlier objective counts as held within 1e-9."""
+"""What counts as better, in units of the scale; an earlier objective counts as held within 1e-9."""
 HELD = 1e-9
 BROKEN = 1e-7
 """What a certified answer may be off the referee's figures and limits: ten times the accuracy it was asked for."""

@@ -84,7 +84,7 @@ class Machine:
         return View(self._levels(z, design, beta, front, angles), np.hstack(firm), equal)
 
     def _levels(self, z, design, beta, front, angles):
-        """Target's objectives, in natural sizes."""
+        """Target's objectives, in units of the scale."""
         if self.target == "retrofit":
             return (self._change(self.designs(z))[:, None],)
         if self.target == "pulse":
@@ -123,7 +123,7 @@ class Machine:
         return map(self.design, attacked(self, seed, claimed, None if near is None else self.point(near)))
 
     def objectives(self, design):
-        """Target's true objectives, in natural sizes."""
+        """Target's true objectives, in units of the scale."""
         if self.target == "retrofit":
             return (float(self._change(np.array([design[name] for name in NAMES]))),)
         if self.target == "pulse":
@@ -132,7 +132,7 @@ class Machine:
         return (peak,) if self.target == "torque" else (abs(self.hand.static(design)["M3_fdc"]) / self.torque, peak)
 
     def stated(self, figures):
-        """Objectives that an answer states, in natural sizes."""
+        """Objectives that an answer states, in units of the scale."""
         if self.target in ("pulse", "retrofit"):
             return (figures["pulse_rms"] / self.torque if self.target == "pulse" else figures["change"],)
         peak = figures["peak_torque"] / self.peak

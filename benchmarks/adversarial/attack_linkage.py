@@ -160,17 +160,17 @@ class Machine:
             return x, *(each[0] for each in self.shape.moved(x[None], EVEN))
 
     def objectives(self, design):
-        """Levels in natural sizes, today's."""
+        """Levels in units of the scale, today's."""
         _, q, *_ = self._at(design)
         pairs = zip(self.curves(q[None]), self._sizes(), strict=True)
         return tuple((peak(curve[0]) if curve.shape[1] > 1 else float(curve[0, 0])) / size for curve, size in pairs)
 
     def stated(self, figures):
-        """Levels that an answer states, in natural sizes."""
+        """Levels that an answer states, in units of the scale."""
         return tuple(figures[name] / size for name, size in zip(self.levels, self._sizes(), strict=True))
 
     def excess(self, design):
-        """Largest violation, in natural sizes; angles in rad."""
+        """Largest violation, in units of the scale; angles in rad."""
         x, q, cosine, sine = self._at(design)
         if not np.all(np.isfinite(q)):
             return np.inf

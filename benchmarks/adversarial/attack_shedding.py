@@ -62,7 +62,7 @@ class Frame:
         return np.clip((values - ends[:, 0]) / np.ptp(ends, axis=1), 0, 1)
 
     def objectives(self, design):
-        """Target's true objective, in natural sizes."""
+        """Target's true objective, in units of the scale."""
         if self.target == "force":
             return (cam_force.extreme(self._of(design), design["K1"], 1)[0] / self.force_size,)
         if self.target == "speed":
@@ -70,7 +70,7 @@ class Frame:
         return (design["K1"] / self.stiffness_size,)
 
     def stated(self, figures):
-        """Objective that an answer states, in natural sizes."""
+        """Objective that an answer states, in units of the scale."""
         if self.target == "force":
             return (figures["contact_max"] / self.force_size,)
         if self.target == "speed":

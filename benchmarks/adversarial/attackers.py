@@ -29,7 +29,7 @@ WORST = 1e3
 
 
 class View(NamedTuple):
-    """What designs are worth, in natural sizes, a row for each.
+    """What designs are worth, in units of the scale, a row for each.
 
     levels: each objective is the largest of its columns; firm: no less than 0; equal: 0.
     """
@@ -207,8 +207,8 @@ def attacked(
 ) -> Iterator[np.ndarray]:
     """Yield designs that may be better than claimed, each a point of the unit box.
 
-    claimed: the objectives to beat, in natural sizes, or nothing where any admissible design refutes. near: the one
-    start there is, in place of the best of many, an evolved one and random ones. A later level is sought with the
+    claimed: the objectives to beat, in units of the scale, or nothing where any admissible design refutes. near: the
+    one start there is, in place of the best of many, an evolved one and random ones. A later level is sought with the
     claimed earlier ones held.
     """
     claims, ends = claimed or (np.inf,), list[np.ndarray]()

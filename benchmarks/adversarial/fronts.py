@@ -3,7 +3,7 @@
 Scene K is of the job that K names in turn, drawn as `attack.py` draws it (a linkage: a packaged one whose numbers are
 drawn within a tenth), with its target's demands or without any; its axes are two that the scene offers. Then certified
 rows are attacked: what each seeks is searched for from scratch, from many starts, and solved from the design of every
-other row of the front. A row is beaten where that is certified too and better by more than 1e-6 of its natural size.
+other row of the front. A row is beaten where that is certified too and better by more than 1e-6 of its scale.
 Each front that ends otherwise is printed with how to make it again.
 
     python -m benchmarks.adversarial.fronts [--from A] [--to B] [--points N] [--rows R] [--jobs linkage,rapier]

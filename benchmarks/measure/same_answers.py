@@ -1,7 +1,7 @@
 """This checkout against another: the same answers to every packaged scene and target, and to variations of them.
 
 A case is the same when its status, its binding limits and the keys of its JSON are, and when its objectives agree to
-1e-12 of their natural size (`Objective.scale`); of a case without an optimum, when the same limits clash and the least
+1e-12 of their scale (`Objective.scale`); of a case without an optimum, when the same limits clash and the least
 relaxation is the same to 1e-9; of a refusal, when its words are. Every exception is printed; the exit code says
 whether there are any.
 
@@ -211,7 +211,7 @@ def differences(here: Case, there: Case) -> Iterator[str]:
 
 
 def gap(here: Case, there: Case) -> float:
-    """Return by how much the objectives of two answers differ, in their natural sizes."""
+    """Return by how much the objectives of two answers differ, in units of their scale."""
     pairs = zip(here["objectives"], there["objectives"], strict=True)
     return max(abs(abs(a) ** power - abs(b) ** power) / scale for (_, a, _, _), (_, b, scale, power) in pairs)
 

@@ -3,7 +3,7 @@
     python benchmarks/measure/tolerances.py [--only NAME] [--json]
 
 Every target of three packaged scenes is solved from its first start, then warm at two neighbours. Told of each number:
-solves that were not reached, by how much the worst objective is off (natural sizes), excess between nodes, IPOPT's
+solves that were not reached, by how much the worst objective is off (scales), excess between nodes, IPOPT's
 iterations, and neighbours that pivots alone did not reach. Where a mean is read, GAUSS_NODES says how far it is off.
 """
 
@@ -54,7 +54,7 @@ IPOPTS = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a choice of the numbers leads to; objectives: of every solve, in natural sizes, None where not reached."""
+    """Result of a choice of the numbers; objectives: of every solve, in units of the scale, None where not reached."""
 
     objectives: tuple[tuple[float, ...] | None, ...]
     excess: float

@@ -76,7 +76,7 @@ def text(given: object, key: str, allowed: str, remedy: str) -> str:
 def texts(given: object, key: str, allowed: str, remedy: str) -> tuple[str, ...]:
     """Names of a sequence, in its order. Raises BadInput for anything else: a set has no order."""
     if isinstance(given, str) or not _ordered(given):
-        raise refusal("it is no list of names", "", key, given, allowed, remedy)
+        raise refusal("it is not a list of names", "", key, given, allowed, remedy)
     return tuple(text(name, key, allowed, remedy) for name in given)
 
 
@@ -87,14 +87,14 @@ def names(given: object, key: str, allowed: str, remedy: str) -> tuple[str, ...]
     except TypeError:
         items = None
     if items is None:
-        raise refusal("it is no list of names", "", key, given, allowed, remedy)
+        raise refusal("it is not a list of names", "", key, given, allowed, remedy)
     return tuple(text(name, key, allowed, remedy) for name in items)
 
 
 def listed(given: object, key: str, allowed: str, remedy: str) -> list[Any]:
     """Members of a sequence. Raises BadInput for anything else: a set has no order."""
     if isinstance(given, str | bytes | Mapping) or not _ordered(given):
-        raise refusal("it is no list", "", key, given, allowed, remedy)
+        raise refusal("it is not a list", "", key, given, allowed, remedy)
     return list(given)
 
 
@@ -108,7 +108,7 @@ def table(given: object, key: str, allowed: str, remedy: str) -> dict[str, Any]:
 def path(given: object, key: str, allowed: str, remedy: str) -> str:
     """Path or the name that is given. Raises BadInput for anything else."""
     if not isinstance(given, str | os.PathLike):
-        raise refusal("it is no path", "", key, given, allowed, remedy)
+        raise refusal("it is not a path", "", key, given, allowed, remedy)
     return text(os.fspath(given), key, allowed, remedy)
 
 

@@ -10,7 +10,7 @@ class Frozen(dict[str, Any]):
     """A dict that refuses to change; it pickles, compares and prints as JSON like any other."""
 
     def _refuse(self, *_: object, **__: object) -> NoReturn:
-        raise TypeError("it never changes: make a new one, such as {**this, name: value}")
+        raise TypeError("it cannot be changed: make a new one, such as {**this, name: value}")
 
     __setitem__ = __delitem__ = __ior__ = clear = pop = popitem = setdefault = update = _refuse
 

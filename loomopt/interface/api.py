@@ -158,7 +158,7 @@ def solve(
             arguments.called(hook, key, "a function", "Give a function, or leave it out")
     arguments.flag(prove, "prove")
     if warm_start is not None and not isinstance(warm_start, Answer):
-        raise refusal("it is no answer", "", "warm_start", warm_start, "what `solve` returned", "Give one or none")
+        raise refusal("it is not an answer", "", "warm_start", warm_start, "what `solve` returned", "Give one or none")
     arguments.flag(global_proof, "global_proof")
     if not isinstance(round_to, bool):
         round_to = arguments.table(round_to, "round_to", "numbers and their steps", "Write {'l1': '0.5 mm'}, or True")
@@ -172,8 +172,8 @@ def solve(
 
         reductions.append(BackOff(robust, min_yield, seed=seed))
     if len(reductions) > 1:
-        remedy = "Round first, then back off with the sizes set as bounds"
-        raise refusal("sizes and back-off cannot be combined", "", "round_to", remedy=remedy)
+        remedy = "Use --round first, then --robust with the sizes set in [bounds]"
+        raise refusal("--round and --robust cannot be combined", "", "round_to", remedy=remedy)
     with cell_progress() as say:
         on_text = on_step or say
         solution = engine.solve(

@@ -125,7 +125,7 @@ def workers(executor: Executor | run.Making | None, count: int | None) -> Execut
     """Executor of a study, from an executor or a number of processes, not both. Raises BadInput."""
     if executor is not None and count is not None:
         remedy = "Give one of them"
-        raise refusal("there are an executor and a number of workers", key="workers", origin="", remedy=remedy)
+        raise refusal("an executor and a number of workers are both given", key="workers", origin="", remedy=remedy)
     if not isinstance(executor, Executor | None):
         arguments.called(executor, "executor", EXECUTORS, "Give one of them, or workers=2")
     return run.workers(count) if count is not None else executor

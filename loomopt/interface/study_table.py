@@ -114,7 +114,11 @@ def labelled_point(
         places = _named_places(study, rows, label, allowed)
         points = [row.point for k, row in enumerate(rows) if all(_is_there(c, k, value) for c, value in places)]
     if len(points) != 1:
-        problem = f"it names the points {', '.join(map(str, points[:20]))}" if points else "the study has no such point"
+        problem = (
+            f"it names the points {', '.join(map(str, points[:20]))}"
+            if points
+            else "the study does not have this point"
+        )
         remedy = "Name more columns, or the number" if points else remedy
         raise refusal(problem, "", "point", label, allowed, remedy)
     return points[0]
@@ -133,7 +137,7 @@ def _named_places(
     for text in label.split(",") if isinstance(label, str) else ():
         match = NAMED.fullmatch(text.strip())
         if match is None or first is None:
-            raise refusal("it is no label of a row", "", "point", label, allowed, remedy)
+            raise refusal("it is not the label of a row", "", "point", label, allowed, remedy)
         named.append((match["key"] or match["name"] or first.name, match["value"] or match["rest"] or match["bare"]))
     places = []
     for name, given in named:

@@ -200,7 +200,7 @@ def curves(
     rows = functools.partial(job.curves, scene, {**job.today(scene), **designs.flat(design)})
     more: dict[str, object] = {"target": target} if target else {}
     if accuracy is not None and any(isinstance(effect, Event) for effect in scene.active):
-        problem = "what is simulated has no curves in as few rows as show their peaks"
+        problem = "the accuracy of curves cannot be chosen for a simulated motion"
         raise refusal(problem, scene.origin, "accuracy", remedy="Leave the accuracy out, or take the effect off")
     given: dict[str, tuple[float, ...]] = {}
     if measured is not None:

@@ -97,7 +97,7 @@ class Task(abc.ABC):
 
     @lazy
     def sampler(self) -> Sampler:
-        """Today's machine, which natural sizes are read from."""
+        """Today's machine, which scales are read from."""
         return sampled(self.model, self.known)
 
     # The program, step by step.
@@ -142,11 +142,11 @@ class Task(abc.ABC):
         return tuple(self.variable(name, ends) for name, ends in self.limited.items())
 
     def variable(self, name: str, ends: Ends) -> Variable:
-        """Variable of natural size."""
+        """Variable with its scale."""
         return Variable(name, *ends, self.scale(name, ends), self.room(name, ends), self.labels.get(name, ""))
 
     def scale(self, name: str, ends: Ends) -> float:
-        """Natural size of a variable: the largest it is or may be."""
+        """Scale of a variable: the largest it is or may be."""
         return max(abs(self.known[name]), *map(abs, ends)) or 1.0
 
     def room(self, name: str, ends: Ends) -> Ends:
@@ -331,17 +331,17 @@ class Task(abc.ABC):
         """Mass that the target's designs add; None where they add none, or minimise it themselves."""
         return None
 
-    # Natural sizes.
+    # Scales.
 
     def figure_size(self, name: str) -> float:
-        """Natural size of a figure: today's value of it, or of the first row that it is read from."""
+        """Scale of a figure: today's value of it, or of the first row that it is read from."""
         row, axis = self.read_from.get(name, (name,))[0], self.scene.schema.own_axes.get(name)
         in_model = self.model.has_row(row) or self.model.has_quantity(row)
         read = axis.rows[0] if axis and axis.rows and not in_model else row
         return size_read(self.sampler, read, self.scene.schema.figures)
 
     def size(self, axis: str) -> float:
-        """Natural size of what of an axis is sought the least of."""
+        """Scale of what of an axis is sought the least of."""
         return next((v.scale for v in self.variables if axis in (v.name, v.called)), 0.0) or self.figure_size(axis)
 
 

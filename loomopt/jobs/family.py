@@ -75,7 +75,7 @@ class FamilyJob(Job):
         if states or first.model.known_in:
             named = ", ".join(states) or "a load that is known in part of the cycle only"
             remedy = f"Take it off{f' (--without {states[0]})' if states else ''}, or solve each member by itself"
-            raise refusal(f"a family of machines with {named} is not solved", self.scene.origin, key, remedy=remedy)
+            raise refusal(f"a family cannot be solved with {named}", self.scene.origin, key, remedy=remedy)
         given, separate = family.table(self.scene).own, set[str]()
         variables = [name for name in self.scene.bounds if standing_for(first, self.scene.full(name))]
         for place, name in enumerate(given):
@@ -85,8 +85,8 @@ class FamilyJob(Job):
             separate |= stands
         if self.job.sizes(self.scene):
             named = ", ".join(self.job.sizes(self.scene))
-            problem = "what comes in sizes only is not chosen for a family"
-            raise refusal(problem, self.scene.origin, f"bounds.{named}", remedy="Give the sizes that are sold no list")
+            problem = "stock sizes cannot be chosen for a family"
+            raise refusal(problem, self.scene.origin, f"bounds.{named}", remedy="Take the list of stock sizes out")
         return together(programs, separate, family.table(self.scene).combine)
 
     # Designs: what is shared under its own name, what is not under the member's.

@@ -47,7 +47,7 @@ def _single(group: str, name: str, noun: str) -> "EntryPoint | None":
     """One entry point of a name. Raises BadInput, naming the distributions, where several claim it."""
     points = [point for point in entry_points(group) if point.name == name]
     if len(points) > 1:
-        problem = f"{noun} {name} is brought by {' and by '.join(map(_distribution, points))}"
+        problem = f"{noun} {name} is provided by {' and by '.join(map(_distribution, points))}"
         raise BadInput(problem, key=name, remedy="Uninstall all of them but one")
     return points[0] if points else None
 
@@ -230,7 +230,7 @@ def template(name: str) -> str:
     """Commented scene to start from. Raises BadInput for an unknown job, and one without a template."""
     place = find(name).resources / "template.toml"
     if not place.is_file():
-        raise BadInput(f"job {name} brings no template", file=str(place), remedy="Start from one of its scenes")
+        raise BadInput(f"job {name} has no template", file=str(place), remedy="Start from one of its scenes")
     return place.read_text(encoding="utf-8")
 
 

@@ -196,7 +196,7 @@ def _refuse_gaps(rows: Sequence[_Row]) -> None:
         if after.angle - row.angle > WIDEST and not (row.corner and after.corner):
             begin, end = math.degrees(row.angle), math.degrees(after.angle)
             raise ValueError(
-                f"nothing says what the curve does between {begin:.6g} and {end:.6g} deg: mark both as corners for a "
+                f"the curve is not known between {begin:.6g} and {end:.6g} deg: mark both as corners for a "
                 "straight line between them, or give samples there"
             )
 

@@ -68,9 +68,9 @@ def requested_of(
             remedy = "Name one of them, or give a number of the scene min and max in [bounds]"
             raise unknown("axis", name, known, origin, name, remedy)
         if sense not in known[name].senses:
-            other = "least" if sense == "most" else "most"
-            problem = f"of {name} the {other} can be sought, not the {sense}"
-            raise BadInput(problem, file=origin, key=name, remedy="Ask for its other end.")
+            verb, way = ("maximised", "minimised") if sense == "most" else ("minimised", "maximised")
+            problem = f"{name} cannot be {verb}, it can only be {way}"
+            raise BadInput(problem, file=origin, key=name, remedy=f"Write --{way.removesuffix('d')} {name}.")
     return {name: known[name] for name in requested}
 
 

@@ -84,7 +84,7 @@ def _curve(scene: Scene, load: Load[Any], parameters: Table) -> tuple[Curve, csv
         return (PeriodicCubics(cubics) if table.second_column else cubics[0]), read
     except ValueError as error:
         remedy = f"Correct the table: angles are {table.angle}; a column {CORNER} marks corners with 1"
-        raise refusal(f"the table is no curve over one turn: {error}", read.file, remedy=remedy) from None
+        raise refusal(f"the table is not a curve over one turn: {error}", read.file, remedy=remedy) from None
 
 
 def bounds(scene: Scene, known: Mapping[str, float]) -> dict[str, tuple[float, float]]:

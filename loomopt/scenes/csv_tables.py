@@ -188,7 +188,7 @@ def _bytes(path: Path, given: str, origin: str, key: str) -> bytes:
     """Bytes of a file, at most one more than is allowed. Raises BadInput."""
     try:
         if not path.is_file():
-            problem = "the table cannot be read: there is no such file"
+            problem = "the table cannot be read: the file does not exist"
             near = near_file(path)
             remedy = f'Perhaps "{Path(given).with_name(Path(near).name)}" is meant' if near else "Correct it"
             raise refusal(problem, origin, key, given, remedy=remedy)
@@ -342,7 +342,7 @@ def _size(unit: str, kind: str, where: str, usual: str, origin: str) -> tuple[fl
     except QuantityError:
         meant = meant_unit(plain, kind)
     remedy = f'Perhaps "{meant}" is meant' if meant else "Write one of these units"
-    raise refusal(f"{where}: {_cell(unit)} is no unit of this column", origin, allowed=usual, remedy=remedy)
+    raise refusal(f"{where}: {_cell(unit)} is not a unit of this column", origin, allowed=usual, remedy=remedy)
 
 
 def _check_length(row: Row, head: Row, separator: str, origin: str) -> None:

@@ -71,7 +71,7 @@ def loaded(path: Path) -> object:
 def _file_bytes(path: Path) -> bytes:
     """Bytes of a file, one more than allowed at most. Raises BadInput for what is no file."""
     if not path.is_file():
-        problem = "it is no ordinary file" if path.exists() else "there is no such file"
+        problem = "it is not an ordinary file" if path.exists() else "the file does not exist"
         near = near_file(path)
         remedy = f'Perhaps "{near}" is meant' if near else "Correct the path"
         raise refusal(f"the design cannot be read: {problem}", str(path), remedy=remedy)
@@ -93,7 +93,7 @@ def _unique_entries(pairs: Sequence[tuple[str, object]], origin: str) -> dict[st
     entries: dict[str, object] = {}
     for name, value in pairs:
         if name in entries:
-            raise refusal("a name comes twice in one object", origin, name, remedy="Take out all but one")
+            raise refusal("a name occurs twice in one object", origin, name, remedy="Take out all but one")
         entries[name] = value
     return entries
 
@@ -258,7 +258,7 @@ def read_given(path: Path) -> DesignGiven:
         return DesignGiven(data)
     target, status, answer_scene = data.get("target"), data.get("status"), data.get("scene")
     if target is not None and not isinstance(target, str):
-        raise refusal("the target is no name", origin, "target", target, remedy="Correct it or take it out")
+        raise refusal("the target is not a name", origin, "target", target, remedy="Correct it or take it out")
     status = status if isinstance(status, str) else None
     if answer_scene is None:
         return DesignGiven(data["design"], Call(target=target), target, status)
@@ -271,7 +271,7 @@ def read_given(path: Path) -> DesignGiven:
     files = answer_scene.get("files", {})
     if not isinstance(files, Mapping) or not all(isinstance(text, str) for text in files.values()):
         raise refusal(
-            "the answer's files are no texts", origin, "scene.files", remedy="Give the answer as it was printed"
+            "the answer's files are not text", origin, "scene.files", remedy="Give the answer as it was printed"
         )
     return DesignGiven(data["design"], call, target, status, document, Frozen(files))
 

@@ -65,7 +65,7 @@ def _read_text(path: Path, origin: str) -> str:
             near = near_file(path)
             remedy = f'Perhaps "{near}" is meant' if near else "Correct the path"
             remedy += "; a packaged scene is called by its name alone: see `loomopt list`"
-            raise refusal("there is no such file", origin, allowed=allowed, remedy=remedy)
+            raise refusal("the file does not exist", origin, allowed=allowed, remedy=remedy)
         if not path.is_file():
             raise refusal("it is not an ordinary file", origin, allowed=allowed, remedy="Name a file")
         with path.open("rb") as file:

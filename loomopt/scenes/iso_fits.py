@@ -98,7 +98,7 @@ def deviations(name: str, nominal: float) -> tuple[float, float]:
     """
     parts = split_class(name)
     if parts is None:
-        raise ValueError(f"{name} is no tolerance class of the tables")
+        raise ValueError(f"{name} is not a known tolerance class")
     letter, grade = parts
     size = abs(nominal) * 1e3 - AS_WRITTEN
     if not 0.0 < size <= LARGEST:

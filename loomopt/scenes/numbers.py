@@ -28,7 +28,7 @@ def quantity(scene: Scene, key: str) -> Quantity:
         return known.get(key) or known[table]
     if scene.given(key) is not None:
         remedy = "Vary a number, such as operation.speed"
-        raise refusal("it is no number", scene.origin, key, scene.given(key), remedy=remedy)
+        raise refusal("it is not a number", scene.origin, key, scene.given(key), remedy=remedy)
     raise unknown("number", key, known, scene.origin, key)
 
 

@@ -43,7 +43,7 @@ def _stock(cursor: Cursor, quantity: Quantity) -> tuple[float, ...]:
     """Sizes of one number that are sold, ascending. Raises BadInput."""
     raw = cursor.raw
     if not isinstance(raw, list | tuple) or not raw:
-        raise cursor.fault("it is no list of sizes", raw, remedy='Write wire = ["1 mm", "1.2 mm"]')
+        raise cursor.fault("it is not a list of sizes", raw, remedy='Write wire = ["1 mm", "1.2 mm"]')
     return tuple(sorted({cursor._replace(raw=size).number(quantity) for size in raw}))
 
 

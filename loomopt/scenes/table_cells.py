@@ -87,7 +87,7 @@ def text(raw: bytes, origin: str) -> str:
         except UnicodeDecodeError as error:
             place = error.start
     remedy = "Save the file as UTF-8"
-    raise refusal(f"it is no text in UTF-8, UTF-16 or Windows-1252 (byte {place})", origin, remedy=remedy)
+    raise refusal(f"it is not text in UTF-8, UTF-16 or Windows-1252 (byte {place})", origin, remedy=remedy)
 
 
 def _encoding_without_mark(raw: bytes) -> str:
@@ -154,7 +154,7 @@ def _sheet(raw: bytes, origin: str) -> list[Sequence[object]]:
     except BadInput:
         raise
     except (zipfile.BadZipFile, KeyError, ValueError, OSError, TypeError, AttributeError, EOFError) as error:
-        problem = f"it is no workbook that can be read ({shown(type(error).__name__)})"
+        problem = f"the workbook cannot be read ({shown(type(error).__name__)})"
         raise refusal(problem, origin, remedy=_TO_EXCEL) from None
     return []
 
@@ -171,7 +171,7 @@ def _parquet(raw: bytes, origin: str) -> list[Sequence[object]]:
     try:
         frame = pd.read_parquet(io.BytesIO(raw))
     except (ImportError, OSError, ValueError):
-        raise refusal("it is no Parquet file that can be read", origin, remedy=_TO_EXCEL) from None
+        raise refusal("the Parquet file cannot be read", origin, remedy=_TO_EXCEL) from None
     if frame.index.name is not None:
         frame = frame.reset_index()
     return [list(map(str, frame.columns)), *(list(row) for row in frame.itertuples(index=False))]

@@ -126,7 +126,7 @@ def _tolerance(cursor: Cursor, quantity: Quantity) -> Tolerance:
         )
         share = above_is_share or below_is_share
         if share and not ((above_is_share or above == 0.0) and (below_is_share or below == 0.0)):
-            problem = "one side is a share of the nominal and the other is none"
+            problem = "one side is a percentage and the other is not"
             raise cursor.fault(problem, remedy="Write both in % or both in a unit")
         if above + below < 0.0:
             problem = "the upper end of the band lies below its lower end"
@@ -141,7 +141,7 @@ def _tolerance(cursor: Cursor, quantity: Quantity) -> Tolerance:
     sigmas = cursor.at("sigmas").number(Quantity("number", above=0)) if "sigmas" in given else SIGMAS
     group = given.get("group", "")
     if not isinstance(group, str):
-        raise cursor.at("group").fault("it is no name", group, remedy='Write group = "machine"')
+        raise cursor.at("group").fault("it is not a name", group, remedy='Write group = "machine"')
     if bool(group) != ("correlation" in given):
         lacking = "correlation" if group else "group"
         problem = f"{lacking} is missing: numbers of one group are correlated"
@@ -174,7 +174,7 @@ def _deviation(cursor: Cursor, quantity: Quantity) -> tuple[bool, float]:
 
 def _standard(cursor: Cursor, quantity: Quantity) -> str:
     if quantity.kind != "length":
-        problem = f"classes are of lengths, and this is of kind {quantity.kind}"
+        problem = f"a tolerance class needs a length, and this is of kind {quantity.kind}"
         raise cursor.fault(problem, cursor.raw, remedy="Give plus_minus instead")
     return cursor.word(tolerance_classes.CLASSES, "tolerance class")
 
@@ -182,7 +182,7 @@ def _standard(cursor: Cursor, quantity: Quantity) -> str:
 def _fit(cursor: Cursor, quantity: Quantity) -> str:
     raw = cursor.raw
     if quantity.kind != "length":
-        problem = f"fits are of lengths, and this is of kind {quantity.kind}"
+        problem = f"a fit needs a length, and this is of kind {quantity.kind}"
         raise cursor.fault(problem, raw, remedy="Give plus and minus instead")
     if not isinstance(raw, str) or iso_fits.split_class(raw) is None:
         allowed = f"a letter of {' '.join(iso_fits.LETTERS)} with a grade of {iso_fits.LEAST_GRADE} to "

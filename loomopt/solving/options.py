@@ -86,9 +86,7 @@ def target_name(scene: Scene, target: str | None, families: bool = False) -> str
         )
     if name == FAMILY and not families:
         remedy = "Choose the target of one member, with its numbers set"
-        raise refusal(
-            "a family is solved and swept, and no more is asked of it", scene.origin, "target", name, remedy=remedy
-        )
+        raise refusal("a family can only be solved and swept", scene.origin, "target", name, remedy=remedy)
     return name
 
 

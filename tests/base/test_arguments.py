@@ -26,18 +26,18 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
         ({"over": OVER, "workers": "2"}, r'workers: it is not a whole number \(given: "2"\). Allowed: 1 to 1024'),
         ({"over": OVER, "workers": True}, "workers: it is not a whole number"),
         ({"over": OVER, "executor": "dask"}, "executor: it cannot be called"),
-        ({"over": OVER, "executor": lambda: 3}, "executor: what it makes is no executor .given: 3"),
+        ({"over": OVER, "executor": lambda: 3}, "executor: the function does not make an executor .given: 3"),
         ({"over": OVER, "on_row": 3}, "on_row: it cannot be called"),
-        ({"over": OVER, "store": 3}, "store: it is no path"),
+        ({"over": OVER, "store": 3}, "store: it is not a path"),
         ({"over": OVER, "seed": 1.5}, "seed: it is not a whole number"),
         ({"over": OVER, "seed": -1}, "seed: it is less than 0"),
         ({"over": OVER, "accuracy": "1e-8"}, "accuracy: it is not a number"),
         ({"over": OVER, "target": ["balance"]}, "target: it is not text .given: a list.*balance, pulse"),
     ],
     "pareto": [
-        ({"axes": "peak_torque"}, r'axes: it is no list of names \(given: "peak_torque"\).*Write \("A", "B"\)'),
-        ({"axes": None}, "axes: it is no list of names"),
-        ({"axes": {"peak_torque", "m4e"}}, "axes: it is no list of names .given: set"),
+        ({"axes": "peak_torque"}, r'axes: it is not a list of names \(given: "peak_torque"\).*Write \("A", "B"\)'),
+        ({"axes": None}, "axes: it is not a list of names"),
+        ({"axes": {"peak_torque", "m4e"}}, "axes: it is not a list of names .given: set"),
         ({"axes": (1, 2)}, "axes: it is not text .given: 1"),
         ({"axes": AXES, "points": "ten"}, r'points: it is not a whole number \(given: "ten"\).*from 3 to 20000'),
         ({"axes": AXES, "points": 10.0}, "points: it is not a whole number"),
@@ -47,7 +47,7 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
         ({"axes": AXES, "ranges": {"m4e": (None, 5)}}, "m4e: it is not a number .given: none"),
         ({"axes": AXES, "ranges": {"m4e": (1, 2, 3)}}, "m4e: a range has two ends"),
         ({"axes": AXES, "ranges": {"m4e": (5, 0)}}, r"m4e: .*\(given: 5:0 in SI\). Allowed: .*smaller end first"),
-        ({"axes": AXES, "maximise": 3}, "maximise: it is no list of names"),
+        ({"axes": AXES, "maximise": 3}, "maximise: it is not a list of names"),
         ({"axes": AXES, "accuracy": None}, "accuracy: it is not a number"),
     ],
     "effects": [
@@ -59,7 +59,7 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
     "solve": [
         ({"starts": "2"}, "starts: it is not a whole number"),
         ({"seed": "2"}, "seed: it is not a whole number"),
-        ({"warm_start": "before"}, "warm_start: it is no answer"),
+        ({"warm_start": "before"}, "warm_start: it is not an answer"),
         ({"global_proof": True, "gap": "2"}, "gap: it is not a number"),
         ({"global_proof": True, "seconds": None}, "seconds: it is not a number"),
     ],
@@ -220,7 +220,7 @@ def test_a_hook_or_a_flag_of_the_wrong_kind_is_told():
 
 def test_a_name_in_place_of_names_is_told():
     for call in (lambda: SCENE.change({}, "gravity"), lambda: SCENE.change({}, (), "gravity")):
-        with pytest.raises(lo.BadInput, match=r'it is no list of names \(given: "gravity"\)'):
+        with pytest.raises(lo.BadInput, match=r'it is not a list of names \(given: "gravity"\)'):
             call()
     assert SCENE.free("") is not None
     assert SCENE.change({}, {"gravity"}).effects.keys() == SCENE.with_effect("gravity").effects.keys()

@@ -96,7 +96,7 @@ def test_the_table_says_in_a_sentence_what_may_be_left_out(cli, static, tmp_path
         (("--tolerance", "nan"), "the tolerance is out of range"),
         (("--with", "friction"), "unknown effect"),
         (("--figure", "bars.gif"), ".png, .svg, .pdf"),
-        (("--workers", "0"), "no such number of workers"),
+        (("--workers", "0"), "number of workers is out of range"),
     ],
 )
 def test_bad_input_is_refused_before_anything_is_solved(cli, arguments, said, monkeypatch):

@@ -27,14 +27,14 @@ BAD = [
     ("--set mechanism.law=spline", ["mechanism.law_coefficients", "needs its coefficients"]),
     ("--set mechanism.law=table", ["mechanism.law_table", "needs its file"]),
     ("--set mechanism.law_table=falls.csv", ["mechanism.law_table", 'law = "table"']),
-    ("--set mechanism.law=table --set mechanism.law_table=none.csv", ["none.csv", "no such file"]),
+    ("--set mechanism.law=table --set mechanism.law_table=none.csv", ["none.csv", "does not exist"]),
     ("--set mechanism.law=table --set mechanism.law_table=falls.csv", ["falls.csv", "falls between u ="]),
     ("--set mechanism.law=table --set mechanism.law_table=back.csv", ["back.csv", "u must increase"]),
     (
         "--set mechanism.law=table --set mechanism.law_table=head.csv",
         ["head.csv", "line 1, column theta", "unit is missing"],
     ),
-    ("--set mechanism.law=table --set mechanism.law_table=units.csv", ["units.csv", "column s", '"kg" is no unit']),
+    ("--set mechanism.law=table --set mechanism.law_table=units.csv", ["units.csv", "column s", '"kg" is not a unit']),
     ("--set mechanism.law=table --set mechanism.law_table=few.csv", ["few.csv", "3 rows"]),
     (
         "--set mechanism.law=table --set mechanism.law_table=word.csv",

@@ -198,7 +198,7 @@ def test_a_machine_with_a_crank_of_1e_9_of_the_frame_is_evaluated_to_rounding():
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="natural sizes come from today's torques: uncertified, stationarity 1", strict=True)
+@pytest.mark.xfail(reason="scales come from today's torques: uncertified, stationarity 1", strict=True)
 def test_a_crank_of_no_size_today_does_not_spoil_the_optimum():
     answer = lo.solve(lo.load("beatup").set("mechanism.l1", "167e-9 mm"), starts=1)
     assert answer.status == "optimal", answer.message

@@ -133,9 +133,9 @@ def test_the_command_tells_and_draws_them(scene, tmp_path, capsys):
 
 
 def test_without_an_effect_that_tells_forces_it_is_said_which_would(scene, capsys):
-    with pytest.raises(BadInput, match="no effect that is on tells forces by their components"):
+    with pytest.raises(BadInput, match="no active effect gives forces by components"):
         lo.evaluate("beatup").plot_forces()
     assert app.run(["simulate", "beatup", "--forces"]) == 2
     said = capsys.readouterr()
     assert said.out == ""
-    assert "Put one on" in said.err
+    assert "Put one of these on" in said.err

@@ -40,11 +40,11 @@ def test_every_row_of_a_front_by_every_number_that_is_printed(front):
 @pytest.mark.parametrize(
     ("label", "told"),
     [
-        (7, "no such point"),
-        ("61 mm", "no such point"),
+        (7, "does not have this point"),
+        ("61 mm", "does not have this point"),
         ("65 kg", "kg"),
         ("width = 3 mm", "no column width"),
-        ("", "no label"),
+        ("", "not the label"),
         (1.5, "not a whole number"),
         (None, "not a whole number"),
         (True, "not a whole number"),

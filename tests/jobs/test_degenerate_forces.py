@@ -42,7 +42,7 @@ OTHERS = {
 }
 """Packaged scene → what puts today's machine at a change point; a cam's roller in line with its arm and its shaft."""
 SAID = {
-    "rapier": "does not turn all round: the sley four-bar is no crank-rocker",
+    "rapier": "does not turn all round: the sley four-bar is not a crank-rocker",
     "sixbar-sley": "does not turn all round",
     "shedding": "base_radius 10 mm must be greater than the difference 10 mm",
 }

@@ -103,5 +103,5 @@ def test_a_job_without_a_template_says_so(monkeypatch, tmp_path):
         resources = tmp_path
 
     monkeypatch.setattr(registry, "find", lambda name: Bare())
-    with pytest.raises(BadInput, match="job knitting brings no template"):
+    with pytest.raises(BadInput, match="job knitting has no template"):
         registry.template("knitting")

@@ -124,11 +124,11 @@ def test_two_distributions_with_one_job_are_named_and_other_scenes_still_run(loo
     other = [distribution("other-press", {"press": "other_press:JOB"})]
     for words in (("solve", "press"), ("new", "press", "x.toml"), ("check", "press")):
         cases = loomopt(*words, status=2, folders=other).stderr
-        assert "job press is brought by loomopt-press and by other-press" in cases
+        assert "job press is provided by loomopt-press and by other-press" in cases
     assert json.loads(loomopt("solve", "beatup", "--json", folders=other).stdout)["status"] == "optimal"
     listed = loomopt("list", folders=other)
     assert "beatup-heavy" in listed.stdout
-    assert "job press is brought by loomopt-press and by other-press" in listed.stderr
+    assert "job press is provided by loomopt-press and by other-press" in listed.stderr
 
 
 @pytest.mark.parametrize(
@@ -277,7 +277,7 @@ EFFECT = dataclasses.replace(KNOWN, name="wind")
 def test_an_effect_of_two_distributions_is_refused(loomopt, distribution):
     both = [distribution("other-bar", {"beatup.torsion_bar": "other_bar:EFFECT"}, group="loomopt.effects")]
     cases = loomopt("show", "beatup", "--set", "effects.torsion_bar.k=1 N*m/rad", status=2, folders=both).stderr
-    assert "effect beatup.torsion_bar is brought by loomopt-press and by other-bar" in cases
+    assert "effect beatup.torsion_bar is provided by loomopt-press and by other-bar" in cases
 
 
 def test_a_name_of_loomopt_cannot_be_taken(loomopt, distribution):

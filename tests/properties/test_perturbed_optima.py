@@ -44,7 +44,7 @@ optimum = functools.cache(lambda name: solved(*OPTIMA[name]))
 
 
 def objectives(program, x):
-    """Return a design's objectives, in order, in their natural sizes."""
+    """Return a design's objectives, in order, in units of their scale."""
     sampler = sampler_at(program, x)
     assert sampler is not None
     values = [sampler.peak(o.row) if o.quantities else sampler.figures[o.row] for o in program.objectives]

@@ -213,15 +213,15 @@ def test_what_is_expected_is_no_part_of_the_machine():
         ({"scene": 3}, "has no tables"),
         ({"scene": {}}, "has no tables"),
         ({"scene__document": []}, "has no tables"),
-        ({"scene__files": ["x"]}, "the answer's files are no texts"),
-        ({"scene__files": {"targets.match.table": 3}}, "the answer's files are no texts"),
+        ({"scene__files": ["x"]}, "the answer's files are not text"),
+        ({"scene__files": {"targets.match.table": 3}}, "the answer's files are not text"),
         ({"scene__call": 3}, "the changes of the call cannot be read"),
         ({"scene__call__with": "gravity"}, "the changes of the call cannot be read"),
         ({"scene__call__set": ["x"]}, "the changes of the call cannot be read"),
         ({"scene__call__target": 5}, "the changes of the call cannot be read"),
         ({"scene__call__set": {"operation.M0": "7 mm"}}, "scene.call: operation.M0: the changes of the answer's call"),
         ({"scene__call__with": ["gravitas"]}, "scene.call: effects: the changes of the answer's call are invalid"),
-        ({"target": 5}, "the target is no name"),
+        ({"target": 5}, "the target is not a name"),
     ],
 )
 def test_what_is_wrong_with_an_answer_is_named_with_its_file(file, changes, problem):
@@ -283,7 +283,7 @@ def test_an_answers_tables_go_with_it(tmp_path):
     loaded: Any = lo.load(place)
     assert loaded.figures == figures
     assert loaded.figures["match_rms"] > 0
-    with pytest.raises(lo.BadInput, match="table: the table cannot be read: there is no such file"):
+    with pytest.raises(lo.BadInput, match="table: the table cannot be read: the file does not exist"):
         lo.evaluate(loaded.scene.set("targets.match.table", str(tmp_path / "none.csv")))
     assert pickle.loads(pickle.dumps(loaded.scene)).paths.texts == loaded.scene.paths.texts
     (own / "rapier-wish.csv").write_text(wish.replace("\n0,", "\n0.001,", 1) + "# mine\n")

@@ -279,7 +279,7 @@ def test_a_bad_file(tmp_path, content, problem, remedy):
 
 def test_files_that_are_none(tmp_path):
     told(caught(load, tmp_path), str(tmp_path), "", "folder", "file in it")
-    told(caught(load, tmp_path / "none.toml"), str(tmp_path), "", "no such file", "loomopt list")
+    told(caught(load, tmp_path / "none.toml"), str(tmp_path), "", "does not exist", "loomopt list")
     told(caught(load, "a\x00b.toml"), "a\\x00b.toml", "", "", "path")
     told(caught(load, "x" * 5000 + ".toml"), "xxx", "", "cannot be read", "path")
     told(caught(load, "/dev/zero"), "/dev/zero", "", "not an ordinary file", "Name a file")
@@ -444,7 +444,7 @@ def test_a_file_that_is_not_there_is_told_the_near_one(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my-bu.toml").write_text(TEXT)
     (tmp_path / "first-answer.json").write_text("{}")
-    told(caught(load, "my_bu.toml"), "my_bu.toml", "", "no such file", '"my-bu.toml"')
+    told(caught(load, "my_bu.toml"), "my_bu.toml", "", "does not exist", '"my-bu.toml"')
     told(caught(load, "My-bu"), "My-bu", "", "no packaged scene", '"my-bu.toml"')
     assert "first-answer.json" in caught(designs.loaded, tmp_path / "first_answer.json").remedy
     assert "my-bu" not in caught(load, "press.toml").remedy

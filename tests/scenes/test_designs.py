@@ -166,7 +166,7 @@ def test_what_is_no_json_is_named(tmp_path, content):
 
 
 def test_files_that_are_none_are_named(tmp_path):
-    for path, problem in ((tmp_path, "no ordinary file"), (tmp_path / "none.json", "no such file")):
+    for path, problem in ((tmp_path, "not an ordinary file"), (tmp_path / "none.json", "does not exist")):
         assert problem in refused(designs.read, path, SCENE).problem
     big = tmp_path / "big.json"
     with big.open("wb") as file:

@@ -64,10 +64,10 @@ REFUSED = {
     "a column in two units": (
         "phi1 [deg],phi1 [rad],S [mm]\n" + "\n".join(f"{k},{k},1" for k in range(12)), "column phi1 2 times"),
     "no unit": ("phi1,S\n" + "\n".join(ROWS), "line 1, column phi1: the unit is missing"),
-    "another unit": (HEAD.replace("mm", "mN") + "\n".join(ROWS), 'column S: "mN" is no unit of this column'),
+    "another unit": (HEAD.replace("mm", "mN") + "\n".join(ROWS), 'column S: "mN" is not a unit of this column'),
     "a date": (with_row("150,2024-05-01"), '"2024-05-01" is no number'),
     "an old workbook": (b"\xd0\xcf\x11\xe0" + bytes(600), "a workbook of Excel 97"),
-    "a workbook cut short": (b"PK\x03\x04" + bytes(600), "no workbook that can be read"),
+    "a workbook cut short": (b"PK\x03\x04" + bytes(600), "the workbook cannot be read"),
     "unit without its bracket": ("phi1 [deg,S [mm]\n" + "\n".join(ROWS), "no column phi1"),
     "long cell": (HEAD + "0," + "1" * (csv.field_size_limit() + 1) + "\n", "not CSV"),
     "open quotation mark": (with_row('150,"10'), "not CSV"),

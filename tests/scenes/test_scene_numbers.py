@@ -32,7 +32,7 @@ def test_every_number_has_its_kind(key, kind):
 @pytest.mark.parametrize(
     ("key", "words"),
     [
-        ("problem.title", "it is no number"),
+        ("problem.title", "it is not a number"),
         ("operation.M00", "operation.M0"),
         ("effects.gravity.tilt", "unknown number"),
         ("limits.mu_min.max", "limits.mu_min.min"),

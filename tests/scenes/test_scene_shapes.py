@@ -163,7 +163,7 @@ SHAPES = [
     ("problem.title", 5, "problem.title: it is not text (given: 5)", "Allowed: text in quotes"),
     ("bounds.l1.free", [True], "bounds.l1.free: it is neither true nor false (given: a list)", "Allowed: true, false"),
     ("limits.swing", "23 deg", 'limits.swing: it is not a table (given: "23 deg")', "Allowed: a table with min"),
-    ("stock", {"l1": "1 mm"}, 'stock.l1: it is no list of sizes (given: "1 mm")', "Write wire"),
+    ("stock", {"l1": "1 mm"}, 'stock.l1: it is not a list of sizes (given: "1 mm")', "Write wire"),
     ("display", {"length": 3}, "display.length: it is not a unit (given: 3)", "Allowed: a unit of length"),
     ("effects.mass.rod", [3], "effects.mass.rod: it is not a table (given: a list)", "Allowed: a table"),
 ]  # fmt: skip

@@ -20,7 +20,7 @@ class Problem:
     """Least f, with every row of `above` >= 0 and every row of `equal` = 0, within bounds.
 
     start, best: x; least: f there; formulas take x1, x2, ..., after a number system where `maths` is set;
-    sizes: natural sizes that are neither 1 nor, of f, |least|.
+    sizes: scales that are neither 1 nor, of f, |least|.
     """
 
     start: tuple[float, ...]

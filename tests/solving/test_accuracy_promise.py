@@ -86,7 +86,7 @@ def from_one_start(name, accuracy):
 
 
 def size(figures, name):
-    """Return a figure's natural size: angles 1 rad, what may vanish the largest of its kind, else itself."""
+    """Return a figure's scale: angles 1 rad, what may vanish the largest of its kind, else itself."""
     kind = {"M3_fdc": "peak_torque", "contact_min": "spring_force_max"}.get(name, name)
     return 1.0 if name in ANGLES else abs(figures[kind]) or 1.0
 

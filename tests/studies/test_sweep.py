@@ -115,7 +115,7 @@ def test_a_row_reproduces_its_whole_answer(serial):
         assert dict(answer.design) == dict(row.design)
         assert dict(answer.figures) == dict(row.figures)
         assert answer.scene.operation["M0"] == row.place["operation.M0"]
-    with pytest.raises(BadInput, match="no such point"):
+    with pytest.raises(BadInput, match="does not have this point"):
         serial.answer(21)
 
 
@@ -228,7 +228,7 @@ def test_the_key_follows_the_contents_of_a_table_that_the_scene_names(tmp_path):
         ({"operation.M0": "600:900:25"}, "unit is missing"),
         ({"operation.M0": "600:900:25 mm"}, "a unit of length, not of torque"),
         ({"operation.M00": "600:900:25 N*m"}, 'Perhaps "M0" is meant'),
-        ({"problem.title": ["a", "b"]}, "it is no number"),
+        ({"problem.title": ["a", "b"]}, "it is not a number"),
         ({"mechanism.l1": "31:400:1 mm"}, "l1"),
         ({"operation.M0": "1:20000:1 N*m", "operation.speed": ["600 rpm", "700 rpm"]}, "more than 20000 combinations"),
     ],

@@ -116,11 +116,11 @@ def program(
     moves: tuple[Move, ...] = (),
     **kinds: Any,
 ) -> Program:
-    """Return a program in variables between -WIDE and WIDE, all of natural size 1.
+    """Return a program in variables between -WIDE and WIDE, all of scale 1.
 
     limits: (row, sign, value), of the family its row belongs to; one more, far away, as every machine has limits;
     objectives: see `objective`; bounds: name -> (least, most), infinite for none; formulas: rows that need a number
-    system's functions; sizes: natural size of any variable or row that is not of size 1; kinds: see `model`.
+    system's functions; sizes: scale of any variable or row that is not of size 1; kinds: see `model`.
     """
     rows, waves = {name: functools.partial(_read, name) for name in names} | dict(rows or {}), waves or {}
     bounds, sizes = bounds or {}, defaultdict(lambda: 1.0, sizes or {})

@@ -56,9 +56,7 @@ def report(
     inputs = [_checked_input(thing, target, changes, wanted, proven) for thing in things]
     if wanted and not any(source.scene for source in inputs):
         remedy = "Leave out --study, or name an answer or a scene too"
-        raise refusal(
-            "a store's fronts and sweeps have no studies beside them", "", "--study", wanted[0], remedy=remedy
-        )
+        raise refusal("--study cannot be used with a store", "", "--study", wanted[0], remedy=remedy)
     chapters: list[Chapter] = []
     with call_progress() as progress:
         for source in inputs:
@@ -100,8 +98,8 @@ def _checked_input(
 
     answer, store = registry.answer_path(thing), store_file.is_store(Path(thing))
     if (answer or store) and (target or changes):
-        remedy = "Leave out --target, --set, --with, --without and --free, or evaluate the design in a scene of its own"
-        raise refusal("it is judged as it was found", "", thing, remedy=remedy)
+        remedy = "Leave out --target, --set, --with, --without and --free, or evaluate the design in another scene"
+        raise refusal("an answer or a store has its own scene and target", "", thing, remedy=remedy)
     if store:
         tables = store_file.read_studies(Path(thing))
         return Input(lambda say: [document.of_study(table.study, table.solved) for table in tables])
@@ -134,7 +132,7 @@ def _check_studies(scene: "Scene", target: str | None, studies: Sequence[str]) -
     registry.of_target(scene, name).demand(scene, name)
     if studies and name == FAMILY:
         remedy = "Leave out --study, or report one design by itself"
-        raise refusal("studies are of one design in its scene", "", "--study", studies[0], remedy=remedy)
+        raise refusal("--study needs one design and its scene", "", "--study", studies[0], remedy=remedy)
     if "budget" in studies:
         budget.compute(scene, {})
     if "tolerance" in studies:
@@ -241,7 +239,9 @@ def _answer(given: str) -> Path:
     path = registry.answer_path(given)
     if path is None:
         allowed = "what `loomopt solve PROBLEM --json` prints, in files that end in .json, and today"
-        raise refusal("it is no answer's file", "", given, allowed=allowed, remedy="Solve it first, into a file")
+        raise refusal(
+            "it is not the file of an answer", "", given, allowed=allowed, remedy="Solve it first, into a file"
+        )
     return path
 
 

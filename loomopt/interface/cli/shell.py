@@ -123,7 +123,7 @@ def read_steps(text: str) -> dict[str, str]:
     pairs = [pair.partition("=") for pair in text.split(",")]
     if not all(name.strip() and step.strip() for name, _, step in pairs):
         remedy = 'Write --round "l1=0.5 mm,l2=0.5 mm", or --round scene for [steps] and [stock] of the scene'
-        raise refusal("these are no steps", "", "--round", text, "NAME=STEP,…", remedy)
+        raise refusal("the steps cannot be read", "", "--round", text, "NAME=STEP,…", remedy)
     steps = {name.strip(): step.strip() for name, _, step in pairs}
     if len(steps) < len(pairs):
         raise refusal("a number has two steps", "", "--round", text, remedy="Give each number one step")

@@ -146,11 +146,11 @@ def _axes(minimise: list[str], maximise: list[str], against: str) -> tuple[str, 
     named = [*minimise, *maximise]
     twice = next((name for name in named if named.count(name) > 1), None)
     sought = [name for name in named if name != against] or named
-    remedy = "Write --minimise A --against B, or --maximise A; and --maximise B where its most is sought"
+    remedy = "Write --minimise A --against B, or --maximise A; and --maximise B to maximise B"
     if twice:
-        raise refusal("it is sought twice", "", twice, remedy=remedy)
+        raise refusal("the axis is given twice", "", twice, remedy=remedy)
     if len(sought) != 1:
-        problem = f"{len(sought)} axes are sought beside {against}" if sought else "no axis is sought"
+        problem = f"{len(sought)} axes are optimised against {against}" if sought else "no axis is optimised"
         raise refusal(problem, "", "--minimise", ", ".join(sought) or against, remedy=remedy)
     return sought[0], against
 

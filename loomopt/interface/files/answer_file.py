@@ -58,7 +58,7 @@ def read_answer(path: Path) -> StoredAnswer:
         answer = _answer(document, evaluation, scene)
     except (AttributeError, KeyError, TypeError, ValueError, ArithmeticError):
         remedy = "Give the answer as it was printed, or its design object alone"
-        raise refusal("it is no answer as solve prints it", str(path), remedy=remedy) from None
+        raise refusal("it is not an answer that `loomopt solve --json` printed", str(path), remedy=remedy) from None
     return StoredAnswer(answer, tuple(_doubts(document, answer)))
 
 
@@ -191,12 +191,12 @@ def _doubts(document: Mapping[str, Any], answer: Answer) -> Iterator[str]:
                 now, then = (UnitFormatter(answer.scene).shown(name, number, 9) for number in (value, float(printed)))
                 yield f"{name} is {now} for its design, the file says {then}."
     if differing > MOST_TOLD:
-        yield f"So it is with {differing - MOST_TOLD} more of its figures."
+        yield f"{differing - MOST_TOLD} more of its figures differ too."
     if answer.status != "optimal":
         return
     yield from (f"It says optimal, and limit {limit.name} does not hold." for limit in answer.limits if not limit.ok)
     certificate = answer.certificate
     if certificate is None or not certificate.passed:
-        yield "It says optimal, and holds no certificate that has passed."
+        yield "Its status is optimal, but its certificate has not passed."
     elif certificate.reasons or not (certificate.feasibility <= FEASIBLE and certificate.residual <= STATIONARY):
-        yield "It says optimal, and its certificate's own numbers are beyond their thresholds."
+        yield "Its status is optimal, but numbers of its certificate exceed their thresholds."

@@ -352,11 +352,11 @@ def check_workshop(paths: Sequence[Path], how: Workshop) -> None:
     endings = {path: path.suffix.lower() for path in paths}
     if how._replace(only="") != USUAL and ".dxf" not in endings.values():
         remedy = "Name a file that ends in .dxf"
-        raise refusal("--dxf and --arcs are of DXF files", "", "--out", str(paths[0]), remedy=remedy)
+        raise refusal("--dxf and --arcs are for DXF files only", "", "--out", str(paths[0]), remedy=remedy)
     for path, ending in endings.items():
         if how.only and ending in (".csv", ".xlsx"):
             remedy = "Name a file that ends in .dxf or .svg"
-            raise refusal("--only is of drawings", "", "--out", str(path), remedy=remedy)
+            raise refusal("--only is for drawings only", "", "--out", str(path), remedy=remedy)
 
 
 @working()
@@ -405,7 +405,7 @@ def only(drawn: "Drawing", layer: str) -> "Drawing":
 
     if layer not in drawn.layers:
         raise refusal(
-            "the drawing has no such layer", "", "--only", layer, ", ".join(drawn.layers), "Choose one of them"
+            "the drawing does not have this layer", "", "--only", layer, ", ".join(drawn.layers), "Choose one of them"
         )
     primitives = tuple(
         primitive for primitive in drawn.primitives if primitive.layer == layer and not isinstance(primitive, Text)

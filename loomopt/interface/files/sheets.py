@@ -33,7 +33,7 @@ MADE = datetime.datetime(2000, 1, 1)
 def decimal_comma(given: str) -> bool:
     """Whether `--decimal` asks for a comma. Raises BadInput for what is neither."""
     if given not in DECIMALS:
-        raise refusal("it is no decimal sign", "", "--decimal", given, ", ".join(DECIMALS), "Choose one of them")
+        raise refusal("it is not a decimal sign", "", "--decimal", given, ", ".join(DECIMALS), "Choose one of them")
     return DECIMALS[given]
 
 

@@ -39,7 +39,7 @@ def read_studies(path: Path) -> list[StudyTable]:
         StudyTable(_study(about, path), rows) for about, rows in studies.values() if rows and "samples" not in about
     ]
     if not tables and any(rows for _, rows in studies.values()):
-        problem = "the store holds machines of a tolerance study, which are no designs"
+        problem = "the store holds a tolerance study, which has no designs"
         raise refusal(problem, str(path), "store", remedy="Give the design's answer and --study tolerance")
     if not tables:
         raise refusal("the store holds no row yet", str(path), "store", remedy="Run its study first")
@@ -59,7 +59,9 @@ def _study(record: Mapping[str, Any], path: Path) -> SceneStudy:
     except BadInput:
         raise
     except (KeyError, TypeError, ValueError, AttributeError):
-        raise refusal("what it says of a study is damaged", str(path), "store", remedy="Run the study again") from None
+        raise refusal(
+            "its description of a study is damaged", str(path), "store", remedy="Run the study again"
+        ) from None
 
 
 def _front(record: Mapping[str, Any], scene: Scene) -> SceneStudy:

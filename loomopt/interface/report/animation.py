@@ -79,7 +79,12 @@ def check_file(path: Path) -> None:
     if suffix(path, ENDINGS) == ".mp4" and not shutil.which("ffmpeg"):
         remedy = "Install ffmpeg, or end the name in .gif or .html"
         raise refusal(
-            "ffmpeg is not found, which writes it", str(path), "--animate", ".mp4", ", ".join(ENDINGS), remedy
+            "ffmpeg, which writes this format, is not installed",
+            str(path),
+            "--animate",
+            ".mp4",
+            ", ".join(ENDINGS),
+            remedy,
         )
     check(path)
 

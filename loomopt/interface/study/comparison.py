@@ -195,7 +195,7 @@ def compare(given_designs: Sequence[object], within: Scene | None = None, names:
     stray = next((design for design in given_designs if not isinstance(design, Evaluation) and design != TODAY), None)
     allowed = f'answers, evaluations, and "{TODAY}"'
     if stray is not None:
-        raise refusal("it is no design to compare", "", "compare", type(stray).__name__, allowed, "Give answers")
+        raise refusal("it cannot be compared", "", "compare", type(stray).__name__, allowed, "Give answers")
     if not known or len(given_designs) < 2:
         raise refusal("there is nothing to compare", "", "compare", allowed=allowed, remedy="Give two designs at least")
     first = known[0]

@@ -181,7 +181,7 @@ def relaxation(answer: Solution) -> TextTable:
 def binding(answer: Solution) -> str | TextTable:
     """Limits that bind, each with its price, then those that are worth more together."""
     if not answer.binding:
-        return "No limit binds beside the sizes." if answer.rounded else "No limit binds."
+        return "No limit binds except the sizes." if answer.rounded else "No limit binds."
     lines = tuple((price.text, next(iter(price.worth)), price.reading) for price in answer.binding)
     lines += tuple((f"{named(price.limits)} together", price.figure, price.reading) for price in answer.bind_together)
     return TextTable("What binds, and what loosening it is worth", ("limit", "moves", "by"), lines)

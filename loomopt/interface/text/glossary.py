@@ -49,7 +49,7 @@ def read(job: str) -> Source:
     place = registry.find(job).resources / "sources.csv"
     if not place.is_file():
         remedy = "Where a scene's numbers come from stands in its file: see `loomopt show`"
-        raise BadInput(f"job {job} brings no printed figures", key="--sources", remedy=remedy)
+        raise BadInput(f"job {job} has no published figures", key="--sources", remedy=remedy)
     first, _, rest = place.read_text(encoding="utf-8").partition("\n")
     return Source(first.removeprefix("# "), tuple(Printed(**row) for row in csv.DictReader(rest.splitlines())))
 

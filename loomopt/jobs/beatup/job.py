@@ -76,7 +76,7 @@ class Beatup(Job):
         for name in scene.table(RetrofitTarget).weights if target == "retrofit" else ():
             if name not in VARIABLES:
                 raise BadInput(
-                    f"{name} is no design variable",
+                    f"{name} is not a design variable",
                     file=scene.origin,
                     key=f"targets.retrofit.weights.{name}",
                     allowed=", ".join(VARIABLES),

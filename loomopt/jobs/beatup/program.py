@@ -1,4 +1,4 @@
-"""From a beat-up scene and a target to the program: variables, limits, objectives and their natural sizes."""
+"""From a beat-up scene and a target to the program: variables, limits, objectives and their scales."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -233,7 +233,7 @@ class BeatupTask(Task):
         without = {row: 0.0} if self.limited["m4e"][0] == 0.0 else {}
         return Added(Value("m4e", row, size), without, INDIFFERENT if share is None else share, share is None)
 
-    # Natural sizes, from today's machine without the change from today.
+    # Scales, from today's machine without the change from today.
 
     @lazy
     def sampler(self) -> Sampler:

@@ -252,7 +252,7 @@ def _ratio(cursor: Cursor) -> int | float:
     value = cursor.number(Quantity("number"))
     if value == 0 or abs(value) > MOST_PARTS:
         allowed = f"a number but 0, at most {MOST_PARTS} in size; negative where it turns the other way"
-        raise cursor.fault("it is no ratio", cursor.raw, allowed, "Correct it")
+        raise cursor.fault("it is not a ratio", cursor.raw, allowed, "Correct it")
     return int(value) if value == int(value) else value
 
 
@@ -469,7 +469,7 @@ def _name_faults(cursor: Cursor, parts: Sequence[Part]) -> Iterator[BadInput]:
                 where = place.at(_key_of(part, name))
                 if name in others or name == FRAME_NAME:
                     description = "the frame" if name == FRAME_NAME else f"a {'link' if sort == 'joint' else 'joint'}"
-                    problem = f"{name} is {description}, and a {sort} is wanted"
+                    problem = f"{name} is {description}, but a {sort} is needed"
                     yield where.fault(problem, allowed=", ".join(known), remedy=f"Name a {sort}")
                 else:
                     yield where.unknown(sort, name, known, f"Add a part that places {name}")

@@ -1,4 +1,4 @@
-"""From a linkage scene and a target to the program: variables, limits, objectives and their natural sizes."""
+"""From a linkage scene and a target to the program: variables, limits, objectives and their scales."""
 
 import itertools
 import math
@@ -224,10 +224,10 @@ class LinkageTask(Task):
         lengths = tuple(name for name, kind in self.scene.schema.variables.items() if kind == "length")
         return [*([self.scale_move("scale", lengths)] if lengths else []), *self.axis_moves()]
 
-    # Natural sizes.
+    # Scales.
 
     def figure_size(self, name: str) -> float:
-        """Natural size of a figure: today's; of a force at an event the largest term that it is made of.
+        """Scale of a figure: today's; of a force at an event the largest term that it is made of.
 
         Where today's is only rounding, as of a machine that is balanced already, the largest figure of its kind.
         """

@@ -254,7 +254,7 @@ def _travel(cursor: Cursor, name: str, read: parts.TableEntries, known: Known) -
     side = cursor.at(sides[0])
     reference = _one_of(side, known, "event above it")
     if not known[reference].extreme or known[reference].of:
-        problem = f"a travel counts from an extreme of the output, and {reference} is none"
+        problem = f"a travel counts from an extreme of the output, and {reference} is not one"
         raise side.fault(problem, remedy='Name an event with extreme = "max" or "min"')
     rise = 1 if known[reference].extreme == "max" else -1
     before = -1 if sides[0] == "before" else 1
@@ -690,7 +690,8 @@ def _check_targets(scene: Scene, known: LinkageScene) -> None:
                 faults.add(unknown("figure or bounded number", figure, [*axes_, *bounded], scene.origin, path_))
             elif axis and sense not in axis.senses:
                 opposite = "least" if sense == "most" else "most"
-                problem = f"of {figure} the {opposite} can be sought, not the {sense}"
+                verb, way = ("maximised", "minimised") if sense == "most" else ("minimised", "maximised")
+                problem = f"{figure} cannot be {verb}, it can only be {way}"
                 faults.add(refusal(problem, scene.origin, path_, remedy=f"Write {opposite}, or choose another figure"))
         if len(dict.fromkeys(table.sought)) < len(table.sought):
             faults.add(refusal("a figure stands twice", scene.origin, key, remedy="Take one out"))

@@ -1,4 +1,4 @@
-"""From a rapier scene and a target to the program: variables, limits, objectives and their natural sizes."""
+"""From a rapier scene and a target to the program: variables, limits, objectives and their scales."""
 
 import math
 from collections.abc import Callable, Collection, Sequence
@@ -193,7 +193,7 @@ class RapierTask(Task):
         return Variable(name, *ends, self.operated_size(name), around or ends)
 
     def operated_size(self, name: str) -> float:
-        """Natural size of a number of the operation."""
+        """Scale of a number of the operation."""
         stroke = float(self.known.get("stroke", 0.0))
         if name == "stroke":
             return stroke

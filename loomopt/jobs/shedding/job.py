@@ -69,7 +69,7 @@ SAME_TURN = 1e-9
 CLOSE = 1e-9
 """Share of the largest cam force below which contact just holds."""
 GAVE_WAY = 1e-7
-"""A number that a target keeps has given way when it is off by this, in its natural size."""
+"""A number that a target keeps has given way when it is off by this, in units of its scale."""
 SAME = 1e-12
 """Share of the largest |N| by which two least values are one: rise and return mirror each other."""
 MOVES = " The moves, where not every force is known, are not judged."

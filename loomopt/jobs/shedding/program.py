@@ -376,7 +376,7 @@ class SheddingTask(Task):
         )
 
     def scale(self, name: str, ends: Ends) -> float:
-        """Variable's natural size, SI."""
+        """Variable's scale, SI."""
         if name == "K1":
             return self.sizes.stiffness
         if name in SEGMENTS:
@@ -546,7 +546,7 @@ class SheddingTask(Task):
         linear = not any(map(self.decides, self.checks)) and unique and (spring or drive.POWER not in self.scene.limits)
         return ONE_OPTIMUM if linear else ""
 
-    # Natural sizes.
+    # Scales.
 
     @lazy
     def sizes(self) -> SpringScale:
@@ -555,5 +555,5 @@ class SheddingTask(Task):
         return SpringScale(self.sampler, self.limited["X0"][1] + self.known["travel"], most)
 
     def figure_size(self, name: str) -> float:
-        """Natural size of a figure."""
+        """Scale of a figure."""
         return self.limit_size(name, 0.0) if name in CYCLE else size_read(self.sampler, name, self.scene.schema.figures)

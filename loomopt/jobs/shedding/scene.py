@@ -289,7 +289,7 @@ def check_law(scene: Scene) -> None:
     if name == "spline":
         fault = cam_spline.fault(_coefficients(scene))
         if fault:
-            raise refusal(f"the spline is no cam law: {fault}", scene.origin, "mechanism.law_coefficients")
+            raise refusal(f"the spline is not a cam law: {fault}", scene.origin, "mechanism.law_coefficients")
     elif name == "table":
         read_law(scene)
 
@@ -393,7 +393,7 @@ def read_law(scene: Scene) -> LawRead:
     try:
         return LawRead(cam_spline.tabulated(places, [s / heights[-1] for s in heights], half), read, tuple(half))
     except ValueError as error:
-        raise refusal(f"the table is no cam law: {error}", given, remedy="Correct the table") from None
+        raise refusal(f"the table is not a cam law: {error}", given, remedy="Correct the table") from None
 
 
 def _steps(heights: Sequence[float], angles: Sequence[float]) -> Iterator[tuple[float, float, float, float]]:

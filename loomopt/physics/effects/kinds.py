@@ -435,7 +435,7 @@ class StatePeak(NamedTuple):
 
 def no_oscillator(at: Inputs[None]) -> "SteadyOscillator":
     """Raise LookupError: no load with corners is carried."""
-    raise LookupError("the state answers no load with corners")
+    raise LookupError("the state cannot carry a load with corners")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -685,7 +685,9 @@ def faults(active: Mapping[Effect, Table]) -> Iterator[Fault]:
         carried = effect.carries if isinstance(effect, State) else ()
         for load in active:
             if isinstance(load, Load) and load.name in carried and load.corners and not load.response:
-                problem = f"effect {effect.name} carries {load.name}, which has corners: its answer has no closed form"
+                problem = (
+                    f"effect {effect.name} carries {load.name}, which has corners: its response has no closed form"
+                )
                 yield Fault(effect, load.name, False, problem)
         for clash in effect.clashes:
             if clash.effect in tables:

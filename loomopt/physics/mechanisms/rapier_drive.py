@@ -327,7 +327,7 @@ def fault(dimensions: Dimensions, shown: ShowValue = usual) -> str:
         return "every length and ratio must be greater than 0"
     four_bar = crank_rocker.fault(d.l1, d.l2, d.l3, d.l71, shown=shown)
     if four_bar:
-        return f"the sley four-bar is no crank-rocker: {four_bar.replace('l4', 'l71')}"
+        return f"the sley four-bar is not a crank-rocker: {four_bar.replace('l4', 'l71')}"
     phi1 = _angles(d)
     span = _span(d, phi1)
     locks = []

@@ -313,9 +313,9 @@ def _is_there(candidate: Candidate, best: Candidate) -> bool:
 def _sought(search: Search) -> str:
     """Extent of the search, as a sentence that claims no more than was done."""
     if search.stayed:
-        return "Solved again near the answer given; other basins were not looked at."
+        return "Solved again near the given answer; other basins were not searched."
     if search.program.single:
-        return f"No other basin was looked for: {search.program.single}."
+        return f"Other basins were not searched: {search.program.single}."
     solves, optima = len(search.candidates), len(_optima(search))
     reached = f"{solves} solve{'s' if solves > 1 else ''}"
     ended = f"Best of {optima} optima" if optima > 1 else "The only optimum"
@@ -402,7 +402,7 @@ def _little(formatter: UnitFormatter, comparison: Alternative, answer: Solution)
 
 def _left_open(certificate: Certificate) -> str:
     """Sentence that names the variables of which other values are as good; "" for none."""
-    return f"Left open, for others are as good: {', '.join(certificate.open)}." if certificate.open else ""
+    return f"Other values are equally good for: {', '.join(certificate.open)}." if certificate.open else ""
 
 
 def prices(formatter: UnitFormatter, certificate: Certificate) -> tuple[Price, ...]:

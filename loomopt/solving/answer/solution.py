@@ -423,9 +423,9 @@ class Rounded(NamedTuple):
 
     sizes: least and largest of each number's sizes, SI, and how many; points: of the lattice; admissible: those that
     keep every limit, reaching: those of them that reach the goals, where all were looked at; boxes: solves of a branch
-    and bound, 0 where all were; gap: what the boxes left open may still be better by, in natural sizes of the first
-    level that they differ in; nominal: the optimum without sizes; rests: what the claim that nothing on the lattice is
-    better rests on.
+    and bound, 0 where all were; gap: what the boxes left open may still be better by, in units of the scale of the
+    first level that they differ in; nominal: the optimum without sizes; rests: what the claim that nothing on the
+    lattice is better rests on.
     """
 
     sizes: Mapping[str, tuple[float, float, int]]

@@ -134,7 +134,7 @@ def _no_number(error: Exception, by: str, clear: bool) -> Certificate:
     """Certificate of a design at which a quantity has no value."""
     bad_input = blamed(error)
     why = f": {bad_input.problem}" if isinstance(bad_input, BadInput) else f" ({type(error).__name__})"
-    reason = f"a value or a slope is no number here{why}"
+    reason = f"a value or a slope is not a number here{why}"
     return Certificate(False, (reason,), (), math.inf, math.inf, False, False, by=by, clear=clear)
 
 
@@ -345,7 +345,7 @@ def _design_reasons(local: Local, feasibility: float) -> Iterator[str]:
     """Yield the reasons against the design itself."""
     sizes = {v.name: v.scale for v in local.program.variables}
     if max((abs(x) / sizes[name] for name, x in local.x.items() if name in sizes), default=0.0) > LARGEST_VARIABLE:
-        yield "the design is out of all proportion: slopes cannot be trusted here"
+        yield "the numbers of the design differ too much in size for reliable slopes"
     if not feasibility <= FEASIBLE:
         worst = max(range(len(local.active.excess)), key=lambda k: local.active.excess[k])
         yield f"limit {local.program.limits[worst].name} is exceeded by {feasibility:.2g} of its size"
@@ -354,9 +354,9 @@ def _design_reasons(local: Local, feasibility: float) -> Iterator[str]:
 def _cycle_reasons(cycle: WholeCycle, accuracy: float) -> Iterator[str]:
     """Yield the reasons from the check of the whole cycle."""
     if not cycle.violation <= accuracy:
-        yield f"a whole-cycle value is exceeded by {cycle.violation:.2g} between refined points"
+        yield f"a whole-cycle limit is exceeded by {cycle.violation:.2g} between refined points"
     if cycle.bound == "violated":
-        yield "a whole-cycle value is exceeded somewhere between refined points"
+        yield "a whole-cycle limit is exceeded somewhere between refined points"
 
 
 def _optimality_reasons(levels: Sequence[CertifiedLevel]) -> Iterator[str]:
@@ -367,7 +367,7 @@ def _optimality_reasons(levels: Sequence[CertifiedLevel]) -> Iterator[str]:
         if not level.complementarity <= COMPLEMENTARY:
             yield f"a limit that is not met exactly carries a price: {level.complementarity:.2g}"
         if level.price > LARGEST_PRICE:
-            yield f"the price of limit {level.dearest} is without measure: {level.price:.2g}, no KKT point"
+            yield f"the price of limit {level.dearest} is too large: {level.price:.2g}, no KKT point"
     falling = [
         judged_level.level.objective
         for judged_level in levels

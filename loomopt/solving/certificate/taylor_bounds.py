@@ -30,7 +30,7 @@ NEAR_TOP = 1.5
 Proofs of all packaged scenes take a tenth more readings with 0.5, tops inside a box alone; with 1 to 6 as many."""
 
 CycleRow = tuple[str, float, Where | None]
-"""A whole-cycle quantity, its natural size, and the pieces where it counts."""
+"""A whole-cycle quantity, its scale, and the pieces where it counts."""
 
 
 class CycleBound(NamedTuple):

@@ -101,7 +101,7 @@ class Point:
     nodes: tuple[tuple[Extreme, ...], ...] = ()
     violation: float = math.inf
     extra: Floats = field(default_factory=lambda: np.zeros(0), compare=False)
-    """The epigraph variables, or the excesses of an elastic solve, in natural sizes."""
+    """The epigraph variables, or the excesses of an elastic solve, in units of the scale."""
     multipliers: Multipliers = field(default_factory=Multipliers, compare=False)
     build_seconds: float = 0.0
     binding: tuple[tuple[Extreme, ...], ...] = ()

@@ -148,9 +148,7 @@ class EventBox:
         ends = sorted((float(zone.low.min()), float(zone.high.max())) for zone in zones)
         gaps = [(a[1], b[0]) for a, b in itertools.pairwise(ends)] + [(ends[-1][1], ends[0][0] + TURN)]
         if any(begin > end for begin, end in gaps):
-            raise OpenError(
-                "two turns of the output are too close to each other to be told apart within the tolerances"
-            )
+            raise OpenError("two turns of the output are too close to each other to be separated within the tolerances")
         rates = self.following.turns[0].rates
         for gap in gaps:
             self._clear(

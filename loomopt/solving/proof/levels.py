@@ -25,9 +25,9 @@ from loomopt.solving.proof.tree import Question, Tree, grown, multipliers
 from loomopt.solving.search.search import Search, certify_best, compare, solve_from
 
 HELD = SAME_OBJECTIVE
-"""What an earlier level's objective may exceed the answer's by, natural size: that much counts as the same optimum."""
+"""What an earlier level's objective may exceed the answer's by, scale: that much counts as the same optimum."""
 LEAST_SIZE = 1e-3
-"""Share of its natural size below which an optimum is as good as 0: the gap is then relative to that share."""
+"""Share of its scale below which an optimum is as good as 0: the gap is then relative to that share."""
 
 LOOKED_AT = 16
 """Promising middles of a batch that are judged as designs, each of which takes a millisecond."""

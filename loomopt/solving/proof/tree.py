@@ -16,7 +16,7 @@ from loomopt.physics.tolerances import ACTIVE, FEASIBLE
 from loomopt.solving.proof.reading import LIMIT, LateError, Read, Reader
 
 WEIGHT = 100.0
-"""Weight of the sum of an objective's multipliers, which is 1, against slopes of natural size."""
+"""Weight of the sum of an objective's multipliers, which is 1, against scaled slopes."""
 USED = 1e-9
 """Multiplier below which a row says nothing."""
 
@@ -94,7 +94,7 @@ ROOM = 1e-14
 class Tree:
     """State of a search.
 
-    low, high: (names, boxes) of open boxes; least: what the objective is at least in each, natural size; boxes: how
+    low, high: (names, boxes) of open boxes; least: what the objective is at least in each, scale; boxes: how
     many were read; stuck: the least of those that are too small to halve.
     """
 

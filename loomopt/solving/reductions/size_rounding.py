@@ -41,9 +41,9 @@ MOST_POINTS, BLOCK = 10_000_000, 2**16
 MOST_BOXES = 600
 """Boxes of sizes that are solved at most."""
 AFFINE = 1e-9
-"""Natural size of a level within which it is zero where a straight line says so."""
+"""Scale of a level within which it is zero where a straight line says so."""
 AGREES = 1e-7
-"""Share of its natural size by which a level read on the lattice and as solved may differ."""
+"""Share of its scale by which a level read on the lattice and as solved may differ."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,8 @@ class SizeRounding:
     def apply(self, task: Task) -> Task:
         """Task without sizes. Raises BadInput for sizes that are none."""
         if task.global_proof:
-            remedy = "Leave out the proof: an answer in sizes says what of the lattice was read"
-            raise refusal("sizes and the global proof cannot be combined", "", "round_to", remedy=remedy)
+            remedy = "Leave out --global: a rounded answer reports what was checked on the lattice"
+            raise refusal("--global cannot be combined with --round", "", "round_to", remedy=remedy)
         read_sizes(task.scene, self.steps)
         return task.at("solving without sizes")
 
@@ -83,7 +83,7 @@ class SizeRounding:
             return replace(answer, scene=task.scene, sentences=sentences)
         _check_goals(lattice, nominal, answer)
         if best.levels and not _agree(lattice, answer, best):
-            sentences = Sentences("What was read on the lattice and what was solved there differ; please report it.")
+            sentences = Sentences("The values read and the values solved on the lattice differ; please report it.")
             return replace(answer, status="uncertified", sentences=sentences, scene=task.scene)
         return _explain(lattice, answer, nominal, best)
 
@@ -136,12 +136,12 @@ def read_sizes(scene: Scene, given: Mapping[str, object] | None) -> dict[str, tu
     steps, stock = numbers.sizes(source)
     if not steps and not stock:
         remedy = "Write --round l1=0.5mm, or add [steps] to the scene"
-        raise refusal("nothing says which sizes there are", source.origin, "round_to", remedy=remedy)
+        raise refusal("no sizes are given", source.origin, "round_to", remedy=remedy)
     grids: dict[str, tuple[float, ...]] = {}
     scene_steps = numbers.sizes(scene).steps
     for number in dict.fromkeys((*steps, *stock)):
         if number in stock and number in steps:
-            problem = f"{number} has a step and sizes in stock, of which only one can count"
+            problem = f"{number} has both a step and stock sizes"
             remedy = f"Take steps.{number} or stock.{number} out of the file"
             if number not in scene_steps:
                 remedy = f"Leave {number} out of --round, or take stock.{number} out of the file"
@@ -167,7 +167,7 @@ def read_sizes(scene: Scene, given: Mapping[str, object] | None) -> dict[str, tu
 
 
 class Best(NamedTuple):
-    """The best point, SI by number, and how it was found; levels: what it is worth there, in natural sizes."""
+    """The best point, SI by number, and how it was found; levels: what it is worth there, in units of the scale."""
 
     point: Mapping[str, float] | None
     admissible: int | None
@@ -451,7 +451,7 @@ def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) 
     size_text = ", ".join(f"{name} {words.shown(name, value)}" for name, value in (best.point or {}).items())
     texts = [f"Sizes: {size_text}.", report.cost_sentence("They cost", answer, nominal, words, AGREES)]
     if best.boxes and best.gap:
-        texts.append(f"Others on the lattice of {lattice.points} points may be better by {best.gap:.2g} natural sizes")
+        texts.append(f"At most {100 * best.gap:.2g} % better may exist on the lattice of {lattice.points} points")
         texts[-1] += f": {best.boxes} boxes were solved."
     else:
         counts = "" if best.admissible is None else f", {best.admissible} of which keep all limits"
@@ -463,7 +463,7 @@ def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) 
     binding = tuple(price for price in answer.binding if price.limit not in lattice.sizes)
     together = tuple(price for price in answer.bind_together if not {*price.limits} & {*lattice.sizes})
     figures = {**answer.figures, **{name: here.figures[name] for name in ("change",) if name in answer.figures}}
-    stops = report.stops(binding, together) if binding else "No limit binds beside the sizes."
+    stops = report.stops(binding, together) if binding else "No limit binds except the sizes."
     sentences = report.explained(answer, *texts)._replace(limits=stops)
     result = replace(answer, scene=scene, limits=here.limits, binding=binding, bind_together=together, figures=figures)
     return replace(result, sentences=sentences, rounded=rounded)

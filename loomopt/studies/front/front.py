@@ -79,18 +79,18 @@ def trade(
     ranges = {current(name, former): ends for name, ends in (ranges or {}).items()}
     stray = [name for name in (*maximise, *minimise, *ranges) if name not in axes]
     if stray:
-        remedy = "Name one of them, or trade it."
-        raise BadInput(f"{stray[0]} is none of both axes", key=stray[0], allowed=", ".join(axes), remedy=remedy)
+        remedy = "Name one of the two axes."
+        raise BadInput(f"{stray[0]} is not one of the two axes", key=stray[0], allowed=", ".join(axes), remedy=remedy)
     allowed = f"a whole number from {FEWEST} to {numbers.MOST_VALUES}"
     count = POINTS if points is None else arguments.whole(points, "points", allowed, "Correct the number")
     if not FEWEST <= count <= numbers.MOST_VALUES:
-        problem = "a front needs more points" if count < FEWEST else "a front has no such number of points"
+        problem = "a front needs more points" if count < FEWEST else "the number of points is out of range"
         raise BadInput(problem, key="points", value=shown(points), allowed=allowed, remedy="Correct the number.")
     for name, (low, high) in ranges.items():
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             value, allowed = f"{low:g}:{high:g} in SI", "the smaller end, then the larger one"
             raise BadInput(
-                "a range goes from less to more",
+                "the first end of a range must be smaller",
                 key=name,
                 value=value,
                 allowed=allowed,

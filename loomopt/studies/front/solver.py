@@ -45,7 +45,7 @@ ENDS = {-1: "min", 0: "fixed", 1: "max"}
 
 def capped(axis: Traded) -> str:
     """Name of the limit on an axis."""
-    return f"{axis.axis.name} at most as asked"
+    return f"{axis.axis.name} at most at its limit"
 
 
 class Subproblem(NamedTuple):
@@ -341,7 +341,7 @@ class Solver:
         for axis, cap in zip(self.axes, request.caps, strict=True):
             size = axis.objective.scale
             if cap is not None and axis.objective.merit(sampler) / size > cap / size + FEASIBLE:
-                return f"{axis.axis.name} comes out above what was asked"
+                return f"{axis.axis.name} comes out above its limit"
         return ""
 
     def _figure(self, axis: Traded, program: Program, x: Mapping[str, float]) -> float:

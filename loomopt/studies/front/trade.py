@@ -256,9 +256,9 @@ class Trade:
             row, sense = rows[end], self.senses[end]
             x = row.warm["point"]["x"] if "point" in row.warm else {}
             away = self.solver.runaway(x) if x else ""
-            why = f"{away} grows without end towards it" if away else "the search runs away from any design"
+            why = f"{away} grows without limit" if away else "the search diverges"
             if x and not away and not row.certified and (away := self.solver.unstopped(x)):
-                why = f"{away} goes as far towards it as it may be, and no limit stops it"
+                why = f"{away} reaches an end of its range, where no limit stops it"
             if away or row.reason == DIVERGED:
                 raise BadInput(
                     f"the {sense} {name} is not reached: {why}",
@@ -487,7 +487,7 @@ def _with_levels_checked(result: Reached, higher_levels: Sequence[float]) -> Rea
     if result.certified and any(
         level > best_level + plan.ALIKE for level, best_level in zip(levels, higher_levels, strict=True)
     ):
-        return Reached("infeasible", "what the target holds is out of reach here")
+        return Reached("infeasible", "the target's demands cannot be met here")
     return result
 
 

@@ -94,15 +94,17 @@ class BackOff:
         """Task of the nominal machine. Raises BadInput for a back-off that is none."""
         if self.sigmas is not None and self.share is not None:
             remedy = "Give one of them"
-            raise refusal("--robust and --yield say the same twice", "", "robust", self.sigmas, remedy=remedy)
+            raise refusal("--robust and --yield cannot be combined", "", "robust", self.sigmas, remedy=remedy)
         if self.sigmas is not None:
             allowed, remedy = f"more than 0, at most {MOST_SIGMAS:g} standard deviations", "Write --robust 3"
             if not 0.0 < arguments.number(self.sigmas, "robust", allowed, remedy) <= MOST_SIGMAS:
-                raise refusal("there is no such back-off", "", "robust", self.sigmas, allowed, remedy)
+                raise refusal(
+                    "the number of standard deviations is out of range", "", "robust", self.sigmas, allowed, remedy
+                )
         if self.share is not None:
             allowed, remedy = "a share of all machines between 0 and 1", "Write --yield 0.99"
             if not 0.0 < arguments.number(self.share, "min_yield", allowed, remedy) < 1.0:
-                raise refusal("there is no such yield", "", "min_yield", self.share, allowed, remedy)
+                raise refusal("the yield is out of range", "", "min_yield", self.share, allowed, remedy)
         plan_tolerance(task.scene, None, task.target)
         return replace(task, global_proof=None)
 
@@ -117,7 +119,7 @@ class BackOff:
         plan = request.plan(answer, {})
         start = Pass(answer, plan, margins(plan))
         if not any(margin.sigma for margin in start.margins if not margin.fixed):
-            problem = "no limit of a figure moves with what [tolerances] names, so that there is nothing to back off"
+            problem = "the numbers in [tolerances] change no limited figure, so that there is nothing to back off"
             remedy = "Give more numbers a tolerance, or take it off"
             raise refusal(problem, task.scene.origin, "tolerances", remedy=remedy)
         request.say("drawing machines of the optimum")
@@ -442,7 +444,8 @@ def _sentences(scene: Scene, ended: Pass, answer: Solution, robust: Robust) -> l
         f"All limits hold on {_percent(now)} of the machines instead of {100 * was.value:.4g} %.",
     ]
     if robust.exempt:
-        sentences.append(f"Nothing backs off {', '.join(robust.exempt)}: an equality or a goal, kept as it is.")
+        verb = "is a target and has" if len(robust.exempt) == 1 else "are targets and have"
+        sentences.append(f"{', '.join(robust.exempt)} {verb} no margin.")
     if robust.corners:
         holds = ", ".join(f"{name} on {_percent(robust.yields[name])}" for name in robust.corners)
         sentences.append(
@@ -512,7 +515,7 @@ def _narrow(request: Request, here: Pass, name: str, width: float, needed: float
 def _fixed(here: Pass) -> str:
     """Phrase of the sides that no back-off can move."""
     fixed = ", ".join(dict.fromkeys(margin.name for margin in here.margins if margin.fixed))
-    return f"nothing backs off {fixed}" if fixed else f"no more than {MOST_SIGMAS:g} sigma are tried"
+    return f"no margin for {fixed}" if fixed else f"no more than {MOST_SIGMAS:g} sigma are tried"
 
 
 def _most(request: Request, largest: Yield, here: Pass, obstacle: str) -> Solution:
@@ -520,7 +523,7 @@ def _most(request: Request, largest: Yield, here: Pass, obstacle: str) -> Soluti
     least = 100 * (request.back_off.share or 0.0)
     problem = (
         f"{least:.6g} % of the machines cannot hold all limits: the most that was found is "
-        f"{_percent(largest)}, the yield of the design shown, with {_backed(here)}. In the way of more: "
+        f"{_percent(largest)}, the yield of the design shown, with {_backed(here)}. Obstacle to a higher yield: "
         f"{obstacle or f'{TRIALS} back-offs were tried'}. Tighten the tolerances, widen the limits or ask for less."
     )
     return _uncertified(request, here.answer, "infeasible", problem)

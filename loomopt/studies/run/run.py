@@ -44,7 +44,7 @@ def workers(count: int) -> Callable[[], Executor]:
     remedy = "Write as many as the machine has cores"
     if not 1 <= arguments.whole(count, "workers", f"1 to {MOST_WORKERS}", remedy) <= MOST_WORKERS:
         raise BadInput(
-            "there can be no such number of workers",
+            "the number of workers is out of range",
             key="workers",
             value=shown(count),
             allowed=f"1 to {MOST_WORKERS}",
@@ -405,7 +405,12 @@ class WorkerPool:
             if not isinstance(executor, Executor):
                 remedy = "Give a function that makes one, such as lambda: ThreadPoolExecutor(2)"
                 raise refusal(
-                    "what it makes is no executor", "", "executor", executor, "any of concurrent.futures", remedy
+                    "the function does not make an executor",
+                    "",
+                    "executor",
+                    executor,
+                    "any of concurrent.futures",
+                    remedy,
                 )
             self.executor = executor
         assert self.executor

@@ -108,10 +108,10 @@ class Store:
             self._file.execute(f"PRAGMA application_id = {APPLICATION}")
             self._file.execute(f"PRAGMA user_version = {VERSION}")
         elif head != (APPLICATION, VERSION):
-            raise BadInput("the file is no store of this version", file=str(self.path), key="store", remedy=_OTHER)
+            raise BadInput("the file is not a store of this version", file=str(self.path), key="store", remedy=_OTHER)
         elif stored != TABLES:  # a view or a trigger would be run whenever a row is read or written
             names = sorted({*stored, *TABLES} - {name for name, table in TABLES.items() if stored.get(name) == table})
-            problem = f"it holds what no store holds: {', '.join(names)}"
+            problem = f"it has tables that no store has: {', '.join(names)}"
             raise BadInput(problem, file=str(self.path), key="store", remedy=_OTHER)
 
     @contextlib.contextmanager
@@ -154,7 +154,7 @@ class Store:
             records = self._file.execute("SELECT key, told FROM study ORDER BY rowid").fetchall()
         read = {key: _read_description(description) for key, description in records}
         if not all(read.values()):
-            raise BadInput("what it says of a study is damaged", file=str(self.path), key="store", remedy=_OTHER)
+            raise BadInput("its description of a study is damaged", file=str(self.path), key="store", remedy=_OTHER)
         return read
 
     def rows(self, key: str) -> list[Row]:
@@ -172,7 +172,7 @@ class Store:
             with contextlib.suppress(ValueError, RecursionError):
                 record = {name: _read(cell) for name, cell in zip(COLUMNS, values, strict=True)}
         if not record or not all(holds(record[name]) for name, holds in KINDS.items()):
-            problem = f"the row of point {shown(values[0])} is damaged: it is not as it was written"
+            problem = f"the row of point {shown(values[0])} is damaged"
             remedy = (
                 f"{_OTHER}, or take the row out (DELETE FROM row WHERE point = {shown(values[0])}): it is solved again"
             )

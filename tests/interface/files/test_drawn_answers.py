@@ -57,7 +57,7 @@ def test_a_design_that_breaks_limits_is_exported_as_such(nearest, tmp_path, caps
     assert said.startswith("beatup: nearest design for balance; limits not held: ")
     assert run([*arguments, "--set", "limits.swing.max=30 deg"]) == 0
     said = title((tmp_path / "a.svg").read_text(encoding="utf-8"))
-    assert said.startswith("beatup: a given design; limits not held: "), "in another scene it is no answer"
+    assert said.startswith("beatup: a given design; limits not held: "), "in another scene it is not an answer"
 
 
 def test_every_file_that_is_asked_for_is_written_or_a_second_one_refused(tmp_path, capsys):

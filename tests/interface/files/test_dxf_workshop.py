@@ -85,7 +85,7 @@ def test_biarcs_of_a_circle_are_the_circle(tolerance):
         ({"version": "r13"}, "r2010, r12"),
         ({"arcs": "0.001 mm"}, "too small"),
         ({"arcs": "1 kg"}, "length"),
-        ({"only": "nose"}, "no such layer"),
+        ({"only": "nose"}, "does not have this layer"),
     ],
 )
 def test_what_cannot_be_written_is_refused(tmp_path, options, told):

@@ -37,7 +37,7 @@ def test_an_answer_comes_back_as_it_was(answer, tmp_path):
     [
         ({"design": {"K1": 2e5, "X0": 0.08}}, "for its design, the file says"),
         ({"design": {"K1": 9e4, "X0": 0.08}}, "does not hold"),
-        ({"certificate": None}, "no certificate"),
+        ({"certificate": None}, "its certificate has not passed"),
     ],
 )
 def test_what_does_not_agree_is_doubted(answer, change, doubt, tmp_path):

@@ -181,9 +181,9 @@ def test_one_page_holds_an_answer_with_stores_and_studies(files, tmp_path, monke
         (["beatup", "a.json", "damaged.json"], "damaged.json"),
         (["beatup", "shedding", "--study", "tolerance"], "no number of the scene has a tolerance"),
         (["shedding", "rapier", "--study", "budget"], "no effect acts on the crank"),
-        (["beatup", "sweep.db", "--target", "pulse"], "judged as it was found"),
+        (["beatup", "sweep.db", "--target", "pulse"], "has its own scene and target"),
         (["beatup", "shedding", "--target", "pulse"], "pulse"),
-        (["sweep.db", "front.db", "--study", "budget"], "have no studies beside them"),
+        (["sweep.db", "front.db", "--study", "budget"], "cannot be used with a store"),
     ],
 )
 def test_all_inputs_are_checked_before_anything_is_computed(files, inputs, told, tmp_path, monkeypatch, capsys):

@@ -97,7 +97,7 @@ def test_a_job_without_sources_says_so(monkeypatch, capsys):
     assert run(["show", "beatup", "--sources"]) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    assert "no printed figures" in err
+    assert "no published figures" in err
 
 
 def test_a_scene_of_one_s_own_shows_nobody_s_figures(tmp_path, capsys):
@@ -105,7 +105,7 @@ def test_a_scene_of_one_s_own_shows_nobody_s_figures(tmp_path, capsys):
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
     assert run(["show", str(tmp_path / "mine.toml"), "--sources"]) == 0
     out = capsys.readouterr().out
-    assert "no printed figures" in out
+    assert "no published figures" in out
     assert not [each.key for each in glossary.read("beatup").figures if each.key in out]
     assert run(["show", "beatup", "--set", "operation.M0=700 N*m", "--sources"]) == 0
     assert "beta_reference" in capsys.readouterr().out

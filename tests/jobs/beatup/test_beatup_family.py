@@ -201,7 +201,7 @@ def test_bad_input_is_one_message_with_its_key(change, key):
     ],
 )
 def test_what_a_family_does_not_answer_is_said_in_one_line(ask):
-    with pytest.raises(BadInput, match="a family is solved and swept"):
+    with pytest.raises(BadInput, match="a family can only be solved and swept"):
         ask(family((600, 700)))
 
 

@@ -149,7 +149,7 @@ def solved_with(scene, target, limit, side, value):
 
 
 def program_value(program, name, sign, value):
-    """Return the first objective, in its natural size, of a program with one limit put where no scene can put it."""
+    """Return the first objective, in units of its scale, of a program with one limit put where no scene can put it."""
     limits = [dataclasses.replace(k, value=value) if (k.name, k.sign) == (name, sign) else k for k in program.limits]
     moved = dataclasses.replace(program, limits=tuple(limits))
     point = exchange.solve(moved, moved.starts[0], Settings())

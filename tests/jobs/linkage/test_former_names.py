@@ -55,7 +55,7 @@ def test_a_scene_that_uses_the_former_name_is_the_scene_that_uses_the_name(place
 
 def test_most_of_a_former_name_is_refused_by_the_name():
     place = changed(PLACES[3], {})
-    with pytest.warns(FormerNameWarning), pytest.raises(BadInput, match=r"of moment\.front the least can be sought"):
+    with pytest.warns(FormerNameWarning), pytest.raises(BadInput, match=r"moment\.front cannot be maximised"):
         registry.scene(raw(named(place, "force.front")))
 
 

@@ -72,7 +72,7 @@ MISTAKES = [
     (
         {"targets": {"balance": {"least": None, "most": ["peak_torque"]}}},
         "targets.balance.most",
-        "the least can be sought",
+        "it can only be minimised",
     ),
     ({"targets": {"balance": {"least": []}}}, "targets.balance", "nothing to optimise"),
     ({"targets": {"balance": {"least": ["swing", "swing"]}}}, "targets.balance", "stands twice"),

@@ -77,7 +77,7 @@ CASES = {
     "retrofit": (SIX, six_bar(change, balanced=True, resting=True), (), 0.1, 0.05111270929),
     "press": (PRESS, press, (), 8000.0, 6721.970155),
 }
-"""Scene, formulas, held numbers that are freed, natural size and what loomopt comes to."""
+"""Scene, formulas, held numbers that are freed, scale and what loomopt comes to."""
 
 
 def box(scene, freed):

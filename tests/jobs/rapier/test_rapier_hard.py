@@ -111,7 +111,7 @@ TABLES = {
     "row cut short": ("phi1 [deg],S [mm]\n" + ROWS + "120\n", "line 14, column S: the cell is empty"),
     "three rows": ("phi1 [deg],S [mm]\n0,0\n90,400\n180,850\n", "3 rows"),
     "empty": ("", "empty"),
-    "missing": (None, "no such file"),
+    "missing": (None, "does not exist"),
 }
 
 

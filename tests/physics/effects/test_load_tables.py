@@ -96,7 +96,7 @@ def test_setting_a_table_takes_the_place_of_the_pulse_and_back(resisted):
         ("angle [deg],M [N*m]\n0,1\n5,2\n", "2 rows"),
         ("angle [deg],M [N*m]\n0,1\n5,2\n9,1\n", "mark both as corners"),
         ("angle [deg],M [N*m],corner\n0,1,1\n5,2,\n9,1,yes\n", 'line 4, column corner: "yes" is no mark'),
-        ("angle [deg],M [N]\n0,1\n5,2\n9,1\n", 'line 1, column M: "N" is no unit of this column'),
+        ("angle [deg],M [N]\n0,1\n5,2\n9,1\n", 'line 1, column M: "N" is not a unit of this column'),
         ("angle [deg],T [N*m]\n0,1\n5,2\n9,1\n", "no column M [(]line 1: holds"),
     ],
 )

@@ -45,7 +45,7 @@ def test_curves_show_frame_and_cam_apart():
 
 
 def test_curves_of_flight_are_not_thinned():
-    with pytest.raises(BadInput, match="as few rows"):
+    with pytest.raises(BadInput, match="the accuracy of curves"):
         lo.simulate(SLOW, accuracy=1e-6)
 
 

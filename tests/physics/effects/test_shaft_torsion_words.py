@@ -87,7 +87,9 @@ def test_a_load_with_corners_that_no_oscillator_answers_is_not_carried():
     dumb = replace(resistance, response=None)
     on = [known["inertia"], dumb, known["shaft_torsion"]]
     (fault,) = faults({effect: effect.table(**effect.examples[0]) for effect in on})
-    assert fault.problem == "effect shaft_torsion carries resistance, which has corners: its answer has no closed form"
+    assert (
+        fault.problem == "effect shaft_torsion carries resistance, which has corners: its response has no closed form"
+    )
 
 
 def test_a_machine_too_sharp_for_harmonics_is_refused():

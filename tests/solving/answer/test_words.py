@@ -130,7 +130,7 @@ def test_a_relaxation_says_how_far_a_limit_must_give_way(words, sign, need, side
     ],
 )
 def test_more_than_three_widths_are_out_of_proportion(words, name, sign, value, need, fair):
-    """Bounds of 5 mm by their width, a figure by its limit, and what should vanish by its natural size (50 N m)."""
+    """Bounds of 5 mm by their width, a figure by its limit, and what should vanish by its scale (50 N m)."""
     found = words.relaxation(limit(name, sign, value, scale=50.0), need, alone=True)
     assert found.in_proportion == fair
     assert found.text.endswith(")" if fair else ", out of proportion)")

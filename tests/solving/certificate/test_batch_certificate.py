@@ -33,7 +33,7 @@ def optimum(job, target):
 
 
 def beside(program, x, share, count):
-    """Return an optimum and designs around it, all off by a share of natural sizes."""
+    """Return an optimum and designs around it, all off by a share of scales."""
     drawn = np.random.default_rng(1).standard_normal((count, len(program.variables)))
     moved = [
         {

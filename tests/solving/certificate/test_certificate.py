@@ -57,7 +57,7 @@ def test_a_limit_exceeded_by_a_millionth_is_seen(best, name, step):
     design = best[600] | {name: best[600][name] + step, "r4e": 0.08}
     certificate = judged(scene_of(600), "balance", design)
     refused(certificate, " is exceeded by ")
-    assert certificate.feasibility >= 1e-7, "a hundred times what is allowed, whatever a row's natural size"
+    assert certificate.feasibility >= 1e-7, "a hundred times what is allowed, whatever a row's scale"
 
 
 def test_a_figure_exceeded_by_a_millionth_is_seen(best):
@@ -286,7 +286,7 @@ def test_a_point_that_is_no_number_never_passes(bad):
 
 
 def leaning(price):
-    """Return: least price · x − y² held by x ≥ 0 (in its natural size), at 0."""
+    """Return: least price · x − y² held by x ≥ 0 (in units of its scale), at 0."""
     return toy.program("xy", {"f": lambda v: price * v["x"] + v["y"] ** 2}, limits=(("x", -1, 0.0),))
 
 
@@ -295,7 +295,7 @@ def test_a_price_beyond_measure_is_no_kkt_point(price, passes):
     certificate = certify(leaning(price), {"x": 0.0, "y": 0.0}, ACCURACY)
     assert certificate.passed == passes
     if not passes:
-        refused(certificate, "the price of limit x is without measure: 1")
+        refused(certificate, "the price of limit x is too large: 1")
 
 
 @pytest.mark.parametrize(("far", "passes"), [(0.99e8, True), (1.01e8, False)])

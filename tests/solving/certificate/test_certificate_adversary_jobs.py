@@ -40,7 +40,7 @@ def optimum(name):
 
 
 def objectives(program, x):
-    """Return a design's objectives, in order, in their natural sizes."""
+    """Return a design's objectives, in order, in units of their scale."""
     sampler = sampler_at(program, x)
     assert sampler is not None
     found = []
@@ -51,7 +51,7 @@ def objectives(program, x):
 
 
 def nudged(program, x, name, share):
-    """Return x with one variable off by a share of itself, or of its natural size where it is 0."""
+    """Return x with one variable off by a share of itself, or of its scale where it is 0."""
     size = next(v.scale for v in program.variables if v.name == name)
     return x | {name: x[name] + share * (abs(x[name]) or size)}
 

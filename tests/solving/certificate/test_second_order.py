@@ -91,7 +91,7 @@ def test_the_certificate_tells_the_first_step_and_its_length():
     program = toy.program("xy", {"f": lambda v: (v["x"] - 1) ** 2 + v["y"] ** 2}, sizes={"x": 4.0})
     certificate = certify(program, {"x": 1 + 4e-8, "y": 0.0}, 1e-8)
     assert certificate.correction == pytest.approx({"x": -4e-8, "y": 0.0}, rel=1e-8, abs=1e-18)
-    assert certificate.step == pytest.approx(1e-8, rel=1e-6), "in natural sizes"
+    assert certificate.step == pytest.approx(1e-8, rel=1e-6), "in units of the scale"
     assert certificate.error == pytest.approx(1e-8, rel=1e-6)
 
 

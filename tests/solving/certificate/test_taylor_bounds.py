@@ -172,7 +172,7 @@ def test_a_spike_between_the_samples_is_refuted_and_the_certificate_says_so(wave
     assert status == "violated"
     assert certificate.violation <= ACCURACY, "the dense scan misses it too"
     assert not certificate.passed
-    assert certificate.reasons == ("a whole-cycle value is exceeded somewhere between refined points",)
+    assert certificate.reasons == ("a whole-cycle limit is exceeded somewhere between refined points",)
     assert certificate.whole_cycle == "refined"
 
 

@@ -29,7 +29,7 @@ def local_by(derivatives, program, x):
 
 @both
 def test_third_derivatives_of_polynomials(derivatives):
-    """x² y along x, then x and y; natural sizes 2 and 3 count."""
+    """x² y along x, then x and y; scales 2 and 3 count."""
     program = toy.program("xy", {"f": lambda v: v["x"] ** 2 * v["y"] + v["y"] ** 5}, sizes={"x": 2.0, "y": 3.0})
     found = local_by(derivatives, program, {"x": 0.3, "y": 0.4}).derivatives
     thirds, errors = found.thirds(np.array([1.0, 0.0]), np.eye(2))

@@ -11,7 +11,7 @@ def test_a_solve_ends_three_decades_below_what_is_promised():
     assert [said[name] for name in TOLERANCES] == [1e-11, 1e-11, 1e-11, 1e-9]
     assert said["bound_relax_factor"] == 0.0, "no limit is loosened"
     assert said["acceptable_iter"] == 0, "nothing less is taken"
-    assert said["nlp_scaling_method"] == "none", "rows have their natural sizes"
+    assert said["nlp_scaling_method"] == "none", "rows have their scales"
     assert (said["max_iter"], said["print_level"], said["sb"]) == (300, 0, "yes")
     assert said["mumps_permuting_scaling"] == 0
     assert said["mumps_pivot_order"] == 2

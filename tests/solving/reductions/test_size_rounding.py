@@ -77,7 +77,7 @@ def test_from_python_and_the_scene():
         ({"l1": "20 mm"}, "no size of l1 lies within its bounds"),
         ({"l1": "1 kg"}, "l1"),
         ({"l1": "-1 mm"}, "out of range"),
-        (True, "nothing says which sizes there are"),
+        (True, "no sizes are given"),
     ],
 )
 def test_what_cannot_be_rounded_is_refused(steps, said):
@@ -87,12 +87,12 @@ def test_what_cannot_be_rounded_is_refused(steps, said):
 
 def test_sizes_and_backoff_are_not_sought_together():
     scene = registry.load("beatup").update({"tolerances": {"l1": "0.06 mm"}})
-    with pytest.raises(BadInput, match="sizes and back-off cannot be combined"):
+    with pytest.raises(BadInput, match="--round and --robust cannot be combined"):
         lo.solve(scene, round_to={"l1": "1 mm"}, robust=3)
 
 
 def test_a_proof_of_all_designs_is_none_of_those_in_sizes():
-    with pytest.raises(BadInput, match="sizes and the global proof cannot be combined"):
+    with pytest.raises(BadInput, match="--global cannot be combined with --round"):
         lo.solve("beatup", round_to={"l*": "0.5 mm"}, global_proof=True)
 
 
@@ -127,7 +127,7 @@ def test_sizes_are_no_limits_and_the_file_agrees_with_its_design(tmp_path):
 def test_without_a_limit_beside_the_sizes():
     found = rounded("shedding", {"K1": "500 N/m", "X0": "10 mm"})
     assert found.binding == ()
-    assert answers.binding(found) == "No limit binds beside the sizes."
+    assert answers.binding(found) == "No limit binds except the sizes."
 
 
 def test_a_pattern_leaves_what_is_held():

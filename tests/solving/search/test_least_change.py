@@ -315,5 +315,5 @@ def test_what_is_left_open_is_said(monkeypatch):
     monkeypatch.setattr(least_change, "_solve_least_change", lambda *_: None)
     answer = lo.solve(freed(operation__speed="60 rpm"), starts=1)
     assert answer.status == "optimal"
-    assert "Left open, for others are as good: rise, far_dwell, return." in answer.message
+    assert "Other values are equally good for: rise, far_dwell, return." in answer.message
     assert answer.as_dict()["certificate"]["settled"] == ["open: rise, far_dwell, return"]

@@ -26,7 +26,7 @@ def left(value):
         (search(), "The only optimum reached by 1 solve."),
         (search(left(1002.0), screened=512), "The only optimum reached by 2 solves, 512 designs sampled."),
         (search(candidate(1, 3, x=2.0), left(7.0)), "Best of 2 optima reached by 3 solves."),
-        (search(stayed=True), "Solved again near the answer given; other basins were not looked at."),
+        (search(stayed=True), "Solved again near the given answer; other basins were not searched."),
     ],
 )
 def test_what_was_done_is_told(made, sentence):
@@ -36,7 +36,7 @@ def test_what_was_done_is_told(made, sentence):
 def test_why_no_other_basin_was_looked_for():
     made = search()
     made = replace(made, program=replace(made.program, single="it is linear"))
-    assert report._sought(made) == "No other basin was looked for: it is linear."
+    assert report._sought(made) == "Other basins were not searched: it is linear."
 
 
 def test_solves_that_ended_in_the_best_are_those_there_and_those_left_at_its_value():

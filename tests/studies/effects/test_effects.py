@@ -19,7 +19,7 @@ from loomopt.studies.run.rows import StudyTask
 
 # The peak's column is of tests/reference/beatup.py at the reference's design, over 4 million angles. The rod's weight,
 # inside the drive, is in it; M3, the design and the regrets are those of a rod without weight.
-TABLE = {  # shift of M3 and of the peak, N·m; regret of M3, % of its natural size
+TABLE = {  # shift of M3 and of the peak, N·m; regret of M3, % of its scale
     "inertia": (677.009, -77.201606, 13.804),
     "rocker_inertia": (54.59525, -6.640084, 7.114),
     "counterweight_inertia": (11.57419, -1.407698, 1.030),
@@ -315,7 +315,7 @@ def test_its_repr_and_its_page_have_the_summary(beatup):
     assert "Evaluate the design with speed_fluctuation, which solve does not take." in page
     assert "resistance, rod_inertia and gravity as good a design is found, but its figures are wrong" in page
     assert "solve" not in page.split("</thead>")[0], "times differ from run to run"
-    with pytest.raises(TypeError, match="never changes"):
+    with pytest.raises(TypeError, match="cannot be changed"):
         beatup.rows[0].shift["M3_fdc"] = 0.0
 
 

@@ -268,7 +268,7 @@ def test_the_end_of_an_axis_that_has_one_need_not_be_named():
     alone = front.trade(rapier, ("peak_acceleration", "dwell"))
     assert alone.senses == ("least", "most")
     assert alone.key == front.trade(rapier, ("peak_acceleration", "dwell"), maximise=("dwell",)).key
-    with pytest.raises(BadInput, match="of dwell the most can be sought, not the least"):
+    with pytest.raises(BadInput, match="dwell cannot be minimised, it can only be maximised"):
         front.trade(rapier, ("peak_acceleration", "dwell"), minimise=("dwell",))
     assert front.trade(lo.load("shedding"), ("K1", "X0"), ranges={"X0": (0.02, 0.08)}).senses == ("least", "least")
 
@@ -376,13 +376,13 @@ def test_a_range_ends_the_front(ranges, axis, reached):
     ("axes", "more", "said"),
     [
         (("peak_torque", "nonsense"), {}, 'unknown axis "nonsense"'),
-        (("peak_torque", "m4e"), {"maximise": ("peak_torque",)}, "the least can be sought, not the most"),
+        (("peak_torque", "m4e"), {"maximise": ("peak_torque",)}, "it can only be minimised"),
         (("peak_torque", "peak_torque"), {}, "two axes that differ"),
-        (("peak_torque", "m4e"), {"ranges": {"m4e": (2.0, 1.0)}}, "from less to more"),
+        (("peak_torque", "m4e"), {"ranges": {"m4e": (2.0, 1.0)}}, "must be smaller"),
         (("peak_torque", "m4e"), {"points": 2}, "more points"),
-        (("peak_torque", "m4e"), {"points": 99_999_999_999}, "no such number of points.*3 to 20000"),
+        (("peak_torque", "m4e"), {"points": 99_999_999_999}, "number of points is out of range.*3 to 20000"),
         (("peak_torque", "m4e"), {"points": 3.5}, "it is not a whole number"),
-        (("peak_torque", "m4e"), {"maximise": "l1"}, "l1 is none of both axes"),
+        (("peak_torque", "m4e"), {"maximise": "l1"}, "l1 is not one of the two axes"),
         (("peak_torque", "m4e"), {"target": "nothing"}, "no target nothing"),
         (("peak_torque", "reed_centrifugal"), {}, "nothing in the scene gives reed_centrifugal"),
     ],

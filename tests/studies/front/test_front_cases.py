@@ -110,7 +110,7 @@ def test_a_point_whose_second_level_is_not_certified_keeps_what_the_first_came_t
 @pytest.mark.few(1)
 @pytest.mark.parametrize("intervals", slow.after(1, [6, 9]))
 def test_a_cap_far_beyond_its_natural_size_is_met_though_its_multiplier_is_small(intervals):
-    """The torque may be forty times its natural size: what it costs there is small, what its slope balances is not."""
+    """The torque may be forty times its scale: what it costs there is small, what its slope balances is not."""
     scene = lo.load("shedding").update(
         {
             "mechanism.travel": "93.8 mm",

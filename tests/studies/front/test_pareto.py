@@ -157,7 +157,7 @@ def test_an_answer_of_a_front_is_judged_and_proven_by_its_own_limits(serial, ree
     proofs = of_reed.prove()
     assert proofs.passed
     assert "M3_fdc" in {proof.limit for proof in proofs.proofs}
-    with pytest.raises(BadInput, match="no such point"):
+    with pytest.raises(BadInput, match="does not have this point"):
         reed.answer(999)
 
 
@@ -225,7 +225,7 @@ def test_failures_stay_rows_with_their_reason_and_dominated_ones_are_left_out(se
     assert found.rows[-1] == failed
     table = found.table()
     assert table.loc[99, "reason"] == "it died"
-    assert table.loc[99, "m4e [kg]"] == pytest.approx(failed.place["m4e"]), "what was asked"
+    assert table.loc[99, "m4e [kg]"] == pytest.approx(failed.place["m4e"]), "the requested value"
     assert table["peak_torque [N*m]"].isna().tolist() == [False] * len(serial.rows) + [True]
 
 
@@ -248,9 +248,9 @@ def test_one_design_that_is_best_in_both():
         ({"m4e": "0:3"}, "the unit is missing"),
         ({"m4e": "0:3 mm"}, "a unit of length, not of mass"),
         ({"m4e": "0:3:1 kg"}, "no range of numbers"),
-        ({"m4e": "3:0 kg"}, "from less to more"),
+        ({"m4e": "3:0 kg"}, "must be smaller"),
         ({"m4e": (0.0, 1.0, 2.0)}, "two ends"),
-        ({"l1": "30:31 mm"}, "none of both axes"),
+        ({"l1": "30:31 mm"}, "not one of the two axes"),
     ],
 )
 def test_ranges_are_read_with_their_units(given, words):

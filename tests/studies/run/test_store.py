@@ -172,7 +172,7 @@ def test_what_no_store_holds_is_refused_at_once(tmp_path, what):
     damaged(path, *(OTHERS[what]))
     before = path.read_bytes()
     name = {"view": "row", "trigger": "slow", "column": "row", "missing": "row"}.get(what, "mine")
-    with pytest.raises(BadInput, match=f"it holds what no store holds: {name}"):
+    with pytest.raises(BadInput, match=f"it has tables that no store has: {name}"):
         Store(path)
     assert path.read_bytes() == before
 

@@ -282,7 +282,7 @@ def test_a_store_keeps_scrambles_and_a_study_resumes_from_it(tmp_path):
         assert file.execute("SELECT count(*) FROM study").fetchall() == [(2,)]
     with pytest.raises(BadInput, match="nothing to resume from"):
         lo.tolerance(scene, samples=1600, worst=False, resume=True)
-    with pytest.raises(BadInput, match="machines of a tolerance study, which are no designs"):
+    with pytest.raises(BadInput, match="a tolerance study, which has no designs"):
         read_studies(path)
 
 
