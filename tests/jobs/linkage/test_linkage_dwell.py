@@ -85,3 +85,38 @@ def test_windows_and_events_that_mean_nothing_are_refused_in_one_line(changes, k
     assert key in str(told.value)
     assert problem in str(told.value)
     assert "\n" not in str(told.value)
+
+
+def plain_six(speed):
+    """The six-bar with the loads of the four-bar alone, and no limits but swing and transmission angles."""
+    effects = dict.fromkeys(("mass", "gravity"))
+    changes = {
+        "operation": {"speed": speed},
+        "mechanism": {"end": None},
+        "bounds": {"end": None},
+        "limits": {"peak_torque": None, "travel": None},
+        "effects": effects,
+        "available": None,
+        "windows": {"rest": None},
+        "targets": dict.fromkeys(("pulse", "retrofit", "torque", "rms", "smooth", "dwell")),
+    }
+    return resting(SIX, **changes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("drive", "speed", "rest", "peak", "left"),
+    [
+        ("four", "600 rpm", 59.4805, 88.6894, 0.0),
+        ("four", "400 rpm", 67.0180, 54.3709, 357.665),
+        ("six", "400 rpm", 140.214, 131.551, 0.0),
+        ("six", "600 rpm", 68.9256, 141.886, -88.3744),
+    ],
+)
+def test_the_table_of_drives(drive, speed, rest, peak, left):
+    scene = lo.scene(changed(four().document, {"operation": {"speed": speed}})) if drive == "four" else plain_six(speed)
+    answer = lo.solve(scene, "balance")
+    assert answer.status == "optimal"
+    assert math.degrees(answer.figures["length.still"]) == pytest.approx(rest, abs=1e-3)
+    assert answer.figures["peak_torque"] == pytest.approx(peak, rel=1e-5)
+    assert answer.figures["moment.front"] == pytest.approx(left, rel=1e-5, abs=1e-5)

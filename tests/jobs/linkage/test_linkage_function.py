@@ -64,3 +64,54 @@ def test_a_function_that_it_does_not_have_is_missed_least(tmp_path):
     # The limit on the transmission angle does not bind here.
     assert answer.figures["mu.beat"] > math.radians(40.1)
     assert answer.figures["match_rms"] == pytest.approx(rms, rel=1e-6)
+
+
+SERVO = {
+    "mechanism": {"l1": "80 mm", "l2": "90 mm", "l3": "60 mm", "l4": "100 mm"},
+    "parts": {
+        "crank": None,
+        "servo": {
+            "kind": "cam",
+            "at": "A",
+            "pin": "B",
+            "length": "l1",
+            "start": "60 deg",
+            "law": "polynomial_345",
+            "lift": "50 deg",
+            "begins": "0 deg",
+            "rise": "150 deg",
+            "far_dwell": "30 deg",
+            "return": "150 deg",
+        },
+    },
+    "output": {"sense": "counter-clockwise"},
+    "events": {"front": {"near": None}, "rear": {"near": None}},
+    "effects": {"resistance": None, "counterweight": None},
+    "bounds": dict.fromkeys(("l1", "l2", "l3", "l4", "mass")),
+    "limits": None,
+    "targets": {"balance": None},
+}
+
+
+def test_an_input_that_rocks_is_a_cam_part():
+    scene = lo.scene(changed(four_bar().document, SERVO))
+    swing = lo.evaluate(scene).figures["swing"]
+    ends = rocker(0.08, 0.09, 0.06, 0.1, np.radians([60.0, 110.0]))
+    assert swing == pytest.approx(abs(ends[1] - ends[0]), rel=1e-12)
+
+
+def test_a_parallelogram_is_a_gear_of_ratio_one():
+    parts = {"beat": {"kind": "gear", "at": "D", "with": "crank", "ratio": 1, "pin": "C", "length": "l1"}}
+    changes = {
+        "mechanism": {"l2": None, "l3": None},
+        "parts": {"beat": None} | {"rocker": parts["beat"]},
+        "output": {"angle": None, "sense": None, "y": "C"},
+        "events": {"front": {"near": None}, "rear": {"near": None}},
+        "effects": {"inertia": {"J": None, "mass": "1 kg"}, "resistance": None, "counterweight": None},
+        "bounds": None,
+        "limits": None,
+        "targets": {"balance": None},
+    }
+    figures = lo.evaluate(lo.scene(changed(four_bar().document, changes))).figures
+    assert figures["swing"] == pytest.approx(2 * 0.031, rel=1e-12)
+    assert figures["peak_velocity"] == pytest.approx(0.031, rel=1e-12)
