@@ -201,6 +201,7 @@ def cycle_of(names, lengths, rod, points=512):
     return np.array([torques(names, numbers, k * TURN / points, rod)[1] for k in range(points)])
 
 
+@pytest.mark.few(12)
 @pytest.mark.parametrize("rod", MODELS)
 @pytest.mark.parametrize("lengths", LINKAGES)
 @pytest.mark.parametrize("names", [CONSERVATIVE, *((name,) for name in CONSERVATIVE)], ids=" ".join)
@@ -287,7 +288,7 @@ def lagrange(names, rod):
     [(LOADS, "lumped"), (("rod_inertia",), "lumped"), (LOADS, "exact"), *(((name,), "exact") for name in LOADS)],
     ids=lambda value: value if isinstance(value, str) else "+".join(value),
 )
-@pytest.mark.few(5)
+@pytest.mark.few(3)
 def test_crank_torque_is_lagranges_also_when_the_speed_changes(names, rod):
     """At random crank angles, speeds and accelerations; Je is the coefficient of the acceleration."""
     reference, rng = lagrange(names, rod), np.random.default_rng(3)

@@ -74,6 +74,7 @@ def test_drawings_of_packaged_scenes_are_clear_today_and_solved(name):
         assert clear.faults_of(outputs.drawing(scene, design, said)) == []
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("job", RANDOM)
 def test_drawings_of_inch_machines_are_clear(job):
     scene = inch.scene(job, operation__speed="350 rpm")

@@ -108,6 +108,7 @@ def test_a_cam_s_force_stands_on_its_profile():
     assert abs(across) < 0.02
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("others", [(), ("centrifugal",), ("rod_inertia", "gravity", "speed_fluctuation")])
 def test_labels_keep_clear(others):
     for design in ({}, {"l1": 0.03, "l2": 0.077, "l3": 0.1481, "l4": 0.167, "m4e": 6.286, "r4e": 0.08}):

@@ -617,11 +617,17 @@ def machine_of(job, design):
     return MACHINES[job](design)
 
 
+@functools.cache
+def figures(job, effect, example, design):
+    """Figures of an effect that have no angle, by name, SI; example: the items of its values."""
+    return getattr(machine_of(job, design), effect)({key: number(text) for key, text in example})
+
+
 def value(job, effect, example, design, angle, what):
     """Return a term, N or N·m, or a figure or row `what` of an effect, SI; angle: deg, "" where none counts."""
-    own, machine = {key: number(text) for key, text in example.items()}, machine_of(job, design)
     if not angle:
-        return float(getattr(machine, effect)(own)[what])
+        return float(figures(job, effect, tuple(example.items()), design)[what])
+    own, machine = {key: number(text) for key, text in example.items()}, machine_of(job, design)
     return float(getattr(machine, effect if what == "term" else what)(own, MP.mpf(angle) * PI / 180))
 
 

@@ -54,6 +54,7 @@ def priced(answer, name):
     return figure, worth
 
 
+@pytest.mark.few(2)
 @every_job
 def test_figures_are_told_of_today_and_of_an_answer(job):
     scene = scene_of(job)

@@ -140,6 +140,7 @@ def nothing(monkeypatch):
 LATE = [pytest.param(degrees, marks=pytest.mark.slow) for degrees in (3.0, 210.0, 355.0)]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("job", JOBS)
 @pytest.mark.parametrize("degrees", [100.0, *LATE])
 def test_a_load_of_nothing_changes_nothing_wherever_its_corner_lies(job, degrees, tmp_path, nothing):

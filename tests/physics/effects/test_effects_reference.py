@@ -101,7 +101,14 @@ def quantity(found, name, node):
     return found.model.quantity(systems.FLOAT, found.given, name, node)
 
 
-@pytest.mark.parametrize("row", [row for row in ROWS if plain_effects.knows(*row[:2])], ids=" ".join)
+@pytest.mark.parametrize(
+    "row",
+    [
+        pytest.param(row, id=" ".join(row), marks=[pytest.mark.slow] * (row[:2] == ("linkage", "speed_fluctuation")))
+        for row in ROWS
+        if plain_effects.knows(*row[:2])
+    ],
+)
 def test_a_row_is_what_plain_formulas_say_in_many_digits(row):
     """Rows of an effect that plain_effects.py does not know stand for themselves."""
     job, effect, example, design, angle, what, value = row

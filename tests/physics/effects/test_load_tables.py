@@ -41,6 +41,7 @@ def test_the_pulse_as_samples_is_the_pulse(resisted):
     assert sampled[0] == sampled[-1] == 0.0
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("target", ["balance", "pulse", "torque"])
 def test_an_optimum_with_the_sampled_pulse_is_that_of_the_pulse(resisted, target):
     first, second = (lo.solve(scene, target) for scene in (lo.load("beatup"), resisted))

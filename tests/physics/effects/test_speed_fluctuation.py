@@ -308,6 +308,7 @@ ALGEBRAIC = {
 }
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("job", "off"), NODES, ids=lambda value: value if isinstance(value, str) else "-".join(value))
 def test_a_scene_of_algebraic_effects_has_not_a_node_more(job, off):
     on = [name for name in ALGEBRAIC[job] if name not in off]

@@ -219,6 +219,7 @@ def test_velocity_integrates_to_the_rise_and_acceleration_to_rest(law):
     assert totals == pytest.approx([1, 0], rel=0, abs=1e-13)
 
 
+@pytest.mark.few(12)
 @every_law
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_peaks_are_those_in_closed_form(law, order):

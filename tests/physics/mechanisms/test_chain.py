@@ -299,6 +299,7 @@ def enclosed(value):
     return flint.arb(near, max(abs(float(value - near)) * (1 + 1e-9), 1e-300))
 
 
+@pytest.mark.few(5)
 @every_case
 def test_equations_of_every_part_can_be_printed_and_derived(case):
     sp = pytest.importorskip("sympy")
@@ -538,7 +539,6 @@ def test_a_pose_frees_its_arrays_at_once(case):
         return weakref.ref(pose.joints["P"].place.x)
 
     run()
-    gc.collect()
     gc.disable()
     try:
         assert run()() is None
