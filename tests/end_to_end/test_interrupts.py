@@ -222,6 +222,7 @@ def test_a_listener_that_leaves_does_not_change_the_exit_status():
         assert done.returncode == status
 
 
+@pytest.mark.few(1)
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no such device here")
 @pytest.mark.parametrize("words", ["list", "solve beatup --json", "evaluate beatup"])
 def test_output_on_a_full_disk_is_bad_input(words):

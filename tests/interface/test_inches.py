@@ -95,6 +95,7 @@ def _inner(value):
     return value.values() if isinstance(value, dict) else [value]
 
 
+@pytest.mark.few(2)
 def test_what_a_person_sees_differs_in_units_only(pair):
     shown = [masked(answers.solution(answer.result, answer.scene)) for answer in pair]
     assert shown[0] == shown[1]
@@ -177,7 +178,7 @@ def seen(scene):
     yield [scene.shown_in(kind) for kind in SI_UNIT]
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("written", "name"), slow.grid(["own", "inches", "mixed"], packaged.problems()))
 def test_no_table_has_two_units_of_one_kind(written, name):
     """Effects that have values are on; two units of one dimension are two units of one kind: energy is no torque."""

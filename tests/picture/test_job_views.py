@@ -70,7 +70,7 @@ def test_a_cycle_without_marks_is_shown_every_fifteen_degrees(monkeypatch):
 
 
 @pytest.mark.parametrize("name", packaged.problems())
-@pytest.mark.few(5)
+@pytest.mark.few(3)
 def test_every_packaged_scene_is_drawn_and_its_equations_printed(name):
     scene = lo.load(name)
     job, view = registry.of(scene), registry.of(scene).views

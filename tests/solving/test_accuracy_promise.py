@@ -129,6 +129,7 @@ def test_the_promise_holds_for_other_machines_and_targets(name, accuracy):
     kept(solved(name, accuracy), accuracy, solved(name, BEST).figures)
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("name", OTHERS)
 def test_the_best_answer_estimates_no_more_than_it_promises(name):
     answer = solved(name, BEST)

@@ -133,6 +133,7 @@ DEGENERATE = {
 }  # fmt: skip
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize(
     "name",
     [
@@ -256,6 +257,7 @@ CYCLES = {
 }  # fmt: skip
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", CYCLES)
 def test_what_must_hold_at_every_angle_is_found_and_certified(name):
     program, wanted = CYCLES[name]

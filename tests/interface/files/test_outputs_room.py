@@ -90,7 +90,7 @@ def test_a_limit_on_file_sizes_is_met_before_solving(here):
 
 @pytest.mark.parametrize("form", ["--json", "table"])
 @pytest.mark.parametrize("after", [0, 1, 3])
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 def test_the_answer_is_printed_though_the_disk_fills_up_meanwhile(here, capsys, monkeypatch, form, after):
     full(monkeypatch, after=after)
     assert run(["solve", "beatup", "--out", "new/answer", *([form] if form == "--json" else [])]) == 2
@@ -102,7 +102,7 @@ def test_the_answer_is_printed_though_the_disk_fills_up_meanwhile(here, capsys, 
 
 
 @pytest.mark.parametrize("after", [0, 1, 2, 3])
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_an_earlier_answer_stays_whole_where_a_new_one_cannot_be_written(here, monkeypatch, after):
     answer = lo.solve(lo.load("beatup"))
     outputs.answer(here / "answer", answer.result, answer.scene)

@@ -56,7 +56,7 @@ def test_a_counterweight_without_mass_stands_at_its_largest_radius():
 
 
 @pytest.mark.parametrize(("first", "target"), [("peak_power", None), ("peak_torque", "balance")])
-@pytest.mark.few(1)
+@pytest.mark.slow
 def test_a_radius_that_is_traded_is_its_own_without_a_mass_too(first, target):
     trade = front.trade(BEATUP, (first, "r4e"), target)
     rows = [trade.solved(task, None) for task in trade.batch(())]

@@ -46,6 +46,7 @@ def designs(draw):
     return {"l1": found.l1, "l2": found.l2, "l3": found.l3, "l4": found.l4}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("layer", ["front dead centre", "rear dead centre"])
 @few
 @given(design=designs())

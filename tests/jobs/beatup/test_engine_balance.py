@@ -89,6 +89,7 @@ def test_every_random_start_reaches_the_same_design(answers, M0, count, monkeypa
             assert found.design[name] == pytest.approx(wanted.design[name], rel=0, abs=1e-7 * width), name
 
 
+@pytest.mark.slow
 def test_many_starts_in_one_call_say_how_many_were_best():
     answer = lo.solve(scene_of(800), starts=STARTS, seed=3)
     assert answer.solver["starts"] == STARTS

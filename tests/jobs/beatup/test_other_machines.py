@@ -126,6 +126,7 @@ def test_any_number_of_the_scene_may_be_bounded(name, target):
     assert answer.figures["peak_torque"] <= fixed.figures["peak_torque"] * (1 + 1e-9), "more freedom cannot be worse"
 
 
+@pytest.mark.slow
 def test_a_number_that_changes_nothing_may_be_freed_too():
     """The peak lies outside the pulse, so its length is a flat direction: the best known peak stays the best."""
     scene = lo.load("beatup").set("bounds.pulse", {"min": "25 deg", "max": "35 deg"})

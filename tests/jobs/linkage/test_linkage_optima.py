@@ -165,6 +165,7 @@ def in_other_units(document, length, torque, inertia, force=(1.0, "kN")):
     return {key: each if key in ("parts", "problem") else text(each) for key, each in document.items()}
 
 
+@pytest.mark.slow
 def test_inches_change_nothing():
     document = in_other_units(four_bar().document, (1 / 25.4, "in"), (1.0, "N*m"), (1.0, "kg*m^2"))
     assert least(registry.scene(document)) == pytest.approx(reference(), rel=1e-12)

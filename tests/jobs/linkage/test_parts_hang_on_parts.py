@@ -22,7 +22,7 @@ COMMANDS = (
 """What is called of each, and its options."""
 
 
-@pytest.mark.few(1, slow=20)
+@pytest.mark.few(0, slow=21)
 @pytest.mark.parametrize("second", ["", *hanging_parts.CLOSURES])
 @pytest.mark.parametrize("first", hanging_parts.CLOSURES)
 @pytest.mark.parametrize("drive", hanging_parts.DRIVES)

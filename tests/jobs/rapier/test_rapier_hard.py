@@ -75,6 +75,7 @@ def test_a_design_that_no_start_leads_to_is_found_from_todays_machine():
     assert answer.design["l5"] == pytest.approx(0.120, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_transmission_angle_of_80_degrees_is_bought_with_acceleration():
     scene = lo.load("rapier")
     steep, plain = lo.solve(scene.set("limits.mu_min.min", "80 deg"), starts=1), lo.solve(scene, starts=1)

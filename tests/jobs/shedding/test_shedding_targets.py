@@ -140,6 +140,7 @@ def test_prices_of_the_least_peak_force_are_confirmed_by_solving_again():
     confirmed(scene, "force", "contact_max", ("N_min", "travel", "speed"), 1e-5)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("reference", "K1"),
     [

@@ -84,7 +84,7 @@ def test_a_demand_binds_and_its_price_is_that_of_solving_again(job, key):
 
 @every_job
 @pytest.mark.parametrize("name", KEYS.values())
-@pytest.mark.few(3)
+@pytest.mark.few(2)
 def test_a_limit_on_its_figure_is_kept_as_a_demand_is(job, name):
     key = next(key for key in KEYS if KEYS[key] == name)
     value, scene_at = tightened(job, key)
@@ -97,6 +97,7 @@ def test_a_limit_on_its_figure_is_kept_as_a_demand_is(job, name):
     assert [limit.name for limit in broken.limits if not limit.ok] == [name]
 
 
+@pytest.mark.few(2)
 @every_job
 def test_a_demand_no_design_keeps_is_named(job):
     answer = solve(scene_of(job, high="-1 mm"))

@@ -25,6 +25,7 @@ def test_the_first_flight_is_that_of_the_reference(case):
     assert found["landing_energy"] == pytest.approx(mass * speed**2 / 2, rel=1e-9)
 
 
+@pytest.mark.few(2)
 @every
 def test_scipys_integrator_with_events_says_the_same(case):
     scene, frame, lift, *_ = CASES[case]

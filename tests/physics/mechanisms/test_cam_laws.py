@@ -152,6 +152,7 @@ def test_acceleration_is_the_textbook_shape_in_50_digits(name, u):
     assert abs(found - PEAKS[name][1] * ACCELERATIONS[name](Fraction(u))) < 1e-50
 
 
+@pytest.mark.few(5)
 @every_law
 @given(u=shares)
 @REPEATABLE
@@ -187,6 +188,7 @@ def test_a_law_is_continuous_to_the_order_it_claims_and_no_further(law):
     assert jumps[law.smooth + 1] > 1
 
 
+@pytest.mark.few(5)
 @every_law
 @given(u=shares)
 @REPEATABLE
@@ -196,6 +198,7 @@ def test_a_law_rises_all_the_way(law, u):
     assert law.formula(systems.FLOAT, u, piece_at(law, u)).s1 >= 0
 
 
+@pytest.mark.few(5)
 @every_law
 @given(u=shares)
 @REPEATABLE
@@ -235,6 +238,7 @@ def test_peaks_are_those_in_print(name):
             assert abs(known - exact(Fraction(printed))) <= unit * 0.501
 
 
+@pytest.mark.few(5)
 @every_law
 @given(u=shares | st.floats(0, 1e-3) | st.floats(0, 1e-3).map(lambda rest: 1 - rest))
 @REPEATABLE
@@ -246,6 +250,7 @@ def test_floats_keep_1e_15_of_each_peak(law, u):
         assert abs(found[order] - known[order]) < 4e-15 * PEAKS[law.name][order - 1]
 
 
+@pytest.mark.few(5)
 @every_law
 @given(rest=st.floats(0, 1e-4))
 @REPEATABLE
@@ -256,6 +261,7 @@ def test_floats_keep_1e_15_at_both_ends(law, rest):
             assert abs(found[order] - known[order]) < 1e-15 * max(1, abs(known[order]))
 
 
+@pytest.mark.few(5)
 @every_law
 def test_every_number_system_gives_the_same_numbers(law):
     places = np.array([0.0, 0.06, 0.125, 0.2, 0.375, 0.45, 0.5, 0.6, 0.625, 0.8, 0.875, 0.93, 1.0])

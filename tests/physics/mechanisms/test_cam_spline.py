@@ -90,6 +90,7 @@ def test_each_derivative_of_the_spline_is_that_of_the_one_before_in_50_digits(n)
             assert abs((after[order] - before[order]) / (2 * h) - here[order + 1]) < 1e-27
 
 
+@pytest.mark.slow
 @given(accelerations)
 @REPEATABLE
 def test_the_spline_of_symbols_is_the_spline_of_numbers(values):

@@ -229,6 +229,7 @@ def test_a_tighter_coil_is_stressed_more_and_takes_more_initial_stress(coil):
     assert width == pytest.approx(2 * 6.9e6 * (4 - (coil.index - 3) / 6.5), rel=1e-12)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("own", [{}, {"hook_length": 0.04, "correction": "EN 13906"}])
 @given(coil=coils(), force=forces)
 @settings(REPEATABLE, max_examples=20)

@@ -30,7 +30,7 @@ def retyped(answer, count, **changed):
 
 @pytest.mark.parametrize("count", [5, 6, 8])
 @pytest.mark.parametrize("case", CASES, ids=" ".join)
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_a_design_typed_again_exceeds_limits_by_rounding_only(answers, case, count):
     answer = answers[case]
     found = lo.evaluate(answer.scene, retyped(answer, count), answer.target)

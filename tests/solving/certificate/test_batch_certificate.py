@@ -72,6 +72,7 @@ def test_derivatives_are_the_same_bits_in_batches_of_any_size(job, target):
             assert one.bends.tobytes() == other.bends.tobytes()
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("job", "target", "count"),
     [("beatup", "balance", 8), ("shedding", "force", 8)]

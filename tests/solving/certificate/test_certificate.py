@@ -43,6 +43,7 @@ def best():
 # The loom's own optima, spoilt -----------------------------------------------------------------------------------
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("M0", [600, 745, 800, 900])
 def test_the_optimum_itself_passes(best, M0):
     certificate = judged(scene_of(M0), "balance", best[M0])
@@ -101,7 +102,7 @@ def test_a_common_factor_of_the_lengths_within_its_bounds_is_no_perturbation(bes
         (600, "bounds.l1", "30.001 mm"),
     ],
 )
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 def test_the_best_of_a_tighter_limit_is_not_the_best(M0, key, value):
     """The optimum moved along all other active limits, each of them still held exactly."""
     held = {"min": value, "max": value} if key.startswith("limits") and key.count(".") == 1 else value

@@ -61,7 +61,7 @@ ROUNDS = 6
 # Every packaged scene ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(10)
+@pytest.mark.few(7)
 @each_pair
 def test_every_packaged_answer_is_proven_and_no_entry_is_missing(name, target):
     scene, answer = lo.load(name), solved(name, target)

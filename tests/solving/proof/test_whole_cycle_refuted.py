@@ -17,6 +17,7 @@ from reference.cam_force import lopsided
 from reference.rapier import Drive
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", [name for name in problems() if name != "beatup-light"])
 def test_todays_machines_are_refuted_for_what_evaluate_says_fails(name):
     scene = lo.load(name)
@@ -47,7 +48,7 @@ FRAMES = {
 
 
 @pytest.mark.parametrize("name", FRAMES)
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 def test_a_spring_a_millionth_too_soft_is_refuted_and_the_softest_is_proven(name):
     """The least stiffness is the plain reference's, to 30 digits."""
     case = FRAMES[name]
@@ -148,6 +149,7 @@ STATIC = {
 ONE_SIDED = {"mu_min": "min", "sley_mu_min": "min", "pulse_rms": "max", "J4": "max"}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "case",
     ["beatup", "rapier", "pulse"],

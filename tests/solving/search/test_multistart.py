@@ -240,7 +240,7 @@ TWO_VALLEYS = {
 """Two basins 2e-4 apart, C0y at either of its bounds: a third of random starts ends in the better one."""
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", slow.after(2, range(8)))
 def test_starts_are_not_led_into_the_basin_that_is_known(seed):
     answer = lo.solve(lo.load("rapier").update(TWO_VALLEYS), seed=seed)

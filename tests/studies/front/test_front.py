@@ -163,6 +163,7 @@ TORQUE = {
 }
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("reed", "peak"), TORQUE.items())
 def test_peak_torque_against_reed_torque(torque, reed, peak):
     trade, (least, balanced) = torque
@@ -249,6 +250,7 @@ def test_statics_govern_a_short_spring(preload):
     assert read(at(preload[0], 0.001, preload[1][1]), "K1") == pytest.approx(static, rel=1e-10)
 
 
+@pytest.mark.slow
 def test_stiffness_against_speed():
     ranges = {"speed": (10 * RPM, 900 * RPM)}
     trade = front.trade(lo.load("shedding"), ("K1", "speed"), maximise=("speed",), ranges=ranges, points=3)

@@ -83,7 +83,7 @@ def larger(by):
     return lambda value: repr(float(value) * (1 + by))
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("line", "column", "new", "named"),
     [

@@ -128,7 +128,7 @@ def test_yield_of_the_beatup(least, sigmas, peak):
     assert solved(beatup(), robust.linear).figures["peak_torque"] == pytest.approx(peak, abs=6e-10)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("standard", "peak"), [("IT7", 88.698245993), ("ISO 2768-f", 88.781426524), ("ISO 2768-m", 88.920745742)]
 )
@@ -290,6 +290,7 @@ EVEN = {name: {"plus_minus": half, "spread": "uniform"} for name, half in SPRING
 ALL = SPRING | {"F": "10 N", "T1": "10 %", "T2": "10 %", "M": "2 %", "speed": "1 %", "travel": "0.2 mm"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("problem", "made", "stiffness"),
     [

@@ -118,6 +118,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("deaths", "said"), slow.after(1, [(2, "7"), (9, "BrokenExecutor worker processes were killed 3"), (1, "7")])
 )
