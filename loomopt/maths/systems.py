@@ -258,6 +258,39 @@ def ball_series(centre: float, half: float) -> Number:
     return flint.arb_series([flint.arb(centre, half), 1], ORDER)
 
 
+@functools.cache
+def centred_balls() -> Maths:
+    """Taylor series over balls, narrowed by those at their middles, beside plain balls."""
+    from loomopt.maths.centred_series import CentredSeries
+
+    system = balls()
+
+    def both(x: Number) -> tuple[Number, Number]:
+        return (x.middle, x.narrowed()) if isinstance(x, CentredSeries) else (x, x)
+
+    def atan2(y: Number, x: Number) -> Number:
+        centred = next((number for number in (y, x) if isinstance(number, CentredSeries)), None)
+        if centred is None:
+            return system.atan2(y, x)
+        middle, box = (system.atan2(*ends) for ends in zip(both(y), both(x), strict=True))
+        return CentredSeries(middle, box, centred.offsets)
+
+    def floor(x: Number) -> Number:
+        return system.floor(both(x)[1])
+
+    return replace(system, name="centred balls", atan2=atan2, floor=floor)
+
+
+def centred_ball_series(centre: float, half: float) -> Number:
+    """Series of a variable itself over the ball centre ± half, beside that at its middle."""
+    from loomopt.maths.centred_series import CentredSeries, Offsets
+
+    ball: Callable[..., Number] = balls().number
+    once = ball(centre, half) - ball(centre)
+    offsets = Offsets(once, 2 * once, ball(0.0).union(ball(half) * ball(half)))
+    return CentredSeries(ball_series(centre, 0.0), ball_series(centre, half), offsets, narrow=True)
+
+
 def _unserved(*operands: Number) -> Number:
     raise ValueError("a motion of its own is not enclosed over boxes of designs")
 

@@ -14,12 +14,13 @@ import numpy as np
 
 from loomopt.base.records import lazy
 from loomopt.maths import systems
+from loomopt.maths.centred_series import CentredSeries
 from loomopt.maths.systems import Number
 from loomopt.model.model import Integral
 from loomopt.model.program import Program
-from loomopt.model.reading import Reading
+from loomopt.model.reading import Quantities, Reading
 from loomopt.model.sampling import Sampler
-from loomopt.physics.cycle import Where
+from loomopt.physics.cycle import Node, Where
 
 MOST_BOXES, MEAN_BOXES = 20_000, 2048
 """Boxes of crank angle after which a bound is undecided (every packaged row takes under 2000), and boxes of a mean: the
@@ -72,6 +73,7 @@ class Boxes(Reading):
         exact = {name: system.number(value) for name, value in {**sampler.values, **sampler.hints}.items()}
         super().__init__(model, system, model.given(system, exact), sampler.cycle, sampler.stills)
         self.sampler = sampler
+        self._centred = Quantities(model, (system, systems.centred_balls()), self.given)
         self._read: dict[tuple[int, float, float], Number] = {}
         self._read_of = ""
 
@@ -130,7 +132,7 @@ class Boxes(Reading):
         ball = piece, centre, half
         if ball not in self._read:
             self.sampler.session.positions += 1
-            self._read[ball] = self._series(name, *ball)
+            self._read[ball] = self._narrow_series(name, *ball) if half else self._series(name, *ball)
         return sign * self._read[ball]
 
     def mean(self, integral: Integral) -> Number:
@@ -154,11 +156,20 @@ class Boxes(Reading):
 
     def _series(self, name: str, piece: int, centre: float, half: float) -> Number:
         """Taylor series of a quantity in u, to second order, around a ball of u on a piece."""
-        u = systems.ball_series(centre, half)
-        begin, end = self.starts[piece : piece + 2]
-        angle = begin + (end - begin) * u
+        angle = self._angle(piece, systems.ball_series(centre, half))
         value = self.quantity(name, angle, self._switches[piece])
         return systems.ball_series(0.0, 0.0) * 0 + value
+
+    def _narrow_series(self, name: str, piece: int, centre: float, half: float) -> Number:
+        """Taylor series as `_series`, narrowed by that at the middle: three times the work, and far fewer boxes."""
+        angle = self._angle(piece, systems.centred_ball_series(centre, half))
+        value = self._centred((name,), Node(angle, self._switches[piece]))[0]
+        return value.narrowed() if isinstance(value, CentredSeries) else systems.ball_series(0.0, 0.0) * 0 + value
+
+    def _angle(self, piece: int, u: Number) -> Number:
+        """Crank angle, rad, of a share of a piece."""
+        begin, end = self.starts[piece : piece + 2]
+        return begin + (end - begin) * u
 
 
 def box_verdict(

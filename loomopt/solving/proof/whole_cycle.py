@@ -65,27 +65,33 @@ def prove(
     return Proofs(scene.name, name, proofs, scene, model.uncovered(whole.model.effects, whole.given.tables))
 
 
-FIRST_BOXES, SECONDS = 2000, 5.0
-"""Boxes of every claim before any gets more (every packaged row takes fewer), and s of the processor from which on no
-claim gets more."""
+LEAST_BOXES, FIRST_BOXES, GROWTH, SECONDS = 100, 500, 4, 5.0
+"""Boxes that every claim gets at least, boxes of every claim in the first round (every packaged row takes fewer),
+growth of that number from round to round, and s of the processor from which on no claim gets more than the least."""
 
 
 def _decided(program: Program, job: Job, formatter: UnitFormatter, reads: "tuple[_Read, _Read]") -> list[Proof]:
-    """Proofs: each claim gets a few boxes, then open claims get more, while time is left."""
+    """Proofs: each claim gets a few boxes, then in every round open claims get more, while time is left."""
     start_time = time.process_time()
+    most = min(FIRST_BOXES, taylor_bounds.MOST_BOXES)
 
-    def late(boxes: int) -> bool:
-        return boxes >= taylor_bounds.MOST_BOXES or time.process_time() - start_time > SECONDS
+    def is_late() -> bool:
+        return time.process_time() - start_time > SECONDS
+
+    def first_stop(boxes: int) -> bool:
+        return boxes >= most or (boxes >= LEAST_BOXES and is_late())
+
+    def stop(boxes: int) -> bool:
+        return boxes >= most or is_late()
 
     claims = list(_claims(program, job, formatter, *reads))
-    few = min(FIRST_BOXES, taylor_bounds.MOST_BOXES)
-    proofs = [
-        claim if isinstance(claim, Proof) else _over_cycle(*claim, lambda boxes: boxes >= few) for claim in claims
-    ]
-    for place, claim in enumerate(claims):
-        if not isinstance(claim, Proof) and proofs[place].status == "undecided" and not late(few):
-            more = _over_cycle(*claim, late)
-            proofs[place] = more if more.boxes >= proofs[place].boxes else proofs[place]
+    proofs = [claim if isinstance(claim, Proof) else _over_cycle(*claim, first_stop) for claim in claims]
+    while most < taylor_bounds.MOST_BOXES and not is_late():
+        most = min(GROWTH * most, taylor_bounds.MOST_BOXES)
+        for place, claim in enumerate(claims):
+            if not isinstance(claim, Proof) and proofs[place].status == "undecided" and not is_late():
+                more = _over_cycle(*claim, stop)
+                proofs[place] = more if more.boxes >= proofs[place].boxes else proofs[place]
     return proofs
 
 
