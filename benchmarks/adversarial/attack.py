@@ -4,14 +4,15 @@ A certified answer is beaten where an admissible design (every limit held to 1e-
 1e-6 in units of the scale, the first objective first; broken where it breaks a limit or states another figure than it
 has; matched where the attack, not knowing it, ends within 1e-6 of it, which measures the attack. `infeasible` is
 refuted where an admissible design is found. Whatever is not certified is told with its reasons. Lost is a scene whose
-referee died. Each failure is printed with its scene and design. Any of them but "second order open" ends in exit status
-1, and so do many lost ones.
+referee died, raised is one that ends in a traceback. Each failure is printed with its scene and design. Any of them but
+"second order open" ends in exit status 1, and so do many lost ones.
 
     python benchmarks/adversarial/attack.py [--count N] [--seed S] [--jobs rapier,beatup,shedding,linkage] [--seconds T]
-                                [--only K] [--compare] [--json]
+                                [--first K] [--only K] [--compare] [--json]
 
 --count: scenes of each job; --seconds: no scene is begun later. Scene K of a job and seed is always the same one:
---only K draws it alone. --compare also solves with one and with eight starts, and counts who finds the best known.
+--first K begins with it, --only K draws it alone. --compare also solves with one and with eight starts, and counts who
+finds the best known.
 """
 
 import argparse
@@ -20,6 +21,7 @@ import itertools
 import multiprocessing
 import sys
 import time
+import traceback
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -47,11 +49,12 @@ COUNTED = (
     "refuted",
     f"uncertified: {OPEN}",
     "uncertified: other",
+    "raised",
     "lost",
 )
 MOST_LOST = 0.05
 """Scenes whose referee may die, for each that was tried."""
-FAILURES = ("beaten", "broken", "refuted", "uncertified: other")
+FAILURES = ("beaten", "broken", "refuted", "uncertified: other", "raised")
 
 
 def better(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
@@ -155,16 +158,13 @@ class Trial:
         }
 
 
-def told(job: str, seed: int, number: int, trial: Trial) -> list[str]:
+def told(job: str, seed: int, number: int, task: Any, verdicts: list[tuple[str, str]]) -> list[str]:
     """Line for each failure, from which it can be made again."""
-    task = trial.task
     known = getattr(task, "document", None)
     made = f"lo.scene({known!r})" if known else f"lo.load({task.base!r}).update({task.changes!r})"
     again = f"lo.solve({made}, {task.target!r})"
     place = f"--jobs {job} --seed {seed} --only {number}"
-    return [
-        f"{kind} ({place}): {why}\n    {again}\n    answer {dict(trial.answer.design)}" for kind, why in trial.verdicts
-    ]
+    return [f"{kind} ({place}): {why}\n    {again}" for kind, why in verdicts]
 
 
 def parsed() -> argparse.Namespace:
@@ -173,6 +173,7 @@ def parsed() -> argparse.Namespace:
     words.add_argument("--seed", type=int, default=0)
     words.add_argument("--jobs", default=",".join(JOBS))
     words.add_argument("--seconds", type=float, default=float("inf"))
+    words.add_argument("--first", type=int, default=0)
     words.add_argument("--only", type=int)
     words.add_argument("--compare", action="store_true")
     words.add_argument("--json", action="store_true")
@@ -188,13 +189,18 @@ class Outcome(NamedTuple):
 
 def outcome(job: str, seed: int, number: int, compare: bool) -> Outcome:
     """Return what becomes of a scene."""
-    trial = Trial(scene_of(job, seed, number), number)
-    trial.solved(CALLS if compare else ["default"])
-    trial.judged()
+    task = scene_of(job, seed, number)
+    try:
+        trial = Trial(task, number)
+        trial.solved(CALLS if compare else ["default"])
+        trial.judged()
+    except Exception:
+        return Outcome(["tried", "raised"], told(job, seed, number, task, [("raised", traceback.format_exc())]))
     counted = ["tried", trial.answer.status, *{kind for kind, _ in trial.verdicts}, *["matched"] * trial.matched]
     if compare and trial.found is not None:
         counted += ["comparable", *(f"best by {name}" for name, hit in trial.hits().items() if hit)]
-    return Outcome(counted, told(job, seed, number, trial))
+    verdicts = [(kind, f"{why}\n    answer {dict(trial.answer.design)}") for kind, why in trial.verdicts]
+    return Outcome(counted, told(job, seed, number, task, verdicts))
 
 
 def outcomes(options: argparse.Namespace) -> Iterator[tuple[str, Outcome]]:
@@ -203,7 +209,7 @@ def outcomes(options: argparse.Namespace) -> Iterator[tuple[str, Outcome]]:
     In a process of its own: SciPy's SLSQP has ended it by a segmentation fault, once in some hundred scenes.
     """
     jobs, began = options.jobs.split(","), time.perf_counter()
-    numbers = [options.only] if options.only is not None else range(options.count)
+    numbers = [options.only] if options.only is not None else range(options.first, options.first + options.count)
     pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
     for number, job in itertools.product(numbers, jobs):
         if time.perf_counter() - began > options.seconds:

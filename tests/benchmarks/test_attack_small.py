@@ -151,3 +151,17 @@ def test_a_scene_is_the_same_by_its_number_and_is_read(attack, job):
     assert (one.changes, one.target) == (other.changes, other.target)
     assert one.changes != attack.scene_of(job, 3, 5).changes
     assert lo.load(one.base).update(one.changes).job == job
+
+
+def test_a_scene_that_raises_is_told_and_is_a_failure(attack, monkeypatch):
+    def raises(*asked, **options):
+        raise IndexError("beyond the end")
+
+    monkeypatch.setattr(lo, "solve", raises)
+    found = attack.outcome("shedding", 3, 4, compare=False)
+    assert found.counted == ["tried", "raised"]
+    assert "raised" in attack.FAILURES
+    (line,) = found.lines
+    assert line.startswith("raised (--jobs shedding --seed 3 --only 4): Traceback")
+    assert "IndexError: beyond the end" in line
+    assert "lo.solve(lo.load(" in line

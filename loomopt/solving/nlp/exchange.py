@@ -136,7 +136,8 @@ def refine_active_set(program: Program, point: Point, settings: Settings) -> Poi
     """Move a solved point onto all rows that carry a slope, even if the solver stopped far from them.
 
     IPOPT stops at a distance of its tolerance over the multiplier. Several nodes at one extreme share the multiplier,
-    and a small multiplier of a steep row balances a large slope: a row counts by multiplier times slope.
+    and a small multiplier of a steep row balances a large slope: a row counts by multiplier times slope. The point may
+    have moved since it was solved: epigraph variables start at its peaks.
     """
     calls = Calls(program, settings)
     sampler = calls.sampler(point.x)
@@ -147,7 +148,7 @@ def refine_active_set(program: Program, point: Point, settings: Settings) -> Poi
     node_prices = [family_nodes[: multipliers.rows.slots] for family_nodes in sums]
     nodes = [[e for e, _ in family_nodes] for family_nodes in node_prices]
     nlp = calls.nlp(sampler, nodes, warm=False)
-    arguments = calls.arguments(nlp, sampler, point.x, point.extra, nodes)
+    arguments = calls.arguments(nlp, sampler, point.x, calls.levels(sampler), nodes)
     carried = multipliers.for_slots(nlp.rows).lam_g
     for row_prices, family_nodes in zip(nlp.rows.node_rows(carried), node_prices, strict=True):
         row_prices[:] = np.pad([price for _, price in family_nodes], (0, len(row_prices) - len(family_nodes)))

@@ -169,10 +169,14 @@ class Calls:
         if self.elastic:
             elastic_start = self.elastic.start
             return elastic_start.extra if elastic_start else np.ones(nlp.rows.extras)
-        levels = [self.program.objectives[epigraph.objective] for epigraph in self.epigraphs]
-        first = np.array([level.merit(sampler) / level.scale for level in levels])
+        first = self.levels(sampler)
         share = np.where(first < 0.0, 1 / FIRST_SHARE, FIRST_SHARE)
         return np.asarray(share * first + FIRST_ROOM)
+
+    def levels(self, sampler: Sampler) -> Floats:
+        """Least admissible values of the epigraph variables, over the whole cycle."""
+        objectives = [self.program.objectives[epigraph.objective] for epigraph in self.epigraphs]
+        return np.array([objective.merit(sampler) / objective.scale for objective in objectives])
 
     def excess(self, family: RowFamily, extreme: Extreme, extra: Floats) -> float:
         """Excess of an extreme over its bound, relative to the row's scale."""

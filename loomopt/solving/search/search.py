@@ -250,8 +250,9 @@ def _first_levels_alone(search: Search, best: Candidate) -> Search:
             x = fewer.best.x
             search, moved, draft = _draft_at(search, x)
             if draft.whole.passed:
-                levels = objectives(program, moved)
-                candidate = Candidate(replace(first.point, x=dict(moved)), levels, best.value, moved, draft.whole)
+                # Nodes and multipliers stay those of all levels.
+                point, levels = replace(best.point, x=dict(moved)), objectives(program, moved)
+                candidate = Candidate(point, levels, best.value, moved, draft.whole)
                 return replace(search, best=candidate, candidates=(*search.candidates, candidate))
     return search
 

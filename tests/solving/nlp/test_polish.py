@@ -190,3 +190,14 @@ def test_a_steep_row_counts_by_its_slope():
     closer = exchange.refine_active_set(steep, short, Settings(farthest=2e-5))
     assert closer is not None
     assert np.hypot(closer.x["x"], closer.x["y"]) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_design_that_moved_since_its_solve_is_led_back_from_its_own_peaks():
+    """After a step along a flat direction another level's peak may be far from where the solver left it."""
+    task = program([("y", -1, 2.0)], PEAK)
+    exact = solved(task)
+    moved = {name: value + 1e-6 for name, value in exact.x.items()}
+    stale = replace(exact, x=moved, extra=exact.extra + 1e-3)
+    back = exchange.refine_active_set(task, stale, Settings(farthest=2e-5))
+    assert back is not None
+    assert back.x == pytest.approx({"x": 1.0, "y": 2.0}, abs=1e-11)

@@ -92,3 +92,12 @@ def test_equal_peaks_that_move_along_a_flat_direction_end_in_a_certificate(level
     assert found.passed, found.best.certificate.reasons
     assert found.best.x["l2"] == pytest.approx(0.5382228, abs=1e-7)
     assert found.best.x["l3"] == pytest.approx(0.6334228, abs=1e-7)
+
+
+@pytest.mark.slow
+def test_the_whole_search_ends_in_the_same_certificate():
+    """The certificate's steps lead along the flat direction, over which peak_torque rises by 1e-4 of its size."""
+    answer = lo.solve(lo.scene(SCENE), "t")
+    assert answer.status == "optimal", answer.message
+    assert answer.design["l2"] == pytest.approx(0.5382228, abs=1e-7)
+    assert answer.design["l3"] == pytest.approx(0.6334228, abs=1e-7)

@@ -193,6 +193,19 @@ def test_a_stronger_weight_that_leads_nowhere_leaves_the_best_as_it_was(certifie
     assert len(found.candidates) == 2
 
 
+def test_the_first_level_alone_keeps_the_rows_of_all_levels(certified, solved):
+    """A later solve that starts warm from the best reads its nodes family by family."""
+    answers = certified[1]
+    points = solved[1]
+    answers[1.0] = gave_way(stationarity=1.0)
+    points.append(Point({"x": 0.0, "y": 0.0}, "Solve_Succeeded", True, nodes=((),), structure="first level"))
+    both = candidate(1, x=1.0)
+    both = both._replace(point=replace(both.point, nodes=((), ()), structure="both levels"))
+    found = certify_best(replace(empty(candidates=(both,)), settings=Settings(penalty=1e7)))
+    assert (found.passed, found.best.x) == (True, {"x": 0.0, "y": 0.0})
+    assert found.best.point == replace(both.point, x={"x": 0.0, "y": 0.0})
+
+
 # Newton's corrections ---------------------------------------------------------------------------------------------
 
 
