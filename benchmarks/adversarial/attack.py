@@ -57,9 +57,9 @@ MOST_LOST = 0.05
 FAILURES = ("beaten", "broken", "refuted", "uncertified: other", "raised")
 
 
-def better(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+def better(first: tuple[float, ...], other: tuple[float, ...]) -> bool:
     """Whether objectives are lower by more than 1e-6: the first, or where it is held the second."""
-    for a, b in zip(one, other, strict=True):
+    for a, b in zip(first, other, strict=True):
         if a < b - BETTER:
             return True
         if a > b + HELD:
@@ -67,9 +67,9 @@ def better(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
     return False
 
 
-def near(one: tuple[float, ...], other: tuple[float, ...], room: float = BETTER) -> bool:
+def near(first: tuple[float, ...], other: tuple[float, ...], room: float = BETTER) -> bool:
     """Whether no objective is higher by more than `room`."""
-    return all(a <= b + room for a, b in zip(one, other, strict=True))
+    return all(a <= b + room for a, b in zip(first, other, strict=True))
 
 
 def scene_of(job: str, seed: int, number: int) -> Any:
@@ -228,9 +228,9 @@ def main() -> None:
     options = parsed()
     counts = {job: Counter[str]() for job in options.jobs.split(",")}
     failures = list[str]()
-    for job, found in outcomes(options):
-        counts[job].update(found.counted)
-        for line in found.lines:
+    for job, result in outcomes(options):
+        counts[job].update(result.counted)
+        for line in result.lines:
             failures.append(line)
             print(line, file=sys.stderr, flush=True)
     columns = [*COUNTED, *(["comparable", *(f"best by {name}" for name in CALLS)] if options.compare else [])]

@@ -72,8 +72,8 @@ class Machine:
         values = {"swing": (psi_r - psi_f,), "theta": (beta - beta_r,), "mu_min": (near, far)}
         firm = []
         for name, (low, high) in self.hand.limits.items():
-            firm += [each - low for each in values[name]] if low is not None else []
-            firm += [high - each for each in values[name]] if high is not None else []
+            firm += [value - low for value in values[name]] if low is not None else []
+            firm += [high - value for value in values[name]] if high is not None else []
         front = self.hand.torques(design, beta)[0] / self.torque
         equal = front[:, :0]
         if self.target == "torque":
@@ -104,7 +104,7 @@ class Machine:
         if self.target in ("pulse", "retrofit"):
             return angles
         design, (low, high) = self.design(z), self._corners
-        found = []
+        results = []
         with np.errstate(all="ignore"):
             beta = by_hand.dead_centres(*(design[name] for name in LENGTHS))[0]
             for begin, end in ((low, high), (high, 2 * np.pi + low)):
@@ -113,10 +113,10 @@ class Machine:
                 inner = (size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:]) & (size[1:-1] > SHARE * size.max())
                 for k in np.flatnonzero(inner) + 1:
                     bend = size[k - 1] - 2 * size[k] + size[k + 1]
-                    found.append(
+                    results.append(
                         offsets[k] + step * (size[k - 1] - size[k + 1]) / (2 * bend) if bend < 0 else offsets[k]
                     )
-        return (np.append(angles[0], found),)
+        return (np.append(angles[0], results),)
 
     def attack(self, seed, claimed, near=None):
         """Yield designs that may be better than claimed, or admissible at all."""

@@ -133,7 +133,7 @@ class Machine:
 
     def _sizes(self):
         q = self.shape.moved(self.today[None], EVEN)[0]
-        return [float(np.abs(each).max()) for each in self.curves(q)]
+        return [float(np.abs(curve).max()) for curve in self.curves(q)]
 
     def view(self, z, angles):
         q, cosine, sine = self.shape.moved(self.designs(z), len(angles[0]))
@@ -157,7 +157,7 @@ class Machine:
     def _at(self, design):
         x = np.array([design[name] for name in self.shape.names])
         with np.errstate(all="ignore"):
-            return x, *(each[0] for each in self.shape.moved(x[None], EVEN))
+            return x, *(item[0] for item in self.shape.moved(x[None], EVEN))
 
     def objectives(self, design):
         """Levels in units of the scale, today's."""
@@ -184,9 +184,9 @@ class Machine:
 def drawn(rng):
     """Random scene around a machine that closes."""
     while True:
-        found = _drawn(rng)
-        if found is not None:
-            return found
+        result = _drawn(rng)
+        if result is not None:
+            return result
 
 
 def _drawn(rng):
@@ -206,7 +206,7 @@ def _drawn(rng):
     texts = [_text(value, unit) for value, unit in zip(x, units, strict=True)]
     today = np.array([value for _, value in texts])
     with np.errstate(all="ignore"):
-        q, cosine, sine = (each[0] for each in shape.moved(today[None], EVEN))
+        q, cosine, sine = (item[0] for item in shape.moved(today[None], EVEN))
     if not np.all(np.isfinite(q)) or np.abs(cosine).max() > np.cos(OPEN) or np.abs(sine).max() > np.cos(OPEN):
         return None
     if _ambiguous(q) or _ambiguous(-q):
@@ -236,7 +236,7 @@ def _machine(rng, shape, texts, units, today, swing, least):
         bounds.pop("l4")
     lower = np.array([bounds[n][0][1] if n in bounds else today[k] for k, n in enumerate(shape.names)])
     upper = np.array([bounds[n][1][1] if n in bounds else today[k] for k, n in enumerate(shape.names)])
-    kept = [_text(angle * rng.uniform(0.6, 0.99), "deg") for angle in least]
+    subset = [_text(angle * rng.uniform(0.6, 0.99), "deg") for angle in least]
     unit = "mm" if shape.on else "deg"
     wide = _text(swing * rng.uniform(0.8, 0.999), unit)
     levels = LEVELS[int(rng.integers(len(LEVELS)))]
@@ -253,7 +253,7 @@ def _machine(rng, shape, texts, units, today, swing, least):
         },
     }
     output, effects = {"angle": "rocker"}, {"inertia": {"J": f"{INERTIA} kg*m^2"}}
-    mu = {"drive": {"min": kept[0][0]}}
+    mu = {"drive": {"min": subset[0][0]}}
     if shape.on:
         parts["E"] = {"kind": "point", "on": shape.on, "radius": "e", "angle": "eps"}
         parts["G"] = {"kind": "pivot", "x": "Gx", "y": "Gy"}
@@ -269,7 +269,7 @@ def _machine(rng, shape, texts, units, today, swing, least):
             "links": {"strut": "st"},
         }
         output, effects = {"slide": "ram"}, {"inertia": {"mass": f"{MASS} kg"}}
-        mu["ram"] = {"min": kept[1][0]}
+        mu["ram"] = {"min": subset[1][0]}
     document = {
         "problem": {"name": "drawn", "job": "linkage", "title": "A linkage drawn at random", "source": "random"},
         "operation": {"speed": f"{speed!r} rpm"},
@@ -283,7 +283,7 @@ def _machine(rng, shape, texts, units, today, swing, least):
         "targets": {"t": {"least": list(levels)}},
     }
     speed = speed * 2 * np.pi / 60
-    return Machine(document, shape, levels, today, lower, upper, wide[1], (kept[0][1], kept[1][1]), speed)
+    return Machine(document, shape, levels, today, lower, upper, wide[1], (subset[0][1], subset[1][1]), speed)
 
 
 def _text(value, unit):

@@ -74,7 +74,7 @@ class Drive:
     def view(self, z, angles):
         peaks, after, before, obliques = angles
         design, ends = self.designs(z).T[:, :, None], self.arcs(z)
-        wide = [np.broadcast_to(each, (len(z), len(each))) for each in (peaks, obliques)]
+        wide = [np.broadcast_to(item, (len(z), len(item))) for item in (peaks, obliques)]
         phi = np.hstack([wide[0], ends[0][:, None] * after, -ends[1][:, None] * before, wide[1]])
         first, last = len(peaks), len(phi[0]) - len(obliques)
         S, _, S_2, cosine, _ = plain.curves(design, phi)
@@ -105,13 +105,13 @@ class Drive:
     def sharper(self, z, angles):
         x, (after, before) = self.designs(z), self.arcs(z)
         with np.errstate(all="ignore"):
-            found = plain.extremes(x, 2), plain.extremes(x, 0, 0.0, after), plain.extremes(x, 0, -before, 0.0)
+            results = plain.extremes(x, 2), plain.extremes(x, 0, 0.0, after), plain.extremes(x, 0, -before, 0.0)
             obliques = plain.extremes(x, 3)[0]
-        scaled = found[0][0], found[1][0] / after, -found[2][0] / before, obliques
-        kept = [each[np.isfinite(each)] for each in scaled]
+        scaled = results[0][0], results[1][0] / after, -results[2][0] / before, obliques
+        subset = [item[np.isfinite(item)] for item in scaled]
         if self.target == "smooth":
-            kept[0] = kept[0][:0]
-        return tuple(np.append(old, new) for old, new in zip(angles, kept, strict=True))
+            subset[0] = subset[0][:0]
+        return tuple(np.append(old, new) for old, new in zip(angles, subset, strict=True))
 
     def dwell(self, x):
         """Shorter dwell, rad."""

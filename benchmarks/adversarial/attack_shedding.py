@@ -90,7 +90,7 @@ class Frame:
                 worst = max(worst, math.radians(low - angle), math.radians(angle - high))
         if "law" in design:
             maps = plain.linear_maps(self.intervals, np.linspace(0, 1, 40 * self.intervals + 1))
-            s, slope, bend = (each @ np.array(design["law"]) for each in maps)
+            s, slope, bend = (item @ np.array(design["law"]) for item in maps)
             worst = max(worst, abs(s[-1] - 1), abs(slope[-1]), -slope.min(), np.abs(bend).max() / (2 * math.pi) - 1)
         return worst
 
@@ -108,8 +108,8 @@ class Frame:
         elif self.question == "speed":
             yield from self._faster(claimed)
         else:
-            found = self._programme()
-            yield from [found] if found else []
+            result = self._programme()
+            yield from [result] if result else []
 
     def _faster(self, claimed):
         """Yield today's spring at the highest of many speeds that keep contact, found closer and closer."""
@@ -118,8 +118,8 @@ class Frame:
             return {"K1": self.K1[0], "X0": self.X0[0], "speed": float(share) * self.plain_scene.rpm * RPM}
 
         shares = np.linspace(0, 3 * (-claimed[0] if claimed else 1.0), SPEEDS)[1:]
-        kept = [k for k, share in enumerate(shares) if self.excess(design(share)) <= 0.0]
-        low, high = (shares[kept[-1]], shares[min(kept[-1] + 1, len(shares) - 1)]) if kept else (0.0, shares[0])
+        subset = [k for k, share in enumerate(shares) if self.excess(design(share)) <= 0.0]
+        low, high = (shares[subset[-1]], shares[min(subset[-1] + 1, len(shares) - 1)]) if subset else (0.0, shares[0])
         for _ in range(50):
             middle = (low + high) / 2
             low, high = (middle, high) if self.excess(design(middle)) <= 0.0 else (low, middle)
@@ -139,10 +139,10 @@ class Frame:
             scaled = np.array(rows) * np.array([size, F, F]) / F
             cost = [0, 0, 1] if self.target == "force" else [1, 0, 0]
             bounds = [(self.K1[0] / size, self.K1[1] / size), (0, None), (None, None)]
-            found = linprog(cost, scaled, np.array(right) / F, bounds=bounds, method="highs-ds", options=plain.TIGHT)
-            if found.status != 0:
+            optimum = linprog(cost, scaled, np.array(right) / F, bounds=bounds, method="highs-ds", options=plain.TIGHT)
+            if optimum.status != 0:
                 return None
-            K1, P, peak = found.x * np.array([size, F, F])
+            K1, P, peak = optimum.x * np.array([size, F, F])
             K1 = min(max(K1 * (1 + 1e-12), self.K1[0]), self.K1[1])
             X0 = min(max(P / K1 if K1 > 0 else self.X0[0], self.X0[0]), self.X0[1])
             at = replace(scene, X0=X0)
@@ -190,11 +190,11 @@ class Angled:
     def sharper(self, z, angles):
         design = self.design(z)
         scene = self.frame._of(design)
-        found = []
+        results = []
         for stretch, u in zip(plain.stretches(scene), angles, strict=True):
             spots = cam_force.summits(cam_force.need(scene, stretch), float(stretch[3]), float(stretch[4]))
-            found.append(np.append(u, spots))
-        return tuple(found)
+            results.append(np.append(u, spots))
+        return tuple(results)
 
     def design(self, z):
         values = self.values(z)

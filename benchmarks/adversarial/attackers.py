@@ -107,10 +107,10 @@ class Rows:
         if y.tobytes() == self.at:
             return
         self.at, steps = y.tobytes(), STEP * np.eye(len(y))
-        found = self.values(np.vstack([y, y + steps, y - steps]))
-        self.rows = [rows[0] for rows in found]
+        values = self.values(np.vstack([y, y + steps, y - steps]))
+        self.rows = [rows[0] for rows in values]
         half = len(y) + 1
-        self.slopes = [(rows[1:half] - rows[half:]).T / (2 * STEP) for rows in found]
+        self.slopes = [(rows[1:half] - rows[half:]).T / (2 * STEP) for rows in values]
 
 
 def solved(
@@ -118,7 +118,7 @@ def solved(
     start: np.ndarray,
     claimed: float,
     level: int = 0,
-    held: tuple[float, ...] = (),
+    fixed: tuple[float, ...] = (),
     ends: Sequence[np.ndarray] = (),
 ) -> np.ndarray | None:
     """Return where SLSQP ends from a start, extremes it misses added round after round, put onto its limits.
@@ -131,9 +131,9 @@ def solved(
     y[-1] = viewed(task, y[None, :-1], coarse).levels[level].max()
     slope = np.eye(len(y))[-1]
     for _ in range(ROUNDS):
-        rows, before = Rows(task, angles, level, held), y
+        rows, before = Rows(task, angles, level, fixed), y
         kinds = (0, 1) if rows.values(y[None])[1].size else (0,)
-        found = minimize(
+        optimum = minimize(
             lambda y: y[-1],
             y,
             jac=lambda y, slope=slope: slope,
@@ -142,7 +142,7 @@ def solved(
             constraints=[rows.part(kind) for kind in kinds],
             options={"ftol": 1e-9 if angles is coarse else 1e-12, "maxiter": 60},
         )
-        y = np.clip(found.x, [0.0] * task.size + [-np.inf], [1.0] * task.size + [np.inf])
+        y = np.clip(optimum.x, [0.0] * task.size + [-np.inf], [1.0] * task.size + [np.inf])
         if broken(viewed(task, y[None, :-1], angles))[0] > HOPELESS or y[-1] > claimed + HOPEFUL:
             break
         if angles is coarse and any(np.sqrt(np.mean((y[:-1] - end) ** 2)) < SAME for end in ends):
@@ -150,7 +150,7 @@ def solved(
         angles = task.sharper(y[:-1], angles)
         if np.abs(y - before).max() < 1e-9:
             break
-    return inside(Rows(task, angles, level, held), y)
+    return inside(Rows(task, angles, level, fixed), y)
 
 
 def inside(rows: Rows, y: np.ndarray) -> np.ndarray:
@@ -176,18 +176,18 @@ def inside(rows: Rows, y: np.ndarray) -> np.ndarray:
 def screened(task: Task, seed: int, count: int = 2048, best: int = 5) -> list[np.ndarray]:
     """Best of many Sobol points that lie apart."""
     z = qmc.Sobol(task.size, seed=seed).random(count)
-    order, found = np.argsort(merit(task, z)), list[np.ndarray]()
+    order, result = np.argsort(merit(task, z)), list[np.ndarray]()
     for k in order:
-        if all(np.sqrt(np.mean((z[k] - other) ** 2)) > 0.2 for other in found):
-            found.append(z[k])
-        if len(found) == best:
+        if all(np.sqrt(np.mean((z[k] - other) ** 2)) > 0.2 for other in result):
+            result.append(z[k])
+        if len(result) == best:
             break
-    return found
+    return result
 
 
 def evolved(task: Task, seed: int, generations: int = 80) -> np.ndarray:
     """Return where differential evolution ends."""
-    found = differential_evolution(
+    result = differential_evolution(
         lambda z: merit(task, np.clip(z.T, 0.0, 1.0)) if z.ndim > 1 else merit(task, np.clip(z, 0.0, 1.0)[None])[0],
         [(0.0, 1.0)] * task.size,
         maxiter=generations,
@@ -199,7 +199,7 @@ def evolved(task: Task, seed: int, generations: int = 80) -> np.ndarray:
         vectorized=True,
         updating="deferred",
     )
-    return np.asarray(found.x)
+    return np.asarray(result.x)
 
 
 def attacked(
@@ -213,14 +213,14 @@ def attacked(
     """
     claims, ends = claimed or (np.inf,), list[np.ndarray]()
     for start in _starts(task, seed) if near is None else [near]:
-        found = solved(task, start, claims[0], ends=ends)
-        if found is None:
+        solution = solved(task, start, claims[0], ends=ends)
+        if solution is None:
             continue
-        ends.append(found)
-        yield found
+        ends.append(solution)
+        yield solution
         for level in range(1, len(claims)):
-            later = solved(task, found, claims[level], level, claims[:level])
-            yield found if later is None else later
+            later = solved(task, solution, claims[level], level, claims[:level])
+            yield solution if later is None else later
 
 
 def _starts(task: Task, seed: int) -> Iterator[np.ndarray]:

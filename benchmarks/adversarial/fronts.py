@@ -78,16 +78,16 @@ def drawn(number: int, jobs: tuple[str, ...] = JOBS) -> Asked:
 
     job = jobs[number % len(jobs)]
     if job == "linkage":
-        scene, own = linkage(number)
+        scene, values = linkage(number)
     else:
         task = scene_of(job, 0, number)
-        scene, own = lo.load(task.base).update(task.changes), task.target
+        scene, values = lo.load(task.base).update(task.changes), task.target
     rng = np.random.default_rng([zlib.crc32(b"fronts"), number])
-    target = own if rng.random() < SHARE else "none"
+    target = values if rng.random() < SHARE else "none"
     offered = {name: axis.senses for name, axis in scene.schema.axes.items()}
     while True:
-        one, other = map(str, rng.choice(sorted(offered), 2, replace=False))
-        axes = one, other
+        first, other = map(str, rng.choice(sorted(offered), 2, replace=False))
+        axes = first, other
         most = tuple(name for name in axes if rng.choice(offered[name]) == "most")
         try:
             front.trade(scene, axes, front.demanding(scene, target), maximise=most)
@@ -102,7 +102,7 @@ def beaten(study: Any, rows: int) -> tuple[int, list[dict[str, Any]]]:
     from loomopt.model.session import working
     from loomopt.studies.front import plan
 
-    trade, found = study.study, list[dict[str, Any]]()
+    trade, result = study.study, list[dict[str, Any]]()
     sought = trade.solver.axes[0]
     known = [row for row in study.rows if row.certified and trade.axes[1] in row.place]
     chosen = known[:: max(1, len(known) // rows)][:rows]
@@ -113,12 +113,14 @@ def beaten(study: Any, rows: int) -> tuple[int, list[dict[str, Any]]]:
             ends = [trade.solver.solve(asking, (), True), trade.solver.solve(asking, others, None)]
         mine = sought.value(plan.value(row, trade.axes[0]))
         for by, end in zip(("search", "rows"), ends, strict=True):
-            kept = all(a <= b + plan.ALIKE for a, b in zip(end.warm.get("held", ()), row.warm["held"], strict=False))
-            apart = mine - sought.value(end.warm["axes"][trade.axes[0]]) if end.certified and kept else 0.0
+            remaining = all(
+                a <= b + plan.ALIKE for a, b in zip(end.warm.get("held", ()), row.warm["held"], strict=False)
+            )
+            apart = mine - sought.value(end.warm["axes"][trade.axes[0]]) if end.certified and remaining else 0.0
             if apart > BETTER * sought.objective.scale:
                 share = apart / sought.objective.scale
-                found.append({"point": row.point, "place": dict(row.place), "by": by, "apart": share})
-    return len(chosen), found
+                result.append({"point": row.point, "place": dict(row.place), "by": by, "apart": share})
+    return len(chosen), result
 
 
 def told(number: int, points: int, rows: int, jobs: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
@@ -126,21 +128,21 @@ def told(number: int, points: int, rows: int, jobs: tuple[str, ...]) -> tuple[st
     import loomopt as lo
     from loomopt.base.errors import BadInput
 
-    asked, began = drawn(number, jobs), time.perf_counter()
-    call = {"number": number, "job": asked.scene.job, "axes": asked.axes, "maximise": asked.maximise}
-    call["target"] = asked.target
+    request, began = drawn(number, jobs), time.perf_counter()
+    call = {"number": number, "job": request.scene.job, "axes": request.axes, "maximise": request.maximise}
+    call["target"] = request.target
     try:
-        study = lo.pareto(asked.scene, asked.axes, asked.target, maximise=asked.maximise, points=points)
+        study = lo.pareto(request.scene, request.axes, request.target, maximise=request.maximise, points=points)
     except BadInput as error:
         return "refused", call | {"why": str(error), "seconds": time.perf_counter() - began}
     amiss = [row.reason for row in study.rows if row.status in OPEN]
     certified = sum(row.certified for row in study.rows)
-    said = {"rows": len(study.rows), "certified": certified, "amiss": amiss}
-    said |= {"slowest": max(row.seconds for row in study.rows), "seconds": time.perf_counter() - began}
-    said["attacked"], said["beaten"] = beaten(study, rows)
-    said["bettered"] = study.findings.bettered
-    word = "beaten" if said["beaten"] else "uncertified" if amiss else "certified" if certified else "infeasible"
-    return word, call | said
+    record = {"rows": len(study.rows), "certified": certified, "amiss": amiss}
+    record |= {"slowest": max(row.seconds for row in study.rows), "seconds": time.perf_counter() - began}
+    record["attacked"], record["beaten"] = beaten(study, rows)
+    record["bettered"] = study.findings.bettered
+    word = "beaten" if record["beaten"] else "uncertified" if amiss else "certified" if certified else "infeasible"
+    return word, call | record
 
 
 def parsed() -> argparse.Namespace:
@@ -158,19 +160,19 @@ def parsed() -> argparse.Namespace:
 def main() -> None:
     harness.one_thread()
     harness.processor_time()
-    asked, began = parsed(), time.monotonic()
+    request, began = parsed(), time.monotonic()
     counts, failures = Counter[str](), list[dict[str, Any]]()
-    for number in range(asked.first, asked.to + 1):
-        if time.monotonic() - began > asked.seconds:
+    for number in range(request.first, request.to + 1):
+        if time.monotonic() - began > request.seconds:
             break
-        word, said = told(number, asked.points, asked.rows, tuple(asked.jobs.split(",")))
+        word, message = told(number, request.points, request.rows, tuple(request.jobs.split(",")))
         counts.update(["tried", word])
-        counts["rows attacked"] += said.get("attacked", 0)
+        counts["rows attacked"] += message.get("attacked", 0)
         if word in ("uncertified", "beaten"):
-            failures.append(said)
-        print(word, said, file=sys.stderr, flush=True)
+            failures.append(message)
+        print(word, message, file=sys.stderr, flush=True)
     row = {name: counts[name] for name in COUNTED}
-    harness.show([row], asked.json, **({"failures": failures} if asked.json else {}))
+    harness.show([row], request.json, **({"failures": failures} if request.json else {}))
     sys.exit(bool(failures))
 
 

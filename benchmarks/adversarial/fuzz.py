@@ -201,15 +201,15 @@ def spoil(draw: random.Random, table: dict[str, Any], names: Sequence[str] = ())
     *path, last = draw.choice(paths(table))
     for name in path:
         table = table[name]
-    what = draw.random()
-    if what < 0.1:
+    subject = draw.random()
+    if subject < 0.1:
         del table[last]
-    elif what < 0.85 and not isinstance(table[last], dict | list):
+    elif subject < 0.85 and not isinstance(table[last], dict | list):
         text = rescaled(draw, table[last])
         table[last] = text if isinstance(table[last], str) else float(text)
         if names and draw.random() < 0.3:
             table[last] = draw.choice(names)
-    elif what < 0.93:
+    elif subject < 0.93:
         table[last] = junk(draw)
     elif names and draw.random() < 0.5:
         table[draw.choice(names)] = draw.choice(
@@ -234,7 +234,7 @@ def spoilt_text(draw: random.Random, text: str, parts: tuple[str, ...]) -> bytes
 def toml(value: object) -> str:
     """Value as TOML writes it in one line; what TOML cannot say is text."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_text(name)} = {toml(each)}" for name, each in value.items()) + "}"
+        return "{" + ", ".join(f"{_text(name)} = {toml(item)}" for name, item in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(toml, value)) + "]"
     if isinstance(value, bool):
@@ -324,8 +324,8 @@ def files(draw: random.Random, folder: Path, sources: Mapping[str, Mapping[str, 
     documents = sources or {name: lo.load(name).document for name in PROBLEMS}
     document: dict[str, Any] = copy.deepcopy(dict(documents[draw.choice(sorted(documents))]))
     if draw.random() < 0.3:  # what is off is on
-        for name, own in document.pop("available", {}).items():
-            document.setdefault("effects", {}).setdefault(name, own)
+        for name, values in document.pop("available", {}).items():
+            document.setdefault("effects", {}).setdefault(name, values)
     if draw.random() < 0.3:  # another machine: dimensions are a little different
         for path in draw.sample(_quantities(document), 2):
             _at(document, path[:-1])[path[-1]] = rescaled(draw, _at(document, path), mild=True)
@@ -334,14 +334,14 @@ def files(draw: random.Random, folder: Path, sources: Mapping[str, Mapping[str, 
             spoil(draw, document, names(document))
     text = "\n".join(f"{_text(name)} = {toml(value)}" for name, value in document.items())
     (folder / "scene.toml").write_bytes(text.encode("utf-8", "surrogatepass"))
-    said = [called(["show", "scene.toml"]), called(["evaluate", "scene.toml", "--json"])]
-    if said[-1] == "read":
+    texts = [called(["show", "scene.toml"]), called(["evaluate", "scene.toml", "--json"])]
+    if texts[-1] == "read":
         off = sorted(document["available"]) if isinstance(document.get("available"), dict) else []
         rest = [["evaluate", "scene.toml", *(word for name in off for word in ("--with", name))]]
         rest += [["show", "scene.toml", "--equations"], ["simulate", "scene.toml", "--out", "curves.csv"]]
         rest += [["solve", "scene.toml", "--starts", "2"]] if draw.random() < SOLVED else []
         called(draw.choice(rest))
-    return said[-1]
+    return texts[-1]
 
 
 def names(document: Mapping[str, Any]) -> list[str]:
@@ -394,9 +394,9 @@ def designs(draw: random.Random, folder: Path) -> str:
             design[f"law_{draw.choice(NUMBERS)}"] = draw.random()
         content = json.dumps(draw.choice((design, {"design": design})), default=str).encode("utf-8", "surrogatepass")
     (folder / "design.json").write_bytes(content)
-    what = draw.choice((["evaluate"], ["evaluate"], ["evaluate"], ["export", "--out", str(folder / "joints.csv")]))
-    json_too = ["--json"] if what == ["evaluate"] else []
-    return called([*what, problem, "--design", str(folder / "design.json"), *json_too])
+    subject = draw.choice((["evaluate"], ["evaluate"], ["evaluate"], ["export", "--out", str(folder / "joints.csv")]))
+    json_too = ["--json"] if subject == ["evaluate"] else []
+    return called([*subject, problem, "--design", str(folder / "design.json"), *json_too])
 
 
 def tables(draw: random.Random, folder: Path) -> str:

@@ -24,12 +24,12 @@ SAME = 1e-6
 
 def bounds(generator: random.Random, names: dict[str, tuple[int, int]], least: int, width: float) -> dict[str, Any]:
     """Narrow bounds, mm, of at least so many lengths, around a random centre."""
-    found = {}
+    results = {}
     for name in generator.sample(sorted(names), generator.randint(least, len(names))):
         centre = generator.uniform(*names[name])
         room = width * centre
-        found[f"bounds.{name}"] = {"min": f"{centre - room:.2f} mm", "max": f"{centre + room:.2f} mm"}
-    return found
+        results[f"bounds.{name}"] = {"min": f"{centre - room:.2f} mm", "max": f"{centre + room:.2f} mm"}
+    return results
 
 
 def drawn(generator: random.Random) -> tuple[str, str | None, dict[str, Any]]:
@@ -73,21 +73,21 @@ def told(name: str, target: str | None, changes: dict[str, Any]) -> dict[str, An
 
 def run(count: int, seed: int, out: Path | None) -> None:
     """Solve so many scenes; print and write what is said of each."""
-    generator, found = random.Random(seed), {}
+    generator, result = random.Random(seed), {}
     for place in range(count):
         name, target, changes = drawn(generator)
-        found[f"{place} {name}"] = told(name, target, changes)
-        print(place, name, found[f"{place} {name}"], flush=True)
+        result[f"{place} {name}"] = told(name, target, changes)
+        print(place, name, result[f"{place} {name}"], flush=True)
         if out:
-            out.write_text(json.dumps(found, indent=1), encoding="utf-8")
+            out.write_text(json.dumps(result, indent=1), encoding="utf-8")
 
 
 def compare(before: Path, after: Path) -> None:
     """Print what two runs say otherwise, and the ratio of their times where both call a scene infeasible."""
-    one, other = (json.loads(path.read_text(encoding="utf-8")) for path in (before, after))
+    first, other = (json.loads(path.read_text(encoding="utf-8")) for path in (before, after))
     spent = [0.0, 0.0]
-    for key in (key for key in one if key in other):
-        a, b = one[key], other[key]
+    for key in (key for key in first if key in other):
+        a, b = first[key], other[key]
         if a["status"] != b["status"]:
             print(key, a["status"], "->", b["status"])
         if a["status"] != "infeasible" or b["status"] != "infeasible":

@@ -97,8 +97,8 @@ def _numbers(value: float) -> tuple[str, ...]:
 
 def files() -> list[str]:
     """Files that are changed, in order."""
-    found = [str(path.relative_to(TOP)) for room in ROOMS for path in sorted((TOP / "loomopt" / room).rglob("*.py"))]
-    return [TOLERANCES, *(name for name in found if not name.endswith("__init__.py"))]
+    results = [str(path.relative_to(TOP)) for room in ROOMS for path in sorted((TOP / "loomopt" / room).rglob("*.py"))]
+    return [TOLERANCES, *(name for name in results if not name.endswith("__init__.py"))]
 
 
 def chosen(count: int, seed: int, only: str) -> list[Mutant]:
@@ -116,11 +116,11 @@ def tests(mutant: Mutant) -> list[str]:
         ]
     else:
         readers = [mutant.file]
-    found = []
+    results = []
     for file in readers:
         folder = TOP / "tests" / Path(file).relative_to("loomopt").parent
-        found += sorted(folder.glob(f"test_{Path(file).stem}*.py"))
-    return [str(path.relative_to(TOP)) for path in dict.fromkeys(found)]
+        results += sorted(folder.glob(f"test_{Path(file).stem}*.py"))
+    return [str(path.relative_to(TOP)) for path in dict.fromkeys(results)]
 
 
 def _assigned(mutant: Mutant) -> str:
@@ -144,8 +144,8 @@ def failed(mirrored: Sequence[str], mutant: Mutant | None = None) -> tuple[bool,
     """Whether tests fail on a copy of the package with a mutant, or with none, and in which words."""
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(TOP / "loomopt", Path(folder) / "loomopt", ignore=shutil.ignore_patterns("__pycache__"))
-        for beside in ("problems", "results", "docs", "benchmarks", "tests", "pyproject.toml"):
-            (Path(folder) / beside).symlink_to(TOP / beside)
+        for neighbour in ("problems", "results", "docs", "benchmarks", "tests", "pyproject.toml"):
+            (Path(folder) / neighbour).symlink_to(TOP / neighbour)
         if mutant:
             place = Path(folder) / mutant.file
             place.write_text(mutant.applied(place.read_text(encoding="utf-8")), encoding="utf-8")
@@ -177,12 +177,12 @@ def main() -> None:
     survivors = 0
     with concurrent.futures.ThreadPoolExecutor(options.workers) as pool:
         alone = list(dict.fromkeys(test for mutant in picked for test in tests(mutant)))
-        broken = [words for found, words in pool.map(lambda test: failed([test]), alone) if found]
+        broken = [words for result, words in pool.map(lambda test: failed([test]), alone) if result]
         if broken:
             sys.exit("\n".join(["Without any mutant:", *broken]))
-        for mutant, (found, words) in zip(picked, pool.map(noticed, picked), strict=True):
-            survivors += not found
-            print("noticed " if found else "SURVIVES", mutant, "|", words, flush=True)
+        for mutant, (result, words) in zip(picked, pool.map(noticed, picked), strict=True):
+            survivors += not result
+            print("noticed " if result else "SURVIVES", mutant, "|", words, flush=True)
     print(f"{survivors} of {len(picked)} survive")
 
 

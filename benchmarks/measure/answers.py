@@ -55,22 +55,22 @@ def answers(name: str, count: int) -> dict[str, Any]:
         for step in STEPS:
             spent[step] += answer.time[f"{step}_s"]
     whole = sum(spent.values())
-    each = {f"{step} %": 100 * value / whole for step, value in spent.items()}
+    items = {f"{step} %": 100 * value / whole for step, value in spent.items()}
     row = {"answers": name, "a second": 1 / statistics.median(taken), "ms": harness.spread([1e3 * s for s in taken])}
-    return {**row, **each, "certified": f"{certified} of {count}", "by": ", ".join(sorted(by))}
+    return {**row, **items, "certified": f"{certified} of {count}", "by": ", ".join(sorted(by))}
 
 
 def memory(count: int) -> dict[str, float]:
     """Largest memory, MB, after a tenth of `count` beat-up answers, and after all."""
     import loomopt as lo
 
-    found, ahead = {}, scenes("beatup balance")
+    result, ahead = {}, scenes("beatup balance")
     answer = lo.solve(next(ahead))
     for k, scene in enumerate(itertools.islice(ahead, count), 1):
         answer = lo.solve(scene, warm_start=answer)
         if k in (max(1, count // 10), count):
-            found[f"MB after {k}"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return found
+            result[f"MB after {k}"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return result
 
 
 def main() -> None:

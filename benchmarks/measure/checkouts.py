@@ -79,10 +79,10 @@ def serve(answer: Callable[[Any], Any]) -> None:
     """Answer questions until there are no more: what a script does as a worker."""
     import loomopt
 
-    said, sys.stdout = sys.stdout, sys.stderr
-    print(json.dumps(str(Path(loomopt.__file__ or "").resolve().parent)), file=said, flush=True)
+    message, sys.stdout = sys.stdout, sys.stderr
+    print(json.dumps(str(Path(loomopt.__file__ or "").resolve().parent)), file=message, flush=True)
     for line in sys.stdin:
-        print(json.dumps(answer(json.loads(line))), file=said, flush=True)
+        print(json.dumps(answer(json.loads(line))), file=message, flush=True)
 
 
 def arguments(text: str) -> argparse.ArgumentParser:

@@ -105,41 +105,41 @@ def main() -> None:
         )
         rows = run.run(trade)
         spent = time.process_time() - began
-        found = read_front(trade, rows)
-        told(case, trade, found, spent)
+        second_front = read_front(trade, rows)
+        told(case, trade, second_front, spent)
         if options.cold:
-            searched(trade, found)
+            searched(trade, second_front)
 
 
-def told(case: Case, trade: trade.Trade, found: Findings, spent: float) -> None:
+def told(case: Case, trade: trade.Trade, result: Findings, spent: float) -> None:
     """Print a front's points beside known ones, its ends, its changes and its speed."""
     first, second = case.axes
-    sought, paid = plan.values(found.rows, first), plan.values(found.rows, second)
-    print(f"\n{case.problem}: {first} against {second}, {found.message}")
+    sought, paid = plan.values(result.rows, first), plan.values(result.rows, second)
+    print(f"\n{case.problem}: {first} against {second}, {result.message}")
     for k in (0, -1):
         print(f"  end: {second} {paid[k]:.9g}, {first} {sought[k]:.9g}")
-    for change in found.changes:
+    for change in result.changes:
         limits = ", ".join(side.text for side in change.limits)
         print(f"  {change.kind} at {second} {change.at:.9g}: {limits}")
     for value, expected in case.known.items():
-        row = asked_at(trade, found, value)
+        row = asked_at(trade, result, value)
         reached = plan.value(row, first)
         print(f"  {second} {value:.9g}: {reached:.9f}, known {expected:.9f}, apart {reached / expected - 1:+.1e}")
     if second == "m4e":
         corners = [(x, CORNER[1] - y) for x, y in zip([*paid, CORNER[0]], [*sought, sought[-1]], strict=True)]
         area = sum((b[0] - a[0]) * (a[1] + b[1]) / 2 for a, b in itertools.pairwise(corners))
         print(f"  area to {CORNER}: {area:.6f}, known {LARGEST_AREA}, apart {area / LARGEST_AREA - 1:+.1e}")
-    certified = [row for row in found.rows if row.certified]
+    certified = [row for row in result.rows if row.certified]
     between = [row for row in certified if row.place]
     print(f"  {len(certified) / spent:.1f} certified points per CPU second, searches and ends included", end="")
     print(f" (asked: {case.least:g}); median {sorted(row.seconds for row in between)[len(between) // 2]:.3f} s a point")
 
 
-def asked_at(trade: trade.Trade, found: Findings, value: float) -> Row:
+def asked_at(trade: trade.Trade, result: Findings, value: float) -> Row:
     """Row with the second axis at a value, solved from its nearest neighbour on the front."""
-    near = min((row for row in found.rows if row.certified), key=lambda row: abs(trade_value(trade, row) - value))
+    near = min((row for row in result.rows if row.certified), key=lambda row: abs(trade_value(trade, row) - value))
     ask = {"also": [], "held": near.warm["held"], "wide": False}
-    return trade.solved(StudyTask(len(found.rows), near.point, {trade.axes[1]: value}, ask), near)
+    return trade.solved(StudyTask(len(result.rows), near.point, {trade.axes[1]: value}, ask), near)
 
 
 def trade_value(trade: trade.Trade, row: Row) -> float:
@@ -147,17 +147,17 @@ def trade_value(trade: trade.Trade, row: Row) -> float:
     return plan.value(row, trade.axes[1])
 
 
-def searched(trade: trade.Trade, found: Findings) -> None:
+def searched(trade: trade.Trade, result: Findings) -> None:
     """Print which of every third point a search from scratch is better at, and which it is worse at."""
     better, worse, count = [], [], 0
     sought = trade.solver.axes[0]
-    for row in [row for row in found.rows if row.certified and row.place][::3]:
+    for row in [row for row in result.rows if row.certified and row.place][::3]:
         cap = trade.solver.axes[1].value(row.place[trade.axes[1]])
         cold = trade.solver.solve(Subproblem(0, (None, cap)), (), wide=True)
         if not cold.certified:
             continue
         count += 1
-        mine, its = (sought.value(each.warm["axes"][trade.axes[0]]) for each in (row, cold))
+        mine, its = (sought.value(item.warm["axes"][trade.axes[0]]) for item in (row, cold))
         apart = (mine - its) / sought.objective.scale
         better += [(row.place, apart)] if apart > SAME_OBJECTIVE else []
         worse += [(row.place, apart)] if apart < -SAME_OBJECTIVE else []

@@ -27,19 +27,19 @@ def six_bar() -> lo.Scene:
     """Six-bar sley without its rest."""
     document: dict[str, Any] = dict(lo.load("sixbar-sley").document)
     for table, key in REST.items():
-        document[table] = {name: each for name, each in document[table].items() if name != key}
+        document[table] = {name: item for name, item in document[table].items() if name != key}
     return registry.scene(document)
 
 
 def spent(action: Callable[[], object], repeats: int) -> float:
     """Median of the CPU seconds that an action takes, each time in a session of its own."""
-    found = []
+    results = []
     for _ in range(repeats):
         with working(Session()):
             began = time.process_time()
             action()
-            found.append(time.process_time() - began)
-    return statistics.median(found)
+            results.append(time.process_time() - began)
+    return statistics.median(results)
 
 
 def measured(repeats: int) -> dict[str, float]:
@@ -63,12 +63,12 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    found = measured(options.repeats)
+    result = measured(options.repeats)
     if options.json:
-        print(json.dumps(found))
+        print(json.dumps(result))
         return
-    base = found["beat-up search"]
-    for name, seconds in found.items():
+    base = result["beat-up search"]
+    for name, seconds in result.items():
         print(f"{name:20s} {seconds:8.3f} s {seconds / base:8.2f} beat-up searches")
 
 

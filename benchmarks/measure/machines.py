@@ -65,8 +65,8 @@ class Task:
         self.job = registry.of(self.scene)
         self.design: dict[str, float] = {}
         for name, value in engine.solve(self.scene, case.target).design.items():
-            own = {self.scene.full(name): value} if isinstance(value, float) else named_knots(value)
-            self.design |= own
+            values = {self.scene.full(name): value} if isinstance(value, float) else named_knots(value)
+            self.design |= values
         self.known = self.job.numbers_of(self.scene, self.design)
         self.model = self.job.model(self.scene, self.design)
         self.spread = [name if name in self.known else self.scene.full(f"effects.{name}") for name in case.spread]
@@ -77,7 +77,7 @@ class Task:
         generator = np.random.default_rng(1)
         for begin in range(0, count, BLOCK):
             shares = 1 + SIGMA * generator.standard_normal((len(self.spread), min(BLOCK, count - begin)))
-            yield {name: self.known[name] * own for name, own in zip(self.spread, shares, strict=True)}
+            yield {name: self.known[name] * values for name, values in zip(self.spread, shares, strict=True)}
 
     def many(self, count: int) -> None:
         """Read machines a block at a time and let go of them."""
@@ -95,8 +95,8 @@ class Task:
 
     def alone(self, values: Mapping[str, float]) -> Mapping[str, Any]:
         """Figures of one machine."""
-        own = {**self.design, **{name: float(values[name]) for name in self.spread}}
-        return self.job.figures(self.scene, own)
+        parameters = {**self.design, **{name: float(values[name]) for name in self.spread}}
+        return self.job.figures(self.scene, parameters)
 
 
 def measured(case: Case, machines: int, alone: int, repeats: int) -> dict[str, Any]:
@@ -108,18 +108,18 @@ def measured(case: Case, machines: int, alone: int, repeats: int) -> dict[str, A
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     calls: dict[str, Callable[[], Any]] = {
         "many": lambda: task.many(machines),
-        "alone": lambda: [task.alone(one) for one in ones],
+        "alone": lambda: [task.alone(instance) for instance in ones],
     }
     taken = harness.turns(calls, repeats)
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
     times = harness.medians(taken)
-    found, worst = task.read(few), 0.0
-    for k, one in enumerate(ones):
-        figures = task.alone(one)
-        for name in figures.keys() & found.keys() - AT_A_TOP:
+    result, worst = task.read(few), 0.0
+    for k, instance in enumerate(ones):
+        figures = task.alone(instance)
+        for name in figures.keys() & result.keys() - AT_A_TOP:
             # The least force is a difference of forces as large as the largest.
             size = figures["contact_max" if name == "contact_min" else name]
-            worst = max(worst, abs(found[name][k] - figures[name]) / (abs(size) or 1.0))
+            worst = max(worst, abs(result[name][k] - figures[name]) / (abs(size) or 1.0))
     ratios = [(turn["alone"] / alone) / (turn["many"] / machines) for turn in taken]
     return {
         "scene": f"{case.problem} {case.target}",

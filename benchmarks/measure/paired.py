@@ -61,7 +61,7 @@ def case(name: str) -> tuple[Any, str, Any]:
     return scene, target, lo.solve(scene.set(key, value), target)
 
 
-def work(name: str, what: str) -> Callable[[], Any]:
+def work(name: str, subject: str) -> Callable[[], Any]:
     """One piece of work."""
     import loomopt as lo
 
@@ -84,46 +84,46 @@ def work(name: str, what: str) -> Callable[[], Any]:
         "simulate": lambda: lo.simulate(scene, neighbour.design),
         "read": lambda: lo.load(CASES[name][0]),
     }
-    return calls[what]
+    return calls[subject]
 
 
 def timed(question: tuple[str, str]) -> dict[str, float]:
     """Milliseconds of processor time that a piece of work takes; of a solve, the certificate's too."""
-    name, what = question
-    call, often = work(name, what), OFTEN.get(what, 1)
+    name, subject = question
+    call, often = work(name, subject), OFTEN.get(subject, 1)
     gc.collect()
     began = time.process_time()
     for _ in range(often):
-        found = call()
+        result = call()
     seconds = (time.process_time() - began) / often
-    part = {"certificate": 1e3 * found.time["certify_s"]} if what == "cold" else {}
-    return {what: 1e3 * seconds, **part}
+    part = {"certificate": 1e3 * result.time["certify_s"]} if subject == "cold" else {}
+    return {subject: 1e3 * seconds, **part}
 
 
 def times(pair: tuple[checkouts.Worker, ...], question: tuple[str, str], repeats: int) -> list[list[dict[str, float]]]:
     """Return what a piece of work took in each worker, the first time left out."""
-    found: list[list[dict[str, float]]] = [[] for _ in pair]
+    results: list[list[dict[str, float]]] = [[] for _ in pair]
     for repeat in range(repeats + 1):
         places = range(len(pair)) if repeat % 2 else reversed(range(len(pair)))
         for place in places:
             taken = pair[place].ask(question)
             if repeat:
-                found[place].append(taken)
-    return found
+                results[place].append(taken)
+    return results
 
 
 def rows(name: str, here: list[dict[str, float]], there: list[dict[str, float]]) -> Iterator[dict[str, Any]]:
     """Yield the table's lines of one piece of work."""
     for part in here[0]:
-        one, other = [taken[part] for taken in here], [taken[part] for taken in there]
-        low, high = np.quantile([a / b for a, b in zip(one, other, strict=True)], (0.25, 0.75)).tolist()
+        first, other = [taken[part] for taken in here], [taken[part] for taken in there]
+        low, high = np.quantile([a / b for a, b in zip(first, other, strict=True)], (0.25, 0.75)).tolist()
         yield {
             "case": name,
             "work": part,
-            "here [ms]": statistics.median(one),
+            "here [ms]": statistics.median(first),
             "there [ms]": statistics.median(other),
-            "ratio of medians": statistics.median(one) / statistics.median(other),
-            "ratio of least": min(one) / min(other),
+            "ratio of medians": statistics.median(first) / statistics.median(other),
+            "ratio of least": min(first) / min(other),
             "lower quartile": low,
             "upper quartile": high,
         }
@@ -137,12 +137,14 @@ def main() -> None:
     parser.add_argument("--work", default=",".join(WORK), help="pieces of work, with commas between")
     parser.add_argument("--most", type=float, default=math.inf, help="largest ratio that passes")
     options = parser.parse_args()
-    wanted = [what for what in WORK if what in options.work.split(",")]
-    questions = [(name, what) for name in CASES if name.startswith(options.only) for what in wanted]
+    wanted = [subject for subject in WORK if subject in options.work.split(",")]
+    questions = [(name, subject) for name in CASES if name.startswith(options.only) for subject in wanted]
     with checkouts.workers(__file__, options.other) as pair:
-        found = [line for question in questions for line in rows(question[0], *times(pair, question, options.repeats))]
-    worst = max(min(each[ratio] for ratio in RATIOS) for each in found)
-    harness.show(found, options.json, worst=worst)
+        results = [
+            line for question in questions for line in rows(question[0], *times(pair, question, options.repeats))
+        ]
+    worst = max(min(item[ratio] for ratio in RATIOS) for item in results)
+    harness.show(results, options.json, worst=worst)
     sys.exit(worst > options.most)
 
 

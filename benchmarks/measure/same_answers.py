@@ -102,9 +102,9 @@ def sheddings() -> Iterator[Case]:
         yield case("shedding", "stiffness", effects__warp_tension__shape=shape, operation__N_min="50 N")
         yield case("shedding", "law", "dry_friction", effects__warp_tension__shape=shape, targets__law__intervals=8)
     for symmetric in (False, True):
-        own: dict[str, Any] = {"targets__law__symmetric": symmetric, "targets__law__intervals": 8}
-        yield case("shedding", "law", *FRAME, **own)
-        yield case("shedding-printed-travel", "law", **own, operation__speed="500 rpm")
+        values: dict[str, Any] = {"targets__law__symmetric": symmetric, "targets__law__intervals": 8}
+        yield case("shedding", "law", *FRAME, **values)
+        yield case("shedding-printed-travel", "law", **values, operation__speed="500 rpm")
     yield case("shedding", "stiffness", free="rise")
     yield case("shedding", "stiffness", "damping", free="rise")
     yield case("shedding", "stiffness", bounds__X0__max="60 mm")
@@ -125,44 +125,44 @@ def cases() -> list[Case]:
     return [*packaged, *beatups(), *rapiers(), *sheddings()]
 
 
-def name_of(asked: Case) -> str:
+def name_of(request: Case) -> str:
     """Return what a case is called in the list of exceptions."""
-    changes = [f"{key} = {value}" for key, value in asked["set"].items()]
-    parts = [*asked["effects"], *([f"free {asked['free']}"] if asked["free"] else []), *changes]
-    parts += [f"{key} {value}" for key, value in asked["options"].items()]
-    return " ".join([asked["scene"], asked["target"], *([f"({', '.join(parts)})"] if parts else [])])
+    changes = [f"{key} = {value}" for key, value in request["set"].items()]
+    parts = [*request["effects"], *([f"free {request['free']}"] if request["free"] else []), *changes]
+    parts += [f"{key} {value}" for key, value in request["options"].items()]
+    return " ".join([request["scene"], request["target"], *([f"({', '.join(parts)})"] if parts else [])])
 
 
 # In a worker ------------------------------------------------------------------------------------------------------
 
 
-def answered(asked: Case) -> Case:
+def answered(request: Case) -> Case:
     """Return what is compared of a case's answer."""
     import loomopt as lo
 
     try:
-        scene = lo.load(asked["scene"])
-        for effect in asked["effects"]:
+        scene = lo.load(request["scene"])
+        for effect in request["effects"]:
             scene = scene.with_effect(effect)
-        scene = scene.update(asked["set"])
-        scene = scene.free(asked["free"]) if asked["free"] else scene
-        answer = lo.solve(scene, asked["target"], **asked["options"])
+        scene = scene.update(request["set"])
+        scene = scene.free(request["free"]) if request["free"] else scene
+        answer = lo.solve(scene, request["target"], **request["options"])
     except lo.BadInput as error:
         return {"status": "refused", "message": str(error)}
-    objectives = program_of(scene, asked["target"]).objectives
-    found = answer.as_dict()
+    objectives = program_of(scene, request["target"]).objectives
+    result = answer.as_dict()
     return {
         "status": answer.status,
         "message": answer.message,
-        "objectives": [[each.figure, answer.figures[each.figure], each.scale, each.power] for each in objectives],
+        "objectives": [[item.figure, answer.figures[item.figure], item.scale, item.power] for item in objectives],
         "binding": sorted(f"{price.limit} {price.side}" for price in answer.binding),
         "worth": {f"{p.limit} {p.side}": dict(p.worth) for p in answer.binding},
-        "keys": sorted(keys(found)),
+        "keys": sorted(keys(result)),
         "clash": sorted(answer.clash),
-        "relaxation": {f"{each.limit} {each.side}": each.needed for each in answer.relaxation},
-        "figures": {**found["figures"], **{f"today's {k}": v for k, v in answer.before.figures.items()}}
+        "relaxation": {f"{item.limit} {item.side}": item.needed for item in answer.relaxation},
+        "figures": {**result["figures"], **{f"today's {k}": v for k, v in answer.before.figures.items()}}
         if answer.before
-        else found["figures"],
+        else result["figures"],
     }
 
 
@@ -173,14 +173,14 @@ def program_of(scene: Any, target: str) -> Any:
     return registry.of(scene).program(scene, target)
 
 
-def keys(found: Any, at: str = "") -> Iterator[str]:
+def keys(result: Any, at: str = "") -> Iterator[str]:
     """Yield the paths of all keys of a JSON object; those of a list's entries once."""
-    if isinstance(found, Mapping):
-        for key, value in found.items():
+    if isinstance(result, Mapping):
+        for key, value in result.items():
             yield f"{at}.{key}"
             yield from keys(value, f"{at}.{key}")
-    elif isinstance(found, list):
-        for value in found:
+    elif isinstance(result, list):
+        for value in result:
             yield from keys(value, f"{at}[]")
 
 
@@ -201,13 +201,13 @@ def differences(here: Case, there: Case) -> Iterator[str]:
         if not off <= SAME:
             yield f"objectives off by {off:.2g}: {here['objectives']} | {there['objectives']}"
     for part in ("binding", "clash", "keys"):
-        more, less = (sorted({*one[part]} - {*other[part]}) for one, other in ((here, there), (there, here)))
+        more, less = (sorted({*item[part]} - {*other[part]}) for item, other in ((here, there), (there, here)))
         if more or less:
             yield f"{part}: only here {more}, only there {less}"
     for limit, needed in there["relaxation"].items():
-        own = here["relaxation"].get(limit)
-        if own is None or abs(own - needed) > RELAXED * abs(needed):
-            yield f"relaxation of {limit}: {own} here, {needed} there"
+        values = here["relaxation"].get(limit)
+        if values is None or abs(values - needed) > RELAXED * abs(needed):
+            yield f"relaxation of {limit}: {values} here, {needed} there"
 
 
 def gap(here: Case, there: Case) -> float:
@@ -230,20 +230,20 @@ def main() -> None:
     parser.add_argument("--only", default="", help="scenes whose name starts so")
     parser.add_argument("--figures", type=float, default=1e-8, help="tell of figures that differ by more")
     options = parser.parse_args()
-    wanted = [each for each in cases() if each["scene"].startswith(options.only)]
+    wanted = [item for item in cases() if item["scene"].startswith(options.only)]
     rows = []
     with checkouts.workers(__file__, options.other) as pair:
-        for each in wanted:
+        for item in wanted:
             for worker in pair:
-                worker.send(each)
+                worker.send(item)
             here, there = (worker.receive() for worker in pair)
-            told = list(differences(here, there))
+            report = list(differences(here, there))
             if here["status"] == there["status"] != "refused":
                 off, which = farthest(here["figures"], there["figures"])
-                told += [f"note: figure {which} differs by {off:.2g}"] if off > options.figures else []
-            rows += [{"case": name_of(each), "exception": text} for text in told]
-            for text in told:
-                print(f"{name_of(each)}: {text}", file=sys.stderr)
+                report += [f"note: figure {which} differs by {off:.2g}"] if off > options.figures else []
+            rows += [{"case": name_of(item), "exception": text} for text in report]
+            for text in report:
+                print(f"{name_of(item)}: {text}", file=sys.stderr)
     exceptions = [row for row in rows if not row["exception"].startswith("note")]
     harness.show(
         rows or [{"case": "none", "exception": ""}], options.json, cases=len(wanted), exceptions=len(exceptions)

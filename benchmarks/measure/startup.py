@@ -88,13 +88,13 @@ def spent(code, words, cache):
 
 def one_round(cache, commands):
     """Processor's milliseconds of each command, run once."""
-    found = {ALONE: spent(ALONE, (), cache)[0], FLOOR: spent(LIBRARIES, ("solve", "beatup"), cache)[0]}
+    results = {ALONE: spent(ALONE, (), cache)[0], FLOOR: spent(LIBRARIES, ("solve", "beatup"), cache)[0]}
     for words in commands:
-        found[f"loomopt {words}"] = spent(MAIN, words.split(), cache)[0]
+        results[f"loomopt {words}"] = spent(MAIN, words.split(), cache)[0]
     if commands == COMMANDS:
         whole, solved = spent(TOLD, SOLVE.split()[1:], cache)
-        found[REST] = whole - float(solved)
-    return {name: 1e3 * seconds for name, seconds in found.items()}
+        results[REST] = whole - float(solved)
+    return {name: 1e3 * seconds for name, seconds in results.items()}
 
 
 def calls(cache):
@@ -113,15 +113,15 @@ def main():
         one_round(cache, commands)
         rounds = [one_round(cache, commands) for _ in range(QUICK if options.quick else ROUNDS)]
         counted = calls(cache)
-    floor, rows = statistics.median(one[FLOOR] for one in rounds), []
+    floor, rows = statistics.median(item[FLOOR] for item in rounds), []
     for name in rounds[0]:
-        times, ratios = [one[name] for one in rounds], [one[name] / one[ALONE] for one in rounds]
+        times, ratios = [item[name] for item in rounds], [item[name] / item[ALONE] for item in rounds]
         rows.append(
             {
                 "command": name,
                 "median [ms]": statistics.median(times),
                 "beside the import": harness.spread(ratios),
-                "beside the libraries at work": harness.spread([one[name] / one[FLOOR] for one in rounds]),
+                "beside the libraries at work": harness.spread([item[name] / item[FLOOR] for item in rounds]),
                 "median beside their median": statistics.median(times) / floor,
             }
         )

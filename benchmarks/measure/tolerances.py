@@ -74,7 +74,7 @@ def tasks() -> Iterator[tuple[Program, ...]]:
 def outcome(programs: list[tuple[Program, ...]]) -> Outcome:
     """Return what all solves lead to."""
     session.current().forget(transcribe.NLPS)
-    found: list[tuple[float, ...] | None] = []
+    results: list[tuple[float, ...] | None] = []
     excess, iterations, left = 0.0, 0, 0
     for first, *others in programs:
         near = None
@@ -86,11 +86,11 @@ def outcome(programs: list[tuple[Program, ...]]) -> Outcome:
             left += near is not None and point.iterations > 0
             near = point if point.usable else None
             if not point.usable or sampler is None:
-                found.append(None)
+                results.append(None)
                 continue
             excess = max(excess, point.violation, *(k.excess(sampler) for k in program.limits if k.sign != 0))
-            found.append(tuple(level.merit(sampler) / level.scale for level in program.objectives))
-    return Outcome(tuple(found), excess, iterations, left)
+            results.append(tuple(level.merit(sampler) / level.scale for level in program.objectives))
+    return Outcome(tuple(results), excess, iterations, left)
 
 
 def bearers(name: str) -> list[Any]:
@@ -104,9 +104,9 @@ def changed(name: str, value: Any) -> Iterator[None]:
     with ExitStack() as stack:
         for module in bearers(name):
             stack.enter_context(mock.patch.object(module, name, value))
-        for said in (transcribe.IPOPT, transcribe.WARM):
-            own = {key: value for key in IPOPTS.get(name, ()) if key in said}
-            stack.enter_context(mock.patch.dict(said, own))
+        for message in (transcribe.IPOPT, transcribe.WARM):
+            values = {key: value for key in IPOPTS.get(name, ()) if key in message}
+            stack.enter_context(mock.patch.dict(message, values))
         reading.gauss.cache_clear()
         yield
     reading.gauss.cache_clear()
@@ -131,7 +131,7 @@ def row(name: str, value: Any, usual: Outcome, programs: list[tuple[Program, ...
     return {
         "number": name,
         "value": value,
-        "not reached": sum(each is None for each in here.objectives),
+        "not reached": sum(objective is None for objective in here.objectives),
         "objective off": off,
         "excess": here.excess,
         "iterations": here.iterations,

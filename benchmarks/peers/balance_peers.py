@@ -49,15 +49,15 @@ def scene(M0):
 
 def best_known(cloths):
     """M0 → (M3, peak) from an exchange in plain NumPy, each from its neighbour's answer."""
-    found, previous = {}, peers.slsqp(BEFORE)[0]
+    result, previous = {}, peers.slsqp(BEFORE)[0]
     for M0 in sorted(cloths):
         design = peers.reference(M0, previous)
         previous = np.append(design / peers.SIZE, previous[5:])
-        found[M0] = plain.front_torque(*design, M0), plain.peaks(design, M0)[0][1]
+        result[M0] = plain.front_torque(*design, M0), plain.peaks(design, M0)[0][1]
     for M0, (front, peak) in KNOWN.items():
-        assert abs(found[M0][0] - front) < 1e-6, (M0, found[M0], front)
-        assert abs(found[M0][1] / peak - 1) < 1e-9, (M0, found[M0], peak)
-    return found
+        assert abs(result[M0][0] - front) < 1e-6, (M0, result[M0], front)
+        assert abs(result[M0][1] / peak - 1) < 1e-9, (M0, result[M0], peak)
+    return result
 
 
 def judged(designs, best):
@@ -143,10 +143,10 @@ class ByHand:
         took, designs = [], {}
         for M0, (nlp, solver, arguments, program) in zip(SWEEP, self.calls, strict=True):
             began = time.perf_counter()
-            said = solver(**arguments)
+            message = solver(**arguments)
             took.append(time.perf_counter() - began)
             assert solver.stats()["return_status"] == "Solve_Succeeded", M0
-            scaled, extra = nlp.rows.split(np.asarray(said["x"]).ravel())
+            scaled, extra = nlp.rows.split(np.asarray(message["x"]).ravel())
             x = {v.name: float(value) * v.scale for v, value in zip(program.variables, scaled, strict=True)}
             designs[M0] = plain_design(JOB.design(program, x)), extra[-1] * program.objectives[-1].scale
         return took, designs
@@ -165,22 +165,22 @@ def slsqp_sweep():
 
 def fast(best):
     """Rows of loomopt and of SLSQP, and the spread of each ratio."""
-    own = Loomopt()
+    values = Loomopt()
     runs: dict[str, list] = {"loomopt": [], "slsqp": [], "ipopt": []}
-    own.calls()
-    by_hand = ByHand(own.answers)
-    own.times["certificate"].clear()
-    own.times["call"].clear()
+    values.calls()
+    by_hand = ByHand(values.answers)
+    values.times["certificate"].clear()
+    values.times["call"].clear()
     for _ in range(TURNS):
-        own.build()
-        for name, sweep in (("loomopt", own.sweep), ("slsqp", slsqp_sweep), ("ipopt", by_hand.sweep)):
+        values.build()
+        for name, sweep in (("loomopt", values.sweep), ("slsqp", slsqp_sweep), ("ipopt", by_hand.sweep)):
             runs[name].append(sweep())
-        own.calls()
+        values.calls()
     took = {name: np.array([sum(times) for times, _ in of]) for name, of in runs.items()}
-    took |= {name: np.array(times).reshape(TURNS, -1).sum(axis=1) for name, times in own.times.items()}
+    took |= {name: np.array(times).reshape(TURNS, -1).sum(axis=1) for name, times in values.times.items()}
     parts = {name: float(np.median(times)) for name, times in took.items()}
-    answers = {M0: (plain_design(a.design), a.figures["peak_torque"]) for M0, a in own.answers.items()}
-    cold = {SINGLE: (plain_design(own.cold.design), own.cold.figures["peak_torque"])}
+    answers = {M0: (plain_design(a.design), a.figures["peak_torque"]) for M0, a in values.answers.items()}
+    cold = {SINGLE: (plain_design(values.cold.design), values.cold.figures["peak_torque"])}
     count, build = len(SWEEP), took["first"] - took["cold"]
     rows = [
         row("loomopt: build, once (what the first solve takes longer)", 1, float(np.median(build))),
@@ -233,8 +233,8 @@ def slow(best):
 
 def row(name, answers, taken, errors=None):
     empty = dict.fromkeys(("M3 off [N*m]", "peak off", "peak understated", "limits broken"))
-    each = None if taken is None else 1e3 * taken / answers
-    return {"method": name, "answers": answers, "ms each": each, **(errors or empty)}
+    item = None if taken is None else 1e3 * taken / answers
+    return {"method": name, "answers": answers, "ms each": item, **(errors or empty)}
 
 
 def main():

@@ -77,7 +77,7 @@ def slsqp(M0, start=START, phi=None, ftol=1e-6):
     At ftol = 1e-6 it finds the grid's own optimum to 3e-7; a tighter one costs time and gains nothing on a grid.
     """
     rows = Rows(M0, angles() if phi is None else phi)
-    found = minimize(
+    optimum = minimize(
         lambda z: OBJECTIVE @ z,
         start,
         jac=lambda z: OBJECTIVE,
@@ -86,7 +86,7 @@ def slsqp(M0, start=START, phi=None, ftol=1e-6):
         method="SLSQP",
         options={"ftol": ftol, "maxiter": 200},
     )
-    return found.x, rows.evaluations
+    return optimum.x, rows.evaluations
 
 
 def reference(M0, start=START):
@@ -111,7 +111,7 @@ def trust_constr(M0):
     The rows' curvature is left out: with SciPy's own estimate of it (BFGS) it stops at an inadmissible design.
     """
     rows = Rows(M0, angles())
-    found = minimize(
+    optimum = minimize(
         lambda z: OBJECTIVE @ z,
         np.append(0.99 * START[:5] + 0.01 * (LOW + HIGH) / 2, START[5:]),
         jac=lambda z: OBJECTIVE,
@@ -121,7 +121,7 @@ def trust_constr(M0):
         method="trust-constr",
         options={"maxiter": 1000},
     )
-    return found.x, rows.evaluations
+    return optimum.x, rows.evaluations
 
 
 def _population(x, M0, phi):
@@ -135,7 +135,7 @@ def _population(x, M0, phi):
 def evolution(M0, generations=400):
     """Answer of SciPy's differential evolution on the grid."""
     phi = angles()
-    found = differential_evolution(
+    result = differential_evolution(
         lambda x: _population(np.atleast_2d(x.T), M0, phi)[0],
         Bounds(LOW, HIGH),
         constraints=NonlinearConstraint(lambda x: _population(np.atleast_2d(x.T), M0, phi)[1].squeeze(), 0.0, np.inf),
@@ -146,7 +146,7 @@ def evolution(M0, generations=400):
         vectorized=True,
         updating="deferred",
     )
-    return found.x, found.nfev
+    return result.x, result.nfev
 
 
 def genetic(M0, generations=200):
@@ -165,8 +165,8 @@ def genetic(M0, generations=200):
             objective, limits = _population(x, M0, phi)
             out["F"], out["G"] = objective[:, None], -limits.T
 
-    found = evolve(Balance(), GA(pop_size=100), ("n_gen", generations), seed=1, verbose=False)
-    return found.X, 100 * generations
+    result = evolve(Balance(), GA(pop_size=100), ("n_gen", generations), seed=1, verbose=False)
+    return result.X, 100 * generations
 
 
 def unrolled(points=GRID):
@@ -193,5 +193,5 @@ def unrolled(points=GRID):
 def solve_unrolled(solver, M0):
     """Answer of the unrolled NLP and its iterations."""
     low, high = np.append(LOW, [0, 0]), np.append(HIGH, [np.inf, np.inf])
-    found = solver(x0=START, p=M0, lbx=low, ubx=high, lbg=0.0)
-    return np.asarray(found["x"]).ravel(), solver.stats()["iter_count"]
+    result = solver(x0=START, p=M0, lbx=low, ubx=high, lbg=0.0)
+    return np.asarray(result["x"]).ravel(), solver.stats()["iter_count"]

@@ -70,9 +70,9 @@ def compared(rival: Rival, points: int) -> list[dict[str, object]]:
     """Row for loomopt's front, one for the peer's, and one for the front asked at the peer's places too."""
     began = time.process_time()
     trade = front.trade(lo.load(rival.problem), rival.axes, rival.target, points=points)
-    found = read_front(trade, run.run(trade))
+    second_front = read_front(trade, run.run(trade))
     spent, name = time.process_time() - began, " against ".join(rival.axes)
-    certified = [row for row in found.rows if row.certified]
+    certified = [row for row in second_front.rows if row.certified]
     mine = _judged(rival, [rival.own(row) for row in certified])
     if not harness.installed("pymoo"):
         absent = f"{name}: pymoo is not installed (extra `bench`)"
@@ -80,13 +80,13 @@ def compared(rival: Rival, points: int) -> list[dict[str, object]]:
     designs, looked = evolved(rival, points, LONGER * spent)
     theirs = _judged(rival, list(designs))
     began = time.process_time()
-    asked = [row for _, second in theirs if (row := _asked(trade, found, rival.sign * second))]
-    fuller = [*mine, *_judged(rival, [rival.own(row) for row in asked])]
+    requests = [row for _, second in theirs if (row := _asked(trade, second_front, rival.sign * second))]
+    fuller = [*mine, *_judged(rival, [rival.own(row) for row in requests])]
     longer = spent + time.process_time() - began
     whole = [*fuller, *theirs]
     return [
         _row(f"{name}: loomopt", spent, len(certified), mine, whole),
-        _row(f"{name}: loomopt, asked at the peer's places too", longer, len(certified) + len(asked), fuller, whole),
+        _row(f"{name}: loomopt, asked at the peer's places too", longer, len(certified) + len(requests), fuller, whole),
         _row(f"{name}: NSGA-II", LONGER * spent, looked, theirs, whole),
     ]
 
@@ -95,10 +95,10 @@ def _judged(rival: Rival, designs: Sequence[np.ndarray]) -> list[Spot]:
     return [spot for design in designs if (spot := rival.judge(design))]
 
 
-def _asked(trade: trade.Trade, found: Findings, second: float) -> Row | None:
+def _asked(trade: trade.Trade, result: Findings, second: float) -> Row | None:
     """Front's design at a place; None beside the front."""
-    paid = plan.values(found.rows, trade.axes[1])
-    row = asked_at(trade, found, second) if min(paid) < second < max(paid) else None
+    paid = plan.values(result.rows, trade.axes[1])
+    row = asked_at(trade, result, second) if min(paid) < second < max(paid) else None
     return row if row and row.certified else None
 
 
@@ -123,8 +123,8 @@ def plain_loop(points: int) -> int:
 
 @functools.lru_cache(maxsize=2)
 def _trade(payload: bytes) -> trade.Trade:
-    found: trade.Trade = pickle.loads(payload)
-    return found
+    data: trade.Trade = pickle.loads(payload)
+    return data
 
 
 def half(payload: bytes, work: Sequence[tuple[StudyTask, Row | None]]) -> None:
@@ -143,22 +143,22 @@ def shared(axes: tuple[str, str], target: str | None, repeats: int, fresh: bool)
     work, payload = list(run.tasks(trade, run.run(trade))), pickle.dumps(trade)
 
     def halves(pool: Executor) -> None:
-        for each in [pool.submit(half, payload, work[first::2]) for first in (0, 1)]:
-            each.result()
+        for item in [pool.submit(half, payload, work[first::2]) for first in (0, 1)]:
+            item.result()
 
     def timed(pool: Executor | None, solve: Callable[[Executor], object]) -> float:
         began = time.perf_counter()
-        own = pool or run.workers(2)()
-        solve(own)
+        values = pool or run.workers(2)()
+        solve(values)
         if not pool:
-            own.shutdown()
+            values.shutdown()
         return time.perf_counter() - began
 
     pool = None if fresh else run.workers(2)()
     if pool:
         halves(pool)
         run.run(trade, pool)
-    turns = [(timed(pool, halves), timed(pool, lambda own: run.run(trade, own))) for _ in range(repeats)]
+    turns = [(timed(pool, halves), timed(pool, lambda values: run.run(trade, values))) for _ in range(repeats)]
     if pool:
         pool.shutdown()
     return statistics.median(plain / ours for plain, ours in turns)

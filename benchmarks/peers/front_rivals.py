@@ -107,8 +107,8 @@ def rapier() -> Rival:
         l4 = _secant(functools.partial(strokes, x), len(x))
         S, _, S_2, cosine, square = layouts.curves(full(x, l4), phi, sleys[0])
         reach, (l5, l6) = np.sqrt(square), (low + width * x).T[:2]
-        beside = [layouts.curves(full(x, l4), *on)[0] for on in ((side, sleys[2]), (-side, sleys[3]))]
-        arcs = [_arc(np.abs(travel), side) for travel in beside]
+        neighbours = [layouts.curves(full(x, l4), *on)[0] for on in ((side, sleys[2]), (-side, sleys[3]))]
+        arcs = [_arc(np.abs(travel), side) for travel in neighbours]
         rows = [
             np.abs(_top(S) / layouts.NEEDS.stroke - 1) - ON_GRID,
             _top(np.abs(cosine)) - np.cos(layouts.NEEDS.transmission) + BETWEEN,
@@ -121,10 +121,10 @@ def rapier() -> Rival:
         with np.errstate(all="ignore"):
             l4 = _secant(lambda l4: np.array([layouts.stroke(full(x[None], l4)[:, 0, 0])[0]]), 1)
             design = full(x[None], l4)[:, 0, 0]
-            dwell = min(layouts.dwell(design, each) for each in (1, -1))
+            dwell = min(layouts.dwell(design, item) for item in (1, -1))
             needs = replace(layouts.NEEDS, after=dwell * (1 - BROKEN), before=dwell * (1 - BROKEN))
-            kept = layouts.violation(design, needs) <= BROKEN
-        return (float(layouts.peak(design)), -float(dwell)) if kept else None
+            remaining = layouts.violation(design, needs) <= BROKEN
+        return (float(layouts.peak(design)), -float(dwell)) if remaining else None
 
     def own(row: Row) -> np.ndarray:
         return (np.array([row.design[name] for name in layouts.NAMES[1:]]) - low) / width

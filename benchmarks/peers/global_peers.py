@@ -28,16 +28,16 @@ def ours(name, gap):
     """Return what loomopt proves, with the processor's seconds."""
     began = time.process_time()
     answer = lo.solve(lo.load(name), global_proof=True, gap=gap)
-    found = answer.global_bound
-    assert found is not None
-    first = found.levels[0]
+    result = answer.global_bound
+    assert result is not None
+    first = result.levels[0]
     return {
         "method": f"loomopt, {name}",
         "best": first.best,
         "bound": first.bound,
-        "boxes": found.boxes,
+        "boxes": result.boxes,
         "seconds": time.process_time() - began,
-        "status": "proven" if found.proven else found.why,
+        "status": "proven" if result.proven else result.why,
     }
 
 
@@ -84,10 +84,10 @@ def scip(name, gap, limit):
     model.setParam("limits/time", limit)
     began = time.process_time()
     model.optimize()
-    found = {"bound": model.getDualbound(), "boxes": model.getNTotalNodes(), "status": model.getStatus()}
+    results = {"bound": model.getDualbound(), "boxes": model.getNTotalNodes(), "status": model.getStatus()}
     if model.getNSols():
-        found["best"] = model.getObjVal()
-    return row | found | {"seconds": time.process_time() - began}
+        results["best"] = model.getObjVal()
+    return row | results | {"seconds": time.process_time() - began}
 
 
 def lowest_drawn(name, count, seed=0):
@@ -95,20 +95,20 @@ def lowest_drawn(name, count, seed=0):
     rng = np.random.default_rng(seed)
     l1, l2, l3, l4, s = plain.LOWER[:, None] + rng.random((5, count)) * (plain.UPPER - plain.LOWER)[:, None]
     with np.errstate(invalid="ignore"):
-        kept = (plain.limits(l1, l2, l3, l4) >= 0).all(axis=0)
+        remaining = (plain.limits(l1, l2, l3, l4) >= 0).all(axis=0)
         torque = np.abs(plain.front_torque(l1, l2, l3, l4, s, CLOTHS[name]))
-    return float(torque[kept].min()), int(kept.sum())
+    return float(torque[remaining].min()), int(remaining.sum())
 
 
 def measured(quick):
     """One row for each method and cloth, with what random designs say of the bound."""
     rows = []
     for name in CLOTHS:
-        least, kept = lowest_drawn(name, DRAWN // (10 if quick else 1))
+        least, remaining = lowest_drawn(name, DRAWN // (10 if quick else 1))
         for row in (ours(name, 1e-3 if quick else GAP), scip(name, GAP, 5.0 if quick else 120.0)):
             refuted = row.get("bound", 0.0) > least
             known = {column: row.get(column) for column in COLUMNS}
-            rows.append(known | {"least_drawn": least, "drawn": kept, "refuted": refuted})
+            rows.append(known | {"least_drawn": least, "drawn": remaining, "refuted": refuted})
     return rows
 
 

@@ -100,7 +100,7 @@ class Rows:
 def slsqp(start, angles, ftol, needs=plain.NEEDS, exact=False):
     """SLSQP's z from a start (the design, scaled, and T) with rows at the angles `Rows` takes."""
     rows = Rows(angles, needs, exact)
-    found = minimize(
+    optimum = minimize(
         lambda z: OBJECTIVE @ z,
         start,
         jac=lambda z: OBJECTIVE,
@@ -109,7 +109,7 @@ def slsqp(start, angles, ftol, needs=plain.NEEDS, exact=False):
         method="SLSQP",
         options={"ftol": ftol, "maxiter": 300},
     )
-    return found.x
+    return optimum.x
 
 
 def turn(count):
@@ -143,8 +143,8 @@ def added(start, needs=plain.NEEDS, exact=False, rounds=20):
     for _ in range(rounds):
         z = slsqp(z, angles, ftol, needs, exact)
         at, most[0], missed = unscaled(z), z[8], 0
-        found = plain.extremes(at, 2), plain.extremes(at, 0, -needs.before, needs.after), plain.extremes(at, 3)
-        for k, (phi, value) in enumerate(found):
+        results = plain.extremes(at, 2), plain.extremes(at, 0, -needs.before, needs.after), plain.extremes(at, 3)
+        for k, (phi, value) in enumerate(results):
             over = np.abs(value) > most[k] * (1 + enough)
             angles[k], missed = np.append(angles[k], phi[over]), missed + over.sum()
         if not missed:
@@ -154,12 +154,12 @@ def added(start, needs=plain.NEEDS, exact=False, rounds=20):
 
 def drawn(count, seed):
     """Random designs within the bounds that assemble all round, whatever their other limits."""
-    generator, found = np.random.default_rng(seed), list[np.ndarray]()
+    generator, result = np.random.default_rng(seed), list[np.ndarray]()
     with np.errstate(all="ignore"):
-        while len(found) < count:
+        while len(result) < count:
             trial = generator.uniform(plain.LOWER, plain.UPPER)
-            found += [trial] if min(plain.margins(trial)) > plain.MARGIN else []
-    return found
+            result += [trial] if min(plain.margins(trial)) > plain.MARGIN else []
+    return result
 
 
 def evolution(seed, generations=1000):
@@ -178,7 +178,7 @@ def evolution(seed, generations=1000):
         over += 2 * np.maximum(0, np.abs(cosine).max(axis=1) - np.cos(plain.NEEDS.transmission))
         return np.abs(S_2).max(axis=1) + over
 
-    found = differential_evolution(
+    result = differential_evolution(
         penalised,
         [(0, 1)] * 8,
         maxiter=generations,
@@ -191,7 +191,7 @@ def evolution(seed, generations=1000):
         vectorized=True,
         updating="deferred",
     )
-    return unscaled(found.x)
+    return unscaled(result.x)
 
 
 def best_known():
@@ -230,14 +230,14 @@ class Loomopt:
         assert answer.status == "optimal"
         return self._plain(answer.design)
 
-    def _plain(self, found):
-        return np.array([found[name] for name in plain.NAMES])
+    def _plain(self, result):
+        return np.array([result[name] for name in plain.NAMES])
 
 
 def judged(runs, best):
     """Columns of one method: runs are (seconds of each turn, design)."""
-    off = np.array([abs(plain.peak(found) / best - 1) for _, found in runs])
-    broken = np.array([plain.violation(found) for _, found in runs])
+    off = np.array([abs(plain.peak(result) / best - 1) for _, result in runs])
+    broken = np.array([plain.violation(result) for _, result in runs])
     times, there = np.array([np.median(took) for took, _ in runs]), (off < WITHIN) & (broken < WITHIN)
     near = (off < NEAR) & (broken < NEAR)
     return {
@@ -278,14 +278,14 @@ def main():
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
-    best, own = best_known(), Loomopt()
+    best, values = best_known(), Loomopt()
     exact = "SciPy SLSQP, 72 points and the extremes missed"
-    fast = {"loomopt: solve": own.solve, "SciPy SLSQP, 360 points": on_grid, exact: added}
+    fast = {"loomopt: solve": values.solve, "SciPy SLSQP, 360 points": on_grid, exact: added}
     starts = [plain.TODAY, *drawn(3 if options.quick else 20, seed=1)]
     runs = timed(fast, starts, TURNS)
-    calls = {"loomopt: whole call, one start, certificate": own.once, "SciPy SLSQP, the paper's layout": on_grid}
+    calls = {"loomopt: whole call, one start, certificate": values.once, "SciPy SLSQP, the paper's layout": on_grid}
     runs |= timed(calls, [plain.TODAY], TURNS)
-    runs |= timed({"loomopt: whole call, own starts, certificate": own.call}, [plain.TODAY], TURNS)
+    runs |= timed({"loomopt: whole call, own starts, certificate": values.call}, [plain.TODAY], TURNS)
     if not options.quick:
         runs |= timed({"SciPy SLSQP, 3600 points": lambda start: on_grid(start, 3600)}, starts[:6], 1)
         runs |= timed({"SciPy differential evolution, 360 points": evolution}, range(6), 1)
@@ -296,10 +296,10 @@ def main():
         rows,
         options.json,
         best_off_known=best / KNOWN - 1,
-        claimed_off_best=own.first.figures["peak_acceleration"] / best - 1,
-        first_call_s=own.first_time,
-        build_s=own.first.time["build_s"],
-        certify_s=own.answer.time["certify_s"],
+        claimed_off_best=values.first.figures["peak_acceleration"] / best - 1,
+        first_call_s=values.first_time,
+        build_s=values.first.time["build_s"],
+        certify_s=values.answer.time["certify_s"],
         call_to_slsqp=beside(*(runs[name] for name in calls)),
         solve_to_slsqp=beside(runs["loomopt: solve"], runs["SciPy SLSQP, 360 points"]),
         solve_to_slsqp_exchange=beside(runs["loomopt: solve"], runs[exact]),

@@ -98,21 +98,21 @@ def row(name, n, symmetric):
 
 def orders(rows):
     """Order at which K1 converges, from each three sizes that double."""
-    found = {}
-    for of in dict.fromkeys((each["scene"], each["law"]) for each in rows):
-        K1 = {each["intervals"]: each["K1 [N/m]"] for each in rows if (each["scene"], each["law"]) == of}
+    results = {}
+    for of in dict.fromkeys((item["scene"], item["law"]) for item in rows):
+        K1 = {item["intervals"]: item["K1 [N/m]"] for item in rows if (item["scene"], item["law"]) == of}
         for n in K1:
             if {2 * n, 4 * n} <= K1.keys():
                 order = np.log2((K1[n] - K1[2 * n]) / (K1[2 * n] - K1[4 * n]))
-                found[f"{of[0]}, {of[1]}, {n} to {4 * n}"] = round(float(order), 3)
-    return found
+                results[f"{of[0]}, {of[1]}, {n} to {4 * n}"] = round(float(order), 3)
+    return results
 
 
 def raised(name, n):
     """Least K1 with the bound on s'' raised, by the linear programme alone, and what no law reaches."""
     case = SCENES[name]
-    found = {f"{factor} x 2 pi": float(plain.least_law(case, n, amax=factor * BOUND)[0]) for factor in RAISED}
-    return found | {"no law reaches": plain.unbounded_law(case)}
+    results = {f"{factor} x 2 pi": float(plain.least_law(case, n, amax=factor * BOUND)[0]) for factor in RAISED}
+    return results | {"no law reaches": plain.unbounded_law(case)}
 
 
 def by_hand(case, n):
@@ -132,19 +132,19 @@ def by_hand(case, n):
         rows += [(steady + T * (2 * s - 1)) / force for T in (case.T1, case.T2)]
     g, x = ca.vertcat(*rows), ca.vertcat(s, v, a, K1, X0)
     solver = ca.nlpsol("law", "ipopt", {"x": x, "f": K1, "g": g}, {"ipopt": IPOPT, "print_time": False})
-    u, one, free = np.arange(n + 1) / n, np.ones(n + 1), np.full(n + 1, np.inf)
+    u, item, free = np.arange(n + 1) / n, np.ones(n + 1), np.full(n + 1, np.inf)
     start = u - np.sin(BOUND * u) / BOUND, 1 - np.cos(BOUND * u), BOUND * np.sin(BOUND * u)
-    lower, upper = [0 * one, 0 * one, -BOUND * one], [one, free, BOUND * one]
+    lower, upper = [0 * item, 0 * item, -BOUND * item], [item, free, BOUND * item]
     for low, high, ends in zip(lower, upper, ((0, 1), (0, 0), (0, 0)), strict=True):
         low[[0, -1]] = high[[0, -1]] = ends
-    asked = {
+    request = {
         "x0": np.concatenate([*start, [1, case.X0]]),
         "lbx": np.concatenate([*lower, [0, 0]]),
         "ubx": np.concatenate([*upper, [np.inf, case.X0]]),
         "lbg": np.zeros(g.numel()),
         "ubg": np.concatenate([np.zeros(2 * n), np.full(g.numel() - 2 * n, np.inf)]),
     }
-    return solver, asked, stiffness
+    return solver, request, stiffness
 
 
 def clocked(call):
@@ -159,23 +159,25 @@ def beside(name, n):
     taken: dict[str, list[float]] = {"build": [], "solve": [], "loomopt": []}
     for _ in range(TURNS):
         (solver, asked, unit), built = clocked(lambda: by_hand(SCENES[name], n))
-        said, solved = clocked(lambda: solver(**asked))  # noqa: B023
+        message, solved = clocked(lambda: solver(**asked))  # noqa: B023
         session.current().forget(transcribe.NLPS)
-        answer, own = clocked(lambda: lo.solve(scene, "law"))
-        for part, seconds in zip(taken.values(), (built, solved, own), strict=True):
+        answer, values = clocked(lambda: lo.solve(scene, "law"))
+        for part, seconds in zip(taken.values(), (built, solved, values), strict=True):
             part.append(seconds)
     assert answer.status == "optimal", (name, n, answer.message)
     assert solver.stats()["success"], (name, n)
-    build, solve, own = map(statistics.median, taken.values())
+    build, solve, values = map(statistics.median, taken.values())
     return {
         "scene": name,
         "intervals": n,
         "K1 [N/m]": answer.figures["K1"],
-        "off IPOPT's": answer.figures["K1"] / (unit * float(said["f"])) - 1,
+        "off IPOPT's": answer.figures["K1"] / (unit * float(message["f"])) - 1,
         "IPOPT: build [ms]": 1e3 * build,
         "solve [ms]": 1e3 * solve,
-        "loomopt [ms]": 1e3 * own,
-        "ratio": harness.spread([own / (build + solve) for build, solve, own in zip(*taken.values(), strict=True)]),
+        "loomopt [ms]": 1e3 * values,
+        "ratio": harness.spread(
+            [values / (build + solve) for build, solve, values in zip(*taken.values(), strict=True)]
+        ),
     }
 
 

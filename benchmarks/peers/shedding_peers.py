@@ -124,7 +124,7 @@ def slsqp(case, theta, start=TODAY):
     """K1 and X0 by SLSQP with a row at each cam angle, slopes exact."""
     X, rest = rows(case, theta)
     scale = SIZE[0] * SIZE[1]
-    found = minimize(
+    optimum = minimize(
         lambda z: z[0],
         np.array(start) / SIZE,
         jac=lambda z: np.array([1.0, 0.0]),
@@ -137,7 +137,7 @@ def slsqp(case, theta, start=TODAY):
         method="SLSQP",
         options={"ftol": 1e-12, "maxiter": 300},
     )
-    return tuple(map(float, found.x * SIZE))
+    return tuple(map(float, optimum.x * SIZE))
 
 
 def exchanged(case):
@@ -185,10 +185,10 @@ SLOW: dict[str, Callable] = {
 }
 
 
-def judged(found, best):
+def judged(result, best):
     """Columns of one method: the worst of its cases."""
-    off = {name: float(mp.mpf(K1) / best[name] - 1) for name, (K1, _) in found.items()}
-    lost = [lift_off(CASES[name], *at) for name, at in found.items()]
+    off = {name: float(mp.mpf(K1) / best[name] - 1) for name, (K1, _) in result.items()}
+    lost = [lift_off(CASES[name], *at) for name, at in result.items()]
     worst = max(off, key=lambda name: abs(off[name]))
     return {
         "within 1e-9": f"{sum(abs(x) < 1e-9 for x in off.values())}/{len(off)}",
@@ -216,21 +216,21 @@ def main():
     began = time.perf_counter()
     called(plain.PAPER)
     first = time.perf_counter() - began
-    methods, found = METHODS if options.quick else METHODS | SLOW, {}
+    methods, result = METHODS if options.quick else METHODS | SLOW, {}
 
     def kept(name):
-        found[name] = {of: methods[name](case) for of, case in CASES.items()}
+        result[name] = {of: methods[name](case) for of, case in CASES.items()}
 
     turns = harness.turns({name: functools.partial(kept, name) for name in methods}, TURNS)
     times = harness.medians(turns)
     unit = times["loomopt: whole call"]
-    table = [{"method": name, "time": times[name] / unit, **judged(found[name], best)} for name in methods]
+    table = [{"method": name, "time": times[name] / unit, **judged(result[name], best)} for name in methods]
     pressed = {count: float(plain.uniform_grid(plain.PRESSED, count) / best["pressed on"] - 1) for count in GRIDS}
     rounds = [PARTS[k : k + len(CASES)] for k in range(1, len(PARTS), len(CASES))]
-    parts = {part: [sum(call[part] for call in each) for each in rounds] for part in ("solve", "certify")}
+    parts = {part: [sum(call[part] for call in item) for item in rounds] for part in ("solve", "certify")}
 
     def beside(part, method):
-        return harness.spread([own / turn[method] for own, turn in zip(parts[part], turns, strict=True)])
+        return harness.spread([values / turn[method] for values, turn in zip(parts[part], turns, strict=True)])
 
     lowest = "SciPy SLSQP, 36 points and the lowest added"
     harness.show(

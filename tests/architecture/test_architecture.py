@@ -89,8 +89,8 @@ def test_every_module_has_a_room():
 
 @pytest.mark.slow
 def test_the_library_imports_nothing_of_the_command_line():
-    own = ("interface.cli", "__main__")
-    outside = {name: path for name, path in modules().items() if not name.startswith(own)}
+    values = ("interface.cli", "__main__")
+    outside = {name: path for name, path in modules().items() if not name.startswith(values)}
     spots = [
         f"{name}:{line}"
         for name, path in outside.items()
@@ -300,8 +300,8 @@ def test_tolerances_of_several_files_have_one_value_and_say_where_they_come_from
     assert len(set(names)) == len(names)
     for place, node in assigned:
         after = body[place + 1]
-        said = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
-        assert said, f"line {node.lineno}: nothing is said of it"
+        message = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        assert message, f"line {node.lineno}: nothing is said of it"
     others = {name: path for name, path in modules().items() if name != "physics.tolerances"}
     words = {name: set(re.findall(r"\w+", text_of(path))) for name, path in others.items()}
     for _, node in assigned:

@@ -38,9 +38,9 @@ def quoted(page):
 @cache
 def files():
     """Return every file and folder of the repository that is kept, from its root."""
-    kept = [folder for folder in ROOT.iterdir() if not folder.name.startswith(".") and folder.name != "build"]
-    found = {path.relative_to(ROOT).as_posix() for folder in kept for path in (folder, *folder.rglob("*"))}
-    return frozenset(found)
+    subset = [folder for folder in ROOT.iterdir() if not folder.name.startswith(".") and folder.name != "build"]
+    results = {path.relative_to(ROOT).as_posix() for folder in subset for path in (folder, *folder.rglob("*"))}
+    return frozenset(results)
 
 
 def is_file(name):
@@ -52,27 +52,27 @@ def is_file(name):
 @cache
 def modules():
     """Files of each module of the package, of the tests and of the benchmarks, by its last word."""
-    found: dict[str, list[Path]] = {}
+    results: dict[str, list[Path]] = {}
     for path in [*PACKAGE.rglob("*.py"), *(ROOT / "tests").rglob("*.py"), *(ROOT / "benchmarks").rglob("*.py")]:
-        found.setdefault(path.parent.name if path.stem == "__init__" else path.stem, []).append(path)
-    return found
+        results.setdefault(path.parent.name if path.stem == "__init__" else path.stem, []).append(path)
+    return results
 
 
 @cache
 def names_in(word):
     """Names that the modules of one last word define, and the modules of a package of that name."""
-    found: set[str] = set()
+    scene: set[str] = set()
     for path in modules()[word]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
-                found.add(node.name)
+                scene.add(node.name)
             elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-                found.add(node.id)
+                scene.add(node.id)
             elif isinstance(node, ast.alias):
-                found.add((node.asname or node.name).split(".")[0])
+                scene.add((node.asname or node.name).split(".")[0])
         if path.stem == "__init__" and path.is_relative_to(PACKAGE):
-            found.update(child.stem for child in path.parent.iterdir())
-    return frozenset(found)
+            scene.update(child.stem for child in path.parent.iterdir())
+    return frozenset(scene)
 
 
 def called(name):
@@ -104,7 +104,10 @@ def command_line():
     group = typer.main.get_command(application([]))
     commands = dict(group.commands)  # type: ignore[attr-defined]
     options = {
-        name for each in commands.values() for option in each.params for name in (*option.opts, *option.secondary_opts)
+        name
+        for command in commands.values()
+        for option in command.params
+        for name in (*option.opts, *option.secondary_opts)
     }
     return frozenset(commands), frozenset(options)
 
@@ -113,26 +116,26 @@ def faults(page):
     """Return the names of a page that lead nowhere."""
     text = page.read_text(encoding="utf-8")
     names = [name for name in quoted(page) if name not in EXAMPLES and not any(word in name for word in ANY)]
-    found = [f"no file {name}" for name in names if FILE.fullmatch(name) and not is_file(name)]
+    results = [f"no file {name}" for name in names if FILE.fullmatch(name) and not is_file(name)]
     for path, test in TEST.findall(text):
         if not (ROOT / path).exists() or f"def {test}(" not in (ROOT / path).read_text(encoding="utf-8"):
-            found.append(f"no test {path}::{test}")
+            results.append(f"no test {path}::{test}")
     dotted = [
         name
         for name in names
         if DOTTED.fullmatch(name) and name.split(".")[0] not in DATA and not name.endswith(ENDINGS)
     ]
-    found += [told for name in dotted if not FILE.fullmatch(name) and (told := called(name))]
-    found += [
+    results += [report for name in dotted if not FILE.fullmatch(name) and (report := called(name))]
+    results += [
         f"no word {name}"
         for name in names
         if WORD.fullmatch(name) and name not in all_words() and name not in text.replace(f"`{name}`", "")
     ]
     commands, options = command_line()
-    found += [
+    results += [
         f"no option {name}" for name in sorted(set(OPTION.findall(text))) if name not in options and name not in OTHERS
     ]
-    return found + [f"no command {name}" for name in sorted(set(COMMAND.findall(text))) if name not in commands]
+    return results + [f"no command {name}" for name in sorted(set(COMMAND.findall(text))) if name not in commands]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
@@ -157,9 +160,9 @@ def test_every_study_and_every_part_key_has_its_place_in_the_pages():
     """Folders and files of studies stand in the architecture, keys of parts in the page of linkages."""
     from loomopt.jobs.linkage.parts import KEYS
 
-    told = (ROOT / "docs" / "development" / "architecture.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "development" / "architecture.md").read_text(encoding="utf-8")
     names = [path.stem for path in (PACKAGE / "studies").iterdir() if not path.stem.startswith("_")]
-    assert [name for name in names if name not in told] == []
+    assert [name for name in names if name not in text] == []
     rows = (ROOT / "docs" / "reference" / "linkages.md").read_text(encoding="utf-8").splitlines()
     lines = {kind: next(line for line in rows if line.startswith(f"| `{kind}`")) for kind in KEYS}
     assert [(kind, key) for kind, keys in KEYS.items() for key in keys if f"`{key}`" not in lines[kind]] == []

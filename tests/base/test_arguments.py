@@ -69,10 +69,10 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
 
 
 @pytest.mark.parametrize(
-    ("name", "given", "said"), [(name, given, said) for name in WRONG for given, said in WRONG[name]]
+    ("name", "given", "message"), [(name, given, message) for name in WRONG for given, message in WRONG[name]]
 )  # fmt: skip
-def test_an_argument_of_the_wrong_kind_is_one_message(name, given, said):
-    with pytest.raises(lo.BadInput, match=said) as caught:
+def test_an_argument_of_the_wrong_kind_is_one_message(name, given, message):
+    with pytest.raises(lo.BadInput, match=message) as caught:
         getattr(lo, name)("beatup-light", **given)
     assert "\n" not in str(caught.value)
 
@@ -194,14 +194,14 @@ KEYS += ["targets", "available.gravity", "mechanism.l1", "effects.resistance.tab
 
 @pytest.mark.parametrize("key", KEYS)
 def test_whatever_a_key_is_set_to_is_taken_or_told(key):
-    told = []
+    texts = []
     for odd in ODD:
         try:
             repr(SCENE.set(key, odd))
         except lo.BadInput as error:
-            told.append(str(error))
-    assert told
-    assert all(line.isprintable() for text in told for line in text.split("\n"))
+            texts.append(str(error))
+    assert texts
+    assert all(line.isprintable() for text in texts for line in text.split("\n"))
 
 
 def test_a_hook_or_a_flag_of_the_wrong_kind_is_told():

@@ -79,11 +79,11 @@ def brought(monkeypatch, body):
 @pytest.mark.parametrize("body", ["raise SystemExit(0)", "return 1 / 0", "return given['k']", "return force(given)"])
 def test_code_of_another_distribution_that_fails_is_named(monkeypatch, body):
     force = brought(monkeypatch, body)
-    said = r"effect beatup\.wind of loomopt-wind fails in force, line 2 of windy"
-    with pytest.raises(Broken, match=said) as told, naming():
+    message = r"effect beatup\.wind of loomopt-wind fails in force, line 2 of windy"
+    with pytest.raises(Broken, match=message) as caught, naming():
         force({})
-    assert str(told.value).isprintable()
-    assert told.value.__cause__ is not None
+    assert str(caught.value).isprintable()
+    assert caught.value.__cause__ is not None
 
 
 def test_what_is_told_or_stopped_already_stays_as_it_is(monkeypatch):

@@ -10,33 +10,33 @@ import pytest
 from loomopt.base.records import Awaited, Frozen, freeze
 
 
-def made(asked):
-    """Return a mapping of five squares, two of them known; asked: what has been computed, name by name."""
+def made(request):
+    """Return a mapping of five squares, two of them known; request: what has been computed, name by name."""
 
     def later(names):
-        asked.append(list(names))
+        request.append(list(names))
         return {name: int(name) ** 2 for name in names}
 
     return Awaited("12345", {"1": 1, "3": 9}, later)
 
 
 def test_a_value_is_computed_when_it_is_read_and_once():
-    asked = list[list[str]]()
-    found = made(asked)
-    assert (len(found), list(found), "4" in found, "9" in found, found["3"]) == (5, list("12345"), True, False, 9)
-    assert asked == []
-    assert (found["4"], found["4"], found.get("4")) == (16, 16, 16)
-    assert asked == [["4"]]
+    request = list[list[str]]()
+    result = made(request)
+    assert (len(result), list(result), "4" in result, "9" in result, result["3"]) == (5, list("12345"), True, False, 9)
+    assert request == []
+    assert (result["4"], result["4"], result.get("4")) == (16, 16, 16)
+    assert request == [["4"]]
     with pytest.raises(KeyError):
-        found["9"]
+        result["9"]
 
 
 def test_with_the_second_that_is_read_all_the_rest_is_computed():
-    asked = list[list[str]]()
-    found = made(asked)
-    assert dict(found) == {"1": 1, "2": 4, "3": 9, "4": 16, "5": 25}
-    assert list(dict(found)) == list("12345")
-    assert asked == [["2"], ["4", "5"]]
+    request = list[list[str]]()
+    result = made(request)
+    assert dict(result) == {"1": 1, "2": 4, "3": 9, "4": 16, "5": 25}
+    assert list(dict(result)) == list("12345")
+    assert request == [["2"], ["4", "5"]]
 
 
 def test_it_is_a_mapping_like_any_other():
@@ -52,15 +52,15 @@ def test_it_is_a_mapping_like_any_other():
         made([])["1"] = 2
 
 
-@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))])
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda item: pickle.loads(pickle.dumps(item))])
 def test_a_copy_has_all_values_and_never_changes(copied):
-    found = copied(made([]))
-    assert type(found) is Frozen
-    assert found == {"1": 1, "2": 4, "3": 9, "4": 16, "5": 25}
+    result = copied(made([]))
+    assert type(result) is Frozen
+    assert result == {"1": 1, "2": 4, "3": 9, "4": 16, "5": 25}
 
 
 def test_freezing_leaves_unread_what_is_unread():
-    asked = list[list[str]]()
-    record = SimpleNamespace(squares=made(asked), plain={"a": 1})
+    request = list[list[str]]()
+    record = SimpleNamespace(squares=made(request), plain={"a": 1})
     freeze(record, "squares", "plain")
-    assert (type(record.squares), type(record.plain), asked) == (Awaited, Frozen, [])
+    assert (type(record.squares), type(record.plain), request) == (Awaited, Frozen, [])

@@ -45,10 +45,10 @@ def test_no_answer_of_the_draw_is_beaten_broken_refuted_or_left_uncertified(job)
         "--json",
     ]
     done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, timeout=300)
-    said = json.loads(done.stdout)
-    assert said["failures"] == []
+    data = json.loads(done.stdout)
+    assert data["failures"] == []
     assert done.returncode == 0, done.stderr
-    row = said["rows"][0]
+    row = data["rows"][0]
     assert row["tried"] == COUNTS[job]
     assert row["optimal"] == row["matched"] > 0, "the attack must come as far as the answers do by itself"
 
@@ -133,7 +133,7 @@ def test_what_is_not_certified_is_told_apart(frame, reasons, kind):
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "expected"),
+    ("first", "other", "expected"),
     [
         ((1.0, 5.0), (1.000002, 1.0), True),
         ((1.0, 5.0), (1.0000005, 1.0), False),
@@ -141,27 +141,27 @@ def test_what_is_not_certified_is_told_apart(frame, reasons, kind):
         ((1.00000001, 0.9), (1.0, 1.0), False),
     ],
 )
-def test_designs_are_compared_objective_by_objective(attack, one, other, expected):
-    assert attack.better(one, other) == expected
+def test_designs_are_compared_objective_by_objective(attack, first, other, expected):
+    assert attack.better(first, other) == expected
 
 
 @pytest.mark.parametrize("job", COUNTS)
 def test_a_scene_is_the_same_by_its_number_and_is_read(attack, job):
-    one, other = (attack.scene_of(job, 3, 4) for _ in range(2))
-    assert (one.changes, one.target) == (other.changes, other.target)
-    assert one.changes != attack.scene_of(job, 3, 5).changes
-    assert lo.load(one.base).update(one.changes).job == job
+    first, other = (attack.scene_of(job, 3, 4) for _ in range(2))
+    assert (first.changes, first.target) == (other.changes, other.target)
+    assert first.changes != attack.scene_of(job, 3, 5).changes
+    assert lo.load(first.base).update(first.changes).job == job
 
 
 def test_a_scene_that_raises_is_told_and_is_a_failure(attack, monkeypatch):
-    def raises(*asked, **options):
+    def raises(*request, **options):
         raise IndexError("beyond the end")
 
     monkeypatch.setattr(lo, "solve", raises)
-    found = attack.outcome("shedding", 3, 4, compare=False)
-    assert found.counted == ["tried", "raised"]
+    result = attack.outcome("shedding", 3, 4, compare=False)
+    assert result.counted == ["tried", "raised"]
     assert "raised" in attack.FAILURES
-    (line,) = found.lines
+    (line,) = result.lines
     assert line.startswith("raised (--jobs shedding --seed 3 --only 4): Traceback")
     assert "IndexError: beyond the end" in line
     assert "lo.solve(lo.load(" in line

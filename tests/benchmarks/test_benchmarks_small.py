@@ -31,9 +31,9 @@ def rows(script):
 
 def median(script, ratio):
     """Return the median of a ratio over the turns of one run; they tell their spread too."""
-    found = said(script)[ratio]
-    assert found["lowest"] <= found["median"] <= found["highest"]
-    return found["median"]
+    result = said(script)[ratio]
+    assert result["lowest"] <= result["median"] <= result["highest"]
+    return result["median"]
 
 
 def test_a_ratio_is_told_by_the_median_of_all_turns_and_their_spread(monkeypatch):
@@ -78,14 +78,14 @@ def test_building_takes_less_than_three_solves():
     "method", ["loomopt: solve from today's machine", "loomopt: re-solve", "loomopt: whole call, with report"]
 )
 def test_loomopts_designs_are_the_best_known_over_the_whole_turn(method):
-    found = rows("peers.balance_peers")[method]
-    assert found["M3 off [N*m]"] < 1e-6
-    assert found["peak off"] < 1e-8
-    assert found["peak understated"] < 1e-8
-    assert found["limits broken"] < 1e-9
+    row = rows("peers.balance_peers")[method]
+    assert row["M3 off [N*m]"] < 1e-6
+    assert row["peak off"] < 1e-8
+    assert row["peak understated"] < 1e-8
+    assert row["limits broken"] < 1e-9
 
 
 def test_a_grid_understates_the_peak():
-    found = rows("peers.balance_peers")["SciPy SLSQP, 360 points: re-solve"]
-    assert 1e-5 < found["peak understated"] < 1e-2
-    assert 1e-5 < found["peak off"] < 1e-2
+    row = rows("peers.balance_peers")["SciPy SLSQP, 360 points: re-solve"]
+    assert 1e-5 < row["peak understated"] < 1e-2
+    assert 1e-5 < row["peak off"] < 1e-2

@@ -24,16 +24,16 @@ def compared():
     return importlib.import_module("benchmarks.measure.same_answers")
 
 
-def run(script, *asked):
-    command = [sys.executable, "-m", f"benchmarks.measure.{script}", str(TOP), "--json", *asked]
+def run(script, *request):
+    command = [sys.executable, "-m", f"benchmarks.measure.{script}", str(TOP), "--json", *request]
     done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
 
 def test_a_checkout_gives_the_same_answers_as_itself():
-    said = run("same_answers", "--only", "shedding-static")
-    assert (said["cases"], said["exceptions"]) == (3, 0)
+    result = run("same_answers", "--only", "shedding-static")
+    assert (result["cases"], result["exceptions"]) == (3, 0)
 
 
 def test_all_work_is_timed_in_both():
@@ -56,7 +56,7 @@ def test_every_packaged_scene_and_target_is_compared(compared):
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({}, ""),
         ({"objectives": [["K1", 100.0 + 5e-12, 50.0, 1], ["rms", 2.0, 4.0, 2]]}, ""),
@@ -67,10 +67,10 @@ def test_every_packaged_scene_and_target_is_compared(compared):
         ({"keys": []}, "keys: only here [], only there ['.status']"),
     ],
 )
-def test_what_differs_is_told(compared, changes, said):
-    (*told,) = compared.differences({**ANSWER, **changes}, ANSWER)
-    assert said in " ".join(told)
-    assert bool(told) == bool(said)
+def test_what_differs_is_told(compared, changes, message):
+    (*report,) = compared.differences({**ANSWER, **changes}, ANSWER)
+    assert message in " ".join(report)
+    assert bool(report) == bool(message)
 
 
 def test_clashes_and_relaxations_are_compared_where_nothing_is_admissible(compared):

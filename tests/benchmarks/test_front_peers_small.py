@@ -37,8 +37,8 @@ def test_the_referee_reads_published_designs_and_refuses_softer_ones(rival):
 
 def test_the_referee_of_the_beat_up_reads_the_published_optimum(peers):
     beatup = peers.beatup()
-    told = check.read_reference(packaged.results_path() / "beatup.balance.csv").iloc[0]
-    design = {str(name).split(" [")[0]: cell for name, cell in told.items()}
+    report = check.read_reference(packaged.results_path() / "beatup.balance.csv").iloc[0]
+    design = {str(name).split(" [")[0]: cell for name, cell in report.items()}
     best = beatup.own(SimpleNamespace(design={n: float(design[n]) for n in ("l1", "l2", "l3", "l4", "m4e", "r4e")}))
     assert beatup.judge(best) == pytest.approx((88.689413492, 0.0), abs=1e-6)
     assert beatup.judge(best * [1.1, 1, 1, 1, 1]) is None
@@ -49,8 +49,8 @@ def test_the_referee_of_the_beat_up_reads_the_published_optimum(peers):
 
 def test_the_referee_of_the_rapier_reads_the_published_optimum(peers):
     rapier = peers.rapier()
-    told = check.read_reference(packaged.results_path() / "rapier.stroke-dwell.csv").iloc[0]
-    design = {str(name).split(" [")[0]: float(cell) for name, cell in told.items() if str(name)[0] in "laCp"}
+    report = check.read_reference(packaged.results_path() / "rapier.stroke-dwell.csv").iloc[0]
+    design = {str(name).split(" [")[0]: float(cell) for name, cell in report.items() if str(name)[0] in "laCp"}
     best = rapier.own(SimpleNamespace(design=design))
     peak, dwell = rapier.judge(best)
     assert peak == pytest.approx(0.694984753570, rel=1e-6)
@@ -74,8 +74,8 @@ def test_a_peer_that_knows_the_front_adds_nothing_where_the_front_is_asked_at_it
     known = [curve(144270.37243, 0.040), curve(119901.39519, 0.060), curve(90e3, 0.060)]
     monkeypatch.setattr(peers.harness, "installed", lambda name: True)
     monkeypatch.setattr(peers, "evolved", lambda rival, designs, seconds: (np.array(known), 3))
-    mine, asked, theirs = peers.compared(rival, 3)
+    mine, request, theirs = peers.compared(rival, 3)
     assert theirs["admissible"] == 2, "one is too soft"
     assert mine["missed"] > 0.01, "three designs are a coarse front"
-    assert asked["missed"] == pytest.approx(0.0, abs=1e-9)
+    assert request["missed"] == pytest.approx(0.0, abs=1e-9)
     assert theirs["missed"] > 0.05

@@ -18,24 +18,24 @@ def ended(*arguments):
 
 def test_a_front_is_the_same_by_its_number():
     fronts = importlib.import_module("benchmarks.adversarial.fronts")
-    one, other = (fronts.drawn(4) for _ in range(2))
-    assert one[1:] == other[1:]
-    assert one.scene.hash == other.scene.hash
-    assert one.axes != fronts.drawn(7).axes
+    first, other = (fronts.drawn(4) for _ in range(2))
+    assert first[1:] == other[1:]
+    assert first.scene.hash == other.scene.hash
+    assert first.axes != fronts.drawn(7).axes
 
 
 @pytest.mark.parametrize("number", [5, 13, 29])
 def test_a_front_of_a_random_scene_is_certified(number):
-    said, status = ended("--from", str(number), "--to", str(number))
-    assert (status, said["failures"]) == (0, [])
-    assert said["rows"][0]["tried"] == said["rows"][0]["certified"] == 1
+    message, status = ended("--from", str(number), "--to", str(number))
+    assert (status, message["failures"]) == (0, [])
+    assert message["rows"][0]["tried"] == message["rows"][0]["certified"] == 1
 
 
 @pytest.mark.slow
 @pytest.mark.whole
 def test_fronts_of_random_scenes_end_certified_or_without_an_admissible_design():
-    said, status = ended("--to", "21")
-    (row,) = said["rows"]
-    assert (status, said["failures"]) == (0, [])
+    message, status = ended("--to", "21")
+    (row,) = message["rows"]
+    assert (status, message["failures"]) == (0, [])
     assert row["tried"] == row["certified"] + row["infeasible"] + row["refused"] == 22
     assert row["certified"] > 15

@@ -13,16 +13,16 @@ def infeasible():
 
 
 def test_a_scene_without_room_is_told_with_what_it_needs(infeasible):
-    found = infeasible.told("beatup", "balance", {"bounds.l1": {"min": "80 mm", "max": "81 mm"}})
-    assert found["status"] == "infeasible"
-    assert found["cpu"] > 0.0
-    assert all(need > 0.0 for need in found["relaxed"].values())
+    result = infeasible.told("beatup", "balance", {"bounds.l1": {"min": "80 mm", "max": "81 mm"}})
+    assert result["status"] == "infeasible"
+    assert result["cpu"] > 0.0
+    assert all(need > 0.0 for need in result["relaxed"].values())
 
 
 def test_draws_are_the_seeds_own_and_of_all_jobs(infeasible):
-    one, other = ([infeasible.drawn(random.Random(seed)) for seed in range(12)] for _ in range(2))
-    assert one == other
-    assert {name for name, _, _ in one} == {"beatup", "rapier", "shedding"}
+    first, other = ([infeasible.drawn(random.Random(seed)) for seed in range(12)] for _ in range(2))
+    assert first == other
+    assert {name for name, _, _ in first} == {"beatup", "rapier", "shedding"}
 
 
 def test_what_two_runs_say_otherwise_is_printed(infeasible, tmp_path, capsys):

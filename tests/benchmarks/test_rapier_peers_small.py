@@ -79,10 +79,10 @@ def test_the_referee_rejects_other_designs(plain, peers, name, change):
 
 @pytest.mark.parametrize("method", [LOOMOPT, CALL])
 def test_loomopt_reaches_the_best_known_from_every_start(method):
-    found = rows(SCRIPT)[method]
-    assert found["within 1e-6"] == 1.0
-    assert found["peak off"] < 1e-8
-    assert found["limits broken"] < 1e-8
+    row = rows(SCRIPT)[method]
+    assert row["within 1e-6"] == 1.0
+    assert row["peak off"] < 1e-8
+    assert row["limits broken"] < 1e-8
 
 
 def test_the_peak_that_loomopt_claims_is_the_referees():
@@ -90,9 +90,9 @@ def test_the_peak_that_loomopt_claims_is_the_referees():
 
 
 def test_slsqp_on_a_grid_breaks_limits_between_the_points():
-    found = rows(SCRIPT)
-    assert 1e-6 < found[GRID]["limits broken"] < 1e-4
-    assert found[ADDED]["limits broken"] < 1e-8
+    second_rows = rows(SCRIPT)
+    assert 1e-6 < second_rows[GRID]["limits broken"] < 1e-4
+    assert second_rows[ADDED]["limits broken"] < 1e-8
 
 
 def test_a_solve_takes_at_most_one_and_a_half_times_slsqp_on_a_grid():

@@ -94,18 +94,18 @@ def by_root(plain, scene, near):
 def test_the_referees_least_spring_is_the_root_of_its_slope(plain, name, K1, degrees):
     """By root finding in 40 digits; the figures are known from the same data, [Qiu21] at 600 rpm."""
     scene = getattr(plain, name)
-    found, _, theta = plain.least_stiffness(scene)
+    result, _, theta = plain.least_stiffness(scene)
     with mp.workdps(40):
-        assert abs(found / by_root(plain, scene, math.radians(degrees)) - 1) < 1e-25
-    assert float(found) == pytest.approx(K1, rel=1e-12)
+        assert abs(result / by_root(plain, scene, math.radians(degrees)) - 1) < 1e-25
+    assert float(result) == pytest.approx(K1, rel=1e-12)
     assert float(theta) == pytest.approx(degrees, abs=1e-4)
 
 
 @pytest.mark.parametrize(("name", "K1"), [("PAPER", 103143.06), ("PRINTED", 36588.20)])
 def test_with_the_papers_damping_the_return_governs(plain, name, K1):
-    found, (stretch, _), _ = plain.least_stiffness(replace(getattr(plain, name), C=35))
+    result, (stretch, _), _ = plain.least_stiffness(replace(getattr(plain, name), C=35))
     assert stretch[0] == -1
-    assert float(found) == pytest.approx(K1, abs=5e-3)
+    assert float(result) == pytest.approx(K1, abs=5e-3)
 
 
 def test_statics_alone_gives_the_spring_of_the_dwell(plain):
@@ -116,9 +116,9 @@ def test_statics_alone_gives_the_spring_of_the_dwell(plain):
 @pytest.mark.parametrize(("K1", "paper", "printed"), KEPT)
 def test_the_referees_contact_speeds(plain, K1, paper, printed):
     for scene, rpm in ((plain.PAPER, paper), (plain.PRINTED, printed)):
-        found = plain.contact_speed(scene, K1)
-        assert float(found) == pytest.approx(rpm, abs=5e-3)
-        assert float(plain.least_stiffness(replace(scene, rpm=found))[0]) == pytest.approx(K1, rel=1e-14)
+        result = plain.contact_speed(scene, K1)
+        assert float(result) == pytest.approx(rpm, abs=5e-3)
+        assert float(plain.least_stiffness(replace(scene, rpm=result))[0]) == pytest.approx(K1, rel=1e-14)
 
 
 def test_a_spring_too_soft_at_rest_keeps_contact_at_no_speed(plain):
@@ -130,9 +130,9 @@ def test_the_least_spring_just_keeps_contact(plain, changes):
     scene = replace(plain.PAPER, **changes)
     K1, (stretch, u), _ = plain.least_stiffness(scene)
     assert abs(plain.force(mp, scene, stretch, u, K1) - scene.N_min) < 1e-9
-    for each in plain.stretches(scene):
-        u = np.linspace(float(each[3]), float(each[4]), 4001)
-        assert plain.force(np, scene, each, u, float(K1)).min() > scene.N_min - 1e-8
+    for stretche in plain.stretches(scene):
+        u = np.linspace(float(stretche[3]), float(stretche[4]), 4001)
+        assert plain.force(np, scene, stretche, u, float(K1)).min() > scene.N_min - 1e-8
 
 
 @pytest.mark.parametrize("changes", [{}, {"C": 35}, {"shape": "step", "N_min": 50}])
@@ -236,18 +236,18 @@ def test_the_spring_no_law_reaches_is_that_of_a_flight_as_long_as_the_rise(plain
 
 
 def test_loomopts_springs_are_the_least_in_every_case():
-    found = rows(PEERS)[CALL]
-    assert found["within 1e-9"] == "9/9"
-    assert abs(found["worst off"]) < 1e-11
-    assert found["contact lost"] < 1e-11
+    row = rows(PEERS)[CALL]
+    assert row["within 1e-9"] == "9/9"
+    assert abs(row["worst off"]) < 1e-11
+    assert row["contact lost"] < 1e-11
 
 
 def test_peers_that_refine_are_right_and_equal_points_lose_contact():
-    found = rows(PEERS)
-    assert abs(found[FORMULA]["worst off"]) < 1e-9
-    assert abs(found[EXCHANGE]["worst off"]) < 1e-8
+    second_rows = rows(PEERS)
+    assert abs(second_rows[FORMULA]["worst off"]) < 1e-9
+    assert abs(second_rows[EXCHANGE]["worst off"]) < 1e-8
     for method in ("SciPy SLSQP, 360 points", "formula, 360 equal points", "formula, 3600 equal points"):
-        assert found[method]["contact lost"] > 1e-5
+        assert second_rows[method]["contact lost"] > 1e-5
 
 
 def test_a_solve_takes_no_longer_than_slsqp_where_that_is_right():
@@ -255,9 +255,9 @@ def test_a_solve_takes_no_longer_than_slsqp_where_that_is_right():
 
 
 def test_loomopts_laws_need_the_springs_of_the_linear_programmes():
-    found = said(LAW)["rows"]
-    assert len(found) == 8
-    for row in found:
+    result = said(LAW)["rows"]
+    assert len(result) == 8
+    for row in result:
         assert abs(row["off"]) < 1e-10, row
         assert max(row["contact lost"], row["law's faults"]) < 1e-10, row
         assert row["peak s''"] < BOUND * (1 + 1e-10), row
@@ -265,10 +265,10 @@ def test_loomopts_laws_need_the_springs_of_the_linear_programmes():
 
 def test_a_certified_law_takes_at_most_ten_times_ipopt_alone_on_an_nlp_written_for_it():
     """And is the same optimum, from 16 to 256 intervals."""
-    found = said(LAW)["beside_ipopt_alone"]
-    assert [row["intervals"] for row in found] == [16, 64, 256]
-    assert max(abs(row["off IPOPT's"]) for row in found) < 1e-9
-    assert max(row["ratio"]["median"] for row in found) <= 10.0
+    result = said(LAW)["beside_ipopt_alone"]
+    assert [row["intervals"] for row in result] == [16, 64, 256]
+    assert max(abs(row["off IPOPT's"]) for row in result) < 1e-9
+    assert max(row["ratio"]["median"] for row in result) <= 10.0
 
 
 def test_a_free_law_of_16_intervals_needs_a_quarter_less_spring_than_the_softest_fixed_one():
@@ -284,20 +284,20 @@ def test_a_free_law_of_16_intervals_needs_a_quarter_less_spring_than_the_softest
 def test_loomopts_least_cam_force_and_its_speed_are_the_referees(peers, plain):
     for case in (plain.PAPER, plain.PRINTED, plain.PRESSED):
         peak, K1, X0 = plain.least_force(case)
-        found = lo.solve(peers.scene(case), "force")
-        assert found.status == "optimal"
-        assert found.figures["contact_max"] == pytest.approx(peak, rel=1e-10)
-        assert [found.design["K1"], found.design["X0"]] == pytest.approx([K1, X0], rel=1e-9)
+        answer = lo.solve(peers.scene(case), "force")
+        assert answer.status == "optimal"
+        assert answer.figures["contact_max"] == pytest.approx(peak, rel=1e-10)
+        assert [answer.design["K1"], answer.design["X0"]] == pytest.approx([K1, X0], rel=1e-9)
     for K1, *_ in KEPT:
         for case in (plain.PAPER, plain.PRINTED):
-            found = lo.solve(peers.scene(case).set("mechanism.K1", f"{K1} N/m"), "speed")
+            answer = lo.solve(peers.scene(case).set("mechanism.K1", f"{K1} N/m"), "speed")
             rpm = plain.contact_speed(case, K1)
-            assert found.figures["contact_speed"] == pytest.approx(float(rpm * mp.pi / 30), rel=1e-11)
+            assert answer.figures["contact_speed"] == pytest.approx(float(rpm * mp.pi / 30), rel=1e-11)
 
 
 @pytest.mark.parametrize("raised", [2, 4, 8])
 def test_with_the_bound_raised_loomopts_law_is_the_linear_programmes(plain, raised):
     scene = lo.load("shedding").set("targets.law.intervals", 8).set("limits.law_acceleration.max", repr(raised * BOUND))
-    found = lo.solve(scene, "law")
-    assert found.status == "optimal"
-    assert found.figures["K1"] == pytest.approx(freed(plain, 8, raised)[0], rel=1e-9)
+    answer = lo.solve(scene, "law")
+    assert answer.status == "optimal"
+    assert answer.figures["K1"] == pytest.approx(freed(plain, 8, raised)[0], rel=1e-9)

@@ -91,13 +91,13 @@ def test_solve_json_is_the_contract(cli):
     worth = {price["limit"]: price["worth"]["M3_fdc"] for price in data["binding"]}
     assert worth["l1"] == pytest.approx(27520, rel=1e-3)
     assert all(limit["ok"] for limit in data["limits"])
-    found = data["certificate"]
-    assert {"feasibility", "unique", "settled"} <= set(found)
-    assert (found["passed"], found["reasons"], found["minimum"]) == (True, [], True)
-    assert [level["objective"] for level in found["levels"]] == ["M3_fdc", "peak_torque"]
-    assert all(set(level) == {"objective", "stationarity", "complementarity"} for level in found["levels"])
-    assert found["whole_cycle"].keys() == {"violation", "by"}
-    assert found["whole_cycle"]["by"] in ("refined", "bounded", "proven")
+    result = data["certificate"]
+    assert {"feasibility", "unique", "settled"} <= set(result)
+    assert (result["passed"], result["reasons"], result["minimum"]) == (True, [], True)
+    assert [level["objective"] for level in result["levels"]] == ["M3_fdc", "peak_torque"]
+    assert all(set(level) == {"objective", "stationarity", "complementarity"} for level in result["levels"])
+    assert result["whole_cycle"].keys() == {"violation", "by"}
+    assert result["whole_cycle"]["by"] in ("refined", "bounded", "proven")
 
 
 def test_an_infeasible_target_exits_3_with_the_json_object_and_the_least_relaxation(cli):
@@ -183,11 +183,11 @@ def test_set_changes_a_number_in_any_unit(cli, resistance):
 
 
 def test_a_held_bound_stays_until_it_is_freed(cli):
-    held = answered(cli, "beatup", "--set", "bounds.l1.free=false")
+    fixed = answered(cli, "beatup", "--set", "bounds.l1.free=false")
     freed = answered(cli, "beatup", "--set", "bounds.l1.free=false", "--free", "l1")
-    assert held["design"]["l1"] == 0.031
+    assert fixed["design"]["l1"] == 0.031
     assert freed["design"]["l1"] == pytest.approx(0.03, rel=1e-9)
-    assert freed["figures"]["peak_torque"] < held["figures"]["peak_torque"]
+    assert freed["figures"]["peak_torque"] < fixed["figures"]["peak_torque"]
 
 
 def test_effects_are_put_on_and_taken_off(cli):

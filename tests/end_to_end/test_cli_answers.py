@@ -68,17 +68,17 @@ def evaluated(cli, *arguments):
 def test_an_answer_is_read_as_it_was_solved(cli, solved, problem, changes):
     answer = solved(problem, *changes)
     assert answer["status"] == "optimal"
-    found, err = evaluated(cli, problem, "--design", "a.json")
-    assert found["effects"] == answer["effects"]
-    assert found["design"] == answer["design"]
-    assert found["limits"] == answer["limits"], "judged by what it was solved for"
+    result, err = evaluated(cli, problem, "--design", "a.json")
+    assert result["effects"] == answer["effects"]
+    assert result["design"] == answer["design"]
+    assert result["limits"] == answer["limits"], "judged by what it was solved for"
     for name, value in answer["figures"].items():
-        assert found["figures"][name] == (None if value is None else pytest.approx(value, rel=1e-12, abs=1e-9)), name
-    told = any(word.startswith("--") and word not in ("--target", "--starts") for word in changes)
-    assert err.count("Remark: a.json adds the changes of its call: ") == told
+        assert result["figures"][name] == (None if value is None else pytest.approx(value, rel=1e-12, abs=1e-9)), name
+    report = any(word.startswith("--") and word not in ("--target", "--starts") for word in changes)
+    assert err.count("Remark: a.json adds the changes of its call: ") == report
     assert "another scene" not in err
     alone, err = evaluated(cli, "a.json")
-    assert (alone, "Remark: a.json" in err) == (found, False)
+    assert (alone, "Remark: a.json" in err) == (result, False)
     status, out, _ = cli("prove", problem, "--design", "a.json", "--json")
     assert (status, json.loads(out)["target"]) == (0, answer["target"])
 
@@ -101,22 +101,22 @@ def file(tmp_path):
 def test_the_file_on_the_command_line_wins_over_the_scene_of_an_answer(cli, solved, file):
     answer = solved(file())
     file(M0="600 N*m")
-    found, err = evaluated(cli, "my.toml", "--design", "a.json")
-    assert found["design"] == answer["design"]
-    assert found["figures"]["M3_fdc"] == pytest.approx(answer["figures"]["M3_fdc"] - 145, abs=1e-6)
-    told = (
+    result, err = evaluated(cli, "my.toml", "--design", "a.json")
+    assert result["design"] == answer["design"]
+    assert result["figures"]["M3_fdc"] == pytest.approx(answer["figures"]["M3_fdc"] - 145, abs=1e-6)
+    report = (
         "Remark: the settings differ from those of a.json; my.toml is used: operation.M0 = 600 N*m (a.json: 745 N*m).\n"
     )
-    assert err == told
-    own, err = evaluated(cli, "a.json")
-    assert (own["figures"], err) == (answer["figures"], "")
+    assert err == report
+    values, err = evaluated(cli, "a.json")
+    assert (values["figures"], err) == (answer["figures"], "")
 
 
 def test_the_file_of_another_loom_wins_too(cli, solved):
     solved("beatup")
-    found, err = evaluated(cli, "beatup-light", "--design", "a.json")
-    assert found["problem"] == "beatup-light"
-    assert found["figures"]["M3_fdc"] == pytest.approx(-145, abs=1e-6)
+    result, err = evaluated(cli, "beatup-light", "--design", "a.json")
+    assert result["problem"] == "beatup-light"
+    assert result["figures"]["M3_fdc"] == pytest.approx(-145, abs=1e-6)
     assert "problem.name = beatup-light (a.json: beatup)" in err
     assert "operation.M0 = 600 N*m (a.json: 745 N*m)" in err
 
@@ -124,10 +124,10 @@ def test_the_file_of_another_loom_wins_too(cli, solved):
 def test_an_answer_brings_to_another_file_what_its_call_changed_and_nothing_else(cli, solved, file):
     solved(file(), *GRAVITY, "--target", "torque")
     file(M0="600 N*m", speed="500 rpm")
-    found, err = evaluated(cli, "my.toml", "--design", "a.json")
+    result, err = evaluated(cli, "my.toml", "--design", "a.json")
     same, _ = evaluated(cli, "my.toml", "--design", "a.json", "--set", "operation.M0=700 N*m", "--target", "torque")
-    assert found == same
-    assert "gravity" in found["effects"]
+    assert result == same
+    assert "gravity" in result["effects"]
     assert err == (
         "Remark: a.json adds the changes of its call: gravity on, operation.M0 = 700 N*m; "
         "the settings differ from those of a.json; my.toml is used: operation.speed = 500 rpm (a.json: 600 rpm).\n"
@@ -136,11 +136,11 @@ def test_an_answer_brings_to_another_file_what_its_call_changed_and_nothing_else
 
 def test_the_calls_own_changes_come_last(cli, solved):
     answer = solved("beatup", *GRAVITY)
-    found, err = evaluated(
+    result, err = evaluated(
         cli, "beatup", "--design", "a.json", "--set", "operation.M0=800 N*m", "--with", "centrifugal"
     )
-    assert found["effects"] == [*answer["effects"], "centrifugal"]
-    assert found["figures"]["M3_fdc"] == pytest.approx(answer["figures"]["M3_fdc"] + 100, abs=1e-6)
+    assert result["effects"] == [*answer["effects"], "centrifugal"]
+    assert result["figures"]["M3_fdc"] == pytest.approx(answer["figures"]["M3_fdc"] + 100, abs=1e-6)
     assert err == "Remark: a.json adds the changes of its call: gravity on.\n"
 
 
@@ -148,8 +148,8 @@ def test_a_design_comes_through_a_pipe(cli, solved, monkeypatch):
     answer = solved("beatup", *GRAVITY)
     for given in (answer, answer["design"]):
         monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(json.dumps(given).encode())))
-        found, err = evaluated(cli, "beatup", "--design", "-")
-        assert found["design"] == answer["design"]
+        result, err = evaluated(cli, "beatup", "--design", "-")
+        assert result["design"] == answer["design"]
         assert err.startswith("Remark: standard input adds") == (given is answer)
     for stdin in (io.TextIOWrapper(io.BytesIO(b"\n")), None):
         monkeypatch.setattr("sys.stdin", stdin)
@@ -186,9 +186,9 @@ def test_show_draws_a_given_design(cli, solved, tmp_path):
 
 def test_bounds_are_freed_on_every_command_of_a_design(cli, solved):
     scene = ("beatup", "--set", "bounds.l1.free=false")
-    for more, held in (((), True), (("--free", "l1"), False)):
-        found, _ = evaluated(cli, *scene, *more)
-        assert any(limit["name"] == "l1" and limit["min"] == limit["max"] for limit in found["limits"]) == held
+    for more, fixed in (((), True), (("--free", "l1"), False)):
+        result, _ = evaluated(cli, *scene, *more)
+        assert any(limit["name"] == "l1" and limit["min"] == limit["max"] for limit in result["limits"]) == fixed
     answer = solved(*scene, "--free", "l1")
     assert answer["scene"]["call"]["free"] == ["l1"]
     assert evaluated(cli, "beatup", "--design", "a.json")[0]["limits"] == answer["limits"]
@@ -245,8 +245,8 @@ def test_a_target_is_taken_and_a_wrong_one_refused(cli, command, tmp_path):
 
 def test_a_speed_answer_is_judged_by_its_own_limits_and_by_another_targets_where_asked(cli, solved):
     answer = solved("shedding", "--target", "speed")
-    own, _ = evaluated(cli, "shedding", "--design", "a.json")
-    assert all(limit["ok"] for limit in own["limits"])
+    values, _ = evaluated(cli, "shedding", "--design", "a.json")
+    assert all(limit["ok"] for limit in values["limits"])
     status, out, _ = cli("evaluate", "shedding", "--design", "a.json", "--target", "stiffness")
     assert status == 0
     assert out.startswith("shedding: NOT admissible: speed")
@@ -263,6 +263,6 @@ def test_a_target_that_the_changed_scene_cannot_serve_is_refused(cli, solved):
 def test_an_answer_without_an_admissible_design_is_handed_on_too(cli, solved):
     answer = solved("beatup-light", "--target", "torque", *GRAVITY[:2])
     assert answer["status"] == "infeasible"
-    found, _ = evaluated(cli, "beatup-light", "--design", "a.json")
-    assert found["effects"] == answer["effects"]
-    assert [limit["ok"] for limit in found["limits"]] == [limit["ok"] for limit in answer["limits"]]
+    result, _ = evaluated(cli, "beatup-light", "--design", "a.json")
+    assert result["effects"] == answer["effects"]
+    assert [limit["ok"] for limit in result["limits"]] == [limit["ok"] for limit in answer["limits"]]

@@ -124,8 +124,8 @@ def listing(folder):
     return sorted((str(path), path.stat().st_mtime_ns) for path in folder.rglob("*"))
 
 
-@pytest.mark.parametrize(("line", "told"), CASES, ids=lambda value: str(value)[:60])
-def test_bad_input_is_one_plain_line(line, told, place, capsys):
+@pytest.mark.parametrize(("line", "report"), CASES, ids=lambda value: str(value)[:60])
+def test_bad_input_is_one_plain_line(line, report, place, capsys):
     before = listing(place)
     status = run([word.replace("~", " ") for word in line.split()])
     out, err = capsys.readouterr()
@@ -133,7 +133,7 @@ def test_bad_input_is_one_plain_line(line, told, place, capsys):
     assert err.startswith("loomopt: ")
     assert err.endswith("\n")
     assert err[:-1].isprintable(), "more than one line, or an escape sequence"
-    for part in told:
+    for part in report:
         assert part in err
     assert "Traceback" not in err
     assert listing(place) == before

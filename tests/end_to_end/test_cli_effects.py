@@ -87,7 +87,7 @@ def test_the_table_says_in_a_sentence_what_may_be_left_out(cli, static, tmp_path
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (("--target", "drop"), "job beatup has no target drop"),
         (("--tolerance", "0"), "the tolerance is out of range"),
@@ -99,11 +99,11 @@ def test_the_table_says_in_a_sentence_what_may_be_left_out(cli, static, tmp_path
         (("--workers", "0"), "number of workers is out of range"),
     ],
 )
-def test_bad_input_is_refused_before_anything_is_solved(cli, arguments, said, monkeypatch):
+def test_bad_input_is_refused_before_anything_is_solved(cli, arguments, message, monkeypatch):
     monkeypatch.setattr(Effects, "solved", lambda *_: pytest.fail("nothing is to be solved"))
     status, out, err = cli("effects", "beatup", *arguments)
     assert (status, out) == (2, "")
-    assert said in err
+    assert message in err
     assert len(err.splitlines()) == 1
     if "--tolerance" in arguments:
         assert "--tolerance" in err

@@ -81,9 +81,9 @@ def test_sizes_that_are_sold_are_not_told_by_boxes():
 
 @pytest.mark.slow
 def test_python_has_the_same_proof():
-    said: list[str] = []
-    answer = lo.solve(lo.load("beatup-light"), global_proof=True, gap=1e-2, seconds=30.0, on_step=said.append)
+    texts: list[str] = []
+    answer = lo.solve(lo.load("beatup-light"), global_proof=True, gap=1e-2, seconds=30.0, on_step=texts.append)
     assert answer.global_bound is not None
     assert answer.global_bound.proven
     assert [level.objective for level in answer.global_bound.levels] == ["M3_fdc", "peak_torque"]
-    assert said
+    assert texts

@@ -52,9 +52,9 @@ def test_changes_are_told_in_the_json_and_in_words(cli):
     assert change["at"] == pytest.approx(2.096358e-3, rel=1e-4)
     assert (change["kind"], change["limits"]) == ("active set", ["N_min min"])
     assert change["between"][0] < 2.096358e-3 < change["between"][1]
-    _, said, _ = cli(*arguments)
-    assert "\nX0 2.09636 mm: what binds changes, N_min min\n" in said
-    assert "K1 per X0 is the slope of the front." in said
+    _, message, _ = cli(*arguments)
+    assert "\nX0 2.09636 mm: what binds changes, N_min min\n" in message
+    assert "K1 per X0 is the slope of the front." in message
 
 
 @pytest.mark.slow
@@ -128,10 +128,10 @@ def test_axes_that_do_not_conflict_are_one_point(cli):
     ],
 )
 def test_the_most_of_an_axis(cli, monkeypatch, arguments, axes):
-    asked: dict[str, Trade] = {}
-    monkeypatch.setattr(studies, "run", lambda study, how: len(asked.setdefault("study", study).axes))
+    request: dict[str, Trade] = {}
+    monkeypatch.setattr(studies, "run", lambda study, how: len(request.setdefault("study", study).axes))
     assert cli("beatup", *arguments)[0] == 2
-    trade = asked["study"]
+    trade = request["study"]
     assert dict(zip(trade.axes, trade.senses, strict=True)) == axes
     assert list(trade.axes) == list(axes)
 
@@ -164,7 +164,7 @@ def test_an_end_without_a_least_asks_for_a_range(cli, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (("--minimise", "nonsense", "--against", "m4e"), 'unknown axis "nonsense"'),
         (("--minimise", "m4e", "--against", "m4e"), "two axes that differ"),
@@ -188,11 +188,11 @@ def test_an_end_without_a_least_asks_for_a_range(cli, tmp_path):
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
 )
-def test_bad_input_is_one_message_and_nothing_is_written(cli, tmp_path, arguments, said):
+def test_bad_input_is_one_message_and_nothing_is_written(cli, tmp_path, arguments, message):
     status, out, err = cli("beatup", *arguments)
     assert (status, out, err.count("\n")) == (2, "", 1), err
     assert err.startswith("loomopt: ")
-    assert said in err
+    assert message in err
     assert list(tmp_path.iterdir()) == []
 
 

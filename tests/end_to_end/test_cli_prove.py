@@ -31,14 +31,14 @@ def cli(capsys, monkeypatch):
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     """Return the answers of the default targets as JSON files."""
-    folder, found = tmp_path_factory.mktemp("answers"), {}
+    folder, result = tmp_path_factory.mktemp("answers"), {}
     for name in DEFAULTS:
-        found[name] = folder / f"{name}.json"
+        result[name] = folder / f"{name}.json"
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
             assert run(["solve", name, "--json"]) == 0
-        found[name].write_text(printed.getvalue())
-    return found
+        result[name].write_text(printed.getvalue())
+    return result
 
 
 def proved(cli, *arguments, status=0):

@@ -37,12 +37,12 @@ PRINTED: dict[tuple[str, ...], str] = {}
 
 def answered(cli, *arguments, status=0):
     """Return the one JSON object a command prints; what it prints of the packaged scene alone is asked for once."""
-    asked = tuple(map(str, arguments))
-    if asked not in PRINTED or asked[1] != "rapier" or "--design" in asked:
-        code, out, err = cli(*asked, "--json")
+    request = tuple(map(str, arguments))
+    if request not in PRINTED or request[1] != "rapier" or "--design" in request:
+        code, out, err = cli(*request, "--json")
         assert (code, err) == (status, "")
-        PRINTED[asked] = out
-    return json.loads(PRINTED[asked], parse_constant=pytest.fail)
+        PRINTED[request] = out
+    return json.loads(PRINTED[request], parse_constant=pytest.fail)
 
 
 def check_contract(data, design=DESIGN):
@@ -169,10 +169,10 @@ def test_show_names_targets_bounds_and_equations(cli):
 
 @pytest.mark.slow
 def test_free_sley_adds_the_four_bar_to_the_design_and_is_better(cli):
-    held, freed = answered(cli, *SOLVE), answered(cli, *SOLVE, "--free", "sley")
+    fixed, freed = answered(cli, *SOLVE), answered(cli, *SOLVE, "--free", "sley")
     check_contract(freed, DESIGN + SLEY)
     assert freed["status"] == "optimal"
-    assert freed["figures"]["peak_acceleration"] < 0.999 * held["figures"]["peak_acceleration"]
+    assert freed["figures"]["peak_acceleration"] < 0.999 * fixed["figures"]["peak_acceleration"]
 
 
 def test_effects_put_on_are_named_and_give_force_and_torque(cli):

@@ -84,7 +84,7 @@ def test_statics_has_no_contact_speed(cli):
 
 
 @pytest.mark.parametrize(
-    ("problem", "reference", "said", "rpm"),
+    ("problem", "reference", "text", "rpm"),
     [
         ("shedding", plain.PAPER, "would lift off: the cam force would be -13159.9 N at 89.8482 deg", 144.508702549280),
         (
@@ -96,17 +96,17 @@ def test_statics_has_no_contact_speed(cli):
     ],
     ids=["65.6 mm", "14.5 mm"],
 )
-def test_solve_says_in_one_sentence_that_the_papers_spring_would_lift_off(cli, problem, reference, said, rpm):
+def test_solve_says_in_one_sentence_that_the_papers_spring_would_lift_off(cli, problem, reference, text, rpm):
     """Where and by how much: the least cam force of 8029.14 N/m by the plain reference."""
     lost, stretch, u = plain.largest(reference, lambda m, *at: -plain.force(m, *at, plain.number(m, 8029.14)))
     angle = float(plain.cam_angle(reference, stretch, u))
-    assert said.endswith(f"{-float(lost):.6g} N at {angle:.6g} deg")
+    assert text.endswith(f"{-float(lost):.6g} N at {angle:.6g} deg")
     status, out, _ = cli("solve", problem)
     assert status == 0
-    assert said in " ".join(out.split())
+    assert text in " ".join(out.split())
     assert "8029.14 N/m" in out
     message = answered(cli, "solve", problem)["message"]
-    assert said in message
+    assert text in message
     assert f"holds up to {rpm:.7g} rpm" in message
 
 
@@ -197,11 +197,11 @@ def test_an_effect_taken_off_is_gone(cli):
 
 
 def test_free_rise_adds_the_cams_angles_to_the_design_and_is_better(cli):
-    held, freed = answered(cli, "solve", "shedding"), answered(cli, "solve", "shedding", "--free", "rise")
+    fixed, freed = answered(cli, "solve", "shedding"), answered(cli, "solve", "shedding", "--free", "rise")
     check_contract(freed, ["K1", "X0", *ANGLES])
     assert sum(freed["design"][name] for name in ANGLES) == pytest.approx(2 * math.pi, rel=1e-14)
     assert all(freed["units"][name] == "rad" for name in ANGLES)
-    assert freed["figures"]["K1"] < 0.9 * held["figures"]["K1"]
+    assert freed["figures"]["K1"] < 0.9 * fixed["figures"]["K1"]
     shown = {limit["name"] for limit in freed["limits"]}
     assert set(ANGLES) <= shown
 

@@ -76,14 +76,14 @@ def place(tmp_path, monkeypatch):
         (tmp_path / name).write_text(text, encoding="utf-8")
 
 
-@pytest.mark.parametrize(("line", "told"), BAD, ids=[line for line, _ in BAD])
-def test_bad_input_exits_with_2_one_message_and_nothing_on_stdout(cli, place, line, told):
+@pytest.mark.parametrize(("line", "report"), BAD, ids=[line for line, _ in BAD])
+def test_bad_input_exits_with_2_one_message_and_nothing_on_stdout(cli, place, line, report):
     status, out, err = cli("solve", "mine.toml", *(word.replace("~", " ") for word in line.split()), "--json")
     assert (status, out) == (2, "")
     assert err.startswith("loomopt: ")
     assert err.endswith("\n")
     assert err[:-1].isprintable()
-    assert all(part in err for part in told), err
+    assert all(part in err for part in report), err
 
 
 LINES = {
@@ -110,14 +110,14 @@ LINES = {
 
 @pytest.mark.parametrize("name", LINES)
 def test_a_bad_line_in_a_file_exits_with_2(cli, place, name):
-    before, after, told = LINES[name]
+    before, after, report = LINES[name]
     text = Path("mine.toml").read_text(encoding="utf-8")
     assert before in text
     Path("mine.toml").write_text(text.replace(before, after, 1), encoding="utf-8")
     status, out, err = cli("solve", "mine.toml", "--json")
     assert (status, out) == (2, "")
     assert err[:-1].isprintable()
-    assert all(part in err for part in told), err
+    assert all(part in err for part in report), err
 
 
 def test_a_limit_on_the_coils_without_coils_is_refused(cli):

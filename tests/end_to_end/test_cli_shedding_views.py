@@ -45,10 +45,10 @@ def answer():
 def no_follower(tmp_path):
     """Return a scene's file that gives no follower."""
     lines = packaged.problems()["shedding"].read_text(encoding="utf-8").splitlines()
-    kept = [line for line in lines if line.split(" = ")[0] not in FOLLOWER]
-    assert len(kept) == len(lines) - len(FOLLOWER)
+    subset = [line for line in lines if line.split(" = ")[0] not in FOLLOWER]
+    assert len(subset) == len(lines) - len(FOLLOWER)
     path = tmp_path / "bare.toml"
-    path.write_text("\n".join(kept), encoding="utf-8")
+    path.write_text("\n".join(subset), encoding="utf-8")
     return path
 
 
@@ -159,11 +159,11 @@ def test_solve_out_writes_the_cam(cli, tmp_path):
 @pytest.mark.parametrize("target", ["stiffness", "law"])
 def test_an_answer_shows_itself_in_jupyter(target):
     scene = lo.load("shedding").set("targets.law.intervals", 8)
-    found = ElementTree.fromstring(lo.solve(scene, target)._repr_html_())
-    words = "".join(found.itertext())
+    result = ElementTree.fromstring(lo.solve(scene, target)._repr_html_())
+    words = "".join(result.itertext())
     assert "keeps the roller on the cam" in words.replace("\xa0", " ")
     assert ("law: s'' at 9 knots" in words) == (target == "law")
-    assert len(found.findall("{http://www.w3.org/2000/svg}svg")) == 1
+    assert len(result.findall("{http://www.w3.org/2000/svg}svg")) == 1
 
 
 def test_a_narrow_return_is_drawn_with_its_undercut(cli, tmp_path):

@@ -117,7 +117,7 @@ def test_without_an_answer_the_table_is_written_and_no_figure(cli, tmp_path):
     over = ("--over", "operation.M0=500:600:100 N*m", "--target", "torque")
     status, _, err = cli("beatup", *over, "--out", "t.csv", "--figure", "f.png")
     assert (status, err.splitlines()) == (3, ["Wrote t.csv", "f.png is not written: no row is certified"])
-    assert [each.name for each in tmp_path.iterdir()] == ["t.csv"]
+    assert [item.name for item in tmp_path.iterdir()] == ["t.csv"]
 
 
 @pytest.mark.parametrize(
@@ -128,10 +128,10 @@ def test_without_an_answer_the_table_is_written_and_no_figure(cli, tmp_path):
     ],
 )  # fmt: skip
 def test_infeasible_rows_are_rows(cli, over, more, status, statuses):
-    found, out, _ = cli("beatup", "--over", over, *more, "--json")
+    result, out, _ = cli("beatup", "--over", over, *more, "--json")
     data = json.loads(out)
     assert {row["status"] for row in data["rows"]} == statuses
-    assert found == status
+    assert result == status
     assert all(row["reason"].startswith("limits that clash: ") for row in data["rows"] if row["status"] == "infeasible")
     assert len(data["gaps"]) == 1
 

@@ -63,10 +63,10 @@ def test_no_digit_is_cut_and_what_is_asked_for_is_there(printed, command, column
     text, pipe = texts[columns], texts[None]
     assert "…" not in text
     assert max(map(len, text.splitlines())) <= columns
-    said = re.sub(r"terminal of \d+ columns", "", " ".join(text.split()))
+    message = re.sub(r"terminal of \d+ columns", "", " ".join(text.split()))
     whole = [word for word in pipe.split() if len(word) > layout.LONGEST_WORD]  # addresses
-    new = {word for word in words(said) - words(pipe) if re.search(r"\d", word)}
-    assert {word for word in new if not any(word in each for each in whole)} == set()
+    new = {word for word in words(message) - words(pipe) if re.search(r"\d", word)}
+    assert {word for word in new if not any(word in item for item in whole)} == set()
     assert [heading for heading in ASKED[command] if not re.search(rf"\b{re.escape(heading)}\b", text)] == []
 
 
@@ -76,16 +76,16 @@ def test_no_digit_is_cut_and_what_is_asked_for_is_there(printed, command, column
 def test_columns_that_have_gone_are_named_with_how_to_see_them(printed, command, columns):
     texts, parts = printed(command)
     for grid in (part for part in parts if isinstance(part, TextTable)):
-        shown, told = layout.narrow(grid, columns)
+        shown, report = layout.narrow(grid, columns)
         missing = len(grid.columns) - len(shown.columns)
-        assert bool(missing) == bool(told)
-        if told:
-            wide = int(re.search(r"a terminal of (\d+) columns", told)[1])
+        assert bool(missing) == bool(report)
+        if report:
+            wide = int(re.search(r"a terminal of (\d+) columns", report)[1])
             assert wide > columns
             assert layout.narrow(grid, wide) == (grid, "")
             assert layout.narrow(grid, wide - 1)[1]
-            said = " ".join(texts[columns].split())
-            assert " ".join(restore_spaces(told).split()) in said
+            text = " ".join(texts[columns].split())
+            assert " ".join(restore_spaces(report).split()) in text
     assert "Not shown here" not in texts[None]
 
 

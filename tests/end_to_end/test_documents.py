@@ -47,10 +47,10 @@ CARRIED_OUT = [
 def test_a_page_can_be_carried_out_and_its_outputs_are_what_commands_print(page, tmp_path, monkeypatch):
     text = PAGES[page]
     monkeypatch.chdir(tmp_path)
-    told = [(words, lines.rstrip("\n").split("\n")) for words, lines in write.BLOCK.findall(text)]
+    texts = [(words, lines.rstrip("\n").split("\n")) for words, lines in write.BLOCK.findall(text)]
     printed = list(write.run_page(text))
-    assert [words for words, _ in told] == [words for words, _ in printed]
-    for (words, lines), (_, now) in zip(told, printed, strict=True):
+    assert [words for words, _ in texts] == [words for words, _ in printed]
+    for (words, lines), (_, now) in zip(texts, printed, strict=True):
         assert write.lines_agree(lines, now), "\n".join([f"make outputs writes it anew: {words}", *now])
 
 
@@ -117,9 +117,9 @@ def test_each_symbol_of_the_first_table_is_explained_under_it():
     first = BLOCKS[0][1]
     rows = re.findall(r"^(\w+) +-?[\d.]+ +-?[\d.]+", first, re.MULTILINE)
     (match,) = write.TABLE.finditer(README)
-    told = re.findall(r"^\| `(\w+)` \|.* \| (.+) \|$", match[0], re.MULTILINE)
+    report = re.findall(r"^\| `(\w+)` \|.* \| (.+) \|$", match[0], re.MULTILINE)
     assert len(rows) > 10
-    assert [name for name, text in told if text.strip()] == rows
+    assert [name for name, text in report if text.strip()] == rows
 
 
 def test_the_glossary_is_what_the_program_says():
@@ -129,7 +129,7 @@ def test_the_glossary_is_what_the_program_says():
 def test_the_sketches_are_there_and_name_what_the_glossary_marks():
     for name, drawing in write.sketches().items():
         stored = (ROOT / "docs" / name).read_text(encoding="utf-8")
-        texts = [re.findall(r"<text[^>]*>([^<]*)<", each) for each in (stored, drawing)]
+        texts = [re.findall(r"<text[^>]*>([^<]*)<", item) for item in (stored, drawing)]
         assert len(texts[0]) > 5
         assert texts[0] == texts[1]
 
@@ -155,9 +155,9 @@ def test_the_first_python_runs_as_it_stands_in_at_most_twelve_lines(tmp_path, mo
 
 def test_every_public_name_stands_in_the_reference_a_function_with_an_example():
     sections = re.split(r"^## lo\.", PAGES["docs/reference/python.md"], flags=re.MULTILINE)[1:]
-    told = {section.split("\n", 1)[0]: section for section in sections}
-    assert set(told) == {name for name in lo.__all__ if not name.startswith("_")}
-    for name, section in told.items():
+    record = {section.split("\n", 1)[0]: section for section in sections}
+    assert set(record) == {name for name in lo.__all__ if not name.startswith("_")}
+    for name, section in record.items():
         assert f"<!-- generated function {name} -->" in section
         example = re.search(r"^```\{code-cell\} python\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
         assert name[0].isupper() or f"lo.{name}(" in example[1]
@@ -182,15 +182,15 @@ def test_every_link_leads_somewhere(page):
 
 
 def test_every_page_is_reached_from_the_readme():
-    known, found, rest = {*WRITTEN, "docs/reference/glossary.md"}, set(), {"README.md"}
+    known, result, rest = {*WRITTEN, "docs/reference/glossary.md"}, set(), {"README.md"}
     while rest:
         page = rest.pop()
-        found.add(page)
+        result.add(page)
         text = (ROOT / page).read_text(encoding="utf-8")
         targets = [target.partition("#")[0] for target in re.findall(r"\]\(([^)]+)\)", text)]
         named = {os.path.normpath(Path(page).parent / target) for target in targets if "://" not in target}
-        rest |= (named & known) - found
-    assert found == known
+        rest |= (named & known) - result
+    assert result == known
 
 
 def test_the_architecture_names_folders_and_files_that_are_there():

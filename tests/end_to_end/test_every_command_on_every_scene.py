@@ -58,22 +58,22 @@ ALWAYS = (("show",), ("show", "--equations"), ("evaluate", "--json"), ("simulate
 
 def subjects():
     """Return, as pytest parameters: a scene, of a package or a template, and the effects that are put on."""
-    found = []
+    results = []
     for name in (*packaged.problems(), *(f"{job}.toml" for job in sorted(registry.builtin_names()))):
         template = name.endswith(".toml")
         read = registry.scene(tomllib.loads(registry.template(name[:-5]))) if template else registry.load(name)
         alone = available(read)
         sets = ["", *alone, *([" ".join(alone)] if len(alone) > 1 else [])]
-        found += [pytest.param(name, on, id=f"{name} with {on}" if on else name) for on in sets]
-    return found
+        results += [pytest.param(name, on, id=f"{name} with {on}" if on else name) for on in sets]
+    return results
 
 
 def available(scene):
     """Return the effects that a scene has values for but not on."""
-    found = []
+    results = []
     for name, table in scene.document.get("available", {}).items():
-        found += [name] if name in scene.schema.effects else [f"{name}.{instance}" for instance in table]
-    return found
+        results += [name] if name in scene.schema.effects else [f"{name}.{instance}" for instance in table]
+    return results
 
 
 SUBJECTS = subjects()

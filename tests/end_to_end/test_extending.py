@@ -21,8 +21,8 @@ COMMANDS = re.compile(r"^```console\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 def commands(section):
     """Return the words of each command of a section."""
-    (found,) = COMMANDS.findall(SECTIONS[section])
-    return [shlex.split(line) for line in found.splitlines()]
+    (result,) = COMMANDS.findall(SECTIONS[section])
+    return [shlex.split(line) for line in result.splitlines()]
 
 
 @pytest.fixture(scope="module")
@@ -52,19 +52,19 @@ def run(tmp_path_factory):
 @pytest.mark.slow
 def test_the_chapters_effects_are_served(run):
     solve, show, prove = commands("An effect")
-    found = json.loads(run([*solve, "--json"]))
-    assert found["effects"] == ["inertia", "resistance", "air_drag", "tip"]
-    assert found["figures"]["tip_acceleration"] == pytest.approx(168, rel=1e-8)
-    assert "tip_acceleration" in {price["limit"] for price in found["binding"]}
+    data = json.loads(run([*solve, "--json"]))
+    assert data["effects"] == ["inertia", "resistance", "air_drag", "tip"]
+    assert data["figures"]["tip_acceleration"] == pytest.approx(168, rel=1e-8)
+    assert "tip_acceleration" in {price["limit"] for price in data["binding"]}
     assert "M_air_drag" in run(show)
     assert "tip_acceleration <= 200" in run(prove)
 
 
 @pytest.mark.slow
 def test_the_commands_of_the_job_end_well_one_after_the_other(run):
-    told = commands("A job")
-    assert len(told) > 1
-    for words in told:
+    report = commands("A job")
+    assert len(report) > 1
+    for words in report:
         assert words[0] == "loomopt"
         run(words)
     run(["loomopt", "show", "mine.toml"])
@@ -78,11 +78,11 @@ def test_excerpts_stand_in_the_press(name, press, text):
 
 
 def test_the_files_that_are_told_are_the_press():
-    told = set(re.findall(r"^\| `([\w./]+)`", SECTIONS["A job"], re.MULTILINE)) | {"results/"}
+    report = set(re.findall(r"^\| `([\w./]+)`", SECTIONS["A job"], re.MULTILINE)) | {"results/"}
     package = PRESS / "loomopt_press"
     here = {path.name + "/" * path.is_dir() for path in package.iterdir() if path.name not in ("__pycache__",)}
-    assert told <= here
-    assert here - told == {"__init__.py", "slide.py", "torsion_bar.py"}
+    assert report <= here
+    assert here - report == {"__init__.py", "slide.py", "torsion_bar.py"}
 
 
 @pytest.mark.parametrize("code", re.findall(r"^```python\n(.*?)^```", SECTIONS["A study"], re.MULTILINE | re.DOTALL))

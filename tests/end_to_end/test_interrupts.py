@@ -80,13 +80,13 @@ def test_ctrl_c_during_an_import_stops_cleanly(module):
 
 
 @pytest.mark.parametrize(
-    "what",
+    "subject",
     ["os.kill(os.getpid(), signal.SIGINT)", "Closed()",
      "try:\n        os.kill(os.getpid(), signal.SIGINT)\n    except KeyboardInterrupt:\n        raise ImportError"],
     ids=["raised", "swallowed", "turned into another error"],
 )  # fmt: skip
-def test_ctrl_c_stops_whatever_a_library_makes_of_it(what):
-    assert is_stopped(called(sys.executable, "-c", SWALLOWED.format(what=what)))
+def test_ctrl_c_stops_whatever_a_library_makes_of_it(subject):
+    assert is_stopped(called(sys.executable, "-c", SWALLOWED.format(what=subject)))
 
 
 @pytest.mark.slow
@@ -151,9 +151,9 @@ def test_what_stops_a_study_whose_workers_start_leaves_no_traceback(tmp_path, st
     script = tmp_path / "study.py"
     script.write_text(STARTING)
     (tmp_path / "sitecustomize.py").write_text(SLOW_CHILD)
-    found = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
+    results = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
     words = [sys.executable, str(script), count, wait, str(int(number)), group, *WORKING[study], "--workers", "2"]
-    done = called(*words, cwd=tmp_path, start_new_session=True, env=found)
+    done = called(*words, cwd=tmp_path, start_new_session=True, env=results)
     assert "Traceback" not in done.stderr
     assert done.returncode in (0, 130)  # it may have been quicker
     if done.returncode == 130:

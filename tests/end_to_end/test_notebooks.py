@@ -24,8 +24,8 @@ def test_there_is_one_for_each_job_and_one_on_accuracy():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STORED)
 def test_a_notebook_run_from_a_clean_kernel_says_what_stands_there(name):
-    found = run.kept(ROOT / "notebooks" / f"{name}.ipynb")
-    assert run.differences(STORED[name], found) == [], "make notebooks writes it anew"
+    result = run.kept(ROOT / "notebooks" / f"{name}.ipynb")
+    assert run.differences(STORED[name], result) == [], "make notebooks writes it anew"
 
 
 @pytest.mark.parametrize("name", STORED)
@@ -71,11 +71,11 @@ def test_a_notebook_ends_in_assertions_on_references_with_the_relative_error_pri
 def test_other_numbers_and_other_words_are_found(before, after, differ):
     stored = copy.deepcopy(STORED["beatup"])
     stored.cells = [cell for cell in stored.cells if cell.cell_type == "code"][:1]
-    found = copy.deepcopy(stored)
-    for notebook, text in ((stored, before), (found, after)):
+    result = copy.deepcopy(stored)
+    for notebook, text in ((stored, before), (result, after)):
         notebook.cells[0].outputs = [{"output_type": "display_data", "data": {"text/html": text}, "metadata": {}}]
         notebook.cells[0].outputs = [run.nbformat.from_dict(output) for output in notebook.cells[0].outputs]
-    assert bool(run.differences(stored, found)) == differ
+    assert bool(run.differences(stored, result)) == differ
 
 
 def test_a_cell_or_a_picture_that_is_gone_is_found():

@@ -97,9 +97,9 @@ def test_the_project_says_what_the_package_is():
 
 
 def test_the_citation_is_of_this_version():
-    said = dict(re.findall(r"^([\w-]+): +(.+)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.MULTILINE))
-    assert said["cff-version"] == "1.2.0"
-    assert (said["title"], said["version"], said["license"]) == ("loomopt", loomopt.__version__, "MIT")
+    message = dict(re.findall(r"^([\w-]+): +(.+)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.MULTILINE))
+    assert message["cff-version"] == "1.2.0"
+    assert (message["title"], message["version"], message["license"]) == ("loomopt", loomopt.__version__, "MIT")
 
 
 def test_what_is_handed_over_as_source_is_there():
@@ -132,7 +132,7 @@ def imported(tree):
         elif isinstance(node, ast.Call):
             called = getattr(node.func, "attr", getattr(node.func, "id", ""))
             by_name = called.endswith("import_module")
-            yield from (each.value for each in node.args if by_name and isinstance(each, ast.Constant))
+            yield from (item.value for item in node.args if by_name and isinstance(item, ast.Constant))
 
 
 @pytest.mark.slow
@@ -244,13 +244,13 @@ def test_packaged_scenes_are_found_by_name_and_paths_stay_paths(tmp_path, monkey
 
 @pytest.mark.slow
 def test_no_tracked_file_speaks_of_a_machine_or_a_registry():
-    found = []
+    results = []
     for path in tracked():
         text = path.read_bytes().decode("utf-8", errors="ignore") if path.is_file() else ""
         for number, line in enumerate(text.splitlines(), 1):
             match = MACHINE.search(line) or REGISTRY.search(line)
-            found += [f"{path.relative_to(ROOT)}:{number}: {match[0]}"] if match else []
-    assert found == []
+            results += [f"{path.relative_to(ROOT)}:{number}: {match[0]}"] if match else []
+    assert results == []
 
 
 @pytest.mark.parametrize("line", ["/ho" + "me/someone/loom", "cd /wo" + "rk/x", "--index-" + "url=x", "Dev" + "pi"])

@@ -74,8 +74,8 @@ class Read(HTMLParser):
 @cache
 def pages():
     """Return the pages by their place in the site."""
-    found = (path for path in SITE.rglob("*.html") if "_static" not in path.parts)
-    return {path.relative_to(SITE).as_posix(): Read(path.read_text(encoding="utf-8")) for path in found}
+    result = (path for path in SITE.rglob("*.html") if "_static" not in path.parts)
+    return {path.relative_to(SITE).as_posix(): Read(path.read_text(encoding="utf-8")) for path in result}
 
 
 def inside(page, link):
@@ -88,9 +88,9 @@ def inside(page, link):
 def test_no_page_asks_for_anything_outside_the_site():
     assert len(pages()) > 35
     for page, read in pages().items():
-        asked = [each for each in read.asked if not each.startswith("data:")]
-        assert [each for each in asked if OUTSIDE.match(each)] == [], page
-        assert [each for each in asked if not (SITE / inside(page, each)[0]).exists()] == [], page
+        requests = [item for item in read.asked if not item.startswith("data:")]
+        assert [item for item in requests if OUTSIDE.match(item)] == [], page
+        assert [item for item in requests if not (SITE / inside(page, item)[0]).exists()] == [], page
 
 
 def test_no_style_or_script_asks_for_anything_outside_the_site():
@@ -99,7 +99,7 @@ def test_no_style_or_script_asks_for_anything_outside_the_site():
     for style in styles:
         text = re.sub(r"/\*.*?\*/", "", style.read_text(encoding="utf-8"), flags=re.DOTALL)
         named = re.findall(r"url\(\s*[\"']?([^\"')]+)", text) + re.findall(r"@import\s+[\"']([^\"']+)", text)
-        assert [each for each in named if OUTSIDE.match(each)] == [], style.name
+        assert [item for item in named if OUTSIDE.match(item)] == [], style.name
     for page, read in pages().items():
         assert "mathjax" not in " ".join(read.asked).lower(), page
 
@@ -122,11 +122,11 @@ def test_every_link_leads_to_a_page_and_an_anchor_of_it():
 
 
 def test_every_page_is_reached_from_the_first_one_in_three_clicks():
-    found = edge = {FIRST.relative_to(SITE).as_posix()}
+    result = edge = {FIRST.relative_to(SITE).as_posix()}
     for _ in range(CLICKS):
-        edge = {inside(page, link)[0] for page in edge for link in pages()[page].links} & pages().keys() - found
-        found = found | edge
-    assert pages().keys() - OWN <= found
+        edge = {inside(page, link)[0] for page in edge for link in pages()[page].links} & pages().keys() - result
+        result = result | edge
+    assert pages().keys() - OWN <= result
 
 
 def test_no_page_names_a_path_of_this_machine():
@@ -146,7 +146,7 @@ def test_every_command_stands_in_the_reference_with_its_options():
 @pytest.mark.parametrize("job", ["beatup", "rapier", "shedding"])
 def test_every_equation_of_a_packaged_scene_stands_in_its_theory(job):
     words = "".join(pages()[f"docs/theory/{job}.html"].words)
-    assert [each.name for each in lo.load(job).equations() if each.name not in words] == []
+    assert [equation.name for equation in lo.load(job).equations() if equation.name not in words] == []
 
 
 @pytest.mark.parametrize("job", ["beatup", "rapier", "shedding"])
@@ -172,12 +172,12 @@ def test_in_a_browser_the_site_opens_moves_and_is_searched_from_the_file_system(
         deadline = time.monotonic() + 10
         while "finished" not in shown.one("#search-results").text and time.monotonic() < deadline:
             time.sleep(0.1)
-        found = [each.get_attribute("href") for each in shown.all("#search-results a")]
-        assert any("docs/ideas/index.html" in each for each in found)
+        results = [item.get_attribute("href") for item in shown.all("#search-results a")]
+        assert any("docs/ideas/index.html" in item for item in results)
         for page in ("docs/index", "docs/own-loom/beatup", "docs/theory/beatup", "docs/hard-cases", "notebooks/beatup"):
             shown.open(SITE / f"{page}.html", 400)
             wide = shown.run("return document.documentElement.scrollWidth")
             assert wide <= 400, page
-        asked = [each for each in shown.requests if not each.startswith(("file:", "data:", "about:", "blob:"))]
-        assert asked == []
-        assert [each for each in shown.errors if "PST" not in each] == []
+        requests = [item for item in shown.requests if not item.startswith(("file:", "data:", "about:", "blob:"))]
+        assert requests == []
+        assert [item for item in shown.errors if "PST" not in item] == []

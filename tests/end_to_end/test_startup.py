@@ -107,9 +107,9 @@ def test_a_job_imports_no_module_of_another(name):
     scene = scene_of(name)
     code, modules = imported_together(("evaluate", scene), ("show", scene, "--equations"), ("simulate", scene))
     assert code == 0
-    own = {module for module in modules if module.startswith("loomopt.")}
-    assert f"loomopt.jobs.{name}.job" in own
-    assert not {module for module in own if set(module.split(".")) & others}
+    values = {module for module in modules if module.startswith("loomopt.")}
+    assert f"loomopt.jobs.{name}.job" in values
+    assert not {module for module in values if set(module.split(".")) & others}
 
 
 def test_solving_the_beatup_imports_no_module_of_another_job_no_study_and_no_picture_of_it():
@@ -125,8 +125,8 @@ def test_solving_the_beatup_imports_no_module_of_another_job_no_study_and_no_pic
         "loomopt.studies",
         "loomopt.picture.shapes",
     )
-    own = {module for module in modules if module.startswith("loomopt")}
-    assert not {module for module in own if any(word in module for word in foreign)}
+    values = {module for module in modules if module.startswith("loomopt")}
+    assert not {module for module in values if any(word in module for word in foreign)}
 
 
 @pytest.mark.parametrize(("given", "expected"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
@@ -134,19 +134,19 @@ def test_the_command_runs_its_linear_algebra_in_one_thread_unless_it_is_told_oth
     """Before NumPy is imported: afterwards it would not listen."""
     threads = "os.environ['OPENBLAS_NUM_THREADS'], os.environ['MKL_NUM_THREADS']"
     script = f"import os, loomopt.interface.cli.app; print({threads})"
-    own = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env={**own, **given})
+    values = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env={**values, **given})
     assert done.stdout.split() == [expected, "1"]
 
 
 def test_a_motion_of_its_own_is_imported_only_by_the_scenes_that_need_it():
-    own = {"loomopt.physics.motion.turning", "loomopt.model.crank_motion"}
+    values = {"loomopt.physics.motion.turning", "loomopt.model.crank_motion"}
     for arguments, needed in (
         (("evaluate", "beatup"), set()),
-        (("evaluate", "beatup", "--with", "speed_fluctuation"), own),
+        (("evaluate", "beatup", "--with", "speed_fluctuation"), values),
     ):
         code, modules = imported(*arguments)
         assert code == 0
-        assert own & modules == needed
+        assert values & modules == needed
     _, solving = imported("solve", "beatup")
     assert not {name for name in solving if name.startswith("loomopt.physics.motion")}

@@ -59,8 +59,8 @@ class Copy:
         self.before = self.files()
 
     def files(self):
-        found = (path for path in self.folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
-        return {path.relative_to(self.folder).as_posix(): path.read_bytes() for path in found}
+        result = (path for path in self.folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+        return {path.relative_to(self.folder).as_posix(): path.read_bytes() for path in result}
 
     def touched(self):
         """Return the files that are new or changed."""
@@ -98,8 +98,8 @@ def test_a_new_effect_is_its_file_and_its_reference_rows(copy):
     done = copy.python(*words)
     assert done.returncode == 0, done.stdout
     assert "3 passed" in done.stdout
-    found = json.loads(copy.loomopt("solve", "beatup", "--set", "effects.clock_spring.T=3 N*m", "--json"))
-    assert (found["status"], "clock_spring" in found["effects"]) == ("optimal", True)
+    data = json.loads(copy.loomopt("solve", "beatup", "--set", "effects.clock_spring.T=3 N*m", "--json"))
+    assert (data["status"], "clock_spring" in data["effects"]) == ("optimal", True)
     assert "M_clock_spring = T" in copy.loomopt(
         "show", "beatup", "--set", "effects.clock_spring.T=3 N*m", "--equations"
     )
@@ -185,11 +185,11 @@ def test_a_new_command_is_its_file_and_a_row_of_the_commands(copy):
 def test_a_new_format_of_drawings_is_its_file_and_a_row_of_the_endings(copy):
     copy.write("loomopt/interface/files/primitives_counted.py", FORMAT)
     name = "loomopt/interface/files/outputs.py"
-    own = "def _counted(*of: object) -> None:\n    from loomopt.interface.files import primitives_counted\n\n"
-    put(copy, name, "DRAWINGS: dict[", f"{own}    primitives_counted.write(*of)\n\n\nDRAWINGS: dict[")
+    values = "def _counted(*of: object) -> None:\n    from loomopt.interface.files import primitives_counted\n\n"
+    put(copy, name, "DRAWINGS: dict[", f"{values}    primitives_counted.write(*of)\n\n\nDRAWINGS: dict[")
     text = (copy.folder / name).read_text(encoding="utf-8")
     copy.write(name, text.replace('{".svg": _svg,', '{".count": _counted, ".svg": _svg,'))
     copy.loomopt("export", "beatup", "--out", "drawn.count")
     assert int((copy.folder / "drawn.count").read_text(encoding="utf-8")) > 10
-    touched = [each for each in copy.touched() if each != "drawn.count"]
+    touched = [item for item in copy.touched() if item != "drawn.count"]
     assert touched == [name, "loomopt/interface/files/primitives_counted.py"]

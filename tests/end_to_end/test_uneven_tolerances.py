@@ -34,34 +34,34 @@ def shift_and_sigma(design, name):
 
 
 def test_robust_keeps_the_mean_machine_clear_by_its_sigmas(capsys):
-    found = solved(capsys, *UNEVEN, "--robust", "2")
-    limit = next(limit for limit in found["limits"] if limit["name"] == "theta")
-    shift, sigma = shift_and_sigma(found["design"], "theta")
+    solution = solved(capsys, *UNEVEN, "--robust", "2")
+    limit = next(limit for limit in solution["limits"] if limit["name"] == "theta")
+    shift, sigma = shift_and_sigma(solution["design"], "theta")
     assert abs(shift) > 0.1 * sigma
     assert limit["backed_off"] == pytest.approx(shift + 2 * sigma, abs=1e-4 * sigma)
     assert limit["value"] + limit["backed_off"] == pytest.approx(limit["max"], abs=1e-6 * sigma)
-    assert found["yield"]["theta"]["value"] == pytest.approx((1 + math.erf(math.sqrt(2))) / 2, abs=2e-3)
+    assert solution["yield"]["theta"]["value"] == pytest.approx((1 + math.erf(math.sqrt(2))) / 2, abs=2e-3)
 
 
 @pytest.mark.slow
 def test_yield_is_what_sampled_machines_of_the_design_have(capsys, tmp_path):
-    found = solved(capsys, *UNEVEN, "--yield", "0.95")
-    assert found["yield"]["all"]["value"] == pytest.approx(0.95, abs=1e-3)
+    solution = solved(capsys, *UNEVEN, "--yield", "0.95")
+    assert solution["yield"]["all"]["value"] == pytest.approx(0.95, abs=1e-3)
     file = tmp_path / "design.json"
-    file.write_text(json.dumps(found["design"]), encoding="utf-8")
+    file.write_text(json.dumps(solution["design"]), encoding="utf-8")
     assert run(["tolerance", "beatup", "--design", str(file), *UNEVEN, "--samples", "8192", "--json"]) == 0
     sampled = json.loads(capsys.readouterr().out)["yield"]["all"]
-    assert sampled["value"] == pytest.approx(0.95, abs=4 * math.hypot(sampled["se"], found["yield"]["all"]["se"]))
+    assert sampled["value"] == pytest.approx(0.95, abs=4 * math.hypot(sampled["se"], solution["yield"]["all"]["se"]))
 
 
 @pytest.mark.slow
 def test_a_family_is_solved_at_its_nominal_sizes_and_its_members_are_backed_off_one_by_one(capsys):
-    found = solved(capsys, *FAMILY, *UNEVEN)
-    assert found["design"] == solved(capsys, *FAMILY)["design"]
+    solution = solved(capsys, *FAMILY, *UNEVEN)
+    assert solution["design"] == solved(capsys, *FAMILY)["design"]
     assert run(["solve", "beatup", *FAMILY, *UNEVEN, "--robust", "2"]) == 2
-    told = capsys.readouterr()
-    assert not told.out
-    assert "Choose the target of one member, with its numbers set" in told.err
+    output = capsys.readouterr()
+    assert not output.out
+    assert "Choose the target of one member, with its numbers set" in output.err
     member = solved(capsys, "--set", "operation.M0=650 N*m", *UNEVEN, "--robust", "2")
     assert member["scene"]["document"]["tolerances"]["l1"] == {"plus": "0", "minus": "0.05 mm"}
     assert member["scene"]["document"]["tolerances"]["l4"] == {"fit": "H7"}

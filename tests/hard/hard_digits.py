@@ -19,7 +19,7 @@ def exact(*values):
     return [MP.mpf(value) for value in values]
 
 
-def worst_ulps(found, reference, data):
+def worst_ulps(result, reference, data):
     """Return the largest |error| of floats, in ulps times condition, against a function of the data in many digits."""
     data = exact(*data)
     values = reference(*data)
@@ -27,7 +27,7 @@ def worst_ulps(found, reference, data):
     for k, x in enumerate(data):
         moved = reference(*data[:k], x * (1 + STEP), *data[k + 1 :])
         sizes = [size + abs(m - value) / STEP for size, m, value in zip(sizes, moved, values, strict=True)]
-    errors = zip(found, values, sizes, strict=True)
+    errors = zip(result, values, sizes, strict=True)
     return max(float(abs(MP.mpf(float(f)) - value) / (EPS * size)) for f, value, size in errors)
 
 

@@ -97,7 +97,7 @@ def test_too_little_preload_is_refused_by_name_with_the_least_that_helps(X0):
     answer = lo.solve(lo.load("shedding").set("bounds.X0.max", X0))
     assert answer.status == "infeasible"
     assert any("X0" in text for text in answer.clash)
-    needed = next(one.needed for one in answer.relaxation if one.limit == "X0")
+    needed = next(relaxation.needed for relaxation in answer.relaxation if relaxation.limit == "X0")
     assert needed == pytest.approx(STATIC / 1e6, rel=1e-6)
 
 

@@ -13,10 +13,10 @@ NAMED = re.compile(r"`(tests/hard/\w+\.py)::(\w+)`")
 
 def decorated(file, name):
     """Return a test's decorators and first line as text; "" where there is no such test."""
-    found = re.search(
+    search = re.search(
         rf"((?:^[@ )\]].*\n|^\]\n)*)^def {name}\(", (ROOT / file).read_text(encoding="utf-8"), re.MULTILINE
     )
-    return found.group(0) if found else ""
+    return search.group(0) if search else ""
 
 
 @pytest.mark.parametrize("title", SECTIONS)
@@ -49,9 +49,9 @@ def test_every_case_stands_in_the_table():
 
 
 def test_every_open_test_is_told():
-    told = {name for part in TEXT.split("\nOpen: ")[1:] for _, name in NAMED.findall(part.split("\n## ")[0])}
+    texts = {name for part in TEXT.split("\nOpen: ")[1:] for _, name in NAMED.findall(part.split("\n## ")[0])}
     marked = set()
     for file in sorted((ROOT / "tests" / "hard").glob("test_hard_*.py")):
         names = re.findall(r"^def (test_\w+)\(", file.read_text(encoding="utf-8"), re.MULTILINE)
         marked |= {name for name in names if "xfail" in decorated(f"tests/hard/{file.name}", name)}
-    assert told == marked
+    assert texts == marked

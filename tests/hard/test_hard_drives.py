@@ -48,14 +48,14 @@ def seen_under(l1, l2, l3, l71):
 def test_the_sleys_synthesis_as_the_time_ratio_goes_to_1(theta, swing):
     """Back through the dead centres in 120 digits: θ and swing to 1e-14 rad, and no time ratio of 1 is singular."""
     l1, l2 = sley_synthesis.sley(systems.FLOAT, theta, swing, 0.684, 0.773)
-    found = seen_under(*exact(l1, l2, 0.684, 0.773))
-    assert [float(found[0] - MP.mpf(theta)), float(found[1] - MP.mpf(swing))] == pytest.approx([0, 0], abs=1e-14)
+    result = seen_under(*exact(l1, l2, 0.684, 0.773))
+    assert [float(result[0] - MP.mpf(theta)), float(result[1] - MP.mpf(swing))] == pytest.approx([0, 0], abs=1e-14)
 
 
 def test_the_sleys_crank_keeps_its_digits_as_the_swing_goes_to_0():
     l1, l2 = sley_synthesis.sley(systems.FLOAT, 0.0, 1e-12, 0.684, 0.773)
-    found = seen_under(*exact(l1, l2, 0.684, 0.773))[1]
-    assert float(found) == pytest.approx(1e-12, rel=1e-12, abs=0)
+    result = seen_under(*exact(l1, l2, 0.684, 0.773))[1]
+    assert float(result) == pytest.approx(1e-12, rel=1e-12, abs=0)
 
 
 # Five-bar at its singular position -------------------------------------------------------------------------------

@@ -100,8 +100,8 @@ def sides_of(lengths):
 def test_positions_and_rates_to_a_few_ulps_times_condition(name):
     for lengths, phi in draws(name):
         pose = CrankRockerPose(systems.FLOAT, lengths, phi)
-        found = pose.psi, pose.psi_1, pose.psi_2
-        assert worst_ulps(found, motion(lengths.side), [*sides_of(lengths), phi]) <= CASES[name][2]
+        results = pose.psi, pose.psi_1, pose.psi_2
+        assert worst_ulps(results, motion(lengths.side), [*sides_of(lengths), phi]) <= CASES[name][2]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -129,9 +129,9 @@ def test_a_rod_of_1e6_cranks_and_a_short_rocker_to_1e_9_rad(name):
             CrankRockerPose(systems.FLOAT, lengths, phi),
             dead_centres(systems.FLOAT, lengths),
         )
-        found = [pose.psi, pose.psi_1, pose.psi_2, *(getattr(stands, of) for of in CENTRES)]
+        results = [pose.psi, pose.psi_1, pose.psi_2, *(getattr(stands, of) for of in CENTRES)]
         true = [*motion(lengths.side)(*exact(*data, phi)), *centres(lengths.side)(*exact(*data))]
-        most = max(float(abs(MP.mpf(one) - other)) for one, other in zip(found, true, strict=True))
+        most = max(float(abs(MP.mpf(item) - other)) for item, other in zip(results, true, strict=True))
         assert most <= 4 * EPS * lengths.l2 / lengths.l1
 
 
@@ -158,8 +158,8 @@ def test_transmission_angle_180_less_1e_8_is_beyond_float64_and_told_by_its_cond
     """The gap is 1e-17 of the frame: rounding of any length moves it by itself. What comes out is finite and tiny."""
     random = np.random.default_rng(3)
     drawn = random.uniform([0.1, 0.6, 0.6], [0.4, 2, 2], (4 * DRAWS, 3)).tolist()
-    found = [(a, b, c, math.sqrt((b + c) ** 2 - 4 * b * c * math.sin(0.5e-8) ** 2) - a) for a, b, c in drawn]
-    chosen = [sides for sides in found if turns(*sides)]
+    results = [(a, b, c, math.sqrt((b + c) ** 2 - 4 * b * c * math.sin(0.5e-8) ** 2) - a) for a, b, c in drawn]
+    chosen = [sides for sides in results if turns(*sides)]
     assert len(chosen) > 5
     for sides in chosen:
         far = crank_rocker.transmission_angle_far(systems.FLOAT, Lengths(*sides))

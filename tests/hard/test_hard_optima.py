@@ -169,7 +169,7 @@ def test_a_clash_above_it_is_refused_with_what_would_do(share):
     answer = lo.solve(lo.load("shedding").set("bounds.K1.max", f"{K1 * (1 - share)!r} N/m"), starts=1)
     assert answer.status == "infeasible"
     assert any("K1" in text for text in answer.clash)
-    alone = {one.limit: one.needed for one in answer.relaxation if one.alone}
+    alone = {relaxation.limit: relaxation.needed for relaxation in answer.relaxation if relaxation.alone}
     assert alone["K1"] == pytest.approx(K1, rel=1e-9)
 
 
@@ -224,16 +224,16 @@ def cubic():
 
 
 def test_an_optimum_without_prices_is_not_certified():
-    found = certify(cubic(), {"x": 0.0, "y": 0.0}, 1e-8)
-    assert not found.passed
-    assert any("can still fall" in reason for reason in found.reasons)
+    certificate = certify(cubic(), {"x": 0.0, "y": 0.0}, 1e-8)
+    assert not certificate.passed
+    assert any("can still fall" in reason for reason in certificate.reasons)
 
 
 @pytest.mark.parametrize("x", [-1e-3, -1e-4, -1e-5])
 def test_a_point_beside_an_optimum_without_prices_is_not_certified(x):
-    found = certify(cubic(), {"x": x, "y": 0.0}, 1e-8)
-    assert not found.passed
-    assert any("is too large" in reason or "carries a price" in reason for reason in found.reasons)
+    certificate = certify(cubic(), {"x": x, "y": 0.0}, 1e-8)
+    assert not certificate.passed
+    assert any("is too large" in reason or "carries a price" in reason for reason in certificate.reasons)
 
 
 def test_an_optimum_without_prices_is_called_uncertified():

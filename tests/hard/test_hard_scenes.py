@@ -90,7 +90,7 @@ def test_1e6_rpm_of_a_cam_is_refused_with_each_limit_that_would_do():
     """K1 as in test_hard_cams; the speed that 1 MN/m survives is certified as the highest for that spring."""
     answer = lo.solve(lo.load("shedding").set("operation.speed", "1e6 rpm"), starts=1)
     assert answer.status == "infeasible"
-    alone = {one.limit: one.needed for one in answer.relaxation if one.alone}
+    alone = {relaxation.limit: relaxation.needed for relaxation in answer.relaxation if relaxation.alone}
     assert alone["K1"] == pytest.approx(278922581701.12384, rel=1e-9)
     highest = optimal(lo.load("shedding").update({"mechanism.K1": "1e6 N/m", "mechanism.X0": "80 mm"}), "speed")
     assert alone["speed"] == pytest.approx(highest.design["speed"], rel=1e-6)
@@ -179,7 +179,7 @@ def test_without_resistance_a_tolerance_of_1_percent_of_it_is_zero_and_refused_b
     answer = lo.solve(lo.load("beatup").set("operation.M0", "0 N*m"), target, starts=1)
     assert answer.status == "infeasible"
     assert any("M3_fdc = 0" in text for text in answer.clash)
-    alone = [one.needed for one in answer.relaxation if one.alone and one.limit == "M3_fdc"]
+    alone = [relaxation.needed for relaxation in answer.relaxation if relaxation.alone and relaxation.limit == "M3_fdc"]
     assert alone == [pytest.approx(-676.981102081, rel=1e-6)]
 
 

@@ -138,10 +138,12 @@ def test_a_neighbours_answer_is_a_warm_start_to_the_same_design(answer):
 def test_progress_is_told(answer):
     iterations: list[int] = []
     starts: list[tuple[int, ...]] = []
-    found = lo.solve(SCENE, starts=3, on_iteration=iterations.append, on_start=lambda *told: starts.append(told))
+    second_answer = lo.solve(
+        SCENE, starts=3, on_iteration=iterations.append, on_start=lambda *report: starts.append(report)
+    )
     assert starts == [(1, 3), (2, 3), (3, 3)]
     assert len(iterations) >= 3
-    assert found.design == pytest.approx(answer.design, rel=1e-7, abs=1e-9)
+    assert second_answer.design == pytest.approx(answer.design, rel=1e-7, abs=1e-9)
 
 
 def test_a_scene_from_tables_is_the_scene_from_the_file():
@@ -241,7 +243,7 @@ def test_the_public_names_are_these():
     assert set(lo.__all__) == PUBLIC
     answer = lo.solve("beatup-light", starts=1)
     for name, thing in (("Answer", answer), ("Scene", answer.scene)):
-        assert {each for each in dir(thing) if not each.startswith("_")} == METHODS[name]
+        assert {item for item in dir(thing) if not item.startswith("_")} == METHODS[name]
 
 
 LISTED = "import sys, loomopt; print(*dir(loomopt)); print(*(n for n in sys.modules if n.startswith('loomopt.')))"
@@ -298,22 +300,22 @@ def test_an_answer_of_another_job_stands_for_nothing():
 
 def test_an_answer_is_evaluated_simulated_and_proven_in_its_own_scene_for_its_own_target():
     scene = lo.load("shedding").with_effect("dry_friction").set("operation.speed", "400 rpm")
-    own = lo.solve(scene, "speed")
-    again = own.evaluate()
-    assert own.status == "optimal"
-    assert (again.admissible, again.effects, again.limits) == (True, own.effects, own.limits)
+    own_answer = lo.solve(scene, "speed")
+    again = own_answer.evaluate()
+    assert own_answer.status == "optimal"
+    assert (again.admissible, again.effects, again.limits) == (True, own_answer.effects, own_answer.limits)
     assert {n: v for n, v in again.figures.items() if v is not None} == pytest.approx(
-        {n: v for n, v in own.figures.items() if v is not None}, rel=1e-12, abs=1e-9
+        {n: v for n, v in own_answer.figures.items() if v is not None}, rel=1e-12, abs=1e-9
     )
-    assert not lo.evaluate(scene, own).admissible, "today's speed is a limit of the default target"
-    assert lo.evaluate(scene, own, "speed").limits == again.limits
-    curves = own.simulate()
-    assert curves.equals(own.curves())
+    assert not lo.evaluate(scene, own_answer).admissible, "today's speed is a limit of the default target"
+    assert lo.evaluate(scene, own_answer, "speed").limits == again.limits
+    curves = own_answer.simulate()
+    assert curves.equals(own_answer.curves())
     assert "dry_friction [N]" in curves
-    assert (curves.attrs["target"], curves.attrs["effects"]) == ("speed", ", ".join(own.effects))
-    assert len(own.simulate(accuracy=1e-3)) < len(curves)
-    assert own.prove().target == "speed"
-    assert own.prove(slack=1e-7).passed
+    assert (curves.attrs["target"], curves.attrs["effects"]) == ("speed", ", ".join(own_answer.effects))
+    assert len(own_answer.simulate(accuracy=1e-3)) < len(curves)
+    assert own_answer.prove().target == "speed"
+    assert own_answer.prove(slack=1e-7).passed
 
 
 def test_no_message_speaks_of_the_command_line_to_python():
@@ -353,8 +355,8 @@ def test_no_answer_speaks_of_the_command_line_to_python(monkeypatch):
 def test_each_step_is_told_before_it():
     steps: list[str] = []
     lo.solve(SCENE, starts=3, prove=True, on_step=steps.append)
-    told = [step for step in steps if "equations" not in step]
-    assert told == ["building the balance", *(f"start {k} of 3" for k in (1, 2, 3)), "certifying", "proving"]
+    texts = [step for step in steps if "equations" not in step]
+    assert texts == ["building the balance", *(f"start {k} of 3" for k in (1, 2, 3)), "certifying", "proving"]
 
 
 def test_what_is_looked_for_where_nothing_is_admissible_is_told_one_by_one():
@@ -372,16 +374,18 @@ def test_what_is_looked_for_where_nothing_is_admissible_is_told_one_by_one():
 def test_a_scene_has_the_equations_that_show_prints(name, capsys):
     assert run(["show", name, "--equations"]) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    found = lo.load(name).equations()
-    assert all(" ".join(each.text.split()) in printed and each.name in printed for each in found)
-    assert all(each.latex and each._repr_latex_() == rf"$\displaystyle {each.latex}$" for each in found)
+    equations = lo.load(name).equations()
+    assert all(" ".join(item.text.split()) in printed and item.name in printed for item in equations)
+    assert all(item.latex and item._repr_latex_() == rf"$\displaystyle {item.latex}$" for item in equations)
 
 
 def test_an_effect_is_in_the_equations_while_it_is_on():
     on = SCENE.with_effect("gravity")
     off = on.without_effect("gravity")
-    assert any("M_gravity" in each.text and "M_{\\mathrm{gravity}}" in each.latex for each in on.equations())
-    assert not any("gravity" in each.text + each.latex + each.name for each in off.equations())
+    assert any(
+        "M_gravity" in equation.text and "M_{\\mathrm{gravity}}" in equation.latex for equation in on.equations()
+    )
+    assert not any("gravity" in equation.text + equation.latex + equation.name for equation in off.equations())
     assert off.equations() == SCENE.equations()
 
 

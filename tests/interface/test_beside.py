@@ -55,17 +55,17 @@ def test_an_answer_is_drawn_beside_what_was_measured(measured):
 def test_the_command_tells_the_rms_and_writes_both(measured, tmp_path):
     out = [tmp_path / name for name in ("curves.csv", "curves.png")]
     words = ["simulate", "beatup", "--beside", str(measured), *(w for path in out for w in ("--out", str(path)))]
-    told = CliRunner().invoke(app.application(words), words)
-    assert told.exit_code == 0, told.output
-    assert "psi" in told.stdout
-    assert " 24 " in told.stdout
-    assert " 0.1 " in told.stdout
+    report = CliRunner().invoke(app.application(words), words)
+    assert report.exit_code == 0, report.output
+    assert "psi" in report.stdout
+    assert " 24 " in report.stdout
+    assert " 0.1 " in report.stdout
     assert "psi_measured [deg]" in out[0].read_text()
     assert out[1].stat().st_size > 1000
 
 
 @pytest.mark.parametrize(
-    ("rows", "told"),
+    ("rows", "report"),
     [
         ("phi [deg],chi [deg]\n0,1\n", "no column of the curves"),
         ("psi [deg]\n1\n", "no column phi"),
@@ -75,10 +75,10 @@ def test_the_command_tells_the_rms_and_writes_both(measured, tmp_path):
         ("", "empty"),
     ],
 )
-def test_a_file_that_measures_nothing_is_refused_in_one_line(tmp_path, rows, told):
+def test_a_file_that_measures_nothing_is_refused_in_one_line(tmp_path, rows, report):
     path = tmp_path / "bad.csv"
     path.write_text(rows)
-    with pytest.raises(BadInput, match=told):
+    with pytest.raises(BadInput, match=report):
         lo.simulate("beatup", measured=path)
 
 
@@ -98,9 +98,9 @@ def test_own_curves_are_read_as_measured_ones(tmp_path, problem, name, comma):
     made = CliRunner().invoke(app.application(words), words)
     assert made.exit_code == 0, made.output
     frame = lo.simulate(problem, measured=path)
-    told = {str(key): value for key, value in frame.attrs.items() if str(key).startswith("rms_")}
-    assert len(told) > 3
-    for key, value in told.items():
+    record = {str(key): value for key, value in frame.attrs.items() if str(key).startswith("rms_")}
+    assert len(record) > 3
+    for key, value in record.items():
         assert float(value) <= 1e-11 * frame[key.removeprefix("rms_")].abs().max(), key
 
 
@@ -108,9 +108,9 @@ def test_precision_and_the_rule_for_ambiguous_commas_are_told(tmp_path):
     path = tmp_path / "m.csv"
     path.write_text("phi [deg];psi [deg]\n0;82,250\n66;67,125\n120;74,500\n")
     words = ["simulate", "beatup", "--beside", str(path)]
-    told = CliRunner().invoke(app.application(words), words)
-    assert told.exit_code == 0, told.output
-    assert "0.0005" in told.stdout
-    assert "commas are read as decimal commas" in " ".join(told.stdout.split())
+    report = CliRunner().invoke(app.application(words), words)
+    assert report.exit_code == 0, report.output
+    assert "0.0005" in report.stdout
+    assert "commas are read as decimal commas" in " ".join(report.stdout.split())
     frame = lo.simulate("beatup", measured=path)
     assert float(frame.attrs["precision_psi"]) == pytest.approx(math.radians(0.0005))

@@ -54,8 +54,8 @@ def test_one_unit_and_what_differs(light, inches):
 
 def test_each_is_judged_in_its_own_scene_or_all_in_one(light):
     heavy = lo.evaluate("beatup-heavy", light)
-    own = lo.compare(light, heavy)
-    assert own.designs[0].evaluation.figures["M3_fdc"] != own.designs[1].evaluation.figures["M3_fdc"]
+    values = lo.compare(light, heavy)
+    assert values.designs[0].evaluation.figures["M3_fdc"] != values.designs[1].evaluation.figures["M3_fdc"]
     both = lo.compare(light, heavy, scene="beatup")
     assert both.designs[0].evaluation.figures == both.designs[1].evaluation.figures
     assert both.designs[0].evaluation.figures == lo.evaluate("beatup", light).figures
@@ -86,12 +86,12 @@ def test_the_command(light, tmp_path, monkeypatch, capsys):
     Path("a.json").write_text(outputs.document(light))
     Path("b.json").write_text(outputs.document(replace(light)))
     assert run(["compare", "a.json", "b.json", "today", "--json", "--out", "c.csv", "--figure", "c.svg"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert [each["name"] for each in told["designs"]] == ["a", "b", "today"]
-    assert told["designs"][0]["design"] == told["designs"][1]["design"] == pytest.approx(dict(light.design))
-    assert told["units"]["l1"] == "m"
-    assert {"name", "design", "figures", "limits"} <= set(told["designs"][2])
-    assert "l2" in told["differs"]
+    data = json.loads(capsys.readouterr().out)
+    assert [item["name"] for item in data["designs"]] == ["a", "b", "today"]
+    assert data["designs"][0]["design"] == data["designs"][1]["design"] == pytest.approx(dict(light.design))
+    assert data["units"]["l1"] == "m"
+    assert {"name", "design", "figures", "limits"} <= set(data["designs"][2])
+    assert "l2" in data["differs"]
     assert Path("c.csv").read_text().count("\n") > 10
     assert "<svg" in Path("c.svg").read_text()
     assert run(["compare", "a.json", "today", "--in", "beatup-heavy"]) == 0

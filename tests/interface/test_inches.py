@@ -59,10 +59,10 @@ def _is_unit(word):
 
 def by_powers(units):
     """Return the different units of each dimension."""
-    found: dict[tuple[int, ...], set[str]] = {}
+    results: dict[tuple[int, ...], set[str]] = {}
     for unit in units:
-        found.setdefault(parse_unit(unit).powers, set()).add(unit)
-    return found
+        results.setdefault(parse_unit(unit).powers, set()).add(unit)
+    return results
 
 
 @pytest.fixture(scope="module", params=CASES)
@@ -74,15 +74,15 @@ def pair(request):
 
 @pytest.mark.slow
 def test_an_answer_has_the_same_numbers(pair):
-    one, other = (answer.as_dict() for answer in pair)
+    first, other = (answer.as_dict() for answer in pair)
     assert pair[0].status == "optimal"
-    assert one["units"] == other["units"]
-    assert one["reached"] == other["reached"]
+    assert first["units"] == other["units"]
+    assert first["reached"] == other["reached"]
     for key in ("design", "figures"):
-        assert other[key] == {n: v if v is None else pytest.approx(v, rel=1e-9, abs=0) for n, v in one[key].items()}
+        assert other[key] == {n: v if v is None else pytest.approx(v, rel=1e-9, abs=0) for n, v in first[key].items()}
     for key in ("limits", "binding"):
-        assert len(one[key]) == len(other[key]) > 0
-        for mine, theirs in zip(one[key], other[key], strict=True):
+        assert len(first[key]) == len(other[key]) > 0
+        for mine, theirs in zip(first[key], other[key], strict=True):
             for word in mine.keys() - {"text"}:
                 assert theirs[word] == (pytest.approx(mine[word], rel=1e-9) if is_size(mine[word]) else mine[word])
 
@@ -101,20 +101,20 @@ def test_what_a_person_sees_differs_in_units_only(pair):
     assert shown[0] == shown[1]
     text = layout.render(answers.solution(pair[1].result, pair[1].scene), None)
     assert not re.search(r" (mm|N\*m|N|N/m|kg)\b", text)
-    own, inches = (set(answer.table()["unit"]) for answer in pair)
-    assert ("mm" in own, "in" in inches, "mm" in inches) == (True, True, False)
+    values, inches = (set(answer.table()["unit"]) for answer in pair)
+    assert ("mm" in values, "in" in inches, "mm" in inches) == (True, True, False)
 
 
 def test_a_table_has_the_same_sizes(pair):
-    own, inches = (answer.table() for answer in pair)
-    assert list(own.columns) == list(inches.columns)
-    assert list(own.index) == list(inches.index)
-    for name in own.index:
-        ratio = factor(own["unit"][name]) / factor(inches["unit"][name])
+    values, inches = (answer.table() for answer in pair)
+    assert list(values.columns) == list(inches.columns)
+    assert list(values.index) == list(inches.index)
+    for name in values.index:
+        ratio = factor(values["unit"][name]) / factor(inches["unit"][name])
         for column in ("today", "design", "min", "max"):
-            a, b = own[column][name] * ratio, inches[column][name]
+            a, b = values[column][name] * ratio, inches[column][name]
             assert b == pytest.approx(a, rel=1e-9, abs=0, nan_ok=True), (name, column)
-        assert list(own.loc[name, ["ok", "binds"]]) == list(inches.loc[name, ["ok", "binds"]])
+        assert list(values.loc[name, ["ok", "binds"]]) == list(inches.loc[name, ["ok", "binds"]])
 
 
 def test_a_price_is_told_in_the_tables_units(pair):
@@ -134,13 +134,13 @@ def test_show_and_evaluate_differ_in_units_only(name):
     scenes = lo.load(name), in_inches(name)
     evaluated = [lo.evaluate(scene) for scene in scenes]
     assert evaluated[0].as_dict() == evaluated[1].as_dict()
-    told = [masked(answers.evaluation(found.result, s, None)) for found, s in zip(evaluated, scenes, strict=True)]
-    assert told[0] == told[1]
+    texts = [masked(answers.evaluation(result.result, s, None)) for result, s in zip(evaluated, scenes, strict=True)]
+    assert texts[0] == texts[1]
     drawn = [masked(curves(scene, {}, None)[1:]) for scene in scenes]
     assert drawn[0].count("U") == drawn[1].count("U") > 2
     shown = [parts(scene) for scene in scenes]
-    own, inches = ([part for part in parts if isinstance(part, TextTable)] for parts in shown)
-    numbers = [[(line[0], line[2], line[3]) for line in grids[0].lines if line[2]] for grids in (own, inches)]
+    values, inches = ([part for part in parts if isinstance(part, TextTable)] for parts in shown)
+    numbers = [[(line[0], line[2], line[3]) for line in grids[0].lines if line[2]] for grids in (values, inches)]
     assert numbers[0] == numbers[1], "SI is the same"
     given = {line[0]: line[1] for line in inches[0].lines}
     for key, text in given.items():
@@ -150,28 +150,28 @@ def test_show_and_evaluate_differ_in_units_only(name):
 def test_a_relaxation_is_the_same_in_other_words():
     answers = [lo.solve(scene("beatup-light"), "torque", starts=1) for scene in (lo.load, in_inches)]
     assert [answer.status for answer in answers] == ["infeasible", "infeasible"]
-    one, other = (answer.relaxation for answer in answers)
-    assert [(r.limit, r.side, r.alone) for r in one] == [(r.limit, r.side, r.alone) for r in other]
-    for mine, theirs in zip(one, other, strict=True):
+    first, other = (answer.relaxation for answer in answers)
+    assert [(r.limit, r.side, r.alone) for r in first] == [(r.limit, r.side, r.alone) for r in other]
+    for mine, theirs in zip(first, other, strict=True):
         assert theirs.needed == pytest.approx(mine.needed, rel=1e-9)
         assert masked([mine.text]) == masked([theirs.text])
-    assert any(" lbf*in -> " in each.text for each in other)
+    assert any(" lbf*in -> " in item.text for item in other)
     assert not any(re.search(r" (mm|N\*m|kg)\b", text) for a in other for text in (a.text, answers[1].message))
 
 
 def test_what_physics_says_of_a_clash_is_in_the_scenes_units():
     clash = ("surge_ratio", "shear_share")
     scenes = (all_on(lo.load("shedding")), all_on(in_inches("shedding")))
-    own, inches = (registry.of(scene).explain(scene, clash) for scene in scenes)
-    assert re.search(r" mm carry at least \S+ MPa .* allows \S+ MPa", own)
+    values, inches = (registry.of(scene).explain(scene, clash) for scene in scenes)
+    assert re.search(r" mm carry at least \S+ MPa .* allows \S+ MPa", values)
     assert re.search(r" in carry at least \S+ psi .* allows \S+ psi", inches)
-    assert masked([own]) == masked([inches])
+    assert masked([values]) == masked([inches])
 
 
 def seen(scene):
     """Return the tables of a scene that a person sees, each as its units."""
-    found = lo.evaluate(scene)
-    yield [row["unit"] for row in tables.rows(found.result, scene)]
+    evaluation = lo.evaluate(scene)
+    yield [row["unit"] for row in tables.rows(evaluation.result, scene)]
     grids = [part for part in scenes.curves(scene, {}, None) if isinstance(part, TextTable)]
     heads = [head for grid in grids for head in grid.columns]
     yield [head.partition("[")[2].rstrip("]") for head in heads]
@@ -223,10 +223,10 @@ def test_display_in_a_file_is_followed_by_every_table(cli):
     text = packaged.problems()["beatup"].read_text(encoding="utf-8")
     Path("own.toml").write_text(text, encoding="utf-8")
     Path("shown.toml").write_text(text.replace("[targets", f"{DISPLAY}\n[targets", 1), encoding="utf-8")
-    own, shown = (json.loads(cli("solve", file, "--starts", "1", "--json")) for file in ("own.toml", "shown.toml"))
+    values, shown = (json.loads(cli("solve", file, "--starts", "1", "--json")) for file in ("own.toml", "shown.toml"))
     for key in ("design", "figures", "units", "reached"):
-        assert own[key] == shown[key], "JSON stays SI"
-    assert own["scene"]["hash"] == shown["scene"]["hash"]
+        assert values[key] == shown[key], "JSON stays SI"
+    assert values["scene"]["hash"] == shown["scene"]["hash"]
     assert shown["scene"]["document"]["display"]["length"] == "in"
     assert "in, " in cli("show", "shown.toml")
     assert re.search(r"bounds\.l1\.min +30 mm +0\.03 +m", cli("show", "shown.toml")), "as it was given"

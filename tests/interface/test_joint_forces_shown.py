@@ -89,10 +89,10 @@ OWN = {
 
 @pytest.mark.parametrize("name", OWN)
 def test_each_force_is_shown_on_the_parts_that_it_is_between(name):
-    own = lo.load(name).with_effect("joint_forces", *(["head_inertia"] if name == "rapier" else []))
-    own = own.update(LEVER) if name == "shedding" else own
-    evaluated = lo.evaluate(own)
-    forces = from_curves(own, evaluated.simulate(), evaluated.design)
+    values = lo.load(name).with_effect("joint_forces", *(["head_inertia"] if name == "rapier" else []))
+    values = values.update(LEVER) if name == "shedding" else values
+    evaluated = lo.evaluate(values)
+    forces = from_curves(values, evaluated.simulate(), evaluated.design)
     for force, parts in OWN[name].items():
         assert list(forces[force].headings) == parts
         for part in parts:
@@ -101,19 +101,21 @@ def test_each_force_is_shown_on_the_parts_that_it_is_between(name):
     # Each part's direction is that of the line between two of its joints.
     lines = {"rod": "BC", "rocker": "DC"} if name == "beatup" else {"pitman": "BC"} if name == "knuckle-press" else {}
     phi = next(iter(forces.values())).phi
-    motion = registry.of(own).views.motion(own, evaluated.design, phi)
+    motion = registry.of(values).views.motion(values, evaluated.design, phi)
     assert motion is not None
     for part, way_of in lines.items():
-        one, other = way_of[0], way_of[1]
-        ends = [motion.joints[end] if end in motion.joints else np.asarray(motion.pivots[end]) for end in (one, other)]
+        first, other = way_of[0], way_of[1]
+        ends = [
+            motion.joints[end] if end in motion.joints else np.asarray(motion.pivots[end]) for end in (first, other)
+        ]
         way = ends[1] - ends[0]
-        turned = next(each.headings[part] for each in forces.values() if part in each.headings)
+        turned = next(item.headings[part] for item in forces.values() if part in item.headings)
         assert np.column_stack(turned) == pytest.approx(way / np.linalg.norm(way, axis=1)[:, None], abs=1e-12)
 
 
 def test_a_two_force_member_carries_its_force_along_its_line():
-    own = lo.load("beatup").with_effect("joint_forces")
-    x, y = from_curves(own, lo.simulate(own))["force_C"].on("rod")
+    own_scene = lo.load("beatup").with_effect("joint_forces")
+    x, y = from_curves(own_scene, lo.simulate(own_scene))["force_C"].on("rod")
     assert np.max(np.abs(y)) < 1e-9 * np.max(np.abs(x))
 
 
@@ -136,6 +138,6 @@ def test_without_an_effect_that_tells_forces_it_is_said_which_would(scene, capsy
     with pytest.raises(BadInput, match="no active effect gives forces by components"):
         lo.evaluate("beatup").plot_forces()
     assert app.run(["simulate", "beatup", "--forces"]) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert "Put one of these on" in said.err
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert "Put one of these on" in output.err

@@ -38,7 +38,7 @@ def test_every_row_of_a_front_by_every_number_that_is_printed(front):
 
 
 @pytest.mark.parametrize(
-    ("label", "told"),
+    ("label", "report"),
     [
         (7, "does not have this point"),
         ("61 mm", "does not have this point"),
@@ -50,8 +50,8 @@ def test_every_row_of_a_front_by_every_number_that_is_printed(front):
         (True, "not a whole number"),
     ],
 )
-def test_what_names_no_row_is_refused_with_what_is_allowed(travels, label, told):
-    with pytest.raises(BadInput, match=told) as caught:
+def test_what_names_no_row_is_refused_with_what_is_allowed(travels, label, report):
+    with pytest.raises(BadInput, match=report) as caught:
         travels.answer(label)
     assert "point" in str(caught.value)
 

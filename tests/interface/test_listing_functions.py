@@ -23,12 +23,12 @@ def folder(tmp_path, monkeypatch):
 
 def test_problems_are_those_of_the_list(capsys):
     assert run(["list", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)["problems"]
-    assert [each["name"] for each in told] == list(packaged.problems())
-    assert told == [each._asdict() | {"targets": list(each.targets)} for each in lo.problems()]
+    load = json.loads(capsys.readouterr().out)["problems"]
+    assert [problem["name"] for problem in load] == list(packaged.problems())
+    assert load == [problem._asdict() | {"targets": list(problem.targets)} for problem in lo.problems()]
     assert run(["list"]) == 0
     text = " ".join(capsys.readouterr().out.split())
-    assert all(each.title in text and ", ".join(each.targets) in text for each in lo.problems())
+    assert all(problem.title in text and ", ".join(problem.targets) in text for problem in lo.problems())
 
 
 def test_a_scene_to_start_from(folder):
@@ -40,15 +40,15 @@ def test_a_scene_to_start_from(folder):
         lo.new("beatup", path)
     with pytest.raises(lo.BadInput):
         lo.new("no-such-job", folder / "other.toml")
-    assert [each.name for each in folder.iterdir()] == ["mine.toml"]
+    assert [item.name for item in folder.iterdir()] == ["mine.toml"]
 
 
 def test_a_packaged_problem_is_copied_with_what_it_names(folder):
     assert run(["new", "--from", "rapier", "mine.toml"]) == 0
-    assert sorted(each.name for each in folder.iterdir()) == ["mine.toml", "rapier-wish.csv"]
-    own, theirs = lo.load("mine.toml"), lo.load("rapier")
-    assert own.document == theirs.document
-    assert lo.evaluate(own, target="match").figures == lo.evaluate(theirs, target="match").figures
+    assert sorted(item.name for item in folder.iterdir()) == ["mine.toml", "rapier-wish.csv"]
+    values, theirs = lo.load("mine.toml"), lo.load("rapier")
+    assert values.document == theirs.document
+    assert lo.evaluate(values, target="match").figures == lo.evaluate(theirs, target="match").figures
     assert run(["new", "--from", "rapier", "other.toml"]) == 2  # the table is there already
     assert not Path("other.toml").exists()
 
@@ -67,8 +67,8 @@ def test_a_zip_has_all_problems_of_a_job(folder):
 )
 def test_what_cannot_be_made_is_one_message(words, folder, capsys):
     assert run(words.split()) == 2
-    told = capsys.readouterr()
-    assert (told.out, told.err.count("\n")) == ("", 1)
+    output = capsys.readouterr()
+    assert (output.out, output.err.count("\n")) == ("", 1)
     assert list(folder.iterdir()) == []
 
 
@@ -83,11 +83,11 @@ def test_a_schema_checks_its_own_scenes(capsys):
 
 @pytest.mark.parametrize("command", ["solve", "evaluate"])
 def test_what_is_printed_is_what_the_terminal_shows(command, capsys):
-    found = lo.solve("shedding-static") if command == "solve" else lo.evaluate("shedding-static")
+    result = lo.solve("shedding-static") if command == "solve" else lo.evaluate("shedding-static")
     assert run([command, "shedding-static"]) == 0
     printed = capsys.readouterr().out
     timed = re.compile(r"Time: .*|IPOPT.*")
-    assert timed.sub("", str(found)).strip() == timed.sub("", printed).strip()
+    assert timed.sub("", str(result)).strip() == timed.sub("", printed).strip()
 
 
 def test_a_study_prints_its_table(capsys):
@@ -116,11 +116,11 @@ def test_a_study_of_one_answer_prints_what_its_command_prints(capsys):
 @pytest.mark.parametrize("name", app.COMMANDS)
 def test_each_help_ends_in_an_example_of_its_own_options(name, capsys):
     assert run([name, "--help"]) == 0
-    told = " ".join(capsys.readouterr().out.split())
+    text = " ".join(capsys.readouterr().out.split())
     example = app.EXAMPLES[name]
-    assert told.endswith(f"For example: {example}")
+    assert text.endswith(f"For example: {example}")
     assert example.startswith(f"loomopt {name}")
-    assert all(f" {option}" in told.split("For example")[0] for option in re.findall(r"--[a-z]+", example))
+    assert all(f" {option}" in text.split("For example")[0] for option in re.findall(r"--[a-z]+", example))
 
 
 def test_a_shell_completes_commands_whoever_else_takes_part(monkeypatch, capsys):

@@ -134,7 +134,9 @@ def test_a_long_command_in_a_pipe_is_heard_on_stderr_alone():
 
 def cells(monkeypatch, *sources):
     """Return what cells of a notebook leave when they are run one after the other."""
-    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(textwrap.dedent(each)) for each in sources])
+    notebook = nbformat.v4.new_notebook(
+        cells=[nbformat.v4.new_code_cell(textwrap.dedent(source)) for source in sources]
+    )
     client = NotebookClient(notebook, timeout=120, kernel_name="python3", allow_errors=True)
     received = []
     genuine = client.process_message

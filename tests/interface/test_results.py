@@ -80,9 +80,9 @@ def test_an_export_is_the_file_of_the_command(answer, name, tmp_path, monkeypatc
     assert answer.export(name) == Path(name)
     Path("design.json").write_text(json.dumps(dict(answer.design)))
     assert run(["export", "beatup-light", "--design", "design.json", "--out", f"b{Path(name).suffix}"]) == 0
-    own, theirs = (Path(each).read_text().splitlines() for each in (name, f"b{Path(name).suffix}"))
-    assert len(own) == len(theirs) > 5
-    assert sum(mine != other for mine, other in zip(own, theirs, strict=True)) < 0.05 * len(own)
+    values, theirs = (Path(item).read_text().splitlines() for item in (name, f"b{Path(name).suffix}"))
+    assert len(values) == len(theirs) > 5
+    assert sum(mine != other for mine, other in zip(values, theirs, strict=True)) < 0.05 * len(values)
 
 
 def test_an_evaluation_is_exported_too_and_other_files_are_refused(evaluation, tmp_path):
@@ -117,7 +117,7 @@ def test_rows_of_answers_compare_and_those_of_other_units_do_in_si(answer):
     inches = lo.evaluate(inch.scene("beatup-light"))
     assert {"l1 [mm]"} <= set(today.to_frame().columns) - set(inches.to_frame().columns)
     assert "l1 [in]" in inches.to_frame()
-    alike = pd.concat([each.to_frame(si=True) for each in (today, inches)], ignore_index=True)
+    alike = pd.concat([item.to_frame(si=True) for item in (today, inches)], ignore_index=True)
     numbers = alike.select_dtypes("number")
     assert not alike.isna().any(axis=None)
     assert len(numbers.columns) > 15
@@ -128,15 +128,15 @@ def test_rows_of_answers_compare_and_those_of_other_units_do_in_si(answer):
 def test_a_list_of_a_design_is_one_cell():
     knots = (0.0, 8.0, 0.0, -8.0, 0.0)
     law = {"mechanism.law": "spline", "mechanism.law_coefficients": str(list(knots))}
-    found = lo.evaluate(lo.load("shedding").update(law), {"K1": 1e5, "law": knots})
-    row = found.to_frame().iloc[0]
+    second_evaluation = lo.evaluate(lo.load("shedding").update(law), {"K1": 1e5, "law": knots})
+    row = second_evaluation.to_frame().iloc[0]
     assert row["K1 [N/m]"] == pytest.approx(1e5)
     assert row["law [1]"] == pytest.approx(knots)
 
 
 def test_words_of_things_are_short_and_say_what_counts(answer, evaluation):
     infeasible = lo.solve("beatup-light", "retrofit", starts=1)
-    told = {
+    record = {
         repr(answer): [
             "Answer",
             "beatup-light, balance: optimal but M3_fdc not reached",
@@ -149,7 +149,7 @@ def test_words_of_things_are_short_and_say_what_counts(answer, evaluation):
         repr(answer.draw()): ["beatup-light"],
         repr(infeasible): ["infeasible", "limits that clash", "l1 >= 30 mm"],
     }
-    for text, words in told.items():
+    for text, words in record.items():
         assert len(text) <= 200
         assert "\n" not in text
         assert [word for word in words if word not in text] == []
@@ -199,8 +199,8 @@ CALLS = [(lo, each.__name__, each) for each in PUBLIC if not inspect.isclass(eac
 @pytest.mark.parametrize(("kind", "name", "call"), CALLS, ids=lambda value: getattr(value, "__name__", str(value)))
 def test_an_editor_knows_every_argument_and_result(kind, name, call):
     signature = inspect.signature(call)
-    arguments = [each for each in signature.parameters.values() if each.name != "self"]
-    assert all(each.annotation is not inspect.Parameter.empty for each in arguments)
+    arguments = [item for item in signature.parameters.values() if item.name != "self"]
+    assert all(item.annotation is not inspect.Parameter.empty for item in arguments)
     assert signature.return_annotation is not inspect.Signature.empty
     assert inspect.getdoc(call)
     assert "Any" not in str(signature) or name == "as_dict"  # JSON's own data

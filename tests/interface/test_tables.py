@@ -161,6 +161,6 @@ def test_the_same_scene_gives_the_same_digits(answer):
 
 def test_the_nearest_design_of_an_infeasible_answer_is_called_relaxed():
     """As in the terminal."""
-    found = lo.solve(SCENE.set("operation.M0", "500 N*m"), "torque")
-    assert found.status == "infeasible"
-    assert list(found.table().columns) == ["unit", "today", "relaxed", "min", "max", "ok", "binds", "reached"]
+    second_answer = lo.solve(SCENE.set("operation.M0", "500 N*m"), "torque")
+    assert second_answer.status == "infeasible"
+    assert list(second_answer.table().columns) == ["unit", "today", "relaxed", "min", "max", "ok", "binds", "reached"]

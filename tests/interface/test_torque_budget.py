@@ -17,28 +17,28 @@ MORE = ["--with", "gravity", "--with", "bearing_friction", "--fluctuation", "0.0
 def told(capsys, *words):
     """Return the exit status, stdout and stderr of the command."""
     status = app.run(["budget", *words])
-    said = capsys.readouterr()
-    return status, said.out, said.err
+    output = capsys.readouterr()
+    return status, output.out, output.err
 
 
 def test_json_has_the_shares_their_sum_and_the_motor(capsys):
     status, out, err = told(capsys, "beatup", *MORE, "--json")
-    found = json.loads(out)
+    data = json.loads(out)
     assert (status, err) == (0, "")
-    assert found["problem"] == "beatup"
-    assert [row["effect"] for row in found["rows"]] == ["inertia", "resistance", "gravity", "bearing_friction"]
-    for row in (*found["rows"], found["total"]):
+    assert data["problem"] == "beatup"
+    assert [row["effect"] for row in data["rows"]] == ["inertia", "resistance", "gravity", "bearing_friction"]
+    for row in (*data["rows"], data["total"]):
         assert {"at_peak", "rms", "energy"} <= row.keys()
-    assert found["motor"].keys() >= {"rms_torque", "mean_power", "peak_power", "regenerated", "flywheel"}
-    assert found["motor"]["flywheel"] == pytest.approx(0.814006, rel=1e-5)
-    assert found["units"]["flywheel"] == "kg*m^2"
-    assert found["total"]["at_peak"] == pytest.approx(math.fsum(row["at_peak"] for row in found["rows"]), rel=1e-14)
+    assert data["motor"].keys() >= {"rms_torque", "mean_power", "peak_power", "regenerated", "flywheel"}
+    assert data["motor"]["flywheel"] == pytest.approx(0.814006, rel=1e-5)
+    assert data["units"]["flywheel"] == "kg*m^2"
+    assert data["total"]["at_peak"] == pytest.approx(math.fsum(row["at_peak"] for row in data["rows"]), rel=1e-14)
 
 
 def test_what_is_not_known_is_null_with_its_reason(capsys):
-    found = json.loads(told(capsys, "beatup", "--json")[1])
-    assert found["motor"]["flywheel"] is None
-    assert found["undefined"]["flywheel"] == "no fluctuation is given, such as 0.02"
+    data = json.loads(told(capsys, "beatup", "--json")[1])
+    assert data["motor"]["flywheel"] is None
+    assert data["undefined"]["flywheel"] == "no fluctuation is given, such as 0.02"
     document = {**lo.load("shedding-static").without_effect("warp_tension").document}
     document["operation"] = {key: value for key, value in document["operation"].items() if key != "speed"}
     still = lo.budget(lo.scene({**document, "targets": {}}))
@@ -59,14 +59,14 @@ def test_the_terminal_tells_them_in_the_scene_s_units(capsys):
 
 
 def test_a_table_has_a_line_per_effect_and_one_for_their_sum():
-    found = lo.budget(lo.load("beatup").set("display.torque", "lbf*in"))
-    table, si = found.table(), found.table(si=True)
+    budget = lo.budget(lo.load("beatup").set("display.torque", "lbf*in"))
+    table, si = budget.table(), budget.table(si=True)
     assert list(table.index) == ["inertia", "resistance", "total"]
-    assert si.loc["total", "at_peak [N*m]"] == found.total.at_peak
-    assert table.loc["total", "at_peak [lbf*in]"] == pytest.approx(found.total.at_peak / 0.1129848290276167, rel=1e-14)
+    assert si.loc["total", "at_peak [N*m]"] == budget.total.at_peak
+    assert table.loc["total", "at_peak [lbf*in]"] == pytest.approx(budget.total.at_peak / 0.1129848290276167, rel=1e-14)
     assert table.attrs["scene"] == "beatup"
-    assert "inertia" in found._repr_html_()
-    assert repr(found) == "<Budget beatup: crank torque -830.638 lbf*in at its peak, of 2 effects>"
+    assert "inertia" in budget._repr_html_()
+    assert repr(budget) == "<Budget beatup: crank torque -830.638 lbf*in at its peak, of 2 effects>"
 
 
 def test_the_figure_has_a_curve_for_each_share_and_no_text_runs_into_anything(tmp_path):
@@ -74,18 +74,18 @@ def test_the_figure_has_a_curve_for_each_share_and_no_text_runs_into_anything(tm
     for effect in scene.schema.effects.values():
         if effect.name not in scene.effects and effect.name not in ("shaft_torsion", "speed_fluctuation"):
             scene = scene.set(f"effects.{effect.name}", dict(effect.examples[0]))
-    found = lo.budget(scene)
-    assert len(found.rows) >= 7
-    drawn = found.plot(tmp_path / "budget.svg")
+    budget = lo.budget(scene)
+    assert len(budget.rows) >= 7
+    drawn = budget.plot(tmp_path / "budget.svg")
     assert overlaps.found(drawn) == []
     (axes,) = drawn.axes
     curves = [y for y in (np.asarray(line.get_ydata()) for line in axes.lines) if len(y) > 2]
-    assert len(curves) == len(found.rows) + 1, "the shares and their sum"
+    assert len(curves) == len(budget.rows) + 1, "the shares and their sum"
     sums = np.sum(curves[:-1], axis=0)
     assert curves[-1] == pytest.approx(sums, abs=1e-9)
     assert (tmp_path / "budget.svg").stat().st_size > 1000
     with pytest.raises(BadInput, match="svg"):
-        found.plot(tmp_path / "budget.gif")
+        budget.plot(tmp_path / "budget.gif")
 
 
 def test_figures_are_written_from_the_command_line(tmp_path, capsys):
@@ -96,7 +96,7 @@ def test_figures_are_written_from_the_command_line(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("rapier",), "no effect acts on the crank"),
         (("beatup", "--fluctuation", "0"), "--fluctuation: it is out of range"),
@@ -104,8 +104,8 @@ def test_figures_are_written_from_the_command_line(tmp_path, capsys):
         (("beatup", "--figure", "a.gif"), ".png"),
     ],
 )
-def test_bad_input_is_one_line_and_nothing_is_printed(words, said, capsys):
+def test_bad_input_is_one_line_and_nothing_is_printed(words, message, capsys):
     status, out, err = told(capsys, *words)
     assert (status, out) == (2, "")
-    assert said in err
+    assert message in err
     assert len(err.splitlines()) == 1

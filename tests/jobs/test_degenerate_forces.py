@@ -22,10 +22,10 @@ FORCES = ("force_A", "force_B", "force_C", "force_D", "shaking_force", "shaking_
 
 
 def test_today_s_machine_at_a_change_point_is_one_message():
-    with pytest.raises(BadInput) as told:
+    with pytest.raises(BadInput) as caught:
         lo.evaluate(SCENE.set("mechanism.l3", CHANGE_POINT))
-    assert "not a crank-rocker: l1 + l4 < l2 + l3 fails (198 mm against 198 mm)" in str(told.value)
-    assert len(str(told.value).splitlines()) == 1
+    assert "not a crank-rocker: l1 + l4 < l2 + l3 fails (198 mm against 198 mm)" in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
 
 
 def test_next_to_a_change_point_forces_are_numbers_that_grow():
@@ -55,15 +55,17 @@ def loaded(name):
 
 
 def forces_of(scene):
-    found = lo.evaluate(scene)
-    return {name: value for name, value in found.figures.items() if name.startswith(OF_FORCES)}, found.undefined
+    evaluation = lo.evaluate(scene)
+    return {
+        name: value for name, value in evaluation.figures.items() if name.startswith(OF_FORCES)
+    }, evaluation.undefined
 
 
 @pytest.mark.parametrize("name", OTHERS)
 def test_every_machine_at_a_change_point_is_one_message(name):
-    with pytest.raises(BadInput, match=SAID[name]) as told:
+    with pytest.raises(BadInput, match=SAID[name]) as caught:
         lo.evaluate(loaded(name).update(OTHERS[name]))
-    assert len(str(told.value).splitlines()) == 1
+    assert len(str(caught.value).splitlines()) == 1
 
 
 @pytest.mark.parametrize("name", LOADED)
@@ -77,20 +79,20 @@ def test_a_shaft_that_does_not_turn_forward_is_refused(name):
 def test_without_a_load_pins_carry_nothing_or_say_what_is_missing(name):
     scene = loaded(name)
     scene = scene.without_effect(*(effect for effect in scene.effects if effect != "joint_forces"))
-    found, undefined = forces_of(scene)
-    held = {"beatup": ("force_A", "force_B", "force_C"), "rapier": tuple(found), "shedding": ()}[name]
-    assert {each: found[each] for each in held} == dict.fromkeys(held, 0.0)
-    assert all((value is None) == (each in undefined) for each, value in found.items())
+    result, undefined = forces_of(scene)
+    fixed = {"beatup": ("force_A", "force_B", "force_C"), "rapier": tuple(result), "shedding": ()}[name]
+    assert {item: result[item] for item in fixed} == dict.fromkeys(fixed, 0.0)
+    assert all((value is None) == (item in undefined) for item, value in result.items())
     missing = {"beatup": {"shaking_moment"}, "rapier": set(), "shedding": {"shaking_force", "lever_pivot_force"}}
-    assert {each for each, value in found.items() if value is None} == missing[name]
+    assert {item for item, value in result.items() if value is None} == missing[name]
 
 
 def test_a_linkage_without_a_load_carries_nothing():
     scene = lo.load("sixbar-sley").with_effect("joint_forces")
     document = scene.without_effect(*(effect for effect in scene.effects if effect not in ("joint_forces", "inertia")))
-    found, undefined = forces_of(document.set("effects.inertia", {"J": "1e-30 kg*m^2"}))
+    result, undefined = forces_of(document.set("effects.inertia", {"J": "1e-30 kg*m^2"}))
     assert set(undefined) == {"friction_loss"}
-    assert all(value == pytest.approx(0.0, abs=1e-24) for value in found.values())
+    assert all(value == pytest.approx(0.0, abs=1e-24) for value in result.values())
 
 
 def test_masses_of_nothing_are_refused_or_weigh_nothing():
@@ -98,17 +100,17 @@ def test_masses_of_nothing_are_refused_or_weigh_nothing():
         with pytest.raises(BadInput, match=f"{key}: it is out of range"):
             loaded(name).set(key, "0 kg")
     scene = loaded("shedding").set("effects.inertia.M", "0 kg")
-    found, undefined = forces_of(scene)
-    assert found["shaking_force"] == 0.0
+    result, undefined = forces_of(scene)
+    assert result["shaking_force"] == 0.0
     assert set(undefined) == {"friction_loss", "lever_pivot_force"}
-    assert found["roller_force"] > 0.0
+    assert result["roller_force"] > 0.0
 
 
 @pytest.mark.parametrize("system", [systems.FLOAT, systems.mpmath()])
 def test_a_group_in_line_says_so_in_the_formulas_too(system):
     at = [(system.number(x), system.number(y)) for x, y in ((3.0, 0.0), (2.0, 0.0), (0.0, 1.0))]
-    stretched, beside, up = (Vector(*each) for each in at)
-    dyad = Dyad(stretched, beside, 2 * cross(stretched, beside))
+    stretched, neighbour, up = (Vector(*item) for item in at)
+    dyad = Dyad(stretched, neighbour, 2 * cross(stretched, neighbour))
     load = Wrench(Vector(system.number(1.0), system.number(2.0)), system.number(3.0))
     for solve in (
         lambda: two_links(dyad, None, load),
@@ -124,19 +126,21 @@ def test_a_whole_chain_in_line_says_so():
     folded = four_bar(1.0, 5.0, 2.0, 4.0)
     with pytest.raises(ZeroDivisionError, match="singular position"):
         solve_forces(folded, folded.pose(systems.FLOAT, {}, 0.0), [Applied("C", Vector(10.0, 5.0))])
-    beside = solve_forces(folded, folded.pose(systems.FLOAT, {}, 1e-3), [Applied("C", Vector(10.0, 5.0))])
-    assert all(math.isfinite(force.x) and math.isfinite(force.y) for force in beside.forces.values())
+    neighbour = solve_forces(folded, folded.pose(systems.FLOAT, {}, 1e-3), [Applied("C", Vector(10.0, 5.0))])
+    assert all(math.isfinite(force.x) and math.isfinite(force.y) for force in neighbour.forces.values())
 
 
 def test_a_crank_that_turns_the_other_way_has_the_same_forces():
     """Past the same positions, with the same load: the same forces, and the torque by a ratio of -1."""
-    own = four_bar(1.0, 3.0, 2.5, 3.5)
-    parts = [replace(each, words=(*each.words, ("ratio", -1))) if each.kind == "crank" else each for each in own.parts]
+    values = four_bar(1.0, 3.0, 2.5, 3.5)
+    parts = [
+        replace(part, words=(*part.words, ("ratio", -1))) if part.kind == "crank" else part for part in values.parts
+    ]
     other = Chain(tuple(parts))
     for phi in (0.4, 2.0, 5.0):
         load = [Applied("C", Vector(30.0, -70.0))]
-        one = solve_forces(own, own.pose(systems.FLOAT, {}, phi), load)
+        first = solve_forces(values, values.pose(systems.FLOAT, {}, phi), load)
         two = solve_forces(other, other.pose(systems.FLOAT, {}, -phi), load)
-        for place, force in one.forces.items():
+        for place, force in first.forces.items():
             assert two.forces[place] == pytest.approx(force, rel=1e-12)
-        assert two.torque == pytest.approx(-one.torque, rel=1e-12)
+        assert two.torque == pytest.approx(-first.torque, rel=1e-12)

@@ -25,15 +25,17 @@ def with_and_without(name):
 def test_it_adds_quantities_and_changes_no_digit_of_another(name):
     off, on = with_and_without(name)
     job = registry.of(off)
-    without, beside = (job.sampler(scene, job.today(scene)) for scene in (off, on))
-    own = {*beside.model._quantities} - {*without.model._quantities}
+    without, neighbour = (job.sampler(scene, job.today(scene)) for scene in (off, on))
+    values = {*neighbour.model._quantities} - {*without.model._quantities}
     assert not [name for name in without.model._quantities if name.startswith(("force_", "roller_", "direction of"))]
-    assert own
+    assert values
     for quantity in without.model.quantities:
-        one, other = (Sampler(each.model, each.values).peak(quantity) for each in (without, beside))
-        assert one == other, quantity
+        first, other = (Sampler(variable.model, variable.values).peak(quantity) for variable in (without, neighbour))
+        assert first == other, quantity
     programs = [job.task(scene, scene.schema.default_target).program() for scene in (off, on)]
-    assert [each.name for each in programs[0].variables] == [each.name for each in programs[1].variables]
+    assert [variable.name for variable in programs[0].variables] == [
+        variable.name for variable in programs[1].variables
+    ]
 
 
 @pytest.mark.slow
@@ -54,6 +56,6 @@ def test_a_certified_answer_costs_at_most_half_as_much_again(name):
     (plain, figures), (told, others) = times
     print(f"{name}: {plain:.3f} s, with joint_forces {told:.3f} s, {told / plain:.2f} times")
     assert told <= MOST * plain
-    assert {each: others[each] for each in figures if figures[each] is not None} == {
-        each: value for each, value in figures.items() if value is not None
+    assert {figure: others[figure] for figure in figures if figures[figure] is not None} == {
+        figure: value for figure, value in figures.items() if value is not None
     }

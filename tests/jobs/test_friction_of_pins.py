@@ -52,9 +52,9 @@ def with_pins(scene, names):
 
 def rate(values):
     """Return the slope by φ of an angle at PHI, by central differences round the turn."""
-    own = np.unwrap(values)
-    turn = 2 * math.pi * round((own[-1] - own[0]) / (2 * math.pi))
-    return (np.roll(own, -1) - np.roll(own, 1) + turn * ENDS) / (2 * (PHI[1] - PHI[0]))
+    parameters = np.unwrap(values)
+    turn = 2 * math.pi * round((parameters[-1] - parameters[0]) / (2 * math.pi))
+    return (np.roll(parameters, -1) - np.roll(parameters, 1) + turn * ENDS) / (2 * (PHI[1] - PHI[0]))
 
 
 def slope(motion, ends):
@@ -69,12 +69,12 @@ def test_the_loss_is_the_sum_of_small_steps(name):
     pins, effects = CASES[name]
     scene = with_pins(lo.load(name).with_effect("joint_forces", *effects), pins)
     job, design = registry.of(scene), registry.of(scene).today(scene)
-    found, motion = job.sampler(scene, design), job.views.motion(scene, design, PHI)
+    result, motion = job.sampler(scene, design), job.views.motion(scene, design, PHI)
     energy = 0.0
-    for k, (pin, (one, other)) in enumerate(pins.items()):
-        turned = np.abs(slope(motion, one) - slope(motion, other))
-        energy += 0.1 * (10 + k) / 1000 * np.sum(found.at_angles(f"force_{pin}", PHI) * turned) * 2 * math.pi / STEPS
-    expected = energy * found.given.values["speed"] / (2 * math.pi)
+    for k, (pin, (item, other)) in enumerate(pins.items()):
+        turned = np.abs(slope(motion, item) - slope(motion, other))
+        energy += 0.1 * (10 + k) / 1000 * np.sum(result.at_angles(f"force_{pin}", PHI) * turned) * 2 * math.pi / STEPS
+    expected = energy * result.given.values["speed"] / (2 * math.pi)
     assert lo.evaluate(scene).figures["friction_loss"] == pytest.approx(expected, rel=5e-5)  # forces jump within a step
 
 
@@ -87,8 +87,8 @@ def test_a_roller_rolls_and_where_it_has_no_contact_nothing_is_lost(stiffness):
     scene = with_pins(lo.load("shedding").with_effect("joint_forces").update(LEVER), names)
     scene = scene.set("mechanism.K1", stiffness)
     job = registry.of(scene)
-    found = job.sampler(scene, job.today(scene))
-    cam = drawing.CamDrawing(found)
+    sampler = job.sampler(scene, job.today(scene))
+    cam = drawing.CamDrawing(sampler)
     at = cam.at(PHI)
     pitch, arm = np.roll(at.pitch, -1, axis=0) - np.roll(at.pitch, 1, axis=0), at.contact.angle
     swing = np.roll(arm, -1) - np.roll(arm, 1)
@@ -96,14 +96,14 @@ def test_a_roller_rolls_and_where_it_has_no_contact_nothing_is_lost(stiffness):
     # In the cam's frame a roller turns by its centre's way over its radius, and its arm goes round.
     rolled = np.hypot(*pitch.T) / step / cam.follower.roller_radius - 1 - swing / step
     turned = {"cam_shaft_force": np.ones(STEPS), "roller_force": rolled, "lever_pivot_force": swing / step}
-    pushing = found.at_angles("cam_force", PHI) > 0.0
+    pushing = sampler.at_angles("cam_force", PHI) > 0.0
     assert bool(np.all(pushing)) == (stiffness == "110 N/mm")
     energy = math.fsum(
-        0.1 * (10 + k) / 1000 * np.mean(pushing * found.at_angles(force, PHI) * np.abs(turned[force]))
+        0.1 * (10 + k) / 1000 * np.mean(pushing * sampler.at_angles(force, PHI) * np.abs(turned[force]))
         for k, force in enumerate(turned)
     )
     figures = lo.evaluate(scene).figures
-    assert figures["friction_loss"] == pytest.approx(energy * found.given.values["speed"], rel=1e-3)
+    assert figures["friction_loss"] == pytest.approx(energy * sampler.given.values["speed"], rel=1e-3)
     # In a dwell two circles roll on each other.
     dwell = cam.at(np.array([6.2])).contact.rolling
     assert dwell == pytest.approx(cam.follower.base_radius / cam.follower.roller_radius - 1, rel=1e-12)
@@ -111,9 +111,9 @@ def test_a_roller_rolls_and_where_it_has_no_contact_nothing_is_lost(stiffness):
 
 def test_what_a_cam_has_no_lever_for_is_null_and_says_so():
     scene = with_pins(lo.load("shedding").with_effect("joint_forces"), ("shaft", "roller", "lever"))
-    found = lo.evaluate(scene).as_dict()
-    assert found["figures"]["friction_loss"] is None
-    assert found["undefined"]["friction_loss"].startswith("friction_loss needs mechanism.lever.arm")
+    result = lo.evaluate(scene).as_dict()
+    assert result["figures"]["friction_loss"] is None
+    assert result["undefined"]["friction_loss"].startswith("friction_loss needs mechanism.lever.arm")
 
 
 @pytest.mark.parametrize("job", ["beatup", "rapier", "shedding", "linkage"])
@@ -121,8 +121,8 @@ def test_a_template_s_own_lines_for_forces_are_read(job):
     """Each is a comment; taken in, nothing is missing but the pins that are not named in it."""
     lines = re.sub(r"(?m)^# +(pins\.|gears\.|crank = \{ mass|lever = \{ arm)", r"\1", registry.template(job))
     assert lines.count("\npins.") == 1
-    found = lo.evaluate(lo.scene(tomllib.loads(lines)).with_effect("joint_forces"))
-    assert set(found.undefined) == {"friction_loss"}
-    missing = found.undefined["friction_loss"].removeprefix("friction_loss needs ").split(" and ")
+    evaluation = lo.evaluate(lo.scene(tomllib.loads(lines)).with_effect("joint_forces"))
+    assert set(evaluation.undefined) == {"friction_loss"}
+    missing = evaluation.undefined["friction_loss"].removeprefix("friction_loss needs ").split(" and ")
     assert missing
     assert all(re.fullmatch(r"effects\.joint_forces\.pins\.\w+\.(mu|radius)", key) for key in missing)

@@ -14,16 +14,16 @@ from loomopt.studies import check
 @pytest.fixture
 def scans(monkeypatch):
     """Return the groups of entry points that are scanned, as they are."""
-    found, really = [], importlib.metadata.entry_points
+    result, really = [], importlib.metadata.entry_points
 
     def counted(**wanted):
-        found.extend([wanted["group"]] if wanted["group"].startswith("loomopt") else [])
+        result.extend([wanted["group"]] if wanted["group"].startswith("loomopt") else [])
         return really(**wanted)
 
     monkeypatch.setattr(importlib.metadata, "entry_points", counted)
     packaged.entry_points.cache_clear()
     registry.find.cache_clear()
-    yield found
+    yield result
     packaged.entry_points.cache_clear()
     registry.find.cache_clear()
 

@@ -42,9 +42,9 @@ def test_variables_are_all_bounded_numbers_and_the_others_are_parameters():
 
 
 def test_limits_are_the_scenes_and_the_margins_of_the_links():
-    own = {(limit.name, limit.sign): limit.value for limit in PROGRAM.limits}
-    assert own["m4e", -1] == 0.5
-    assert own["swing", -1] == SCENE.limits["swing"].min
+    values = {(limit.name, limit.sign): limit.value for limit in PROGRAM.limits}
+    assert values["m4e", -1] == 0.5
+    assert values["swing", -1] == SCENE.limits["swing"].min
     margins = [limit for limit in PROGRAM.limits if limit.name.startswith("assembly")]
     assert margins
     assert not any(limit.relaxable for limit in margins)
@@ -81,7 +81,7 @@ class Ordered(Plain):
 
 
 @pytest.mark.parametrize(
-    ("target", "traded", "held"),
+    ("target", "traded", "fixed"),
     [
         ("balance", ("swing", "m4e"), ("M3_fdc",)),
         ("balance", ("peak_torque", "m4e"), ("M3_fdc",)),
@@ -89,10 +89,10 @@ class Ordered(Plain):
         ("", ("peak_torque", "m4e"), ()),
     ],
 )
-def test_a_target_s_earlier_levels_are_held_before_what_is_traded(target, traded, held):
+def test_a_target_s_earlier_levels_are_held_before_what_is_traded(target, traded, fixed):
     """Of any job: the last one is what the axes take the place of."""
     task = Ordered(SCENE, target, traded)
-    assert tuple(level.figure for level in task.program().objectives) == held
+    assert tuple(level.figure for level in task.program().objectives) == fixed
     assert JOB.task(SCENE, target, traded).higher_levels() == task.higher_levels()
 
 
@@ -105,10 +105,10 @@ def test_a_level_that_an_effect_adds_is_none_of_the_target_s_own():
 
 def test_an_axis_that_is_read_from_rows_of_other_names_has_their_size():
     """Whatever its name: mu.x is read from two."""
-    own = {**SCENE.schema.own_axes, "mu.x": Axis("mu.x", "angle", ("mu_near", "mu_far"), senses=("most",))}
-    scene = replace(SCENE, schema=replace(SCENE.schema, own_axes=own))
-    asked: dict[str, Sense] = {"mu.x": "most", "l2": "least"}
-    task = Plain(scene, "torque", tuple(asked))
-    known = axes.requested_of(scene.schema.axes, scene.bounds, asked, "")
-    _, (first, _) = axes.with_axes(task.program(), known, asked, scene.full, task.size)
+    values = {**SCENE.schema.own_axes, "mu.x": Axis("mu.x", "angle", ("mu_near", "mu_far"), senses=("most",))}
+    scene = replace(SCENE, schema=replace(SCENE.schema, own_axes=values))
+    request: dict[str, Sense] = {"mu.x": "most", "l2": "least"}
+    task = Plain(scene, "torque", tuple(request))
+    known = axes.requested_of(scene.schema.axes, scene.bounds, request, "")
+    _, (first, _) = axes.with_axes(task.program(), known, request, scene.full, task.size)
     assert first.objective.scale == pytest.approx(abs(task.sampler.static["mu_near"]), rel=1e-15)

@@ -39,10 +39,10 @@ def test_terms_hold_those_in_40_digits(name):
     at = low + rng.random((2, count)) * (high - low)
     for k in range(count):
         strip = along(np.array([[low[0, k]]]), np.array([[high[0, k]]]))
-        found = FORMULAS[name](M, strip, variable(0, 1, low[1, k : k + 1], high[1, k : k + 1]))
+        result = FORMULAS[name](M, strip, variable(0, 1, low[1, k : k + 1], high[1, k : k + 1]))
         true = taylor(FORMULAS[name], *(MP.number(float(v)) for v in at[:, k]))
         there = taylor(FORMULAS[name], MP.number(float(at[0, k])), MP.number(float(middle[1, k])))
-        for term, value, other in zip(found.terms, true, there, strict=True):
+        for term, value, other in zip(result.terms, true, there, strict=True):
             v = term.v if isinstance(term, intervals.Enclosure) else term
             assert float(v.low.ravel()[0]) - ROOM <= value <= float(v.high.ravel()[0]) + ROOM
             if isinstance(term, intervals.Enclosure):
@@ -57,7 +57,7 @@ def test_what_stands_beside_a_series_steps_back_for_it():
     u = along(np.array([[0.2]]), np.array([[0.3]]))
     x = variable(0, 1, np.array([1.0]), np.array([2.0]))
     for number in (x, Interval(1.0, 2.0), 1.5, 2):
-        for found in (number + u, number - u, number * u, number / u, u + number, u - number, u * number, u / number):
-            assert isinstance(found, IntervalSeries)
+        for result in (number + u, number - u, number * u, number / u, u + number, u - number, u * number, u / number):
+            assert isinstance(result, IntervalSeries)
     assert not isinstance(M.sin(x), IntervalSeries)
     assert not isinstance(M.sqrt(x), IntervalSeries)

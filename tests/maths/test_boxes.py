@@ -36,9 +36,9 @@ def drawn(rng, count, reach=2.0):
     return low, high, low + rng.random((2, count)) * (high - low)
 
 
-def holds(found, k, value):
+def holds(result, k, value):
     """Say whether an interval's element k holds a number of 40 digits."""
-    low, high = (float(end.ravel()[k if end.size > 1 else 0]) for end in (found.low, found.high))
+    low, high = (float(end.ravel()[k if end.size > 1 else 0]) for end in (result.low, result.high))
     return (math.isinf(low) or MP.number(low) <= value) and (math.isinf(high) or value <= MP.number(high))
 
 
@@ -52,11 +52,11 @@ def test_every_operation_holds_the_value_in_40_digits_at_10000_random_boxes_toge
     sloped = formula(M, *(variable(k, 2, low[k], high[k]) for k in range(2)))
     middle = (low + high) / 2
     for k in range(BOXES):
-        x, y = (MP.number(float(each)) for each in at[:, k])
+        x, y = (MP.number(float(item)) for item in at[:, k])
         value = formula(MP, x, y)
         assert holds(plain, k, value)
         assert holds(sloped.v, k, value)
-        centre = [MP.number(float(each)) for each in middle[:, k]]
+        centre = [MP.number(float(item)) for item in middle[:, k]]
         # The mean value form is what the slopes are for.
         moved = value - formula(MP, *centre)
         ends = [np.clip(end, -1e300, 1e300) for end in (sloped.g.low, sloped.g.high)]
@@ -69,12 +69,12 @@ def test_every_operation_holds_the_value_in_40_digits_at_10000_random_boxes_toge
 @pytest.mark.parametrize("far", [1.0, 20.0, 1e6])
 def test_sines_are_right_to_the_error_that_is_stated(far):
     x = np.random.default_rng(3).uniform(-far, far, 3000)
-    found = intervals.sin(interval(x)), intervals.cos(interval(x))
+    results = intervals.sin(interval(x)), intervals.cos(interval(x))
     for k, angle in enumerate(x):
-        for each, true in zip(found, (MP.sin(MP.number(float(angle))), MP.cos(MP.number(float(angle)))), strict=True):
-            assert each.low[k] <= true <= each.high[k]
-    for each in found:
-        assert np.all(each.high - each.low <= 2.01 * TRIG_ERROR)
+        for item, true in zip(results, (MP.sin(MP.number(float(angle))), MP.cos(MP.number(float(angle)))), strict=True):
+            assert item.low[k] <= true <= item.high[k]
+    for item in results:
+        assert np.all(item.high - item.low <= 2.01 * TRIG_ERROR)
 
 
 def test_sines_hold_their_tops_and_what_is_too_far_to_reduce():
@@ -105,12 +105,12 @@ def test_slopes_at_a_branch_cut_are_without_bound():
         variable(0, 2, np.array([-0.1, 0.1, -0.1]), np.array([0.1, 0.2, 0.1])),
         variable(1, 2, *np.array([[-2.0] * 3, [-1.0, -1.0, 0.0]])),
     )
-    found = intervals.atan2(y, x)
-    assert np.all(np.isinf(found.g.low[:, 0, [0, 2]]))
-    assert np.all(np.isinf(found.g.high[:, 0, [0, 2]]))
-    assert np.all(np.isfinite(found.g.high[:, 0, 1]))
-    assert found.v.low[0, 0] <= -math.pi
-    assert found.v.high[0, 0] >= math.pi
+    result = intervals.atan2(y, x)
+    assert np.all(np.isinf(result.g.low[:, 0, [0, 2]]))
+    assert np.all(np.isinf(result.g.high[:, 0, [0, 2]]))
+    assert np.all(np.isfinite(result.g.high[:, 0, 1]))
+    assert result.v.low[0, 0] <= -math.pi
+    assert result.v.high[0, 0] >= math.pi
 
 
 def test_what_holds_zero_has_no_bounded_inverse_and_nothing_times_anything_is_nothing():
@@ -125,11 +125,11 @@ def test_what_holds_zero_has_no_bounded_inverse_and_nothing_times_anything_is_no
 
 
 def test_roots_are_of_what_is_not_negative():
-    found = intervals.sqrt(Interval([-1.0, -2.0, 4.0], [4.0, -1.0, 4.0]))
-    assert found.low[0] == 0.0
-    assert found.high[0] >= 2.0
-    assert np.isinf(found.high[1])
-    assert found.low[2] <= 2.0 <= found.high[2]
+    result = intervals.sqrt(Interval([-1.0, -2.0, 4.0], [4.0, -1.0, 4.0]))
+    assert result.low[0] == 0.0
+    assert result.high[0] >= 2.0
+    assert np.isinf(result.high[1])
+    assert result.low[2] <= 2.0 <= result.high[2]
     slope = intervals.sqrt(variable(0, 1, np.array([-1.0]), np.array([4.0]))).g
     assert np.isinf(slope.high).all()
 
@@ -142,11 +142,11 @@ def test_pi_is_between_its_ends():
 
 def test_values_are_chosen_box_by_box():
     x = variable(0, 1, np.zeros(3), np.ones(3))
-    found = chosen(np.array([[0.0, 1.0, 2.0]]), (x, x * 2.0, interval(7.0)))
-    assert isinstance(found, Enclosure)
-    assert found.v.high[0, :2] == pytest.approx([1.0, 2.0])
-    assert found.v.low[0, 2] == 7.0
-    assert found.g.high[0, 0] == pytest.approx([1.0, 2.0, 0.0])
+    result = chosen(np.array([[0.0, 1.0, 2.0]]), (x, x * 2.0, interval(7.0)))
+    assert isinstance(result, Enclosure)
+    assert result.v.high[0, :2] == pytest.approx([1.0, 2.0])
+    assert result.v.low[0, 2] == 7.0
+    assert result.g.high[0, 0] == pytest.approx([1.0, 2.0, 0.0])
     plain = chosen(np.array([[1.0, 0.0]]), (interval(1.0), Interval(2.0, 3.0)))
     assert plain.low.tolist() == [[2.0, 1.0]]
 
@@ -176,15 +176,17 @@ def test_a_loom_machine_in_a_box_has_its_torques_in_40_digits_inside(effect):
     stills = {event: dict.fromkeys(model.switches, 1.0) for event in model.events_read}
     switch, phi = dict.fromkeys(model.switches, 1.0), 1.3
     given: Given = model.given(M, numbers)
-    found = model.static(M, given, stills, rows)
-    found["torque"] = model.quantity(M, given, "peak_torque", Node(M.number(phi) + given.values["beta"], switch))
+    result = model.static(M, given, stills, rows)
+    result["torque"] = model.quantity(M, given, "peak_torque", Node(M.number(phi) + given.values["beta"], switch))
     for k, point in enumerate(points):
         values = {name: MP.number(value) for name, value in {**program.parameters, **point}.items()}
-        own = model.given(MP, values)
-        true = model.static(MP, own, stills, rows)
-        true["torque"] = model.quantity(MP, own, "peak_torque", Node(MP.number(phi) + own.values["beta"], switch))
+        parameters = model.given(MP, values)
+        true = model.static(MP, parameters, stills, rows)
+        true["torque"] = model.quantity(
+            MP, parameters, "peak_torque", Node(MP.number(phi) + parameters.values["beta"], switch)
+        )
         for name, value in true.items():
-            assert holds(found[name].v, k, value), name
+            assert holds(result[name].v, k, value), name
 
 
 def test_the_next_floats_of_many_are_those_of_one():
@@ -196,7 +198,7 @@ def test_the_next_floats_of_many_are_those_of_one():
         with np.errstate(over="ignore"):
             assert np.array_equal(outward(plain), np.nextafter(plain, end))
         near = np.concatenate([np.linspace(0.2, 4.0, 500) * least, np.arange(300) * 5e-324])
-        found, one = outward(near), np.nextafter(near, end)
-        beyond = found if end > 0 else -found
-        assert np.all(beyond >= (one if end > 0 else -one))
-        assert np.all(np.abs(found - one) <= np.spacing(np.abs(one)))
+        result, first = outward(near), np.nextafter(near, end)
+        beyond = result if end > 0 else -result
+        assert np.all(beyond >= (first if end > 0 else -first))
+        assert np.all(np.abs(result - first) <= np.spacing(np.abs(first)))

@@ -35,8 +35,8 @@ def by_casadi(formula, x, y):
     at = ca.SX.sym("at", 2)
     f = formula(systems.casadi(), at[0], at[1])
     hessian, gradient = ca.hessian(f, at)
-    found = ca.Function("f", [at], [f, gradient, hessian])([x, y])
-    return [np.asarray(each, dtype=float) for each in found]
+    result = ca.Function("f", [at], [f, gradient, hessian])([x, y])
+    return [np.asarray(item, dtype=float) for item in result]
 
 
 def pair(x, y, directions=None):
@@ -46,16 +46,16 @@ def pair(x, y, directions=None):
 @pytest.mark.parametrize("name", FORMULAS)
 def test_each_operation_has_the_derivatives_of_automatic_differentiation(name):
     value, gradient, hessian = by_casadi(FORMULAS[name], X, Y)
-    found = FORMULAS[name](M, *pair(X, Y))
-    assert found.v == pytest.approx(value.item(), rel=1e-15)
-    assert found.g == pytest.approx(gradient.ravel(), rel=1e-14, abs=1e-15)
-    assert np.broadcast_to(found.h, (2, 2)) == pytest.approx(hessian, rel=1e-13, abs=1e-14)
+    result = FORMULAS[name](M, *pair(X, Y))
+    assert result.v == pytest.approx(value.item(), rel=1e-15)
+    assert result.g == pytest.approx(gradient.ravel(), rel=1e-14, abs=1e-15)
+    assert np.broadcast_to(result.h, (2, 2)) == pytest.approx(hessian, rel=1e-13, abs=1e-14)
 
 
 @given(st.floats(0.1, 10), st.floats(-10, -0.1), st.floats(-3, 3), st.floats(-3, 3))
 def test_derivatives_along_directions_are_those_of_all_variables_seen_from_them(x, y, a, b):
     directions = np.array([[a, b, 1.0], [b, -a, 0.5]])
-    whole, along = (FORMULAS["all"](M, *pair(x, y, each)) for each in (np.eye(2), directions))
+    whole, along = (FORMULAS["all"](M, *pair(x, y, item)) for item in (np.eye(2), directions))
     size = np.abs(whole.g).max() * 10, np.abs(whole.h).max() * 100
     assert along.g == pytest.approx(whole.g @ directions, rel=1e-12, abs=1e-13 * size[0])
     assert along.h == pytest.approx(directions.T @ whole.h @ directions, rel=1e-12, abs=1e-13 * size[1])
@@ -92,7 +92,7 @@ def test_nodes_and_designs_broadcast_as_numpy_does(name):
 def test_arrays_and_jets_meet_in_either_order():
     x, _ = pair(X, Y)
     array = np.array([1.0, 2.0, 4.0])
-    for found, value, slope in (
+    for result, value, slope in (
         (array * x, X * array, array),
         (x * array, X * array, array),
         (array + x, X + array, np.ones(3)),
@@ -101,9 +101,9 @@ def test_arrays_and_jets_meet_in_either_order():
         (array / x, array / X, -array / X**2),
         (x / array, X / array, 1 / array),
     ):
-        assert isinstance(found, Jet)
-        assert found.v == pytest.approx(value, rel=1e-15)
-        assert found.whole().g[:, 0] == pytest.approx(slope, rel=1e-15)
+        assert isinstance(result, Jet)
+        assert result.v == pytest.approx(value, rel=1e-15)
+        assert result.whole().g[:, 0] == pytest.approx(slope, rel=1e-15)
 
 
 def test_sums_and_entries_carry_their_derivatives():
@@ -136,12 +136,12 @@ def test_what_is_not_chosen_spoils_nothing():
     with np.errstate(all="ignore"):
         root = M.sqrt(x)
         assert not np.isfinite(root.whole().g).all()
-        found = chosen(np.array([0.0, 1.0]), (x, 3 * x, root))
-    assert found.whole().g.tolist() == [[1.0, 0.0], [3.0, 0.0]]
+        result = chosen(np.array([0.0, 1.0]), (x, 3 * x, root))
+    assert result.whole().g.tolist() == [[1.0, 0.0], [3.0, 0.0]]
 
 
 def test_numbers_without_derivatives_stack_as_numbers():
     assert stacked([1, 2.5]).tolist() == [1.0, 2.5]
     x, _ = pair(X, Y)
-    found = stacked([1, x, 2.5])
-    assert (found.v.tolist(), found.g[1].tolist(), found.g[0].tolist()) == ([1.0, X, 2.5], [1.0, 0.0], [0.0, 0.0])
+    result = stacked([1, x, 2.5])
+    assert (result.v.tolist(), result.g[1].tolist(), result.g[0].tolist()) == ([1.0, X, 2.5], [1.0, 0.0], [0.0, 0.0])

@@ -35,8 +35,8 @@ def test_values_of_one_half_correlation(count, digits):
 
 def test_a_value_and_its_opposite_are_one():
     ways = np.array([[2.0], [-1.0]])
-    found = joint_normal.within(ways, np.array([-np.inf, -np.inf]), np.array([2.0, 1.0]))
-    assert found == pytest.approx(math.erf(1 / math.sqrt(2)), abs=1e-14)
+    result = joint_normal.within(ways, np.array([-np.inf, -np.inf]), np.array([2.0, 1.0]))
+    assert result == pytest.approx(math.erf(1 / math.sqrt(2)), abs=1e-14)
 
 
 def test_what_nothing_moves_holds_or_does_not():

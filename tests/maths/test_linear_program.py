@@ -23,16 +23,16 @@ def program(seed, tied):
 @pytest.mark.parametrize("seed", range(60))
 def test_the_least_is_the_one_scipy_finds(seed, tied):
     cost, start, ways, signed = program(seed, tied)
-    found = least(cost, start, ways, signed)
+    result = least(cost, start, ways, signed)
     other = scipy.optimize.linprog(
         cost @ ways, A_ub=-ways[signed], b_ub=start[signed], bounds=[(None, None)] * ways.shape[1]
     )
     assert other.status == 0
-    assert found is not None
-    assert cost @ found == pytest.approx(cost @ start + other.fun, abs=1e-9)
-    assert found[signed].min(initial=0.0) >= 0.0
-    moved = np.linalg.lstsq(ways, found - start, rcond=None)[0]
-    assert ways @ moved == pytest.approx(found - start, abs=1e-9)
+    assert result is not None
+    assert cost @ result == pytest.approx(cost @ start + other.fun, abs=1e-9)
+    assert result[signed].min(initial=0.0) >= 0.0
+    moved = np.linalg.lstsq(ways, result - start, rcond=None)[0]
+    assert ways @ moved == pytest.approx(result - start, abs=1e-9)
 
 
 def test_what_falls_without_end_has_no_least():

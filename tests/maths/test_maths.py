@@ -33,11 +33,11 @@ def position_figures(m, lengths, phi):
 def linkage_figures(m, lengths, phi):
     centres = crank_rocker.dead_centres(m, lengths)
     names = ("beta", "beta_r", "theta", "swing", "psi_front", "psi_rear", "psi_2_front")
-    found = {name: getattr(centres, name) for name in names}
-    found["near"] = crank_rocker.transmission_angle_near(m, lengths)
-    found["far"] = crank_rocker.transmission_angle_far(m, lengths)
+    results = {name: getattr(centres, name) for name in names}
+    results["near"] = crank_rocker.transmission_angle_near(m, lengths)
+    results["far"] = crank_rocker.transmission_angle_far(m, lengths)
     ratios = crank_rocker_synthesis.synthesis(m, phi / 50, 1 + phi / 20, 1 - phi / 10)
-    return found | dict(zip(("l1/l4", "l2/l4", "l3/l4"), ratios, strict=True))
+    return results | dict(zip(("l1/l4", "l2/l4", "l3/l4"), ratios, strict=True))
 
 
 FORMULAS = {"of the position": position_figures, "of the linkage": linkage_figures}
@@ -48,13 +48,13 @@ def evaluated(system, figures, numbers, side):
     if system.name == "casadi":
         symbols = ca.SX.sym("x", 5)
         l1, l2, l3, l4, phi = ca.vertsplit(symbols)
-        found = figures(system, Lengths(l1, l2, l3, l4, side), phi)
-        values = ca.Function("f", [symbols], [ca.vertcat(*found.values())])(list(numbers))
-        return dict(zip(found, np.array(values).ravel(), strict=True))
-    l1, l2, l3, l4, one = (system.number(number) for number in numbers)
-    angle = np.array([[one, 0.5]]) if system.name == "numpy" else one
-    found = figures(system, Lengths(l1, l2, l3, l4, side), angle)
-    return {name: float(np.ravel(value)[0]) for name, value in found.items()}
+        second_figures = figures(system, Lengths(l1, l2, l3, l4, side), phi)
+        values = ca.Function("f", [symbols], [ca.vertcat(*second_figures.values())])(list(numbers))
+        return dict(zip(second_figures, np.array(values).ravel(), strict=True))
+    l1, l2, l3, l4, first = (system.number(number) for number in numbers)
+    angle = np.array([[first, 0.5]]) if system.name == "numpy" else first
+    second_figures = figures(system, Lengths(l1, l2, l3, l4, side), angle)
+    return {name: float(np.ravel(value)[0]) for name, value in second_figures.items()}
 
 
 @pytest.mark.parametrize("kind", FORMULAS)
@@ -64,34 +64,34 @@ def test_one_formula_gives_the_same_number_in_every_system(linkage, kind):
     for phi in ANGLES:
         reference = evaluated(systems.mpmath(), FORMULAS[kind], (*lengths, phi), side)
         for system in SYSTEMS:
-            found = evaluated(system, FORMULAS[kind], (*lengths, phi), side)
-            assert found.keys() == reference.keys()
-            for name, value in found.items():
+            evaluation = evaluated(system, FORMULAS[kind], (*lengths, phi), side)
+            assert evaluation.keys() == reference.keys()
+            for name, value in evaluation.items():
                 assert value == pytest.approx(reference[name], rel=1e-12, abs=1e-15), (system.name, name, phi)
 
 
 @pytest.mark.parametrize("system", SYSTEMS, ids=lambda system: system.name)
 def test_functions_are_those_of_mathematics(system):
     for x in (-2.5, -0.3, 1e-9, 0.7, 3.0):
-        own = system.number(x)
-        assert float(system.sin(own)) == pytest.approx(math.sin(x), rel=1e-15)
-        assert float(system.cos(own)) == pytest.approx(math.cos(x), rel=1e-15)
-        assert float(system.sqrt(own * own)) == pytest.approx(abs(x), rel=1e-15)
+        values = system.number(x)
+        assert float(system.sin(values)) == pytest.approx(math.sin(x), rel=1e-15)
+        assert float(system.cos(values)) == pytest.approx(math.cos(x), rel=1e-15)
+        assert float(system.sqrt(values * values)) == pytest.approx(abs(x), rel=1e-15)
         for y in (-1.0, 0.5):
-            assert float(system.atan2(system.number(y), own)) == pytest.approx(math.atan2(y, x), rel=1e-15)
+            assert float(system.atan2(system.number(y), values)) == pytest.approx(math.atan2(y, x), rel=1e-15)
     assert float(system.pi) == math.pi
 
 
 @pytest.mark.parametrize("system", SYSTEMS, ids=lambda system: system.name)
 @pytest.mark.parametrize("value", [0.1, 1e-300, -math.pi, 2.0**-1000, 1.7976931348623157e308])
 def test_a_scene_number_is_the_same_float64_in_every_system(system, value):
-    own = system.number(value)
+    values = system.number(value)
     if system.name == "sympy":
-        assert Fraction(*map(int, sp.Rational(own).as_numer_denom())) == Fraction(value)
+        assert Fraction(*map(int, sp.Rational(values).as_numer_denom())) == Fraction(value)
     elif system.name == "mpmath":
-        assert Fraction(int(own * 2**1100), 2**1100) == Fraction(value)
+        assert Fraction(int(values * 2**1100), 2**1100) == Fraction(value)
     else:
-        assert Fraction(float(own)) == Fraction(value)
+        assert Fraction(float(values)) == Fraction(value)
 
 
 def test_mpmath_has_its_own_digits_and_leaves_everybody_elses_alone():
@@ -117,8 +117,8 @@ CHOICES = (-2.5, 0.0, 0.1, 7.0)
 def test_the_value_at_a_place_is_chosen_in_every_system(system, place):
     """Places are numbers 0.0, 1.0 ...: what a switch holds; an integer will do."""
     values = [system.number(value) for value in CHOICES]
-    for asked in (float(place), place):
-        assert float(system.choose(asked, values)) == CHOICES[place]
+    for request in (float(place), place):
+        assert float(system.choose(request, values)) == CHOICES[place]
     assert float(system.choose(system.number(float(place)), values)) == CHOICES[place]
 
 
@@ -134,8 +134,8 @@ def test_numpy_chooses_for_each_node_its_own():
 def test_numpy_chooses_one_of_whole_columns():
     """A place for each node, a value for all of them but one that has its own at each: what a pose hands over."""
     theta = np.linspace(0.0, 1.0, 4)
-    found = systems.numpy().choose(np.array([0.0, 1.0, 0.0, 1.0]), (theta, 5))
-    assert np.array_equal(found, [0.0, 5.0, 2 / 3, 5.0])
+    result = systems.numpy().choose(np.array([0.0, 1.0, 0.0, 1.0]), (theta, 5))
+    assert np.array_equal(result, [0.0, 5.0, 2 / 3, 5.0])
 
 
 @pytest.mark.parametrize("count", [3, 40])
@@ -145,17 +145,20 @@ def test_numpy_chooses_among_few_and_many_at_few_nodes_and_many(nodes, count):
     drawn = np.random.default_rng(nodes)
     places = drawn.integers(1, count, nodes).astype(float)
     columns = [np.full(nodes, np.nan), *drawn.random((count - 2, nodes)), 7]
-    found = systems.numpy().choose(places, columns)
-    assert found.tolist() == [float(np.broadcast_to(columns[int(k)], nodes)[n]) for n, k in enumerate(places)]
-    assert found.dtype == np.float64
+    result = systems.numpy().choose(places, columns)
+    assert result.tolist() == [float(np.broadcast_to(columns[int(k)], nodes)[n]) for n, k in enumerate(places)]
+    assert result.dtype == np.float64
     assert systems.numpy().choose(places, range(count)).tolist() == places.tolist()
 
 
 def test_a_constant_is_the_same_number():
     """In the form that arithmetic is quickest with; what is no scalar stays what it is."""
     for system in SCALAR:
-        own = system.number(0.1)
-        assert float(system.constant(own) - own if system.name != "balls" else (system.constant(own) - own)[0]) == 0.0
+        values = system.number(0.1)
+        assert (
+            float(system.constant(values) - values if system.name != "balls" else (system.constant(values) - values)[0])
+            == 0.0
+        )
     column = np.array([[1.0], [2.0]])
     assert systems.numpy().constant(column) is column
     assert systems.numpy().constant(3).shape == ()
@@ -197,17 +200,17 @@ def weighed(system, numbers):
 @pytest.mark.parametrize("system", ARRAYS, ids=lambda system: system.name)
 def test_sums_over_positions_are_the_same_in_every_system(system):
     a = ca.SX.sym("a") if system.name == "casadi" else system.number(0.3)
-    found = weighed(system, a)
+    result = weighed(system, a)
     if system.name == "casadi":
-        found = [ca.Function("f", [a], [each])(0.3) for each in found]
+        result = [ca.Function("f", [a], [item])(0.3) for item in result]
     expected = [
         sum(w * math.sqrt(1 + 0.3 * math.sin(x)) * math.exp(-x) for w, x in zip(row, (0.1, 0.7, 2.0), strict=True))
         for row in ((1.0, -2.0, 0.5), (0.25, 3.0, -1.0))
     ]
-    assert [float(value) for value in found] == pytest.approx(expected, rel=1e-13)
+    assert [float(value) for value in result] == pytest.approx(expected, rel=1e-13)
 
 
 def test_sums_over_positions_take_many_designs_at_once():
     a = np.array([0.3, 0.5])
-    single = [weighed(systems.FLOAT, float(each)) for each in a]
+    single = [weighed(systems.FLOAT, float(item)) for item in a]
     assert pytest.approx(np.array(single), rel=1e-14) == np.array(weighed(systems.numpy(), a)).T

@@ -72,9 +72,9 @@ def test_many_multipliers_are_found_to_their_last_digits():
     matrix, wanted = generator.normal(size=(130, 125)), np.zeros(125)
     used = generator.permutation(125)[:120]
     wanted[used] = generator.uniform(0.01, 2.0, size=120)
-    found = nnls(matrix, matrix @ wanted)
-    assert set(np.flatnonzero(found)) == set(used)
-    assert found == pytest.approx(wanted, rel=1e-12)
+    result = nnls(matrix, matrix @ wanted)
+    assert set(np.flatnonzero(result)) == set(used)
+    assert result == pytest.approx(wanted, rel=1e-12)
 
 
 def test_columns_that_nearly_depend_on_each_other_are_solved_to_the_residual_scipy_finds():
@@ -86,10 +86,10 @@ def test_columns_that_nearly_depend_on_each_other_are_solved_to_the_residual_sci
     assert ours == pytest.approx(scipy.optimize.nnls(matrix, target)[1], rel=1e-8)
 
 
-@pytest.mark.parametrize("what", ["matrix", "target"])
+@pytest.mark.parametrize("subject", ["matrix", "target"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_what_is_no_number_is_refused(what, value):
+def test_what_is_no_number_is_refused(subject, value):
     matrix, target = problem(0, 4, 6)
-    (matrix if what == "matrix" else target)[..., 1] = value
+    (matrix if subject == "matrix" else target)[..., 1] = value
     with pytest.raises(ArithmeticError, match="no number"):
         nnls(matrix, target)

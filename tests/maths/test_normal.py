@@ -11,8 +11,8 @@ SHARES = [1e-300, 1e-12, 1e-5, 0.01, 0.0749, 0.0751, 0.3, 0.5, 0.7, 0.9249, 0.92
 
 
 def test_the_quantile_is_that_of_one_value():
-    found = normal.quantile(np.array(SHARES))
-    assert found == pytest.approx([NormalDist().inv_cdf(share) for share in SHARES], rel=1e-15, abs=1e-300)
+    result = normal.quantile(np.array(SHARES))
+    assert result == pytest.approx([NormalDist().inv_cdf(share) for share in SHARES], rel=1e-15, abs=1e-300)
 
 
 def test_what_lies_below_the_quantile_is_the_share():

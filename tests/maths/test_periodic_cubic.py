@@ -67,15 +67,15 @@ def test_samples_left_out_tell_how_well_they_resolve_the_curve():
 
 
 @pytest.mark.parametrize(
-    ("angles", "values", "marked", "told"),
+    ("angles", "values", "marked", "report"),
     [
         ((0.0, 1.0, 2.0, TURN), (0.0, 1.0, 0.5, 0.1), (False,) * 4, "with another value"),
         ((0.0, 1.0, 2.0), (0.0, 1.0, 0.0), (False,) * 3, "mark both as corners"),
         ((0.0, 1.0), (0.0, 1.0), (True,) * 2, "too few"),
     ],
 )
-def test_what_says_no_curve_is_refused(angles, values, marked, told):
-    with pytest.raises(ValueError, match=told):
+def test_what_says_no_curve_is_refused(angles, values, marked, report):
+    with pytest.raises(ValueError, match=report):
         through(angles, values, marked)
 
 

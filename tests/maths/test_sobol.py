@@ -28,9 +28,9 @@ def test_without_the_shift_they_are_those_of_scipy(monkeypatch):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_each_half_quarter_and_eighth_of_each_coordinate_has_its_share(seed):
-    found = points(512, 12, seed)
+    second_points = points(512, 12, seed)
     for parts in (2, 4, 8, 512):
-        shares = np.floor(found * parts).astype(int)
+        shares = np.floor(second_points * parts).astype(int)
         assert all(np.all(np.bincount(column, minlength=parts) == 512 // parts) for column in shares.T)
 
 

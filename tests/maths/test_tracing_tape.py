@@ -70,42 +70,42 @@ def test_every_operation_gives_the_same_bits_in_every_system(name, system, calle
 
 def counting(system=systems.FLOAT):
     """Return a number system, and a list of what its sine is called with and what is made a constant."""
-    asked, constants = [], []
+    request, constants = [], []
 
     def sin(x):
-        asked.append(x)
+        request.append(x)
         return system.sin(x)
 
     def constant(x):
         constants.append(x)
         return x
 
-    return replace(system, sin=sin, constant=constant), asked, constants
+    return replace(system, sin=sin, constant=constant), request, constants
 
 
 def test_equal_expressions_are_computed_once():
     def formula(m, x, y):
         return m.sin(x + y) * m.sin(x + y) + m.sin(y + x) / m.sin(x + y)
 
-    own, asked, _ = counting()
-    assert run(written(formula, 2), own, X, Y, 2) == formula(systems.FLOAT, X, Y)
-    assert asked == [X + Y, Y + X], "the order of a sum is kept: jets and others may add in theirs"
+    values, request, _ = counting()
+    assert run(written(formula, 2), values, X, Y, 2) == formula(systems.FLOAT, X, Y)
+    assert request == [X + Y, Y + X], "the order of a sum is kept: jets and others may add in theirs"
 
 
 def test_what_no_output_needs_is_left_out_unless_it_may_fail():
-    own, asked, _ = counting()
+    values, request, _ = counting()
     tape = Tape()
     m, x = recording.recorded(tape), tape.input()
     m.sin(x)
     before = len(tape.operations)
     _ = (m.pi * x + 1) * x
-    assert tape.program((x,), [x], [], since=before)([own])([])(X) == (X,)
-    assert asked == []
-    assert tape.program((x,), [x], [], since=0)([own])([])(X) == (X,)
-    assert asked == [X]
+    assert tape.program((x,), [x], [], since=before)([values])([])(X) == (X,)
+    assert request == []
+    assert tape.program((x,), [x], [], since=0)([values])([])(X) == (X,)
+    assert request == [X]
     dead = 1 / x
     assert dead.place == len(tape.operations) - 1
-    function = tape.program((x,), [x], [], since=dead.place)([own])([])
+    function = tape.program((x,), [x], [], since=dead.place)([values])([])
     with pytest.raises(ZeroDivisionError):
         function(0.0)
 
@@ -114,14 +114,14 @@ def test_what_is_known_is_computed_once_for_all_calls_and_what_always_is_once_fo
     def formula(m, x, y):
         return m.sin(m.pi * 2) + m.sin(x) * m.sin(y)
 
-    own, asked, _ = counting()
-    bind = written(formula)([own])
-    assert asked == [math.pi * 2]
+    values, request, _ = counting()
+    bind = written(formula)([values])
+    assert request == [math.pi * 2]
     function = bind([X])
-    assert asked == [math.pi * 2, X]
+    assert request == [math.pi * 2, X]
     for y in (0.25, 0.5):
         assert function(y)[0] == formula(systems.FLOAT, X, y)
-    assert asked == [math.pi * 2, X, 0.25, 0.5]
+    assert request == [math.pi * 2, X, 0.25, 0.5]
     assert bind([0.125])(0.25)[0] == formula(systems.FLOAT, 0.125, 0.25), "of another design nothing is left"
 
 
@@ -129,8 +129,8 @@ def test_scalars_that_meet_what_varies_in_arithmetic_become_constants_once():
     def formula(m, x, y):
         return 2 * y + 2 / y - x * y + m.atan2(y, 3.0) + y**4 + (x + 5) * m.choose(0, (y, 7))
 
-    own, _, constants = counting()
-    function = written(formula)([own])([X])
+    values, _, constants = counting()
+    function = written(formula)([values])([X])
     assert function(Y)[0] == formula(systems.FLOAT, X, Y)
     assert function(X)[0] == formula(systems.FLOAT, X, X)
     assert sorted(constants) == [X, 2, X + 5]
@@ -142,9 +142,9 @@ def test_two_systems_share_a_formula():
     first, second = recording.recorded(tape, 0), recording.recorded(tape, 1)
     x, y = tape.input(), tape.input()
     program = tape.program((first.sin(x) * second.sin(y) * second.sin(x),), [y], [x])
-    one, by_one, _ = counting()
+    item, by_one, _ = counting()
     two, by_two, _ = counting()
-    assert program([one, two])([X])(Y)[0] == math.sin(X) * math.sin(Y) * math.sin(X)
+    assert program([item, two])([X])(Y)[0] == math.sin(X) * math.sin(Y) * math.sin(X)
     assert (by_one, by_two) == ([X], [X, Y])
 
 
@@ -152,10 +152,10 @@ def test_outputs_may_be_inputs_numbers_and_several():
     tape = Tape()
     x, y = tape.input(), tape.input()
     program = tape.program((x, 2, y, x * y, x * y, -0.0, "a word"), [y], [x])
-    found = program([systems.FLOAT])([X])(Y)
-    assert found == (X, 2, Y, X * Y, X * Y, 0.0, "a word")
-    assert math.copysign(1.0, found[5]) == -1.0
-    assert type(found[1]) is int
+    second_program = program([systems.FLOAT])([X])(Y)
+    assert second_program == (X, 2, Y, X * Y, X * Y, 0.0, "a word")
+    assert math.copysign(1.0, second_program[5]) == -1.0
+    assert type(second_program[1]) is int
     assert tape.program((), [], [])([systems.FLOAT])([])() == ()
 
 
@@ -180,8 +180,8 @@ def test_literals_that_are_equal_but_not_the_same_stay_apart():
     x = tape.input()
     tape.program(tuple(x + number for number in numbers), [x], [])
     assert len(tape.operations) == 1 + 2 * len(numbers)
-    found = tape.program(numbers, [x], [])([systems.FLOAT])([])(X)
-    assert [(type(value), repr(value)) for value in found] == [(type(value), repr(value)) for value in numbers]
+    program = tape.program(numbers, [x], [])([systems.FLOAT])([])(X)
+    assert [(type(value), repr(value)) for value in program] == [(type(value), repr(value)) for value in numbers]
     assert tape.program((x * -3, (-3) ** x, x - -3.5), [x], [])([systems.FLOAT])([])(2.0) == (-6.0, 9, 5.5)
 
 
@@ -190,9 +190,9 @@ def test_a_place_of_the_node_chooses_when_the_function_is_called(places):
     tape = Tape()
     m, place, x = recording.recorded(tape), tape.input(), tape.input()
     program = tape.program((m.choose(place, (x * x, 1, -x)) + m.choose(place, (1, 3, 5)),), [place, x], [])
-    own, u = systems.numpy(), np.linspace(0.1, 0.7, 4)
-    expected = own.choose(places, (u * u, 1, -u)) + own.choose(places, (1, 3, 5))
-    assert bits(program([own])([])(places, u)[0]) == bits(expected)
+    values, u = systems.numpy(), np.linspace(0.1, 0.7, 4)
+    expected = values.choose(places, (u * u, 1, -u)) + values.choose(places, (1, 3, 5))
+    assert bits(program([values])([])(places, u)[0]) == bits(expected)
 
 
 def test_one_recording_serves_every_piece():

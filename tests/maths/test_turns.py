@@ -34,13 +34,13 @@ def test_its_slope_is_one(angle, behind, expected):
     import casadi as ca
 
     (jet,) = variables([angle], np.eye(1), curved=True)
-    found = within_turn(systems.jets(), jet, behind)
-    assert float(found.v) == pytest.approx(expected, abs=2e-15)
-    assert (found.g.item(), found.h.item()) == (1.0, 0.0)
+    result = within_turn(systems.jets(), jet, behind)
+    assert float(result.v) == pytest.approx(expected, abs=2e-15)
+    assert (result.g.item(), result.h.item()) == (1.0, 0.0)
     x = ca.SX.sym("x")
     turned = within_turn(systems.casadi(), x, behind)
     function = ca.Function("f", [x], [turned, ca.gradient(turned, x)])
-    assert [float(each) for each in function(angle)] == pytest.approx([expected, 1.0], abs=2e-15)
+    assert [float(item) for item in function(angle)] == pytest.approx([expected, 1.0], abs=2e-15)
 
 
 @each_case
@@ -73,7 +73,7 @@ def test_astride_the_cut_nothing_is_claimed():
 def test_it_is_recorded_as_it_is_done():
     tape = recording.Tape()
     x = tape.input()
-    found = within_half_turn(recording.recorded(tape), x)
-    function = tape.program((found,), (x,), ())((systems.FLOAT,))(())
+    result = within_half_turn(recording.recorded(tape), x)
+    function = tape.program((result,), (x,), ())((systems.FLOAT,))(())
     for angle, _, _ in CASES:
         assert function(angle) == (within_half_turn(systems.FLOAT, angle),)

@@ -71,8 +71,8 @@ def spring(at: Inputs[balance.Pose]) -> Number:
 
 def cloth(at: Inputs[balance.Pose]) -> Number:
     """Return F, faded in from where the cloth is met to the front, where it is let go."""
-    met = -at.maths.cos(at.table["width"])
-    return at.switch * at.table["F"] * (-at.maths.cos(at.pose.phi) + met) / (1 + met)
+    contact = -at.maths.cos(at.table["width"])
+    return at.switch * at.table["F"] * (-at.maths.cos(at.pose.phi) + contact) / (1 + contact)
 
 
 def pressed(at: Inputs[object]) -> tuple[Number, ...]:

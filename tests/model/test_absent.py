@@ -88,9 +88,9 @@ def test_programs_have_not_one_node_more(job):
 def test_what_is_taken_off_again_leaves_no_node(job):
     scene = lo.load(job)
     target = scene.schema.default_target
-    beside = scene.with_effect("head_inertia") if job == "rapier" else scene
+    neighbour = scene.with_effect("head_inertia") if job == "rapier" else scene
     for name in LATER[job]:
-        on = beside.with_effect(name)
+        on = neighbour.with_effect(name)
         off = on.without_effect(*on.effects.keys() - scene.effects.keys())
         assert name in on.effects
         assert off.effects.keys() == scene.effects.keys()
@@ -117,6 +117,6 @@ def test_a_state_that_is_on_has_nodes_of_its_own_and_off_again_none():
     with_it = scene.with_effect("shaft_torsion")
     assert nodes(with_it) > 10 * nodes(scene)
     assert nodes(with_it.without_effect("shaft_torsion")) == nodes(scene)
-    on, off = (registry.of(each).model(each) for each in (with_it, with_it.without_effect("shaft_torsion")))
+    on, off = (registry.of(item).model(item) for item in (with_it, with_it.without_effect("shaft_torsion")))
     assert on.key != off.key
     assert off.key == registry.of(scene).model(scene).key

@@ -14,9 +14,9 @@ from loomopt.model.sampling import sampled
 from loomopt.physics.schema import Axis
 
 
-def traded(name, target, **asked):
+def traded(name, target, **request):
     scene = lo.load(name)
-    return scene, *registry.of(scene).traded(scene, target, asked)
+    return scene, *registry.of(scene).traded(scene, target, request)
 
 
 def figure(scene, program, axis, design):
@@ -40,11 +40,11 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("name", "asked"), CASES)
-def test_an_axis_is_the_figure_a_designer_reads(name, asked):
+@pytest.mark.parametrize(("name", "request"), CASES)
+def test_an_axis_is_the_figure_a_designer_reads(name, request):
     """Also of the moment of inertia J4, a figure beside a number of the effect inertia that is called the same."""
     target = {"rapier": "stroke-dwell"}.get(name)
-    scene, program, axes = traded(name, target, **asked)
+    scene, program, axes = traded(name, target, **request)
     job = registry.of(scene)
     design = job.today(scene) | ({"m4e": 3.0, "r4e": 0.07} if name == "beatup" else {})
     known = {**design, **job.figures(scene, design)}
@@ -53,9 +53,9 @@ def test_an_axis_is_the_figure_a_designer_reads(name, asked):
         assert axis.figure(axis.value(known[axis.axis.name])) == pytest.approx(known[axis.axis.name])
 
 
-@pytest.mark.parametrize(("name", "asked"), CASES)
-def test_less_of_a_value_is_what_is_sought(name, asked):
-    for axis in traded(name, {"rapier": "stroke-dwell"}.get(name), **asked)[2]:
+@pytest.mark.parametrize(("name", "request"), CASES)
+def test_less_of_a_value_is_what_is_sought(name, request):
+    for axis in traded(name, {"rapier": "stroke-dwell"}.get(name), **request)[2]:
         low, high = axis.value(0.5), axis.value(0.6)
         assert (low < high) == (axis.sense == "least")
         step = 1e-6
@@ -155,10 +155,10 @@ AXES = {
 AT = {"p": 3.0, "q": -1.5}
 
 
-def toy_axes(**asked):
+def toy_axes(**request):
     program = toy.program(("p", "q"), ROWS, WAVES, objectives=("sum",))
-    known = requested_of(AXES, ("q",), asked, "toy.toml")
-    return program, *with_axes(program, known, asked, lambda name: name, lambda name: 2.0)
+    known = requested_of(AXES, ("q",), request, "toy.toml")
+    return program, *with_axes(program, known, request, lambda name: name, lambda name: 2.0)
 
 
 @pytest.mark.parametrize(
@@ -173,30 +173,30 @@ def toy_axes(**asked):
     ],
 )
 def test_an_axis_becomes_the_last_level_and_reads_what_it_is_named_for(name, sense, kind, merit, figure):
-    own, program, (axis,) = toy_axes(**{name: sense})
-    assert program.objectives == (*own.objectives, axis.objective)
+    values, program, (axis,) = toy_axes(**{name: sense})
+    assert program.objectives == (*values.objectives, axis.objective)
     assert type(axis.objective) is kind
     assert axis.objective.scale == 2.0
-    found = axis.objective.merit(sampled(program.model, AT))
-    assert found == pytest.approx(merit)
-    assert axis.figure(found) == pytest.approx(figure)
+    result = axis.objective.merit(sampled(program.model, AT))
+    assert result == pytest.approx(merit)
+    assert axis.figure(result) == pytest.approx(figure)
     assert axis.called == ("|size|" if kind is Magnitude else name)
     assert program.objectives[0].merit(sampled(program.model, AT)) == pytest.approx(1.5), "what is held is as it was"
-    assert (program.model is own.model) == (sense == "least"), "opposites stand beside the model's own rows"
+    assert (program.model is values.model) == (sense == "least"), "opposites stand beside the model's own rows"
 
 
 def test_axes_stand_in_the_order_asked_for_and_opposites_are_made_once():
     _, first, axes = toy_axes(area="most", q="least")
     _, again, _ = toy_axes(q="least", area="most")
     assert [axis.axis.name for axis in axes] == ["area", "q"]
-    assert [each.figure for each in again.objectives] == ["sum", "q", "area"]
+    assert [objective.figure for objective in again.objectives] == ["sum", "q", "area"]
     assert set(first.model.own_rows) - set(ROWS) >= {"-area"}
 
 
 def test_an_axis_that_is_not_there_is_told_with_what_is():
-    with pytest.raises(BadInput, match='unknown axis "are"') as told:
+    with pytest.raises(BadInput, match='unknown axis "are"') as caught:
         toy_axes(are="least")
-    assert "area" in str(told.value)
+    assert "area" in str(caught.value)
     with pytest.raises(BadInput, match="wave cannot be maximised, it can only be minimised"):
         toy_axes(wave="most")
     program = toy.program(("p",), objectives=("p",))

@@ -57,8 +57,8 @@ rapier,total,10.02968815,5.315927122,10.02968815,25.49321418
 """Today's machines by formulas of their own, each integrated over the turn by another rule; N*m and J."""
 
 
-def rows(found):
-    return {row.effect: row for row in (*found.rows, found.total)}
+def rows(result):
+    return {row.effect: row for row in (*result.rows, result.total)}
 
 
 @pytest.mark.parametrize(
@@ -75,19 +75,19 @@ def test_shares_are_those_of_the_reference(line):
 @pytest.mark.parametrize("name", SCENES)
 def test_the_shares_add_up_to_the_crank_torque_everywhere(name):
     scene = SCENES[name]()
-    found = lo.budget(scene)
-    total, largest = found.total, found.total.peak
-    assert math.fsum(row.at_peak for row in found.rows) == pytest.approx(total.at_peak, rel=1e-14)
-    assert math.fsum(row.share for row in found.rows) == pytest.approx(1.0, rel=1e-13)
-    assert math.fsum(row.energy for row in found.rows) == pytest.approx(total.energy, abs=1e-11 * largest)
+    budget = lo.budget(scene)
+    total, largest = budget.total, budget.total.peak
+    assert math.fsum(row.at_peak for row in budget.rows) == pytest.approx(total.at_peak, rel=1e-14)
+    assert math.fsum(row.share for row in budget.rows) == pytest.approx(1.0, rel=1e-13)
+    assert math.fsum(row.energy for row in budget.rows) == pytest.approx(total.energy, abs=1e-11 * largest)
     job = registry.of(scene)
     sampler = job.sampler(scene, job.today(scene))
     assert largest == pytest.approx(sampler.peak("peak_torque"), rel=1e-12)
-    curves = np.sum(list(found.torque.curves.values()), axis=0)
+    curves = np.sum(list(budget.torque.curves.values()), axis=0)
     table = lo.simulate(scene)
     torque = next(column for column in table if column in ("Md [N*m]", "cam_torque [N*m]", "crank_torque [N*m]"))
-    beside = np.interp(table["phi [rad]"], found.torque.phi, curves)
-    apart = np.abs(table[torque] - beside)
+    neighbour = np.interp(table["phi [rad]"], budget.torque.phi, curves)
+    apart = np.abs(table[torque] - neighbour)
     assert np.median(apart) <= 1e-12 * largest
     assert np.mean(apart <= 1e-9 * largest) > 0.98, "but for both sides of corners"
 
@@ -96,10 +96,10 @@ def test_the_shares_add_up_to_the_crank_torque_everywhere(name):
 def test_what_dissipates_is_the_motor_s_work(name):
     """By the power of the curves, half a degree apart: what gives back has no part in it."""
     scene = SCENES[name]()
-    found = lo.budget(scene)
-    dissipating = math.fsum(row.energy for row in found.rows)
+    budget = lo.budget(scene)
+    dissipating = math.fsum(row.energy for row in budget.rows)
     speed = scene.operation["speed"]
-    assert found.motor.mean_power == pytest.approx(dissipating * speed / (2 * math.pi), rel=1e-9, abs=1e-9)
+    assert budget.motor.mean_power == pytest.approx(dissipating * speed / (2 * math.pi), rel=1e-9, abs=1e-9)
     table = lo.simulate(scene)
     phi, power = table["phi [rad]"].to_numpy(), table["motor_power [W]"].to_numpy()
     time = 1 / table["omega [rad/s]"].to_numpy() if "omega [rad/s]" in table else np.full(len(phi), 1 / speed)
@@ -110,22 +110,22 @@ def test_what_dissipates_is_the_motor_s_work(name):
         return np.sum(np.diff(phi) * (values[1:] + values[:-1]) / 2)
 
     mean, back = (integral(given * time) / integral(time) for given in (power, np.maximum(-power, 0.0)))
-    assert mean == pytest.approx(found.motor.mean_power, abs=2e-4 * found.motor.peak_power)
-    assert back == pytest.approx(found.motor.regenerated, abs=2e-4 * found.motor.peak_power)
-    assert found.motor.peak_power == pytest.approx(np.max(np.abs(power)), rel=1e-3)
-    assert found.motor.peak_power == pytest.approx(lo.evaluate(scene).figures["peak_power"], rel=1e-12)
+    assert mean == pytest.approx(budget.motor.mean_power, abs=2e-4 * budget.motor.peak_power)
+    assert back == pytest.approx(budget.motor.regenerated, abs=2e-4 * budget.motor.peak_power)
+    assert budget.motor.peak_power == pytest.approx(np.max(np.abs(power)), rel=1e-3)
+    assert budget.motor.peak_power == pytest.approx(lo.evaluate(scene).figures["peak_power"], rel=1e-12)
 
 
 def test_an_inertia_alone_asks_for_a_flywheel_of_its_own_closed_form():
     """Of J alone the crank stores J ω² ψ'²/2: what it takes and gives back is that at its largest."""
     scene = lo.load("beatup").without_effect("resistance")
-    found = lo.budget(scene, fluctuation=0.01)
-    speed, (inertia,) = scene.operation["speed"], found.rows
+    budget = lo.budget(scene, fluctuation=0.01)
+    speed, (inertia,) = scene.operation["speed"], budget.rows
     rate = np.max(np.abs(lo.simulate(scene)["psi_1 [1]"]))
     stored = 0.62 * speed**2 * rate**2 / 2
-    assert found.motor.energy_swing == pytest.approx(stored, rel=1e-4), "half-degree samples of ψ'"
-    assert found.motor.flywheel == pytest.approx(found.motor.energy_swing / (0.01 * speed**2), rel=1e-14)
-    assert (inertia.energy, found.motor.mean_power, inertia.share) == (0.0, 0.0, 1.0)
+    assert budget.motor.energy_swing == pytest.approx(stored, rel=1e-4), "half-degree samples of ψ'"
+    assert budget.motor.flywheel == pytest.approx(budget.motor.energy_swing / (0.01 * speed**2), rel=1e-14)
+    assert (inertia.energy, budget.motor.mean_power, inertia.share) == (0.0, 0.0, 1.0)
 
 
 def test_a_flywheel_keeps_the_fluctuation_it_is_sized_for():
@@ -139,27 +139,27 @@ def test_a_flywheel_keeps_the_fluctuation_it_is_sized_for():
 
 def test_a_design_has_a_budget_of_its_own():
     answer = lo.solve("beatup")
-    own, given = answer.budget(), lo.budget("beatup", answer)
-    assert own.torque == given.torque
-    assert own.total.at_peak == pytest.approx(-88.68941349, rel=1e-9)
-    assert rows(own)["resistance"].energy == pytest.approx(0.09003420291, rel=1e-9)
+    values, given = answer.budget(), lo.budget("beatup", answer)
+    assert values.torque == given.torque
+    assert values.total.at_peak == pytest.approx(-88.68941349, rel=1e-9)
+    assert rows(values)["resistance"].energy == pytest.approx(0.09003420291, rel=1e-9)
 
 
 def test_of_two_peaks_that_mirror_each_other_the_first_counts():
-    found = lo.budget(shed())
-    assert found.total.at_peak > 0.0
-    assert found.torque.angle < math.pi
+    budget = lo.budget(shed())
+    assert budget.total.at_peak > 0.0
+    assert budget.torque.angle < math.pi
 
 
 @pytest.mark.parametrize(
-    ("scene", "said"),
+    ("scene", "message"),
     [
         (lambda: lo.load("rapier"), "no effect acts on the crank"),
         (lambda: lo.load("shedding-static"), "effect warp_tension is defined in a part of the turn only"),
     ],
 )
-def test_where_there_is_nothing_to_share_out_that_is_said(scene, said):
-    with pytest.raises(BadInput, match=said):
+def test_where_there_is_nothing_to_share_out_that_is_said(scene, message):
+    with pytest.raises(BadInput, match=message):
         lo.budget(scene())
 
 
@@ -170,11 +170,11 @@ def test_a_fluctuation_that_is_none_is_refused(value):
 
 
 def test_what_carries_others_says_so():
-    found = lo.budget(SCENES["beat-up, elastic shaft"]())
-    inertia, resistance, shaft = found.rows
+    budget = lo.budget(SCENES["beat-up, elastic shaft"]())
+    inertia, resistance, shaft = budget.rows
     assert (inertia.effect, resistance.effect, shaft.effect) == ("inertia", "resistance", "shaft_torsion")
-    said = "inertia and resistance reach the crank through shaft_torsion, whose share is the difference"
-    assert found.remarks == (said,)
+    message = "inertia and resistance reach the crank through shaft_torsion, whose share is the difference"
+    assert budget.remarks == (message,)
     # What swings gives back all that it takes; the shaft keeps what its damping takes, c z'^2 of each turn.
     assert inertia.energy == 0.0
     assert shaft.energy == pytest.approx(_damped(SCENES["beat-up, elastic shaft"]()), rel=1e-9)

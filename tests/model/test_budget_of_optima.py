@@ -36,14 +36,14 @@ def budget(case):
 
 @pytest.mark.parametrize("case", dict.fromkeys(line["case"] for line in LINES))
 def test_shares_are_those_of_the_reference(case):
-    found = budget(case)
-    rows = {row.effect: row for row in (*found.rows, found.total)}
-    told = [line for line in LINES if line["case"] == case]
+    second_budget = budget(case)
+    rows = {row.effect: row for row in (*second_budget.rows, second_budget.total)}
+    texts = [line for line in LINES if line["case"] == case]
     apart = {"inertia", "spring_inertia"} if case.endswith("losses") else set()
-    assert rows.keys() - apart == {line["effect"] for line in told}
+    assert rows.keys() - apart == {line["effect"] for line in texts}
     # The shedding's design is solved here, to what a solve leaves.
     close = 1e-6 if case.startswith("shedding") else 1e-9
-    for line in told:
+    for line in texts:
         row = rows[line["effect"]]
         for name in ("at_peak", "rms", "peak", "energy"):
             # The reference's own search of the peak ends within 2e-8 rad of it.

@@ -13,8 +13,8 @@ JOB = registry.of(SCENE)
 
 
 def task(symmetric=False, intervals=6, **changes):
-    own = {"targets.law.intervals": intervals, "targets.law.symmetric": symmetric}
-    return JOB.program(SCENE.update({**own, **changes}), "law")
+    values = {"targets.law.intervals": intervals, "targets.law.symmetric": symmetric}
+    return JOB.program(SCENE.update({**values, **changes}), "law")
 
 
 def names(program):
@@ -35,13 +35,13 @@ def test_a_free_law_is_a_chain_of_its_knots_and_a_given_one_is_none(symmetric):
 def test_stations_are_the_knots_of_rise_and_return_by_their_places_among_all_corners():
     program = task()
     sampler = Sampler(program.model, {**program.parameters, **program.starts[0]})
-    found = stations(program.model, sampler.given, names(program))
+    result = stations(program.model, sampler.given, names(program))
     angles = program.model.corners(systems.FLOAT, sampler.given)
     rise, back, near = (sampler.given.values[name] for name in ("rise", "return", "begin.near"))
     there = [k / 6 * rise for k in range(1, 6)] + [near - k / 6 * back for k in range(1, 6)]
-    assert [angles[station.corner] for station in found] == pytest.approx(there, rel=1e-14)
-    assert found[0] == Station(4, {shedding.SEGMENT: 0.0, shedding.LAW: 1.0}), "after four segments"
-    assert station_switches(program.model, names(program)) == [station.switch for station in found]
+    assert [angles[station.corner] for station in result] == pytest.approx(there, rel=1e-14)
+    assert result[0] == Station(4, {shedding.SEGMENT: 0.0, shedding.LAW: 1.0}), "after four segments"
+    assert station_switches(program.model, names(program)) == [station.switch for station in result]
 
 
 @pytest.mark.parametrize("symmetric", [False, True])

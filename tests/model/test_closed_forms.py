@@ -65,9 +65,13 @@ def test_every_extreme_of_the_torque_stands_where_its_slope_is_zero(changes):
         exact = {float(phi % (2 * mpmath.pi)): float((a + b * mpmath.cos(phi)) * r * mpmath.sin(phi)) for phi in angles}
     sampler = Sampler(MODEL, {**NUMBERS, **changes})
     largest = max(map(abs, exact.values()))
-    found = {sampler.angle(each): each.value for each in sampler.extremes("torque") if abs(each.value) > 1e-9 * largest}
-    assert sorted(found) == pytest.approx(sorted(exact), abs=1e-6)
-    assert [found[phi] for phi in sorted(found)] == pytest.approx([exact[phi] for phi in sorted(exact)], rel=1e-12)
+    results = {
+        sampler.angle(extreme): extreme.value
+        for extreme in sampler.extremes("torque")
+        if abs(extreme.value) > 1e-9 * largest
+    }
+    assert sorted(results) == pytest.approx(sorted(exact), abs=1e-6)
+    assert [results[phi] for phi in sorted(results)] == pytest.approx([exact[phi] for phi in sorted(exact)], rel=1e-12)
     assert sampler.peak("torque") == pytest.approx(largest, rel=1e-12)
 
 
@@ -88,12 +92,13 @@ def test_a_mean_over_pieces_is_the_integral_over_just_these(width):
     """The cloth adds F (met − cos φ)/(1 + met), met = −cos width, from π − width to π."""
     a, b, _ = map(float, parts({}))
     sampler = Sampler(WITH_CLOTH, {**NUMBERS, "cloth.width": width})
-    met, F = -math.cos(width), NUMBERS["cloth.F"]
+    contact, F = -math.cos(width), NUMBERS["cloth.F"]
     exact = mpmath.quad(
-        lambda phi: a + b * mpmath.cos(phi) + F * (met - mpmath.cos(phi)) / (1 + met), [math.pi - width, math.pi]
+        lambda phi: a + b * mpmath.cos(phi) + F * (contact - mpmath.cos(phi)) / (1 + contact),
+        [math.pi - width, math.pi],
     )
     assert sampler.figures["pressing"] == pytest.approx(float(exact) / width, rel=1e-9 if width < 0.01 else 1e-12)
-    whole = a + F * (met * width + math.sin(width)) / (1 + met) / TURN
+    whole = a + F * (contact * width + math.sin(width)) / (1 + contact) / TURN
     assert sampler.figures["whole"] == pytest.approx(whole, rel=1e-9), "pieces count by their widths"
 
 

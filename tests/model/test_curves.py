@@ -21,29 +21,29 @@ def scene_of(job):
 
 
 def without_speed(job, *effects):
-    document = {table: dict(own) for table, own in lo.load(job).document.items()}
+    document = {table: dict(values) for table, values in lo.load(job).document.items()}
     del document["operation"]["speed"], document["targets"]
-    document["effects"] = {name: own for name, own in document.get("effects", {}).items() if name in effects}
+    document["effects"] = {name: values for name, values in document.get("effects", {}).items() if name in effects}
     return lo.scene(document)
 
 
 def at(scene, column, angle):
     """Return a column of today's curves at a crank angle, rad."""
-    found = registry.of(scene).curves(scene, {}, 1, [angle])
-    return float(found[column][np.argmin(np.abs(found["phi [rad]"] - angle))])
+    curves = registry.of(scene).curves(scene, {}, 1, [angle])
+    return float(curves[column][np.argmin(np.abs(curves["phi [rad]"] - angle))])
 
 
 @pytest.mark.parametrize("job", OUTPUT)
 def test_what_moves_per_second_is_the_derivative_by_time(job):
     scene, (name, unit) = scene_of(job), OUTPUT[job]
     omega = scene.operation["speed"]
-    found = registry.of(scene).curves(scene, {}, 72, (0.5, 3.0, 6.0))
+    curves = registry.of(scene).curves(scene, {}, 72, (0.5, 3.0, 6.0))
     for order, power in ((1, ""), (2, "^2"), (3, "^3")):
-        own = next((c for c in found if c.startswith(f"{name}_{order} [")), None)
+        item = next((c for c in curves if c.startswith(f"{name}_{order} [")), None)
         column = f"{name}_{'t' * order} [{unit}/s{power}]"
-        assert (column in found) == (own is not None)
-        if own:
-            assert np.array_equal(found[column], found[own] * omega**order)
+        assert (column in curves) == (item is not None)
+        if item:
+            assert np.array_equal(curves[column], curves[item] * omega**order)
     step = 1e-5
     ahead, here, back = (at(scene, f"{name} [{unit}]", 1.0 + sign * step * omega) for sign in (1, 0, -1))
     assert (ahead - back) / (2 * step) == pytest.approx(at(scene, f"{name}_t [{unit}/s]", 1.0), rel=1e-5)
@@ -53,24 +53,24 @@ def test_what_moves_per_second_is_the_derivative_by_time(job):
 @pytest.mark.parametrize("job", OUTPUT)
 def test_motor_power_is_crank_torque_times_speed(job):
     scene = scene_of(job)
-    found = tables.curves(scene, {})
-    torque = found[f"{TORQUE[job]} [N*m]"]
-    assert np.array_equal(found["motor_power [W]"], torque * scene.operation["speed"])
+    curves = tables.curves(scene, {})
+    torque = curves[f"{TORQUE[job]} [N*m]"]
+    assert np.array_equal(curves["motor_power [W]"], torque * scene.operation["speed"])
 
 
 @pytest.mark.parametrize("job", OUTPUT)
 def test_a_curve_is_as_large_as_its_figure_says(job):
     scene = scene_of(job)
-    found, figures = tables.curves(scene, {}), lo.evaluate(scene).figures
+    result, figures = tables.curves(scene, {}), lo.evaluate(scene).figures
     for figure, column in PEAKS[job].items():
-        assert np.abs(found[column]).max() == pytest.approx(figures[figure], rel=1e-12)
+        assert np.abs(result[column]).max() == pytest.approx(figures[figure], rel=1e-12)
 
 
 def test_the_power_follows_a_speed_that_the_design_chooses():
     scene, design = lo.load("shedding"), {"speed": 12.0}
-    found = tables.curves(scene, design)
-    assert np.array_equal(found["motor_power [W]"], found["cam_torque [N*m]"] * 12.0)
-    assert np.array_equal(found["X_t [m/s]"], found["X_1 [m/rad]"] * 12.0)
+    curves = tables.curves(scene, design)
+    assert np.array_equal(curves["motor_power [W]"], curves["cam_torque [N*m]"] * 12.0)
+    assert np.array_equal(curves["X_t [m/s]"], curves["X_1 [m/rad]"] * 12.0)
     figures = lo.evaluate(scene, design).figures
     assert figures["peak_power"] == pytest.approx(12.0 * figures["peak_torque"], rel=1e-12)
 

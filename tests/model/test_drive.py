@@ -18,7 +18,7 @@ def test_peak_power_is_the_largest_torque_times_the_speed(job):
     scene = SCENES[job]
     figures = lo.evaluate(scene).figures
     assert figures["peak_power"] == pytest.approx(scene.operation["speed"] * figures["peak_torque"], rel=1e-12)
-    assert {"peak_torque", "peak_power"} <= {each.name for each in lo.prove(scene).proofs}
+    assert {"peak_torque", "peak_power"} <= {proof.name for proof in lo.prove(scene).proofs}
     assert lo.evaluate(scene).units["peak_power"] == "W"
 
 
@@ -36,7 +36,7 @@ def test_a_limit_on_the_power_is_kept_priced_and_certified():
     answer = lo.solve(scene, starts=1, prove=True)
     assert answer.status == "optimal"
     assert answer.figures["peak_power"] == pytest.approx(5500, rel=1e-8)
-    (price,) = [each for each in answer.binding if each.limit == "peak_power"]
+    (price,) = [item for item in answer.binding if item.limit == "peak_power"]
     assert price.text == "peak_power <= 5.5 kW"
     assert price.unit == {"M3_fdc": "N*m/W"}
     more = lo.solve(scene.set("limits.peak_power.max", "5.501 kW"), starts=1)
@@ -56,7 +56,7 @@ def test_a_shed_slows_down_to_a_motors_power():
 def test_a_limit_on_the_power_needs_a_load_and_the_speed():
     with pytest.raises(lo.BadInput, match="no effect in the scene makes a tape force"):
         lo.evaluate(lo.load("rapier").set("limits.peak_power.max", "5 W"))
-    document = {table: dict(own) for table, own in lo.load("rapier").document.items()}
+    document = {table: dict(values) for table, values in lo.load("rapier").document.items()}
     del document["operation"]["speed"], document["targets"]
     document["effects"], document["limits"]["peak_power"] = {"tape_friction": {"force": "15 N"}}, {"max": "5 W"}
     with pytest.raises(lo.BadInput, match=r"peak_power needs the speed[\s\S]*Give operation.speed"):

@@ -20,9 +20,9 @@ CASES = {
 
 def made(case):
     """Return the job of a family and its program, with a start whose own variables differ between members."""
-    name, members, own = CASES[case]
+    name, members, values = CASES[case]
     more = {f"{KEY}.of": "torque", f"{KEY}.combine": "sum"} if case == "sum of peaks" else {}
-    scene = lo.load(name).update({f"{KEY}.members": members, f"{KEY}.own": own} | more)
+    scene = lo.load(name).update({f"{KEY}.members": members, f"{KEY}.own": values} | more)
     job = registry.of_target(scene, "family")
     program = job.program(scene, "family")
     x = dict(program.starts[0])
@@ -36,16 +36,16 @@ def made(case):
 def test_every_limit_is_what_it_is_in_its_member(case):
     job, program, x = made(case)
     whole = sampled(program.model, {**program.parameters, **x})
-    told: dict[tuple[str, int, float], list[float]] = {}
+    record: dict[tuple[str, int, float], list[float]] = {}
     for limit in program.limits:
-        told.setdefault((limit.name, limit.sign, limit.value), []).append(limit.residual(whole.rows))
+        record.setdefault((limit.name, limit.sign, limit.value), []).append(limit.residual(whole.rows))
     for part in job.parts:
-        own = part.sampler(x)
+        sampler = part.sampler(x)
         for limit in part.program.limits:
             name = part.limits.get(limit.name, limit.name)
-            found = told[name, limit.sign, limit.value]
-            alone = limit.residual(own.rows)
-            assert min(abs(each - alone) for each in found) <= 1e-12 * max(1.0, abs(alone)), name
+            result = record[name, limit.sign, limit.value]
+            alone = limit.residual(sampler.rows)
+            assert min(abs(item - alone) for item in result) <= 1e-12 * max(1.0, abs(alone)), name
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -54,9 +54,9 @@ def test_what_is_sought_is_the_worst_or_the_sum_of_what_members_seek(case):
     whole = sampled(program.model, {**program.parameters, **x})
     levels = list(program.objectives)
     for place, level in enumerate(job.parts[0].program.objectives):
-        each = [part.program.objectives[place].merit(part.sampler(x)) for part in job.parts]
+        items = [part.program.objectives[place].merit(part.sampler(x)) for part in job.parts]
         expected = (
-            [max(each), sum(each)] if level.is_magnitude else [sum(each) if case == "sum of peaks" else max(each)]
+            [max(items), sum(items)] if level.is_magnitude else [sum(items) if case == "sum of peaks" else max(items)]
         )
         for value in expected:
             assert levels.pop(0).merit(whole) == pytest.approx(value, rel=1e-10, abs=1e-12)

@@ -93,19 +93,19 @@ def closing(top, at, width=0.5):
 )
 def test_the_angle_where_links_nearly_fold_is_found_between_samples(at, top, singular):
     """The maximum lies between two samples of a degree, and the search says where, to a share of a microdegree."""
-    found = Group({}, {"closes": "span"}).singular("", closing(top, at))
-    assert len(found) == int(singular)
-    for angle in found:
+    result = Group({}, {"closes": "span"}).singular("", closing(top, at))
+    assert len(result) == int(singular)
+    for angle in result:
         assert math.remainder(angle - at, 2 * math.pi) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_where_the_angle_is_known_in_closed_form_no_other_is_looked_at():
-    asked = []
+    requests = []
 
     def squares(names, phi):
-        asked.append((names, phi.tolist()))
+        requests.append((names, phi.tolist()))
         return [np.array([1.0, 0.3]) for _ in names]
 
     group = Group({}, {"stretched": "far", "folded": "near"}, closest=(0.7, 2.0))
     assert group.singular("left.", squares) == (0.7,), "both names are largest there, once"
-    assert asked == [(("left.far", "left.near"), [0.7, 2.0])]
+    assert requests == [(("left.far", "left.near"), [0.7, 2.0])]

@@ -106,12 +106,12 @@ def test_a_limit_is_touched_where_it_is_no_farther_than_that(kind):
 
 def test_a_whole_cycle_limit_is_touched_at_each_of_its_extremes():
     limit = replace(ABOVE["wave"][0], value=3.0)
-    found = limit.touches(sampler())
-    assert sorted(float(sampler().angle(touch.node)) for touch in found) == pytest.approx(
+    result = limit.touches(sampler())
+    assert sorted(float(sampler().angle(touch.node)) for touch in result) == pytest.approx(
         [0.0, np.pi, 2 * np.pi], abs=1e-6
     )
-    assert [touch.excess for touch in found] == pytest.approx([0.0] * 3, abs=1e-15)
-    assert limit.near(sampler()) == [touch.node for touch in found]
+    assert [touch.excess for touch in result] == pytest.approx([0.0] * 3, abs=1e-15)
+    assert limit.near(sampler()) == [touch.node for touch in result]
 
 
 def test_where_the_weight_vanishes_a_ratio_keeps_the_row_from_below():
@@ -179,6 +179,6 @@ def test_another_kind_of_limit_gives_way():
     """Within the bounds x · y is at most 400."""
     answer = toy.solve(square(value=500.0))
     assert answer.status == "infeasible"
-    assert [(each.limit, each.needed) for each in answer.relaxation if each.limit == "f"] == [
+    assert [(relaxation.limit, relaxation.needed) for relaxation in answer.relaxation if relaxation.limit == "f"] == [
         ("f", pytest.approx(400.0, rel=1e-6))
     ]

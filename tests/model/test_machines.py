@@ -38,19 +38,24 @@ def drawn(problem, effects, names, share, count=FEW):
     full = {name: next(key for key in (scene.full(name), name, f"effects.{name}") if key in known) for name in names}
     generator = np.random.default_rng(3)
     shares = 1 + share * generator.uniform(-1.0, 1.0, (len(names), count))
-    return scene, job, known, {full[name]: known[full[name]] * own for name, own in zip(names, shares, strict=True)}
+    return (
+        scene,
+        job,
+        known,
+        {full[name]: known[full[name]] * values for name, values in zip(names, shares, strict=True)},
+    )
 
 
-def figures(scene, job, known, drawn, asked=None):
+def figures(scene, job, known, drawn, request=None):
     model = job.model(scene)
-    read = job.figures_of if asked is None else lambda scene, of: job.figures_of(scene, of, asked)
+    read = job.figures_of if request is None else lambda scene, of: job.figures_of(scene, of, request)
 
     def alone(values):
         try:
-            found = job.figures(scene, {name: values[name] for name in drawn})
+            second_figures = job.figures(scene, {name: values[name] for name in drawn})
         except ValueError:
             return {}
-        return {name: value for name, value in found.items() if value is not None}
+        return {name: value for name, value in second_figures.items() if value is not None}
 
     return read_all(model, {**known, **drawn}, sampled(model, known), lambda of: read(scene, of), alone)
 
@@ -59,18 +64,18 @@ def figures(scene, job, known, drawn, asked=None):
 @pytest.mark.parametrize(("problem", "effects", "names", "share"), CASES)
 def test_every_figure_is_that_of_the_machine_alone(problem, effects, names, share):
     scene, job, known, values = drawn(problem, effects, names, share)
-    found = figures(scene, job, known, values)
+    second_figures = figures(scene, job, known, values)
     for k in range(FEW):
-        one = job.figures(scene, {name: float(value[k]) for name, value in values.items()})
-        for name, value in one.items():
+        first = job.figures(scene, {name: float(value[k]) for name, value in values.items()})
+        for name, value in first.items():
             if value is None:
-                assert name not in found or not math.isfinite(found[name][k]), name
+                assert name not in second_figures or not math.isfinite(second_figures[name][k]), name
                 continue
-            size = max(abs(value), 1e-3 * float(np.abs(found[name]).max()))
+            size = max(abs(value), 1e-3 * float(np.abs(second_figures[name]).max()))
             tolerance = AT_A_TOP if name == "contact_angle" else CLOSE
             # A least force near zero is a difference of forces as large as the largest.
-            size = max(size, abs(one["contact_max"])) if name == "contact_min" else size
-            assert found[name][k] == pytest.approx(value, rel=0, abs=tolerance * size), name
+            size = max(size, abs(first["contact_max"])) if name == "contact_min" else size
+            assert second_figures[name][k] == pytest.approx(value, rel=0, abs=tolerance * size), name
 
 
 def test_two_tops_that_nearly_tie_are_both_refined():
@@ -81,22 +86,22 @@ def test_two_tops_that_nearly_tie_are_both_refined():
     tilted["far_dwell"] = known["far_dwell"] + known["return"] - tilted["return"]
     many = Machines(model, tilted, sampled(model, known)).peak("lift")
     for k in (0, 20, 40, 63):
-        one = {name: float(value[k]) if np.ndim(value) else value for name, value in tilted.items()}
-        assert many[k] == pytest.approx(sampled(model, one).peak("lift"), abs=1e-9)
+        items = {name: float(value[k]) if np.ndim(value) else value for name, value in tilted.items()}
+        assert many[k] == pytest.approx(sampled(model, items).peak("lift"), abs=1e-9)
 
 
 def test_a_machine_that_cannot_move_has_no_figure_and_the_others_do():
     scene, job, known, values = drawn("rapier", (), ("l4", "l5", "l6", "C0x"), 0.3, 40)
-    found = figures(scene, job, known, values, ("stroke", "mu_min"))
-    bad = np.isnan(found["stroke"])
+    second_figures = figures(scene, job, known, values, ("stroke", "mu_min"))
+    bad = np.isnan(second_figures["stroke"])
     assert 0 < bad.sum() < 40
     for k in range(40):
         try:
-            one = job.figures(scene, {name: float(value[k]) for name, value in values.items()})["stroke"]
+            first = job.figures(scene, {name: float(value[k]) for name, value in values.items()})["stroke"]
         except ValueError:
-            one = math.nan
-        assert (one != one) == bad[k]
-        assert bad[k] or found["stroke"][k] == pytest.approx(one, rel=1e-12)
+            first = math.nan
+        assert (first != first) == bad[k]
+        assert bad[k] or second_figures["stroke"][k] == pytest.approx(first, rel=1e-12)
 
 
 def test_machines_whose_corners_change_places_are_read_each_in_its_own_order():
@@ -104,11 +109,11 @@ def test_machines_whose_corners_change_places_are_read_each_in_its_own_order():
     scene, job, known, _ = drawn("beatup", ("bearing_friction",), (), 0.0)
     name = next(key for key in known if key.endswith("pulse"))
     values = {name: np.linspace(0.2, 6.0, 24)}
-    found = figures(scene, job, known, values)
+    second_figures = figures(scene, job, known, values)
     for k in range(24):
-        one = job.figures(scene, {name: float(values[name][k])})
+        first = job.figures(scene, {name: float(values[name][k])})
         for figure in ("peak_torque", "pulse_rms"):
-            assert found[figure][k] == pytest.approx(one[figure], rel=CLOSE), (figure, k)
+            assert second_figures[figure][k] == pytest.approx(first[figure], rel=CLOSE), (figure, k)
 
 
 def test_the_same_bits_whatever_stands_beside_a_machine():
@@ -128,5 +133,5 @@ def test_crossings_of_many_functions_at_once():
     def excess(x, which):
         return x ** powers[which] - (roots**powers)[which], powers[which] * x ** (powers[which] - 1)
 
-    found = turning_points.crossings(excess, np.zeros(3), np.full(3, 4.0))
-    assert found == pytest.approx(roots, rel=1e-15)
+    result = turning_points.crossings(excess, np.zeros(3), np.full(3, 4.0))
+    assert result == pytest.approx(roots, rel=1e-15)

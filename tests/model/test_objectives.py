@@ -38,7 +38,7 @@ def test_a_design_is_worth_its_largest_piece(kind):
 
 
 def test_rows_are_of_the_design_or_over_the_cycle():
-    assert {kind: (each.sides, each.quantities) for kind, (each, _) in KINDS.items()} == {
+    assert {kind: (item.sides, item.quantities) for kind, (item, _) in KINDS.items()} == {
         "value": ((("p", 1.0),), ()),
         "worst": ((("p", 1.0), ("q", 1.0)), ()),
         "magnitude": ((("p", 1.0), ("p", -1.0)), ()),
@@ -46,8 +46,8 @@ def test_rows_are_of_the_design_or_over_the_cycle():
         "worst magnitude": ((("p", 1.0), ("p", -1.0), ("q", 1.0), ("q", -1.0)), ()),
         "worst peak": ((), ("wave", "swing")),
     }
-    assert [each.is_smooth for each, _ in KINDS.values()] == [True] + [False] * 5
-    assert [each.rows for each, _ in KINDS.values()][:4] == [("p",), ("p", "q"), ("p",), ("wave",)]
+    assert [item.is_smooth for item, _ in KINDS.values()] == [True] + [False] * 5
+    assert [item.rows for item, _ in KINDS.values()][:4] == [("p",), ("p", "q"), ("p",), ("wave",)]
 
 
 def test_a_magnitude_has_its_own_sign_and_both_where_it_vanishes():
@@ -63,15 +63,15 @@ def test_the_pieces_of_a_peak_stand_at_its_extremes():
 
 
 def test_the_structure_is_kind_and_rows():
-    kinds = [each for each, _ in KINDS.values()]
-    assert len({each.structure for each in kinds}) == len(kinds)
+    kinds = [item for item, _ in KINDS.values()]
+    assert len({item.structure for item in kinds}) == len(kinds)
     assert Value("other", "p", 9.0, power=2).structure == kinds[0].structure
     assert Value("p", "q", 4.0).structure != kinds[0].structure
     assert Worst("both", "p", 4.0, ("x",)).structure != kinds[1].structure
 
 
 def test_what_keeps_an_objective_at_a_value_is_as_many_limits_as_it_has_rows():
-    assert {kind: each.limits("cap", 7.0) for kind, (each, _) in list(KINDS.items())[:4]} == {
+    assert {kind: item.limits("cap", 7.0) for kind, (item, _) in list(KINDS.items())[:4]} == {
         "value": [DesignLimit("cap", 1, "p", 7.0, 4.0)],
         "worst": [DesignLimit("cap", 1, "p", 7.0, 4.0), DesignLimit("cap", 1, "q", 7.0, 4.0)],
         "magnitude": [DesignLimit("cap", 1, "p", 7.0, 4.0), DesignLimit("cap", -1, "p", -7.0, 4.0)],
@@ -83,18 +83,18 @@ def test_what_keeps_an_objective_at_a_value_is_as_many_limits_as_it_has_rows():
 
 
 def test_what_an_objective_is_never_less_than():
-    assert [each.least for each, _ in KINDS.values()] == [-math.inf, -math.inf, 0.0, 0.0, 0.0, 0.0]
-    of_sizes = [each.least_of(()) for each, _ in KINDS.values()]
-    of_values = [each.least_of({"wave"}) for each, _ in KINDS.values()]
+    assert [item.least for item, _ in KINDS.values()] == [-math.inf, -math.inf, 0.0, 0.0, 0.0, 0.0]
+    of_sizes = [item.least_of(()) for item, _ in KINDS.values()]
+    of_values = [item.least_of({"wave"}) for item, _ in KINDS.values()]
     assert of_sizes == [-math.inf, -math.inf, 0.0, 0.0, 0.0, 0.0]
     assert of_values == [-math.inf, -math.inf, 0.0, -math.inf, 0.0, -math.inf], "a signed wave may lie below 0"
     bounds = {"p": -8.0, "q": -4.0, "wave": 2.0}
-    assert [each.least_within(bounds) for each, _ in list(KINDS.values())[:4]] == [-8.0, -math.inf, 0.0, -math.inf]
+    assert [item.least_within(bounds) for item, _ in list(KINDS.values())[:4]] == [-8.0, -math.inf, 0.0, -math.inf]
     assert Value("q", "q", 1.0).least_within({}) == -math.inf
 
 
 def test_a_figure_is_sought_least_or_most_and_worsens_the_other_way():
-    assert [each.sought for each, _ in list(KINDS.values())[:4]] == ["least", "least", "least magnitude", "least"]
+    assert [item.sought for item, _ in list(KINDS.values())[:4]] == ["least", "least", "least magnitude", "least"]
     assert Value("speed", "period", 1.0, power=-1).sought == "most"
     assert [Value("p", "p", 1.0).worsening(3.0, 5.0, most) for most in (False, True)] == [2.0, -2.0]
     assert Magnitude("p", "p", 1.0).worsening(3.0, -5.0, most=False) == 2.0

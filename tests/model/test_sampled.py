@@ -32,10 +32,10 @@ def test_a_zero_of_the_other_sign_is_another_design():
 
 
 def test_what_is_kept_is_what_would_be_sampled():
-    kept, fresh = sampled(MODEL, VALUES), Sampler(MODEL, VALUES)
-    assert kept.values == VALUES
-    assert kept.figures == fresh.figures
-    assert kept.extremes("peak_torque") == fresh.extremes("peak_torque")
+    remaining, fresh = sampled(MODEL, VALUES), Sampler(MODEL, VALUES)
+    assert remaining.values == VALUES
+    assert remaining.figures == fresh.figures
+    assert remaining.extremes("peak_torque") == fresh.extremes("peak_torque")
 
 
 def test_no_more_are_kept_than_one_start_looks_at():
@@ -71,7 +71,7 @@ def test_extremes_are_shared_by_names_of_the_same_numbers_and_by_no_others():
         coarse = sampled(program.model, {**known, "m4e": mass}, 180)
         for sampler in (same, other, coarse):
             sampler.share()
-        assert [each.knows("peak_torque") for each in (same, other, coarse)] == [True, False, False]
+        assert [item.knows("peak_torque") for item in (same, other, coarse)] == [True, False, False]
         shared = same.extremes("peak_torque")
     with working(Session()):
         assert Sampler(program.model, {**known, "m4e": mass}).extremes("peak_torque") == shared

@@ -16,10 +16,10 @@ JOB = registry.of(BEATUP)
 
 
 def scene(*effects, **changes):
-    found = BEATUP
+    result = BEATUP
     for name in effects:
-        found = found.with_effect(name)
-    return found.update({key.replace("__", "."): value for key, value in changes.items()}) if changes else found
+        result = result.with_effect(name)
+    return result.update({key.replace("__", "."): value for key, value in changes.items()}) if changes else result
 
 
 SCENES = {
@@ -80,12 +80,12 @@ def test_peaks_of_other_machines_too_down_to_transmission_angles_of_a_few_degree
 @pytest.mark.parametrize("name", ["the paper's", "every effect", "friction above all", "long crank"])
 def test_every_local_extreme_of_the_scan_is_found_with_its_sign(name):
     sampled = JOB.sampler(SCENES[name], {})
-    found = sampled.extremes("peak_torque")
-    assert [abs(e.value) for e in found] == sorted((abs(e.value) for e in found), reverse=True)
+    extremes = sampled.extremes("peak_torque")
+    assert [abs(e.value) for e in extremes] == sorted((abs(e.value) for e in extremes), reverse=True)
     for piece, values in enumerate(scanned(sampled, "peak_torque")):
         padded = np.concatenate([[-np.inf], values, [-np.inf]])
         tops = np.flatnonzero((padded[1:-1] > padded[:-2]) & (padded[1:-1] > padded[2:]))
-        here = [e for e in found if e.piece == piece]
+        here = [e for e in extremes if e.piece == piece]
         for k in tops[values[tops] > 1e-3 * sampled.peak("peak_torque")]:
             nearest = min(here, key=lambda e: abs(e.u - k / (len(values) - 1)))
             assert abs(nearest.value) == pytest.approx(vertex(values, k), rel=1e-10)
@@ -109,9 +109,9 @@ def test_extremes_of_several_quantities_are_refined_in_two_passes_for_all(monkey
     names, read = ("span_near", "span_far", "obliquity", "peak_acceleration"), []
     whole = Sampler.together
 
-    def counted(self, asked, pieces, u):
-        read.append(asked)
-        return whole(self, asked, pieces, u)
+    def counted(self, request, pieces, u):
+        read.append(request)
+        return whole(self, request, pieces, u)
 
     monkeypatch.setattr(Sampler, "together", counted)
     sampled.search(names)
@@ -124,10 +124,10 @@ def test_extremes_of_several_quantities_are_refined_in_two_passes_for_all(monkey
 def test_an_extreme_may_stand_on_one_side_of_a_corner():
     """A Coulomb torque that outweighs all else: |M3| jumps at the dead centres, where one side has the peak."""
     sampled = JOB.sampler(SCENES["friction above all"], {})
-    found = sampled.extremes("M3_square")[0]
-    assert found.u in (0.0, 1.0)
+    extreme = sampled.extremes("M3_square")[0]
+    assert extreme.u in (0.0, 1.0)
     M3 = math.sqrt(max(values.max() for values in scanned(sampled, "M3_square")))
-    assert math.sqrt(found.value) == pytest.approx(M3, rel=1e-12)
+    assert math.sqrt(extreme.value) == pytest.approx(M3, rel=1e-12)
 
 
 @pytest.mark.parametrize("pulse", ["29.8 deg", "0.05 deg", "200 deg"])
@@ -163,10 +163,10 @@ def test_the_grid_holds_both_ends_of_every_piece_and_enough_points_of_the_narrow
     sampled = JOB.sampler(SCENES["narrow pulse"], {})
     pieces, u = sampled.grid(720)
     for piece in range(sampled.cycle.pieces):
-        own = u[pieces == piece]
-        assert (own[0], own[-1]) == (0.0, 1.0)
-        assert len(own) >= 91
-        assert np.max(np.diff(own)) * np.diff(sampled.cycle.starts)[piece] <= TURN / 720 * (1 + 1e-12)
+        values = u[pieces == piece]
+        assert (values[0], values[-1]) == (0.0, 1.0)
+        assert len(values) >= 91
+        assert np.max(np.diff(values)) * np.diff(sampled.cycle.starts)[piece] <= TURN / 720 * (1 + 1e-12)
 
 
 @pytest.mark.parametrize(("intervals", "least"), [(4, 91), (16, 41), (64, 11), (256, 9)])

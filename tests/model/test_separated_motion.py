@@ -28,15 +28,15 @@ def own(scene, effect, key):
 
 def test_the_sizes_are_those_of_the_cycloidal_law():
     """Stroke h, speed 2 h ω/β, acceleration 2 π h ω²/β² of the shorter stroke [any textbook of cams]."""
-    found = sizes(sampler())
+    result = sizes(sampler())
     stroke, beta, omega = HELD.travel, min(SCENE.mechanism["rise"], SCENE.mechanism["return"]), 300 * RPM
-    assert found.stroke == pytest.approx(stroke, rel=1e-12)
-    assert found.speed == pytest.approx(2 * stroke * omega / beta, rel=1e-4)
-    assert found.acceleration == pytest.approx(2 * math.pi * stroke * omega**2 / beta**2, rel=1e-4)
+    assert result.stroke == pytest.approx(stroke, rel=1e-12)
+    assert result.speed == pytest.approx(2 * stroke * omega / beta, rel=1e-4)
+    assert result.acceleration == pytest.approx(2 * math.pi * stroke * omega**2 / beta**2, rel=1e-4)
 
 
 def test_each_load_has_the_form_of_its_law_in_both_zones():
-    found = forms(sampler(), shedding.EFFECT)
+    result = forms(sampler(), shedding.EFFECT)
     k, x0, h = HELD.K1, HELD.X0, HELD.travel
     tension: Any = SCENE.effects["warp_tension"]
     expected = {
@@ -50,21 +50,21 @@ def test_each_load_has_the_form_of_its_law_in_both_zones():
             Linear(0, 0, 2 * tension.T2 / h, -tension.T2, 0),
         ],
     }
-    assert set(found) == set(expected)
+    assert set(result) == set(expected)
     for name, zones in expected.items():
-        for one, other in zip(found[name], zones, strict=True):
+        for item, other in zip(result[name], zones, strict=True):
             scale = max(map(abs, other))
-            assert list(one) == pytest.approx(list(other), rel=1e-9, abs=1e-9 * scale), name
+            assert list(item) == pytest.approx(list(other), rel=1e-9, abs=1e-9 * scale), name
 
 
 def test_the_body_is_the_sum_of_its_loads_and_goes_on_at_its_corner():
     read = sampler()
-    found = body(read, shedding.EFFECT, forms(read, shedding.EFFECT))
-    assert found.mass == pytest.approx(own(SCENE, "inertia", "M"), rel=1e-12)
-    assert found.damping == pytest.approx(own(SCENE, "damping", "C"), rel=1e-12)
-    assert found.friction == pytest.approx(own(SCENE, "dry_friction", "F"), rel=1e-12)
-    assert list(found.corners) == pytest.approx([HELD.travel / 2], rel=1e-12)
-    assert found.rest(0, found.corners[0]) == pytest.approx(found.rest(1, found.corners[0]), rel=1e-12)
+    result = body(read, shedding.EFFECT, forms(read, shedding.EFFECT))
+    assert result.mass == pytest.approx(own(SCENE, "inertia", "M"), rel=1e-12)
+    assert result.damping == pytest.approx(own(SCENE, "damping", "C"), rel=1e-12)
+    assert result.friction == pytest.approx(own(SCENE, "dry_friction", "F"), rel=1e-12)
+    assert list(result.corners) == pytest.approx([HELD.travel / 2], rel=1e-12)
+    assert result.rest(0, result.corners[0]) == pytest.approx(result.rest(1, result.corners[0]), rel=1e-12)
 
 
 def test_on_its_cam_the_forms_give_the_force_of_contact():
@@ -96,16 +96,16 @@ def turned(term):
 @pytest.mark.parametrize(
     ("term", "why"),
     [
-        (lambda pose, own: own["M"] * pose.acceleration**2, "not linear"),
-        (lambda pose, own: own["M"] * pose.acceleration + pose.q * pose.velocity, "not linear"),
-        (lambda pose, own: own["M"] * pose.acceleration * pose.q1, "reads the mechanism's q1"),
+        (lambda pose, values: values["M"] * pose.acceleration**2, "not linear"),
+        (lambda pose, values: values["M"] * pose.acceleration + pose.q * pose.velocity, "not linear"),
+        (lambda pose, values: values["M"] * pose.acceleration * pose.q1, "reads the mechanism's q1"),
     ],
 )
 def test_what_is_not_linear_in_the_outputs_own_motion_is_refused_by_name(term, why):
     read, load = turned(term)
-    with pytest.raises(UnfollowedError, match=why) as told:
+    with pytest.raises(UnfollowedError, match=why) as caught:
         separation._form(read, shedding.EFFECT, load, 0.0)
-    assert "separation and inertia cannot be on together" in str(told.value)
+    assert "separation and inertia cannot be on together" in str(caught.value)
 
 
 def test_an_output_without_mass_does_not_fly():
@@ -120,11 +120,11 @@ def test_a_stiff_spring_holds_the_frame_and_its_curves_are_those_of_the_cam():
     """With 100 times the spring nothing parts, and the columns are those of a scene without the effect."""
     stiff = SCENE.set("mechanism.K1", f"{100 * HELD.K1!r} N/m")
     job = registry.of(stiff)
-    found = job.parted(stiff, job.sampler(stiff, {}))
-    assert not found.course.parted
-    assert set(found.figures.values()) == {None}
+    result = job.parted(stiff, job.sampler(stiff, {}))
+    assert not result.course.parted
+    assert set(result.figures.values()) == {None}
     with_it, without = lo.simulate(stiff), lo.simulate(stiff.without_effect("separation"))
     assert np.all(with_it["gap [m]"] == 0.0)
     for angle in (0.5, 2.0, 4.0):
-        one, other = (np.interp(angle, table["phi [rad]"], table["N [N]"]) for table in (with_it, without))
-        assert one == pytest.approx(other, rel=1e-4)
+        first, other = (np.interp(angle, table["phi [rad]"], table["N [N]"]) for table in (with_it, without))
+        assert first == pytest.approx(other, rel=1e-4)

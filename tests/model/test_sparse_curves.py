@@ -48,8 +48,8 @@ def top(function, exact):
 @pytest.mark.parametrize("name", SMOOTH)
 def test_the_top_is_as_close_as_asked_and_no_farther_than_claimed(name, accuracy):
     function, exact = SMOOTH[name]
-    angles, found, error = asked(function, accuracy)
-    missed = 1 - found / top(function, exact)
+    angles, result, error = asked(function, accuracy)
+    missed = 1 - result / top(function, exact)
     assert missed <= accuracy
     assert missed <= error + 1e-12
     assert len(angles) < 1000, "few rows are the point"
@@ -58,20 +58,20 @@ def test_the_top_is_as_close_as_asked_and_no_farther_than_claimed(name, accuracy
 @pytest.mark.parametrize("name", BENT)
 def test_corners_levels_and_nothing_end_too(name):
     function, exact = BENT[name]
-    angles, found, _ = asked(function, 1e-6)
-    assert found == pytest.approx(top(function, exact), abs=1e-6)
+    angles, result, _ = asked(function, 1e-6)
+    assert result == pytest.approx(top(function, exact), abs=1e-6)
     assert len(angles) < SPARSE_MOST_ROWS
 
 
 def test_more_accuracy_takes_more_rows_and_leaves_less():
     function, _ = SMOOTH["one wave"]
-    found = [asked(function, 10.0**-k) for k in (3, 6, 9)]
-    rows, errors = [len(angles) for angles, _, _ in found], [error for *_, error in found]
+    results = [asked(function, 10.0**-k) for k in (3, 6, 9)]
+    rows, errors = [len(angles) for angles, _, _ in results], [error for *_, error in results]
     assert rows == sorted(rows)
     assert errors == sorted(errors, reverse=True)
 
 
 def test_a_spike_beside_a_singular_position_is_found():
     place = 4.0
-    _, found, _ = asked(lambda phi: 1 / np.hypot(1, (phi - place) / 1e-6), 1e-6, (place,))
-    assert found == pytest.approx(1.0, abs=1e-6)
+    _, result, _ = asked(lambda phi: 1 / np.hypot(1, (phi - place) / 1e-6), 1e-6, (place,))
+    assert result == pytest.approx(1.0, abs=1e-6)

@@ -81,10 +81,10 @@ SYSTEMS = {"float": systems.FLOAT, "numpy": systems.numpy(), "mpmath": systems.m
 def by_hand(phi, pressed, ratio=0.5, **changes):
     """Return Q and the crank torque at one crank angle, from the closed form."""
     v = {**NUMBERS, **{key.replace("__", "."): value for key, value in changes.items()}}
-    r, k, met = v["r"], v["spring.k"], math.cos(v["cloth.width"])
+    r, k, contact = v["r"], v["spring.k"], math.cos(v["cloth.width"])
     first = v["inertia.m"] * r * v["speed"] ** 2 - k * r
     force = k * (r - v["spring.p"]) + first * math.cos(phi) / (1 - ratio**2)
-    force += v["cloth.F"] * (-math.cos(phi) - met) / (1 - met) if pressed else 0.0
+    force += v["cloth.F"] * (-math.cos(phi) - contact) / (1 - contact) if pressed else 0.0
     return force, force * r * math.sin(phi) + 0.7
 
 

@@ -17,14 +17,14 @@ def sampler(name, **design):
 
 def test_stretches_are_those_of_the_curve():
     """Where the cam force of the packaged frame is at most 50 N, by its curve and by its stretches."""
-    own, close = sampler("shedding"), 0.001
+    values, close = sampler("shedding"), 0.001
     frame = lo.simulate("shedding")
     low = frame["phi [rad]"][np.abs(frame["N [N]"]) <= 50.0]
-    found = near_zero(own, "lift", 50.0, 0.0)
-    inside = [any(begin - close <= phi <= end + close for begin, end in found) for phi in low]
-    assert len(found) >= 2
+    result = near_zero(values, "lift", 50.0, 0.0)
+    inside = [any(begin - close <= phi <= end + close for begin, end in result) for phi in low]
+    assert len(result) >= 2
     assert all(inside)
-    assert near_zero(own, "lift", 0.0, 0.0) == []
+    assert near_zero(values, "lift", 0.0, 0.0) == []
 
 
 def test_a_stretch_across_the_turns_end_is_one():

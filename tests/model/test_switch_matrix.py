@@ -109,27 +109,27 @@ class Combination(NamedTuple):
 
     @property
     def names(self):
-        return [one.effect for one in self.ones]
+        return [instance.effect for instance in self.ones]
 
 
 def completed(combination):
     """Return a combination with the effects that its own need beside them, at their first example."""
     effects = packaged(combination.job).schema.effects
-    needed = {name for one in combination.ones for name in effects[one.effect].companions} - set(combination.names)
-    ones = {one.effect: one for one in (*combination.ones, *(One(name, 0) for name in needed))}
+    needed = {name for item in combination.ones for name in effects[item.effect].companions} - set(combination.names)
+    ones = {item.effect: item for item in (*combination.ones, *(One(name, 0) for name in needed))}
     return combination._replace(ones=tuple(ones[name] for name in effects if name in ones))
 
 
-def without(combination, one):
+def without(combination, first):
     """Return the combination without an effect."""
-    return combination._replace(ones=tuple(each for each in combination.ones if each != one))
+    return combination._replace(ones=tuple(instance for instance in combination.ones if instance != first))
 
 
 def combines(combination):
     """Say whether a combination may be on together."""
     effects = packaged(combination.job).schema.effects
-    own = {effects[n]: effects[n].table.model_validate(effects[n].examples[k]) for n, k in combination.ones}
-    return not any(faults(own))
+    values = {effects[n]: effects[n].table.model_validate(effects[n].examples[k]) for n, k in combination.ones}
+    return not any(faults(values))
 
 
 def matrix():
@@ -141,15 +141,15 @@ def tried():
     """Yield nothing, all, each alone and every pair."""
     for job in JOBS:
         effects = packaged(job).schema.effects
-        each = {name: [One(name, k) for k in range(len(effect.examples))] for name, effect in effects.items()}
+        items = {name: [One(name, k) for k in range(len(effect.examples))] for name, effect in effects.items()}
         yield Combination(job, ())
-        for k in range(max(map(len, each.values()))):
-            whole = Combination(job, tuple(ones[min(k, len(ones) - 1)] for ones in each.values()))
-            lone = [one for one in whole.ones if effects[one.effect].clashes and not combines(whole)]
+        for k in range(max(map(len, items.values()))):
+            whole = Combination(job, tuple(ones[min(k, len(ones) - 1)] for ones in items.values()))
+            lone = [instance for instance in whole.ones if effects[instance.effect].clashes and not combines(whole)]
             yield functools.reduce(without, lone, whole)
         for size in (1, 2):
-            for names in itertools.combinations(each, size):
-                yield from (Combination(job, ones) for ones in itertools.product(*(each[name] for name in names)))
+            for names in itertools.combinations(items, size):
+                yield from (Combination(job, ones) for ones in itertools.product(*(items[name] for name in names)))
 
 
 COMBINATIONS = list(dict.fromkeys(matrix()))
@@ -161,7 +161,10 @@ def scene_of(combination):
     scene = packaged(combination.job)
     for name in scene.effects:
         scene = scene.without_effect(name)
-    examples = {one.effect: scene.schema.effects[one.effect].examples[one.example] for one in combination.ones}
+    examples = {
+        instance.effect: scene.schema.effects[instance.effect].examples[instance.example]
+        for instance in combination.ones
+    }
     return scene.update({f"effects.{name}": dict(example) for name, example in examples.items()})
 
 
@@ -186,7 +189,7 @@ def at_phi(table, column):
 def offered(job):
     """Return the names of all numbers of a job's effects and tables."""
     effects = packaged(job).schema.effects
-    lasts = [completed(Combination(job, (One(name, len(each.examples) - 1),))) for name, each in effects.items()]
+    lasts = [completed(Combination(job, (One(name, len(effect.examples) - 1),))) for name, effect in effects.items()]
     return frozenset().union(*(registry.find(job).numbers(scene_of(last)) for last in lasts))
 
 
@@ -219,7 +222,7 @@ def read_by(combination):
 def alone(combination):
     """Return the combinations of nothing, and of each of its effects alone, what it needs beside it apart."""
     none = combination._replace(ones=())
-    return none, [completed(combination._replace(ones=(one,))) for one in combination.ones]
+    return none, [completed(combination._replace(ones=(instance,))) for instance in combination.ones]
 
 
 def effects_of(combination):
@@ -229,7 +232,11 @@ def effects_of(combination):
 
 def has(kind):
     """Return the combinations with an effect of a kind."""
-    return [each for each in COMBINATIONS if any(isinstance(effect, kind) for effect in effects_of(each))]
+    return [
+        combination
+        for combination in COMBINATIONS
+        if any(isinstance(effect, kind) for effect in effects_of(combination))
+    ]
 
 
 def each_of(combinations):
@@ -264,11 +271,13 @@ def test_curves_have_columns_of_the_active_effects_only(combination):
     expected += [f"{force} [{unit}]"] if output else []
     expected += ([TORQUE[job], "motor_power [W]"] if known else [TORQUE[job]]) if names else []
     names = [effect.name for effect in effects_of(combination)]
-    told = {f"{each} joint_forces": BY_INERTIA[each] for each in BY_INERTIA if "inertia" in names}
+    record = {f"{item} joint_forces": BY_INERTIA[item] for item in BY_INERTIA if "inertia" in names}
     keys = [key for name in names for key in (name, f"{job} {name}")]
     # Vectors stand before sizes alone.
-    every = [(*CHECKED.get(key, []), *told.get(key, [])) for key in keys]
-    checked = [column for own in every for column in (own if job != "shedding" else sorted(own, key=_is_no_vector))]
+    every = [(*CHECKED.get(key, []), *record.get(key, [])) for key in keys]
+    checked = [
+        column for entry in every for column in (entry if job != "shedding" else sorted(entry, key=_is_no_vector))
+    ]
     expected += dict.fromkeys(checked)
     assert list(table_of(combination)) == expected + (AFTER[job].split(", ") if job in AFTER else [])
 
@@ -291,9 +300,9 @@ def test_a_state_s_term_stands_for_those_of_the_loads_that_it_carries(combinatio
     force, unit = FORCE[combination.job]
     columns = {load: f"{COLUMN.get(load.name, load.name)} [{unit}]" for load in loads if load.acts == "output"}
     terms = [at_phi(table, column) for load, column in columns.items() if load.name not in gone]
-    found = at_phi(table, f"{force} [{unit}]")
-    assert np.max(np.abs(found - sum(terms))) <= 1e-13 * np.max(np.abs(found))
-    assert np.max(np.abs(found - sum(at_phi(table, column) for column in columns.values()))) > 0.1 * np.max(found)
+    result = at_phi(table, f"{force} [{unit}]")
+    assert np.max(np.abs(result - sum(terms))) <= 1e-13 * np.max(np.abs(result))
+    assert np.max(np.abs(result - sum(at_phi(table, column) for column in columns.values()))) > 0.1 * np.max(result)
 
 
 def lifting_the_rod(combination):
@@ -320,16 +329,16 @@ def test_force_and_torque_are_the_sums_of_single_effects(combination):
     force, unit = FORCE[combination.job]
     none, ones = alone(combination)
     for column in (f"{force} [{unit}]", TORQUE[combination.job]):
-        base, found = at_phi(table_of(none), column), at_phi(table_of(combination), column)
-        pairs = [(single, without(single, one)) for single, one in zip(ones, combination.ones, strict=True)]
+        base, result = at_phi(table_of(none), column), at_phi(table_of(combination), column)
+        pairs = [(single, without(single, item)) for single, item in zip(ones, combination.ones, strict=True)]
         singles = [at_phi(table_of(single), column) for single, _ in pairs]
         bases = [at_phi(table_of(other), column) for _, other in pairs]
         total = base + sum((a - b for a, b in zip(singles, bases, strict=True)), np.zeros(len(PHI)))
         if column == TORQUE[combination.job]:
             total = total + lifting_the_rod(combination)
         size = max(np.nanmax(np.abs(values)) for values in (base, *singles))
-        assert np.array_equal(np.isnan(found), np.isnan(total))
-        assert np.nanmax(np.abs(found - total)) <= 1e-13 * size
+        assert np.array_equal(np.isnan(result), np.isnan(total))
+        assert np.nanmax(np.abs(result - total)) <= 1e-13 * size
 
 
 @turned
@@ -339,7 +348,7 @@ def test_the_motor_gives_what_the_crank_and_the_flywheel_take(combination):
     table, speed = table_of(combination), scene_of(combination).operation["speed"]
     near = job.curves(scene_of(combination), DESIGNS["beatup"], steps=1, also=[*(PHI - 1e-4), *(PHI + 1e-4)])
     rows = [np.searchsorted(near["phi [rad]"], PHI + side - 1e-9) for side in (-1e-4, 1e-4)]
-    low, high = (near["omega [rad/s]"][each] for each in rows)
+    low, high = (near["omega [rad/s]"][row] for row in rows)
     omega = at_phi(table, "omega [rad/s]")
     given = 35 / (0.08 * speed) * (sampled.static["no_load_speed"] - omega)
     assert np.allclose(given, at_phi(table, "motor_torque [N*m]"), rtol=0, atol=1e-10)
@@ -351,53 +360,53 @@ def test_the_motor_gives_what_the_crank_and_the_flywheel_take(combination):
 def test_an_absent_effect_leaves_no_symbol_in_the_graph(combination):
     """All numbers of all effects are offered as symbols; only those of active effects are taken up."""
     active = effects_of(combination)
-    own = {f"{effect.name}.{key}" for effect in active for key in effect.table.model_fields}
+    values = {f"{effect.name}.{key}" for effect in active for key in effect.table.model_fields}
     demanded = {f"{effect.name}.{demand.value}" for effect in active for demand in getattr(effect, "demands", ())}
-    unread = demanded.union(*(UNREAD.get(str(one), set()) for one in combination.ones))
-    expected = own.intersection(registry.find(combination.job).numbers(scene_of(combination))) - unread
+    unread = demanded.union(*(UNREAD.get(str(instance), set()) for instance in combination.ones))
+    expected = values.intersection(registry.find(combination.job).numbers(scene_of(combination))) - unread
     effects = packaged(combination.job).schema.effects
-    found = {name for name in read_by(combination) if name.split(".")[0] in effects}
-    assert found == expected
+    results = {name for name in read_by(combination) if name.split(".")[0] in effects}
+    assert results == expected
 
 
 @pytest.mark.slow
 @every
 def test_a_combination_reads_what_its_effects_read_alone_and_no_more(combination):
     none, ones = alone(combination)
-    assert read_by(combination) == read_by(none).union(*(read_by(one) for one in ones))
-    for effect, one in zip(effects_of(combination), ones, strict=True):
-        assert {key.split(".")[1] for key in effect.needs} <= read_by(one)
+    assert read_by(combination) == read_by(none).union(*(read_by(item) for item in ones))
+    for effect, item in zip(effects_of(combination), ones, strict=True):
+        assert {key.split(".")[1] for key in effect.needs} <= read_by(item)
 
 
 @pytest.mark.few(50)
 @every
 def test_figures_of_absent_effects_are_undefined(combination):
     job, scene = registry.find(combination.job), scene_of(combination)
-    found = job.figures(scene, DESIGNS.get(combination.job, {}))
+    figures = job.figures(scene, DESIGNS.get(combination.job, {}))
     for name, effect in scene.schema.effects.items():
         for figure in effect.figures:
             givers = {of for of, other in scene.schema.effects.items() if figure in other.figures}
             there = bool(givers & set(combination.names)) and not isinstance(effect, Event)
             there = there and figure.name not in job.model(scene).undefined
-            assert (found[figure.name] is not None) == there, (name, figure.name)
+            assert (figures[figure.name] is not None) == there, (name, figure.name)
     for figure, givers in WITH[combination.job].items():
         known = One("warp_tension", 2) not in combination.ones
-        assert (found[figure] is not None) == (known and bool(givers & set(combination.names))), figure
+        assert (figures[figure] is not None) == (known and bool(givers & set(combination.names))), figure
     if combination.job == "beatup":
         loads = loads_of(combination)
-        assert (found["M3_fdc"] is not None) == any(load.acts == "output" for load in loads)
-        assert (found["peak_torque"] is not None) == bool(loads)
+        assert (figures["M3_fdc"] is not None) == any(load.acts == "output" for load in loads)
+        assert (figures["peak_torque"] is not None) == bool(loads)
 
 
 @every
 def test_the_cycle_has_the_corners_and_switches_of_the_active_effects_only(combination):
     none, _ = alone(combination)
     added = len(sampler_of(combination).cycle.order) - len(sampler_of(none).cycle.order)
-    assert added == sum(CORNERS.get(str(one), 0) for one in combination.ones)
+    assert added == sum(CORNERS.get(str(instance), 0) for instance in combination.ones)
     names = sampler_of(combination).cycle.names
-    own = [name for name in names if name not in {*sampler_of(none).cycle.names, PIECE}]
+    values = [name for name in names if name not in {*sampler_of(none).cycle.names, PIECE}]
     assert (PIECE in names) == any(isinstance(effect, Speed) for effect in effects_of(combination))
-    assert own == [load.name for load in loads_of(combination) if getattr(load, "corners", None)]
+    assert values == [load.name for load in loads_of(combination) if getattr(load, "corners", None)]
 
 
 def test_the_matrix_holds_none_all_each_and_every_pair():
@@ -406,5 +415,5 @@ def test_the_matrix_holds_none_all_each_and_every_pair():
     One that needs another is with it in each row: of the three on the rapier two pairs are rows already. The last in
     the shedding stands beside the six that it can be with, one of which it needs, and beside one shape of the seventh.
     """
-    count = {job: sum(each.job == job for each in COMBINATIONS) for job in JOBS}
+    count = {job: sum(combination.job == job for combination in COMBINATIONS) for job in JOBS}
     assert count == {"beatup": 1 + 2 + 11 + 54 + 8, "rapier": 1 + 1 + 4 + 5, "shedding": 1 + 3 + 10 + 42 + 8}

@@ -37,18 +37,18 @@ LAWS = ("harmonic", "modified_sine", "modified_trapezoid", "polynomial_345", "fr
 @functools.cache
 def samplers():
     """Return today's machine of every packaged scene, of all effects together, of the cam laws, and made-up ones."""
-    found = {}
+    results = {}
     for name in problems():
         scene = lo.load(name)
-        found[name] = registry.of(scene).sampler(scene, {})
+        results[name] = registry.of(scene).sampler(scene, {})
     for name, effects in EFFECTS.items():
-        scene = functools.reduce(lambda one, effect: one.with_effect(effect), effects, lo.load(name))
-        found[f"{name} with all effects"] = registry.of(scene).sampler(scene, {})
+        scene = functools.reduce(lambda first, effect: first.with_effect(effect), effects, lo.load(name))
+        results[f"{name} with all effects"] = registry.of(scene).sampler(scene, {})
     for law in LAWS:
         scene = lo.load("shedding").update({"mechanism.law": law, "effects.warp_tension.shape": "step"})
-        found[law] = registry.of(scene).sampler(scene, {})
-    found["a state"] = Sampler(ELASTIC, WITH_ARM)
-    return found
+        results[law] = registry.of(scene).sampler(scene, {})
+    results["a state"] = Sampler(ELASTIC, WITH_ARM)
+    return results
 
 
 NAMES = [*problems(), *(f"{name} with all effects" for name in EFFECTS), *LAWS, "a state"]
@@ -88,12 +88,12 @@ def alike(model, systems, given, node, whole=lambda value: value):
 
     whole(value): as a value of all nodes, or of a whole series: a constant may be told with less.
     """
-    found = []
+    results = []
     for name in quantities(model):
         recording = RECORDED(model, (name,), tuple(node.switch), given.known)
-        found.append(told(lambda: [whole(model.quantity(systems[1], given, name, node))]))  # noqa: B023
-        assert told(lambda: map(whole, recording.bind(systems, given)(node))) == found[-1], name  # noqa: B023
-    return found
+        results.append(told(lambda: [whole(model.quantity(systems[1], given, name, node))]))  # noqa: B023
+        assert told(lambda: map(whole, recording.bind(systems, given)(node))) == results[-1], name  # noqa: B023
+    return results
 
 
 def spread(node):
@@ -118,10 +118,10 @@ def test_several_together_are_each_alone(name):
     node = sampler.node(*nodes(sampler, 20, 5))
     node = Node(node.phi, {**node.switch, DATUM: np.linspace(-0.5, 0.5, 20)})
     recording = reading.recorded_quantities(sampler.model, names, tuple(node.switch), sampler.given.known)
-    found = recording.bind((systems.FLOAT, systems.numpy()), sampler.given)(node)
-    for each, value in zip(names, found, strict=True):
-        alone = sampler.model.quantity(systems.numpy(), sampler.given, each, node)
-        assert bits(spread(node)(value)) == bits(spread(node)(alone)), each
+    result = recording.bind((systems.FLOAT, systems.numpy()), sampler.given)(node)
+    for item, value in zip(names, result, strict=True):
+        alone = sampler.model.quantity(systems.numpy(), sampler.given, item, node)
+        assert bits(spread(node)(value)) == bits(spread(node)(alone)), item
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -174,12 +174,12 @@ def test_a_formula_that_raises_raises_the_same():
     """A drive whose links do not meet all round: in floats the root of a negative number."""
     sampler = samplers()["rapier"]
     given = sampler.model.given(systems.FLOAT, {**sampler.values, "l5": 1.4 * sampler.values["l5"]})
-    found = [
+    results = [
         alike(sampler.model, (systems.FLOAT, systems.FLOAT), given, Node(phi, switched(sampler, 0)))
         for phi in np.linspace(0.0, 6.0, 40).tolist()
     ]
-    assert [ValueError] in [each for of in found for each in of]
-    assert any(ValueError not in each for of in found for each in of)
+    assert [ValueError] in [item for of in results for item in of]
+    assert any(ValueError not in item for of in results for item in of)
 
 
 # When ---------------------------------------------------------------------------------------------------------------
@@ -187,9 +187,9 @@ def test_a_formula_that_raises_raises_the_same():
 
 def yoke(**quantities):
     """Return a machine of a model of its own, so that nothing was asked of it before."""
-    own = {"torque": CycleQuantity(lambda at: at.crank_torque), **quantities}
+    values = {"torque": CycleQuantity(lambda at: at.crank_torque), **quantities}
     rows = {"front_force": DesignRow(lambda at: at.force, event=FRONT)}
-    return JobModel(Yoke(), (INERTIA, SPRING, CLOTH), own_quantities=own, own_rows=rows)
+    return JobModel(Yoke(), (INERTIA, SPRING, CLOTH), own_quantities=values, own_rows=rows)
 
 
 @pytest.fixture
@@ -250,8 +250,8 @@ def test_numbers_made_by_hand_are_not_recorded(monkeypatch):
     sampler = Sampler(yoke(), NUMBERS)
     by_hand = Given(sampler.given.values, sampler.given.tables)
     node = Node(1.0, {"cloth": 0.0})
-    (found,) = Quantities(sampler.model, (systems.FLOAT, systems.FLOAT), by_hand)(("torque",), node)
-    assert found == sampler.model.quantity(systems.FLOAT, sampler.given, "torque", node)
+    (result,) = Quantities(sampler.model, (systems.FLOAT, systems.FLOAT), by_hand)(("torque",), node)
+    assert result == sampler.model.quantity(systems.FLOAT, sampler.given, "torque", node)
 
 
 def test_recordings_go_with_their_model(monkeypatch):

@@ -61,11 +61,11 @@ def force(angle, K1, speed, preload):
 
 @every
 def test_the_least_spring_is_the_exact_one(tmp_path, speed, preload, K1, angle, grid):
-    found = lo.solve(scene(tmp_path, speed, preload), prove=True)
-    assert found.design["K1"] == pytest.approx(K1, rel=1e-10)
-    assert math.degrees(found.figures["contact_angle"]) == pytest.approx(angle, abs=1e-5)
-    assert found.figures["travel"] == pytest.approx(0.045)
-    assert found.certificate.passed
+    answer = lo.solve(scene(tmp_path, speed, preload), prove=True)
+    assert answer.design["K1"] == pytest.approx(K1, rel=1e-10)
+    assert math.degrees(answer.figures["contact_angle"]) == pytest.approx(angle, abs=1e-5)
+    assert answer.figures["travel"] == pytest.approx(0.045)
+    assert answer.certificate.passed
 
 
 @every

@@ -49,7 +49,7 @@ def mean(vectors):
 
 def loads(pose, name, speed, gravity):
     """Return what acts on each link in the mean of its joints, and what power it takes."""
-    found, power = [], 0.0
+    result, power = [], 0.0
     for link, mass, inertia in zip(LINKS[name], MASSES, INERTIAS, strict=True):
         joints = [pose.joints[joint] for joint in LINKS[name][link]]
         place, velocity, bend = (mean([joint.at(order) for joint in joints]) for order in (0, 1, 2))
@@ -58,9 +58,9 @@ def loads(pose, name, speed, gravity):
         if link == LOADED[name][0]:
             force = Vector(force.x + LOADED[name][1][0], force.y + LOADED[name][1][1])
         couple = -inertia * rates[1] * speed**2
-        found.append(Applied(link, force, place, couple))
+        result.append(Applied(link, force, place, couple))
         power += (force.x * velocity.x + force.y * velocity.y + couple * rates[0]) * speed
-    return found, power
+    return result, power
 
 
 @pytest.mark.parametrize("gravity", [False, True])
@@ -109,7 +109,7 @@ def bars(pose, speed, inertias=None, left_out=()):
 
     inertias: link → kg·m² about its centre, of uniform bars without it; left_out: links whose −ω² s is left out.
     """
-    found, power = [], 0.0
+    result, power = [], 0.0
     for link, (mass, length) in BARS.items():
         inertia = mass * length**2 / 12 if inertias is None else inertias[link]
         centre, along = pose.links[link].point(length / 2), pose.links[link].unit()
@@ -119,9 +119,9 @@ def bars(pose, speed, inertias=None, left_out=()):
         x, y = bend.x + towards * along.x, bend.y + towards * along.y
         force = Vector(-mass * x * speed**2, -mass * y * speed**2 - mass * G)
         couple = -inertia * rates[1] * speed**2
-        found.append(Applied(link, force, centre.place, couple))
+        result.append(Applied(link, force, centre.place, couple))
         power += force.x * velocity.x + force.y * velocity.y + couple * rates[0]
-    return found, power
+    return result, power
 
 
 def test_static_four_bar_and_its_equation_of_motion():
@@ -139,8 +139,8 @@ def test_static_four_bar_and_its_equation_of_motion():
     # Printed at 1 rad/s to seven digits, right and as the program has it.
     inertias = {"crank": 0.0, "rod": 0.05, "rocker": 0.02}
     for left_out, torque in (((), 21.4194636), (("rod",), 21.4074709), (tuple(BARS), 21.4074709)):
-        found = solve_forces(linked, pose, bars(pose, 1.0, inertias, left_out)[0])
-        assert found.torque == pytest.approx(torque, abs=5e-8)
+        result = solve_forces(linked, pose, bars(pose, 1.0, inertias, left_out)[0])
+        assert result.torque == pytest.approx(torque, abs=5e-8)
 
 
 @pytest.mark.parametrize("sense", [1, -1])

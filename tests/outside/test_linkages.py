@@ -40,7 +40,7 @@ def side(row, first, second, pin):
 
 def seen(row, origin, end, joint):
     """Return where a joint lies on the line from origin to end, and to its left, m."""
-    (ox, oy), (ex, ey), (jx, jy) = (place(row, each) for each in (origin, end, joint))
+    (ox, oy), (ex, ey), (jx, jy) = (place(row, item) for item in (origin, end, joint))
     u, v, x, y = ex - ox, ey - oy, jx - ox, jy - oy
     size = math.hypot(u, v)
     return {"along": (u * x + v * y) / size, "across": (u * y - v * x) / size}

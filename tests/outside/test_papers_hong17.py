@@ -58,9 +58,9 @@ def sley():
     low, high = math.radians(40), math.radians(80)
     for _ in range(60):
         middle = (low + high) / 2
-        found = crank_rocker_synthesis.synthesise(-theta(), middle, SWING, PRINTED.l71)
-        low, high = (middle, high) if found.l3 < PRINTED.l3 else (low, middle)
-    return found
+        answer = crank_rocker_synthesis.synthesise(-theta(), middle, SWING, PRINTED.l71)
+        low, high = (middle, high) if answer.l3 < PRINTED.l3 else (low, middle)
+    return answer
 
 
 def layout():
@@ -71,8 +71,8 @@ def layout():
 
 def built():
     """Return the packaged scene on the layout in closed form, unrounded."""
-    found = layout()
-    return {"C0x": found.C0x, "C0y": found.C0y, "l5": found.reach - PRINTED.l4, "phi40": found.phi40}
+    result = layout()
+    return {"C0x": result.C0x, "C0y": result.C0y, "l5": result.reach - PRINTED.l4, "phi40": result.phi40}
 
 
 def figure(name):
@@ -139,10 +139,10 @@ def test_every_row_is_recomputed():
 
 @pytest.mark.parametrize("key", COMPUTED)
 def test_a_printed_figure_is_recomputed_and_its_verdict_follows(key):
-    row, found = ROWS[key], COMPUTED[key]()
-    assert abs(found - float(row["computed"])) <= digit(row["computed"]) * (1 + 1e-9)
+    row, result = ROWS[key], COMPUTED[key]()
+    assert abs(result - float(row["computed"])) <= digit(row["computed"]) * (1 + 1e-9)
     printed = float(row["printed"])
-    away, unit = abs(found - printed), digit(row["printed"]) * (1 + 1e-9)
+    away, unit = abs(result - printed), digit(row["printed"]) * (1 + 1e-9)
     follows = "reproduces" if away <= unit else "rounding" if away <= DRAWN * abs(printed) else "misprint"
     if row["verdict"] == "not determined":
         assert follows == "reproduces"
@@ -152,12 +152,12 @@ def test_a_printed_figure_is_recomputed_and_its_verdict_follows(key):
 
 def test_the_packaged_scene_is_what_is_printed_on_the_layout_in_closed_form():
     """Its l5, C0 and φ40 are rounded to 0.1 μm and 1e-5 deg."""
-    today, found = RAPIER.mechanism, built()
+    today, result = RAPIER.mechanism, built()
     for name in ("l1", "l2", "l3", "l71", "phi30", "l3p", "alpha", "l4", "l6", "i1", "i2", "wheel"):
         assert today[name] == pytest.approx(getattr(PRINTED, name), rel=1e-15)
     for name in ("C0x", "C0y", "l5"):
-        assert today[name] == pytest.approx(found[name], abs=5.1e-8)
-    assert math.degrees(today["phi40"]) == pytest.approx(math.degrees(found["phi40"]), abs=5.1e-6)
+        assert today[name] == pytest.approx(result[name], abs=5.1e-8)
+    assert math.degrees(today["phi40"]) == pytest.approx(math.degrees(result["phi40"]), abs=5.1e-6)
 
 
 def test_the_second_crank_stands_on_the_main_shafts_vertical_below_it():
@@ -183,8 +183,8 @@ def test_both_printed_dwells_together_fix_what_counts_as_standing_still():
     """Rounded to whole degrees both are 36 for s_dwell from 5.72 to 5.88 mm; at 6 mm the one before is 37."""
 
     def dwells(mm):
-        found = JOB.figures(RAPIER.set("operation.s_dwell", f"{mm} mm"), built())
-        return [round(math.degrees(found[name])) for name in ("dwell_after", "dwell_before")]
+        figures = JOB.figures(RAPIER.set("operation.s_dwell", f"{mm} mm"), built())
+        return [round(math.degrees(figures[name])) for name in ("dwell_after", "dwell_before")]
 
     assert [dwells(mm) for mm in (5.71, 5.73, 5.88, 5.89)] == [[35, 36], [36, 36], [36, 36], [36, 37]]
     assert dwells(6.0) == [36, 37]

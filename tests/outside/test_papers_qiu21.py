@@ -76,13 +76,13 @@ def test_every_row_is_recomputed():
 
 @pytest.mark.parametrize("key", COMPUTED)
 def test_a_printed_figure_is_recomputed_and_its_verdict_follows(key):
-    row, found = ROWS[key], COMPUTED[key]()
-    assert abs(found - float(row["computed"])) <= digit(row["computed"]) * (1 + 1e-9)
+    row, result = ROWS[key], COMPUTED[key]()
+    assert abs(result - float(row["computed"])) <= digit(row["computed"]) * (1 + 1e-9)
     if row["verdict"] == "not determined":
         assert row["printed"] == ""
         return
     printed = float(row["printed"])
-    away, unit = abs(found - printed), digit(row["printed"]) * (1 + 1e-9)
+    away, unit = abs(result - printed), digit(row["printed"]) * (1 + 1e-9)
     follows = "reproduces" if away <= unit else "rounding" if away <= READ_OFF * abs(printed) else "misprint"
     assert row["verdict"] == follows
 

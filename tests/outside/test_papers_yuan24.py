@@ -40,8 +40,8 @@ def scene(J4=0.62, M0=600.0):
 
 def static(lengths, name, J4=0.62, M0=600.0):
     """Return a figure at one position, from the program's own formulas, SI."""
-    found = registry.of(BEATUP).sampler(scene(J4, M0), design(lengths)).static
-    return min(found["mu_near"], found["mu_far"]) if name == "mu_min" else found[name]
+    result = registry.of(BEATUP).sampler(scene(J4, M0), design(lengths)).static
+    return min(result["mu_near"], result["mu_far"]) if name == "mu_min" else result[name]
 
 
 def around(lengths):
@@ -52,8 +52,8 @@ def around(lengths):
 
 def by_angles(case, l4=0.167, swing=23.08):
     theta, beta = ANGLES[case] if isinstance(case, str) else case
-    found = crank_rocker_synthesis.synthesise(math.radians(theta), math.radians(beta), math.radians(swing), l4)
-    return found.l1, found.l2, found.l3, found.l4
+    answer = crank_rocker_synthesis.synthesise(math.radians(theta), math.radians(beta), math.radians(swing), l4)
+    return answer.l1, answer.l2, answer.l3, answer.l4
 
 
 def of_table_2(case):
@@ -73,8 +73,8 @@ def torque(lengths, J4, M0):
 
 def torque_745():
     """Return M3 at M0 = 745 with the spread of the paper's own inertia torque, printed twice: 735 and 736."""
-    own = [600.0 + 135.0, 800.0 - 64.0]
-    return static(REFERENCE, "M3_fdc", M0=745.0), [745.0 - max(own), 745.0 - min(own)]
+    values = [600.0 + 135.0, 800.0 - 64.0]
+    return static(REFERENCE, "M3_fdc", M0=745.0), [745.0 - max(values), 745.0 - min(values)]
 
 
 def bends(lengths, size):
@@ -106,8 +106,8 @@ def peak_change(lengths, J4):
 
 
 def counterweight(name):
-    found = lo.evaluate(scene(), design(REFERENCE) | {"m4e": 12.4, "r4e": 0.08})
-    return found.figures[name]
+    evaluation = lo.evaluate(scene(), design(REFERENCE) | {"m4e": 12.4, "r4e": 0.08})
+    return evaluation.figures[name]
 
 
 def radius_without_eccentricity():
@@ -190,11 +190,11 @@ def test_every_row_is_recomputed():
 
 @pytest.mark.parametrize("key", COMPUTED)
 def test_a_printed_figure_is_recomputed_and_its_verdict_follows(key):
-    row, found = ROWS[key], COMPUTED[key]()
+    row, result = ROWS[key], COMPUTED[key]()
     if key == "sign_of_M_R":
-        assert (found, row["printed"], row["verdict"]) == (row["computed"], "+", "misprint")
+        assert (result, row["printed"], row["verdict"]) == (row["computed"], "+", "misprint")
         return
-    value, spread = found if isinstance(found, tuple) and len(found) == 2 else (found, [])
+    value, spread = result if isinstance(result, tuple) and len(result) == 2 else (result, [])
     values = list(value) if isinstance(value, tuple) else [value]
     computed, units = numbers(row["computed"])
     for number, expected, unit in zip(values, computed, units, strict=True):

@@ -38,13 +38,13 @@ def read(**changes):
 
 
 def test_it_is_accepted_as_wound_on_a_bench():
-    scene, found = read()
+    scene, result = read()
     stress = 8 * 26.1 * 11.1e-3 / (math.pi * 1.6e-3**3)
     assert stress == pytest.approx(180.1e6, rel=1e-3)
     strength = 2220e6 / 1.6**0.167
     index = 11.1 / 1.6
-    assert found.static[coil.MOST_INITIAL] == pytest.approx((0.135 - 0.00625 * index) * strength - stress, rel=1e-10)
-    limits = {each.name: each for each in lo.evaluate(scene).limits}
+    assert result.static[coil.MOST_INITIAL] == pytest.approx((0.135 - 0.00625 * index) * strength - stress, rel=1e-10)
+    limits = {limit.name: limit for limit in lo.evaluate(scene).limits}
     assert limits[coil.LEAST_INITIAL].ok
     assert limits[coil.MOST_INITIAL].ok
     for winding in ("shigley", "machine"):
@@ -52,28 +52,28 @@ def test_it_is_accepted_as_wound_on_a_bench():
 
 
 def test_shear_is_corrected_as_the_standard_does():
-    _, found = read()
-    index, given = 11.1 / 1.6, found.given.values
+    _, result = read()
+    index, given = 11.1 / 1.6, result.given.values
     force = given["K1"] * (given["X0"] + given["travel"])
     straight = 8 * force * 11.1e-3 / (math.pi * 1.6e-3**3)
-    assert found.static["shear_stress"] == pytest.approx((index + 0.5) / (index - 0.75) * straight, rel=1e-13)
+    assert result.static["shear_stress"] == pytest.approx((index + 0.5) / (index - 0.75) * straight, rel=1e-13)
     wahl = (4 * index - 1) / (4 * index - 4) + 0.615 / index
     assert read(factor="Wahl")[1].static["shear_stress"] == pytest.approx(wahl * straight, rel=1e-13)
 
 
 def test_free_hooks_are_not_judged_and_have_a_length_of_their_own():
-    _, found = read(hook_length="12 mm")
-    given = found.given.values
+    _, result = read(hook_length="12 mm")
+    given = result.given.values
     rate = 81500e6 * 1.6e-3**4 / (8 * 11.1e-3**3 * 21)
     stretched = given["X0"] + given["travel"] - 26.1 / rate
-    assert found.static["bending_share"] == 0.0
-    assert found.static["spring_length"] == pytest.approx(2 * 12e-3 + 22 * 1.6e-3 + stretched, rel=1e-13)
+    assert result.static["bending_share"] == 0.0
+    assert result.static["spring_length"] == pytest.approx(2 * 12e-3 + 22 * 1.6e-3 + stretched, rel=1e-13)
     assert read()[1].static["spring_length"] == pytest.approx(2 * 9.5e-3 + 22 * 1.6e-3 + stretched, rel=1e-13)
 
 
 def test_a_band_of_the_initial_tension_stands_for_the_windings():
-    _, found = read(winding="shigley", initial_tension={"min": "20 N", "max": "30 N"})
+    _, result = read(winding="shigley", initial_tension={"min": "20 N", "max": "30 N"})
     per_force = 8 * 11.1e-3 / (math.pi * 1.6e-3**3)
-    assert found.given.values["coil.initial_tension"] == 25.0
+    assert result.given.values["coil.initial_tension"] == 25.0
     for row in (coil.LEAST_INITIAL, coil.MOST_INITIAL):
-        assert found.static[row] == pytest.approx(5.0 * per_force, rel=1e-12)
+        assert result.static[row] == pytest.approx(5.0 * per_force, rel=1e-12)

@@ -26,7 +26,7 @@ def load(name, value, acts="output"):
 
 
 def given(*loads):
-    return Given({}, {each.name: {} for each in loads})
+    return Given({}, {item.name: {} for item in loads})
 
 
 def test_the_output_force_is_the_sum_of_output_terms_alone():
@@ -101,6 +101,8 @@ def test_velocity_and_acceleration_of_the_output(omega_dot, acceleration):
 def test_terms_come_in_the_order_of_the_loads_with_their_numbers():
     loads = (INERTIA, RESISTANCE)
     numbers = Given({"s": 0.0, "M0": 745.0, "beta": 1.2}, {"inertia": {"J4": 0.62}, "resistance": {"pulse": 0.52}})
-    found = [(each.name, term) for each, term in balance.terms(systems.FLOAT, loads, POSE, numbers, {"resistance": 1})]
-    assert found == [("inertia", 0.62 * -0.3 * 60.0**2), ("resistance", pytest.approx(745.0 * math.cos(0)))]
+    results = [
+        (item.name, term) for item, term in balance.terms(systems.FLOAT, loads, POSE, numbers, {"resistance": 1})
+    ]
+    assert results == [("inertia", 0.62 * -0.3 * 60.0**2), ("resistance", pytest.approx(745.0 * math.cos(0)))]
     assert list(balance.terms(systems.FLOAT, (), POSE, NOTHING, {})) == []

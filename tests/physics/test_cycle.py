@@ -47,13 +47,13 @@ def far_apart(angles, least=1e-6):
 @REPEATABLE
 def test_pieces_cover_one_turn_and_begin_at_the_corners_in_order(a, b, c, d):
     assume(far_apart((a, b, c, d)))
-    found = split((a, b), (c, d))
-    assert found.pieces == 4
-    assert np.all(np.diff(found.starts) > 0)
-    assert found.starts[-1] - found.starts[0] == pytest.approx(TURN, rel=1e-15)
+    parts = split((a, b), (c, d))
+    assert parts.pieces == 4
+    assert np.all(np.diff(parts.starts) > 0)
+    assert parts.starts[-1] - parts.starts[0] == pytest.approx(TURN, rel=1e-15)
     for angle in (a, b, c, d):
-        assert np.min(np.abs((found.starts - angle + math.pi) % TURN - math.pi)) < 1e-14
-    for start, (index, turns) in zip(found.starts, found.order, strict=False):
+        assert np.min(np.abs((parts.starts - angle + math.pi) % TURN - math.pi)) < 1e-14
+    for start, (index, turns) in zip(parts.starts, parts.order, strict=False):
         assert start == (a, b, c, d)[index] + TURN * turns
 
 
@@ -61,10 +61,10 @@ def test_pieces_cover_one_turn_and_begin_at_the_corners_in_order(a, b, c, d):
 @REPEATABLE
 def test_every_switch_holds_all_over_its_piece(a, b, c, d):
     assume(far_apart((a, b, c, d)))
-    found = split((a, b), (c, d))
+    parts = split((a, b), (c, d))
     for piece, share in itertools.product(range(4), (1e-3, 0.3, 0.999)):
-        angle = found.starts[piece] * (1 - share) + found.starts[piece + 1] * share
-        assert tuple(found.switches[piece]) == (arc(angle, (a, b)), 0.0, arc(angle, (c, d)))
+        angle = parts.starts[piece] * (1 - share) + parts.starts[piece + 1] * share
+        assert tuple(parts.switches[piece]) == (arc(angle, (a, b)), 0.0, arc(angle, (c, d)))
 
 
 @given(corner_angles, corner_angles, corner_angles, corner_angles, st.floats(0, 1))
@@ -74,12 +74,12 @@ def test_a_node_is_an_affine_function_of_the_corners(a, b, c, d, u):
     assume(far_apart((a, b, c, d), 1e-2))
     corners = np.array([a, b, c, d])
     moved = corners + np.array([0.001, -0.002, 0.003, -0.001])
-    found, after = split(corners[:2], corners[2:]), split(moved[:2], moved[2:])
+    result, after = split(corners[:2], corners[2:]), split(moved[:2], moved[2:])
     symbols = ca.SX.sym("corner", 4)
     for piece in range(4):
-        offset, coefficients = found.coefficients(piece, u, 4)
+        offset, coefficients = result.coefficients(piece, u, 4)
         assert math.fsum(coefficients) == pytest.approx(1.0, rel=1e-15)
-        here = float(found.angles(np.array([piece]), np.array([u]))[0])
+        here = float(result.angles(np.array([piece]), np.array([u]))[0])
         assert cycle.node_angle(offset, coefficients, list(corners)) == pytest.approx(here, rel=0, abs=1e-13)
         there = cycle.node_angle(offset, coefficients, ca.vertsplit(symbols))
         value = float(ca.Function("f", [symbols], [there])(moved))
@@ -91,71 +91,71 @@ def test_a_node_is_an_affine_function_of_the_corners(a, b, c, d, u):
 @REPEATABLE
 def test_nodes_at_crank_angles_are_found_alone_and_together(a, b, c, d, angles):
     assume(far_apart((a, b, c, d)))
-    found = split((a, b), (c, d))
-    pieces, u = found.located(np.array(angles))
+    parts = split((a, b), (c, d))
+    pieces, u = parts.located(np.array(angles))
     assert np.all((u >= 0.0) & (u <= 1.0))
-    back = found.angles(pieces, u)
+    back = parts.angles(pieces, u)
     for k, angle in enumerate(angles):
         assert math.remainder(back[k] - angle, TURN) == pytest.approx(0.0, abs=1e-13)
-        assert found.place(angle) == (pieces[k], u[k])
+        assert parts.place(angle) == (pieces[k], u[k])
 
 
 def test_switches_are_read_by_name_on_one_piece_or_several():
-    found = split((0.5, 2.0), (1.0, 5.0))
-    assert found.switch(0) == {"first": 1.0, "plain": 0.0, "second": 0.0}
-    several = found.switch(np.array([0, 1, 3]))
+    parts = split((0.5, 2.0), (1.0, 5.0))
+    assert parts.switch(0) == {"first": 1.0, "plain": 0.0, "second": 0.0}
+    several = parts.switch(np.array([0, 1, 3]))
     assert {name: list(values) for name, values in several.items()} == {
         "first": [1.0, 1.0, 0.0],
         "plain": [0.0, 0.0, 0.0],
         "second": [0.0, 1.0, 0.0],
     }
-    assert list(found.on(("second", 1.0))) == [False, True, True, False]
-    assert list(found.on(None)) == [True] * 4
+    assert list(parts.on(("second", 1.0))) == [False, True, True, False]
+    assert list(parts.on(None)) == [True] * 4
 
 
 @given(corner_angles, corner_angles, corner_angles, corner_angles)
 @REPEATABLE
 def test_pieces_begin_in_another_number_system_where_they_do_in_floats(a, b, c, d):
     assume(far_apart((a, b, c, d)))
-    found = split((a, b), (c, d))
-    assert found.begins((a, b, c, d), math.pi) == pytest.approx(list(found.starts), rel=1e-15, abs=1e-14)
+    parts = split((a, b), (c, d))
+    assert parts.begins((a, b, c, d), math.pi) == pytest.approx(list(parts.starts), rel=1e-15, abs=1e-14)
     symbols = ca.SX.sym("corner", 4)
-    begins = ca.Function("f", [symbols], [ca.vertcat(*found.begins(ca.vertsplit(symbols), math.pi))])
-    assert np.asarray(begins([a, b, c, d])).ravel() == pytest.approx(found.starts, rel=1e-15, abs=1e-14)
+    begins = ca.Function("f", [symbols], [ca.vertcat(*parts.begins(ca.vertsplit(symbols), math.pi))])
+    assert np.asarray(begins([a, b, c, d])).ravel() == pytest.approx(parts.starts, rel=1e-15, abs=1e-14)
     assert cycle.split((), (), lambda angle: ()).begins((), math.pi) == [0.0, TURN]
 
 
 def test_a_corner_is_the_end_of_one_piece_and_the_start_of_the_next():
-    found = split((0.5, 2.0), (1.0, 5.0))
-    ends = found.angles(np.arange(4), np.ones(4))
-    starts = found.angles(np.arange(4), np.zeros(4))
+    parts = split((0.5, 2.0), (1.0, 5.0))
+    ends = parts.angles(np.arange(4), np.ones(4))
+    starts = parts.angles(np.arange(4), np.zeros(4))
     assert ends[:-1] == pytest.approx(starts[1:], rel=1e-15)
     assert ends[-1] == pytest.approx(starts[0] + TURN, rel=1e-15)
 
 
 def test_without_corners_the_cycle_is_one_piece():
-    found = cycle.split((), ("plain",), lambda angle: (0.0,))
-    assert (found.pieces, found.order) == (1, ())
-    assert list(found.starts) == [0.0, TURN]
-    offset, coefficients = found.coefficients(0, 0.25, 0)
+    parts = cycle.split((), ("plain",), lambda angle: (0.0,))
+    assert (parts.pieces, parts.order) == (1, ())
+    assert list(parts.starts) == [0.0, TURN]
+    offset, coefficients = parts.coefficients(0, 0.25, 0)
     assert (offset, list(coefficients)) == (TURN / 4, [])
-    assert found.piece_before(1.0) == 0
+    assert parts.piece_before(1.0) == 0
 
 
 @pytest.mark.parametrize("turns", [-2, 0, 3])
 def test_the_piece_before_a_corner_ends_there_whatever_the_turn(turns):
-    found = split((0.5, 2.0), (1.0, 5.0))
+    parts = split((0.5, 2.0), (1.0, 5.0))
     for corner in (0.5, 1.0, 2.0, 5.0):
-        piece = found.piece_before(corner + turns * TURN)
-        assert math.remainder(found.starts[piece + 1] - corner, TURN) == pytest.approx(0, abs=1e-12)
-        inside = found.piece_before(corner + 0.2 + turns * TURN)
-        assert math.remainder(found.starts[inside] - corner, TURN) == pytest.approx(0, abs=1e-12)
+        piece = parts.piece_before(corner + turns * TURN)
+        assert math.remainder(parts.starts[piece + 1] - corner, TURN) == pytest.approx(0, abs=1e-12)
+        inside = parts.piece_before(corner + 0.2 + turns * TURN)
+        assert math.remainder(parts.starts[inside] - corner, TURN) == pytest.approx(0, abs=1e-12)
 
 
 def test_touching_corners_leave_a_piece_of_no_width_and_no_nonsense():
-    found = split((0.5, 2.0), (2.0, 5.0))
-    assert np.sort(np.diff(found.starts))[0] == 0.0
-    assert found.pieces == 4
+    parts = split((0.5, 2.0), (2.0, 5.0))
+    assert np.sort(np.diff(parts.starts))[0] == 0.0
+    assert parts.pieces == 4
 
 
 FRICTION = BEATUP.with_effect("bearing_friction")
@@ -173,9 +173,9 @@ def test_curves_show_both_values_of_every_corner_and_friction_jumps_at_the_dead_
     given_ = sampler(FRICTION).given.values
     front, rear = given_["beta"], math.pi + given_["beta_r"]
     half = math.radians(29.8) / 2
-    found = at_corners(FRICTION, "M3 [N*m]")
-    assert sorted(found) == pytest.approx(sorted([front - half, front, front + half, rear]), rel=1e-14)
-    jumps = {angle: before - after for angle, (before, after) in found.items()}
+    result = at_corners(FRICTION, "M3 [N*m]")
+    assert sorted(result) == pytest.approx(sorted([front - half, front, front + half, rear]), rel=1e-14)
+    jumps = {angle: before - after for angle, (before, after) in result.items()}
     assert jumps.pop(min(jumps, key=lambda angle: abs(angle - front))) == pytest.approx(4.0, rel=1e-10)
     assert jumps.pop(min(jumps, key=lambda angle: abs(angle - rear))) == pytest.approx(-4.0, rel=1e-10)
     assert list(jumps.values()) == pytest.approx([0, 0], abs=1e-9)

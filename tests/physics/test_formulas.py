@@ -31,16 +31,16 @@ EFFECT_FILES = sorted(
 
 def offences(node):
     """Return what stands in a piece of code and must not stand in a formula."""
-    found = []
+    results = []
     for part in ast.walk(node):
         if isinstance(part, FORBIDDEN_NODES):
-            found.append(f"line {part.lineno if hasattr(part, 'lineno') else '?'}: {type(part).__name__}")
+            results.append(f"line {part.lineno if hasattr(part, 'lineno') else '?'}: {type(part).__name__}")
         name = getattr(part, "id", getattr(part, "attr", None))
         if isinstance(part, ast.Name | ast.Attribute) and name in FORBIDDEN_NAMES:
-            found.append(f"line {part.lineno}: {name}")
+            results.append(f"line {part.lineno}: {name}")
         if isinstance(part, ast.Constant) and isinstance(part.value, float) and not part.value.is_integer():
-            found.append(f"line {part.lineno}: {part.value}")
-    return found
+            results.append(f"line {part.lineno}: {part.value}")
+    return results
 
 
 def functions(tree):
@@ -69,8 +69,8 @@ def asks_the_scene(test):
     if isinstance(kind, ast.In | ast.NotIn) and ast.unparse(right) in ("own", "at.table"):
         return True
     word = left if isinstance(kind, ast.In | ast.NotIn) else right
-    asked = isinstance(kind, ast.In | ast.NotIn | ast.Eq | ast.NotEq)
-    return asked and isinstance(getattr(word, "value", None), str)
+    request = isinstance(kind, ast.In | ast.NotIn | ast.Eq | ast.NotEq)
+    return request and isinstance(getattr(word, "value", None), str)
 
 
 def reads_inputs(function):
@@ -83,23 +83,23 @@ def without_structure(node):
     """Return a function without what asks how the scene is built."""
 
     class Structure(ast.NodeTransformer):
-        def visit_ImportFrom(self, found):
+        def visit_ImportFrom(self, result):
             return None  # of what only scenes that call for it import
 
-        def visit_Assert(self, found):
-            return None if asks_the_scene(found.test) else found
+        def visit_Assert(self, result):
+            return None if asks_the_scene(result.test) else result
 
-        def visit_If(self, found):
-            self.generic_visit(found)
-            return [*found.body, *found.orelse] if asks_the_scene(found.test) else found
+        def visit_If(self, result):
+            self.generic_visit(result)
+            return [*result.body, *result.orelse] if asks_the_scene(result.test) else result
 
-        def visit_comprehension(self, found):
-            found.ifs = [test for test in found.ifs if not asks_the_scene(test)]
-            return self.generic_visit(found)
+        def visit_comprehension(self, result):
+            result.ifs = [test for test in result.ifs if not asks_the_scene(test)]
+            return self.generic_visit(result)
 
-        def visit_IfExp(self, found):
-            self.generic_visit(found)
-            return ast.Tuple([found.body, found.orelse], ast.Load()) if asks_the_scene(found.test) else found
+        def visit_IfExp(self, result):
+            self.generic_visit(result)
+            return ast.Tuple([result.body, result.orelse], ast.Load()) if asks_the_scene(result.test) else result
 
     return Structure().visit(node)
 
@@ -142,9 +142,9 @@ def test_formulas_of_the_dyad_hold_no_branch(name):
 
 @pytest.mark.parametrize("file", NOT_FORMULAS)
 def test_formulas_of_the_crank_rocker_hold_no_branch(file):
-    found = functions(read("mechanisms", file))
-    assert found.keys() > NOT_FORMULAS[file]
-    assert {name: offences(found[name]) for name in found.keys() - NOT_FORMULAS[file] if offences(found[name])} == {}
+    result = functions(read("mechanisms", file))
+    assert result.keys() > NOT_FORMULAS[file]
+    assert {name: offences(result[name]) for name in result.keys() - NOT_FORMULAS[file] if offences(result[name])} == {}
 
 
 @pytest.mark.parametrize("name", ["_under", "_critical", "_over", "constants"])
@@ -158,8 +158,8 @@ NO_FORMULAS = ("shedding/separation.py", "beatup/shaft_torsion.py")
 
 @pytest.mark.parametrize("file", EFFECT_FILES)
 def test_formulas_of_an_effect_hold_no_branch(file):
-    found = functions(read("effects", file))
-    formulas = {name: node for name, node in found.items() if name not in IN_FLOATS and reads_inputs(node)}
+    result = functions(read("effects", file))
+    formulas = {name: node for name, node in result.items() if name not in IN_FLOATS and reads_inputs(node)}
     assert formulas or file in NO_FORMULAS
     for name, node in formulas.items():
         assert not offences(without_structure(node)), name

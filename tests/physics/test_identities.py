@@ -80,10 +80,10 @@ def in_scene(names, numbers):
 
 def torques(names, numbers, phi, rod="exact", omega_dot=None, system=systems.FLOAT):
     """Return M3 and Md of the product at a crank angle, rad."""
-    found, numbers = model(names, rod), in_scene(names, numbers)
-    given_ = found.given(system, {name: system.number(value) for name, value in numbers.items()})
-    plain = found.given(systems.FLOAT, numbers)
-    cornered = {load.name: load for load in found.loads if load.corners}
+    result, numbers = model(names, rod), in_scene(names, numbers)
+    given_ = result.given(system, {name: system.number(value) for name, value in numbers.items()})
+    plain = result.given(systems.FLOAT, numbers)
+    cornered = {load.name: load for load in result.loads if load.corners}
     corners = {
         name: load.corners(Inputs(systems.FLOAT, plain.values, plain.tables[name], None))
         for name, load in cornered.items()
@@ -92,7 +92,7 @@ def torques(names, numbers, phi, rod="exact", omega_dot=None, system=systems.FLO
     angle = system.number(phi)
     lengths = beatup.shared_linkage(given_).lengths
     pose = ReedMotion(angle, given_.values["speed"], crank_rocker.CrankRockerPose(system, lengths, angle), omega_dot)
-    arguments = (system, found.loads, pose, given_, switches)
+    arguments = (system, result.loads, pose, given_, switches)
     return balance.output_force(*arguments), balance.crank_torque(*arguments)
 
 
@@ -131,42 +131,42 @@ class Machine:
             "rocker_inertia": n["rocker_inertia.J3"],
             "counterweight_inertia": n["counterweight_inertia.JS"],
         }
-        found = sum(inertia[name] for name in self.names if name in inertia) * psi**2 / 2
+        result = sum(inertia[name] for name in self.names if name in inertia) * psi**2 / 2
         if "rod_inertia" in self.names and self.rod == "lumped":
             at_c = n["rod_inertia.m2"] * n["rod_inertia.s2"] / n["today.l2"]
-            found += at_c * (cx**2 + cy**2) / 2 + (n["rod_inertia.m2"] - at_c) * (bx**2 + by**2) / 2
+            result += at_c * (cx**2 + cy**2) / 2 + (n["rod_inertia.m2"] - at_c) * (bx**2 + by**2) / 2
         elif "rod_inertia" in self.names:
-            found += n["rod_inertia.m2"] * (sx**2 + sy**2) / 2 + n["rod_inertia.JS2"] * rod**2 / 2
+            result += n["rod_inertia.m2"] * (sx**2 + sy**2) / 2 + n["rod_inertia.JS2"] * rod**2 / 2
         if "gravity" in self.names:
             direction = self.positions(phi)[2] + n["gravity.offset"] + n["gravity.tilt"]
             heights = n["m4"] * n["r4"] * MP.sin(direction) + n["m4e"] * n["r4e"] * MP.sin(direction + MP.pi)
-            found += MP.mpf("9.80665") * (heights + self.lifted(phi))
-        return found
+            result += MP.mpf("9.80665") * (heights + self.lifted(phi))
+        return result
 
     def lifted(self, phi):
         """Return mass times height of crank, rocker and rod, kg·m; of the two of an effect only where it is on."""
         n, tilt = self.number, self.number["gravity.tilt"]
         psi, _, *_, x, y = self.state(phi)
-        found = n["crank.mass"] * n["crank.centre"] * MP.sin(MP.mpf(phi) + tilt)
+        result = n["crank.mass"] * n["crank.centre"] * MP.sin(MP.mpf(phi) + tilt)
         if "rocker_inertia" in self.names:
-            found += n["rocker_inertia.m3"] * n["rocker_inertia.s3"] * MP.sin(psi + tilt)
+            result += n["rocker_inertia.m3"] * n["rocker_inertia.s3"] * MP.sin(psi + tilt)
         if "rod_inertia" in self.names:
-            found += n["rod_inertia.m2"] * (x * MP.sin(tilt) + y * MP.cos(tilt))
-        return found
+            result += n["rod_inertia.m2"] * (x * MP.sin(tilt) + y * MP.cos(tilt))
+        return result
 
     def losses(self, phi):
         """Return the power that leaves the machine, W: friction's heat, and the cloth's resistance times its motion."""
-        n, found = self.number, MP.mpf(0)
+        n, result = self.number, MP.mpf(0)
         psi_dot = self.rates(phi)[0] * n["speed"]
         if "bearing_friction" in self.names:
-            found += n["bearing_friction.coulomb"] * abs(psi_dot) + n["bearing_friction.viscous"] * psi_dot**2
+            result += n["bearing_friction.coulomb"] * abs(psi_dot) + n["bearing_friction.viscous"] * psi_dot**2
         if "resistance" in self.names:
             beta = self.stretched()
             away = abs(phi - beta - 2 * MP.pi * MP.nint((phi - beta) / (2 * MP.pi)))
             inside = away < n["resistance.pulse"] / 2
             resistance = n["M0"] * MP.cos(MP.pi * away / n["resistance.pulse"]) if inside else 0
-            found -= resistance * psi_dot  # the cloth pushes toward +ψ, and so gives power where ψ grows
-        return found
+            result -= resistance * psi_dot  # the cloth pushes toward +ψ, and so gives power where ψ grows
+        return result
 
     def stretched(self):
         l1, l2, l3, l4 = (self.number[f"l{k}"] for k in (1, 2, 3, 4))
@@ -206,14 +206,14 @@ def cycle_of(names, lengths, rod, points=512):
 @pytest.mark.parametrize("lengths", LINKAGES)
 @pytest.mark.parametrize("names", [CONSERVATIVE, *((name,) for name in CONSERVATIVE)], ids=" ".join)
 def test_without_cloth_and_friction_the_crank_does_no_work_over_a_cycle(names, lengths, rod):
-    found = cycle_of(names, lengths, rod)
-    assert abs(np.mean(found)) <= 1e-12 * math.sqrt(np.mean(found**2))
+    result = cycle_of(names, lengths, rod)
+    assert abs(np.mean(result)) <= 1e-12 * math.sqrt(np.mean(result**2))
 
 
 def test_thirty_two_angles_suffice_for_the_papers_machine():
     """The trapezoid rule converges spectrally on a smooth cycle."""
-    found = cycle_of(CONSERVATIVE, LINKAGES[0], "exact", 32)
-    assert abs(np.mean(found)) <= 1e-12 * math.sqrt(np.mean(found**2))
+    result = cycle_of(CONSERVATIVE, LINKAGES[0], "exact", 32)
+    assert abs(np.mean(result)) <= 1e-12 * math.sqrt(np.mean(result**2))
 
 
 def test_friction_turns_the_work_of_a_cycle_into_heat():
@@ -304,8 +304,8 @@ def test_crank_torque_is_lagranges_also_when_the_speed_changes(names, rod):
 
         size = max(abs(torques(names, numbers, k * TURN / 24, rod, omega_dot)[1]) for k in range(24))
         for rate in (None, 0.0, omega_dot):
-            found = torques(names, numbers, phi, rod, rate)[1]
-            assert found == pytest.approx(expected(rate or 0.0), rel=0, abs=1e-12 * size)
+            result = torques(names, numbers, phi, rod, rate)[1]
+            assert result == pytest.approx(expected(rate or 0.0), rel=0, abs=1e-12 * size)
         steady, fast = (torques(names, numbers, phi, rod, rate)[1] for rate in (0.0, 2000.0))
         Je = (expected(2000.0) - expected(0.0)) / 2000.0
         assert (fast - steady) / 2000.0 == pytest.approx(Je, rel=0, abs=1e-12 * size / abs(omega_dot))

@@ -25,9 +25,9 @@ def balanced(random):
     """Return a random crank-rocker of any size with its centres of mass."""
     swing = math.radians(random.uniform(5, 60))
     theta, beta = random.uniform(-0.2, 0.2) * swing, math.radians(random.uniform(15, 80))
-    found = crank_rocker_synthesis.synthesise(theta, beta, swing, 10 ** random.uniform(-2, 1))
-    lengths = {name: getattr(found, name) for name in ("l1", "l2", "l3", "l4")}
-    radii = {name: random.uniform(0.1, 1.0) * found.l4 for name in ("r4", "r4e")}
+    answer = crank_rocker_synthesis.synthesise(theta, beta, swing, 10 ** random.uniform(-2, 1))
+    lengths = {name: getattr(answer, name) for name in ("l1", "l2", "l3", "l4")}
+    radii = {name: random.uniform(0.1, 1.0) * answer.l4 for name in ("r4", "r4e")}
     return lengths | radii | {"m4": random.uniform(1, 1000), "m4e": random.choice([0.0, 12.3456789])}
 
 
@@ -56,11 +56,11 @@ RANDOM = {"beatup": balanced, "rapier": driven, "shedding": lifted}
 
 def drawings(job):
     """Yield drawings of random machines of a job: as many as were asked for that assemble."""
-    random, scene, found = np.random.default_rng(7), lo.load(job), 0
-    while found < MACHINES:
+    random, scene, result = np.random.default_rng(7), lo.load(job), 0
+    while result < MACHINES:
         try:
             yield outputs.drawing(scene, RANDOM[job](random), outputs.DrawnSubject("a machine of random numbers"))
-            found += 1
+            result += 1
         except (BadInput, ValueError):
             continue
 
@@ -69,9 +69,9 @@ def drawings(job):
 @pytest.mark.parametrize("name", NAMES)
 def test_drawings_of_packaged_scenes_are_clear_today_and_solved(name):
     scene, solved = lo.load(name), references.design(name)
-    found = outputs.describe_design(lo.evaluate(scene, solved).result, scene.schema.default_target, "optimal")
-    for design, said in (({}, outputs.DrawnSubject("today's machine")), (solved, found)):
-        assert clear.faults_of(outputs.drawing(scene, design, said)) == []
+    result = outputs.describe_design(lo.evaluate(scene, solved).result, scene.schema.default_target, "optimal")
+    for design, message in (({}, outputs.DrawnSubject("today's machine")), (solved, result)):
+        assert clear.faults_of(outputs.drawing(scene, design, message)) == []
 
 
 @pytest.mark.few(1)
@@ -98,8 +98,8 @@ def test_every_label_stands_near_its_thing_or_has_a_line_to_it(name):
     for text in (p for p in drawn.primitives if isinstance(p, Text)):
         box = text_box(text, h)
         wide = (box.left - room, box.bottom - room, box.right + room, box.top + room)
-        led = any(math.dist(box.nearest(*tip), tip) < 0.2 * h for tip in tips)
-        assert led or clear.meets(wide, lines).any(), text.text
+        leader = any(math.dist(box.nearest(*tip), tip) < 0.2 * h for tip in tips)
+        assert leader or clear.meets(wide, lines).any(), text.text
 
 
 LINK = Line("frame", (Point(0.0, 0.0), Point(1.0, 1.0)))
@@ -125,9 +125,9 @@ def test_a_made_up_overlap_is_found(texts, fault):
 
 
 def test_a_text_beside_the_sheet_is_found():
-    beside = shown(Text("notes", Point(1.5, 0.0), "l1"))
-    assert clear.faults(beside, clear.paper(SMALL)) == ["'l1' lies beside the sheet"]
-    assert clear.faults(beside, clear.paper(beside)) == []
+    neighbour = shown(Text("notes", Point(1.5, 0.0), "l1"))
+    assert clear.faults(neighbour, clear.paper(SMALL)) == ["'l1' lies beside the sheet"]
+    assert clear.faults(neighbour, clear.paper(neighbour)) == []
 
 
 def test_a_text_moved_onto_a_link_of_a_real_drawing_is_found():

@@ -22,8 +22,8 @@ class PointTable(Table):
 
 
 def force(at):
-    found = at.table["m"] * at.table["at"] ** 2 * at.pose.acceleration
-    return found + sum(at.table[key] for key in ("J4", "phi") if key in at.table)
+    result = at.table["m"] * at.table["at"] ** 2 * at.pose.acceleration
+    return result + sum(at.table[key] for key in ("J4", "phi") if key in at.table)
 
 
 MASS = Load(name="mass", summary="a mass", table=PointTable, rank=15, acts="output", force=force, many=True)
@@ -46,7 +46,7 @@ def written(monkeypatch):
 
     def of(**tables):
         scene = lo.load("beatup").update({f"effects.{name}": table for name, table in tables.items()})
-        return {each.name: each for each in scene.equations()}
+        return {equation.name: equation for equation in scene.equations()}
 
     return of
 
@@ -57,7 +57,7 @@ def right(equation):
 
 
 def names(equation):
-    return {str(each) for each in right(equation).free_symbols}
+    return {str(free_symbol) for free_symbol in right(equation).free_symbols}
 
 
 def test_a_key_that_is_not_given_is_not_written(written):
@@ -67,19 +67,19 @@ def test_a_key_that_is_not_given_is_not_written(written):
 
 def test_no_two_numbers_share_a_symbol(written):
     """J4 is the reed's, phi the crank's angle, and each instance has numbers of its own."""
-    found = written(
+    result = written(
         single={"m": "1 kg", "J4": "2 kg", "phi": "3 mm"},
         mass={"rod": {"m": "1 kg", "J4": "2 kg"}, "rocker": {"m": "1 kg"}},
     )
-    assert names(found["inertia"]) >= {"J4", "m4e", "r4e"}
-    assert names(found["mass.rod"]) == {"rod_m", "rod_at", "rod_J4", "omega", "q2"}
-    assert names(found["mass.rocker"]) == {"rocker_m", "rocker_at", "omega", "q2"}
-    assert names(found["single"]) == {"m", "at", "J4_single", "phi_single", "omega", "q2"}
-    assert names(found["balance"]) >= {"M_mass_rod", "M_mass_rocker", "M_single"}
+    assert names(result["inertia"]) >= {"J4", "m4e", "r4e"}
+    assert names(result["mass.rod"]) == {"rod_m", "rod_at", "rod_J4", "omega", "q2"}
+    assert names(result["mass.rocker"]) == {"rocker_m", "rocker_at", "omega", "q2"}
+    assert names(result["single"]) == {"m", "at", "J4_single", "phi_single", "omega", "q2"}
+    assert names(result["balance"]) >= {"M_mass_rod", "M_mass_rocker", "M_single"}
 
 
 def test_names_with_dots_are_read_back_and_drawn(written):
-    found = written(dots={}, mass={"rod": {"m": "1 kg"}})
-    assert found["dots"].text == "mu_x = l2 + l3"
-    assert found["dots"].latex == r"\mathrm{mu\ x} = l_{2} + l_{3}"
-    assert r"M_{\mathrm{mass\ rod}} =" in found["mass.rod"].latex
+    result = written(dots={}, mass={"rod": {"m": "1 kg"}})
+    assert result["dots"].text == "mu_x = l2 + l3"
+    assert result["dots"].latex == r"\mathrm{mu\ x} = l_{2} + l_{3}"
+    assert r"M_{\mathrm{mass\ rod}} =" in result["mass.rod"].latex

@@ -47,19 +47,19 @@ def test_powers_follow_primes_and_are_not_lost_among_them():
 
 @pytest.mark.parametrize(("sign", "written"), [("=", "="), ("<=", r"\le"), (">=", r"\ge")])
 def test_a_relation_keeps_its_sign_in_both_and_its_words_in_both(sign, written):
-    found = relation("limit", A, sign, B, "in the dwells")
-    assert found.text == f"a {sign} b_2 in the dwells"
-    assert found.latex == rf"a {written} b_{{2}}\quad \text{{in the dwells}}"
+    result = relation("limit", A, sign, B, "in the dwells")
+    assert result.text == f"a {sign} b_2 in the dwells"
+    assert result.latex == rf"a {written} b_{{2}}\quad \text{{in the dwells}}"
     assert relation("limit", A, sign, B).text == f"a {sign} b_2"
 
 
 def test_one_case_is_an_equation_and_several_say_where_each_holds():
     assert cases("term", A, [(B, "always")]) == equation("term", A, B)
-    found = cases("term", A, [(B, (0, PHI, sp.pi)), ("not known", "in the dwells")])
-    assert found.text == "a = b_2 for 0 <= phi <= pi, not known in the dwells"
-    assert found.latex.count(r"\\") == 1
-    assert found.latex.count("&") == 2
-    assert r"\text{not known} & \text{in the dwells}" in found.latex
+    result = cases("term", A, [(B, (0, PHI, sp.pi)), ("not known", "in the dwells")])
+    assert result.text == "a = b_2 for 0 <= phi <= pi, not known in the dwells"
+    assert result.latex.count(r"\\") == 1
+    assert result.latex.count("&") == 2
+    assert r"\text{not known} & \text{in the dwells}" in result.latex
 
 
 def test_rates_of_a_loop_are_its_derivatives():

@@ -26,7 +26,7 @@ def told(scene):
 def test_forces_are_told_at_front_dead_centre_and_at_their_peaks():
     forces = told(SCENE)
     assert [(force.joint, bool(force.event)) for force in forces] == [
-        (pin, own) for own in (True, False) for pin in "ABCD"
+        (pin, entry) for entry in (True, False) for pin in "ABCD"
     ]
     for force in forces:
         if force.event:
@@ -46,10 +46,10 @@ def test_arrows_point_as_the_forces_do_and_are_as_long_as_they_are_large():
     shafts = [part.points for part in lines if len(part.points) == 2]
     shown = [force for force in forces if force.size > force_arrows.LEAST * largest]
     assert len(shafts) == len(shown) == 5
-    for (one, other), force in zip(shafts, shown, strict=True):
+    for (item, other), force in zip(shafts, shown, strict=True):
         length = force_arrows.LONGEST * drawing.height * force.size / largest
-        assert math.dist(one, other) == pytest.approx(length, rel=1e-12)
-        assert math.atan2(other.y - one.y, other.x - one.x) == pytest.approx(math.atan2(force.y, force.x), abs=1e-12)
+        assert math.dist(item, other) == pytest.approx(length, rel=1e-12)
+        assert math.atan2(other.y - item.y, other.x - item.x) == pytest.approx(math.atan2(force.y, force.x), abs=1e-12)
     texts = [part.text for part in drawing.primitives if part.layer == "forces" and isinstance(part, Text)]
     assert "FC = 65.69 N" in texts
     assert "FC = 4957 N at 51.02°" in texts
@@ -84,7 +84,7 @@ def test_every_job_draws_its_pins_at_their_peaks_and_no_label_runs_into_anything
     assert clear.faults_of(drawing) == []
     pins = {"roller_force": "C", "cam_shaft_force": "A", "lever_pivot_force": "B"} if name == "shedding" else {}
     if not pins:
-        pins = {each: each.removeprefix("force_") for each in figures if each.startswith("force_")}
+        pins = {figure: figure.removeprefix("force_") for figure in figures if figure.startswith("force_")}
     peaks = {text.split(" at ")[0] for text in texts_of(drawing) if " at " in text}
     assert peaks == {f"F{joint} = {scene.show(figures[force], 'force', 4)}" for force, joint in pins.items()}
     assert len(texts_of(drawing)) == len(peaks) * (1 if name == "shedding" else 2), "the shed's least force is negative"

@@ -26,9 +26,9 @@ def at(moving, joint):
 def test_links_are_stiff_and_every_joint_closes_its_turn(name):
     moving, _ = motion(name)
     assert len(moving.angles) == POSES
-    for one, other in moving.links:
-        long = np.hypot(*(at(moving, one) - at(moving, other)).T)
-        assert np.ptp(long) <= ROUNDED * long.max(), (one, other)
+    for item, other in moving.links:
+        long = np.hypot(*(at(moving, item) - at(moving, other)).T)
+        assert np.ptp(long) <= ROUNDED * long.max(), (item, other)
     for joint, points in moving.joints.items():
         steps = np.hypot(*(points - np.roll(points, 1, axis=0)).T)
         assert steps[0] <= 3 * steps[1:].max(), joint
@@ -40,8 +40,8 @@ def test_links_are_stiff_and_every_joint_closes_its_turn(name):
 )
 def test_a_link_is_as_long_as_the_scene_says(name, link, length):
     moving, scene = motion(name)
-    one, other = (at(moving, joint) for joint in link)
-    assert np.hypot(*(one - other).T) == pytest.approx(scene.mechanism[length], rel=1e-12)
+    first, other = (at(moving, joint) for joint in link)
+    assert np.hypot(*(first - other).T) == pytest.approx(scene.mechanism[length], rel=1e-12)
 
 
 def test_the_picture_agrees_with_the_curves():

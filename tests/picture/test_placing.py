@@ -15,9 +15,9 @@ POST = Line("frame", (Point(0.0, -30.0), Point(0.0, 30.0)))
 
 def placed(labels, *strokes):
     """Return the texts and leaders of labels among strokes, 1 high, after a check that they are clear."""
-    found = place(labels, strokes, 1.0)
-    assert clear.faults(Drawing("", 1.0, (*strokes, *found))) == []
-    return [p for p in found if isinstance(p, Text)], [p for p in found if isinstance(p, Line)]
+    result = place(labels, strokes, 1.0)
+    assert clear.faults(Drawing("", 1.0, (*strokes, *result))) == []
+    return [p for p in result if isinstance(p, Text)], [p for p in result if isinstance(p, Line)]
 
 
 @pytest.mark.parametrize("side", [0.0, math.pi])
@@ -45,8 +45,8 @@ def test_a_label_that_stands_far_off_has_a_leader_to_its_point():
 
 def test_any_number_of_labels_of_one_point_find_room():
     labels = [Label("notes", Point(0.0, 0.0), 0.0, f"label {k}") for k in range(24)]
-    found = place(labels, [POST], 1.0)
-    boxes = [shapes.text_box(p, 1.0) for p in found if isinstance(p, Text)]
+    result = place(labels, [POST], 1.0)
+    boxes = [shapes.text_box(p, 1.0) for p in result if isinstance(p, Text)]
     assert len(boxes) == 24
     assert not [pair for pair in itertools.combinations(boxes, 2) if clear.overlap(*pair)]
 
@@ -80,9 +80,9 @@ def test_ground_is_hatched_on_its_side(side, below):
 
 
 def test_a_centre_of_mass_is_a_circle_with_a_cross_through_it():
-    found = mass(Point(1.0, 2.0), 1.0)
-    assert [p.centre for p in found if isinstance(p, Circle)] == [(1.0, 2.0)]
-    middles = [p.points[0].part(p.points[1]) for p in found if isinstance(p, Line)]
+    result = mass(Point(1.0, 2.0), 1.0)
+    assert [p.centre for p in result if isinstance(p, Circle)] == [(1.0, 2.0)]
+    middles = [p.points[0].part(p.points[1]) for p in result if isinstance(p, Line)]
     assert middles == [pytest.approx((1.0, 2.0))] * 2
 
 
@@ -102,11 +102,11 @@ def crowded(seed, strokes=25, labels=12):
 def test_no_label_of_a_crowded_drawing_meets_a_stroke_or_another(seed):
     """But for the leader of a point that is walled in by labels, which ends OUTSIDE."""
     wanted, strokes = crowded(seed)
-    found = place(wanted, strokes, 1.0)
-    texts, leaders = [p for p in found if isinstance(p, Text)], [p for p in found if isinstance(p, Line)]
-    led = [leader for leader in leaders if math.dist(*leader.points) < shapes.OUTSIDE - 1.0]
-    assert len(led) >= len(leaders) - 1
-    assert clear.faults(Drawing("", 1.0, (*strokes, *texts, *led))) == []
+    result = place(wanted, strokes, 1.0)
+    texts, leaders = [p for p in result if isinstance(p, Text)], [p for p in result if isinstance(p, Line)]
+    leading = [leader for leader in leaders if math.dist(*leader.points) < shapes.OUTSIDE - 1.0]
+    assert len(leading) >= len(leaders) - 1
+    assert clear.faults(Drawing("", 1.0, (*strokes, *texts, *leading))) == []
     assert [text.text for text in texts] == [label.text for label in wanted]
     for label, text in zip(wanted, texts, strict=True):
         box = shapes.text_box(text, 1.0)
@@ -128,10 +128,10 @@ def test_a_drawing_of_another_size_has_its_labels_in_the_same_places(size):
     wanted, strokes = crowded(2)
     larger = shapes.scale_drawing(Drawing("", 1.0, tuple(strokes)), size)
     near = [label._replace(near=Point(size * label.near.x, size * label.near.y)) for label in wanted]
-    found = place(near, larger.primitives, size)
+    result = place(near, larger.primitives, size)
     once: Any = shapes.scale_drawing(Drawing("", 1.0, tuple(place(wanted, strokes, 1.0))), size).primitives
-    for one, other in zip(found, once, strict=True):
-        first, second = (np.array(each.points if isinstance(each, Line) else [each.at]) for each in (one, other))
+    for item, other in zip(result, once, strict=True):
+        first, second = (np.array(entry.points if isinstance(entry, Line) else [entry.at]) for entry in (item, other))
         assert first == pytest.approx(second, rel=1e-12, abs=1e-12 * size)
 
 
@@ -162,17 +162,17 @@ def test_a_later_label_keeps_clear_of_an_earlier_ones_leader():
     wide = shapes.LabelWish([(0.0, 0.0)], 0.0, 12.0, 1.5)
     small = shapes.LabelWish([(2.0, 0.9)], -math.pi / 2, 2.0, 1.5)
     (alone,) = shapes.place([small], posts, 1.0, LEADER)
-    led, moved = shapes.place([wide, small], posts, 1.0, LEADER)
-    leader = np.array([[(0.0, 0.0), led.box.nearest(0.0, 0.0)]])
+    leading, moved = shapes.place([wide, small], posts, 1.0, LEADER)
+    leader = np.array([[(0.0, 0.0), leading.box.nearest(0.0, 0.0)]])
     assert clear.meets(alone.box, leader).any()
     assert not clear.meets(moved.box, leader).any()
 
 
 def test_no_leader_runs_over_a_label_that_was_there_before():
     wanted, strokes = crowded(4, strokes=60, labels=25)
-    found = place(wanted, strokes, 1.0)
-    texts = [shapes.text_box(part, 1.0) for part in found if isinstance(part, Text)]
-    leaders = [np.array([part.points]) for part in found if isinstance(part, Line)]
+    result = place(wanted, strokes, 1.0)
+    texts = [shapes.text_box(part, 1.0) for part in result if isinstance(part, Text)]
+    leaders = [np.array([part.points]) for part in result if isinstance(part, Line)]
     assert leaders, "of so many labels some stand far off"
     assert not [leader for leader in leaders for box in texts if clear.meets(box, leader).any()]
 

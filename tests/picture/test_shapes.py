@@ -43,8 +43,8 @@ def test_scaling_by_a_power_of_two_scales_whatever_is_measured_to_the_last_bit(p
     size = 2.0**power
     larger = scale_drawing(SHEET, size)
     assert list(extent(larger)) == [size * side for side in extent(SHEET)]
-    for one, other in zip(SHEET.primitives, larger.primitives, strict=True):
-        assert np.array_equal(marks(other, larger.height), size * marks(one, SHEET.height))
+    for item, other in zip(SHEET.primitives, larger.primitives, strict=True):
+        assert np.array_equal(marks(other, larger.height), size * marks(item, SHEET.height))
     assert scale_drawing(larger, 1 / size) == SHEET
 
 
@@ -56,7 +56,7 @@ def test_marks_lie_on_the_stroke_from_end_to_end_and_close_together(stroke):
     if isinstance(stroke, Line):
         ends = [*stroke.points, *(stroke.points[:1] if stroke.closed else [])]
         assert [tuple(points[0]), tuple(points[-1])] == [ends[0], ends[-1]]
-        length = sum(math.dist(one, other) for one, other in itertools.pairwise(ends))
+        length = sum(math.dist(item, other) for item, other in itertools.pairwise(ends))
         assert np.hypot(*np.diff(points, axis=0).T).sum() == pytest.approx(length, rel=0.02)
     else:
         assert np.hypot(*(points - np.array(stroke.centre)).T) == pytest.approx(stroke.radius, rel=1e-12)
@@ -79,12 +79,12 @@ def test_a_texts_box_hangs_on_its_anchor_and_grows_with_height_and_size(anchor):
 
 
 @given(st.text(max_size=12), st.text(max_size=12))
-def test_what_stands_side_by_side_is_as_wide_as_both_together(one, other):
+def test_what_stands_side_by_side_is_as_wide_as_both_together(first, other):
     def width(text):
         box = text_box(Text("notes", Point(0.0, 0.0), text), 1.0)
         return box.right - box.left
 
-    assert width(one + other) == pytest.approx(width(one) + width(other))
+    assert width(first + other) == pytest.approx(width(first) + width(other))
 
 
 @pytest.mark.parametrize(("narrow", "wide"), [("i", "W"), ("l", "ψ织"), ("a", "A"), ("1", "="), ("e", "…")])
@@ -108,10 +108,10 @@ def test_a_box_is_no_narrower_than_the_letters_that_matplotlib_draws():
 @given(st.floats(1e-9, 1.0))
 @pytest.mark.parametrize("unit", ["mm", "in"])
 def test_a_tolerance_is_told_in_one_digit_that_is_kept(unit, metres):
-    told, said = Units(length=unit).within(metres).split()
-    assert said == unit
-    assert len(told.replace(".", "").strip("0")) == 1
-    ratio = float(told) * float(units.factor(unit)) / metres
+    report, message = Units(length=unit).within(metres).split()
+    assert message == unit
+    assert len(report.replace(".", "").strip("0")) == 1
+    ratio = float(report) * float(units.factor(unit)) / metres
     assert 1 - 1e-6 <= ratio <= 2 + 1e-6, "rounded up, and by less than a digit"
 
 

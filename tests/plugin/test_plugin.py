@@ -41,18 +41,18 @@ def test_a_press_is_listed_and_shown(loomopt):
 
 def test_a_new_press_solves_as_it_stands(loomopt, tmp_path):
     loomopt("new", "press", "my.toml")
-    found = answer(loomopt, "my.toml")
-    assert (found["problem"], found["status"]) == ("my-press", "optimal")
+    second_answer = answer(loomopt, "my.toml")
+    assert (second_answer["problem"], second_answer["status"]) == ("my-press", "optimal")
 
 
 def test_its_optimum_is_certified_and_priced(loomopt):
-    found = answer(loomopt, "press", "--prove")
-    assert found["status"] == "optimal"
-    assert found["certificate"]["passed"]
-    assert found["design"] == pytest.approx(OPTIMUM, rel=1e-9)
-    assert found["figures"]["peak_torque"] == pytest.approx(torque(0.1, 0.5), rel=1e-9)
+    second_answer = answer(loomopt, "press", "--prove")
+    assert second_answer["status"] == "optimal"
+    assert second_answer["certificate"]["passed"]
+    assert second_answer["design"] == pytest.approx(OPTIMUM, rel=1e-9)
+    assert second_answer["figures"]["peak_torque"] == pytest.approx(torque(0.1, 0.5), rel=1e-9)
     h = 1e-6
-    stroke, reach = (next(p for p in found["binding"] if p["limit"] == name) for name in ("stroke", "reach"))
+    stroke, reach = (next(p for p in second_answer["binding"] if p["limit"] == name) for name in ("stroke", "reach"))
     # A longer stroke takes its half from the rod, for the reach is kept.
     longer = (torque(0.1 + h / 2, 0.5 - h / 2) - torque(0.1 - h / 2, 0.5 + h / 2)) / (2 * h)
     assert abs(stroke["worth"]["peak_torque"]) == pytest.approx(longer, rel=1e-4)
@@ -61,9 +61,9 @@ def test_its_optimum_is_certified_and_priced(loomopt):
 
 def test_figures_of_a_design_are_told(loomopt, tmp_path):
     (tmp_path / "design.json").write_text(json.dumps({"crank": 0.12, "rod": 0.4}))
-    found = json.loads(loomopt("evaluate", "press", "--design", "design.json", "--json").stdout)
+    data = json.loads(loomopt("evaluate", "press", "--design", "design.json", "--json").stdout)
     expected = {"peak_torque": torque(0.12, 0.4), "stroke": 0.24, "reach": 0.52, "obliquity": math.asin(0.3)}
-    assert {name: found["figures"][name] for name in expected} == pytest.approx(expected, rel=1e-9)
+    assert {name: data["figures"][name] for name in expected} == pytest.approx(expected, rel=1e-9)
 
 
 def test_curves_and_pictures_are_written(loomopt, tmp_path):
@@ -73,8 +73,8 @@ def test_curves_and_pictures_are_written(loomopt, tmp_path):
     rows = list(csv.DictReader(io.StringIO("\n".join(lines))))
     motion = ["phi [deg]", "q [mm]", "q_1 [m/rad]", "q_2 [m/rad^2]", "q_t [m/s]", "q_tt [m/s^2]"]
     assert list(rows[0]) == [*motion, "forming [kN]", "Q [kN]", "Md [N*m]", "motor_power [W]"]
-    met = [row for row in rows if float(row["forming [kN]"])]
-    assert float(met[0]["Md [N*m]"]) == pytest.approx(torque(0.105, 0.42), rel=1e-9)
+    contact = [row for row in rows if float(row["forming [kN]"])]
+    assert float(contact[0]["Md [N*m]"]) == pytest.approx(torque(0.105, 0.42), rel=1e-9)
     for name in ("linkage.svg", "linkage.dxf", "joints.csv"):
         loomopt("export", "press", "--out", name)
     assert 'data-layer="bottom dead centre"' in (tmp_path / "linkage.svg").read_text()
@@ -91,10 +91,10 @@ def test_its_limits_are_proven_and_a_broken_one_is_not(loomopt):
 
 
 def test_its_accuracy_is_studied(loomopt):
-    found = json.loads(loomopt("accuracy", "press", "--json").stdout)
-    read = {row["quantity"] for row in found["rows"]}
+    data = json.loads(loomopt("accuracy", "press", "--json").stdout)
+    read = {row["quantity"] for row in data["rows"]}
     assert {"peak_torque", "peak_acceleration", "q_2", "torque peak_torque", "torque design"} <= read
-    finest = [row for row in found["rows"] if (row["method"], row["setting"]) == ("exchange", 1e-11)]
+    finest = [row for row in data["rows"] if (row["method"], row["setting"]) == ("exchange", 1e-11)]
     assert all(row["error"] < 1e-10 for row in finest)
 
 
@@ -102,10 +102,10 @@ def test_its_answer_is_compared_with_its_own_results(loomopt, installed, tmp_pat
     assert "reproduces" in loomopt("check", "press").stdout
     loomopt("check", "press", "--write", ".")
     header, row = (tmp_path / "press.torque.csv").read_text().splitlines()[-2:]
-    kept = (installed / "loomopt_press" / "results" / "press.torque.csv").read_text().splitlines()[-2:]
-    assert header == kept[0]
+    remaining = (installed / "loomopt_press" / "results" / "press.torque.csv").read_text().splitlines()[-2:]
+    assert header == remaining[0]
     names = header.split(",")
-    for name, new, old in zip(names, row.split(","), kept[1].split(","), strict=True):
+    for name, new, old in zip(names, row.split(","), remaining[1].split(","), strict=True):
         assert float(new) == pytest.approx(float(old), rel=1e-9) if "[" in name else new == old
 
 
@@ -113,10 +113,10 @@ def test_effects_come_by_entry_point_for_its_own_job_and_for_one_of_loomopt(loom
     heavy = answer(loomopt, "press", "--with", "slide")
     assert (heavy["effects"], heavy["status"]) == (["forming", "slide"], "optimal")
     words = ["--set", "effects.torsion_bar.k=150 N*m/rad", "--set", "effects.torsion_bar.rest=90 deg"]
-    found = answer(loomopt, "beatup", *words)
-    assert found["status"] == "optimal"
-    assert "torsion_bar" in found["effects"]
-    assert found["figures"]["peak_torque"] != pytest.approx(88.6894134918, rel=1e-3)
+    second_answer = answer(loomopt, "beatup", *words)
+    assert second_answer["status"] == "optimal"
+    assert "torsion_bar" in second_answer["effects"]
+    assert second_answer["figures"]["peak_torque"] != pytest.approx(88.6894134918, rel=1e-3)
     assert "M_torsion_bar" in loomopt("show", "beatup", *words, "--equations").stdout
 
 
@@ -132,7 +132,7 @@ def test_two_distributions_with_one_job_are_named_and_other_scenes_still_run(loo
 
 
 @pytest.mark.parametrize(
-    ("code", "said"),
+    ("code", "message"),
     [
         ("import nothing_of_this_name", "cannot be imported: ModuleNotFoundError: No module named"),
         ("JOB = 1 / 0", "cannot be imported: ZeroDivisionError"),
@@ -144,21 +144,21 @@ def test_two_distributions_with_one_job_are_named_and_other_scenes_still_run(loo
         ("from loomopt_press.job import JOB", "calls itself press"),
     ],
 )
-def test_a_job_that_is_none_is_named_with_its_distribution(loomopt, distribution, tmp_path, code, said):
+def test_a_job_that_is_none_is_named_with_its_distribution(loomopt, distribution, tmp_path, code, message):
     broken = [distribution("broken-loom", {"knit": "broken_loom:JOB"}, code)]
     (tmp_path / "knit.toml").write_text('[problem]\nname = "knit"\njob = "knit"\ntitle = "x"\n')
     for words in (("show", "knit.toml"), ("solve", "knit"), ("new", "knit", "x.toml")):
         cases = loomopt(*words, status=2, folders=broken).stderr
-        assert f"job knit of broken-loom {said}" in cases
+        assert f"job knit of broken-loom {message}" in cases
         assert len(cases.strip().splitlines()) == 1
     assert loomopt("evaluate", "press", folders=broken).stderr == ""
     listed = loomopt("list", folders=broken)
     assert "job press; targets torque" in listed.stdout
-    assert said in listed.stderr
+    assert message in listed.stderr
 
 
 @pytest.mark.parametrize(
-    ("code", "said"),
+    ("code", "message"),
     [
         ("import nothing_of_this_name", "cannot be imported: ModuleNotFoundError"),
         ("raise SystemExit(0)", "cannot be imported: SystemExit: 0"),
@@ -166,10 +166,10 @@ def test_a_job_that_is_none_is_named_with_its_distribution(loomopt, distribution
         ("from loomopt_press.slide import EFFECT", "calls itself slide"),
     ],
 )
-def test_an_effect_that_is_none_is_named_with_its_distribution(loomopt, distribution, code, said):
+def test_an_effect_that_is_none_is_named_with_its_distribution(loomopt, distribution, code, message):
     broken = [distribution("broken-effect", {"beatup.wind": "broken_effect:EFFECT"}, code, "loomopt.effects")]
     cases = loomopt("show", "beatup", "--set", "effects.wind.v=1 m", status=2, folders=broken).stderr
-    assert f"effect beatup.wind of broken-effect {said}" in cases
+    assert f"effect beatup.wind of broken-effect {message}" in cases
     assert loomopt("evaluate", "beatup", folders=broken).stderr == ""
 
 
@@ -220,8 +220,8 @@ def test_a_formula_that_fails_in_a_study_is_named_in_its_rows(loomopt, distribut
     code = WIND.format("raise SystemExit(0)")
     broken = [distribution("failing-effect", {"beatup.wind": "failing_effect:EFFECT"}, code, "loomopt.effects")]
     words = ["--set", "effects.wind.k=1", *workers, "--json"]
-    found = json.loads(loomopt("effects", "beatup", *words, status=4, folders=broken).stdout)
-    assert "effect beatup.wind of failing-effect fails in force" in found["reference"]["why"]
+    data = json.loads(loomopt("effects", "beatup", *words, status=4, folders=broken).stdout)
+    assert "effect beatup.wind of failing-effect fails in force" in data["reference"]["why"]
 
 
 PARTS = ["schema", "check", "program", "today", "views", "model", "resources"]

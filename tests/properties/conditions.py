@@ -32,13 +32,13 @@ def errors(formulas, data, phi=None, terms=None):
             moved = formulas(MANY, *exact[:k], exact[k] + step, *exact[k + 1 :])
             for name, value in true.items():
                 sizes[name] += abs(moved[name] - value) / STEP
-    found = formulas(systems.FLOAT, *numbers)
-    return {name: error(found[name], value, sizes[name]) for name, value in true.items()}
+    result = formulas(systems.FLOAT, *numbers)
+    return {name: error(result[name], value, sizes[name]) for name, value in true.items()}
 
 
-def error(found, true, size):
+def error(result, true, size):
     """Return |found − true| in units of eps · size."""
-    return float(abs(MANY.number(float(found)) - true) / (EPS * size + NOTHING))
+    return float(abs(MANY.number(float(result)) - true) / (EPS * size + NOTHING))
 
 
 def assert_right(formulas, data, most, phi=None, terms=None):

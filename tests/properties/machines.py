@@ -124,14 +124,14 @@ def machine(job, *effects, law=""):
         scene = scene.set("effects.rod_inertia.model", law)
     elif law:
         scene = scene.set("mechanism.law", law)
-    found = registry.of(scene)
-    sampler = found.sampler(scene, found.today(scene))
+    result = registry.of(scene)
+    sampler = result.sampler(scene, result.today(scene))
     return sampler.model, sampler.values
 
 
-def varied(draw, values, kept=()):
+def varied(draw, values, remaining=()):
     """Return numbers times random factors, 0.2 to 3; 0 stays."""
-    return {name: value if name in kept else value * draw(factors) for name, value in values.items()}
+    return {name: value if name in remaining else value * draw(factors) for name, value in values.items()}
 
 
 REED = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction")
@@ -141,7 +141,7 @@ REED = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "be
 def reeds(draw, without=()):
     """Draw a beat-up mechanism with everything on that can be, but for some effects."""
     model, values = machine("beatup", *REED, law=draw(st.sampled_from(["lumped", "exact"])))
-    model = dataclasses.replace(model, effects=tuple(each for each in model.effects if each.name not in without))
+    model = dataclasses.replace(model, effects=tuple(effect for effect in model.effects if effect.name not in without))
     values = varied(draw, values | {"m4e": 5.0, "r4e": 0.05, "gravity.offset": 0.1})
     values |= dict(zip(("l1", "l2", "l3", "l4"), sides_of(draw(crank_rockers(nearest=1e-3))), strict=True))
     return model, values | {"resistance.pulse": draw(st.floats(0.05, 1.5))}
@@ -153,5 +153,5 @@ def frames(draw, effects=("damping", "dry_friction")):
     model, values = machine("shedding", *effects, law=draw(st.sampled_from(tuple(LAWS))))
     arcs = [draw(st.floats(0.2, 1)) for _ in range(4)]
     turn = dict(zip(("rise", "far_dwell", "return", "near_dwell"), arcs, strict=True))
-    found = varied(draw, values, kept=("arm", "centre_distance", "base_radius", "roller_radius"))
-    return model, found | {name: TURN * arc / math.fsum(arcs) for name, arc in turn.items()}
+    result = varied(draw, values, remaining=("arm", "centre_distance", "base_radius", "roller_radius"))
+    return model, result | {name: TURN * arc / math.fsum(arcs) for name, arc in turn.items()}

@@ -34,16 +34,16 @@ def torque_all_round(model, values):
 @given(reeds(ROUGH), crank_rockers(nearest=0.05))
 def test_masses_and_weight_of_a_beat_up_take_no_work(reed, lengths):
     model, values = reed
-    found = torque_all_round(model, values | dict(zip(("l1", "l2", "l3", "l4"), sides_of(lengths), strict=True)))
-    assert abs(found.mean()) <= NOTHING * np.sqrt(np.mean(found**2))
+    result = torque_all_round(model, values | dict(zip(("l1", "l2", "l3", "l4"), sides_of(lengths), strict=True)))
+    assert abs(result.mean()) <= NOTHING * np.sqrt(np.mean(result**2))
 
 
 @settings(max_examples=30)
 @given(drives())
 def test_the_head_and_its_tape_take_no_work(d):
     model, values = machine("rapier", "head_inertia")
-    found = torque_all_round(model, values | {name: getattr(d, name) for name in NAMES})
-    assert abs(found.mean()) <= NOTHING * np.sqrt(np.mean(found**2))
+    result = torque_all_round(model, values | {name: getattr(d, name) for name in NAMES})
+    assert abs(result.mean()) <= NOTHING * np.sqrt(np.mean(result**2))
 
 
 def work(model, values, of):

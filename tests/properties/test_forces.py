@@ -37,8 +37,8 @@ def assert_cycle_right(model, values, quantities, place, inside, static=()):
     def formulas(system, *numbers):
         *sizes, angle = numbers
         given_ = model.given(system, dict(zip(names, sizes, strict=True)))
-        found = {name: quantity(system, model, given_, name, Node(angle, switch)) for name in quantities}
-        return found | model.static(system, given_, sampler.stills, static)
+        results = {name: quantity(system, model, given_, name, Node(angle, switch)) for name in quantities}
+        return results | model.static(system, given_, sampler.stills, static)
 
     terms = {"law_fall": 1}
     if "S" in quantities:
@@ -69,7 +69,7 @@ def test_cam_force_and_what_the_cam_is_judged_by(frame, place, inside):
 @given(drives(), st.data(), shares, shares)
 def test_travel_of_the_head_and_what_it_takes(d, data, place, inside):
     model, values = machine("rapier", "head_inertia", "tape_friction")
-    values = varied(data.draw, values, kept=("dwell_after", "dwell_before"))
+    values = varied(data.draw, values, remaining=("dwell_after", "dwell_before"))
     values |= {name: getattr(d, name) for name in NAMES}
     names = ("S", "S_1", "peak_acceleration", "peak_jerk", "obliquity", "tape_force", "peak_torque")
     assert_cycle_right(model, values, names, place, inside, ("swing", "theta", "sley_mu_near", "sley_mu_far"))

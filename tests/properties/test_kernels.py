@@ -181,9 +181,9 @@ def terms_of(name, u):
 
     s = u − sin(2πu)/(2π) begins as a third power; the jerk of 27 cos x + cos 3x has a triple zero.
     """
-    found = {"s": u} if name in HARMONICS + MODIFIED else {}
-    found |= {"s1": 1} if name in MODIFIED else {}
-    return found | ({"s3": 1} if name == "freudenstein_13" else {})
+    result = {"s": u} if name in HARMONICS + MODIFIED else {}
+    result |= {"s1": 1} if name in MODIFIED else {}
+    return result | ({"s3": 1} if name == "freudenstein_13" else {})
 
 
 def law(name, u):

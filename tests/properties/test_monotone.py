@@ -95,8 +95,8 @@ def test_the_least_spring_falls_where_there_is_more_room_for_its_preload(frame):
 def test_the_least_spring_grows_with_the_travel_where_inertia_alone_loads_it(frame):
     """K1 = M ω² h |s''|/(X0 + h s): h/(X0 + h s) grows with h."""
     changes, (less, more) = frame
-    one, other = (least_spring(changes, numbers | NOTHING_AT_REST) for numbers in (less, more))
-    assert 0 < one <= other * (1 + ALIKE)
+    first, other = (least_spring(changes, numbers | NOTHING_AT_REST) for numbers in (less, more))
+    assert 0 < first <= other * (1 + ALIKE)
 
 
 @pytest.mark.slow
@@ -105,10 +105,10 @@ def test_the_least_spring_grows_with_the_travel_where_inertia_alone_loads_it(fra
 def test_the_least_spring_is_that_of_the_upper_dwell_where_nothing_has_mass(frame):
     """K1 = (N_min + G + T1)/X0: below, the spring is stretched farther and the warp pulls less, whatever the travel."""
     changes, both = frame
-    one, other = (least_spring(changes, numbers, ("inertia",)) for numbers in both)
-    held = sum(both[0][name] for name in ("operation.N_min", "effects.weight.G", "effects.warp_tension.T1"))
-    expected = held / both[0]["bounds.X0.max"] * 1e3
-    assert (one, other) == pytest.approx((expected, expected), rel=1e-9, abs=1e-6)
+    first, other = (least_spring(changes, numbers, ("inertia",)) for numbers in both)
+    fixed = sum(both[0][name] for name in ("operation.N_min", "effects.weight.G", "effects.warp_tension.T1"))
+    expected = fixed / both[0]["bounds.X0.max"] * 1e3
+    assert (first, other) == pytest.approx((expected, expected), rel=1e-9, abs=1e-6)
 
 
 # The crank torque of a given machine ------------------------------------------------------------------------------
@@ -122,17 +122,17 @@ def peak_torque(M0):
 
 @settings(max_examples=30)
 @given(resistances, resistances, shares)
-def test_the_peak_torque_of_a_machine_is_a_convex_function_of_the_cloths_resistance(one, other, share):
+def test_the_peak_torque_of_a_machine_is_a_convex_function_of_the_cloths_resistance(first, other, share):
     """At every crank angle Md is a straight line in M0: no chord lies below the largest |Md|."""
-    chord = (1 - share) * peak_torque(one) + share * peak_torque(other)
-    assert peak_torque(one + share * (other - one)) <= chord * (1 + ALIKE)
+    chord = (1 - share) * peak_torque(first) + share * peak_torque(other)
+    assert peak_torque(first + share * (other - first)) <= chord * (1 + ALIKE)
 
 
 @settings(max_examples=20)
 @given(resistances, resistances)
-def test_the_peak_torque_grows_with_the_resistance_once_the_cloth_decides_it(one, other):
+def test_the_peak_torque_grows_with_the_resistance_once_the_cloth_decides_it(first, other):
     """From 2000 N·m on it is more than without any cloth: convex, it falls no more."""
-    less, more = sorted((2000 + one, 2000 + other))
+    less, more = sorted((2000 + first, 2000 + other))
     assert peak_torque(0.0) < peak_torque(less) <= peak_torque(more) * (1 + ALIKE)
 
 
@@ -173,10 +173,10 @@ TASKS: dict[tuple[str, str], tuple[Ranges, tuple[str, ...]]] = {
 EXAMPLES = {"beatup": 8, "rapier": 4, "shedding": 6}
 
 
-def worse(one, other, names):
+def worse(first, other, names):
     """Say whether the first answer's figures are worse: by the first of them that differs."""
     for name in names:
-        mine, its = abs(one.figures[name]), abs(other.figures[name])
+        mine, its = abs(first.figures[name]), abs(other.figures[name])
         if abs(mine - its) > ALIKE * max(mine, its) + 1e-7 * (name == "M3_fdc"):
             return mine > its
     return False

@@ -101,12 +101,12 @@ def test_the_optimum_of_a_tighter_task_is_no_optimum_of_this_one(name):
         limits = {key: (TIGHTER[name][key], percent / 100) for key, percent in drawn.items()}
         tight = {key: f"{a + share * (b - a)!r} {unit}" for key, ((a, b, unit), share) in limits.items()}
         _, other = solved(job, target, changes | tight)
-        certificate, found = certify(program, {v: other[v] for v in x}, ACCURACY), objectives(program, other)
+        certificate, result = certify(program, {v: other[v] for v in x}, ACCURACY), objectives(program, other)
         assert certificate.feasibility <= 1e-9
-        if found[0] > best[0] + 1e-6:
+        if result[0] > best[0] + 1e-6:
             assert not certificate.passed
-            assert any("can still fall" in said for said in certificate.reasons), certificate.reasons
+            assert any("can still fall" in reason for reason in certificate.reasons), certificate.reasons
         else:
-            assert found[0] >= best[0] - 1e-8
+            assert result[0] >= best[0] - 1e-8
 
     refused()

@@ -38,9 +38,9 @@ def resized(thing, names, factor):
 # Kernels ---------------------------------------------------------------------------------------------------------
 
 
-def assert_alike(found, expected, rel=1e-10):
+def assert_alike(result, expected, rel=1e-10):
     """Compare to a share of each value, and of 1: angles and their derivatives, of machines far from singular ones."""
-    assert found == pytest.approx(expected, rel=rel, abs=rel)
+    assert result == pytest.approx(expected, rel=rel, abs=rel)
 
 
 @given(crank_rockers(nearest=1e-2), angles, sizes)
@@ -77,8 +77,8 @@ def test_a_rapier_drive_of_another_size_turns_alike_and_travels_in_proportion(d,
 @settings(max_examples=30)
 @given(drives(), angles)
 def test_a_rapier_drive_run_backward_makes_the_same_motion_backward_to_the_last_digit(d, phi):
-    one, other = (Sley(systems.FLOAT, d, sense=sense).stand for sense in (1, -1))
-    here, there = (Drive(systems.FLOAT, d, stand, sense * phi) for stand, sense in ((one, 1), (other, -1)))
+    first, other = (Sley(systems.FLOAT, d, sense=sense).stand for sense in (1, -1))
+    here, there = (Drive(systems.FLOAT, d, stand, sense * phi) for stand, sense in ((first, 1), (other, -1)))
     signs = (1, -1, 1, -1, -1, 1, -1, 1)
     expected = [sign * value for sign, value in zip(signs, read(here, DRIVE_CURVES), strict=True)]
     assert read(there, DRIVE_CURVES) == expected
@@ -110,15 +110,15 @@ def test_a_dyad_turns_with_its_base_and_knows_no_first_link(drawn, direction, tu
 def test_a_cam_of_another_size_has_the_same_angles_and_its_curvature_in_proportion(contact, theta, factor):
     follower, swing = contact
     larger = resized(follower, ("arm", "centre_distance", "base_radius", "roller_radius"), factor)
-    here, there = (Contact(systems.FLOAT, one, *swing) for one in (follower, larger))
+    here, there = (Contact(systems.FLOAT, item, *swing) for item in (follower, larger))
     unit = follower.centre_distance
     assert_alike(read(there, ("angle", "pressure_angle")), read(here, ("angle", "pressure_angle")))
     assert_alike(there.speed / (factor * unit), here.speed / unit)
     assert_alike(there.curvature * factor * unit, here.curvature * unit, 1e-9)
     for name in ("centre", "profile"):
         point, other = getattr(here, name)(theta), getattr(there, name)(theta)
-        found, expected = ([at.x / size, at.y / size] for at, size in ((other, factor * unit), (point, unit)))
-        assert_alike(found, expected)
+        result, expected = ([at.x / size, at.y / size] for at, size in ((other, factor * unit), (point, unit)))
+        assert_alike(result, expected)
 
 
 @given(contacts(), angles, angles)
@@ -175,10 +175,10 @@ def frame(law, rise, back, size=1.0, heavier=1.0):
 @given(SPRINGS, st.integers(60, 140), st.integers(60, 140), powers(-3, 3), powers(-3, 3))
 def test_the_least_spring_of_a_frame_of_another_size_and_weight_is_in_proportion(law, rise, back, size, heavier):
     """Forces h, lengths s, masses h/s: accelerations grow with s, the stiffness with h/s."""
-    one, other = solved(frame(law, rise, back)), solved(frame(law, rise, back, size, heavier))
-    assert other.design["K1"] == pytest.approx(one.design["K1"] * heavier / size, rel=1e-9)
-    assert other.design["X0"] == pytest.approx(one.design["X0"] * size, rel=1e-9)
-    assert other.figures["contact_max"] == pytest.approx(one.figures["contact_max"] * heavier, rel=1e-9)
+    first, other = solved(frame(law, rise, back)), solved(frame(law, rise, back, size, heavier))
+    assert other.design["K1"] == pytest.approx(first.design["K1"] * heavier / size, rel=1e-9)
+    assert other.design["X0"] == pytest.approx(first.design["X0"] * size, rel=1e-9)
+    assert other.figures["contact_max"] == pytest.approx(first.figures["contact_max"] * heavier, rel=1e-9)
 
 
 @pytest.mark.slow
@@ -186,10 +186,10 @@ def test_the_least_spring_of_a_frame_of_another_size_and_weight_is_in_proportion
 @given(SPRINGS, st.integers(60, 140), st.integers(60, 140))
 def test_a_cam_that_runs_backward_needs_the_same_spring(law, rise, back):
     """Without damping the force depends on where the frame is and how it accelerates, not on which way it goes."""
-    one, other = solved(frame(law, rise, back)), solved(frame(law, back, rise))
-    assert other.design["K1"] == pytest.approx(one.design["K1"], rel=1e-11)
+    first, other = solved(frame(law, rise, back)), solved(frame(law, back, rise))
+    assert other.design["K1"] == pytest.approx(first.design["K1"], rel=1e-11)
     for name in ("contact_max", "contact_speed", "spring_force_max"):
-        assert other.figures[name] == pytest.approx(one.figures[name], rel=1e-9)
+        assert other.figures[name] == pytest.approx(first.figures[name], rel=1e-9)
 
 
 def bounded(low, high, unit):
@@ -215,13 +215,13 @@ def test_the_best_rapier_drive_of_a_loom_that_is_turned_is_the_best_one_turned(q
     changes |= {f"mechanism.{name}": f"{now[name] + turn!r} rad" for name in ("phi30", "phi40")}
     phi40 = scene.bounds["phi40"]
     changes["bounds.phi40"] = bounded(phi40.min + turn, phi40.max + turn, "rad")
-    one, other = best("rapier", target), solved(scene.update(changes), target)
-    pivot, expected = ((of.design["C0x"], of.design["C0y"]) for of in (other, one))
+    first, other = best("rapier", target), solved(scene.update(changes), target)
+    pivot, expected = ((of.design["C0x"], of.design["C0y"]) for of in (other, first))
     assert pivot == pytest.approx(turned(*expected), abs=1e-8)
     for name in ("l4", "l5", "l6", "l3p", "alpha"):
-        assert other.design[name] == pytest.approx(one.design[name], rel=1e-8)
+        assert other.design[name] == pytest.approx(first.design[name], rel=1e-8)
     for name in ("stroke", "dwell", "peak_acceleration", "mu_min"):
-        assert other.figures[name] == pytest.approx(one.figures[name], rel=1e-9)
+        assert other.figures[name] == pytest.approx(first.figures[name], rel=1e-9)
 
 
 @pytest.mark.parametrize("power", [-7, 9])
@@ -233,8 +233,8 @@ def test_the_best_beat_up_of_a_loom_of_another_size_is_in_proportion(power):
         limit = scene.bounds[name]
         changes[f"bounds.{name}"] = bounded(limit.min * factor, limit.max * factor, "m")
     alone = {"bounds.m4e": "0 kg"}
-    one, other = solved(scene.update(alone), "torque"), solved(scene.update(alone | changes), "torque")
+    first, other = solved(scene.update(alone), "torque"), solved(scene.update(alone | changes), "torque")
     for name in links:
-        assert other.design[name] == pytest.approx(factor * one.design[name], rel=1e-9)
+        assert other.design[name] == pytest.approx(factor * first.design[name], rel=1e-9)
     for name in ("M3_fdc", "peak_torque", "swing", "theta", "mu_min"):
-        assert other.figures[name] == pytest.approx(one.figures[name], rel=1e-9, abs=1e-9)
+        assert other.figures[name] == pytest.approx(first.figures[name], rel=1e-9, abs=1e-9)

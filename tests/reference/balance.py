@@ -45,11 +45,11 @@ def kinematics(l1, l2, l3, l4, phi):
 
 def curves(l1, l2, l3, l4, phi, chunk=CHUNK):
     """Return ψ, ψ', ψ'' at many crank angles, a chunk at a time."""
-    found = np.empty((3, len(phi)))
+    result = np.empty((3, len(phi)))
     for begin in range(0, len(phi), chunk):
         part = slice(begin, begin + chunk)
-        found[0, part], found[1, part], found[2, part] = kinematics(l1, l2, l3, l4, phi[part])
-    return found
+        result[0, part], result[1, part], result[2, part] = kinematics(l1, l2, l3, l4, phi[part])
+    return result
 
 
 def limits(l1, l2, l3, l4):
@@ -79,14 +79,14 @@ def peaks(design, M0):
     """Return the local peaks of |Md|, as (φ, |Md|), largest first: dense between the pulse's corners, then refined."""
     beta = front_angle(*design[:4])
     corners = beta + PULSE / 2 * np.array([-1, 1]), beta + np.array([PULSE / 2, 2 * np.pi - PULSE / 2])
-    found = []
+    results = []
     for begin, end in corners:
         phi, step = np.linspace(begin, end, DENSE, retstep=True)
         size = np.abs(crank_torque(*(*design, M0, phi)))
         inner = np.flatnonzero((size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:])) + 1
-        found += [_refined(design, M0, angle, step) for angle in phi[inner]]
-        found += [(phi[k], size[k]) for k in (0, -1)]
-    return sorted(found, key=lambda peak: -peak[1])
+        results += [_refined(design, M0, angle, step) for angle in phi[inner]]
+        results += [(phi[k], size[k]) for k in (0, -1)]
+    return sorted(results, key=lambda peak: -peak[1])
 
 
 def _refined(design, M0, phi, step):

@@ -59,7 +59,9 @@ class Machine:
         self.m4, self.r4 = number.get("m4", 0.0), number.get("r4", 0.0)
         self.crank = dict(scene.tables["mechanism"]).get("crank")
         self.own = {name: table.model_dump() for name, table in scene.effects.items()}
-        self.own = {name: own | {key: freed[key] for key in own.keys() & freed} for name, own in self.own.items()}
+        self.own = {
+            name: values | {key: freed[key] for key in values.keys() & freed} for name, values in self.own.items()
+        }
         self.today = {name: scene.mechanism[name] for name in DESIGN}
         given = {name: (bound.min, bound.max) for name, bound in scene.bounds.items()}
         self.bounds = {name: given.get(name, (self.today[name],) * 2) for name in DESIGN}
@@ -87,9 +89,9 @@ class Machine:
             rocker = self.own.get("rocker_inertia", {})
             M3 = M3 - G * (rocker.get("m3") or 0.0) * (rocker.get("s3") or 0.0) * np.cos(psi + tilt)
         if "bearing_friction" in self.own:
-            own = self.own["bearing_friction"]
+            values = self.own["bearing_friction"]
             opening = np.mod(phi - beta - 1e-12, 2 * np.pi) < np.mod(np.pi + beta_r - beta, 2 * np.pi)
-            M3 = M3 - own["coulomb"] * np.where(opening, 1.0, -1.0) - own["viscous"] * psi_1 * w
+            M3 = M3 - values["coulomb"] * np.where(opening, 1.0, -1.0) - values["viscous"] * psi_1 * w
         Md = -M3 * psi_1
         if "gravity" in self.own:
             up = np.exp(1j * (np.pi / 2 - tilt))
@@ -100,16 +102,16 @@ class Machine:
                 rod_mass, part = self.own["rod_inertia"]["m2"], self.own["rod_inertia"]["s2"] / self.today["l2"]
                 Md = Md + G * rod_mass * (np.conj(up) * ((1 - part) * rates[0] + part * rates[1])).real
         if "rod_inertia" in self.own:
-            own = self.own["rod_inertia"]
-            share = own["s2"] / self.today["l2"]
-            if own["model"] == "lumped":
-                Md = Md + own["m2"] * share * l3**2 * psi_1 * psi_2 * w**2
+            values = self.own["rod_inertia"]
+            share = values["s2"] / self.today["l2"]
+            if values["model"] == "lumped":
+                Md = Md + values["m2"] * share * l3**2 * psi_1 * psi_2 * w**2
             else:
                 s2 = share * l2
-                spin = own["m2"] * s2**2 + own["JS2"]
+                spin = values["m2"] * s2**2 + values["JS2"]
                 across, along = np.cos(phi - rod), np.sin(phi - rod)
                 bend = spin * rod_1 * rod_2
-                bend = bend + own["m2"] * l1 * s2 * (rod_2 * across - rod_1 * (1 - rod_1) * along)
+                bend = bend + values["m2"] * l1 * s2 * (rod_2 * across - rod_1 * (1 - rod_1) * along)
                 Md = Md + bend * w**2
         return M3, Md
 
@@ -118,18 +120,18 @@ class Machine:
         l1, l2, l3, l4 = (design[name] for name in LENGTHS)
         beta, beta_r, psi_f, psi_r = dead_centres(l1, l2, l3, l4)
         m4e, r4e = design["m4e"], design["r4e"]
-        found = {
+        results = {
             "beta": beta,
             "theta": beta - beta_r,
             "swing": psi_r - psi_f,
             "mu_min": min(extreme_transmission(l1, l2, l3, l4)),
         }
-        found["M3_fdc"] = float(self.torques(design, np.array([beta]))[0][0])
-        found["alpha_fdc"] = float(motion(design, np.array([beta]))[2][0]) * self.w**2
-        found["J4"] = self.own.get("inertia", {}).get("J4", math.nan) + m4e * r4e**2
-        found["J4"] += self.own.get("counterweight_inertia", {}).get("JS", 0.0)
-        found["r4"] = (self.m4 * self.r4 - m4e * r4e) / (self.m4 + m4e) if self.m4 else math.nan
-        return found
+        results["M3_fdc"] = float(self.torques(design, np.array([beta]))[0][0])
+        results["alpha_fdc"] = float(motion(design, np.array([beta]))[2][0]) * self.w**2
+        results["J4"] = self.own.get("inertia", {}).get("J4", math.nan) + m4e * r4e**2
+        results["J4"] += self.own.get("counterweight_inertia", {}).get("JS", 0.0)
+        results["r4"] = (self.m4 * self.r4 - m4e * r4e) / (self.m4 + m4e) if self.m4 else math.nan
+        return results
 
     def pulse_rms(self, design, nodes=24):
         """Return the root of the mean square of M3 over the pulse, N·m; NaN without resistance.
@@ -221,7 +223,7 @@ def least(machine, objective, start, firm=(), equal=(), offsets=UNIFORM):
     rows = [{"type": "ineq", "fun": kept}]
     rows += [{"type": "eq", "fun": lambda z: np.array([row(design(z)) for row in equal])}] if equal else []
     with np.errstate(all="ignore"):
-        found = minimize(
+        optimum = minimize(
             (lambda z: z[-1]) if epigraph else (lambda z: objective(design(z))),
             z,
             method="SLSQP",
@@ -229,33 +231,33 @@ def least(machine, objective, start, firm=(), equal=(), offsets=UNIFORM):
             constraints=rows,
             options={"ftol": 1e-14, "maxiter": 80},
         )
-        here = design(np.clip(found.x, 0.0, 1.0 if not epigraph else None))
-        misses = np.array([*(abs(row(here)) for row in equal), -kept(found.x).min()])
+        here = design(np.clip(optimum.x, 0.0, 1.0 if not epigraph else None))
+        misses = np.array([*(abs(row(here)) for row in equal), -kept(optimum.x).min()])
     return here if np.all(misses < 1e-7) else None
 
 
 def least_peak(machine, start, firm=(), equal=()):
     """Return the design of least peak |Md|: three rounds, each with a finer grid around the peaks just reached."""
-    found, offsets = start, UNIFORM
+    result, offsets = start, UNIFORM
     for spread in (0.03, 0.003, 0.0003):
-        found = least(machine, "peak_torque", found, firm, equal, offsets)
-        if found is None:
+        result = least(machine, "peak_torque", result, firm, equal, offsets)
+        if result is None:
             return None
-        beta = machine.static(found)["beta"]
+        beta = machine.static(result)["beta"]
         fine = np.linspace(0, 2 * np.pi, 20_000)
-        size = np.abs(machine.torques(found, beta + fine)[1])
+        size = np.abs(machine.torques(result, beta + fine)[1])
         high = (size[1:-1] >= size[:-2]) & (size[1:-1] >= size[2:]) & (size[1:-1] > 0.98 * size.max())
         around = fine[1:-1][high][:, None] + np.linspace(-spread, spread, 31)
         offsets = np.concatenate([offsets, around.ravel()])
-    return least(machine, "peak_torque", found, firm, equal, offsets)
+    return least(machine, "peak_torque", result, firm, equal, offsets)
 
 
 def random_designs(machine, count, seed):
     """Return designs drawn within the bounds that close all round, whatever their limits."""
-    generator, found = np.random.default_rng(seed), list[dict[str, float]]()
-    while len(found) < count:
+    generator, result = np.random.default_rng(seed), list[dict[str, float]]()
+    while len(result) < count:
         trial = {name: float(generator.uniform(*machine.bounds[name])) for name in DESIGN}
         with np.errstate(all="ignore"):
             closes = np.isfinite([machine.static(trial)["mu_min"], machine.peaks(trial, 36)["peak_torque"]]).all()
-        found += [trial] if closes else []
-    return found
+        result += [trial] if closes else []
+    return result

@@ -24,8 +24,8 @@ def lift(law, segments, theta):
     return np.where(theta <= rise, rising, np.where((down >= 0) & (down <= 1), falling, still))
 
 
-def cross(one, other):
-    return one[0] * other[1] - one[1] * other[0]
+def cross(first, other):
+    return first[0] * other[1] - first[1] * other[0]
 
 
 def contact(follower, lifted, theta):
@@ -57,8 +57,8 @@ def distance(points, polyline):
     start, end = polyline, np.roll(polyline, -1, axis=0)
     chord = end - start
     squared = np.maximum(np.sum(chord**2, axis=1), 1e-300)
-    found = np.empty(len(points))
+    result = np.empty(len(points))
     for k, point in enumerate(points):
         share = np.clip(np.sum((point - start) * chord, axis=1) / squared, 0, 1)
-        found[k] = np.min(np.hypot(*(point - start - share[:, None] * chord).T))
-    return found
+        result[k] = np.min(np.hypot(*(point - start - share[:, None] * chord).T))
+    return result

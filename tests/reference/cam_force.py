@@ -44,7 +44,7 @@ def extreme(scene, K1, sign):
         of = signed(scene, stretch, K1, sign)
         spots = summits(of, float(stretch[3]), float(stretch[4]))
         k = int(of(spots).argmax())
-        best = max(best, (float(of(spots)[k]), stretch, float(spots[k])), key=lambda each: each[0])
+        best = max(best, (float(of(spots)[k]), stretch, float(spots[k])), key=lambda item: item[0])
     return best
 
 

@@ -112,13 +112,13 @@ def keeps(steel, contact, d, D, K1):
     F = K1 * (X0 + contact.travel) / steel.springs
     least, most = winding(d, D)
     most = np.minimum(np.minimum(most, steel.tensions[1]), K1 * X0 / steel.springs)
-    held = (X0 <= steel.X0) & (C >= 4) & (C <= 12) & (most >= np.maximum(least, steel.tensions[0]))
+    fixed = (X0 <= steel.X0) & (C >= 4) & (C <= 12) & (most >= np.maximum(least, steel.tensions[0]))
     # A turn too many by rounding is none: n is found from the very bounds it is held against.
-    held &= (n >= steel.turns[0]) & (n <= steel.turns[1] * (1 + 1e-9))
-    held &= surge(steel, d, D, n) >= steel.surge * contact.cam * (1 - 1e-9)
-    held &= shear(d, D, F) <= steel.shear_share * tensile(steel, d)
-    held &= hook(d, D, F) <= steel.bending_share * tensile(steel, d)
-    return held & (length(steel, d, D, n, most, X0 + contact.travel) <= steel.length)
+    fixed &= (n >= steel.turns[0]) & (n <= steel.turns[1] * (1 + 1e-9))
+    fixed &= surge(steel, d, D, n) >= steel.surge * contact.cam * (1 - 1e-9)
+    fixed &= shear(d, D, F) <= steel.shear_share * tensile(steel, d)
+    fixed &= hook(d, D, F) <= steel.bending_share * tensile(steel, d)
+    return fixed & (length(steel, d, D, n, most, X0 + contact.travel) <= steel.length)
 
 
 def stiffnesses(steel, contact, d, D):
@@ -128,12 +128,12 @@ def stiffnesses(steel, contact, d, D):
     return np.maximum(by_turns, contact.stiffness(steel.X0) * (1 + 1e-12))
 
 
-def _best(steel, d, value, held, points=DIAMETERS):
+def _best(steel, d, value, fixed, points=DIAMETERS):
     """Return the least value(D) over the diameters that held(D) allows; None where none is, looked at so many."""
     D = np.linspace(max(steel.diameters[0], 4 * d), min(steel.diameters[1], 12 * d), points)
     for _ in range(CLOSER):
         values = value(D)
-        allowed = held(D)
+        allowed = fixed(D)
         if not allowed.any():
             return None
         best = int(np.argmin(np.where(allowed, values, np.inf)))

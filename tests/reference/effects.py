@@ -93,15 +93,15 @@ class Shaft:
     def acceleration(self, phi):
         raise NotImplementedError
 
-    def resistance(self, own, phi):
+    def resistance(self, values, phi):
         raise NotImplementedError
 
-    def shaft_torsion(self, own, phi):
+    def shaft_torsion(self, values, phi):
         """Return k z + c z˙ by convolution: all that ever acted on the reed, faded and turned by e^(λ(t − s)).
 
-        phi: a multiple of STEP; own: underdamped.
+        phi: a multiple of STEP; values: underdamped.
         """
-        k, c, J = own["stiffness"], own["damping"], self.carried
+        k, c, J = values["stiffness"], values["damping"], self.carried
         rate = -c / (2 * J) + 1j * MP.sqrt(k / J - (c / (2 * J)) ** 2)
         turn, total = 2 * PI, MP.mpc(0)
         for at, weight, force in self.acting():
@@ -156,55 +156,55 @@ class Reed(Shaft):
     def unbalanced(self):
         return self.v["m4"] * self.v["r4"] - self.v["m4e"] * self.v["r4e"]
 
-    def inertia(self, own, phi):
-        return (own["J4"] + self.v["m4e"] * self.v["r4e"] ** 2) * self.motion(phi)[1]
+    def inertia(self, values, phi):
+        return (values["J4"] + self.v["m4e"] * self.v["r4e"] ** 2) * self.motion(phi)[1]
 
-    def rocker_inertia(self, own, phi):
-        return own["J3"] * self.motion(phi)[1]
+    def rocker_inertia(self, values, phi):
+        return values["J3"] * self.motion(phi)[1]
 
-    def counterweight_inertia(self, own, phi):
-        return own["JS"] * self.motion(phi)[1]
+    def counterweight_inertia(self, values, phi):
+        return values["JS"] * self.motion(phi)[1]
 
-    def resistance(self, own, phi):
+    def resistance(self, values, phi):
         away = phi - self.beta
-        return M0 * MP.cos(PI * away / own["pulse"]) if abs(away) <= own["pulse"] / 2 else MP.mpf(0)
+        return M0 * MP.cos(PI * away / values["pulse"]) if abs(away) <= values["pulse"] / 2 else MP.mpf(0)
 
-    def bearing_friction(self, own, phi):
+    def bearing_friction(self, values, phi):
         rate = self.motion(phi)[0]
-        return own["coulomb"] * MP.sign(rate) + own["viscous"] * rate
+        return values["coulomb"] * MP.sign(rate) + values["viscous"] * rate
 
-    def gravity(self, own, phi):
+    def gravity(self, values, phi):
         """Return −dU/dψ; U is the height of both centres of mass times their weight."""
 
         def potential(psi):
-            up = psi + own["offset"] + own["tilt"]
+            up = psi + values["offset"] + values["tilt"]
             reed, other = self.v["m4"] * self.v["r4"], self.v["m4e"] * self.v["r4e"]
             return MP.mpf("9.80665") * (reed * MP.sin(up) + other * MP.sin(up + PI))
 
         return -slope(potential, self.positions(phi)[2])
 
-    def rod_inertia(self, own, phi):
+    def rod_inertia(self, values, phi):
         """Return half the slope of twice the rod's kinetic energy over ω², times ω²."""
-        share = own["s2"] / self.v["today_l2"]
+        share = values["s2"] / self.v["today_l2"]
 
         def energy(at):
             rates = [slope(lambda p, k=k: self.positions(p)[k], at) for k in (0, 1)]
-            if own["model"] == "lumped":
-                return own["m2"] * (share * abs(rates[1]) ** 2 + (1 - share) * abs(rates[0]) ** 2)
+            if values["model"] == "lumped":
+                return values["m2"] * (share * abs(rates[1]) ** 2 + (1 - share) * abs(rates[0]) ** 2)
             turn = slope(lambda p: MP.arg(self.positions(p)[1] - self.positions(p)[0]), at)
             centre = rates[0] + share * (rates[1] - rates[0])
-            return own["m2"] * abs(centre) ** 2 + own["JS2"] * turn**2
+            return values["m2"] * abs(centre) ** 2 + values["JS2"] * turn**2
 
         return slope(energy, phi) / 2 * SPEED**2
 
-    def reed_centrifugal(self, own, phi):
+    def reed_centrifugal(self, values, phi):
         return self.unbalanced() * self.motion(phi)[0] ** 2
 
-    def shaking_force(self, own, phi):
+    def shaking_force(self, values, phi):
         rate, change = self.motion(phi)
         return self.unbalanced() * MP.hypot(rate**2, change)
 
-    def shaking_moment(self, own, phi):
+    def shaking_moment(self, values, phi):
         """Return what turns the frame about A: of the reed's mass in its centre, and of its inertia about that."""
         v, inertia = self.v, self.carried
 
@@ -240,19 +240,19 @@ class Reed(Shaft):
             entered(row, joint, sign, arm)
         matrix[2, 8] = 1
         right[6], right[7], right[8] = -mass.real, -mass.imag, -couple
-        found = MP.lu_solve(matrix, right)
-        return [MP.mpc(found[k], found[k + 1]) for k in (0, 2, 4, 6)]
+        result = MP.lu_solve(matrix, right)
+        return [MP.mpc(result[k], result[k + 1]) for k in (0, 2, 4, 6)]
 
-    def force_A(self, own, phi):
+    def force_A(self, values, phi):
         return abs(self.pins(phi)[0])
 
-    def force_B(self, own, phi):
+    def force_B(self, values, phi):
         return abs(self.pins(phi)[1])
 
-    def force_C(self, own, phi):
+    def force_C(self, values, phi):
         return abs(self.pins(phi)[2])
 
-    def force_D(self, own, phi):
+    def force_D(self, values, phi):
         return abs(self.pins(phi)[3])
 
 
@@ -281,21 +281,21 @@ class Head:
     def S(self, phi):
         return self.v["travel"] * MP.arg(MP.expj(self.angle(phi) - self.start))
 
-    def head_inertia(self, own, phi):
-        return own["mass"] * slope(self.S, phi, 2) * SHAFT**2
+    def head_inertia(self, values, phi):
+        return values["mass"] * slope(self.S, phi, 2) * SHAFT**2
 
-    def tape_friction(self, own, phi):
-        return own["force"] * MP.sign(slope(self.S, phi))
+    def tape_friction(self, values, phi):
+        return values["force"] * MP.sign(slope(self.S, phi))
 
-    def tape_stretch(self, own):
+    def tape_stretch(self, values):
         """Return how far HEAD stretches the tape where it is farthest out."""
         near = max((2 * PI * k / 72 for k in range(72)), key=self.S)
         farthest = MP.findroot(lambda phi: slope(self.S, phi), (near, near + MP.mpf("0.01")))
-        return {"head_overrun": -HEAD * slope(self.S, farthest, 2) * SHAFT**2 / own["stiffness"]}
+        return {"head_overrun": -HEAD * slope(self.S, farthest, 2) * SHAFT**2 / values["stiffness"]}
 
 
-def corner(opposite, one, other):
-    return MP.acos((one**2 + other**2 - opposite**2) / (2 * one * other))
+def corner(opposite, first, other):
+    return MP.acos((first**2 + other**2 - opposite**2) / (2 * first * other))
 
 
 class Frame:
@@ -322,14 +322,14 @@ class Frame:
     def X(self, theta):
         return self.v["travel"] * self.lowered(theta)[0]
 
-    def inertia(self, own, theta):
-        return own["M"] * slope(self.X, theta, 2) * SPEED**2
+    def inertia(self, values, theta):
+        return values["M"] * slope(self.X, theta, 2) * SPEED**2
 
     def couple(self, theta):
         """Return N λ of the packaged frame: what works as N does over the lever's angle."""
-        own = {name: MP.mpf(value) for name, value in PACKAGED.items()} | {"shape": "linear"}
+        values = {name: MP.mpf(value) for name, value in PACKAGED.items()} | {"shape": "linear"}
         spring = self.v["K1"] * (self.X(theta) + self.v["X0"])
-        N = spring + self.inertia(own, theta) - own["G"] + self.warp_tension(own, theta)
+        N = spring + self.inertia(values, theta) - values["G"] + self.warp_tension(values, theta)
         return N * self.v["travel"] / (MP.mpf(LEVER["swing"]) * PI / 180)
 
     def roller(self, theta):
@@ -350,58 +350,58 @@ class Frame:
         normal *= MP.sign((normal * MP.conj(here)).real)
         return here, pivot, -1j * (here - pivot) / arm, normal
 
-    def roller_force(self, own, theta):
+    def roller_force(self, values, theta):
         here, pivot, _, normal = self.roller(theta)
         return self.couple(theta) / abs((MP.conj(here - pivot) * normal).imag)
 
-    def roller_side(self, own, theta):
+    def roller_side(self, values, theta):
         _, _, way, normal = self.roller(theta)
-        return self.roller_force(own, theta) * (MP.conj(way) * normal).imag
+        return self.roller_force(values, theta) * (MP.conj(way) * normal).imag
 
-    def cam_shaft_force(self, own, theta):
-        return self.roller_force(own, theta)
+    def cam_shaft_force(self, values, theta):
+        return self.roller_force(values, theta)
 
-    def lever_couple(self, own, theta):
+    def lever_couple(self, values, theta):
         return self.couple(theta)
 
-    def shaking_force(self, own, theta):
+    def shaking_force(self, values, theta):
         return abs(MP.mpf(PACKAGED["M"]) * slope(self.X, theta, 2) * SPEED**2)
 
-    def damping(self, own, theta):
-        return own["C"] * slope(self.X, theta) * SPEED
+    def damping(self, values, theta):
+        return values["C"] * slope(self.X, theta) * SPEED
 
-    def weight(self, own, theta):
-        return -own["G"]
+    def weight(self, values, theta):
+        return -values["G"]
 
-    def dry_friction(self, own, theta):
+    def dry_friction(self, values, theta):
         """Return F against the motion; in a dwell what leaves the cam the least force."""
-        return own["F"] * (self.lowered(theta)[2] or -1)
+        return values["F"] * (self.lowered(theta)[2] or -1)
 
-    def warp_tension(self, own, theta):
+    def warp_tension(self, values, theta):
         """Return −T: T1 at the top, −T2 at the bottom."""
         lowered, u, sense = self.lowered(theta)
-        if own["shape"] == "step":
-            return -(own["T1"] + (-own["T2"] - own["T1"]) * u**2 * (3 - 2 * u))
-        if own["shape"] == "levels":
-            return MP.mpf(0) if sense else (own["T2"] if u else -own["T1"])
-        return -own["T1"] * (1 - 2 * lowered) if lowered < 0.5 else own["T2"] * (2 * lowered - 1)
+        if values["shape"] == "step":
+            return -(values["T1"] + (-values["T2"] - values["T1"]) * u**2 * (3 - 2 * u))
+        if values["shape"] == "levels":
+            return MP.mpf(0) if sense else (values["T2"] if u else -values["T1"])
+        return -values["T1"] * (1 - 2 * lowered) if lowered < 0.5 else values["T2"] * (2 * lowered - 1)
 
-    def spring_inertia(self, own, theta):
-        return own["mass"] / 3 * slope(self.X, theta, 2) * SPEED**2
+    def spring_inertia(self, values, theta):
+        return values["mass"] / 3 * slope(self.X, theta, 2) * SPEED**2
 
-    def coil(self, own):
+    def coil(self, values):
         """Return the figures and margins of one of the coils, full loops turned up from the last coil."""
-        K1, X0, d, D, n = self.v["K1"], self.v["X0"], own["wire"], own["diameter"], own["turns"]
-        G, E, C, springs = own["shear_modulus"], own["elasticity"], D / d, own["springs"]
+        K1, X0, d, D, n = self.v["K1"], self.v["X0"], values["wire"], values["diameter"], values["turns"]
+        G, E, C, springs = values["shear_modulus"], values["elasticity"], D / d, values["springs"]
         stretch = X0 + self.v["travel"]
         F = K1 * stretch / springs
-        rate, mass = G * d**4 / (8 * D**3 * n), PI**2 / 4 * d**2 * D * n * own["density"]
+        rate, mass = G * d**4 / (8 * D**3 * n), PI**2 / 4 * d**2 * D * n * values["density"]
         straight = 8 * D / (PI * d**3)
         tau = ((4 * C - 1) / (4 * C - 4) + MP.mpf("0.615") / C) * straight * F
         bent = (4 * C**2 - C - 1) / (4 * C * (C - 1))
         sigma = F * (16 * D * bent / (PI * d**3) + 4 / (PI * d**2))
-        tensile = own["strength"] / (d * 1000) ** own["strength_exponent"]
-        wound, middle = straight * own["initial_tension"], 231 * MP.mpf(10) ** 6 * MP.exp(MP.mpf("-0.105") * C)
+        tensile = values["strength"] / (d * 1000) ** values["strength_exponent"]
+        wound, middle = straight * values["initial_tension"], 231 * MP.mpf(10) ** 6 * MP.exp(MP.mpf("-0.105") * C)
         spread = MP.mpf("6.9e6") * (4 - (C - 3) / MP.mpf("6.5"))
         free = 2 * (D - d) + (n - G / E + 1) * d
         return {
@@ -410,12 +410,12 @@ class Frame:
             "shear_share": tau / tensile,
             "bending_share": sigma / tensile,
             "surge_ratio": MP.sqrt(rate / mass) / 2 / (SPEED / (2 * PI)),
-            "spring_length": free + stretch - own["initial_tension"] / rate,
+            "spring_length": free + stretch - values["initial_tension"] / rate,
             "spring_mass": springs * mass,
             "coils give K1": springs * rate - K1,
             "initial tension: no less than winding gives": wound - (middle - spread),
             "initial tension: no more than can be wound": middle + spread - wound,
-            "coils are drawn open at the top": K1 * X0 / springs - own["initial_tension"],
+            "coils are drawn open at the top": K1 * X0 / springs - values["initial_tension"],
         }
 
 
@@ -463,21 +463,21 @@ class Linkage(Shaft):
     def acceleration(self, phi):
         return slope(self.q, phi, 2) * MAIN**2
 
-    def inertia(self, own, phi):
-        return own["J"] * self.acceleration(phi)
+    def inertia(self, values, phi):
+        return values["J"] * self.acceleration(phi)
 
-    def counterweight(self, own, phi):
-        return own["mass"] * own["radius"] ** 2 * self.acceleration(phi)
+    def counterweight(self, values, phi):
+        return values["mass"] * values["radius"] ** 2 * self.acceleration(phi)
 
-    def resistance(self, own, phi):
+    def resistance(self, values, phi):
         away = phi - self.front
-        return own["torque"] * MP.cos(PI * away / own["pulse"]) if abs(away) <= own["pulse"] / 2 else MP.mpf(0)
+        return values["torque"] * MP.cos(PI * away / values["pulse"]) if abs(away) <= values["pulse"] / 2 else MP.mpf(0)
 
-    def bearing_friction(self, own, phi):
+    def bearing_friction(self, values, phi):
         rate = slope(self.q, phi) * MAIN
-        return own["coulomb"] * MP.sign(rate) + own["viscous"] * rate
+        return values["coulomb"] * MP.sign(rate) + values["viscous"] * rate
 
-    def output_centrifugal(self, own, phi):
+    def output_centrifugal(self, values, phi):
         return MP.mpf(REED_MASS[1]) * MP.mpf(REED_MASS[2]) / 1000 * (slope(self.q, phi) * MAIN) ** 2
 
     def height(self, down, phi):
@@ -496,7 +496,7 @@ class Linkage(Shaft):
             total += mass * abs(rate) ** 2 + inertia * turned**2
         return total
 
-    def speed_fluctuation(self, own):
+    def speed_fluctuation(self, values):
         """Return figures of the crank's own motion: energy, height and q as series of harmonics, then by shooting."""
         inertia, height, travel = (
             Harmonics([float(function(2 * PI * k / HARMONICS)) for k in range(HARMONICS)])
@@ -511,20 +511,20 @@ class Linkage(Shaft):
             return (motor[0] * (no_load - omega) - taken) / (motor[1] + inertia(phi, 0))
 
         machine = turn.Machine(float(MAIN), (front - width / 2, front + width / 2), changed)
-        motor = float(own["motor_torque"] / (own["slip"] * MAIN)), float(own["flywheel"])
+        motor = float(values["motor_torque"] / (values["slip"] * MAIN)), float(values["flywheel"])
         return turn.turn(motor, machine).figures(motor)
 
-    def forming(self, own, phi):
+    def forming(self, values, phi):
         """Return the torque from the rear over 0 to the front."""
-        return MP.mpf(0) if self.front <= phi < self.rear else own["torque"]
+        return MP.mpf(0) if self.front <= phi < self.rear else values["torque"]
 
-    def mass(self, own, phi):
+    def mass(self, values, phi):
         """Return the rise of the rod's kinetic energy by crank angle."""
 
         def energy(at):
-            rate = slope(lambda p: self.centre("rod", own["along"], p), at)
+            rate = slope(lambda p: self.centre("rod", values["along"], p), at)
             turned = slope(lambda p: MP.arg(self.link("rod", p)[1]), at)
-            return (own["mass"] * abs(rate) ** 2 + own["J"] * turned**2) * MAIN**2 / 2
+            return (values["mass"] * abs(rate) ** 2 + values["J"] * turned**2) * MAIN**2 / 2
 
         return slope(energy, phi)
 
@@ -532,16 +532,16 @@ class Linkage(Shaft):
         origin, direction = self.link(name, phi)
         return origin + along * direction
 
-    def gravity(self, own, phi):
+    def gravity(self, values, phi):
         """Return the rise of what the packaged scene's links and its reed weigh."""
-        return MP.mpf("9.80665") * slope(lambda p: self.height(own["down"], p), phi)
+        return MP.mpf("9.80665") * slope(lambda p: self.height(values["down"], p), phi)
 
     def bodies(self):
         """Return link, mass, kg, where its centre lies along the link, m, and inertia about that, of what moves."""
         inertias = {"rod": "0.002", "rocker": "0.01", "link": "0.0096"}
-        found = [(name, MP.mpf(m), MP.mpf(along) / 1000, MP.mpf(inertias[name])) for name, m, along in MASSES]
+        results = [(name, MP.mpf(m), MP.mpf(along) / 1000, MP.mpf(inertias[name])) for name, m, along in MASSES]
         name, mass, along = REED_MASS[0], MP.mpf(REED_MASS[1]), MP.mpf(REED_MASS[2]) / 1000
-        return [*found, (name, mass, along, MP.mpf(REED["J4"]) - mass * along**2)]
+        return [*results, (name, mass, along, MP.mpf(REED["J4"]) - mass * along**2)]
 
     def resists(self, phi):
         """Yield link, centre, force, N, and couple, N m, with which each mass resists its motion."""
@@ -573,32 +573,32 @@ class Linkage(Shaft):
             right[rows[name]] -= load.real
             right[rows[name] + 1] -= load.imag
             right[rows[name] + 2] -= (place.conjugate() * load).imag + couple
-        found = MP.lu_solve(matrix, right)
-        return {joint: MP.mpc(found[2 * k], found[2 * k + 1]) for k, joint in enumerate(joints)}
+        result = MP.lu_solve(matrix, right)
+        return {joint: MP.mpc(result[2 * k], result[2 * k + 1]) for k, joint in enumerate(joints)}
 
     def __getattr__(self, name):
         if not name.startswith("force_"):
             raise AttributeError(name)
-        return lambda own, phi: abs(self.pins(phi)[name.removeprefix("force_")])
+        return lambda values, phi: abs(self.pins(phi)[name.removeprefix("force_")])
 
-    def shaking_force(self, own, phi):
+    def shaking_force(self, values, phi):
         return abs(sum(push for _, _, push, _ in self.resists(phi)))
 
-    def shaking_moment(self, own, phi):
+    def shaking_moment(self, values, phi):
         return sum((place.conjugate() * push).imag + couple for _, place, push, couple in self.resists(phi))
 
-    def load(self, own, phi):
+    def load(self, values, phi):
         """Return the torque against a force on F."""
-        acts = "begins" not in own or not self.front <= phi < self.rear
-        force = MP.mpc(own.get("x", 0), own.get("y", 0)) if acts else 0
+        acts = "begins" not in values or not self.front <= phi < self.rear
+        force = MP.mpc(values.get("x", 0), values.get("y", 0)) if acts else 0
         return -(force.conjugate() * slope(lambda p: self.joints(p)["F"], phi)).real if acts else MP.mpf(0)
 
-    def spring(self, own, phi):
+    def spring(self, values, phi):
         """Return the rise of what the spring holds."""
 
         def energy(at):
             joints = self.joints(at)
-            return own["stiffness"] * (abs(joints[own["ends"]] - joints[own["begins"]]) - own["free"]) ** 2 / 2
+            return values["stiffness"] * (abs(joints[values["ends"]] - joints[values["begins"]]) - values["free"]) ** 2 / 2
 
         return slope(energy, phi)
 
@@ -623,12 +623,12 @@ def figures(job, effect, example, design):
     return getattr(machine_of(job, design), effect)({key: number(text) for key, text in example})
 
 
-def value(job, effect, example, design, angle, what):
-    """Return a term, N or N·m, or a figure or row `what` of an effect, SI; angle: deg, "" where none counts."""
+def value(job, effect, example, design, angle, subject):
+    """Return a term, N or N·m, or a figure or row `subject` of an effect, SI; angle: deg, "" where none counts."""
     if not angle:
-        return float(figures(job, effect, tuple(example.items()), design)[what])
-    own, machine = {key: number(text) for key, text in example.items()}, machine_of(job, design)
-    return float(getattr(machine, effect if what == "term" else what)(own, MP.mpf(angle) * PI / 180))
+        return float(figures(job, effect, tuple(example.items()), design)[subject])
+    values, machine = {key: number(text) for key, text in example.items()}, machine_of(job, design)
+    return float(getattr(machine, effect if subject == "term" else subject)(values, MP.mpf(angle) * PI / 180))
 
 
 CAM_FORCES = ("roller_force", "roller_side", "cam_shaft_force", "lever_couple", "shaking_force")
@@ -677,12 +677,12 @@ def rows(examples):
     """Yield rows of the reference file; examples: job → effect → its examples."""
     cases = {case: angles.split() or [""] for case, angles in CASES.items()}
     coil = {key: number(text) for key, text in examples["shedding"]["coil"][0].items()}
-    cases |= {("shedding", "coil", what): [""] for what in Frame("today").coil(coil)}
+    cases |= {("shedding", "coil", subject): [""] for subject in Frame("today").coil(coil)}
     cases |= {("rapier", "tape_stretch", "head_overrun"): [""]}
-    for (job, effect, what), angles in cases.items():
+    for (job, effect, subject), angles in cases.items():
         for k, example in enumerate(examples[job][effect]):
             for design, angle in itertools.product(("today", "other"), angles):
-                yield job, effect, k, design, angle, what, repr(value(job, effect, example, design, angle, what))
+                yield job, effect, k, design, angle, subject, repr(value(job, effect, example, design, angle, subject))
 
 
 def write(path):
@@ -692,9 +692,9 @@ def write(path):
     schemas = {job: registry.find(job).schema({}) for job in registry.builtin_names()}
     examples = {job: {n: e.examples for n, e in schema.effects.items()} for job, schema in schemas.items()}
     header, *old = csv.reader(path.read_text(encoding="utf-8").splitlines())
-    kept = [row for row in old if not knows(*row[:2])]
+    subset = [row for row in old if not knows(*row[:2])]
     with path.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([header, *rows(examples), *kept])
+        csv.writer(file, lineterminator="\n").writerows([header, *rows(examples), *subset])
 
 
 if __name__ == "__main__":

@@ -42,7 +42,7 @@ class Frame:
             return 0.0, 0.0, 0.0
         turn = 2 * m.pi * u
         s = u - m.sin(turn) / (2 * m.pi), (1 - m.cos(turn)) * rate, 2 * m.pi * m.sin(turn) * rate**2
-        return tuple(self.travel * each for each in s)
+        return tuple(self.travel * item for item in s)
 
     def held(self, x):
         """Return what holds the frame back at rest, friction apart: K1 (X + X0) − G − T."""
@@ -92,13 +92,13 @@ def flown(frame, theta, v, x=None):
             return [y[1], -(frame.held(y[0]) + frame.C * y[1] + sign * frame.F) / frame.M]
 
         known = {"rtol": 1e-13, "atol": 1e-17, "method": "DOP853", "max_step": 0.02 / w}
-        found = solve_ivp(slope, (t, end), state, events=(gap, middle, turned, parting), **known)
-        tops = zip(found.t_events[3], found.y_events[3], strict=True)
-        t, state = found.t[-1], list(found.y[:, -1])
+        result = solve_ivp(slope, (t, end), state, events=(gap, middle, turned, parting), **known)
+        tops = zip(result.t_events[3], result.y_events[3], strict=True)
+        t, state = result.t[-1], list(result.y[:, -1])
         largest = max([largest, gap(t, state), *(gap(at, y) for at, y in tops)])
-        if len(found.t_events[0]):
+        if len(result.t_events[0]):
             return theta + w * t, state[1] - frame.cam(theta + w * t)[1], largest
-        if len(found.t_events[2]) and found.t_events[2][-1] == t:
+        if len(result.t_events[2]) and result.t_events[2][-1] == t:
             sign, state[1] = -sign, -sign * 1e-18
         t += 1e-13
         state[0] += state[1] * 1e-13

@@ -65,9 +65,9 @@ def angle(vector):
     return np.unwrap(np.angle(vector))
 
 
-def oblique(one, other):
+def oblique(first, other):
     """Return |cos μ| of the transmission angle between two links."""
-    return np.abs((one * np.conj(other)).real) / (np.abs(one) * np.abs(other))
+    return np.abs((first * np.conj(other)).real) / (np.abs(first) * np.abs(other))
 
 
 def tops(values, closed=True):
@@ -145,7 +145,7 @@ class SixBar:
         cloth = np.where(abs(since) <= self.PULSE / 2, self.CLOTH * np.cos(np.pi * since / self.PULSE), 0.0)
         output = self.inertia * self.q.over(2) * self.OMEGA**2 + cloth
         down = np.radians(-60)
-        drive = sum(each.torque(Series.over, self.OMEGA, down) for each in self.masses)
+        drive = sum(masse.torque(Series.over, self.OMEGA, down) for masse in self.masses)
         drive = drive - GRAVITY * (np.exp(-1j * down) * self.lifted.over(1)).real
         return output * self.q.over(1) + drive
 
@@ -217,8 +217,8 @@ def least(formulas, bounds, start, size):
     low, high = (np.array([bounds[name][side] for name in names]) for side in (0, 1))
 
     def read(z):
-        found = formulas(dict(zip(names, low + z * (high - low), strict=True)))
-        return None if found is None else [np.atleast_1d(np.asarray(each, dtype=float)) for each in found]
+        result = formulas(dict(zip(names, low + z * (high - low), strict=True)))
+        return None if result is None else [np.atleast_1d(np.asarray(item, dtype=float)) for item in result]
 
     @functools.lru_cache(maxsize=4)
     def known(key):
@@ -231,17 +231,17 @@ def least(formulas, bounds, start, size):
             step = -STEP if z[k] > 0.5 else STEP
             other = read(z + step * np.eye(len(z))[k])
             slopes.append((np.concatenate(other) - flat) / step if other else np.zeros_like(flat))
-        cuts = np.cumsum([len(each) for each in here])[:2]
+        cuts = np.cumsum([len(item) for item in here])[:2]
         return np.split(flat, cuts), np.split(np.array(slopes).T, cuts)
 
     def part(x, place, slope):
-        found = known(np.ascontiguousarray(x[:-1]).tobytes())
-        if found is None:
-            found = known(last[0])
+        result = known(np.ascontiguousarray(x[:-1]).tobytes())
+        if result is None:
+            result = known(last[0])
             # A design that does not close is worse than any: the line search steps back.
-            return found[1][place] if slope else found[0][place] + (1e3 if place == 0 else 0.0)
+            return result[1][place] if slope else result[0][place] + (1e3 if place == 0 else 0.0)
         last[0] = np.ascontiguousarray(x[:-1]).tobytes()
-        return found[slope][place]
+        return result[slope][place]
 
     z = (np.array([start[name] for name in names]) - low) / (high - low)
     z = np.clip(z, 0.0, 1.0)
@@ -267,7 +267,7 @@ def least(formulas, bounds, start, size):
     ]
     if not len(part(np.append(z, t), 2, 0)):
         constraints.pop()
-    found = scipy.optimize.minimize(
+    result = scipy.optimize.minimize(
         lambda x: x[-1],
         np.append(z, t),
         jac=lambda x: np.append(np.zeros(len(x) - 1), 1.0),
@@ -276,7 +276,7 @@ def least(formulas, bounds, start, size):
         constraints=constraints,
         options={"maxiter": 100, "ftol": 1e-11},
     )
-    z = found.x[:-1]
+    z = result.x[:-1]
     here = read(z)
     excess = max([0.0, *here[1], *abs(here[2])])
     return float(np.max(here[0])), dict(zip(names, low + z * (high - low), strict=True)), excess

@@ -28,7 +28,7 @@ class Drive:
 
     def __init__(self, scene, design=None):
         self.numbers = {**scene.operation, **scene.mechanism, **(design or {})}
-        self.effects = {name: own.model_dump() for name, own in scene.effects.items()}
+        self.effects = {name: effect.model_dump() for name, effect in scene.effects.items()}
         self.even = 2 * np.pi * np.arange(DENSE) / DENSE
         self.series = np.fft.rfft(self.travel(2 * np.pi * np.arange(SAMPLES) / SAMPLES)) * (DENSE / SAMPLES)
         self.series[HARMONICS:] = 0.0
@@ -87,7 +87,7 @@ class Drive:
 
     def dwells(self):
         """Return the angles after and before front dead centre through which |S| stays within s_dwell, rad."""
-        found, room = [], self.numbers["s_dwell"]
+        result, room = [], self.numbers["s_dwell"]
         for side in (1, -1):
             even = self.even[: DENSE // 2]
             first = int(np.argmax(np.abs(self.travel(side * even)) > room))
@@ -95,8 +95,8 @@ class Drive:
             for _ in range(60):
                 middle = (low + high) / 2
                 low, high = (low, middle) if abs(self.travel(side * np.array([middle]))[0]) > room else (middle, high)
-            found.append(low)
-        return tuple(found)
+            result.append(low)
+        return tuple(result)
 
     def mu_min(self):
         """Return the least transmission angle at D, rad: between links 5 and 6, at most a right angle."""

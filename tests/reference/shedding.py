@@ -147,7 +147,7 @@ def mirrored(formula):
 def cubics(accelerations):
     """Return the pieces of the cubic spline with these s'' at even knots, from s = s' = 0."""
     n, a = len(accelerations) - 1, [mp.mpf(float(value)) for value in accelerations]
-    s, v, found = mp.mpf(0), mp.mpf(0), []
+    s, v, result = mp.mpf(0), mp.mpf(0), []
     for k in range(n):
         start, slope = mp.mpf(k) / n, (a[k + 1] - a[k]) * n
 
@@ -156,9 +156,9 @@ def cubics(accelerations):
             d = u - start
             return s + d * (v + d * (b / 2 + d * slope / 6)), v + d * (b + d * slope / 2), b + d * slope
 
-        found.append((start, mp.mpf(k + 1) / n, cubic))
+        result.append((start, mp.mpf(k + 1) / n, cubic))
         s, v, _ = cubic(mp, mp.mpf(k + 1) / n)
-    return found
+    return result
 
 
 def pieces(law):
@@ -172,11 +172,11 @@ def pieces(law):
 def stretches(scene):
     """Return what the turn is made of: sense (1 rise, −1 return, 0 dwell), first cam angle, span, from u, to u, law."""
     rise, far, back, near = scene.angles
-    found = [(0, rise, far, 1, 1, None), (0, rise + far + back, near, 0, 0, None)]
+    results = [(0, rise, far, 1, 1, None), (0, rise + far + back, near, 0, 0, None)]
     if scene.shape != "levels":
         for start, end, formula in pieces(scene.law):
-            found += [(1, 0, rise, start, end, formula), (-1, rise + far, back, start, end, formula)]
-    return found
+            results += [(1, 0, rise, start, end, formula), (-1, rise + far, back, start, end, formula)]
+    return results
 
 
 def tension(m, scene, s, u):
@@ -241,14 +241,14 @@ def golden(of, low, high):
 
 def largest(scene, of):
     """Return value, stretch and u of the largest of(m, scene, stretch, u) over the turn, both ends of each stretch."""
-    found = []
+    results = []
     for stretch in stretches(scene):
         u = np.linspace(float(stretch[3]), float(stretch[4]), DENSE if stretch[0] else 1)
         value = of(np, scene, stretch, u)
-        found.append((value.max(), stretch, int(value.argmax()), len(u) - 1))
-    most, candidates = max(top for top, *_ in found), []
+        results.append((value.max(), stretch, int(value.argmax()), len(u) - 1))
+    most, candidates = max(top for top, *_ in results), []
     with mp.workdps(WORKING):
-        for top, stretch, k, last in found:
+        for top, stretch, k, last in results:
             if top < most - 1e-3 * abs(most):
                 continue
             start, end = (mp.mpf(edge) for edge in stretch[3:5])
@@ -257,7 +257,7 @@ def largest(scene, of):
                 low, high = (start + (end - start) * at / last for at in (max(k - 1, 0), min(k + 1, last)))
                 places.append(golden(lambda u, here=stretch: of(mp, scene, here, u), low, high))
             candidates += [(of(mp, scene, stretch, u), stretch, u) for u in places]
-        return max(candidates, key=lambda each: each[0])
+        return max(candidates, key=lambda item: item[0])
 
 
 def least_stiffness(scene):
@@ -325,8 +325,8 @@ def least_force(scene, X0_max=0.080, K1_max=None):
             right += [rest - scene.N_min, -rest]
         scaled = np.array(rows) * np.array([1e5, 1e3, 1e3])
         bounds = [(0, None if K1_max is None else K1_max / 1e5), (0, None), (0, None)]
-        found = linprog([0, 0, 1], scaled, np.array(right), bounds=bounds, method="highs-ds", options=TIGHT)
-        K1, P, peak = map(float, found.x * np.array([1e5, 1e3, 1e3]))
+        optimum = linprog([0, 0, 1], scaled, np.array(right), bounds=bounds, method="highs-ds", options=TIGHT)
+        K1, P, peak = map(float, optimum.x * np.array([1e5, 1e3, 1e3]))
         at = replace(scene, X0=P / K1)
         top, high, where = largest(at, lambda m, *spot, K1=K1: force(m, *(*spot, number(m, K1))))
         below, low, there = largest(at, lambda m, *spot, K1=K1: -force(m, *(*spot, number(m, K1))))
@@ -397,7 +397,7 @@ def law_lp(scene, n, K1, amax=2 * np.pi, symmetric=False, more=(), at=None):
     weight = np.full(len(f), scene.X0) if at is None else g @ at + g0
     rows = np.hstack([(f - K1 * g) / K1 / weight[:, None], np.ones((len(f), 1))])
     same, right = law_conditions(n, symmetric)
-    found = linprog(
+    optimum = linprog(
         np.append(np.zeros(n + 1), -1.0),
         rows,
         (K1 * g0 - f0) / K1 / weight,
@@ -407,7 +407,7 @@ def law_lp(scene, n, K1, amax=2 * np.pi, symmetric=False, more=(), at=None):
         method="highs-ds",
         options=TIGHT,
     )
-    return found.x[-1] * K1, found.x[:-1]
+    return optimum.x[-1] * K1, optimum.x[:-1]
 
 
 def least_law(scene, n, amax=2 * np.pi, symmetric=False):

@@ -16,20 +16,20 @@ PHI = np.linspace(0.0, 2 * np.pi, 721)
 
 def lengths(count=20):
     """Return random admissible beat-ups (l1 … l4, s), one to a row."""
-    rng, found = np.random.default_rng(1), list[np.ndarray]()
-    while len(found) < count:
+    rng, result = np.random.default_rng(1), list[np.ndarray]()
+    while len(result) < count:
         design = rng.uniform(balance.LOWER, balance.UPPER)
         with np.errstate(invalid="ignore"):
             if np.isfinite(balance.limits(*design[:4])).all():
-                found.append(design)
-    return np.array(found)
+                result.append(design)
+    return np.array(result)
 
 
 def test_the_four_bar_by_circles_is_the_one_by_angles():
     for *sides, _ in lengths():
         by_angles = beatup.motion(dict(zip(beatup.LENGTHS, sides, strict=True)), PHI)[:3]
-        for one, other in zip(balance.kinematics(*sides, PHI), by_angles, strict=True):
-            assert one == pytest.approx(other, rel=1e-11, abs=1e-11)
+        for item, other in zip(balance.kinematics(*sides, PHI), by_angles, strict=True):
+            assert item == pytest.approx(other, rel=1e-11, abs=1e-11)
 
 
 def test_the_balance_for_speed_is_that_of_any_scene():
@@ -81,4 +81,4 @@ def test_a_law_rises_by_one_without_a_step_of_position_or_rate(law):
     assert abs(at[0][0][0]) < 1e-14
     assert abs(at[-1][1][0] - 1) < 1e-14
     for (_, before), (after, _) in itertools.pairwise(at):
-        assert [abs(one - other) < 1e-13 for one, other in zip(before[:2], after[:2], strict=True)] == [True, True]
+        assert [abs(item - other) < 1e-13 for item, other in zip(before[:2], after[:2], strict=True)] == [True, True]

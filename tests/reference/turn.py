@@ -65,13 +65,13 @@ class Turn(NamedTuple):
         """Return the largest value of a function of the angle over the turn, between samples too."""
         angles = self.machine.pulse[0] + np.arange(count + 1) * TURN / count
         best = max(range(1, count), key=lambda k: function(angles[k]))
-        found = minimize_scalar(
+        result = minimize_scalar(
             lambda phi: -function(phi),
             bounds=(angles[best - 1], angles[best + 1]),
             method="bounded",
             options={"xatol": 1e-9},
         )
-        return max(-found.fun, function(angles[0]))
+        return max(-result.fun, function(angles[0]))
 
     def figures(self, motor):
         """Return fluctuation, speed without load, rad/s, and the motor's largest torque, N·m."""
@@ -126,9 +126,9 @@ def turn(motor, machine=BEATUP):
 def figures(flywheel, motor_torque=35.0, slip=0.08):
     """Return the figures of the machine at a speed of its own."""
     motor = (motor_torque / (slip * SPEED), flywheel)
-    found = turn(motor)
-    return found.figures(motor) | {
-        "speed_fdc": found.speed(BETA),
-        "M3_fdc": M0 - J4 * rocker(BETA)[1] * found.speed(BETA) ** 2,
-        "peak_torque": found.highest(lambda phi: abs(found.crank_torque(motor, phi))),
+    second_turn = turn(motor)
+    return second_turn.figures(motor) | {
+        "speed_fdc": second_turn.speed(BETA),
+        "M3_fdc": M0 - J4 * rocker(BETA)[1] * second_turn.speed(BETA) ** 2,
+        "peak_torque": second_turn.highest(lambda phi: abs(second_turn.crank_torque(motor, phi))),
     }

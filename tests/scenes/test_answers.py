@@ -111,8 +111,8 @@ def test_a_whole_answer_brings_its_design_and_what_its_call_changed(answer, file
     assert scene.operation["M0"] == 700.0, "the answer's call"
     assert scene.operation["speed"] == edited.operation["speed"], "the file"
     assert list(scene.effects) == ["inertia", "gravity"]
-    told = designs.scene_changes(scene, handed, "a.json", NOTHING)
-    assert told == ["operation.speed = 500 rpm (a.json: 600 rpm)"]
+    report = designs.scene_changes(scene, handed, "a.json", NOTHING)
+    assert report == ["operation.speed = 500 rpm (a.json: 600 rpm)"]
     later = Call({"operation.M0": "1 N*m", "operation.speed": "2 rpm"}, off=("gravity",))
     scene = designs.resumed(handed, SCENE, later, "a.json")
     assert (scene.operation["M0"], list(scene.effects)) == (1.0, ["inertia"])
@@ -128,8 +128,8 @@ def test_an_answer_without_a_record_of_its_call_brings_its_design_alone(answer, 
     assert handed.call == Call(target="balance")
     scene = designs.resumed(handed, SCENE, NOTHING, "a.json")
     assert scene.hash == SCENE.hash
-    told = designs.scene_changes(scene, handed, "a.json", NOTHING)
-    assert told == ["resistance on", "gravity off", "operation.M0 = 745 N*m (a.json: 700 N*m)"]
+    report = designs.scene_changes(scene, handed, "a.json", NOTHING)
+    assert report == ["resistance on", "gravity off", "operation.M0 = 745 N*m (a.json: 700 N*m)"]
 
 
 @pytest.mark.parametrize("content", [{"l1": 0.03}, {"design": {"l1": 0.03}}, {"design": {"l1": 0.03}, "problem": "x"}])
@@ -182,22 +182,22 @@ def test_what_a_scene_has_otherwise_than_an_answers_is_told_with_what_that_says(
 
 def test_another_scene_of_the_job_is_told_by_its_name_and_not_without_end():
     small = SCENE.update(dict.fromkeys(("bounds.r4e.max", "bounds.r4e.min"), "1 mm"))
-    told = changes(SCENE, small.set("problem.name", "mine"))
-    assert told[0] == "problem.name = mine (a.json: beatup)"
+    report = changes(SCENE, small.set("problem.name", "mine"))
+    assert report[0] == "problem.name = mine (a.json: beatup)"
     many = {f"bounds.l{k}.{end}": f"{170 + k} mm" for k in range(1, 5) for end in ("min", "max")}
     many |= {f"mechanism.l{k}": f"{100 * SCENE.mechanism[f'l{k}']} cm" for k in range(1, 5)}
-    told = changes(SCENE, SCENE.update(many | {"operation.M0": "1 N*m", "operation.speed": "1 rpm"}))
-    assert len(told) == designs.MOST_TOLD + 1
-    assert told[-1] == "and 6 more"
-    assert len(", ".join(told)) < 2000
+    report = changes(SCENE, SCENE.update(many | {"operation.M0": "1 N*m", "operation.speed": "1 rpm"}))
+    assert len(report) == designs.MOST_TOLD + 1
+    assert report[-1] == "and 6 more"
+    assert len(", ".join(report)) < 2000
 
 
 def test_what_is_told_of_a_file_obeys_no_terminal_and_has_an_end():
     rapier = lo.load("rapier")
-    (told,) = changes(rapier, rapier.set("targets.match.table", "a\x1b[31m" + "b" * 500 + ".csv"))
-    assert told.startswith("targets.match.table = a")
-    assert told.isprintable()
-    assert len(told) < 250
+    (report,) = changes(rapier, rapier.set("targets.match.table", "a\x1b[31m" + "b" * 500 + ".csv"))
+    assert report.startswith("targets.match.table = a")
+    assert report.isprintable()
+    assert len(report) < 250
 
 
 def test_what_is_expected_is_no_part_of_the_machine():
@@ -255,14 +255,14 @@ def test_an_answer_names_files_beside_the_scene_only(tmp_path, named):
     scene = lo.load("shedding")
     document = json.loads(json.dumps(scene.document))
     path, call = tmp_path / "answer.json", {"set": {"mechanism.law": "table", "mechanism.law_table": named}}
-    told = {"design": {"K1": 2e4}, "target": "stiffness", "scene": {"document": document, "call": call}}
-    path.write_text(json.dumps(told))
+    record = {"design": {"K1": 2e4}, "target": "stiffness", "scene": {"document": document, "call": call}}
+    path.write_text(json.dumps(record))
     with pytest.raises(lo.BadInput) as refused:
         designs.resumed(designs.read_given(path), scene, NOTHING, str(path))
     assert "law_table" in refused.value.key
     assert "HOME" not in str(refused.value)
     document["mechanism"] = {**document["mechanism"], "law": "table", "law_table": named}
-    path.write_text(json.dumps(told))
+    path.write_text(json.dumps(record))
     with pytest.raises(lo.BadInput) as refused:
         lo.load(path)
     assert "law_table" in refused.value.key
@@ -270,23 +270,23 @@ def test_an_answer_names_files_beside_the_scene_only(tmp_path, named):
 
 
 def test_an_answers_tables_go_with_it(tmp_path):
-    own, wish = tmp_path / "own", packaged.problems()["rapier"].with_name("rapier-wish.csv").read_text()
-    own.mkdir()
-    (own / "my.toml").write_text(packaged.problems()["rapier"].read_text())
-    (own / "rapier-wish.csv").write_text(wish)
-    answer = lo.solve(own / "my.toml", starts=1)
+    values, wish = tmp_path / "own", packaged.problems()["rapier"].with_name("rapier-wish.csv").read_text()
+    values.mkdir()
+    (values / "my.toml").write_text(packaged.problems()["rapier"].read_text())
+    (values / "rapier-wish.csv").write_text(wish)
+    answer = lo.solve(values / "my.toml", starts=1)
     place = tmp_path / "a.json"
     place.write_text(outputs.document(answer))
     assert json.loads(place.read_text())["scene"]["files"] == {"targets.match.table": wish}
     figures = answer.evaluate().figures
-    (own / "rapier-wish.csv").unlink()
+    (values / "rapier-wish.csv").unlink()
     loaded: Any = lo.load(place)
     assert loaded.figures == figures
     assert loaded.figures["match_rms"] > 0
     with pytest.raises(lo.BadInput, match="table: the table cannot be read: the file does not exist"):
         lo.evaluate(loaded.scene.set("targets.match.table", str(tmp_path / "none.csv")))
     assert pickle.loads(pickle.dumps(loaded.scene)).paths.texts == loaded.scene.paths.texts
-    (own / "rapier-wish.csv").write_text(wish.replace("\n0,", "\n0.001,", 1) + "# mine\n")
+    (values / "rapier-wish.csv").write_text(wish.replace("\n0,", "\n0.001,", 1) + "# mine\n")
     handed = designs.read_given(place)
-    scene = designs.resumed(handed, lo.load(own / "my.toml"), NOTHING, "a.json")
+    scene = designs.resumed(handed, lo.load(values / "my.toml"), NOTHING, "a.json")
     assert designs.scene_changes(scene, handed, "a.json", NOTHING) == ["targets.match.table with other rows"]

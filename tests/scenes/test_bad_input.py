@@ -237,9 +237,9 @@ def shown(value):
 
 
 def caught(call, *arguments):
-    with pytest.raises(BadInput) as found:
+    with pytest.raises(BadInput) as second_caught:
         call(*arguments)
-    return found.value
+    return second_caught.value
 
 
 def named(rows):
@@ -414,9 +414,9 @@ def test_an_error_of_several_mistakes_pickles():
     ],
 )  # fmt: skip
 def test_a_unit_s_hint_knows_dimension_and_case(text, kind, meant):
-    with pytest.raises(QuantityError) as found:
+    with pytest.raises(QuantityError) as second_caught:
         Quantity(kind).validate(text)
-    hint = re.search('Perhaps "(.*?)" is meant', found.value.remedy)
+    hint = re.search('Perhaps "(.*?)" is meant', second_caught.value.remedy)
     assert (hint[1] if hint else "") == meant
 
 
@@ -426,9 +426,11 @@ def test_a_long_message_is_shortened():
     assert "(100000 characters)" in str(error)
 
 
-@pytest.mark.parametrize(("turns", "said"), [(0, "it is out of range"), (20_000, "it is out of range"), (1.5, "whole")])
-def test_a_number_beyond_a_tables_own_bounds_says_what_is_allowed(turns, said):
-    with pytest.raises(BadInput, match=rf"turns: .*{said}.*Allowed: a whole number, at least 1, at most 10000\."):
+@pytest.mark.parametrize(
+    ("turns", "message"), [(0, "it is out of range"), (20_000, "it is out of range"), (1.5, "whole")]
+)
+def test_a_number_beyond_a_tables_own_bounds_says_what_is_allowed(turns, message):
+    with pytest.raises(BadInput, match=rf"turns: .*{message}.*Allowed: a whole number, at least 1, at most 10000\."):
         load("shedding").change({"effects.separation.turns": turns}, ["separation"], [])
 
 

@@ -56,28 +56,28 @@ def mutated(draw):
         table = document
         for name in path:
             table = table[name]
-        what = draw(st.sampled_from(["remove", "replace", "add", "rescale", "rescale"]))
-        if what == "remove":
+        subject = draw(st.sampled_from(["remove", "replace", "add", "rescale", "rescale"]))
+        if subject == "remove":
             table.pop(last, None)
-        elif what == "rescale":
+        elif subject == "rescale":
             _, _, unit = str(table.get(last, "")).partition(" ")
             table[last] = f"{draw(st.floats(1e-70, 1e70) | st.floats(0, 1000))} {unit}"
         else:
-            table[last if what == "replace" else draw(KEYS)] = draw(JUNK)
+            table[last if subject == "replace" else draw(KEYS)] = draw(JUNK)
     return document
 
 
 def read_or_refused(call, *arguments):
     """Check that a call gives a scene that works, or plain lines."""
     try:
-        found = call(*arguments)
+        result = call(*arguments)
     except BadInput as error:
         assert all(line.isprintable() for line in str(error).split("\n"))  # noqa: PT017 (both outcomes are right)
         return
-    assert isinstance(found, Scene)
-    assert len(found.hash) == 12
-    assert all(found.shown_in(kind) for kind in SI_UNIT)
-    assert all(math.isfinite(value) for value in found.mechanism.values())
+    assert isinstance(result, Scene)
+    assert len(result.hash) == 12
+    assert all(result.shown_in(kind) for kind in SI_UNIT)
+    assert all(math.isfinite(value) for value in result.mechanism.values())
 
 
 @given(mutated())

@@ -63,7 +63,7 @@ def test_a_design_or_a_whole_answer_is_read(tmp_path, content):
 
 
 def test_text_with_units_is_read_as_in_a_scene(tmp_path):
-    told: dict[str, float | str | Sequence[float | str]] = {
+    record: dict[str, float | str | Sequence[float | str]] = {
         "l1": "3 cm",
         "l2": "77 mm",
         "l3": 0.148,
@@ -71,11 +71,11 @@ def test_text_with_units_is_read_as_in_a_scene(tmp_path):
         "m4e": "6300 g",
         "r4e": "80 mm",
     }
-    assert designs.checked(told, SCENE) == DESIGN
+    assert designs.checked(record, SCENE) == DESIGN
     path = tmp_path / "design.json"
-    path.write_text(json.dumps({"design": told}))
+    path.write_text(json.dumps({"design": record}))
     assert designs.read(path, SCENE) == DESIGN
-    assert lo.evaluate(SCENE, told).figures == lo.evaluate(SCENE, DESIGN).figures
+    assert lo.evaluate(SCENE, record).figures == lo.evaluate(SCENE, DESIGN).figures
 
 
 def test_a_number_without_a_unit_is_asked_about_where_it_is_far_beyond_the_machine():
@@ -126,8 +126,8 @@ def test_a_list_has_all_its_numbers_once(data, problem):
 
 def test_numbers_of_a_list_may_be_text():
     law = [value / 0.88 for value in (0, 6, 4, -4, -6, 0)]
-    found = designs.checked({"law": [repr(value) for value in law]}, load("shedding"))
-    assert found == {f"law_{k}": value for k, value in enumerate(law)}
+    result = designs.checked({"law": [repr(value) for value in law]}, load("shedding"))
+    assert result == {f"law_{k}": value for k, value in enumerate(law)}
 
 
 @pytest.mark.parametrize("text", ['{"l1": 0.03, "l1": 0.031}', '{"design": {"l1": 0.03}, "design": {"l1": 0.031}}'])

@@ -55,7 +55,7 @@ def test_the_packaged_scene_reads_in_SI():
         "m4": 56.8,
         "r4": 0.045,
     }
-    assert [(name, own.model_dump(exclude_none=True)) for name, own in BEATUP.effects.items()] == [
+    assert [(name, effect.model_dump(exclude_none=True)) for name, effect in BEATUP.effects.items()] == [
         ("inertia", {"J4": 0.62}),
         ("resistance", {"pulse": pytest.approx(math.radians(29.8), rel=1e-15)}),
     ]
@@ -67,16 +67,20 @@ def test_the_packaged_scene_reads_in_SI():
 
 @pytest.mark.parametrize("name", packaged.problems())
 def test_packaged_scenes_are_complete(name):
-    found = load(name)
-    assert found.name == name
-    assert found.title
-    assert found.source
-    for target in available_targets(found):
-        assert found.targets[target].model_dump()["expected"] is not None
-    offered = set(found.document.get("available", {})) if found.schema.tables else set(found.schema.effects)
-    for effect in {name for name in offered if not found.schema.effects[name].many} - set(found.effects):
+    second_scene = load(name)
+    assert second_scene.name == name
+    assert second_scene.title
+    assert second_scene.source
+    for target in available_targets(second_scene):
+        assert second_scene.targets[target].model_dump()["expected"] is not None
+    offered = (
+        set(second_scene.document.get("available", {}))
+        if second_scene.schema.tables
+        else set(second_scene.schema.effects)
+    )
+    for effect in {name for name in offered if not second_scene.schema.effects[name].many} - set(second_scene.effects):
         if (name, effect) != ("shedding-static", "separation"):  # its warp tension is known in the dwells only
-            assert effect in found.with_effect(*found.schema.effects[effect].companions, effect).effects
+            assert effect in second_scene.with_effect(*second_scene.schema.effects[effect].companions, effect).effects
 
 
 @pytest.mark.parametrize("name", packaged.problems())
@@ -126,10 +130,10 @@ def test_any_unit_of_length_reads_the_same(unit, millimetres):
 
 def test_a_number_nobody_needs_may_be_missing():
     document = edited({"operation": {}, "effects": {}, "mechanism.m4": None, "mechanism.m4e": None})
-    found = scene(document)
-    assert found.operation == {}
-    assert found.mechanism["m4e"] == 0.0
-    assert "m4" not in found.mechanism
+    second_scene = scene(document)
+    assert second_scene.operation == {}
+    assert second_scene.mechanism["m4e"] == 0.0
+    assert "m4" not in second_scene.mechanism
 
 
 def test_what_was_written_stays_as_it_was():
@@ -211,11 +215,11 @@ def test_a_bound_on_a_number_of_an_effect_that_is_off_waits_for_it():
 
 
 def test_bounds_that_hold_free_and_fix():
-    held = BEATUP.set("bounds.J4", {"min": "0.5 kg*m^2", "max": "0.7 kg*m^2", "free": False})
-    assert held.bounds["J4"] == Bound(0.5, 0.7, False, "kg*m^2")
-    assert held.free("J4").bounds["J4"].free
-    assert held.free(["J4", "l1"]).bounds == held.free("J4, l1").bounds
-    assert held.set("bounds.J4.free", "true").bounds == held.free("J4").bounds
+    second_scene = BEATUP.set("bounds.J4", {"min": "0.5 kg*m^2", "max": "0.7 kg*m^2", "free": False})
+    assert second_scene.bounds["J4"] == Bound(0.5, 0.7, False, "kg*m^2")
+    assert second_scene.free("J4").bounds["J4"].free
+    assert second_scene.free(["J4", "l1"]).bounds == second_scene.free("J4, l1").bounds
+    assert second_scene.set("bounds.J4.free", "true").bounds == second_scene.free("J4").bounds
     assert BEATUP.set("bounds.l4", "167 mm").bounds["l4"] == Bound(0.167, 0.167, True, "mm")
     widened = BEATUP.set("bounds.l4", "167 mm").update({"bounds.l4.min": "160 mm", "bounds.l4.max": "170 mm"})
     assert widened.bounds["l4"] == Bound(0.16, 0.17, True, "mm")
@@ -223,9 +227,9 @@ def test_bounds_that_hold_free_and_fix():
 
 
 def test_targets_have_their_own_values():
-    found = BEATUP.set("targets.torque.M3_tolerance", "5 N*m").set("targets.retrofit.weights.l1", 3)
-    assert found.table(TorqueTarget).M3_tolerance == 5.0
-    assert found.table(RetrofitTarget).weights == {"l1": 3.0}
+    second_scene = BEATUP.set("targets.torque.M3_tolerance", "5 N*m").set("targets.retrofit.weights.l1", 3)
+    assert second_scene.table(TorqueTarget).M3_tolerance == 5.0
+    assert second_scene.table(RetrofitTarget).weights == {"l1": 3.0}
     assert list(scene(edited({"targets": {}})).targets) == list(BEATUP.schema.targets)
 
 

@@ -139,8 +139,8 @@ def test_display_changes_no_number_no_hash_and_is_kept_in_the_document():
     assert scene.hash == BEATUP.hash
     assert (scene.mechanism, scene.bounds, scene.limits) == (BEATUP.mechanism, BEATUP.bounds, BEATUP.limits)
     assert scene.document["display"] == {"length": "in", "torque": "lbf*in"}
-    found = lo.evaluate(scene)
-    assert found.as_dict() == lo.evaluate(BEATUP).as_dict()
+    evaluation = lo.evaluate(scene)
+    assert evaluation.as_dict() == lo.evaluate(BEATUP).as_dict()
 
 
 def test_a_value_is_told_in_the_unit_of_its_kind():
@@ -150,7 +150,7 @@ def test_a_value_is_told_in_the_unit_of_its_kind():
 
 
 @pytest.mark.parametrize(
-    ("display", "said"),
+    ("display", "text"),
     [
         ({"lenght": "in"}, ['unknown kind of quantity "lenght"', 'Perhaps "length" is meant']),
         ({"angular_speed": "rpm"}, ["unknown kind of quantity", "speed"]),
@@ -167,14 +167,14 @@ def test_a_value_is_told_in_the_unit_of_its_kind():
         ("in", ["it is not a table"]),
     ],
 )
-def test_bad_input_is_one_plain_message(display, said):
+def test_bad_input_is_one_plain_message(display, text):
     with pytest.raises(lo.BadInput) as caught:
         lo.scene({**BEATUP.document, "display": display})
     message = str(caught.value)
     assert "display" in message
     assert "\n" not in message
     assert len(message) < 900
-    for words in said:
+    for words in text:
         assert words in message
 
 

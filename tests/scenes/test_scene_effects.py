@@ -82,20 +82,20 @@ TWO = {"rod": {"m": "1.5 kg", "at": "30 mm"}, "rocker": {"m": "800 g"}}
 
 
 def test_there_may_be_many_instances_of_an_effect():
-    found = built({"effects": {"mass": TWO}})
-    assert list(found.effects) == ["inertia", "mass.rod", "mass.rocker", "resistance"]
-    assert [found.effects[f"mass.{name}"].m for name in TWO] == [1.5, 0.8]
-    assert [(effect.name, effect.instance) for effect in found.active[1:3]] == [
+    result = built({"effects": {"mass": TWO}})
+    assert list(result.effects) == ["inertia", "mass.rod", "mass.rocker", "resistance"]
+    assert [result.effects[f"mass.{name}"].m for name in TWO] == [1.5, 0.8]
+    assert [(effect.name, effect.instance) for effect in result.active[1:3]] == [
         ("mass.rod", "rod"),
         ("mass.rocker", "rocker"),
     ]
-    assert found.active == built({"effects": {"mass": TWO}}).active, "one object for one instance"
-    assert [label(found.active[1], "m"), owned(found.active[1], "m")] == ["rod.m", "mass.rod.m"]
-    assert numbers.numbers(found)["mass.rod.at"] == 0.03
-    assert [found.full(name) for name in ("rod.m", "rocker.m", "J4", "l1")] == [
+    assert result.active == built({"effects": {"mass": TWO}}).active, "one object for one instance"
+    assert [label(result.active[1], "m"), owned(result.active[1], "m")] == ["rod.m", "mass.rod.m"]
+    assert numbers.numbers(result)["mass.rod.at"] == 0.03
+    assert [result.full(name) for name in ("rod.m", "rocker.m", "J4", "l1")] == [
         *("mass.rod.m", "mass.rocker.m", "inertia.J4", "l1")
     ]
-    assert len({found.hash, built({}).hash, built({"effects": {"mass": {"rod": TWO["rod"]}}}).hash}) == 3
+    assert len({result.hash, built({}).hash, built({"effects": {"mass": {"rod": TWO["rod"]}}}).hash}) == 3
 
 
 def test_labels_with_dots_may_be_bounded_freed_and_limited():
@@ -104,15 +104,15 @@ def test_labels_with_dots_may_be_bounded_freed_and_limited():
         "A": {"x": {"min": "1 mm", "max": "2 mm"}},
     }
     limits = {"rod": {"tension": {"max": "5 kN"}}}
-    found = built({"effects": {"mass": TWO}, "bounds": bounds, "limits": limits})
-    assert {"rod.m", "rod.at", "A.x", "l1"} <= set(found.bounds)
-    assert found.bounds["rod.m"] == Bound(1.0, 2.0, False, "kg")
-    assert found.bounds["A.x"].max == 0.002
-    assert found.limits["rod.tension"] == LimitRange(None, 5000.0, "kN")
-    freed = found.free("rod.m")
+    result = built({"effects": {"mass": TWO}, "bounds": bounds, "limits": limits})
+    assert {"rod.m", "rod.at", "A.x", "l1"} <= set(result.bounds)
+    assert result.bounds["rod.m"] == Bound(1.0, 2.0, False, "kg")
+    assert result.bounds["A.x"].max == 0.002
+    assert result.limits["rod.tension"] == LimitRange(None, 5000.0, "kN")
+    freed = result.free("rod.m")
     assert freed.bounds["rod.m"].free
     assert freed.set("bounds.rod.m.max", "2500 g").bounds["rod.m"].max == 2.5
-    assert (found.shown_in("mass"), found.shown_in("force")) == ("kg", "kN")
+    assert (result.shown_in("mass"), result.shown_in("force")) == ("kg", "kN")
 
 
 @pytest.mark.parametrize(
@@ -134,13 +134,13 @@ def test_what_is_wrong_with_an_instance_or_a_label_is_told_at_its_key(changes, k
 
 
 def test_an_instance_goes_on_and_off_with_its_values():
-    found = built({"effects": {"mass": TWO}})
-    off = found.without_effect("mass.rod")
+    result = built({"effects": {"mass": TWO}})
+    off = result.without_effect("mass.rod")
     assert list(off.effects) == ["inertia", "mass.rocker", "resistance"]
-    assert off.with_effect("mass.rod").effects == found.effects
+    assert off.with_effect("mass.rod").effects == result.effects
     assert off.without_effect("mass.rod") is off
     assert off.set("effects.mass.rod.m", "2 kg").effects["mass.rod"].at == 0.03, "the rest of its values"
-    assert found.set("effects.mass.rod.m", "2 kg").effects["mass.rod"].m == 2.0
+    assert result.set("effects.mass.rod.m", "2 kg").effects["mass.rod"].m == 2.0
     none = off.without_effect("mass.rocker")
     assert list(none.effects) == ["inertia", "resistance"]
     assert none.with_effect("mass.rocker").effects == off.effects
@@ -150,9 +150,9 @@ class Shaped(Table):
     shape: str = "round"
 
 
-def apart(name, own=Table, **declared):
+def apart(name, values=Table, **declared):
     """Return an effect without a term of its own worth, that says beside what it stands."""
-    return Load(name=name, summary="", table=own, acts="drive", force=lambda *_: 0, **declared)
+    return Load(name=name, summary="", table=values, acts="drive", force=lambda *_: 0, **declared)
 
 
 def test_an_effect_that_another_needs_is_asked_for():
@@ -278,7 +278,7 @@ class Counted(Table):
 
 
 def test_the_label_of_an_absent_key_hides_no_given_one():
-    first, second = apart("first", own=Guessed, rank=40), apart("second", own=Counted, rank=41)
+    first, second = apart("first", values=Guessed, rank=40), apart("second", values=Counted, rank=41)
     given = {"effects": {"first": {}, "second": {"k": "3 mm"}}, "bounds": {"k": {"min": "1 mm", "max": "4 mm"}}}
     scene = built(given, first, second)
     assert scene.full("k") == "second.k"

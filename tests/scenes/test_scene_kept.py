@@ -28,10 +28,10 @@ def test_a_scene_is_asked_for_its_task_once():
 
 
 def test_what_fails_is_not_kept():
-    scene, asked = lo.load("beatup"), []
+    scene, request = lo.load("beatup"), []
 
     def fails():
-        asked.append(1)
+        request.append(1)
         raise ValueError("no")
 
     for _ in range(2):
@@ -39,7 +39,7 @@ def test_what_fails_is_not_kept():
             cached(scene, "what", fails)
         except ValueError:
             continue
-    assert len(asked) == 2
+    assert len(request) == 2
 
 
 def test_what_depends_on_a_file_is_made_anew(tmp_path):

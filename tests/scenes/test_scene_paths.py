@@ -78,9 +78,9 @@ def test_an_empty_file_name_is_refused(place):
 @pytest.mark.parametrize("table", ["loop", "no\0thing", "x" * 5000, "below"])
 def test_what_can_be_no_file_is_refused(place, table):
     scene = lo.load("rapier").set("targets.match.table", table)
-    for own in (scene, lo.scene(scene.document)):
+    for entry in (scene, lo.scene(scene.document)):
         with pytest.raises(BadInput):
-            match_table(own)
+            match_table(entry)
     with pytest.raises(BadInput):
         match_table(rapier(place, table))
 
@@ -99,9 +99,9 @@ def test_the_cam_law_of_a_scene_file_stays_in_its_folder_too(place):
 def test_the_folder_is_the_scenes_from_wherever_it_is_read(place, monkeypatch, table):
     scene = rapier(Path("scenes"), table)
     monkeypatch.chdir("/")
-    for found in (scene, pickle.loads(pickle.dumps(scene)), scene.set("operation.speed", "90 rpm")):
+    for result in (scene, pickle.loads(pickle.dumps(scene)), scene.set("operation.speed", "90 rpm")):
         with pytest.raises(BadInput, match="its own folder"):
-            match_table(found)
+            match_table(result)
     inside = lo.load(place / "mine.toml").set("targets.match.table", "in")
     assert match_table(pickle.loads(pickle.dumps(inside)))
 

@@ -75,12 +75,12 @@ LINKAGE = lo.load("sixbar-sley").document
 def document(job):
     """Return raw tables in which every table of a job stands."""
     name = "sixbar-sley" if job == "linkage" else job
-    found = tomllib.loads(packaged.problems()[name].read_text(encoding="utf-8"))
+    data = tomllib.loads(packaged.problems()[name].read_text(encoding="utf-8"))
     for table, more in MORE[job].items():
-        found[table] = {**found.get(table, {}), **more}
-    found["display"] = {"length": "in"}
-    found["targets"]["family"] = FAMILY
-    return found
+        data[table] = {**data.get(table, {}), **more}
+    data["display"] = {"length": "in"}
+    data["targets"]["family"] = FAMILY
+    return data
 
 
 def paths(table, start=()):
@@ -93,12 +93,12 @@ def paths(table, start=()):
 
 def changed(table, path, value):
     """Return raw tables with the value of one path changed."""
-    found = copy.deepcopy(table)
-    inside = found
+    result = copy.deepcopy(table)
+    inside = result
     for name in path[:-1]:
         inside = inside[name]
     inside[path[-1]] = value
-    return found
+    return result
 
 
 def told(text):
@@ -175,11 +175,11 @@ def test_a_wrong_shape_is_one_line_with_key_given_and_allowed(key, value, proble
         lambda: lo.scene(changed(LINKAGE, key.split("."), value)),
         lambda: lo.load("sixbar-sley").set(key, value),
     ):
-        with pytest.raises(BadInput) as found:
+        with pytest.raises(BadInput) as caught:
             call()
-        assert problem in str(found.value)
-        assert allowed in str(found.value)
-        assert "\n" not in str(found.value)
+        assert problem in str(caught.value)
+        assert allowed in str(caught.value)
+        assert "\n" not in str(caught.value)
 
 
 OWN = [shape for shape in SHAPES if shape[0].split(".")[0] in ("targets", "output", "parts", "events", "windows")]
@@ -194,9 +194,9 @@ def test_the_json_schema_refuses_the_same_shapes(key, value):
 
 
 def test_two_mistakes_are_two_lines():
-    with pytest.raises(BadInput) as found:
+    with pytest.raises(BadInput) as caught:
         lo.load("beatup").update({"limits.swing": {"min": "1 mm", "max": "2 mm"}, "targets.balance.expected": 3})
-    assert [line.split(": ")[1] for line in str(found.value).split("\n")] == [
+    assert [line.split(": ")[1] for line in str(caught.value).split("\n")] == [
         "limits.swing.min",
         "limits.swing.max",
         "targets.balance.expected",

@@ -46,18 +46,18 @@ def built(**tables):
 
 
 def test_a_job_may_declare_further_tables():
-    found = built(parts=PARTS)
-    assert found.document["parts"] == PARTS
-    assert found.set("parts.rod.kind", "slider").document["parts"]["rod"] == {"kind": "slider"}
-    assert dict(document_values(found.document))["parts.crank.length"] == "l1"
-    assert pickle.loads(pickle.dumps(found)) == found
+    result = built(parts=PARTS)
+    assert result.document["parts"] == PARTS
+    assert result.set("parts.rod.kind", "slider").document["parts"]["rod"] == {"kind": "slider"}
+    assert dict(document_values(result.document))["parts.crank.length"] == "l1"
+    assert pickle.loads(pickle.dumps(result)) == result
     json.dumps(json_schema.scene(Parted.known))
 
 
 def test_what_stands_there_decides_an_answer():
     """And a job without such tables has the hashes it had."""
-    found = built(parts=PARTS)
-    assert len({found.hash, built().hash, found.set("parts.rod.kind", "slider").hash}) == 3
+    result = built(parts=PARTS)
+    assert len({result.hash, built().hash, result.set("parts.rod.kind", "slider").hash}) == 3
     assert scene.build(BEATUP.document, BEATUP.jobs, "mine.toml").hash == BEATUP.hash
 
 
@@ -70,8 +70,8 @@ def test_a_table_of_a_job_is_none_of_another_job():
 def test_a_further_table_is_never_taken_for_one_of_a_near_name():
     """[events] is near [effects]."""
     plain = {name: table for name, table in BEATUP.document.items() if name != "effects"}
-    found = scene.build({**plain, "events": {"front": {"extreme": "max"}}}, Parted(), "mine.toml")
-    assert not found.effects
+    result = scene.build({**plain, "events": {"front": {"extreme": "max"}}}, Parted(), "mine.toml")
+    assert not result.effects
     with pytest.raises(BadInput, match=r'Perhaps "parts" is meant'):
         built(part=PARTS)
 

@@ -69,12 +69,12 @@ KINDS = {
 
 
 def rows(columns):
-    return [[f"{name} [{unit}]" for name, unit, _ in columns], *zip(*(each for _, _, each in columns), strict=True)]
+    return [[f"{name} [{unit}]" for name, unit, _ in columns], *zip(*(item for _, _, item in columns), strict=True)]
 
 
 def joined(cells, sign=",", comma=False):
-    told = ([cell.replace(".", ",") if comma and k else cell for cell in row] for k, row in enumerate(cells))
-    return "".join(f"{sign.join(row)}\n" for row in told)
+    report = ([cell.replace(".", ",") if comma and k else cell for cell in row] for k, row in enumerate(cells))
+    return "".join(f"{sign.join(row)}\n" for row in report)
 
 
 def plain(columns):
@@ -175,13 +175,13 @@ def test_what_is_written_is_read_to_the_last_digit(tmp_path_factory, values, com
     frame.attrs["scene"] = "made up, 1.5"
     sheets.write(path, {"curves": frame}, comma)
     try:
-        found = csv_tables.read_measured(path, {"phi": "angle", "Md": "torque"})
+        result = csv_tables.read_measured(path, {"phi": "angle", "Md": "torque"})
     except BadInput as error:
         assert "part thousands" in str(error) or "decimal sign" in str(error)  # noqa: PT017 (only some tables have two readings)
         assert ending == ".csv"
         assert not comma
         return
-    assert found.columns["Md"] == tuple(values)
+    assert result.columns["Md"] == tuple(values)
 
 
 @given(st.binary(max_size=400))
@@ -211,7 +211,7 @@ def test_a_workbook_travels_with_an_answer(tmp_path):
     path = tmp_path / "law.xlsx"
     path.write_bytes(workbook(KINDS[law]))
     scene = lo.load("shedding").update({"mechanism.law": "table", "mechanism.law_table": str(path)})
-    held = tables(scene)["mechanism.law_table"]
+    table = tables(scene)["mechanism.law_table"]
     again = tmp_path / "law.csv"
-    again.write_text(held, encoding="utf-8")
+    again.write_text(table, encoding="utf-8")
     assert law(again) == law(path)

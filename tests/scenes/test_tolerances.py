@@ -17,18 +17,18 @@ def made(**given):
 
 
 def test_half_widths_and_standard_deviations():
-    found = made(
+    result = made(
         l1={"plus_minus": "0.06 mm", "sigmas": 2},
         l2="0.06 mm",
         l3={"plus_minus": "0.06 mm", "spread": "uniform"},
         M0="5 %",
         J4={"plus_minus": "2 %", "group": "reed", "correlation": 0.5},
     )
-    assert found["l1"].sigma(0.03) == pytest.approx(3e-5, rel=1e-15)
-    assert found["l2"].sigma(0.08) == pytest.approx(2e-5, rel=1e-15)
-    assert found["l3"].sigma(0.15) == pytest.approx(6e-5 / 3**0.5, rel=1e-15)
-    assert found["M0"].plus_minus(745.0) == pytest.approx(37.25, rel=1e-15)
-    assert (found["J4"].group, found["J4"].correlation) == ("reed", 0.5)
+    assert result["l1"].sigma(0.03) == pytest.approx(3e-5, rel=1e-15)
+    assert result["l2"].sigma(0.08) == pytest.approx(2e-5, rel=1e-15)
+    assert result["l3"].sigma(0.15) == pytest.approx(6e-5 / 3**0.5, rel=1e-15)
+    assert result["M0"].plus_minus(745.0) == pytest.approx(37.25, rel=1e-15)
+    assert (result["J4"].group, result["J4"].correlation) == ("reed", 0.5)
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_a_class_that_says_nothing_of_a_size_is_refused(name, nominal):
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "said"),
+    ("key", "value", "message"),
     [
         ("tolerances", {"l9": "1 mm"}, "l9"),
         ("tolerances", {"l1": "1 kg"}, "kg"),
@@ -82,8 +82,8 @@ def test_a_class_that_says_nothing_of_a_size_is_refused(name, nominal):
         ("accept", {"M3_fdc": "0 N*m"}, "out of range"),
     ],
 )
-def test_what_is_wrong_is_said(key, value, said):
-    with pytest.raises(BadInput, match=said.replace("*", r"\*")) as error:
+def test_what_is_wrong_is_said(key, value, message):
+    with pytest.raises(BadInput, match=message.replace("*", r"\*")) as error:
         BEATUP.update({key: value})
     assert key in str(error.value)
 
@@ -100,16 +100,16 @@ def test_that_of_an_effect_that_is_off_waits_for_it():
 
 
 def test_a_band_that_is_not_even_has_its_middle_and_half_width():
-    found = made(
+    result = made(
         l1={"plus": "0", "minus": "0.05 mm"},
         l2={"plus": "-0.02 mm", "minus": "0.06 mm", "spread": "uniform"},
         l3={"plus": "1 %", "minus": 0},
     )
-    assert found["l1"].band(0.03) == (-5e-5, 0.0)
-    assert (found["l1"].shift(0.03), found["l1"].plus_minus(0.03)) == pytest.approx((-2.5e-5, 2.5e-5), rel=1e-14)
-    assert found["l1"].sigma(0.03) == pytest.approx(2.5e-5 / 3, rel=1e-14)
-    assert (found["l2"].shift(0.08), found["l2"].plus_minus(0.08)) == pytest.approx((-4e-5, 2e-5), rel=1e-14)
-    assert found["l3"].band(0.15) == pytest.approx((0.0, 1.5e-3), rel=1e-14)
+    assert result["l1"].band(0.03) == (-5e-5, 0.0)
+    assert (result["l1"].shift(0.03), result["l1"].plus_minus(0.03)) == pytest.approx((-2.5e-5, 2.5e-5), rel=1e-14)
+    assert result["l1"].sigma(0.03) == pytest.approx(2.5e-5 / 3, rel=1e-14)
+    assert (result["l2"].shift(0.08), result["l2"].plus_minus(0.08)) == pytest.approx((-4e-5, 2e-5), rel=1e-14)
+    assert result["l3"].band(0.15) == pytest.approx((0.0, 1.5e-3), rel=1e-14)
 
 
 FITS = """
@@ -125,8 +125,8 @@ N8 25 -36 -3 | M6 300 -41 -9 | N6 300 -57 -25 | h9 100 -87 0 | H7 500 0 63 | JS7
 @pytest.mark.parametrize("row", FITS.replace("\n", "|").strip("|").split("|"))
 def test_fits_have_the_printed_limits(row):
     name, size, low, high = row.split()
-    found = made(l1={"fit": name})["l1"].band(float(size) / 1000)
-    assert found == pytest.approx((float(low) * 1e-6, float(high) * 1e-6), abs=1e-15)
+    result = made(l1={"fit": name})["l1"].band(float(size) / 1000)
+    assert result == pytest.approx((float(low) * 1e-6, float(high) * 1e-6), abs=1e-15)
 
 
 def test_a_fit_says_nothing_beyond_500_mm():

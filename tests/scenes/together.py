@@ -5,11 +5,11 @@ from loomopt.physics.effects.kinds import Check, Load, faults
 
 def combined(effects):
     """Return the effects that can all be on at once, in the order given."""
-    found = [effect for effect in effects if isinstance(effect, Load | Check)]
-    for effect in (each for each in effects if not isinstance(each, Load | Check)):
-        if goes([*found, effect]):
-            found.append(effect)
-    return [effect for effect in effects if effect in found]
+    results = [effect for effect in effects if isinstance(effect, Load | Check)]
+    for effect in (item for item in effects if not isinstance(item, Load | Check)):
+        if goes([*results, effect]):
+            results.append(effect)
+    return [effect for effect in effects if effect in results]
 
 
 def goes(effects):

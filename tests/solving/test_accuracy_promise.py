@@ -93,8 +93,8 @@ def size(figures, name):
 
 def errors(answer, truth):
     """Return each figure's relative error."""
-    found = answer.figures
-    return {name: abs(found[name] - value) / size(truth, name) for name, value in truth.items() if value is not None}
+    figures = answer.figures
+    return {name: abs(figures[name] - value) / size(truth, name) for name, value in truth.items() if value is not None}
 
 
 def kept(answer, accuracy, truth):
@@ -143,9 +143,9 @@ def test_the_best_optimum_has_the_digits_that_other_solvers_found(name):
     scene, target, figure = JOBS[name]
     expected = float(str(scene.targets[target].model_dump()["expected"][figure]).split()[0])
     for accuracy in ACCURACIES:
-        found = solved(name, accuracy).figures[figure]
-        assert found == pytest.approx(expected, rel=min(accuracy, 1e-3)), accuracy
-    assert found == pytest.approx(expected, rel=BEST)
+        result = solved(name, accuracy).figures[figure]
+        assert result == pytest.approx(expected, rel=min(accuracy, 1e-3)), accuracy
+    assert result == pytest.approx(expected, rel=BEST)
 
 
 def test_the_softest_spring_is_right_to_what_is_asked_against_thirty_digits():

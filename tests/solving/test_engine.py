@@ -52,9 +52,9 @@ def test_every_optimum_that_starts_end_in_is_told_best_first():
 
 
 def test_starts_are_told_as_they_come():
-    told = []
-    toy.solve(toy.program("xy", BOWL), starts=3, on_start=lambda number, count: told.append((number, count)))
-    assert told == [(1, 3), (2, 3), (3, 3)]
+    texts = []
+    toy.solve(toy.program("xy", BOWL), starts=3, on_start=lambda number, count: texts.append((number, count)))
+    assert texts == [(1, 3), (2, 3), (3, 3)]
 
 
 def test_an_answer_may_start_its_neighbour():
@@ -115,10 +115,10 @@ def test_where_nothing_helps_the_solvers_own_word_is_passed_on(monkeypatch):
 
 def test_a_point_that_is_not_certified_is_told_with_the_reason():
     hs13 = {"f": lambda v: (v["x"] - 2) ** 2 + v["y"] ** 2, "g": lambda v: (1 - v["x"]) ** 3 - v["y"]}
-    found = toy.solve(toy.program("xy", hs13, limits=(("g", -1, 0.0), ("y", -1, 0.0))))
-    assert found.status == "uncertified"
-    assert found.message.startswith("A design was reached but not certified: ")
-    assert found.solver["starts"] >= 8
+    answer = toy.solve(toy.program("xy", hs13, limits=(("g", -1, 0.0), ("y", -1, 0.0))))
+    assert answer.status == "uncertified"
+    assert answer.message.startswith("A design was reached but not certified: ")
+    assert answer.solver["starts"] >= 8
 
 
 def test_the_callback_counts_iterations():
@@ -130,20 +130,20 @@ def test_the_callback_counts_iterations():
 def test_a_program_is_solved_without_its_scene():
     program = toy.program("xy", BOWL)
     search = Search(toy.ToyJob(program), program, Settings())
-    found = multistart.run_search(search)
-    assert found.passed
-    assert found.best.x == pytest.approx({"x": 1.0, "y": 0.0}, abs=1e-12)
-    again = multistart.run_search(search, near=[found.candidates[0].point])
+    result = multistart.run_search(search)
+    assert result.passed
+    assert result.best.x == pytest.approx({"x": 1.0, "y": 0.0}, abs=1e-12)
+    again = multistart.run_search(search, near=[result.candidates[0].point])
     assert (again.passed, len(again.candidates)) == (True, 1)
-    other = replace(found.candidates[0].point, structure="another")
+    other = replace(result.candidates[0].point, structure="another")
     assert multistart.run_search(search, near=[other]).candidates[0].point.iterations > 0
 
 
 def test_todays_machine_is_evaluated_when_it_is_asked_for(monkeypatch):
     answer = toy.solve(toy.program("xy", BOWL))
-    asked = []
-    monkeypatch.setattr(report, "evaluation", lambda *_: asked.append(1))
-    assert asked == []
+    requests = []
+    monkeypatch.setattr(report, "evaluation", lambda *_: requests.append(1))
+    assert requests == []
     assert answer.today is None
     assert answer.today is None
-    assert asked == [1]
+    assert requests == [1]

@@ -45,5 +45,5 @@ def test_a_figure_has_the_power_of_its_objective_undone():
 def test_what_a_design_does_not_name_is_todays(given):
     job = toy.ToyJob(toy.program("xy", BOWL))
     with mock.patch.object(registry, "of", return_value=job):
-        found = evaluate(toy.scene_of(job), given)
-    assert found.design == {"x": 0.5, "y": 0.5, **(given or {})}
+        evaluation = evaluate(toy.scene_of(job), given)
+    assert evaluation.design == {"x": 0.5, "y": 0.5, **(given or {})}

@@ -37,13 +37,13 @@ def cam():
 
 
 def price(answer, name):
-    (found,) = (each for each in answer.binding if each.limit == name)
-    (worth,) = found.worth.values()
+    (result,) = (item for item in answer.binding if item.limit == name)
+    (worth,) = result.worth.values()
     return worth
 
 
-def told(found, name):
-    (limit,) = (each for each in found.limits if each.name == name)
+def told(result, name):
+    (limit,) = (item for item in result.limits if item.name == name)
     return limit
 
 
@@ -60,12 +60,12 @@ def test_a_limit_on_both_dwells_gives_the_known_drives(short, degrees, peak):
 
 @pytest.mark.slow
 def test_a_limit_on_one_dwell_is_as_if_the_operation_asked_for_it(rapier):
-    asked, limited = (
+    request, limited = (
         lo.solve(rapier.set(key, "35 deg"), starts=1) for key in ("operation.dwell_after", "limits.dwell_after.min")
     )
-    assert asked.status == limited.status == "optimal"
-    assert limited.design == pytest.approx(asked.design, rel=1e-12)
-    assert price(limited, "dwell_after") == pytest.approx(price(asked, "dwell_after"), rel=1e-9)
+    assert request.status == limited.status == "optimal"
+    assert limited.design == pytest.approx(request.design, rel=1e-12)
+    assert price(limited, "dwell_after") == pytest.approx(price(request, "dwell_after"), rel=1e-9)
     assert limited.reached == {"stroke": True, "dwell_after": True, "dwell_before": True}
 
 
@@ -91,9 +91,9 @@ def test_a_dwell_that_the_target_asks_for_anyway_stands_once(rapier, name):
 def test_what_two_limits_ask_of_one_dwell_stands_by_both_names(rapier):
     both = rapier.update({"limits.dwell.min": "32 deg", "limits.dwell_after.min": "35 deg"})
     program = registry.of(rapier).program(both, "stroke-dwell")
-    found = [(each.name, round(each.value / DEGREE, 9)) for each in program.limits if each.row == "dwell_after"]
-    assert found == [("dwell_after", 35.0), ("dwell", 32.0)]
-    values = {each.name: each.lower / DEGREE for each in program.variables if each.name.startswith("dwell")}
+    results = [(item.name, round(item.value / DEGREE, 9)) for item in program.limits if item.row == "dwell_after"]
+    assert results == [("dwell_after", 35.0), ("dwell", 32.0)]
+    values = {item.name: item.lower / DEGREE for item in program.variables if item.name.startswith("dwell")}
     assert values == pytest.approx({"dwell_after": 35.0, "dwell_before": 32.0})
 
 
@@ -117,7 +117,7 @@ def test_a_stroke_that_the_target_leaves_open_is_limited_and_priced(rapier):
     tight, loose = (lo.solve(scene, "match", warm_start=answer) for scene in scenes[1:])
     slope = (tight.figures["match_rms"] - loose.figures["match_rms"]) / (2 * step)
     assert price(answer, "stroke") == pytest.approx(slope, rel=1e-4)
-    assert {"stroke <= 840 mm"} <= {each.text for each in answer.prove().proofs if each.status == "proven"}
+    assert {"stroke <= 840 mm"} <= {proof.text for proof in answer.prove().proofs if proof.status == "proven"}
 
 
 def test_a_limit_that_the_stroke_keeps_anyway_changes_nothing(rapier):
@@ -131,7 +131,7 @@ def test_a_stroke_apart_from_the_operations_clashes_with_it(rapier):
     answer = lo.solve(rapier.set("limits.stroke.min", "860 mm"), starts=1)
     assert answer.status == "infeasible"
     assert {"stroke = 850 mm", "stroke >= 860 mm"} <= set(answer.clash)
-    assert {each.limit for each in answer.relaxation} == {"stroke"}
+    assert {relaxation.limit for relaxation in answer.relaxation} == {"stroke"}
 
 
 @pytest.mark.slow
@@ -139,7 +139,7 @@ def test_a_stroke_apart_from_the_operations_clashes_with_it(rapier):
 def test_a_dwell_out_of_reach_tells_how_far_it_must_give_way(rapier, target):
     answer = lo.solve(rapier.set("limits.dwell.min", "55 deg"), target, starts=1)
     assert answer.status == "infeasible"
-    (need,) = (each for each in answer.relaxation if each.limit == "dwell")
+    (need,) = (relaxation for relaxation in answer.relaxation if relaxation.limit == "dwell")
     assert need.needed == pytest.approx(LONGEST * DEGREE, abs=1e-6)
     assert need.text.startswith("dwell >= 55 deg -> 50.88")
 
@@ -149,26 +149,26 @@ def test_an_axis_may_be_limited_too(rapier):
     program, _ = registry.of(rapier).traded(
         limited, "stroke-dwell", {"peak_acceleration": "least", "dwell_after": "most"}
     )
-    (dwell,) = (each for each in program.variables if each.name == "dwell_after")
+    (dwell,) = (item for item in program.variables if item.name == "dwell_after")
     assert (dwell.lower, dwell.upper) == pytest.approx((28 * DEGREE, math.pi))
-    asked = {each.name: each.value / DEGREE for each in program.limits if each.row == "dwell_after"}
-    assert asked == pytest.approx({"dwell_after": 28.0, "dwell": 26.0})
+    request = {item.name: item.value / DEGREE for item in program.limits if item.row == "dwell_after"}
+    assert request == pytest.approx({"dwell_after": 28.0, "dwell": 26.0})
 
 
 def test_today_is_judged_by_what_its_figures_are(rapier, cam):
-    found = lo.evaluate(
+    evaluation = lo.evaluate(
         rapier.update({"limits.dwell_before.min": "36.8 deg", "limits.stroke.min": "849 mm"}), target="match"
     )
-    before = told(found, "dwell_before")
-    assert (before.value, before.ok) == (found.figures["dwell_before"], False)
+    before = told(evaluation, "dwell_before")
+    assert (before.value, before.ok) == (evaluation.figures["dwell_before"], False)
     assert before.value / DEGREE == pytest.approx(36.64, abs=5e-3), "as the paper's drive dwells"
-    assert told(found, "stroke").ok
+    assert told(evaluation, "stroke").ok
     slow = told(lo.evaluate(cam.set("limits.contact_speed.min", "150 rpm")), "contact_speed")
     assert (slow.value / RPM, slow.ok) == (pytest.approx(144.508702549), False)
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "target", "said"),
+    ("key", "value", "target", "message"),
     [
         ("limits.dwell_after.min", "35 deg", "dwell", "the lesser of both dwells is maximised.*Limit dwell"),
         ("limits.dwell.min", "-5 deg", None, "the dwell is out of range.*more than 0 deg and less than 180 deg"),
@@ -177,8 +177,8 @@ def test_today_is_judged_by_what_its_figures_are(rapier, cam):
         ("limits.rms_jerk.min", "1 m/rad^3", None, "rms_jerk has no limit min"),
     ],
 )
-def test_what_cannot_be_limited_is_refused_in_one_sentence(rapier, key, value, target, said):
-    with pytest.raises(BadInput, match=said):
+def test_what_cannot_be_limited_is_refused_in_one_sentence(rapier, key, value, target, message):
+    with pytest.raises(BadInput, match=message):
         lo.solve(rapier.set(key, value), target)
 
 
@@ -191,7 +191,7 @@ def test_a_dwell_needs_what_counts_as_standing_still(rapier):
 def test_a_dwell_may_not_be_asked_for_beyond_its_bounds(rapier):
     bounded = rapier.update({"bounds.dwell_after.min": "25 deg", "bounds.dwell_after.max": "40 deg"})
     program = registry.of(rapier).program(bounded.set("limits.dwell_after.min", "30 deg"), "stroke-dwell")
-    (dwell,) = (each for each in program.variables if each.name == "dwell_after")
+    (dwell,) = (variable for variable in program.variables if variable.name == "dwell_after")
     assert (dwell.lower / DEGREE, dwell.upper / DEGREE) == pytest.approx((30.0, 40.0))
     with pytest.raises(BadInput, match=r"limits\.dwell_after\.min: dwell_after cannot reach the limit"):
         lo.solve(bounded.set("limits.dwell_after.min", "50 deg"))
@@ -206,7 +206,7 @@ def test_contact_up_to_a_speed_takes_the_spring_of_that_speed(cam):
     assert price(limited, "contact_speed") == pytest.approx(price(faster, "speed"), rel=1e-9)
     for name in ("N_min", "X0"):
         assert price(limited, name) == pytest.approx(price(faster, name), rel=1e-5)
-    proofs = {each.text: each.status for each in limited.prove().proofs}
+    proofs = {proof.text: proof.status for proof in limited.prove().proofs}
     assert proofs["contact at rest"] == proofs["contact at contact_speed"] == "proven"
 
 
@@ -215,14 +215,14 @@ def test_contact_up_to_its_own_speed_or_less_costs_nothing(cam, speed):
     answer = lo.solve(cam.set("limits.contact_speed.min", f"{speed} rpm"))
     assert answer.status == "optimal"
     assert answer.figures["K1"] == pytest.approx(STIFFNESS[600], rel=1e-11)
-    assert "contact_speed" not in {each.limit for each in answer.binding}
+    assert "contact_speed" not in {item.limit for item in answer.binding}
     assert told(answer, "contact_speed").ok
 
 
 def test_contact_up_to_a_speed_holds_with_friction_and_a_free_law(cam):
     damped = cam.with_effect("damping")
-    asked, limited = (lo.solve(damped.set(key, "900 rpm")) for key in ("operation.speed", "limits.contact_speed.min"))
-    assert limited.figures["K1"] == pytest.approx(asked.figures["K1"], rel=1e-11)
+    request, limited = (lo.solve(damped.set(key, "900 rpm")) for key in ("operation.speed", "limits.contact_speed.min"))
+    assert limited.figures["K1"] == pytest.approx(request.figures["K1"], rel=1e-11)
     law = [
         lo.solve(cam.set(key, "700 rpm"), "law", starts=1) for key in ("operation.speed", "limits.contact_speed.min")
     ]
@@ -233,11 +233,11 @@ def test_contact_up_to_a_speed_holds_with_friction_and_a_free_law(cam):
 def test_a_speed_that_no_spring_survives_tells_how_far_it_must_give_way(cam):
     sought = lo.solve(cam.set("limits.contact_speed.min", "700 rpm"), "speed")
     assert sought.status == "infeasible"
-    (need,) = (each for each in sought.relaxation if each.limit == "contact_speed")
+    (need,) = (relaxation for relaxation in sought.relaxation if relaxation.limit == "contact_speed")
     assert need.needed / RPM == pytest.approx(144.508702549, rel=1e-6)
-    found = lo.solve(cam.set("limits.contact_speed.min", "5000 rpm"))
-    assert found.status == "infeasible"
-    (need,) = (each for each in found.relaxation if each.limit == "contact_speed")
+    answer = lo.solve(cam.set("limits.contact_speed.min", "5000 rpm"))
+    assert answer.status == "infeasible"
+    (need,) = (relaxation for relaxation in answer.relaxation if relaxation.limit == "contact_speed")
     stiffest = registry.of(cam).figures(cam, {"K1": 1e6, "X0": 0.08})
     assert need.needed == pytest.approx(stiffest["contact_speed"], rel=1e-6)
 

@@ -26,8 +26,8 @@ FLAT = {"HS26", "HS49"}
 """Quartic and sextic valleys: the curvature at the optimum is 0 along a direction."""
 
 
-def assert_least(found, least):
-    assert found == pytest.approx(least, rel=ACCURACY, abs=ACCURACY)
+def assert_least(result, least):
+    assert result == pytest.approx(least, rel=ACCURACY, abs=ACCURACY)
 
 
 def test_there_are_more_than_fifty_of_them():
@@ -202,7 +202,7 @@ def test_between_its_ends_dependent_equalities_hide_nothing(t, reason):
     top = min(np.roots([2, -3, -1, 2 / 3]), key=lambda root: abs(root - 0.5))
     certificate = certify(_hs55(), along(float(top.real) if t is None else t), ACCURACY)
     assert not certificate.passed
-    assert any(reason in said for said in certificate.reasons), certificate.reasons
+    assert any(reason in message for message in certificate.reasons), certificate.reasons
 
 
 def test_the_books_start_breaks_the_first_equality():

@@ -142,8 +142,8 @@ def test_ctrl_c_is_told_in_one_line_without_the_solvers_own_warning(after):
     code = STOPPED_BY_THE_CLOCK.format(after=after)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stdout) == (130, "")
-    *progress, told = done.stderr.splitlines()
-    assert told == "loomopt: stopped; nothing was left half-written."
+    *progress, report = done.stderr.splitlines()
+    assert report == "loomopt: stopped; nothing was left half-written."
     assert all(re.fullmatch(r"loomopt: .* \(\d+ s\)", line) for line in progress)
 
 

@@ -26,10 +26,10 @@ def test_the_ends_of_what_is_allowed_are_allowed(accuracy, starts):
     ],
 )
 def test_what_lies_beyond_is_bad_input_under_its_own_name(accuracy, starts, key):
-    with pytest.raises(BadInput) as found:
+    with pytest.raises(BadInput) as caught:
         check_numbers(accuracy, starts)
-    assert found.value.key == key
-    assert str(found.value).startswith(f"{key}: ")
+    assert caught.value.key == key
+    assert str(caught.value).startswith(f"{key}: ")
 
 
 def test_the_default_target_is_the_jobs():

@@ -62,9 +62,9 @@ def test_a_balance_out_of_reach_is_data_and_stands_in_the_table():
     assert (light.status, packaged.status) == ("optimal", "optimal")
     assert light.reached == light.as_dict()["reached"] == {"M3_fdc": False}
     assert packaged.reached == {"M3_fdc": True}
-    for answer, said in ((light, "no"), (packaged, "yes")):
+    for answer, message in ((light, "no"), (packaged, "yes")):
         column = answer.table()["reached"]
-        assert column["M3_fdc"] == said
+        assert column["M3_fdc"] == message
         assert set(column.drop("M3_fdc")) == {""}
         assert answer.message.startswith("Balanced") == answer.reached["M3_fdc"], "the sentence says the same"
     binds = light.table()["binds"]
@@ -79,8 +79,8 @@ def test_balanced_is_relative_to_the_peak_of_the_crank_torque():
 
 
 def test_a_target_that_asks_for_nothing_out_of_reach_has_no_column():
-    found = lo.evaluate("beatup", target="pulse")
-    assert found.reached == {}
+    evaluation = lo.evaluate("beatup", target="pulse")
+    assert evaluation.reached == {}
     answer = lo.solve("beatup", "pulse", starts=1)
     assert answer.as_dict()["reached"] == {}
     assert "reached" not in answer.table().columns
@@ -111,7 +111,7 @@ def test_the_speed_of_target_speed_has_a_limit_where_the_scene_gives_one_only():
     scene = lo.load("shedding")
     for bounded, limit in ((scene, None), (scene.set("bounds.speed", {"min": "10 rpm", "max": "2000 rpm"}), 10.0)):
         answer = lo.solve(bounded, "speed", starts=1)
-        named = {found.name: found for found in answer.limits}
+        named = {result.name: result for result in answer.limits}
         assert answer.status == "optimal"
         assert ("speed" in named) is (limit is not None)
         low = answer.table()["min"]["speed"]

@@ -37,18 +37,18 @@ def solved(scene, target):
 
 @pytest.mark.slow
 def test_the_whole_search_finds_the_best_of_the_optima():
-    found = lo.solve(SCENE)
-    assert (found.status, found.certificate.passed) == ("optimal", True)
-    assert found.figures["M3_fdc"] == pytest.approx(-27.267877430, abs=6e-10)
-    assert found.figures["peak_torque"] == pytest.approx(82.0953123208, abs=6e-11)
-    assert {name: found.design[name] for name in BEST} == pytest.approx(BEST, abs=6e-10)
-    assert "twist" not in found.message
-    assert answer().figures["M3_fdc"] == pytest.approx(found.figures["M3_fdc"], abs=1e-9)
+    second_answer = lo.solve(SCENE)
+    assert (second_answer.status, second_answer.certificate.passed) == ("optimal", True)
+    assert second_answer.figures["M3_fdc"] == pytest.approx(-27.267877430, abs=6e-10)
+    assert second_answer.figures["peak_torque"] == pytest.approx(82.0953123208, abs=6e-11)
+    assert {name: second_answer.design[name] for name in BEST} == pytest.approx(BEST, abs=6e-10)
+    assert "twist" not in second_answer.message
+    assert answer().figures["M3_fdc"] == pytest.approx(second_answer.figures["M3_fdc"], abs=1e-9)
 
 
 @pytest.mark.slow
 def test_prices_are_those_of_solving_again():
-    price = next(each for each in answer().binding if each.limit == "l1")
+    price = next(item for item in answer().binding if item.limit == "l1")
     low, high = (answer(bounds__l1={"min": f"{30 + h} mm", "max": "35 mm"}) for h in (-1e-3, 1e-3))
     worth = (abs(high.figures["M3_fdc"]) - abs(low.figures["M3_fdc"])) / 2e-6
     assert abs(price.worth["M3_fdc"]) == pytest.approx(worth, rel=1e-5)
@@ -66,19 +66,19 @@ def test_a_neighbour_s_answer_is_solved_again_warm():
 @pytest.mark.parametrize("target", ["balance", "pulse", "torque", "retrofit"])
 def test_every_target_of_the_job_is_served(target):
     """At 800 N·m the reed can be balanced on the shaft; what each target is about is met, and read again apart."""
-    found = answer(target, operation__M0="800 N*m")
-    assert (found.status, found.certificate.passed) == ("optimal", True)
-    again = lo.evaluate(SCENE.set("operation.M0", "800 N*m"), found.design)
-    assert again.figures["pulse_rms"] == pytest.approx(found.figures["pulse_rms"], rel=1e-12)
+    second_answer = answer(target, operation__M0="800 N*m")
+    assert (second_answer.status, second_answer.certificate.passed) == ("optimal", True)
+    again = lo.evaluate(SCENE.set("operation.M0", "800 N*m"), second_answer.design)
+    assert again.figures["pulse_rms"] == pytest.approx(second_answer.figures["pulse_rms"], rel=1e-12)
     reached = abs(again.figures["M3_fdc"])
     assert reached <= {"balance": 1e-6, "retrofit": 1e-6, "torque": 8.0 + 1e-6, "pulse": 200.0}[target]
 
 
 @pytest.mark.slow
 def test_what_cannot_be_reached_is_said():
-    found = answer("retrofit")
-    assert found.status == "infeasible"
-    assert found.clash
+    second_answer = answer("retrofit")
+    assert second_answer.status == "infeasible"
+    assert second_answer.clash
 
 
 @pytest.mark.parametrize(("limit", "side"), [("reed_front", "min"), ("shaft_peak", "max"), ("twist_peak", "max")])
@@ -88,17 +88,17 @@ def test_its_figures_can_be_limited(limit, side):
     unit, tight = (
         ("N*m", 0.998 * free) if limit == "shaft_peak" else ("rad", free * (1.0005 if side == "min" else 0.998))
     )
-    found = answer(operation__M0="800 N*m", **{f"limits__{limit}__{side}": f"{tight!r} {unit}"})
-    assert (found.status, found.certificate.passed) == ("optimal", True)
-    assert found.figures[limit] == pytest.approx(tight, rel=1e-7)
-    assert [each.limit for each in found.binding if each.limit == limit] == [limit]
+    second_answer = answer(operation__M0="800 N*m", **{f"limits__{limit}__{side}": f"{tight!r} {unit}"})
+    assert (second_answer.status, second_answer.certificate.passed) == ("optimal", True)
+    assert second_answer.figures[limit] == pytest.approx(tight, rel=1e-7)
+    assert [price.limit for price in second_answer.binding if price.limit == limit] == [limit]
 
 
 @pytest.mark.slow
 def test_a_shaft_s_stiffness_may_be_chosen():
-    found = answer(bounds__stiffness={"min": "1 MN*m/rad", "max": "4 MN*m/rad"})
-    assert (found.status, found.certificate.passed) == ("optimal", True)
-    assert abs(found.figures["M3_fdc"]) < abs(answer().figures["M3_fdc"])
+    second_answer = answer(bounds__stiffness={"min": "1 MN*m/rad", "max": "4 MN*m/rad"})
+    assert (second_answer.status, second_answer.certificate.passed) == ("optimal", True)
+    assert abs(second_answer.figures["M3_fdc"]) < abs(answer().figures["M3_fdc"])
 
 
 def test_slopes_by_jets_are_those_of_40_digits():
@@ -155,20 +155,20 @@ def test_words_of_a_state_are_structure_and_numbers_are_not():
 
 
 def test_no_claim_about_all_designs_is_made():
-    found = lo.solve(SCENE, starts=1, global_proof=True, seconds=5.0)
-    assert not found.global_bound.proven
-    assert "the steady state of shaft_torsion is not bounded by boxes of designs" in found.global_bound.why
+    second_answer = lo.solve(SCENE, starts=1, global_proof=True, seconds=5.0)
+    assert not second_answer.global_bound.proven
+    assert "the steady state of shaft_torsion is not bounded by boxes of designs" in second_answer.global_bound.why
 
 
 def test_every_limit_and_peak_is_proven_and_what_the_proof_rests_on_is_said():
-    found = lo.prove(SCENE, answer().design)
-    assert found.passed
+    proofs = lo.prove(SCENE, answer().design)
+    assert proofs.passed
     assert {"peak shaft_peak", "peak twist_peak", "peak reed_front", "peak peak_torque"} <= {
-        proof.limit for proof in found.proofs
+        proof.limit for proof in proofs.proofs
     }
-    (said,) = found.uncovered
-    assert "32 harmonics" in said
-    assert said in found.as_dict()["uncovered"]
+    (message,) = proofs.uncovered
+    assert "32 harmonics" in message
+    assert message in proofs.as_dict()["uncovered"]
     assert lo.prove(lo.load("beatup"), {}).uncovered == ()
 
 

@@ -78,16 +78,16 @@ def test_ctrl_c_stops_a_main_thread_that_waits_for_another():
 
 
 def test_a_session_of_ones_own_keeps_and_counts_apart():
-    scene, own = lo.load("beatup-light"), Session()
+    scene, values = lo.load("beatup-light"), Session()
     lo.solve(scene, starts=1)
     there, counted = current().count(NLPS), current().positions
-    with working(own):
-        assert current() is own
+    with working(values):
+        assert current() is values
         answer = lo.solve(scene, starts=1)
     assert (current().count(NLPS), current().positions) == (there, counted)
-    assert own.count(NLPS) >= 1
-    assert own.positions >= answer.solver["evaluations"] > 0
-    with working(own):
+    assert values.count(NLPS) >= 1
+    assert values.positions >= answer.solver["evaluations"] > 0
+    with working(values):
         again = lo.solve(scene, starts=1)
     assert again.time["build_s"] < answer.time["build_s"], "what it built is found again"
     assert again.design == answer.design
@@ -96,28 +96,28 @@ def test_a_session_of_ones_own_keeps_and_counts_apart():
 
 
 def test_what_is_kept_goes_by_use_and_when_it_is_let_go():
-    own, made = Session(), list[int]()
+    values, made = Session(), list[int]()
 
     def made_of(key):
         made.append(key)
         return key
 
     def kept(key):
-        return own.cached(SAMPLERS, 2, key, lambda: made_of(key))
+        return values.cached(SAMPLERS, 2, key, lambda: made_of(key))
 
     assert [kept(key) for key in (1, 2, 1, 3, 1, 2)] == [1, 2, 1, 3, 1, 2]
     assert made == [1, 2, 3, 2], "the least recently used has gone"
-    own.forget(SAMPLERS)
-    assert own.count(SAMPLERS) == 0
+    values.forget(SAMPLERS)
+    assert values.count(SAMPLERS) == 0
 
 
 def test_another_thread_computes_in_the_session_of_the_process():
-    found = []
-    thread = threading.Thread(target=lambda: found.append(current()))
+    results = []
+    thread = threading.Thread(target=lambda: results.append(current()))
     with working(Session()):
         thread.start()
         thread.join()
-    assert found == [session.OF_PROCESS]
+    assert results == [session.OF_PROCESS]
 
 
 def test_a_session_that_ends_in_an_error_leaves_room_for_the_next():

@@ -39,21 +39,21 @@ class Browser:
 
     @property
     def errors(self):
-        return [each["message"] for each in self.driver.get_log("browser")]
+        return [item["message"] for item in self.driver.get_log("browser")]
 
     @property
     def requests(self):
         """The addresses that were asked for since the page was opened."""
         import json
 
-        told = (json.loads(each["message"])["message"] for each in self.driver.get_log("performance"))
-        return [each["params"]["request"]["url"] for each in told if each["method"] == "Network.requestWillBeSent"]
+        report = (json.loads(item["message"])["message"] for item in self.driver.get_log("performance"))
+        return [item["params"]["request"]["url"] for item in report if item["method"] == "Network.requestWillBeSent"]
 
     def printed(self):
         """Return the page as PDF on A4."""
         self.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-        told = self.driver.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})
-        return base64.b64decode(told["data"])
+        report = self.driver.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})
+        return base64.b64decode(report["data"])
 
 
 @contextmanager

@@ -25,9 +25,11 @@ def segments(primitive):
     return np.stack([points[:-1], points[1:]], axis=1)
 
 
-def overlap(one, other):
+def overlap(first, other):
     """Say whether the insides of two boxes have a point in common."""
-    return one.left < other.right and other.left < one.right and one.bottom < other.top and other.bottom < one.top
+    return (
+        first.left < other.right and other.left < first.right and first.bottom < other.top and other.bottom < first.top
+    )
 
 
 def meets(box, strokes):
@@ -54,20 +56,20 @@ def paper(drawing: Drawing) -> Box:
 def faults(drawing: Drawing, on: Box | None = None) -> list[str]:
     """Return what is wrong with a drawing, title and legend apart unless they are in it: texts on texts, on strokes,
     beside the sheet `on`."""
-    texts = [each for each in drawing.primitives if isinstance(each, Text)]
-    strokes = [each for each in drawing.primitives if not isinstance(each, Text)]
+    texts = [primitive for primitive in drawing.primitives if isinstance(primitive, Text)]
+    strokes = [primitive for primitive in drawing.primitives if not isinstance(primitive, Text)]
     lines = np.concatenate([segments(stroke) for stroke in strokes])
     owner = np.repeat(np.arange(len(strokes)), [len(segments(stroke)) for stroke in strokes])
     boxes = [text_box(text, drawing.height) for text in texts]
-    found = []
-    for (one, box), (other, second) in itertools.combinations(zip(texts, boxes, strict=True), 2):
-        found += [f"{one.text!r} overlaps {other.text!r}"] if overlap(box, second) else []
+    results = []
+    for (item, box), (other, second) in itertools.combinations(zip(texts, boxes, strict=True), 2):
+        results += [f"{item.text!r} overlaps {other.text!r}"] if overlap(box, second) else []
     for text, box in zip(texts, boxes, strict=True):
         crossing = {strokes[k].layer for k in owner[meets(box, lines)]}
-        found += [f"{text.text!r} lies on a stroke of {layer}" for layer in sorted(crossing)]
+        results += [f"{text.text!r} lies on a stroke of {layer}" for layer in sorted(crossing)]
         inside = not on or (on.left < box.left and box.right < on.right and on.bottom < box.bottom and box.top < on.top)
-        found += [] if inside else [f"{text.text!r} lies beside the sheet"]
-    return found
+        results += [] if inside else [f"{text.text!r} lies beside the sheet"]
+    return results
 
 
 def faults_of(drawing: Drawing) -> list[str]:

@@ -65,14 +65,14 @@ def dyad(name: str, joint: str, pivot: str, pin: str) -> Parts:
 
 def slider(name: str, joint: str, pivot: str, pin: str) -> Parts:
     """Return a rod to a guide of the frame."""
-    own = {"kind": "slider", "from": joint, "through": pivot, "direction": "10 deg", "offset": "5 mm"}
-    return {f"push{name}": {**own, "pin": pin, "side": "ahead", "links": {f"rod{name}": f"r{name}"}}}
+    values = {"kind": "slider", "from": joint, "through": pivot, "direction": "10 deg", "offset": "5 mm"}
+    return {f"push{name}": {**values, "pin": pin, "side": "ahead", "links": {f"rod{name}": f"r{name}"}}}
 
 
 def slot(name: str, joint: str, pivot: str, pin: str) -> Parts:
     """Return a slotted lever about a pivot."""
-    own = {"kind": "slot", "at": pivot, "through": joint, "link": f"lever{name}"}
-    return {f"push{name}": {**own, "pin": pin, "length": f"r{name}"}}
+    values = {"kind": "slot", "at": pivot, "through": joint, "link": f"lever{name}"}
+    return {f"push{name}": {**values, "pin": pin, "length": f"r{name}"}}
 
 
 def offset_slot(name: str, joint: str, pivot: str, pin: str) -> Parts:

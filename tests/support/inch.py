@@ -26,16 +26,20 @@ UNITS = {
 def scene(name: str, **changes: str) -> lo.Scene:
     """Return a packaged scene in inches; changes: keys with "__" for the dot, such as operation__speed="350 rpm"."""
     document = _converted(lo.load(name).document)
-    for own in document.get("targets", {}).values():
-        if "table" in own:  # a scene that is no file has no folder
-            own["table"] = str(packaged.problems()[name].parent / own["table"])
-    found = lo.scene(document)
-    return found.update({key.replace("__", "."): value for key, value in changes.items()}) if changes else found
+    for entry in document.get("targets", {}).values():
+        if "table" in entry:  # a scene that is no file has no folder
+            entry["table"] = str(packaged.problems()[name].parent / entry["table"])
+    second_scene = lo.scene(document)
+    return (
+        second_scene.update({key.replace("__", "."): value for key, value in changes.items()})
+        if changes
+        else second_scene
+    )
 
 
 def _converted(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return {key: each if key in ("problem", "expected") else _converted(each) for key, each in value.items()}
+        return {key: item if key in ("problem", "expected") else _converted(item) for key, item in value.items()}
     return _text(value) if isinstance(value, str) else value
 
 

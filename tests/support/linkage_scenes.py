@@ -51,15 +51,15 @@ torque.least = ["peak_torque"]
 
 def changed(document, changes):
     """Return tables with others merged into them; None takes a key out."""
-    found = copy.deepcopy(dict(document))
+    result = copy.deepcopy(dict(document))
     for name, value in changes.items():
         if value is None:
-            found.pop(name, None)
-        elif isinstance(value, dict) and isinstance(found.get(name), dict):
-            found[name] = changed(found[name], value)
+            result.pop(name, None)
+        elif isinstance(value, dict) and isinstance(result.get(name), dict):
+            result[name] = changed(result[name], value)
         else:
-            found[name] = value
-    return found
+            result[name] = value
+    return result
 
 
 def four_bar(**changes):

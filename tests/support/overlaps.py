@@ -16,49 +16,49 @@ SIZES = (6.0, 4.5), (11.0, 8.0), (16.0, 9.0)
 
 def found_at_every_size(figure):
     """Return what is found in a figure as it is, and at each of SIZES, smaller and larger in turn."""
-    said = found(figure)
+    message = found(figure)
     for size in (*SIZES, SIZES[0]):
         figure.set_size_inches(*size)
-        said += [f"at {size}: {each}" for each in found(figure)]
-    return said
+        message += [f"at {size}: {item}" for item in found(figure)]
+    return message
 
 
 def found(figure):
     """Return in words every text or legend that meets another, a line, or leaves the figure."""
     figure.draw_without_rendering()
     canvas = figure.canvas.get_renderer()
-    axes = [inner for each in figure.axes for inner in (each, *each.child_axes)]
+    axes = [inner for axis in figure.axes for inner in (axis, *axis.child_axes)]
     texts = {text: _box(text, canvas) for text in _texts(figure, axes) if text.get_visible() and text.get_text()}
-    legends = [each.get_legend() for each in figure.axes if each.get_legend()] + list(figure.legends)
+    legends = [axis.get_legend() for axis in figure.axes if axis.get_legend()] + list(figure.legends)
     boxes = {legend: _box(legend, canvas) for legend in legends}
-    own = {text: legend for legend in legends for text in legend.get_texts()}
-    lines = [(name, path) for each in axes for name, path in _lines(each)]
-    said = [
-        f"{_said(one)} meets {_said(two)}" for one, two in combinations(texts, 2) if texts[one].overlaps(texts[two])
+    values = {text: legend for legend in legends for text in legend.get_texts()}
+    lines = [(name, path) for axis in axes for name, path in _lines(axis)]
+    message = [
+        f"{_said(item)} meets {_said(two)}" for item, two in combinations(texts, 2) if texts[item].overlaps(texts[two])
     ]
-    said += [
+    message += [
         f"{_said(text)} meets the legend of {_said(legend)}"
         for text, box in texts.items()
         for legend, area in boxes.items()
-        if own.get(text) is not legend and box.overlaps(area)
+        if values.get(text) is not legend and box.overlaps(area)
     ]
-    said += [
+    message += [
         f"two legends meet: {_said(a)}, {_said(b)}" for a, b in combinations(boxes, 2) if boxes[a].overlaps(boxes[b])
     ]
     for thing, box in {**texts, **boxes}.items():
-        said += [f"{_said(thing)} meets {name}" for name, path in lines if path.intersects_bbox(box, filled=False)]
+        message += [f"{_said(thing)} meets {name}" for name, path in lines if path.intersects_bbox(box, filled=False)]
         if not _inside(box, figure.bbox):
-            said.append(f"{_said(thing)} leaves the figure")
-    return said
+            message.append(f"{_said(thing)} leaves the figure")
+    return message
 
 
 def _texts(figure, axes):
     yield from (text for text in (figure._suptitle, figure._supxlabel, *figure.texts) if text)
-    for legend in [*(each.get_legend() for each in axes), *figure.legends]:
+    for legend in [*(item.get_legend() for item in axes), *figure.legends]:
         yield from legend.get_texts() if legend else ()
-    for each in axes:
-        yield from (each.title, each._left_title, each._right_title, *each.texts)
-        for axis in (each.xaxis, each.yaxis):
+    for item in axes:
+        yield from (item.title, item._left_title, item._right_title, *item.texts)
+        for axis in (item.xaxis, item.yaxis):
             low, high = sorted(axis.get_view_interval())
             yield from (axis.label, axis.offsetText)
             for tick in axis.get_major_ticks():

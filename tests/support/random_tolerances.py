@@ -68,8 +68,8 @@ def slider_crank(draw):
     """Return a slider-crank, its guide beside the crank's axis."""
     l1 = draw.uniform(20, 60)
     numbers = {"l1": l1, "l2": draw.uniform(2.2, 4.5) * l1, "e": draw.uniform(0.05, 0.5) * l1}
-    own = {"kind": "slider", "from": "B", "through": "A", "direction": "0 deg", "offset": "e", "side": "ahead"}
-    parts = {"push": {**own, "pin": "C", "links": {"rod": "l2"}}}
+    values = {"kind": "slider", "from": "B", "through": "A", "direction": "0 deg", "offset": "e", "side": "ahead"}
+    parts = {"push": {**values, "pin": "C", "links": {"rod": "l2"}}}
     return document(numbers, parts, {"slide": "push"}, {"force": "2 kN"}, draw)
 
 

@@ -66,8 +66,8 @@ def freed(case, n, symmetric=False, bound=CYCLOID):
 
 @functools.cache
 def _freed(case, n, symmetric, bound):
-    own = {"intervals": n, "symmetric": symmetric, "acceleration": bound}
-    return lo.solve(product(case).update({f"targets.law.{key}": value for key, value in own.items()}), "law")
+    values = {"intervals": n, "symmetric": symmetric, "acceleration": bound}
+    return lo.solve(product(case).update({f"targets.law.{key}": value for key, value in values.items()}), "law")
 
 
 def programmed(case, n, symmetric=False, bound=CYCLOID):
@@ -89,5 +89,5 @@ def flat(design):
 def lowest(case, law, K1, points=2001):
     """Return the least and the largest cam force, N, of s'' at even knots with a spring K1, by a dense scan."""
     at = replace(case, law=tuple(law))
-    found = [plain.force(np, at, s, np.linspace(float(s[3]), float(s[4]), points), K1) for s in plain.stretches(at)]
-    return min(each.min() for each in found), max(each.max() for each in found)
+    results = [plain.force(np, at, s, np.linspace(float(s[3]), float(s[4]), points), K1) for s in plain.stretches(at)]
+    return min(item.min() for item in results), max(item.max() for item in results)

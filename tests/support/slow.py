@@ -6,15 +6,15 @@ import pytest
 def after(count, cases):
     """Return cases as parameters, those after the first so many slow; a tuple is a value of each name."""
     values = [case if isinstance(case, tuple) else (case,) for case in cases]
-    return [pytest.param(*each, marks=[pytest.mark.slow] * (place >= count)) for place, each in enumerate(values)]
+    return [pytest.param(*value, marks=[pytest.mark.slow] * (place >= count)) for place, value in enumerate(values)]
 
 
-def grid(one, other):
+def grid(first, other):
     """Return all pairs of two columns as parameters; quick are as few of them as have each value of either."""
-    one, other = list(one), list(other)
-    fewer = min(len(one), len(other))
+    first, other = list(first), list(other)
+    fewer = min(len(first), len(other))
     return [
         pytest.param(a, b, marks=[pytest.mark.slow] * (row % fewer != column % fewer))
-        for row, a in enumerate(one)
+        for row, a in enumerate(first)
         for column, b in enumerate(other)
     ]

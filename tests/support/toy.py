@@ -193,8 +193,8 @@ class ToyJob(Job):
 
     name = "toy"
 
-    def __init__(self, own: Program) -> None:
-        self.own = own
+    def __init__(self, values: Program) -> None:
+        self.own = values
 
     def schema(self, document: Mapping[str, Any]) -> SceneSchema:
         figures = [*self.own.model.own_rows, *self.own.model.quantities]

@@ -20,12 +20,12 @@ def test_tolerance_prints_one_object_and_a_table(capsys, tmp_path):
     few = ("tolerance", "beatup", *MADE, "--samples", "160")
     picture, table = tmp_path / "spread.svg", tmp_path / "spread.csv"
     status, out, _ = called(capsys, *few, "--json", "--figure", str(picture), "--out", str(table))
-    found = json.loads(out)
+    data = json.loads(out)
     assert status == 0
-    assert {"problem", "figures", "yield", "samples", "seed", "bad"} <= set(found)
-    assert {"nominal", "sigma_linear", "sigma", "shares"} <= set(found["figures"]["M3_fdc"])
-    assert set(found["yield"]["all"]) == {"value", "se"}
-    case = found["worst"]["M3_fdc"]
+    assert {"problem", "figures", "yield", "samples", "seed", "bad"} <= set(data)
+    assert {"nominal", "sigma_linear", "sigma", "shares"} <= set(data["figures"]["M3_fdc"])
+    assert set(data["yield"]["all"]) == {"value", "se"}
+    case = data["worst"]["M3_fdc"]
     assert case["proven"]
     assert case["min"] < case["found"][0] < case["found"][1] < case["max"]
     assert picture.stat().st_size > 1000
@@ -46,11 +46,11 @@ def test_tolerance_without_any_is_refused(capsys):
 def test_sensitivity_prints_one_object_and_a_tornado(capsys, tmp_path):
     picture = tmp_path / "tornado.svg"
     status, out, _ = called(capsys, "sensitivity", "shedding-static", "--json", "--figure", str(picture))
-    found = json.loads(out)
+    data = json.loads(out)
     assert status == 0
-    assert found["refused"] is None
-    assert set(found["rows"][0]) == {"number", "of", "side", "value", "unit"}
-    assert {"limit", "side", "worth", "range", "ends"} <= set(found["prices"][0])
+    assert data["refused"] is None
+    assert set(data["rows"][0]) == {"number", "of", "side", "value", "unit"}
+    assert {"limit", "side", "worth", "range", "ends"} <= set(data["prices"][0])
     assert picture.stat().st_size > 1000
 
 

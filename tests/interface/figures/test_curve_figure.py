@@ -94,9 +94,9 @@ def test_today_stands_dashed_in_every_panel_beside_a_design(name, kind):
     figure = drawn(name, kind)
     for axes in figure.axes:
         lines = curves_of(axes)
-        own = [line.get_label() for line in lines if not line.get_label().endswith(", today")]
+        values = [line.get_label() for line in lines if not line.get_label().endswith(", today")]
         dashed = {line.get_label() for line in lines if line._unscaled_dash_pattern == curves.DASHED}
-        assert dashed == {f"{label}, today" for label in own} != set()
+        assert dashed == {f"{label}, today" for label in values} != set()
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == ["design", "today, dashed"]
 
@@ -172,16 +172,16 @@ def test_a_scene_in_inches_is_drawn_in_its_own_units_with_the_same_curves(name):
 def test_the_transmission_angle_is_folded_as_it_is_limited():
     for name in ("beatup", "rapier"):
         scene = lo.load(name)
-        found = tables.curves(scene, {})["mu [rad]"]
-        assert found.max() <= math.pi / 2
-        assert found.min() == pytest.approx(lo.evaluate(scene).figures["mu_min"], rel=1e-12)
+        curve = tables.curves(scene, {})["mu [rad]"]
+        assert curve.max() <= math.pi / 2
+        assert curve.min() == pytest.approx(lo.evaluate(scene).figures["mu_min"], rel=1e-12)
     axes = titled(drawn("rapier", "solved"))["transmission angle mu [deg]"]
     assert "mu_min >= 30 deg" in said(axes)
     assert any(text.startswith("least 30 deg at ") for text in said(axes))
 
 
 def test_without_a_speed_curves_are_per_radian():
-    document = {table: dict(own) for table, own in lo.load("rapier").document.items()}
+    document = {table: dict(values) for table, values in lo.load("rapier").document.items()}
     del document["operation"]["speed"], document["targets"]
     scene = lo.scene(document)
     panels = titled(outputs.plot_curves(tables.curves(scene, {}), scene, {}))
@@ -261,7 +261,7 @@ def test_crank_angles_are_in_the_unit_of_all_angles():
     scene = lo.load("beatup").set("display.angle", "rad")
     figure = outputs.plot_curves(tables.curves(scene, {}), scene, {})
     assert overlaps.found(figure) == []
-    said = [text.get_text() for text in figure.findobj(Text) if text.get_text()]
-    assert {text for text in said if "phi [" in text} == {"crank angle phi [rad]"}
-    assert "6.283" in said
-    assert not [text for text in said if "deg" in text]
+    texts = [text.get_text() for text in figure.findobj(Text) if text.get_text()]
+    assert {text for text in texts if "phi [" in text} == {"crank angle phi [rad]"}
+    assert "6.283" in texts
+    assert not [text for text in texts if "deg" in text]

@@ -36,8 +36,8 @@ def test_bars_end_at_the_shares_beside_the_tolerance(shedding):
     warp = next(k for k, row in enumerate(shedding.rows) if row.effect == "warp_tension")
     assert ends(first, 1)[warp] == pytest.approx(100 * shedding.rows[warp].regret["K1"], rel=1e-9)
     assert set(ends(first, 0)) == {0.0}, "no shift"
-    told = [text.get_text() for text in limits.texts]
-    assert f"{100 * shedding.rows[0].excess:+.3g} %" in told
+    texts = [text.get_text() for text in limits.texts]
+    assert f"{100 * shedding.rows[0].excess:+.3g} %" in texts
 
 
 def test_what_gets_less_has_a_bar_to_the_other_side(shedding):
@@ -62,10 +62,10 @@ def test_nothing_meets(shedding):
 
 @pytest.mark.slow
 def test_an_inch_machine_at_350_rpm():
-    found = lo.effects(uncoiled.scene(inch.scene("shedding-static", operation__speed="350 rpm")))
-    assert overlaps.found(found.plot()) == []
-    assert "lbf/in" in found._repr_html_()
-    assert "N/m" not in found._repr_html_()
+    study = lo.effects(uncoiled.scene(inch.scene("shedding-static", operation__speed="350 rpm")))
+    assert overlaps.found(study.plot()) == []
+    assert "lbf/in" in study._repr_html_()
+    assert "N/m" not in study._repr_html_()
 
 
 def test_what_is_unknown_is_no_bar(shedding):

@@ -29,19 +29,19 @@ def test_a_text_on_a_curve_a_text_or_a_border_is_found(axes):
     axes.text(200, 0.55, "on the other")
     assert overlaps.found(axes.figure) == ["'on the top' meets 'on the other'"]
     axes.texts[1].set_position((340, -0.5))
-    assert any("meets the right border" in each for each in overlaps.found(axes.figure))
+    assert any("meets the right border" in item for item in overlaps.found(axes.figure))
 
 
 def test_a_legend_over_the_data_or_over_a_text_is_found(axes):
     legend = axes.legend(loc=(0.1, 0.85))
-    assert any(each.startswith("legend ['sine'] meets the line sine") for each in overlaps.found(axes.figure))
+    assert any(item.startswith("legend ['sine'] meets the line sine") for item in overlaps.found(axes.figure))
     legend.set_loc("upper right")
     assert overlaps.found(axes.figure) == []
     axes.text(300, 0.8, "here")
-    assert any("meets the legend" in each for each in overlaps.found(axes.figure))
+    assert any("meets the legend" in item for item in overlaps.found(axes.figure))
     axes.texts[0].remove()
     axes.figure.legend(["sine"], loc=(0.62, 0.72))
-    assert any(each.startswith("two legends meet") for each in overlaps.found(axes.figure))
+    assert any(item.startswith("two legends meet") for item in overlaps.found(axes.figure))
 
 
 def test_a_text_on_a_single_point_is_found(axes):
@@ -52,7 +52,7 @@ def test_a_text_on_a_single_point_is_found(axes):
 
 def test_a_text_that_leaves_the_figure_is_found(axes):
     axes.set_ylabel("a name that is far too long for axes of such a height, and goes on and on", fontsize=14)
-    assert any(each.endswith("leaves the figure") for each in overlaps.found(axes.figure))
+    assert any(item.endswith("leaves the figure") for item in overlaps.found(axes.figure))
 
 
 def test_what_is_not_drawn_meets_nothing(axes):

@@ -40,14 +40,14 @@ def row(point, certified=True):
 def test_panels_show_the_objective_and_what_differs_with_gaps_and_three_designs():
     figure = plot(PLAN, [row(0), row(1), row(2, certified=False), row(3), row(4)])
     axes = figure.axes
-    assert [each.get_title("left") for each in axes[:2]] == ["peak_torque [N*m]", "l2 [mm]"]
+    assert [axis.get_title("left") for axis in axes[:2]] == ["peak_torque [N*m]", "l2 [mm]"]
     curve = axes[0].get_lines()[0].get_ydata()
     assert [math.isnan(value) for value in curve] == [False, False, True, False, False]
-    titles = [each.get_title() for each in axes[2:]]
+    titles = [axis.get_title() for axis in axes[2:]]
     assert titles == ["A: operation.M0 700 N*m", "B: operation.M0 730 N*m", "C: operation.M0 740 N*m"]
-    assert all(each.lines and not each.texts for each in axes[2:])
+    assert all(axis.lines and not axis.texts for axis in axes[2:])
     assert axes[1].get_xlabel() == "operation.M0 [N*m]"
-    sizes = {round(each.get_xlim()[1] - each.get_xlim()[0], 12) for each in axes[2:]}
+    sizes = {round(axis.get_xlim()[1] - axis.get_xlim()[0], 12) for axis in axes[2:]}
     assert len(sizes) == 1, "designs are of one scale"
     assert overlaps.found_at_every_size(figure) == []
 
@@ -72,11 +72,11 @@ RANGES = {"m4e": (0.0, 2.0)}
 FRONT = front.trade(lo.load("beatup"), ("peak_torque", "m4e"), "balance", ranges=RANGES, points=9)
 
 
-def spot(point, asked, mass, peak, active):
-    """Return a row of a front; asked: of m4e, kg."""
+def spot(point, request, mass, peak, active):
+    """Return a row of a front; request: of m4e, kg."""
     touched = [[f"{name}", "", 1] for name in active]
     warm = {"axes": {"m4e": mass, "peak_torque": peak}, "active": touched, "again": None, "near": None, "fine": None}
-    place = {} if asked is None else {"m4e": asked}
+    place = {} if request is None else {"m4e": request}
     slope = {sloped(("peak_torque", "m4e")): -1.0}
     design = dict(TODAY.design) | {"m4e": mass}
     return Row(point, place, None, "optimal", None, design, {"peak_torque": peak}, slope, {}, True, 0.0, warm)
@@ -102,14 +102,14 @@ def test_a_front_is_one_panel_with_its_changes_named_and_a_jump_left_open():
     assert [round(value, 5) for value, open_ in zip(x, y, strict=True) if math.isnan(open_)] == [1.0, 1.6]
     assert panel.patches[0].get_x() == pytest.approx(0.8)
     assert panel.patches[0].get_width() == pytest.approx(0.40001)
-    said = listed.texts[0].get_text().splitlines()
-    assert said == [
+    message = listed.texts[0].get_text().splitlines()
+    assert message == [
         "1  m4e 0.8 kg to 1.20001 kg: jump, l1 min, l4 max, swing max",
         "2  m4e 1.6 kg to 1.60001 kg: jump, swing max",
     ]
     assert [text.get_text() for text in panel.texts] == ["1", "2", "A", "B", "C"]
     assert all(text.xyann[1] > 0 for text in panel.texts[2:]), "letters stand above the curve"
-    assert [each.get_title() for each in designs] == [
+    assert [design.get_title() for design in designs] == [
         "A: m4e 0 kg\npeak_torque 96 N*m",
         "B: m4e 0.8 kg\npeak_torque 95.2 N*m",
         "C: m4e 2 kg\npeak_torque 90 N*m",
@@ -130,7 +130,7 @@ def test_many_changes_close_together_are_numbered_without_meeting():
     panel, listed = figure.axes[:2]
     numbers = [text for text in panel.texts if text.get_text().isdigit()]
     assert len(numbers) >= 23
-    assert all(one.get_position()[0] < other.get_position()[0] for one, other in itertools.pairwise(numbers))
+    assert all(item.get_position()[0] < other.get_position()[0] for item, other in itertools.pairwise(numbers))
     assert len(listed.texts[0].get_text().splitlines()) >= len(numbers)
     assert overlaps.found_at_every_size(figure) == []
 
@@ -138,13 +138,13 @@ def test_many_changes_close_together_are_numbered_without_meeting():
 def test_one_design_that_is_best_in_both_is_drawn():
     alone = (replace(JUMPING[0], point=0), replace(JUMPING[0], point=1))
     figure = plot(FRONT, alone)
-    assert [each.get_title() for each in figure.axes[1:]] == ["A: m4e 2 kg\npeak_torque 90 N*m"]
+    assert [item.get_title() for item in figure.axes[1:]] == ["A: m4e 2 kg\npeak_torque 90 N*m"]
     panel = figure.axes[0]
     told_above = " ".join(figure._suptitle.get_text().split())
     assert told_above.endswith("peak_torque and m4e do not conflict: one design is best in both")
     figure.draw_without_rendering()
-    told = [[label.get_text() for label in axis.get_ticklabels()] for axis in (panel.xaxis, panel.yaxis)]
-    assert told == [["2"], ["90"]], "the point's own values, and nothing beside them"
+    texts = [[label.get_text() for label in axis.get_ticklabels()] for axis in (panel.xaxis, panel.yaxis)]
+    assert texts == [["2"], ["90"]], "the point's own values, and nothing beside them"
     assert overlaps.found_at_every_size(figure) == []
 
 
@@ -186,9 +186,9 @@ def two_ways(first, second):
     plan = sweep.plan_sweep(lo.load("beatup"), over, "torque")
     rows = []
     for k in range(first * second):
-        one, other = divmod(k, second)
-        place = {"operation.M0": 700.0 + 5 * one, "bounds.l2.max": 0.084 + 0.000125 * other}
-        figures = {"peak_torque": 90.0 + one + 0.3 * other}
+        item, other = divmod(k, second)
+        place = {"operation.M0": 700.0 + 5 * item, "bounds.l2.max": 0.084 + 0.000125 * other}
+        figures = {"peak_torque": 90.0 + item + 0.3 * other}
         rows.append(replace(row(k), place=place, figures=figures, design=dict(TODAY.design) | {"l2": 0.07 + 0.001 * k}))
     return plot(plan, rows)
 
@@ -225,12 +225,12 @@ def test_a_row_that_misses_its_goal_is_marked_and_named():
 
 def test_a_size_that_is_given_is_the_figures_size_and_texts_are_as_large_as_there_is_room():
     figure = plot(PLAN, [row(k) for k in range(4)])
-    own = figure.get_size_inches()
+    values = figure.get_size_inches()
     sizes = sorted({text.get_fontsize() for text in figure.findobj(Text)})
-    figure.set_size_inches(*(own / 2))
-    assert list(figure.get_size_inches()) == list(own / 2)
+    figure.set_size_inches(*(values / 2))
+    assert list(figure.get_size_inches()) == list(values / 2)
     assert sorted({text.get_fontsize() for text in figure.findobj(Text)}) == pytest.approx([s / 2 for s in sizes])
-    figure.set_size_inches(*(own * 2))
+    figure.set_size_inches(*(values * 2))
     assert sorted({text.get_fontsize() for text in figure.findobj(Text)}) == pytest.approx(sizes)
 
 

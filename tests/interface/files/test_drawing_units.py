@@ -37,7 +37,7 @@ def document(drawing, folder):
     return ezdxf.readfile(path)
 
 
-def strokes(found):
+def strokes(result):
     """Return (layer, numbers) of every stroke but leaders, which stand where their labels leave room."""
     read = {
         "LINE": lambda e: [*e.dxf.start.vec2, *e.dxf.end.vec2],
@@ -47,7 +47,7 @@ def strokes(found):
     }
     return [
         (e.dxf.layer, np.array(read[e.dxftype()](e)))
-        for e in found.modelspace()
+        for e in result.modelspace()
         if e.dxftype() not in ("TEXT", "DIMENSION") and e.dxf.layer != "leaders"
     ]
 
@@ -61,18 +61,18 @@ def test_the_dxf_of_an_inch_scene_is_in_inches_and_has_the_lengths_of_the_one_in
     assert not imperial.audit().errors
     pairs = list(zip(strokes(metric), strokes(imperial), strict=True))
     assert len(pairs) > 30
-    for (layer, one), (other_layer, other) in pairs:
+    for (layer, item), (other_layer, other) in pairs:
         assert layer == other_layer
-        assert INCH * other == pytest.approx(one, rel=1e-9, abs=1e-9)
-    heights = [next(t.dxf.height for t in found.modelspace().query("TEXT")) for found in (metric, imperial)]
+        assert INCH * other == pytest.approx(item, rel=1e-9, abs=1e-9)
+    heights = [next(t.dxf.height for t in result.modelspace().query("TEXT")) for result in (metric, imperial)]
     assert heights[0] == pytest.approx(INCH * heights[1], rel=1e-9)
 
 
 def test_a_drawing_says_its_unit(both, tmp_path):
-    for (_, drawing), said in zip(both, ("lengths in mm", "lengths in inches"), strict=True):
+    for (_, drawing), message in zip(both, ("lengths in mm", "lengths in inches"), strict=True):
         shown = [text.dxf.text for text in document(drawing, tmp_path).modelspace().query("TEXT")]
-        assert sum(said in text for text in shown) == 1
-        assert said in svg.render(drawing)
+        assert sum(message in text for text in shown) == 1
+        assert message in svg.render(drawing)
 
 
 def test_an_svg_is_at_true_scale_in_its_unit():
@@ -101,7 +101,7 @@ def test_the_table_of_an_inch_scene_is_in_inches(both):
         other = column.replace(f"[{unit}]", f"[{names.get(unit, unit)}]")
         if metric[column].dtype.kind == "f":
             expected = metric[column].to_numpy()
-            found = sizes.get(unit, 1.0) * imperial[other].to_numpy()
-            assert found == pytest.approx(expected, rel=1e-9, abs=1e-9, nan_ok=True)
+            result = sizes.get(unit, 1.0) * imperial[other].to_numpy()
+            assert result == pytest.approx(expected, rel=1e-9, abs=1e-9, nan_ok=True)
         else:
             assert list(metric[column]) == list(imperial[other])

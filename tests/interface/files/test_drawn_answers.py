@@ -25,7 +25,7 @@ def title(text):
     """Return an SVG's title, which must stand on its sheet too."""
     root = ElementTree.fromstring(text)
     named = root.find("{*}title").text
-    assert named in [each.text for each in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert named in [item.text for item in root.iter("{http://www.w3.org/2000/svg}text")]
     return named
 
 
@@ -43,8 +43,8 @@ def test_the_nearest_design_of_an_infeasible_target_is_drawn_as_such(nearest, tm
     outputs.answer(tmp_path / "out", nearest.result, nearest.scene)
     drawn = (tmp_path / "out/linkage.svg").read_text(encoding="utf-8")
     broken = {limit.name for limit in nearest.limits if not limit.ok}
-    said, _, named = title(drawn).partition("; limits not held: ")
-    assert said == "beatup: nearest design for balance"
+    message, _, named = title(drawn).partition("; limits not held: ")
+    assert message == "beatup: nearest design for balance"
     assert set(named.split(", ")) == broken != set()
     assert "nearest design" in notebook.html(nearest.result)
 
@@ -53,11 +53,11 @@ def test_a_design_that_breaks_limits_is_exported_as_such(nearest, tmp_path, caps
     (tmp_path / "answer.json").write_text(json.dumps(nearest.as_dict()))
     arguments = ["export", "beatup", "--design", str(tmp_path / "answer.json"), "--out", str(tmp_path / "a.svg")]
     assert run(arguments) == 0
-    said = title((tmp_path / "a.svg").read_text(encoding="utf-8"))
-    assert said.startswith("beatup: nearest design for balance; limits not held: ")
+    message = title((tmp_path / "a.svg").read_text(encoding="utf-8"))
+    assert message.startswith("beatup: nearest design for balance; limits not held: ")
     assert run([*arguments, "--set", "limits.swing.max=30 deg"]) == 0
-    said = title((tmp_path / "a.svg").read_text(encoding="utf-8"))
-    assert said.startswith("beatup: a given design; limits not held: "), "in another scene it is not an answer"
+    message = title((tmp_path / "a.svg").read_text(encoding="utf-8"))
+    assert message.startswith("beatup: a given design; limits not held: "), "in another scene it is not an answer"
 
 
 def test_every_file_that_is_asked_for_is_written_or_a_second_one_refused(tmp_path, capsys):
@@ -78,7 +78,7 @@ def test_todays_machine_is_called_so_wherever_it_is_evaluated():
 
 
 @pytest.mark.parametrize(
-    ("status", "said"),
+    ("status", "message"),
     [
         ("optimal", "best design for balance"),
         ("uncertified", "uncertified design for balance"),
@@ -86,12 +86,13 @@ def test_todays_machine_is_called_so_wherever_it_is_evaluated():
         ("failed", "no design for balance found, where the search ended"),
     ],
 )
-def test_an_answer_says_what_its_design_is(nearest, status, said):
-    held = dataclasses.replace(nearest.result, status=status, limits=())
-    assert outputs.describe_design(held).text == said
+def test_an_answer_says_what_its_design_is(nearest, status, message):
+    fixed = dataclasses.replace(nearest.result, status=status, limits=())
+    assert outputs.describe_design(fixed).text == message
     broken = Finding("swing", 0.5, None, 0.4, ok=False)
     assert (
-        outputs.describe_design(dataclasses.replace(held, limits=(broken,))).text == f"{said}; limits not held: swing"
+        outputs.describe_design(dataclasses.replace(fixed, limits=(broken,))).text
+        == f"{message}; limits not held: swing"
     )
     rounding = broken._replace(rounding=True)
-    assert outputs.describe_design(dataclasses.replace(held, limits=(rounding,))).text == said
+    assert outputs.describe_design(dataclasses.replace(fixed, limits=(rounding,))).text == message

@@ -50,21 +50,21 @@ def test_lengths_that_have_tolerances_tell_them(tmp_path):
     made = {"l1": "0.06 mm", "l2": {"class": "IT7"}, "l3": "1 %"}
     scene = lo.load("beatup").update({"tolerances": made})
     outputs.linkage(tmp_path / "made.dxf", scene, lo.evaluate(scene).design)
-    texts = [each.dxf.text for each in ezdxf.readfile(tmp_path / "made.dxf").modelspace().query("DIMENSION")]
+    texts = [item.dxf.text for item in ezdxf.readfile(tmp_path / "made.dxf").modelspace().query("DIMENSION")]
     assert texts == ["l1 = <> %%p0.06", "l2 = <> %%p0.015", "l3 = <> %%p1.55", "l4 = <>"]
 
 
 def test_lengths_are_dimensions_on_a_layer_of_their_own(document):
     space = document.modelspace()
-    found = {each.dxf.text: each for each in space.query("DIMENSION")}
-    assert {text: each.get_measurement() for text, each in found.items()} == {
+    results = {item.dxf.text: item for item in space.query("DIMENSION")}
+    assert {text: item.get_measurement() for text, item in results.items()} == {
         f"{name} = <>": pytest.approx(1000 * length, abs=1e-9) for name, length in PAPER.items()
     }
-    assert {each.dxf.layer for each in found.values()} == {dxf.MEASURES}
-    assert {each.dxftype() for each in space if each.dxf.layer == dxf.MEASURES} == {"DIMENSION"}
+    assert {item.dxf.layer for item in results.values()} == {dxf.MEASURES}
+    assert {item.dxftype() for item in space if item.dxf.layer == dxf.MEASURES} == {"DIMENSION"}
     joints = [circle.dxf.center for circle in space.query('CIRCLE[layer=="joints" | layer=="frame"]')]
-    for each in found.values():  # which follow their points when these are moved
-        assert all(min(end.distance(at) for at in joints) < 1e-9 for end in (each.dxf.defpoint2, each.dxf.defpoint3))
+    for item in results.values():  # which follow their points when these are moved
+        assert all(min(end.distance(at) for at in joints) < 1e-9 for end in (item.dxf.defpoint2, item.dxf.defpoint3))
 
 
 @pytest.mark.parametrize("layer", ["front dead centre", "rear dead centre"])
@@ -94,9 +94,9 @@ def test_circle_and_arc_are_the_paths_of_the_joints(document):
 def test_the_counterweight_is_on_its_layer_at_its_radius_with_its_mass(tmp_path):
     dxf.write(crank_rocker_drawing.linkage(PAPER | {"m4e": 3.0, "r4e": 0.05}, "t"), tmp_path / "a.dxf")
     space = ezdxf.readfile(tmp_path / "a.dxf").modelspace()
-    for circle in (found := space.query('CIRCLE[layer=="masses"]')):
+    for circle in (result := space.query('CIRCLE[layer=="masses"]')):
         assert circle.dxf.center.distance((167, 0)) == pytest.approx(50, abs=1e-9)
-    assert len(found) == 2, "in both dead centres"
+    assert len(result) == 2, "in both dead centres"
     assert "E  m4e = 3 kg, r4e = 50" in [text.dxf.text for text in space.query("TEXT")]
 
 

@@ -29,9 +29,9 @@ def exported(folder, **options):
 def test_both_versions_are_sound_and_tell_what_they_cover(tmp_path, version, code):
     document = exported(tmp_path, version=version)
     assert document.dxfversion == code
-    found = document.audit()
-    assert not found.errors
-    assert not found.fixes
+    result = document.audit()
+    assert not result.errors
+    assert not result.fixes
     low, high = document.header["$EXTMIN"], document.header["$EXTMAX"]
     for entity in document.modelspace().query("CIRCLE"):
         for axis in range(2):
@@ -45,7 +45,7 @@ def test_both_versions_are_sound_and_tell_what_they_cover(tmp_path, version, cod
 def test_arcs_of_the_profile_lie_within_the_tolerance_of_it(tmp_path, version, tolerance):
     document = exported(tmp_path, version=version, arcs=f"{tolerance} mm", only="profile")
     (curve,) = document.modelspace()
-    points = [tuple(each.dxf.location)[:2] for each in curve.vertices] if version == "r12" else None
+    points = [tuple(vertice.dxf.location)[:2] for vertice in curve.vertices] if version == "r12" else None
     rows = (
         [(p, v.dxf.bulge) for p, v in zip(points, curve.vertices, strict=True)]
         if points
@@ -53,8 +53,8 @@ def test_arcs_of_the_profile_lie_within_the_tolerance_of_it(tmp_path, version, t
     )
     arcs = [(complex(x, y), bulge) for (x, y), bulge in rows]
     # The profile itself at cam angles between those at which it was drawn.
-    found = drawing.cam(SCENE, SCENE.mechanism)
-    exact = 1e3 * found.at(np.linspace(0.0, 2 * math.pi, 20_011)).profile
+    result = drawing.cam(SCENE, SCENE.mechanism)
+    exact = 1e3 * result.at(np.linspace(0.0, 2 * math.pi, 20_011)).profile
     apart = distance(exact[:, 0] + 1j * exact[:, 1], [*arcs, arcs[0]])
     assert np.max(apart) <= tolerance
     assert len(arcs) < 120
@@ -64,8 +64,8 @@ def test_arcs_of_the_profile_lie_within_the_tolerance_of_it(tmp_path, version, t
         kink = np.angle((c - b) / (b - a)) - 2 * math.atan(one) - 2 * math.atan(two)
         assert abs(math.remainder(kink, 2 * math.pi)) <= 1e-6
     box = (exact.min(axis=0), exact.max(axis=0))
-    for told, real in zip((document.header["$EXTMIN"], document.header["$EXTMAX"]), box, strict=True):
-        assert told[:2] == pytest.approx(real, abs=1.5 * tolerance)
+    for report, real in zip((document.header["$EXTMIN"], document.header["$EXTMAX"]), box, strict=True):
+        assert report[:2] == pytest.approx(real, abs=1.5 * tolerance)
 
 
 @pytest.mark.parametrize("tolerance", [1e-1, 1e-3, 1e-5])
@@ -80,7 +80,7 @@ def test_biarcs_of_a_circle_are_the_circle(tolerance):
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "report"),
     [
         ({"version": "r13"}, "r2010, r12"),
         ({"arcs": "0.001 mm"}, "too small"),
@@ -88,8 +88,8 @@ def test_biarcs_of_a_circle_are_the_circle(tolerance):
         ({"only": "nose"}, "does not have this layer"),
     ],
 )
-def test_what_cannot_be_written_is_refused(tmp_path, options, told):
-    with pytest.raises(BadInput, match=told):
+def test_what_cannot_be_written_is_refused(tmp_path, options, report):
+    with pytest.raises(BadInput, match=report):
         exported(tmp_path, **options)
 
 

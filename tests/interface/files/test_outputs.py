@@ -74,25 +74,25 @@ def test_solve_out_writes_answer_tables_and_drawing(here, capsys):
 def test_an_answer_evaluates_to_the_figures_it_claims(here, capsys, content):
     solved = json.loads(loom(capsys, "solve", "beatup", "--json"))
     (here / "design.json").write_text(json.dumps(solved["design"] if content == "design" else solved))
-    found = json.loads(loom(capsys, "evaluate", "beatup", "--design", "design.json", "--json"))
-    assert list(found) == ["loomopt", "problem", "effects", "design", "figures", "units", "limits", "reached"]
-    assert all(found[key] == solved[key] for key in found if key not in ("limits", "figures"))
-    assert {limit["name"] for limit in found["limits"]} == {limit["name"] for limit in solved["limits"]}
+    data = json.loads(loom(capsys, "evaluate", "beatup", "--design", "design.json", "--json"))
+    assert list(data) == ["loomopt", "problem", "effects", "design", "figures", "units", "limits", "reached"]
+    assert all(data[key] == solved[key] for key in data if key not in ("limits", "figures"))
+    assert {limit["name"] for limit in data["limits"]} == {limit["name"] for limit in solved["limits"]}
     for name, value in solved["figures"].items():
-        assert found["figures"][name] == (None if value is None else pytest.approx(value, rel=1e-12, abs=1e-9))
+        assert data["figures"][name] == (None if value is None else pytest.approx(value, rel=1e-12, abs=1e-9))
 
 
 def test_evaluate_without_a_design_is_todays_machine(capsys):
-    found = json.loads(loom(capsys, "evaluate", "beatup", "--json"))
-    assert found["design"]["l1"] == 0.031
-    assert found["figures"]["M3_fdc"] == pytest.approx(10.0152, rel=1e-4)
+    data = json.loads(loom(capsys, "evaluate", "beatup", "--json"))
+    assert data["design"]["l1"] == 0.031
+    assert data["figures"]["M3_fdc"] == pytest.approx(10.0152, rel=1e-4)
     assert "all limits held" in loom(capsys, "evaluate", "beatup")
 
 
 def test_an_undefined_number_is_null():
     limits = (Finding("r4", math.nan, None, 1.0, False),)
-    found = Evaluated("loom", (), {"l1": 0.03}, {"r4": None, "swing": math.inf}, {"l1": "m"}, limits)
-    data = json.loads(outputs.document(found), parse_constant=pytest.fail)
+    result = Evaluated("loom", (), {"l1": 0.03}, {"r4": None, "swing": math.inf}, {"l1": "m"}, limits)
+    data = json.loads(outputs.document(result), parse_constant=pytest.fail)
     assert data["figures"] == {"r4": None, "swing": None}
     assert data["limits"][0]["value"] is None
 
@@ -154,12 +154,12 @@ def test_exported_joints_are_at_true_scale(here, capsys):
     at = {line["joint"]: (float(line["x [mm]"]), float(line["y [mm]"])) for line in table}
     for prime in ("", "'"):
         links = {"l1": ("A", f"B{prime}"), "l2": (f"B{prime}", f"C{prime}"), "l3": ("D", f"C{prime}"), "l4": ("A", "D")}
-        for name, (one, other) in links.items():
-            assert math.dist(at[one], at[other]) == pytest.approx(LENGTHS[name], rel=1e-9)
+        for name, (item, other) in links.items():
+            assert math.dist(at[item], at[other]) == pytest.approx(LENGTHS[name], rel=1e-9)
     drawn = [
-        math.dist(one, other)
+        math.dist(item, other)
         for line in ezdxf.readfile("linkage.dxf").modelspace().query("LINE LWPOLYLINE")
-        for one, other in [(line.dxf.start, line.dxf.end) if line.dxftype() == "LINE" else (line[0][:2], line[-1][:2])]
+        for item, other in [(line.dxf.start, line.dxf.end) if line.dxftype() == "LINE" else (line[0][:2], line[-1][:2])]
     ]
     for length in LENGTHS.values():
         assert min(abs(size - length) for size in drawn) < 1e-6

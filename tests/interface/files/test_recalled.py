@@ -14,22 +14,22 @@ def answer():
     return lo.solve("shedding", prove=True, starts=1)
 
 
-def recalled(told, folder):
+def recalled(report, folder):
     path = folder / "answer.json"
-    path.write_text(json.dumps(told))
+    path.write_text(json.dumps(report))
     return answer_file.read_answer(path)
 
 
 def test_an_answer_comes_back_as_it_was(answer, tmp_path):
-    found, doubts = recalled(json.loads(outputs.document(answer)), tmp_path)
+    result, doubts = recalled(json.loads(outputs.document(answer)), tmp_path)
     assert doubts == ()
     for name in ("status", "message", "target", "design", "figures", "limits", "binding", "reached", "time"):
-        assert getattr(found, name) == getattr(answer, name), name
-    own = answer.certificate
+        assert getattr(result, name) == getattr(answer, name), name
+    values = answer.certificate
     for name in ("passed", "reasons", "feasibility", "violation", "minimum", "unique", "by", "whole_cycle"):
-        assert getattr(found.certificate, name) == getattr(own, name), name
-    assert found.proofs.passed
-    assert found.before.figures == answer.before.figures
+        assert getattr(result.certificate, name) == getattr(values, name), name
+    assert result.proofs.passed
+    assert result.before.figures == answer.before.figures
 
 
 @pytest.mark.parametrize(
@@ -41,14 +41,14 @@ def test_an_answer_comes_back_as_it_was(answer, tmp_path):
     ],
 )
 def test_what_does_not_agree_is_doubted(answer, change, doubt, tmp_path):
-    told = json.loads(outputs.document(answer)) | change
-    assert doubt in " ".join(recalled(told, tmp_path).doubts)
+    report = json.loads(outputs.document(answer)) | change
+    assert doubt in " ".join(recalled(report, tmp_path).doubts)
 
 
 def test_a_certificate_is_held_to_its_own_numbers(answer, tmp_path):
-    told = json.loads(outputs.document(answer))
-    told["certificate"]["levels"][0]["stationarity"] = 1e-3
-    assert "thresholds" in " ".join(recalled(told, tmp_path).doubts)
+    data = json.loads(outputs.document(answer))
+    data["certificate"]["levels"][0]["stationarity"] = 1e-3
+    assert "thresholds" in " ".join(recalled(data, tmp_path).doubts)
 
 
 STUDIES = {
@@ -61,10 +61,10 @@ STUDIES = {
 def test_a_store_gives_back_its_studies(name, tmp_path):
     made = STUDIES[name](tmp_path / "kept.db")
     assert store_file.is_store(tmp_path / "kept.db")
-    (found,) = store_file.read_studies(tmp_path / "kept.db")
-    assert found.digest == made.digest
-    assert found.study.key == made.study.key
-    assert str(found.table()) == str(made.table())
+    (result,) = store_file.read_studies(tmp_path / "kept.db")
+    assert result.digest == made.digest
+    assert result.study.key == made.study.key
+    assert str(result.table()) == str(made.table())
 
 
 def test_what_is_no_store_is_not_made_one(tmp_path):
@@ -76,10 +76,10 @@ def test_what_is_no_store_is_not_made_one(tmp_path):
 @pytest.mark.slow
 def test_a_point_of_a_front_is_not_taken_for_its_targets_optimum(tmp_path):
     answer = lo.pareto("beatup", ("peak_torque", "m4e"), points=3).answer(2)
-    found, doubts = recalled(json.loads(outputs.document(answer)), tmp_path)
+    result, doubts = recalled(json.loads(outputs.document(answer)), tmp_path)
     assert doubts == ()
-    assert (found.target, found.message) == ("", answer.message)
-    html = found.report(tmp_path / "a.html").read_text(encoding="utf-8").replace("<wbr>", "").replace("&#x27;", "'")
+    assert (result.target, result.message) == ("", answer.message)
+    html = result.report(tmp_path / "a.html").read_text(encoding="utf-8").replace("<wbr>", "").replace("&#x27;", "'")
     assert "with m4e at most" in html
     assert "Balanced" not in html
-    assert repr(found)
+    assert repr(result)

@@ -34,20 +34,20 @@ def body(path, sign=";"):
 @pytest.mark.slow
 def test_an_answer_is_a_workbook_of_its_design_figures_limits_and_curves(capsys):
     assert run(["solve", "shedding", "--starts", "1", "--json", "--out", "answer.xlsx"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    data = json.loads(capsys.readouterr().out)
     assert openpyxl.load_workbook("answer.xlsx").sheetnames == SHEETS
     design = {row[0]: row[3] for row in cells("answer.xlsx", "design")[1:]}
-    assert design["K1"] == pytest.approx(told["design"]["K1"], rel=1e-9)
+    assert design["K1"] == pytest.approx(data["design"]["K1"], rel=1e-9)
     figures = {row[0]: row[3] for row in cells("answer.xlsx", "figures")[1:]}
-    assert figures["peak_torque"] == pytest.approx(told["figures"]["peak_torque"], rel=1e-9)
+    assert figures["peak_torque"] == pytest.approx(data["figures"]["peak_torque"], rel=1e-9)
     limits = cells("answer.xlsx", "limits")
     assert limits[0] == ["name", "unit", "value", "min", "max", "held"]
-    assert len(limits) - 1 == len(told["limits"])
+    assert len(limits) - 1 == len(data["limits"])
     assert all(row[5] is True for row in limits[1:])
     curves = cells("answer.xlsx", "curves")
     assert len(curves) > 720
     assert max(row[curves[0].index("N [N]")] for row in curves[1:]) == pytest.approx(
-        told["figures"]["contact_max"], rel=1e-6
+        data["figures"]["contact_max"], rel=1e-6
     )
     assert ["scene", "shedding"] in cells("answer.xlsx", "about")
 
@@ -55,9 +55,9 @@ def test_an_answer_is_a_workbook_of_its_design_figures_limits_and_curves(capsys)
 @pytest.mark.parametrize("name", ["answer.csv", "answer.xls", "answer.txt", "results.v2", "a.b/../c.d"])
 def test_a_name_with_an_unknown_ending_is_no_folder(name, folder, capsys):
     assert run(["solve", "shedding", "--out", name]) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert ".xlsx" in told.err
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert ".xlsx" in output.err
     assert list(folder.iterdir()) == []
 
 
@@ -85,8 +85,8 @@ def test_what_is_taken_as_csv_is_taken_as_a_workbook_and_with_commas(words, shee
     assert [len(row) for row in point] == [len(row) for row in comma]
     assert point[0] == comma[0] == book[0]
     numbers = 0
-    for row, other, own in zip(point[1:], comma[1:], book[1:], strict=True):
-        for heading, cell, its, value in zip(point[0], row, other, own, strict=True):
+    for row, other, values in zip(point[1:], comma[1:], book[1:], strict=True):
+        for heading, cell, its, value in zip(point[0], row, other, values, strict=True):
             if sheets.NUMBER.fullmatch(cell) and "time" not in heading:
                 assert "." not in its
                 assert float(its.replace(",", ".")) == float(cell)

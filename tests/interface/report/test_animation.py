@@ -70,9 +70,9 @@ def test_without_ffmpeg_a_film_is_one_message(answer, tmp_path, monkeypatch, cap
     with pytest.raises(lo.BadInput, match="ffmpeg"):
         answer.animate("a.mp4")
     assert run(["show", "beatup", "--animate", "a.mp4"]) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.count("\n") == 1
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.count("\n") == 1
     assert run(["sweep", "shedding", "--over", "operation.speed=590:600:10 rpm", "--animate", "a.mp4"]) == 2
     assert list(tmp_path.iterdir()) == []
 

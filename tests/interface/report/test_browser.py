@@ -59,10 +59,10 @@ def shown():
 def pages(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     for name in PAGES[:3]:
-        found = lo.solve(name, starts=None if name == "rapier" else 2)
+        second_answer = lo.solve(name, starts=None if name == "rapier" else 2)
         static = "shedding-static"
-        beside = [found.budget(), lo.sensitivity(static), lo.effects(static)] if name == "shedding" else []
-        found.report(folder / f"{name}.html", *beside)
+        neighbour = [second_answer.budget(), lo.sensitivity(static), lo.effects(static)] if name == "shedding" else []
+        second_answer.report(folder / f"{name}.html", *neighbour)
     answer = lo.solve(lo.load("beatup").update(CLASH))
     assert answer.status == "infeasible"
     answer.report(folder / "infeasible.html")
@@ -78,8 +78,8 @@ def pages(tmp_path_factory):
 def test_nothing_overlaps_and_nothing_is_asked_for(shown, pages, name, width, scheme):
     shown.open(pages[name], width, scheme)
     assert shown.errors == []
-    assert [each for each in shown.requests if not each.startswith(("file:", "data:"))] == []
-    assert len([each for each in shown.requests if each.startswith("file:")]) <= 1
+    assert [request for request in shown.requests if not request.startswith(("file:", "data:"))] == []
+    assert len([request for request in shown.requests if request.startswith("file:")]) <= 1
     assert shown.run("return document.documentElement.scrollWidth") <= width
     assert shown.run(SPOTS) == []
     assert shown.run(LETTERS) == []
@@ -90,7 +90,7 @@ def test_ink_stands_out_from_its_page(shown, pages, name):
     for scheme in SCHEMES:
         shown.open(pages[name], 1400, scheme)
         ink, page = (
-            [int(each) for each in re.findall(r"\d+", shown.run(f"return getComputedStyle(document.body).{key}"))[:3]]
+            [int(item) for item in re.findall(r"\d+", shown.run(f"return getComputedStyle(document.body).{key}"))[:3]]
             for key in ("color", "backgroundColor")
         )
         assert abs(sum(ink) - sum(page)) > 500, scheme
@@ -137,21 +137,21 @@ def test_the_cursor_reads_what_the_curve_says(shown, pages):
     shown.open(pages["beatup"])
     slide = "const s = document.querySelector('.turn'); s.value = 90; s.dispatchEvent(new Event('input'))"
     shown.run(slide)
-    chart = next(each for each in shown.all(".chart") if "transmission angle" in each.text)
+    chart = next(item for item in shown.all(".chart") if "transmission angle" in item.text)
     read = float(chart.find_element("css selector", ".told").text)
-    said = float(re.search(r"● ?least ([\d.]+)|least ([\d.]+) deg", chart.text).groups()[-1])
-    assert read == pytest.approx(said, rel=2e-3)  # it is least at 180 deg; a curve is drawn in tenths of a pixel
+    message = float(re.search(r"● ?least ([\d.]+)|least ([\d.]+) deg", chart.text).groups()[-1])
+    assert read == pytest.approx(message, rel=2e-3)  # it is least at 180 deg; a curve is drawn in tenths of a pixel
 
 
 def test_the_second_slider_goes_along_a_front(shown, pages):
     shown.open(pages["front"])
     slide = "const s = document.querySelector('.which'); s.value = arguments[0]; s.dispatchEvent(new Event('input'))"
-    told = []
+    texts = []
     for place in (0, 5, 11):
         shown.run(slide, place)
-        told.append((poses(shown), shown.one(".which + output").text))
-    assert len(set(told)) == 3
-    assert all("peak_torque" in words for _, words in told)
+        texts.append((poses(shown), shown.one(".which + output").text))
+    assert len(set(texts)) == 3
+    assert all("peak_torque" in words for _, words in texts)
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -161,7 +161,7 @@ def test_paper_cuts_no_table(shown, pages, name):
     shown.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
     size = {"width": 703, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
     shown.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-    assert [told for right, told in shown.run(RIGHT) if right > 704] == []
+    assert [report for right, report in shown.run(RIGHT) if right > 704] == []
     cut = "return getComputedStyle(document.querySelector('tr')).breakInside"
     assert shown.run(cut) == "avoid"
     shown.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})

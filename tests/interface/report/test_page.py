@@ -57,20 +57,20 @@ def answers():
 
 @pytest.fixture(scope="module")
 def pages(answers):
-    return {name: document.html([document.of_design(each)]) for name, each in answers.items()}
+    return {name: document.html([document.of_design(item)]) for name, item in answers.items()}
 
 
-def page(found, doubts=()):
-    return document.html([document.of_design(found, doubts=doubts)])
+def page(result, doubts=()):
+    return document.html([document.of_design(result, doubts=doubts)])
 
 
-def altered(found, **changes):
+def altered(result, **changes):
     """Return an answer with other fields of its record."""
-    return lo.Answer(replace(found.result, **changes), found.target)
+    return lo.Answer(replace(result.result, **changes), result.target)
 
 
-def status(found):
-    return answer.status(Subject(found.result, found.scene, found.target, found.sought))
+def status(result):
+    return answer.status(Subject(result.result, result.scene, result.target, result.sought))
 
 
 def verdict(html):
@@ -84,9 +84,9 @@ def test_a_page_takes_no_more_of_the_time_of_its_solve(name, most):
     times = []
     for _ in range(3):
         began = time.process_time()
-        found = lo.solve(name)
+        second_answer = lo.solve(name)
         solved = time.process_time()
-        page(found)
+        page(second_answer)
         times.append((solved - began, time.process_time() - solved))
     assert min(made for _, made in times) < most * min(solved for solved, _ in times)
 
@@ -105,54 +105,54 @@ def test_a_page_is_whole_small_and_asks_for_nothing(pages, name):
     html, read = pages[name], Read(pages[name])
     assert not read.inside[2:]
     assert len(html.encode()) < LARGEST
-    asked = [v for _, own in read.tags for key, v in own.items() if key in ("src", "href", "action", "data")]
-    assert [each for each in asked if not each.startswith(("#", "data:,"))] == []
+    requests = [v for _, values in read.tags for key, v in values.items() if key in ("src", "href", "action", "data")]
+    assert [item for item in requests if not item.startswith(("#", "data:,"))] == []
     assert not re.search(r"https?://|url\(|@import|\bfetch\b|XMLHttpRequest", html)
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_it_reads_without_its_script(pages, name):
     read = Read(re.sub(r"<script.*?</script>", "", pages[name], flags=re.DOTALL))
-    hidden = [own.get("class") for _, own in read.tags if "hidden" in own]
+    hidden = [values.get("class") for _, values in read.tags if "hidden" in values]
     assert hidden == ["controls"]
     assert {"What binds, and what it is worth", "The certificate in words", "Curves over the turn"} <= set(read.words)
-    lines = [own for tag, own in read.tags if tag == "line"]
+    lines = [values for tag, values in read.tags if tag == "line"]
     assert lines
-    assert all(float(own[end]) >= 0 for own in lines for end in ("x1", "y1", "x2", "y2"))
+    assert all(float(values[end]) >= 0 for values in lines for end in ("x1", "y1", "x2", "y2"))
 
 
 def test_every_number_of_the_answer_stands_there(answers, pages):
-    for name, found in answers.items():
-        said = "".join(Read(pages[name]).words)
-        for row in found.table().reset_index().to_dict("records"):
-            assert f"{row['design']:.6g}" in said, row["name"]
+    for name, result in answers.items():
+        text = "".join(Read(pages[name]).words)
+        for row in result.table().reset_index().to_dict("records"):
+            assert f"{row['design']:.6g}" in text, row["name"]
 
 
 def test_the_true_status_stands_first(answers):
     good = answers["shedding"]
     bad = replace(good.certificate, passed=False, reasons=("K1 can still fall: stationarity 0.1",))
     broken = (good.limits[0]._replace(ok=False), *good.limits[1:])
-    said = {
+    record = {
         "Optimal and certified": good,
         "NOT CERTIFIED": altered(good, status="uncertified", sentences=Sentences("it is not")),
         "NO ADMISSIBLE DESIGN EXISTS near any start": altered(good, status="infeasible"),
         "FAILED: no design was found": altered(good, status="failed"),
         "INTERRUPTED: not solved to its end": altered(good, status="interrupted"),
     }
-    for told, found in said.items():
-        assert status(found).verdict == told
-        assert (status(found).level == "ok") == (told == "Optimal and certified")
-    html = page(said["NOT CERTIFIED"])
+    for report, result in record.items():
+        assert status(result).verdict == report
+        assert (status(result).level == "ok") == (report == "Optimal and certified")
+    html = page(record["NOT CERTIFIED"])
     assert verdict(html) == "NOT CERTIFIED"
     assert re.search("<title>(.*?)</title>", html)[1].startswith("NOT CERTIFIED")
     assert 'class="status bad"' in html
     assert "Optimal" not in html
-    for found in (
+    for result in (
         altered(good, certificate=bad),
         altered(good, certificate=None),
         altered(good, limits=broken),
     ):  # the word of its status alone makes no optimum
-        assert (status(found).verdict, status(found).level) == ("NOT CERTIFIED", "bad")
+        assert (status(result).verdict, status(result).level) == ("NOT CERTIFIED", "bad")
     assert "stationarity 0.1" in " ".join(status(altered(good, certificate=bad)).sentences)
 
 
@@ -189,27 +189,31 @@ def test_positions_are_those_of_the_mechanism(pages):
         data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', html, re.DOTALL)[1])
         read = Read(html)
         joints = {**data["poses"]["design"][0]["joints"]}
-        links = [own for tag, own in read.tags if tag == "line" and own["data-a"] in joints and own["data-b"] in joints]
-        assert all(len(each) == 2 * POSES for each in joints.values())
-        for own in links:
-            one, other = (np.reshape(joints[own[end]], (-1, 2)) for end in ("data-a", "data-b"))
-            long = np.hypot(*(one - other).T)
+        links = [
+            values
+            for tag, values in read.tags
+            if tag == "line" and values["data-a"] in joints and values["data-b"] in joints
+        ]
+        assert all(len(joint) == 2 * POSES for joint in joints.values())
+        for values in links:
+            first, other = (np.reshape(joints[values[end]], (-1, 2)) for end in ("data-a", "data-b"))
+            long = np.hypot(*(first - other).T)
             assert np.ptp(long) <= 2.0  # tenths of a unit, to which they are rounded
 
 
 def test_equations_are_whole_mathml(pages):
     for html in pages.values():
-        found = re.findall(r"<math .*?</math>", html, re.DOTALL)
-        assert len(found) > 10
-        for each in found:
-            root = ElementTree.fromstring(each.replace("&#160;", " "))
+        result = re.findall(r"<math .*?</math>", html, re.DOTALL)
+        assert len(result) > 10
+        for item in result:
+            root = ElementTree.fromstring(item.replace("&#160;", " "))
             assert root.get("alttext")
             assert len(list(root.iter())) > 3
 
 
 def test_an_angle_of_two_sides_is_no_arctan_of_two():
     every: Any = lo.load("beatup").equations()
-    (front,) = (each for each in every if each.name == "front dead centre")
+    (front,) = (item for item in every if item.name == "front dead centre")
     words = "".join(ElementTree.fromstring(mathml.markup(front)).itertext())
     assert "atan2" in words
     assert words.count(",") == 1
@@ -233,9 +237,9 @@ def test_colours_of_dark_and_light_pages_differ_and_paper_is_light():
 def test_a_report_is_a_file_of_what_is_beside_too(answers, tmp_path):
     place = answers["shedding"].report(tmp_path / "one.html", answers["shedding"].prove())
     assert place.read_text(encoding="utf-8").count("Proof at every crank angle") == 1
-    for path, beside in ((tmp_path / "one.pdf", ()), (tmp_path / "two.html", (3,))):
+    for path, neighbour in ((tmp_path / "one.pdf", ()), (tmp_path / "two.html", (3,))):
         with pytest.raises(lo.BadInput):
-            answers["shedding"].report(path, *beside)
+            answers["shedding"].report(path, *neighbour)
         assert not path.exists()
 
 
@@ -243,12 +247,12 @@ def test_a_report_is_a_file_of_what_is_beside_too(answers, tmp_path):
 def test_the_command_reports_scenes_and_answers_on_one_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert run(["solve", "shedding", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    Path("good.json").write_text(json.dumps(told))
+    data = json.loads(capsys.readouterr().out)
+    Path("good.json").write_text(json.dumps(data))
     Path("edited.json").write_text(
-        json.dumps({**told, "design": {**told["design"], "K1": 1.01 * told["design"]["K1"]}})
+        json.dumps({**data, "design": {**data["design"], "K1": 1.01 * data["design"]["K1"]}})
     )
-    Path("claimed.json").write_text(json.dumps({**told, "certificate": None}))
+    Path("claimed.json").write_text(json.dumps({**data, "certificate": None}))
     assert run(["report", "good.json", "--out", "good.html"]) == 0
     assert verdict(Path("good.html").read_text(encoding="utf-8")) == "Optimal and certified"
     for name in ("edited", "claimed"):
@@ -258,7 +262,7 @@ def test_the_command_reports_scenes_and_answers_on_one_page(tmp_path, monkeypatc
     html = Path("all.html").read_text(encoding="utf-8")
     places = [html.index(f'id="c{k}"') for k in (1, 2, 3)]
     assert all(a < b for a, b in itertools.pairwise(places))
-    assert [own["href"] for tag, own in Read(html).tags if tag == "a"] == ["#c1", "#c2", "#c3"]
+    assert [values["href"] for tag, values in Read(html).tags if tag == "a"] == ["#c1", "#c2", "#c3"]
 
 
 @pytest.mark.parametrize(
@@ -280,14 +284,14 @@ def test_what_cannot_be_reported_is_one_message(words, answers, tmp_path, monkey
     Path("other.db").write_bytes(b"SQLite format 3\x00" + bytes(100))
     before = sorted(Path().iterdir())
     assert run(words) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.count("\n") == 1
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.count("\n") == 1
     assert sorted(Path().iterdir()) == before
 
 
 @pytest.mark.parametrize(
-    ("ticks", "told"),
+    ("ticks", "report"),
     [
         ((0.0, 1.5707963, 3.1415926, 4.712389, 6.2831853), "0 1.57 3.14 4.71 6.28"),
         ((-1000.0, 0.0, 1000.0), "−1000 0 1000"),
@@ -298,12 +302,12 @@ def test_what_cannot_be_reported_is_one_message(words, answers, tmp_path, monkey
         ((5.0,), "5"),
     ],
 )
-def test_numbers_of_an_axis_have_the_digits_that_tell_them_apart(ticks, told):
-    assert " ".join(chart.number(each, ticks) for each in ticks) == told
+def test_numbers_of_an_axis_have_the_digits_that_tell_them_apart(ticks, report):
+    assert " ".join(chart.number(tick, ticks) for tick in ticks) == report
 
 
 def test_round_numbers_stand_on_an_axis():
     for low, high in ((0.0, 1.0), (-3.2e5, 7.7e4), (1e-7, 1.3e-7), (140.02, 140.05)):
-        found = chart.ticks(low, high, 4)
-        assert 3 <= len(found) <= 6
-        assert all(low - 1e-9 * abs(high) <= each <= high + 1e-9 * abs(high) for each in found)
+        result = chart.ticks(low, high, 4)
+        assert 3 <= len(result) <= 6
+        assert all(low - 1e-9 * abs(high) <= item <= high + 1e-9 * abs(high) for item in result)

@@ -43,33 +43,33 @@ def plain(html):
 
 def drawn(html):
     """Return the drawings of a page's charts, read."""
-    found = re.findall(r'<figure class="chart">.*?(<svg .*?</svg>)', html, re.DOTALL)
-    return [ElementTree.fromstring(each) for each in found]
+    result = re.findall(r'<figure class="chart">.*?(<svg .*?</svg>)', html, re.DOTALL)
+    return [ElementTree.fromstring(item) for item in result]
 
 
 def test_a_page_shows_the_terminals_tables_of_each_study(answer, studies, tmp_path):
     shown = plain(answer.report(tmp_path / "all.html", *studies.values()).read_text(encoding="utf-8"))
     assert len(shown.encode()) < 300_000
-    for how, found in studies.items():
-        grids = [part for part in found.tables() if isinstance(part, TextTable)]
+    for how, studie in studies.items():
+        grids = [part for part in studie.tables() if isinstance(part, TextTable)]
         assert grids
         for cell in (cell for grid in grids for line in grid.lines for cell in line):
             assert cell.replace("\ue000", "\xa0") in shown, (how, cell)
 
 
 def test_each_study_has_a_chart_of_its_numbers(studies):
-    pages = {how: "".join(map(markup.part, found.report_parts())) for how, found in studies.items()}
-    found = studies["budget"]
+    pages = {how: "".join(map(markup.part, result.report_parts())) for how, result in studies.items()}
+    result = studies["budget"]
     (shares,) = drawn(pages["budget"])
-    curves = [each for each in shares.iter() if each.get("class", "").startswith("curve")]
-    assert len(curves) == len(found.rows) + 1
-    points = np.array([each.split(",") for each in curves[-1].get("points").split()], dtype=float)
+    curves = [item for item in shares.iter() if item.get("class", "").startswith("curve")]
+    assert len(curves) == len(result.rows) + 1
+    points = np.array([item.split(",") for item in curves[-1].get("points").split()], dtype=float)
     left, right, first, last, bottom, top, least, most = map(float, shares.get("data-ends").split())
     peak = points[np.argmax(np.abs(least + (bottom - points[:, 1]) / (bottom - top) * (most - least)))]
     at = first + (peak[0] - left) / (right - left) * (last - first)
-    assert at == pytest.approx(np.degrees(found.torque.angle), abs=2.0)
-    told = [each.get("aria-label") for each in drawn(pages["tolerance"])]
-    assert told == [
+    assert at == pytest.approx(np.degrees(result.torque.angle), abs=2.0)
+    texts = [item.get("aria-label") for item in drawn(pages["tolerance"])]
+    assert texts == [
         f"machines [%] over {name}"
         for name in ("swing [deg]", "theta [deg]", "mu_min [deg]", "M3_fdc [N*m]", "peak_torque [N*m]")
     ]
@@ -82,9 +82,9 @@ def test_bars_reach_from_0_to_their_values():
     rows = [("up", (2.0, None)), ("down", (-1.0, 0.5)), ("none", (None, float("nan")))]
     (picture,) = drawn(charts.figure(Bars("b", rows, [("c0", "a"), ("c1", "b")])))
     ends = [
-        re.fullmatch(r"M([\d.]+) [\d.]+H([\d.]+)", each.get("d")).groups()
-        for each in picture.iter("path")
-        if each.get("class").startswith("bar")
+        re.fullmatch(r"M([\d.]+) [\d.]+H([\d.]+)", item.get("d")).groups()
+        for item in picture.iter("path")
+        if item.get("class").startswith("bar")
     ]
     long = [float(end) - float(begin) for begin, end in ends]
     assert len({begin for begin, _ in ends}) == 1
@@ -92,31 +92,31 @@ def test_bars_reach_from_0_to_their_values():
 
 
 def test_forces_in_the_joints_are_told_where_an_effect_tells_them():
-    own = lo.load("beatup").with_effect("joint_forces")
-    found = lo.evaluate(own)
-    (part,) = [each for each in document.of_design(found).parts if each.title == "Forces in the joints"]
-    assert part.blocks == tuple(scenes.forces(own, found.simulate(), found.design))
+    scene = lo.load("beatup").with_effect("joint_forces")
+    evaluation = lo.evaluate(scene)
+    (part,) = [item for item in document.of_design(evaluation).parts if item.title == "Forces in the joints"]
+    assert part.blocks == tuple(scenes.forces(scene, evaluation.simulate(), evaluation.design))
     shown = markup.part(part)
     assert all(f"force_<wbr>{joint}</td>" in shown for joint in "ABCD")
-    titles = [each.title for each in document.of_design(lo.evaluate("beatup")).parts]
+    titles = [item.title for item in document.of_design(lo.evaluate("beatup")).parts]
     assert "Forces in the joints" not in titles
 
 
 @pytest.mark.slow
 def test_a_family_has_a_chapter_of_its_own_for_each_member(tmp_path):
     speeds = {"targets.family.members": [{"speed": "500 rpm"}, {"speed": "600 rpm"}]}
-    found = lo.solve(lo.load("shedding").update(speeds), "family", starts=1)
-    html = found.report(tmp_path / "family.html").read_text(encoding="utf-8")
+    second_answer = lo.solve(lo.load("shedding").update(speeds), "family", starts=1)
+    html = second_answer.report(tmp_path / "family.html").read_text(encoding="utf-8")
     heads = re.findall('<p class="verdict">(.*?)</p><h2>(.*?)</h2>', html)
     assert heads == [
         ("Optimal and certified", "shedding, family"),
         ("Member 1: all limits held", "shedding, family, member 1: speed 500 rpm"),
         ("Member 2: all limits held", "shedding, family, member 2: speed 600 rpm"),
     ]
-    whole, *own = html.split("<article")[1:]
+    whole, *values = html.split("<article")[1:]
     assert "Curves over the turn" not in whole
-    assert all(each.count('<figure class="machine"') == 1 for each in own)
-    assert f"{found.members[0].figures['contact_min']:.6g}" in plain(own[0])
+    assert all(item.count('<figure class="machine"') == 1 for item in values)
+    assert f"{second_answer.members[0].figures['contact_min']:.6g}" in plain(values[0])
 
 
 def test_the_command_adds_studies_to_each_answer(tmp_path, monkeypatch, capsys):
@@ -128,9 +128,9 @@ def test_the_command_adds_studies_to_each_answer(tmp_path, monkeypatch, capsys):
     assert run(["report", "shedding", "--study", "front", "--out", "b.html"]) == 2
     assert "budget, tolerance, sensitivity, effects, accuracy, proof" in capsys.readouterr().err
     assert run(["report", "shedding", "--study", "tolerance", "--out", "b.html"]) == 2
-    told = capsys.readouterr().err
-    assert "no number of the scene has a tolerance" in told
-    assert "solving" not in told
+    report = capsys.readouterr().err
+    assert "no number of the scene has a tolerance" in report
+    assert "solving" not in report
     assert not (tmp_path / "b.html").exists()
 
 
@@ -163,19 +163,19 @@ def test_one_page_holds_an_answer_with_stores_and_studies(files, tmp_path, monke
     assert run([*words, "--out", str(page)]) == 0
     html = page.read_text(encoding="utf-8")
     chapters = html.split("<article")[1:]
-    heads = [re.search("<h2>(.*?)</h2>", each)[1] for each in chapters]
+    heads = [re.search("<h2>(.*?)</h2>", chapter)[1] for chapter in chapters]
     assert [head.partition(",")[0] for head in heads] == [
         "sweep of shedding-static",
         "beatup",
         "pareto of shedding-static",
     ]
-    shown = [re.findall("<h3>(.*?)</h3>", each) for each in chapters]
+    shown = [re.findall("<h3>(.*?)</h3>", chapter) for chapter in chapters]
     assert sum(title == "Where the crank torque comes from" for title in shown[1]) == 1
     assert not any("Where the crank torque comes from" in titles for titles in (shown[0], shown[2]))
 
 
 @pytest.mark.parametrize(
-    ("inputs", "told"),
+    ("inputs", "report"),
     [
         (["beatup", "no-such.db"], "no-such.db"),
         (["beatup", "a.json", "damaged.json"], "damaged.json"),
@@ -186,10 +186,10 @@ def test_one_page_holds_an_answer_with_stores_and_studies(files, tmp_path, monke
         (["sweep.db", "front.db", "--study", "budget"], "cannot be used with a store"),
     ],
 )
-def test_all_inputs_are_checked_before_anything_is_computed(files, inputs, told, tmp_path, monkeypatch, capsys):
+def test_all_inputs_are_checked_before_anything_is_computed(files, inputs, report, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(files)
     (files / "damaged.json").write_text('{"status": "optimal"', encoding="utf-8")
     monkeypatch.setattr("loomopt.interface.api.solve", lambda *given, **how: pytest.fail("a scene was solved"))
     assert run(["report", *inputs, "--out", str(tmp_path / "page.html")]) == 2
-    assert told in capsys.readouterr().err
+    assert report in capsys.readouterr().err
     assert not (tmp_path / "page.html").exists()

@@ -45,7 +45,7 @@ def valid(schema, data, root=None):
     if "$ref" in schema and not keeps(root["$defs"][schema["$ref"].removeprefix("#/$defs/")]):
         return False
     if isinstance(schema.get("type"), list):
-        return any(valid({**schema, "type": each}, data, root) for each in schema["type"])
+        return any(valid({**schema, "type": item}, data, root) for item in schema["type"])
     kind = TYPES.get(schema.get("type", ""), object)
     if not isinstance(data, kind) or (isinstance(data, bool) and schema.get("type") in ("integer", "number")):
         return False
@@ -70,16 +70,16 @@ def _inside(schema, data, root):
         return re.search(schema.get("pattern", ""), data) is not None
     if isinstance(data, list):
         size = schema.get("minItems", 0) <= len(data) <= schema.get("maxItems", len(data))
-        size = size and not (schema.get("uniqueItems") and any(each in data[:k] for k, each in enumerate(data)))
-        return size and all(valid(schema.get("items", {}), each, root) for each in data)
+        size = size and not (schema.get("uniqueItems") and any(item in data[:k] for k, item in enumerate(data)))
+        return size and all(valid(schema.get("items", {}), item, root) for item in data)
     if isinstance(data, dict):
-        own, others = schema.get("properties", {}), schema.get("additionalProperties", {})
-        rest = [value for name, value in data.items() if name not in own]
+        values, others = schema.get("properties", {}), schema.get("additionalProperties", {})
+        rest = [value for name, value in data.items() if name not in values]
         return (
             set(schema.get("required", ())) <= set(data)
             and schema.get("minProperties", 0) <= len(data) <= schema.get("maxProperties", len(data))
             and all(valid(schema.get("propertyNames", {}), name, root) for name in data)
-            and all(valid(own[name], value, root) for name, value in data.items() if name in own)
+            and all(valid(values[name], value, root) for name, value in data.items() if name in values)
             and (not rest if others is False else all(valid(others, value, root) for value in rest))
         )
     if isinstance(data, int | float) and not isinstance(data, bool):

@@ -24,18 +24,18 @@ def symbols(scene):
 @pytest.mark.parametrize("job", JOBS)
 def test_every_number_word_and_figure_is_told_with_its_unit(job):
     scene = lo.load(scene_of(job))
-    told, schema = symbols(scene), scene.schema
+    report, schema = symbols(scene), scene.schema
     models = [("", schema.operation), ("", schema.mechanism)]
     models += [(f"{effect.name}.", effect.table) for effect in schema.effects.values()]
-    for path, own in models:
-        for name in own.model_fields:
-            quantity = quantity_of(own, name)
-            if table_inside(own, name) is None:
-                assert told[path + name, scene.shown_in(quantity.kind) if quantity else "1"]
-        for name, quantity in quantities_of(own).items():
-            assert told[path + name, scene.shown_in(quantity.kind)]
-    assert {figure.name for figure in schema.figures.values()} <= {name for name, _ in told}
-    assert all(5 <= len(text) <= 110 for (name, _), text in told.items() if name in schema.figures)
+    for path, values in models:
+        for name in values.model_fields:
+            quantity = quantity_of(values, name)
+            if table_inside(values, name) is None:
+                assert report[path + name, scene.shown_in(quantity.kind) if quantity else "1"]
+        for name, quantity in quantities_of(values).items():
+            assert report[path + name, scene.shown_in(quantity.kind)]
+    assert {figure.name for figure in schema.figures.values()} <= {name for name, _ in report}
+    assert all(5 <= len(text) <= 110 for (name, _), text in report.items() if name in schema.figures)
 
 
 @pytest.mark.parametrize("job", JOBS)
@@ -44,15 +44,15 @@ def test_every_row_of_an_answers_table_and_every_column_of_its_curves_is_told(jo
     names = {name for name, _ in symbols(scene)} | set(scene.bounds)
     assert set(lo.evaluate(scene).table().index) <= names
     columns = {split(str(column)) for column in lo.simulate(scene, accuracy=1e-2)}
-    told = {(each.name, each.unit): each.text for each in glossary.columns(scene)}
-    assert set(told) == columns
-    silent = {name for (name, _), text in told.items() if not text}
+    record = {(item.name, item.unit): item.text for item in glossary.columns(scene)}
+    assert set(record) == columns
+    silent = {name for (name, _), text in record.items() if not text}
     assert silent == set()
 
 
 def test_units_are_those_of_the_scene():
-    told = {name: unit for name, unit in symbols(inch.scene("beatup")) if name in ("l1", "inertia.J4", "M0")}
-    assert told == {"l1": "in", "inertia.J4": "lb*in^2", "M0": "lbf*in"}
+    record = {name: unit for name, unit in symbols(inch.scene("beatup")) if name in ("l1", "inertia.J4", "M0")}
+    assert record == {"l1": "in", "inertia.J4": "lb*in^2", "M0": "lbf*in"}
 
 
 def test_what_the_sketch_names_is_marked(capsys, monkeypatch):
@@ -78,17 +78,17 @@ def test_a_scene_that_cannot_be_drawn_has_its_symbols_too():
 @pytest.mark.parametrize("job", sorted(set(JOBS) - {"linkage"}))  # which is the user's own
 def test_sources_name_every_printed_figure_with_the_verdict_and_why(job, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "300")
-    found = glossary.read(job)
-    assert found.citation == lo.load(job).source
+    result = glossary.read(job)
+    assert result.citation == lo.load(job).source
     assert run(["show", job, "--sources"]) == 0
     out = capsys.readouterr().out
-    for each in found.figures:
-        line = next(line for line in out.splitlines() if line.split()[:1] == [each.key])
-        assert each.verdict in line
-        assert each.computed in line
-        assert all(word in out for word in each.remark.split())
+    for figure in result.figures:
+        line = next(line for line in out.splitlines() if line.split()[:1] == [figure.key])
+        assert figure.verdict in line
+        assert figure.computed in line
+        assert all(word in out for word in figure.remark.split())
     text = (registry.find(job).resources / "sources.csv").read_text("utf-8")
-    assert len(found.figures) == len(list(csv.reader(text.splitlines()))) - 2
+    assert len(result.figures) == len(list(csv.reader(text.splitlines()))) - 2
 
 
 def test_a_job_without_sources_says_so(monkeypatch, capsys):
@@ -106,6 +106,6 @@ def test_a_scene_of_one_s_own_shows_nobody_s_figures(tmp_path, capsys):
     assert run(["show", str(tmp_path / "mine.toml"), "--sources"]) == 0
     out = capsys.readouterr().out
     assert "no published figures" in out
-    assert not [each.key for each in glossary.read("beatup").figures if each.key in out]
+    assert not [figure.key for figure in glossary.read("beatup").figures if figure.key in out]
     assert run(["show", "beatup", "--set", "operation.M0=700 N*m", "--sources"]) == 0
     assert "beta_reference" in capsys.readouterr().out

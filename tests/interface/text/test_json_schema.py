@@ -35,14 +35,14 @@ def of(job):
 
 def judged(data):
     """Return what the schema says of a scene; where the package of that name is installed it must say the same."""
-    found = json_walk.valid(of("beatup") if "job" not in data["problem"] else of(data["problem"]["job"]), data)
+    result = json_walk.valid(of("beatup") if "job" not in data["problem"] else of(data["problem"]["job"]), data)
     try:
         import jsonschema
     except ImportError:
-        return found
+        return result
     checker = jsonschema.Draft202012Validator(of(data["problem"]["job"]))
-    assert checker.is_valid(data) == found
-    return found
+    assert checker.is_valid(data) == result
+    return result
 
 
 def changed(data, key, value):
@@ -50,7 +50,7 @@ def changed(data, key, value):
     first, _, rest = key.partition(".")
     if rest:
         return {**data, first: changed(data.get(first, {}), rest, value)}
-    return {name: each for name, each in data.items() if name != first} | ({} if value is None else {first: value})
+    return {name: item for name, item in data.items() if name != first} | ({} if value is None else {first: value})
 
 
 def taken(data):
@@ -153,23 +153,23 @@ def test_patterns_tell_kinds_apart_by_their_usual_units_as_the_program_does(kind
 
 @pytest.mark.parametrize("job", JOBS)
 def test_the_schema_speaks_of_every_table_and_describes_every_number(job):
-    found = of(job)
-    assert found["$schema"] == "https://json-schema.org/draft/2020-12/schema"
-    own = registry.declared(job).tables
-    assert set(found["properties"]) == {*TABLES, *own}
-    for table in ("operation",) if own else ("operation", "mechanism"):
-        assert all(each["description"] for each in found["properties"][table]["properties"].values())
-    text = json.dumps(found)
-    assert {*re.findall(r'"#/\$defs/(\w+)"', text)} == {*found["$defs"]}
+    result = of(job)
+    assert result["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    values = registry.declared(job).tables
+    assert set(result["properties"]) == {*TABLES, *values}
+    for table in ("operation",) if values else ("operation", "mechanism"):
+        assert all(item["description"] for item in result["properties"][table]["properties"].values())
+    text = json.dumps(result)
+    assert {*re.findall(r'"#/\$defs/(\w+)"', text)} == {*result["$defs"]}
     assert "null" not in text
 
 
 def test_display_takes_one_unit_of_each_kind():
-    found = json_schema.display(registry.declared("beatup"))
+    result = json_schema.display(registry.declared("beatup"))
     right = {"length": "in", "speed": "rpm", "stiffness": "lbf/in", "rotary_damping": "N*m*s/rad"}
-    assert json_walk.valid(found, right)
+    assert json_walk.valid(result, right)
     for wrong in ({"length": "kg"}, {"length": 1}, {"lenght": "in"}, {"stiffness": "N*m"}, {"angular_speed": "rpm"}):
-        assert not json_walk.valid(found, wrong)
+        assert not json_walk.valid(result, wrong)
 
 
 def test_the_command_prints_it_and_an_unknown_job_is_refused(capsys):

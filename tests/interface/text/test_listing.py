@@ -14,8 +14,8 @@ def test_a_head_is_what_the_whole_scene_says_and_its_targets_have_results(name):
     head, scene = packaged.head(packaged.problems()[name]), lo.load(name)
     assert (head.name, head.title, head.job, head.source) == (scene.name, scene.title, scene.job, scene.source)
     assert set(head.targets) <= set(scene.schema.targets)
-    own = {target for problem, _, target in RESULTS if problem == name and "-against-" not in target}
-    assert set(head.targets) == own
+    values = {target for problem, _, target in RESULTS if problem == name and "-against-" not in target}
+    assert set(head.targets) == values
 
 
 def test_the_list_names_every_scene_with_its_targets_and_source(capsys, monkeypatch):

@@ -23,9 +23,9 @@ def tree(html):
 
 
 def test_an_answer_shows_sentence_table_prices_certificate_and_drawing(answer):
-    found = tree(answer._repr_html_())
-    words = "".join(found.itertext())
-    tables = found.findall("table")
+    result = tree(answer._repr_html_())
+    words = "".join(result.itertext())
+    tables = result.findall("table")
     heads = [None, "today", "design", "unit", "limits", "binds", "reached"]
     assert [cell.text for cell in tables[0].iter("th")] == heads
     cells = [[cell.text for cell in line] for line in tables[0].iter("tr")]
@@ -34,7 +34,7 @@ def test_an_answer_shows_sentence_table_prices_certificate_and_drawing(answer):
     assert tables[1].find("caption").text == "What binds, and what loosening it is worth"
     assert all(price.reading in words for price in answer.binding)
     assert "Certificate passed" in words
-    assert len(found.findall("{http://www.w3.org/2000/svg}svg")) == 1
+    assert len(result.findall("{http://www.w3.org/2000/svg}svg")) == 1
 
 
 def test_text_from_outside_is_escaped(answer):
@@ -59,12 +59,12 @@ def test_an_infeasible_answer_shows_what_helps():
 @pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
 def test_a_drawing_fits_a_page_whatever_the_machines_size(name):
-    found = lo.evaluate(name)
-    drawn = found.draw()
+    evaluation = lo.evaluate(name)
+    drawn = evaluation.draw()
     root, full = (ElementTree.fromstring(text) for text in (drawn._repr_svg_(), drawn.svg))
     width, height = float(root.get("width")), float(root.get("height"))
     assert max(width, height) == notebook.PAGE
     sides = [float(side) for side in root.get("viewBox").split()[2:]]
     assert width / height == pytest.approx(sides[0] / sides[1], rel=2e-3)
     assert full.get("width") == f"{sides[0]:.12g}mm"
-    assert found._repr_html_().endswith(f"{drawn._repr_svg_()}</div>")
+    assert evaluation._repr_html_().endswith(f"{drawn._repr_svg_()}</div>")

@@ -170,17 +170,17 @@ def test_an_uncertified_answer_says_so_first_and_last(answer):
 
 def test_starts_that_ended_elsewhere_are_told(answer):
     better, worse = dict(answer.optima[0][0]), dict(answer.optima[0][0]) | {"peak_torque": 99.0}
-    told = dataclasses.replace(
+    report = dataclasses.replace(
         answer.result, optima=((better, 3), (worse, 2)), solver={**answer.solver, "starts": 5, "starts_at_best": 3}
     )
-    shown = text(*answers.solution(told, SCENE), columns=None)
+    shown = text(*answers.solution(report, SCENE), columns=None)
     assert "Starts: 3 of 5 reached the best. Other optima: " in shown
     assert "peak_torque 99 N*m (2)" in shown
 
 
 def test_an_evaluated_design_stands_beside_today_and_names_what_it_breaks(answer):
-    found = api.evaluate(SCENE, {**answer.design, "l1": 0.02})
-    shown = text(*answers.evaluation(found.result, SCENE, api.evaluate(SCENE).result))
+    evaluation = api.evaluate(SCENE, {**answer.design, "l1": 0.02})
+    shown = text(*answers.evaluation(evaluation.result, SCENE, api.evaluate(SCENE).result))
     assert shown.startswith("beatup-light: NOT admissible: l1")
     assert row(shown, "l1")[:3] == ["l1", "31", "20"]
     assert "all limits held" in text(*answers.evaluation(api.evaluate(SCENE).result, SCENE, None))
@@ -222,47 +222,47 @@ def test_curves_fit_the_width_and_show_both_sides_of_a_jump():
 @pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["beatup-light", "rapier", "shedding", "shedding-static"])
 def test_the_design_to_retype_is_the_design_to_the_last_digit(name):
-    found = api.solve(name)
-    shown = text(*answers.solution(found.result, found.scene))
+    second_answer = api.solve(name)
+    shown = text(*answers.solution(second_answer.result, second_answer.scene))
     (line,) = re.findall(r"^to retype: (\{.*?\})", shown, re.MULTILINE | re.DOTALL)
-    formatter, typed = UnitFormatter(found.scene), json.loads(line)
-    assert list(typed) == list(found.design)
+    formatter, typed = UnitFormatter(second_answer.scene), json.loads(line)
+    assert list(typed) == list(second_answer.design)
     back = {k: read(v, formatter.kind(k)) if isinstance(v, str) else v for k, v in typed.items()}
-    assert back == found.design
-    assert api.evaluate(found.scene, back, found.target).admissible
+    assert back == second_answer.design
+    assert api.evaluate(second_answer.scene, back, second_answer.target).admissible
     assert all(isinstance(v, str) == (formatter.unit(k) != "1") for k, v in typed.items())
     assert max(map(len, shown.splitlines())) <= 80
-    assert shown.index(f"\n{found.table().index[-1]} ") < shown.index("to retype: ") < shown.index("What binds")
+    assert shown.index(f"\n{second_answer.table().index[-1]} ") < shown.index("to retype: ") < shown.index("What binds")
 
 
 def test_what_was_proven_is_told_in_a_few_lines_and_only_where_it_was_asked_for(answer):
     assert "Proven" not in text(*answers.solution(answer.result, SCENE))
-    found = api.solve(SCENE, prove=True)
-    assert found.proofs.passed
-    shown = text(*answers.solution(found.result, SCENE), columns=None)
+    second_answer = api.solve(SCENE, prove=True)
+    assert second_answer.proofs.passed
+    shown = text(*answers.solution(second_answer.result, SCENE), columns=None)
     lines = shown[shown.index("Proven at every crank angle") :].splitlines()
     block = [lines[0], *(line for line in lines if line.startswith("    "))]
-    boxes = sum(proof.boxes for proof in found.proofs.proofs)
+    boxes = sum(proof.boxes for proof in second_answer.proofs.proofs)
     assert block[0].endswith(f"up to 1e-08 of each quantity's largest magnitude, in {boxes} boxes:")
     assert [line.split(":")[0].strip() for line in block[1:]] == ["limits", "assembly", "peaks as claimed"]
-    assert all(proof.summary in shown for proof in found.proofs.proofs)
+    assert all(proof.summary in shown for proof in second_answer.proofs.proofs)
     assert "NOT proven" not in shown
 
 
 def test_what_was_not_proven_is_told_beside_what_was(answer):
-    found = api.prove(SCENE, {**answer.design, "l1": 0.02})
-    assert not found.passed
-    shown = text(*answers.proof_summary(found), columns=None)
-    missed = [proof for proof in found.proofs if proof.status != "proven"]
-    assert shown.splitlines()[-1] == "NOT proven: " + ", ".join(f"{each.text} ({each.status})" for each in missed)
-    assert all(each.text not in shown.splitlines()[1] for each in missed)
-    none = dataclasses.replace(found, proofs=tuple(missed))
+    proofs = api.prove(SCENE, {**answer.design, "l1": 0.02})
+    assert not proofs.passed
+    shown = text(*answers.proof_summary(proofs), columns=None)
+    missed = [proof for proof in proofs.proofs if proof.status != "proven"]
+    assert shown.splitlines()[-1] == "NOT proven: " + ", ".join(f"{item.text} ({item.status})" for item in missed)
+    assert all(item.text not in shown.splitlines()[1] for item in missed)
+    none = dataclasses.replace(proofs, proofs=tuple(missed))
     assert text(*answers.proof_summary(none)).startswith("NOT proven: ")
 
 
 def test_the_proofs_stand_in_the_json_as_prove_prints_them():
-    found = api.solve(SCENE, prove=True)
-    assert found.as_dict()["proofs"] == api.prove(SCENE, found).as_dict()["proofs"]
+    second_answer = api.solve(SCENE, prove=True)
+    assert second_answer.as_dict()["proofs"] == api.prove(SCENE, second_answer).as_dict()["proofs"]
     assert "proofs" not in api.solve(SCENE).as_dict()
 
 

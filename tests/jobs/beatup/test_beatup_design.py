@@ -19,9 +19,9 @@ def x(s, r4e):
 
 
 def test_the_mass_is_what_its_inertia_asks_for_at_its_radius():
-    found = JOB.design(PROGRAM, x(3.0 * 0.07**2, 0.07))
-    assert found == LENGTHS | {"m4e": pytest.approx(3.0, rel=1e-15), "r4e": 0.07}
-    assert list(found) == ["l1", "l2", "l3", "l4", "m4e", "r4e"]
+    design = JOB.design(PROGRAM, x(3.0 * 0.07**2, 0.07))
+    assert design == LENGTHS | {"m4e": pytest.approx(3.0, rel=1e-15), "r4e": 0.07}
+    assert list(design) == ["l1", "l2", "l3", "l4", "m4e", "r4e"]
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def test_a_counterweight_without_mass_stands_at_its_largest_radius():
     both, axes = JOB.traded(BEATUP, None, {"peak_torque": "least", "change": "least"})
     alone = replace(both, objectives=both.objectives[:1])
     limited = replace(alone, limits=(*alone.limits, *axes[1].limits("change", 0.1)))
-    assert [JOB.values(each, none)["r4e"] for each in (both, alone, limited)] == [0.0, 0.08, 0.0]
+    assert [JOB.values(item, none)["r4e"] for item in (both, alone, limited)] == [0.0, 0.08, 0.0]
 
 
 @pytest.mark.parametrize(("first", "target"), [("peak_power", None), ("peak_torque", "balance")])
@@ -69,8 +69,8 @@ def test_a_radius_that_is_traded_is_its_own_without_a_mass_too(first, target):
 def test_a_negligible_counterweight_is_taken_for_none():
     most = 12.4 * 0.08**2
     assert JOB.tidy(PROGRAM, x(0.5 * NO_MASS * most, 0.07))["s"] == 0.0
-    kept = x(2 * NO_MASS * most, 0.07)
-    assert JOB.tidy(PROGRAM, kept) == kept
+    remaining = x(2 * NO_MASS * most, 0.07)
+    assert JOB.tidy(PROGRAM, remaining) == remaining
     least = JOB.program(BEATUP.update({"bounds.m4e.min": "1 kg", "bounds.r4e.min": "10 mm"}), "balance")
     assert JOB.tidy(least, x(0.5 * NO_MASS * most, 0.07)) == x(1.0 * 0.01**2, 0.01)
 

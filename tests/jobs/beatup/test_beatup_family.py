@@ -13,10 +13,10 @@ TORQUES = (600, 650, 700, 745, 800)
 KEY = "targets.family"
 
 
-def family(torques=TORQUES, own=("m4e",), scene="beatup", **more):
+def family(torques=TORQUES, values=("m4e",), scene="beatup", **more):
     """Return a packaged scene with a family of cloths."""
     members = [{"M0": f"{torque} N*m"} for torque in torques]
-    return lo.load(scene).update({f"{KEY}.members": members, f"{KEY}.own": list(own)} | more)
+    return lo.load(scene).update({f"{KEY}.members": members, f"{KEY}.own": list(values)} | more)
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def answer():
 
 
 def own(answer, name):
-    return [each.design.get(name, each.figures.get(name)) for each in answer.members]
+    return [member.design.get(name, member.figures.get(name)) for member in answer.members]
 
 
 def test_five_cloths_on_one_linkage(answer):
@@ -64,7 +64,7 @@ def test_prices_are_what_the_worst_and_the_sum_gain_where_a_limit_gives_way(answ
 
 
 def test_words_say_who_decides_who_balances_and_why_not_all(answer):
-    for said in (
+    for message in (
         "member 1 (M0 600 N*m) decides it",
         "member 5 (M0 800 N*m) decides it",
         "Members 3 and 4 reach M3_fdc, members 1, 2 and 5 do not",
@@ -73,29 +73,29 @@ def test_words_say_who_decides_who_balances_and_why_not_all(answer):
         "psi'' is 0.276583",
         "Requirements conflict: psi'' must be at least",
     ):
-        assert said in answer.message
+        assert message in answer.message
     # The least psi'' that the limits leave, and what it holds with the reed alone.
     bend = answer.figures["alpha_fdc"] / answer.scene.operation["speed"] ** 2
     assert bend == pytest.approx(0.276582768, abs=1e-9)
     assert 0.62 * answer.figures["alpha_fdc"] == pytest.approx(676.98, abs=2e-3)
     assert answer.reached == {"M3_fdc": False}
-    assert [each.reached["M3_fdc"] for each in answer.members] == [False, False, True, True, False]
+    assert [member.reached["M3_fdc"] for member in answer.members] == [False, False, True, True, False]
 
 
 def test_the_band_of_one_linkage_balances_every_cloth_in_it():
-    found = lo.solve(family((680, 700, 760)), "family", starts=2)
-    assert found.reached == {"M3_fdc": True}
-    assert "All members reach M3_fdc" in found.message
-    assert own(found, "M3_fdc") == pytest.approx([0.0] * 3, abs=1e-6)
+    second_answer = lo.solve(family((680, 700, 760)), "family", starts=2)
+    assert second_answer.reached == {"M3_fdc": True}
+    assert "All members reach M3_fdc" in second_answer.message
+    assert own(second_answer, "M3_fdc") == pytest.approx([0.0] * 3, abs=1e-6)
 
 
 def test_json_tells_each_member(answer):
-    told = json.loads(json.dumps(answer.as_dict()))
-    assert [each["change"] for each in told["members"]] == [{"operation.M0": f"{torque} N*m"} for torque in TORQUES]
-    assert told["members"][4]["figures"]["peak_torque"] == told["figures"]["peak_torque"]
-    assert told["figures"]["M3_fdc[5]"] == told["members"][4]["figures"]["M3_fdc"]
-    assert told["units"]["m4e[3]"] == "kg"
-    assert told["units"]["M3_fdc[5]"] == "N*m"
+    data = json.loads(json.dumps(answer.as_dict()))
+    assert [item["change"] for item in data["members"]] == [{"operation.M0": f"{torque} N*m"} for torque in TORQUES]
+    assert data["members"][4]["figures"]["peak_torque"] == data["figures"]["peak_torque"]
+    assert data["figures"]["M3_fdc[5]"] == data["members"][4]["figures"]["M3_fdc"]
+    assert data["units"]["m4e[3]"] == "kg"
+    assert data["units"]["M3_fdc[5]"] == "N*m"
 
 
 def test_terminal_and_table_tell_each_member(answer):
@@ -108,12 +108,12 @@ def test_terminal_and_table_tell_each_member(answer):
 
 @pytest.mark.parametrize("torque", [600, 745, 800])
 def test_a_family_of_one_is_the_plain_target(torque):
-    found = lo.solve(family((torque,)), "family", starts=1)
+    second_answer = lo.solve(family((torque,)), "family", starts=1)
     plain = lo.solve(lo.load("beatup").set("operation.M0", f"{torque} N*m"), "balance", starts=1)
     for name, value in plain.design.items():
-        assert found.members[0].design[name] == pytest.approx(value, rel=1e-12, abs=1e-15)
+        assert second_answer.members[0].design[name] == pytest.approx(value, rel=1e-12, abs=1e-15)
     for name in ("M3_fdc", "peak_torque"):
-        assert found.figures[name] == pytest.approx(plain.figures[name], rel=1e-12, abs=1e-9)
+        assert second_answer.figures[name] == pytest.approx(plain.figures[name], rel=1e-12, abs=1e-9)
 
 
 def test_the_order_of_members_changes_nothing(answer):
@@ -126,29 +126,29 @@ def test_the_order_of_members_changes_nothing(answer):
 @pytest.mark.few(1)
 @pytest.mark.parametrize("own_names", [(), ("m4e",)])
 def test_equal_members_are_the_plain_target(own_names):
-    found = lo.solve(family((745, 745), own_names), "family", starts=1)
+    second_answer = lo.solve(family((745, 745), own_names), "family", starts=1)
     plain = lo.solve(lo.load("beatup"), starts=1)
-    assert found.status == "optimal"
-    for member in found.members:
+    assert second_answer.status == "optimal"
+    for member in second_answer.members:
         for name, value in plain.design.items():
             assert member.design[name] == pytest.approx(value, rel=1e-7)
 
 
 def test_without_anything_of_their_own_members_share_all():
-    found = lo.solve(family((700, 745), ()), "family", starts=1)
-    assert found.status == "optimal"
-    assert "m4e" in found.design
+    second_answer = lo.solve(family((700, 745), ()), "family", starts=1)
+    assert second_answer.status == "optimal"
+    assert "m4e" in second_answer.design
     # One inertia for both: the best balances half way between them.
-    assert own(found, "M3_fdc") == pytest.approx([-22.5, 22.5], abs=1e-6)
+    assert own(second_answer, "M3_fdc") == pytest.approx([-22.5, 22.5], abs=1e-6)
 
 
 def test_the_sum_lets_one_member_go():
     summed = lo.solve(family((700, 730, 800), (), **{f"{KEY}.combine": "sum"}), "family", starts=2)
     worst = lo.solve(family((700, 730, 800), ()), "family", starts=2)
-    totals = [math.fsum(map(abs, own(each, "M3_fdc"))) for each in (summed, worst)]
+    totals = [math.fsum(map(abs, own(item, "M3_fdc"))) for item in (summed, worst)]
     assert totals == pytest.approx([100.0, 120.0], abs=1e-6)  # the median is balanced; or the middle of the ends
     assert summed.status == worst.status == "optimal"
-    grids = [answers.members(each.result, each.scene) for each in (summed, worst)]
+    grids = [answers.members(item.result, item.scene) for item in (summed, worst)]
     assert grids[0].columns == grids[1].columns
     assert "M3_fdc [N*m]" in grids[0].columns
 
@@ -157,11 +157,11 @@ def test_the_sum_lets_one_member_go():
 @pytest.mark.parametrize("combine", ["worst", "sum"])
 def test_peaks_of_other_targets_combine_too(combine):
     scene = family((700, 745), **{f"{KEY}.of": "torque", f"{KEY}.combine": combine})
-    found = lo.solve(scene, "family", starts=1)
-    assert found.status == "optimal"
-    peaks = own(found, "peak_torque")
-    assert found.figures["peak_torque"] == max(peaks)
-    alone = [lo.solve(each.scene, "torque", starts=1).figures["peak_torque"] for each in found.members]
+    second_answer = lo.solve(scene, "family", starts=1)
+    assert second_answer.status == "optimal"
+    peaks = own(second_answer, "peak_torque")
+    assert second_answer.figures["peak_torque"] == max(peaks)
+    alone = [lo.solve(member.scene, "torque", starts=1).figures["peak_torque"] for member in second_answer.members]
     assert all(peak >= least - 1e-6 for peak, least in zip(peaks, alone, strict=True))
 
 
@@ -215,26 +215,26 @@ def test_what_only_members_have_is_asked_of_them(answer, tmp_path):
 @pytest.mark.slow
 def test_a_sweep_over_a_family_has_every_members_figures():
     over = {"limits.swing.min": ["22.85 deg", "22.9 deg"]}
-    found = lo.sweep(family((600, 745)), over, "family")
-    frame = found.table()
+    sweep = lo.sweep(family((600, 745)), over, "family")
+    frame = sweep.table()
     assert list(frame["status"]) == ["optimal but M3_fdc not reached"] * 2
     assert frame["M3_fdc[1] [N*m]"].iloc[1] == pytest.approx(-76.981102, abs=1e-6)
 
 
 def test_squares_are_summed_where_the_target_is_a_root_of_squares():
     more = {f"{KEY}.of": "pulse", f"{KEY}.combine": "sum"}
-    found = lo.solve(family((600, 745), **more), "family", starts=1)
-    assert found.status == "optimal"
-    least = math.hypot(*own(found, "pulse_rms"))
-    assert f"The least root sum of squares of pulse_rms is {least:.6g} N*m" in found.message
+    second_answer = lo.solve(family((600, 745), **more), "family", starts=1)
+    assert second_answer.status == "optimal"
+    least = math.hypot(*own(second_answer, "pulse_rms"))
+    assert f"The least root sum of squares of pulse_rms is {least:.6g} N*m" in second_answer.message
     other = lo.solve(family((600, 745), **{f"{KEY}.of": "pulse"}), "family", starts=1)
     assert least <= math.hypot(*own(other, "pulse_rms")) + 1e-6
 
 
 def test_show_tells_the_members_and_finds_bad_ones():
-    told = layout.render(scenes.parts(family((600, 745))), 120)
-    assert "each has its own m4e" in told
-    assert "operation.M0 = 745 N*m" in told
+    report = layout.render(scenes.parts(family((600, 745))), 120)
+    assert "each has its own m4e" in report
+    assert "operation.M0 = 745 N*m" in report
     with pytest.raises(BadInput, match=r"members\[1\].M9"):
         scenes.parts(family().set(f"{KEY}.members", [{"M9": "1 N*m"}]))
 
@@ -247,24 +247,26 @@ def test_editors_know_the_table():
 
 def test_members_that_cannot_share_a_machine_are_infeasible_and_the_clash_is_named():
     members = [{"limits.swing.min": "23.3 deg"}, {"M0": "700 N*m", "limits.swing.max": "23 deg"}]
-    found = lo.solve(lo.load("beatup").update({f"{KEY}.members": members, f"{KEY}.own": ["m4e"]}), "family", starts=2)
-    assert found.status == "infeasible"
-    assert {"swing"} == {each.limit for each in found.relaxation}
-    assert "No admissible design exists" in found.message
+    second_answer = lo.solve(
+        lo.load("beatup").update({f"{KEY}.members": members, f"{KEY}.own": ["m4e"]}), "family", starts=2
+    )
+    assert second_answer.status == "infeasible"
+    assert {"swing"} == {relaxation.limit for relaxation in second_answer.relaxation}
+    assert "No admissible design exists" in second_answer.message
 
 
 def test_a_ratio_that_one_linkage_could_serve_may_lie_out_of_reach():
     # 600 to 650 N*m is a ratio below 1.128, but the limits leave no psi'' below 0.276583: nothing balances at 650.
-    found = lo.solve(family((600, 650)), "family", starts=1)
-    assert found.reached == {"M3_fdc": False}
-    assert "psi'' is 0.276583" in found.message
-    assert "All members are balanced by a psi'' from 0.235425 to 0.245132" in found.message
+    second_answer = lo.solve(family((600, 650)), "family", starts=1)
+    assert second_answer.reached == {"M3_fdc": False}
+    assert "psi'' is 0.276583" in second_answer.message
+    assert "All members are balanced by a psi'' from 0.235425 to 0.245132" in second_answer.message
 
 
 def test_the_ratio_of_what_balances_says_nothing_of_linkages_of_their_own():
-    found = lo.solve(family((600, 745), ("l1", "l2", "l3", "l4", "m4e")), "family", starts=1)
-    assert "ratio" not in found.message
-    for member in found.members:
+    second_answer = lo.solve(family((600, 745), ("l1", "l2", "l3", "l4", "m4e")), "family", starts=1)
+    assert "ratio" not in second_answer.message
+    for member in second_answer.members:
         plain = lo.solve(member.scene, "balance", starts=1)
         assert member.figures["peak_torque"] <= plain.figures["peak_torque"] + 1e-6 or member.reached["M3_fdc"]
         assert abs(member.figures["M3_fdc"]) == pytest.approx(abs(plain.figures["M3_fdc"]), abs=1e-6)

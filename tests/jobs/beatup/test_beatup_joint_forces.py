@@ -66,8 +66,8 @@ NAMES = (*JOINTS, "shaking_force", "shaking_moment")
 
 def scene_of(case):
     effects, keys, _ = EVERY[case]
-    found = lo.load("beatup-light" if case.startswith("light") else "beatup").with_effect("joint_forces", *effects)
-    return (found.update(dict(keys)) if keys else found).without_effect(
+    scene = lo.load("beatup-light" if case.startswith("light") else "beatup").with_effect("joint_forces", *effects)
+    return (scene.update(dict(keys)) if keys else scene).without_effect(
         *(("resistance",) if case == "no cloth" else ())
     )
 
@@ -78,55 +78,55 @@ def sampler(case):
     return job.sampler(scene, {**job.today(scene), **EVERY[case][2]})
 
 
-def just_before(found, name, phi):
+def just_before(result, name, phi):
     """Return a quantity, SI, at a crank angle, rad, on the piece that ends or holds it."""
-    node = Node(phi, found.cycle.switch(found.cycle.piece_before(phi)))
-    return float(found.model.quantity(systems.FLOAT, found.given, name, node))
+    node = Node(phi, result.cycle.switch(result.cycle.piece_before(phi)))
+    return float(result.model.quantity(systems.FLOAT, result.given, name, node))
 
 
-def rms(found, name):
+def rms(result, name):
     """Return the root of a quantity's mean square over the turn, by Gauss's rule on every piece in parts of 15 deg."""
     at, weights = np.polynomial.legendre.leggauss(12)
     pieces, u, widths = [], [], []
-    for piece, width in enumerate(np.diff(found.cycle.starts)):
+    for piece, width in enumerate(np.diff(result.cycle.starts)):
         parts = math.ceil(width / math.radians(15))
         for part in range(parts):
             pieces += [piece] * len(at)
             u += list((part + (at + 1) / 2) / parts)
             widths += list(weights * width / parts)
-    values = found.at(name, np.array(pieces), np.array(u))
+    values = result.at(name, np.array(pieces), np.array(u))
     return math.sqrt(np.dot(widths, values**2) / np.sum(widths))
 
 
-def read(found, case, quantity):
+def read(result, case, quantity):
     """Return what a row of the reference is of, and how closely it is told."""
     called = quantity.replace("F_", "force_").replace("moment_A", "moment")
     if called == "phi_fdc":
-        return math.degrees(found.given.values["beta"]), 1e-12
+        return math.degrees(result.given.values["beta"]), 1e-12
     if called == "M3_fdc":
-        return found.single("M3_fdc"), 1e-12
+        return result.single("M3_fdc"), 1e-12
     if called == "peak_torque":
-        return found.peak(called), 1e-12
-    name, _, what = called.partition(" ")
-    if what == "peak":
-        return found.peak(name), 1e-11 if case == "shaft torsion" else 1e-12
-    if what == "peak angle":  # the reference's own search ends within 2e-8 of a top, and steps between corners
-        return math.degrees(found.angle(found.extremes(name)[0])) % 360, 5e-7
-    if what == "rms":
-        return rms(found, name), 1e-9 if case == "shaft torsion" else 1e-11
-    assert what == "at FDC"
-    return just_before(found, name, found.given.values["beta"]), 1e-12
+        return result.peak(called), 1e-12
+    name, _, subject = called.partition(" ")
+    if subject == "peak":
+        return result.peak(name), 1e-11 if case == "shaft torsion" else 1e-12
+    if subject == "peak angle":  # the reference's own search ends within 2e-8 of a top, and steps between corners
+        return math.degrees(result.angle(result.extremes(name)[0])) % 360, 5e-7
+    if subject == "rms":
+        return rms(result, name), 1e-9 if case == "shaft torsion" else 1e-11
+    assert subject == "at FDC"
+    return just_before(result, name, result.given.values["beta"]), 1e-12
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_forces_are_those_of_the_reference(case):
-    found, told = sampler(case), [row for row in REFERENCE if row["case"] == case]
-    size = max(abs(float(row["value"])) for row in told if row["unit"] == "N")
+    result, report = sampler(case), [row for row in REFERENCE if row["case"] == case]
+    size = max(abs(float(row["value"])) for row in report if row["unit"] == "N")
     checked = set()
-    for row in told:
+    for row in report:
         if row["quantity"] == "energy per turn of Md":
             continue
-        value, close = read(found, case, row["quantity"])
+        value, close = read(result, case, row["quantity"])
         # The reference took the speed's own motion to 1e-11.
         close = max(close, 1e-11) if case == "speed fluctuation" else close
         assert value == pytest.approx(float(row["value"]), rel=close, abs=close * size / 100), row["quantity"]
@@ -139,7 +139,7 @@ def test_the_weight_of_the_rocker_is_in_the_reed_torque():
     bare = sampler_of(lo.load("beatup").with_effect("gravity", "rocker_inertia"))
     whole = sampler_of(lo.load("beatup").with_effect("gravity", "rocker_inertia").update(ROCKER))
     phi = np.linspace(0.0, 2 * math.pi, 91)[:-1]
-    read = [np.array([whole_at.terms()["gravity"] for whole_at in instants(each, phi)]) for each in (bare, whole)]
+    read = [np.array([whole_at.terms()["gravity"] for whole_at in instants(item, phi)]) for item in (bare, whole)]
     psi = plain.motion(bare.given.values, phi)[0]
     tilt = bare.given.values["gravity.tilt"]
     assert read[1] - read[0] == pytest.approx(-6 * plain.G * 0.0775 * np.cos(psi + tilt), rel=1e-12, abs=1e-12)
@@ -150,9 +150,9 @@ def sampler_of(scene):
     return job.sampler(scene, job.today(scene))
 
 
-def instants(found, phi):
+def instants(result, phi):
     return [
-        found.model.instant(systems.FLOAT, found.given, Node(float(each), node_switch(found, each))) for each in phi
+        result.model.instant(systems.FLOAT, result.given, Node(float(item), node_switch(result, item))) for item in phi
     ]
 
 
@@ -166,9 +166,9 @@ def test_what_the_cloth_s_reach_changes_is_the_force_in_D_alone():
     reach = 0.62 / (56.8 * 0.045)
     scene = lo.load("beatup").with_effect("joint_forces").set("effects.resistance.reach", f"{reach!r} m")
     answer = lo.solve(scene.update({"bounds.m4e": "0 kg", "targets.balance.indifference": "0"}))
-    found = registry.find("beatup").sampler(scene, answer.design)
+    second_sampler = registry.find("beatup").sampler(scene, answer.design)
     assert answer.figures["M3_fdc"] == pytest.approx(0.0, abs=1e-9)
-    assert just_before(found, "force_D", found.given.values["beta"]) == pytest.approx(0.0, abs=1e-8)
+    assert just_before(second_sampler, "force_D", second_sampler.given.values["beta"]) == pytest.approx(0.0, abs=1e-8)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, -1.1])
@@ -186,14 +186,14 @@ def test_the_cloth_pushes_across_the_line_from_D_to_where_it_meets_the_reed(angl
 
 def newton_euler(case, phi):
     """Return A, B, C, D, each N in x and y, and the crank torque, by each link's equilibrium in one 9 × 9 matrix."""
-    scene, found = scene_of(case), sampler(case)
-    values, own = found.given.values, {name: table.model_dump() for name, table in scene.effects.items()}
+    scene, result = scene_of(case), sampler(case)
+    values, parameters = result.given.values, {name: table.model_dump() for name, table in scene.effects.items()}
     design = {name: values[name] for name in plain.DESIGN}
     omega, change = values["speed"], 0.0
-    if "speed_fluctuation" in own:
-        pose = found.model.instant(systems.numpy(), found.given, Node(np.array([phi]), node_switch(found, phi))).pose
+    if "speed_fluctuation" in parameters:
+        pose = result.model.instant(systems.numpy(), result.given, Node(np.array([phi]), node_switch(result, phi))).pose
         omega, change = float(pose.omega[0]), float(pose.omega_dot[0])
-    psi, psi_1, psi_2, rod, rod_1, rod_2 = (float(each) for each in plain.motion(design, np.array(phi)))
+    psi, psi_1, psi_2, rod, rod_1, rod_2 = (float(item) for item in plain.motion(design, np.array(phi)))
     spin = psi_2 * omega**2 + psi_1 * change
     matrix, right = np.zeros((9, 9)), np.zeros(9)
 
@@ -214,54 +214,57 @@ def newton_euler(case, phi):
     matrix[2, 8] = 1
     moment, offset = values["m4"] * values["r4"] - design["m4e"] * design["r4e"], 0.0
     weight = 0j
-    if "gravity" in own:
-        offset, down = own["gravity"]["offset"], -1j * np.exp(-1j * own["gravity"]["tilt"])
+    if "gravity" in parameters:
+        offset, down = parameters["gravity"]["offset"], -1j * np.exp(-1j * parameters["gravity"]["tilt"])
         weight = plain.G * (values["m4"] + design["m4e"]) * down
         out = np.exp(1j * (psi + offset))
         loaded(2, weight, (np.conj(out * moment) * plain.G * down).imag)
-    inertia = own["inertia"]["J4"] + design["m4e"] * design["r4e"] ** 2
-    inertia += own.get("counterweight_inertia", {}).get("JS", 0.0)
+    inertia = parameters["inertia"]["J4"] + design["m4e"] * design["r4e"] ** 2
+    inertia += parameters.get("counterweight_inertia", {}).get("JS", 0.0)
     swung = (1j * spin - (psi_1 * omega) ** 2) * np.exp(1j * psi)
     loaded(2, -moment * swung * np.exp(1j * offset), -inertia * spin)
-    if "rocker_inertia" in own:
-        rocker = own["rocker_inertia"]
+    if "rocker_inertia" in parameters:
+        rocker = parameters["rocker_inertia"]
         loaded(2, -(rocker["m3"] or 0.0) * (rocker["s3"] or 0.0) * swung, -rocker["J3"] * spin)
-        if "gravity" in own and rocker["m3"]:
+        if "gravity" in parameters and rocker["m3"]:
             push = rocker["m3"] * plain.G * down
             loaded(2, push, (np.conj(rocker["s3"] * np.exp(1j * psi)) * push).imag)
-    if "bearing_friction" in own:
-        friction = own["bearing_friction"]
+    if "bearing_friction" in parameters:
+        friction = parameters["bearing_friction"]
         loaded(2, 0j, -friction["coulomb"] * np.sign(psi_1) - friction["viscous"] * psi_1 * omega)
-    if "resistance" in own:
-        away, pulse = phi - values["beta"], own["resistance"]["pulse"]
+    if "resistance" in parameters:
+        away, pulse = phi - values["beta"], parameters["resistance"]["pulse"]
         push = values["M0"] * np.cos(np.pi * away / pulse) if abs(away) <= pulse / 2 else 0.0
-        reach = own["resistance"]["reach"]
+        reach = parameters["resistance"]["reach"]
         loaded(2, push / reach * 1j * np.exp(1j * psi) if reach else 0j, push)
-    if "rod_inertia" in own:
-        mass, s2 = own["rod_inertia"]["m2"], own["rod_inertia"]["s2"] * design["l2"] / scene.mechanism["l2"]
-        lumped = own["rod_inertia"]["model"] == "lumped"
-        about = mass * s2 * (design["l2"] - s2) if lumped else own["rod_inertia"]["JS2"]
+    if "rod_inertia" in parameters:
+        mass, s2 = (
+            parameters["rod_inertia"]["m2"],
+            parameters["rod_inertia"]["s2"] * design["l2"] / scene.mechanism["l2"],
+        )
+        lumped = parameters["rod_inertia"]["model"] == "lumped"
+        about = mass * s2 * (design["l2"] - s2) if lumped else parameters["rod_inertia"]["JS2"]
         turned = rod_2 * omega**2 + rod_1 * change
         centre = s2 * np.exp(1j * rod)
         carried = (1j * change - omega**2) * crank
         acceleration = carried + (1j * turned - (rod_1 * omega) ** 2) * centre
         force = -mass * acceleration
         loaded(1, force, -about * turned + (np.conj(centre) * force).imag)
-        if "gravity" in own:
+        if "gravity" in parameters:
             push = mass * plain.G * down
             loaded(1, push, (np.conj(centre) * push).imag)
     if "crank.mass" in values:
         own_mass, place = values["crank.mass"], values["crank.centre"] / design["l1"] * crank
         # Its inertia about A is part of the flywheel's.
         loaded(0, -own_mass * (1j * change - omega**2) * place, 0.0)
-        if "gravity" in own:
+        if "gravity" in parameters:
             push = own_mass * plain.G * down
             loaded(0, push, (np.conj(place) * push).imag)
     return np.linalg.solve(matrix, right)
 
 
-def node_switch(found, phi):
-    return found.cycle.switch(found.cycle.place(phi)[0])
+def node_switch(result, phi):
+    return result.cycle.switch(result.cycle.place(phi)[0])
 
 
 ANGLES = (0.3, 1.05, 1.2, 2.6, 3.9, 5.5)
@@ -269,24 +272,24 @@ ANGLES = (0.3, 1.05, 1.2, 2.6, 3.9, 5.5)
 
 @pytest.mark.parametrize("case", [case for case in EVERY if case != "shaft torsion"])
 def test_every_link_is_in_equilibrium(case):
-    found = sampler(case)
-    size = found.peak("force_D")
+    second_sampler = sampler(case)
+    size = second_sampler.peak("force_D")
     for phi in ANGLES:
-        pieces, u = (np.array([each]) for each in found.cycle.place(phi))
-        read = found.together([f"{joint}_{axis}" for joint in JOINTS for axis in "xy"], pieces, u)
-        torque = found.at("peak_torque", pieces, u)
+        pieces, u = (np.array([item]) for item in second_sampler.cycle.place(phi))
+        read = second_sampler.together([f"{joint}_{axis}" for joint in JOINTS for axis in "xy"], pieces, u)
+        torque = second_sampler.at("peak_torque", pieces, u)
         expected = newton_euler(case, phi)
         assert [float(value[0]) for value in read.values()] == pytest.approx(expected[:8], rel=1e-11, abs=1e-12 * size)
         # Crank and rod as well: what the crank must be given is what power says.
-        assert float(torque[0]) == pytest.approx(expected[8], rel=1e-11, abs=1e-12 * found.peak("peak_torque"))
+        assert float(torque[0]) == pytest.approx(expected[8], rel=1e-11, abs=1e-12 * second_sampler.peak("peak_torque"))
 
 
 @pytest.mark.parametrize("case", EVERY)
 def test_torque_from_the_crank_pin_is_the_power_balance(case):
-    found = sampler(case)
-    pieces, u = found.grid(1440)
-    x, y, torque = found.together(["force_B_x", "force_B_y", "peak_torque"], pieces, u).values()
-    phi, values = found.cycle.angles(pieces, u), found.given.values
+    second_sampler = sampler(case)
+    pieces, u = second_sampler.grid(1440)
+    x, y, torque = second_sampler.together(["force_B_x", "force_B_y", "peak_torque"], pieces, u).values()
+    phi, values = second_sampler.cycle.angles(pieces, u), second_sampler.given.values
     lever = values["l1"] * (np.cos(phi) * y - np.sin(phi) * x)
     if "crank.mass" in values and "gravity.tilt" in values:
         lever = lever + plain.G * values["crank.mass"] * values["crank.centre"] * np.cos(phi + values["gravity.tilt"])
@@ -296,30 +299,30 @@ def test_torque_from_the_crank_pin_is_the_power_balance(case):
 @pytest.mark.parametrize("case", EVERY)
 def test_action_is_reaction_on_the_whole_machine(case):
     """Frame, masses, weight and cloth hold the mechanism as a whole: nothing else acts on it."""
-    found, scene = sampler(case), scene_of(case)
-    pieces, u = found.grid(720)
+    result, scene = sampler(case), scene_of(case)
+    pieces, u = result.grid(720)
     names = [f"{name}_{axis}" for name in ("force_A", "force_D", "shaking_force") for axis in "xy"]
-    read = found.together(names, pieces, u)
+    read = result.together(names, pieces, u)
     total = sum(read[f"{name}_x"] + 1j * read[f"{name}_y"] for name in ("force_A", "force_D", "shaking_force"))
-    values, own = found.given.values, scene.effects
-    if "gravity" in own:
+    values, parameters = result.given.values, scene.effects
+    if "gravity" in parameters:
         weighed = ("m4", "m4e", "rod_inertia.m2", "rocker_inertia.m3", "crank.mass")
         mass = sum(values.get(name, 0.0) for name in weighed)
-        total += plain.G * mass * -1j * np.exp(-1j * own["gravity"].tilt)
-    if "resistance" in own and own["resistance"].reach:
-        at = found.model.instant(systems.numpy(), found.given, found.node(pieces, u))
-        total += at.terms()["resistance"] / own["resistance"].reach * 1j * np.exp(-1j * at.pose.q)
-    assert np.max(np.abs(total)) <= 1e-12 * found.peak("force_D")
+        total += plain.G * mass * -1j * np.exp(-1j * parameters["gravity"].tilt)
+    if "resistance" in parameters and parameters["resistance"].reach:
+        at = result.model.instant(systems.numpy(), result.given, result.node(pieces, u))
+        total += at.terms()["resistance"] / parameters["resistance"].reach * 1j * np.exp(-1j * at.pose.q)
+    assert np.max(np.abs(total)) <= 1e-12 * result.peak("force_D")
 
 
 @pytest.mark.parametrize("case", ["today", "optimum", "today, all effects", "rocker"])
 def test_the_mean_shaking_force_over_a_turn_is_zero(case):
     """Of an analytic periodic function the mean of even samples is right to rounding."""
-    found = sampler(case)
+    second_sampler = sampler(case)
     phi = np.linspace(0.0, 2 * math.pi, 128, endpoint=False)
     for axis in "xy":
-        values = found.at_angles(f"shaking_force_{axis}", phi)
-        assert abs(np.mean(values)) <= 1e-13 * found.peak("shaking_force")
+        values = second_sampler.at_angles(f"shaking_force_{axis}", phi)
+        assert abs(np.mean(values)) <= 1e-13 * second_sampler.peak("shaking_force")
 
 
 MP = mpmath.MPContext()
@@ -339,12 +342,18 @@ def swing(lengths, phi):
 @pytest.mark.parametrize("phi", [0.9, 1.9, 4.4])
 def test_forces_are_what_longer_links_would_work(phi):
     """Virtual work with the links' lengths as coordinates: the crank stands, only the rocker is loaded."""
-    found = sampler("today")
-    pieces, u = (np.array([each]) for each in found.cycle.place(phi))
-    read = {name: float(found.at(name, pieces, u)[0]) for joint in JOINTS for name in (f"{joint}_x", f"{joint}_y")}
+    second_sampler = sampler("today")
+    pieces, u = (np.array([item]) for item in second_sampler.cycle.place(phi))
+    read = {
+        name: float(second_sampler.at(name, pieces, u)[0]) for joint in JOINTS for name in (f"{joint}_x", f"{joint}_y")
+    }
     C, D = (MP.mpc(read[f"force_{joint}_x"], read[f"force_{joint}_y"]) for joint in "CD")
-    couple = float(found.model.instant(systems.FLOAT, found.given, Node(phi, node_switch(found, phi))).force)
-    lengths = [MP.mpf(found.given.values[name]) for name in plain.LENGTHS]
+    couple = float(
+        second_sampler.model.instant(
+            systems.FLOAT, second_sampler.given, Node(phi, node_switch(second_sampler, phi))
+        ).force
+    )
+    lengths = [MP.mpf(second_sampler.given.values[name]) for name in plain.LENGTHS]
     at, step = MP.mpf(phi), MP.mpf(10) ** -20
 
     def turned(k):
@@ -358,7 +367,7 @@ def test_forces_are_what_longer_links_would_work(phi):
     for force, direction, rate in ((C, crank, rates[0]), (C, rod, rates[1]), (-C, rocker, rates[2])):
         along = (force * MP.conj(direction)).real
         assert float(along) == pytest.approx(float(-couple * rate), rel=1e-10)
-    mass = float(found.at("shaking_force_x", pieces, u)[0])
+    mass = float(second_sampler.at("shaking_force_x", pieces, u)[0])
     assert float(D.real) == pytest.approx(float(-couple * rates[3]) - mass, rel=1e-10)
 
 
@@ -376,10 +385,10 @@ def test_forces_at_front_dead_centre_in_60_digits():
     C = couple * rod / (rod.real * rocker.imag - rod.imag * rocker.real)
     mass = -1j * spin * MP.mpf("56.8") * MP.mpf("0.045") * rocker / l3
     D = -C - mass
-    found = sampler("today")
+    second_sampler = sampler("today")
     for joint, force in (("force_C", C), ("force_D", D)):
         for axis, value in (("x", force.real), ("y", force.imag)):
-            read = just_before(found, f"{joint}_{axis}", found.given.values["beta"])
+            read = just_before(second_sampler, f"{joint}_{axis}", second_sampler.given.values["beta"])
             assert read == pytest.approx(float(value), abs=2e-9)
     assert (float(C.real), float(C.imag)) == pytest.approx((26.795263186, 59.971396825), abs=5e-10)
     assert (float(D.real), float(D.imag)) == pytest.approx((-1740.212849582, -2559.032481894), abs=5e-10)
@@ -388,11 +397,11 @@ def test_forces_at_front_dead_centre_in_60_digits():
 @pytest.mark.parametrize("name", ["jets", "casadi", "mpmath", "balls"])
 @pytest.mark.parametrize("case", ["today, all effects", "shaft torsion", "reach"])
 def test_the_same_forces_in_every_number_system(name, case):
-    found, system = sampler(case), getattr(systems, name)()
-    reading, piece = found.read(system), found.cycle.place(2.0)[0]
-    switch = {key: float(value) for key, value in found.cycle.switch(piece).items()}
+    result, system = sampler(case), getattr(systems, name)()
+    reading, piece = result.read(system), result.cycle.place(2.0)[0]
+    switch = {key: float(value) for key, value in result.cycle.switch(piece).items()}
     for quantity in NAMES:
-        plain_value = float(found.model.quantity(systems.FLOAT, found.given, quantity, Node(2.0, switch)))
+        plain_value = float(result.model.quantity(systems.FLOAT, result.given, quantity, Node(2.0, switch)))
         value = float(reading.quantity(quantity, system.number(2.0), switch))
         assert value == pytest.approx(plain_value, rel=1e-11)
 
@@ -415,7 +424,7 @@ def test_a_limit_on_a_force_binds_is_priced_and_proven(name, most):
     assert price.worth["peak_torque"] == pytest.approx((tighter - looser) / 2, rel=1e-4)
     proofs = lo.prove(scene, answer)
     assert proofs.passed
-    assert {name, "peak force_A", "peak force_D", "peak shaking_moment"} <= {each.limit for each in proofs.proofs}
+    assert {name, "peak force_A", "peak force_D", "peak shaking_moment"} <= {proof.limit for proof in proofs.proofs}
 
 
 def test_the_optimum_s_own_forces():
@@ -443,11 +452,11 @@ def test_without_its_numbers_a_force_is_undefined_and_says_why():
     for name in ("m4", "r4"):
         del document["mechanism"][name]
     bare = lo.scene(document)
-    found = lo.evaluate(bare)
-    assert found.figures["force_C"] == pytest.approx(sampler("today").peak("force_C"), rel=1e-14)
+    evaluation = lo.evaluate(bare)
+    assert evaluation.figures["force_C"] == pytest.approx(sampler("today").peak("force_C"), rel=1e-14)
     for name in ("force_D", "shaking_force", "shaking_moment"):
-        assert found.figures[name] is None
-        assert found.as_dict()["undefined"][name] == f"{name} needs mechanism.m4 and mechanism.r4"
+        assert evaluation.figures[name] is None
+        assert evaluation.as_dict()["undefined"][name] == f"{name} needs mechanism.m4 and mechanism.r4"
     assert set(lo.evaluate(scene).as_dict()["undefined"]) == {"friction_loss"}
     with pytest.raises(BadInput, match=r"limits.force_D: force_D needs mechanism.m4 and mechanism.r4"):
         lo.solve(bare.set("limits.force_D.max", "3 kN"))
@@ -463,15 +472,15 @@ def test_a_crank_that_is_not_balanced_loads_the_crank_shaft_alone():
     scene = lo.load("beatup").with_effect("joint_forces")
     heavy = scene.update({"mechanism.crank": {"mass": "2 kg", "centre": "12 mm"}})
     job = registry.find("beatup")
-    one, other = (job.sampler(each, job.today(each)) for each in (scene, heavy))
-    pieces, u = one.grid(90)
-    phi, own = one.cycle.angles(pieces, u), 2 * 0.012 * scene.operation["speed"] ** 2
+    first, other = (job.sampler(item, job.today(item)) for item in (scene, heavy))
+    pieces, u = first.grid(90)
+    phi, values = first.cycle.angles(pieces, u), 2 * 0.012 * scene.operation["speed"] ** 2
     for joint, sign in (("force_A", -1), ("force_B", 0), ("force_C", 0), ("force_D", 0), ("shaking_force", 1)):
         for axis, direction in (("x", np.cos(phi)), ("y", np.sin(phi))):
             name = f"{joint}_{axis}"
-            change = other.at(name, pieces, u) - one.at(name, pieces, u)
-            assert change == pytest.approx(sign * own * direction, abs=1e-9)
-    assert other.peak("shaking_moment") == pytest.approx(one.peak("shaking_moment"), rel=1e-14)
+            change = other.at(name, pieces, u) - first.at(name, pieces, u)
+            assert change == pytest.approx(sign * values * direction, abs=1e-9)
+    assert other.peak("shaking_moment") == pytest.approx(first.peak("shaking_moment"), rel=1e-14)
     freed = heavy.update({"bounds.crank.mass": {"min": "1 kg", "max": "2 kg"}})
     assert lo.evaluate(freed).design["crank.mass"] == 2.0
     with pytest.raises(BadInput, match=r"mechanism.crank.*centre"):
@@ -490,12 +499,12 @@ def test_a_crank_that_is_not_balanced_loads_the_crank_shaft_alone():
 )
 def test_no_load_and_no_mass_are_numbers(off, keys, zero):
     scene = scene_of("today").without_effect(*off) if off else scene_of("today")
-    found = lo.evaluate(scene.update(keys) if keys else scene)
-    figures = found.figures
+    evaluation = lo.evaluate(scene.update(keys) if keys else scene)
+    figures = evaluation.figures
     for name in NAMES:
         # The reed's inertia stands in the effect's own table.
         if name == "shaking_moment" and "inertia" in off:
-            assert found.undefined[name] == "shaking_moment needs effects.inertia.J4"
+            assert evaluation.undefined[name] == "shaking_moment needs effects.inertia.J4"
             assert figures[name] is None
         else:
             assert math.isfinite(figures[name])
@@ -507,16 +516,17 @@ def test_a_scene_without_the_effect_has_none_of_it():
     job = registry.find("beatup")
     before, after = (job.model(scene) for scene in (plain_scene, with_it))
     assert not [name for name in before._quantities if name.startswith(("force_", "shaking"))]
-    one, other = (Sampler(each, job.numbers(plain_scene)) for each in (before, after))
-    assert one.peak("peak_torque") == other.peak("peak_torque")
+    first, other = (Sampler(item, job.numbers(plain_scene)) for item in (before, after))
+    assert first.peak("peak_torque") == other.peak("peak_torque")
     assert lo.solve(plain_scene).figures["peak_torque"] == lo.solve(with_it).figures["peak_torque"]
 
 
 def test_where_the_cloth_pushes_is_asked_for_in_a_remark():
     views, scene = registry.find("beatup").views, scene_of("today")
-    told = views.remarks(scene, {})
+    report = views.remarks(scene, {})
     assert (
-        len([text for text in told if text.startswith("force_D contains the resistance of the cloth as a couple")]) == 1
+        len([text for text in report if text.startswith("force_D contains the resistance of the cloth as a couple")])
+        == 1
     )
     assert not views.remarks(scene_of("reach"), {})
     assert not views.remarks(scene_of("no cloth"), {})

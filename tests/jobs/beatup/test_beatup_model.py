@@ -111,13 +111,13 @@ def test_an_effect_may_read_joints_at_front_dead_centre():
     given = model.given(systems.FLOAT, JOB.numbers(rod))
     without = JOB.model(rod).given(systems.FLOAT, JOB.numbers(rod))
     stills = JOB.sampler(rod, {}).stills
-    found = model.static(systems.FLOAT, given, stills, ("M3_fdc",))["M3_fdc"]
+    result = model.static(systems.FLOAT, given, stills, ("M3_fdc",))["M3_fdc"]
     reed = JOB.model(rod).static(systems.FLOAT, without, stills, ("M3_fdc",))["M3_fdc"]
     joints = crank_rocker.front_pose(systems.FLOAT, shared_linkage(given).lengths, shared_linkage(given).centres)
-    own, l1 = given.tables["rod_inertia"], BEATUP.mechanism["l1"]
-    turn = (own["m2"] * own["s2"] ** 2 + own["JS2"]) * joints.rod_1 * joints.rod_2
-    swing = own["m2"] * l1 * own["s2"] * joints.rod_2 * joints.cos_crank_rod
-    assert found - reed == pytest.approx((turn + swing) * (20 * math.pi) ** 2, rel=1e-9)
+    values, l1 = given.tables["rod_inertia"], BEATUP.mechanism["l1"]
+    turn = (values["m2"] * values["s2"] ** 2 + values["JS2"]) * joints.rod_1 * joints.rod_2
+    swing = values["m2"] * l1 * values["s2"] * joints.rod_2 * joints.cos_crank_rod
+    assert result - reed == pytest.approx((turn + swing) * (20 * math.pi) ** 2, rel=1e-9)
 
 
 def test_events_of_the_motion_are_both_dead_centres():
@@ -129,17 +129,17 @@ def test_events_of_the_motion_are_both_dead_centres():
 
 
 def test_static_figures_are_their_formulas():
-    found = figures(FULL, DESIGN)
+    second_figures = figures(FULL, DESIGN)
     s = 3.0 * 0.07**2
     JS = FULL.effect_table(counterweight_inertia.Parameters).JS
-    assert found["J4"] == pytest.approx(0.62 + s + JS, rel=1e-15)
-    assert found["r4"] == pytest.approx((56.8 * 0.045 - 3.0 * 0.07) / 59.8, rel=1e-15)
+    assert second_figures["J4"] == pytest.approx(0.62 + s + JS, rel=1e-15)
+    assert second_figures["r4"] == pytest.approx((56.8 * 0.045 - 3.0 * 0.07) / 59.8, rel=1e-15)
     centres = shared_linkage(JOB.sampler(FULL, DESIGN).given).centres
-    assert found["alpha_fdc"] == pytest.approx(centres.psi_2_front * (20 * math.pi) ** 2, rel=1e-14)
-    assert [found[name] for name in ("swing", "theta", "beta")] == [centres.swing, centres.theta, centres.beta]
+    assert second_figures["alpha_fdc"] == pytest.approx(centres.psi_2_front * (20 * math.pi) ** 2, rel=1e-14)
+    assert [second_figures[name] for name in ("swing", "theta", "beta")] == [centres.swing, centres.theta, centres.beta]
     widths = {"l1": 5, "l2": 25, "l3": 30, "l4": 17, "m4e": 12.4, "r4e": 80}
     moved = {"l1": -0.5, "l2": 18, "l3": -5, "l4": -1, "m4e": 3.0, "r4e": 70}
-    assert found["change"] == pytest.approx(sum((moved[x] / widths[x]) ** 2 for x in widths), rel=1e-12)
+    assert second_figures["change"] == pytest.approx(sum((moved[x] / widths[x]) ** 2 for x in widths), rel=1e-12)
 
 
 def test_the_counterweights_own_inertia_counts_only_with_its_effect():
@@ -177,39 +177,39 @@ def test_an_assembly_row_is_zero_where_the_triangle_closes_with_the_margin_only(
 def test_s_may_stand_for_the_counterweight():
     """Solved in s = m4e r4e², the model gives the same torque as from m4e and r4e."""
     values = JOB.numbers(BEATUP) | DESIGN
-    found, node = JOB.model(BEATUP), Node(2.0, {"resistance": 0})
-    by_mass = found.given(systems.FLOAT, values)
-    by_s = found.given(systems.FLOAT, {k: v for k, v in values.items() if k != "m4e"} | {"s": 3.0 * 0.07**2})
+    result, node = JOB.model(BEATUP), Node(2.0, {"resistance": 0})
+    by_mass = result.given(systems.FLOAT, values)
+    by_s = result.given(systems.FLOAT, {k: v for k, v in values.items() if k != "m4e"} | {"s": 3.0 * 0.07**2})
     for name in ("peak_torque", "M3_square"):
-        assert found.quantity(systems.FLOAT, by_s, name, node) == pytest.approx(
-            found.quantity(systems.FLOAT, by_mass, name, node), rel=1e-15
+        assert result.quantity(systems.FLOAT, by_s, name, node) == pytest.approx(
+            result.quantity(systems.FLOAT, by_mass, name, node), rel=1e-15
         )
     symbols = {name: ca.SX.sym(name) for name in values if name != "m4e"} | {"s": ca.SX.sym("s")}
-    given = found.given(systems.casadi(), symbols)
+    given = result.given(systems.casadi(), symbols)
     pressed = Node(ca.SX.sym("phi"), PRESSED)
-    read = {x.name() for x in ca.symvar(found.quantity(systems.casadi(), given, "peak_torque", pressed))}
+    read = {x.name() for x in ca.symvar(result.quantity(systems.casadi(), given, "peak_torque", pressed))}
     assert "s" in read
     assert not read & {"m4e", "r4e", "m4", "r4"}
 
 
 def test_figures_without_their_numbers_are_undefined_not_invented():
     bare = BEATUP.without_effect("inertia").set("mechanism", {f"l{k}": f"{x} mm" for k, x in DIMENSIONS.items()})
-    found = figures(bare.set("operation", {"M0": "745 N*m"}))
-    assert {name for name, value in found.items() if value is None} == {
+    second_figures = figures(bare.set("operation", {"M0": "745 N*m"}))
+    assert {name for name, value in second_figures.items() if value is None} == {
         *("alpha_fdc", "J4", "r4", "peak_power", "reed_centrifugal", "shaking_force"),
         *("fluctuation", "speed_fdc", "no_load_speed", "motor_torque_max"),
         *("shaft_peak", "twist_peak", "reed_front"),
         *("force_A", "force_B", "force_C", "force_D", "shaking_moment", "friction_loss"),
     }
-    assert found["M3_fdc"] == 745.0
-    assert all(math.isfinite(value) for value in found.values() if value is not None)
+    assert second_figures["M3_fdc"] == 745.0
+    assert all(math.isfinite(value) for value in second_figures.values() if value is not None)
 
 
 DIMENSIONS = {1: 31, 2: 65, 3: 155, 4: 167}
 
 
 def test_the_mean_over_the_pulse_exists_with_the_pulse_only():
-    assert [each.name for each in JOB.model(BEATUP).integrals] == ["pulse_mean_square"]
+    assert [integral.name for integral in JOB.model(BEATUP).integrals] == ["pulse_mean_square"]
     assert JOB.model(BEATUP.without_effect("resistance")).integrals == ()
     assert figures(BEATUP.without_effect("resistance"))["pulse_rms"] is None
 
@@ -223,9 +223,9 @@ def test_the_key_tells_structures_apart_and_numbers_not():
 
 
 def test_a_model_is_plain_unchangeable_data():
-    found = JOB.model(FULL)
-    assert type(found) is JobModel
+    model = JOB.model(FULL)
+    assert type(model) is JobModel
     with pytest.raises(dataclasses.FrozenInstanceError):
-        found.effects = ()  # type: ignore[misc]
-    assert [load.name for load in found.loads] == [name for name in FULL.effects if name != "centrifugal"]
-    assert found.quantities == ("peak_torque", "peak_power", "reed_centrifugal", "shaking_force")
+        model.effects = ()  # type: ignore[misc]
+    assert [load.name for load in model.loads] == [name for name in FULL.effects if name != "centrifugal"]
+    assert model.quantities == ("peak_torque", "peak_power", "reed_centrifugal", "shaking_force")

@@ -27,14 +27,14 @@ def named(program):
 
 
 def test_where_the_mass_matters_only_by_its_inertia_that_is_the_variable():
-    found = JOB.program(BEATUP, "balance")
-    assert list(named(found)) == [*LENGTHS, "r4e", "s"]
-    inertia = named(found)["s"]
+    program = JOB.program(BEATUP, "balance")
+    assert list(named(program)) == [*LENGTHS, "r4e", "s"]
+    inertia = named(program)["s"]
     assert (inertia.lower, inertia.upper, inertia.range) == (-math.inf, math.inf, (0.0, pytest.approx(ROOM)))
-    assert limits(found, "m4e") == [(-1, 0.0, "s", RatioLimit), (1, 12.4, "s", RatioLimit)]
-    assert [limit.reads for limit in found.limits if limit.name == "m4e"] == [("s", "r4e_square")] * 2
-    assert not {"m4e", *LENGTHS} & set(found.parameters)
-    assert [limit.relaxable for limit in found.limits if limit.name == "m4e"] == [False, True]
+    assert limits(program, "m4e") == [(-1, 0.0, "s", RatioLimit), (1, 12.4, "s", RatioLimit)]
+    assert [limit.reads for limit in program.limits if limit.name == "m4e"] == [("s", "r4e_square")] * 2
+    assert not {"m4e", *LENGTHS} & set(program.parameters)
+    assert [limit.relaxable for limit in program.limits if limit.name == "m4e"] == [False, True]
 
 
 @pytest.mark.parametrize(
@@ -68,8 +68,8 @@ def test_where_mass_or_radius_matters_by_itself_both_are_variables(scene, target
 )
 def test_axes_that_read_neither_mass_nor_radius_leave_them_to_their_product(scene, axes, both):
     """So that of equally good designs the one with the least added mass is taken, as by every target."""
-    found, _ = JOB.traded(scene, None, dict.fromkeys(axes, "least"))
-    assert ("s" in named(found), "m4e" in named(found)) == (not both, both)
+    result, _ = JOB.traded(scene, None, dict.fromkeys(axes, "least"))
+    assert ("s" in named(result), "m4e" in named(result)) == (not both, both)
 
 
 def test_a_check_that_nothing_limits_leaves_the_variables_alone():
@@ -78,7 +78,10 @@ def test_a_check_that_nothing_limits_leaves_the_variables_alone():
 
 def test_objectives_are_the_targets_levels():
     def levels(target):
-        return [(each.figure, each.row, type(each), each.power) for each in JOB.program(BEATUP, target).objectives]
+        return [
+            (objective.figure, objective.row, type(objective), objective.power)
+            for objective in JOB.program(BEATUP, target).objectives
+        ]
 
     peak = ("peak_torque", "peak_torque", Peak, 1)
     assert levels("balance") == [("M3_fdc", "M3_fdc", Magnitude, 1), peak]
@@ -97,22 +100,22 @@ def test_what_a_target_demands_of_the_reed_torque():
 
 
 def test_the_least_transmission_angle_is_two_rows_and_margins_never_give_way():
-    found = JOB.program(BEATUP, "balance")
+    program = JOB.program(BEATUP, "balance")
     angle = pytest.approx(math.radians(56.5))
-    assert limits(found, "mu_min") == [(-1, angle, "mu_near", DesignLimit), (-1, angle, "mu_far", DesignLimit)]
-    margins = [limit for limit in found.limits if limit.name.startswith("assembly: ")]
+    assert limits(program, "mu_min") == [(-1, angle, "mu_near", DesignLimit), (-1, angle, "mu_far", DesignLimit)]
+    margins = [limit for limit in program.limits if limit.name.startswith("assembly: ")]
     assert [(limit.sign, limit.value, limit.relaxable) for limit in margins] == [(-1, 0.0, False)] * 3
-    assert all(limit.relaxable for limit in found.limits if limit.name == "mu_min")
+    assert all(limit.relaxable for limit in program.limits if limit.name == "mu_min")
 
 
 def test_a_freed_number_of_an_effect_is_a_variable_under_its_label():
     free = BEATUP.set("bounds.J4", {"min": "0.5 kg*m^2", "max": "0.7 kg*m^2"})
-    found = JOB.program(free, "balance")
-    assert named(found)["inertia.J4"] == Variable("inertia.J4", 0.5, 0.7, 0.7, (0.5, 0.7), "J4")
-    assert limits(found, "J4") == [(-1, 0.5, "inertia.J4", BoundLimit), (1, 0.7, "inertia.J4", BoundLimit)]
-    assert "inertia.J4" not in found.parameters
-    held = JOB.program(free.set("bounds.J4.free", False), "balance")
-    assert (named(held)["inertia.J4"].lower, named(held)["inertia.J4"].upper) == (0.62, 0.62)
+    program = JOB.program(free, "balance")
+    assert named(program)["inertia.J4"] == Variable("inertia.J4", 0.5, 0.7, 0.7, (0.5, 0.7), "J4")
+    assert limits(program, "J4") == [(-1, 0.5, "inertia.J4", BoundLimit), (1, 0.7, "inertia.J4", BoundLimit)]
+    assert "inertia.J4" not in program.parameters
+    second_program = JOB.program(free.set("bounds.J4.free", False), "balance")
+    assert (named(second_program)["inertia.J4"].lower, named(second_program)["inertia.J4"].upper) == (0.62, 0.62)
 
 
 def test_the_retrofits_norm_weighs_free_variables_by_their_bounds():
@@ -135,16 +138,16 @@ def test_starts_use_part_of_the_counterweight_and_never_none_alone():
 
 
 def test_moves_are_data_the_counterweights_first():
-    found = JOB.program(BEATUP, "balance").moves
-    assert [(move.name, move.along, type(move)) for move in found] == [
+    result = JOB.program(BEATUP, "balance").moves
+    assert [(move.name, move.along, type(move)) for move in result] == [
         ("counterweight", ("r4e",), AxisMove),
         ("scale", LENGTHS, ScaleMove),
     ]
-    used, none = found[0].wishes
+    used, none = result[0].wishes
     assert used == Preference("most", "least added mass, so the largest radius", "s", used.above)
     assert used.above == pytest.approx(NO_MASS * ROOM)
     assert none == Preference("today", "no mass, so the radius nearest today's")
-    assert found[1].today == {name: BEATUP.mechanism[name] for name in LENGTHS}
+    assert result[1].today == {name: BEATUP.mechanism[name] for name in LENGTHS}
     assert [move.name for move in JOB.program(BEATUP.set("bounds.r4e", "70 mm"), "balance").moves] == ["scale"]
 
 
@@ -171,10 +174,10 @@ def test_a_limit_on_what_nothing_gives_is_named():
 
 
 def test_programs_of_other_numbers_have_one_structure():
-    one, other = (JOB.program(scene, "balance") for scene in (BEATUP, BEATUP.set("operation.M0", "800 N*m")))
-    assert one.structure == other.structure
-    assert one.structure != JOB.program(BEATUP, "torque").structure
-    assert one.structure != JOB.program(BEATUP.with_effect("rocker_inertia"), "balance").structure
-    assert isinstance(one, Program)
-    assert all(isinstance(each, Limit) and each.scale > 0 for each in one.limits)
-    assert all(isinstance(each, Objective) and each.scale > 0 for each in one.objectives)
+    first, other = (JOB.program(scene, "balance") for scene in (BEATUP, BEATUP.set("operation.M0", "800 N*m")))
+    assert first.structure == other.structure
+    assert first.structure != JOB.program(BEATUP, "torque").structure
+    assert first.structure != JOB.program(BEATUP.with_effect("rocker_inertia"), "balance").structure
+    assert isinstance(first, Program)
+    assert all(isinstance(item, Limit) and item.scale > 0 for item in first.limits)
+    assert all(isinstance(item, Objective) and item.scale > 0 for item in first.objectives)

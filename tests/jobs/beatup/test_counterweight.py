@@ -22,14 +22,14 @@ def test_bounds_that_can_be_built_stay_as_they_are():
 
 @pytest.mark.parametrize("bounds", [{"r4e": (0.0, 100.0)}, {"m4e": (0.0, 1e8)}, {"m4e": (0.0, 1e8), "r4e": (0.0, 1e3)}])
 def test_of_generous_bounds_what_is_of_use_is_left(bounds):
-    found = counterweight_room(TODAY, {**BUILT, **bounds}, 0.62)
-    assert found["m4e"][1] * found["r4e"][1] ** 2 <= AMPLE * 0.62 * (1 + 1e-12)
-    assert found["r4e"][1] <= LONG * 0.167
-    assert all(0.0 < found[name][1] <= {**BUILT, **bounds}[name][1] for name in found)
+    result = counterweight_room(TODAY, {**BUILT, **bounds}, 0.62)
+    assert result["m4e"][1] * result["r4e"][1] ** 2 <= AMPLE * 0.62 * (1 + 1e-12)
+    assert result["r4e"][1] <= LONG * 0.167
+    assert all(0.0 < result[name][1] <= {**BUILT, **bounds}[name][1] for name in result)
 
 
 def test_todays_own_counterweight_and_least_bounds_are_always_within():
     heavy = {"m4e": 500.0, "r4e": 2.0, "l4": 0.167}
-    found = counterweight_room(heavy, {"m4e": (3.0, 1e8), "r4e": (0.1, 100.0)}, 0.62)
-    assert found["m4e"] == (3.0, 500.0)
-    assert found["r4e"] == (0.1, 2.0)
+    result = counterweight_room(heavy, {"m4e": (3.0, 1e8), "r4e": (0.1, 100.0)}, 0.62)
+    assert result["m4e"] == (3.0, 500.0)
+    assert result["r4e"] == (0.1, 2.0)

@@ -40,10 +40,10 @@ def designs(draw):
     beta = draw(st.floats(math.radians(10), math.radians(85)))
     size = draw(st.sampled_from([1e-3, 0.167, 1.0, 1e3]))
     try:
-        found = crank_rocker_synthesis.synthesise(theta, beta, swing, size)
+        answer = crank_rocker_synthesis.synthesise(theta, beta, swing, size)
     except ValueError:
         return PAPER
-    return {"l1": found.l1, "l2": found.l2, "l3": found.l3, "l4": found.l4}
+    return {"l1": answer.l1, "l2": answer.l2, "l3": answer.l3, "l4": answer.l4}
 
 
 @pytest.mark.few(1)
@@ -129,8 +129,8 @@ def test_a_drawing_scales_with_its_machine():
     small, big = (crank_rocker_drawing.linkage(design, "t") for design in (PAPER, large))
     assert big.height == pytest.approx(1000 * small.height)
     for layer in ("frame", "front dead centre", "rear dead centre", "dimensions", "notes"):
-        for one, other in zip(links(small, layer), links(big, layer), strict=True):
-            assert np.array(other) == pytest.approx(1000 * np.array(one), rel=1e-12, abs=1e-12)
+        for item, other in zip(links(small, layer), links(big, layer), strict=True):
+            assert np.array(other) == pytest.approx(1000 * np.array(item), rel=1e-12, abs=1e-12)
 
 
 def test_every_layer_drawn_on_has_a_style():
@@ -148,8 +148,8 @@ def test_joints_are_written_in_mm_with_every_digit():
     at = {row["joint"]: (float(row["x [mm]"]), float(row["y [mm]"])) for row in rows}
     assert list(at) == ["A", "D", "B", "C", "B'", "C'"]
     for b, c in (("B", "C"), ("B'", "C'")):
-        found = [math.dist(at["A"], at[b]), math.dist(at[b], at[c]), math.dist(at["D"], at[c])]
-        assert found == pytest.approx([31, 65, 155], rel=1e-13)
+        results = [math.dist(at["A"], at[b]), math.dist(at[b], at[c]), math.dist(at["D"], at[c])]
+        assert results == pytest.approx([31, 65, 155], rel=1e-13)
 
 
 def test_control_characters_are_taken_out_of_text():
@@ -158,25 +158,25 @@ def test_control_characters_are_taken_out_of_text():
 
 def arms(design):
     """Return mass and arm from D, m, of each centre of mass, in both dead centres: along and across the rocker."""
-    found = crank_rocker_drawing.of(design).skeleton
-    for joints in found.joints.values():
-        d, c = np.array(found.pivots["D"]), np.array(joints["C"])
+    result = crank_rocker_drawing.of(design).skeleton
+    for joints in result.joints.values():
+        d, c = np.array(result.pivots["D"]), np.array(joints["C"])
         along = (c - d) / np.hypot(*(c - d))
-        for name, own in found.masses.items():
+        for name, masse in result.masses.items():
             arm = np.array(joints[name]) - d
-            yield own.mass, float(arm @ along), float(arm[1] * along[0] - arm[0] * along[1])
+            yield masse.mass, float(arm @ along), float(arm[1] * along[0] - arm[0] * along[1])
 
 
 def test_the_counterweight_lies_opposite_the_reed_so_that_their_moment_is_that_of_the_figures():
     scene = lo.load("beatup")
     eccentricity = lo.evaluate(scene, {"m4e": 3.0, "r4e": 0.05}).figures["r4"]
-    found = list(arms(BALANCED))
-    assert [mass for mass, *_ in found] == [56.8, 3.0] * 2
-    assert [along for _, along, _ in found] == pytest.approx([0.045, -0.05] * 2, rel=1e-12)
-    for centre in (found[:2], found[2:]):
+    result = list(arms(BALANCED))
+    assert [mass for mass, *_ in result] == [56.8, 3.0] * 2
+    assert [along for _, along, _ in result] == pytest.approx([0.045, -0.05] * 2, rel=1e-12)
+    for centre in (result[:2], result[2:]):
         moment = sum(mass * along for mass, along, _ in centre)
         assert moment == pytest.approx((56.8 + 3.0) * eccentricity, rel=1e-12)
-    assert all(abs(across) < 1e-15 for *_, across in found)
+    assert all(abs(across) < 1e-15 for *_, across in result)
 
 
 def test_the_centres_of_mass_stand_off_the_rocker_by_the_offset_of_the_effect_that_has_one():

@@ -77,16 +77,16 @@ def test_every_random_start_reaches_the_same_design(answers, M0, count, monkeypa
     reached = []
     for start in drawn:
         monkeypatch.setattr(exchange, "starts", lambda *_, only=start: [only])
-        found = lo.solve(scene, starts=1)
-        if found.figures["peak_torque"] == pytest.approx(BEST[M0][1], rel=1e-7):
-            reached.append(found)
+        result = lo.solve(scene, starts=1)
+        if result.figures["peak_torque"] == pytest.approx(BEST[M0][1], rel=1e-7):
+            reached.append(result)
     record_property("share of random starts that reach the best", len(reached) / count)
     assert len(reached) == count
-    for found in reached:
-        assert found.status == "optimal"
+    for result in reached:
+        assert result.status == "optimal"
         for name in DESIGN:
             width = scene.bounds[name].max - scene.bounds[name].min
-            assert found.design[name] == pytest.approx(wanted.design[name], rel=0, abs=1e-7 * width), name
+            assert result.design[name] == pytest.approx(wanted.design[name], rel=0, abs=1e-7 * width), name
 
 
 @pytest.mark.slow

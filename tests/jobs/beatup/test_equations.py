@@ -44,9 +44,9 @@ def model(*names, rod="exact"):
     return beatup.model(tuple(BEATUP[name] for name in names), options, frozenset(NUMBERS), RESISTED)
 
 
-def words(found):
+def words(result):
     """Return every name that stands in the texts."""
-    return set(re.findall(r"[A-Za-z]\w*", " ".join(equation.text for equation in found)))
+    return set(re.findall(r"[A-Za-z]\w*", " ".join(equation.text for equation in result)))
 
 
 def numbers(given, pose, phi):
@@ -56,9 +56,9 @@ def numbers(given, pose, phi):
     named |= {"psi'": pose.joints.psi_1, "psi''": pose.joints.psi_2, "gamma": math.atan2(rod.y, rod.x)}
     named |= {"gamma'": pose.joints.rod_1, "gamma''": pose.joints.rod_2, "beta": given.values["beta"]}
     named |= {"beta_r": given.values["beta_r"], "l2_today": NUMBERS["today.l2"]} | NUMBERS
-    for own in OWN.values():
+    for entry in OWN.values():
         named |= {
-            {"pulse": "delta", "offset": "chi", "coulomb": "T_c", "viscous": "c"}.get(k, k): v for k, v in own.items()
+            {"pulse": "delta", "offset": "chi", "coulomb": "T_c", "viscous": "c"}.get(k, k): v for k, v in entry.items()
         }
     return named
 
@@ -68,31 +68,37 @@ def value(expression, named):
     return float(expression.subs(exact).evalf(30))
 
 
-def setting(found, phi):
+def setting(result, phi):
     """Return the scene's numbers, the pose and the switches at a crank angle, by plain floats."""
-    on = {effect.name for effect in found.effects}
-    own_numbers = ((name, key, number) for name, own in OWN.items() if name in on for key, number in own.items())
+    on = {effect.name for effect in result.effects}
+    own_numbers = (
+        (name, key, number) for name, parameters in OWN.items() if name in on for key, number in parameters.items()
+    )
     values = NUMBERS | {f"{name}.{key}": number for name, key, number in own_numbers}
-    given = found.given(FLOAT, values)
-    split = found.split(FLOAT, given)
+    given = result.given(FLOAT, values)
+    split = result.split(FLOAT, given)
     switches = split.switch(split.place(phi)[0])
-    return given, found.kinematics.pose(FLOAT, given, Node(phi, switches)), switches
+    return given, result.kinematics.pose(FLOAT, given, Node(phi, switches)), switches
 
 
 @pytest.mark.parametrize("rod", ["lumped", "exact"])
 @pytest.mark.parametrize("phi", [0.3, 1.0, 1.15, 1.3, 2.0, 4.0, 4.5, 6.0])
 @pytest.mark.few(3)
 def test_printed_terms_are_the_balance(rod, phi):
-    found = model(*OWN, rod=rod)
-    given, pose, switches = setting(found, phi)
-    named, symbolic = numbers(given, pose, phi), beatup_equations.terms(found)
-    for load, term in balance.terms(FLOAT, found.loads, pose, given, switches):
+    second_model = model(*OWN, rod=rod)
+    given, pose, switches = setting(second_model, phi)
+    named, symbolic = numbers(given, pose, phi), beatup_equations.terms(second_model)
+    for load, term in balance.terms(FLOAT, second_model.loads, pose, given, switches):
         assert value(symbolic[load.name], named) == pytest.approx(term, rel=1e-12, abs=1e-12)
-    output = sum(symbolic[load.name] for load in found.loads if load.acts == "output")
-    drive = sum(symbolic[load.name] for load in found.loads if load.acts == "drive")
-    arguments = (FLOAT, found.loads, pose, given, switches)
+    output = sum(symbolic[load.name] for load in second_model.loads if load.acts == "output")
+    drive = sum(symbolic[load.name] for load in second_model.loads if load.acts == "drive")
+    arguments = (FLOAT, second_model.loads, pose, given, switches)
     assert value(output, named) == pytest.approx(balance.output_force(*arguments), rel=1e-12)
-    (within,) = (each.form[0][2] for each in beatup_equations.equations(found) if "M_gravity_drive =" in each.text)
+    (within,) = (
+        equation.form[0][2]
+        for equation in beatup_equations.equations(second_model)
+        if "M_gravity_drive =" in equation.text
+    )
     torque = output * sp.Symbol("q'", real=True) + drive + within
     assert value(torque, named) == pytest.approx(balance.crank_torque(*arguments), rel=1e-12)
 
@@ -111,10 +117,10 @@ def read(text):
 @pytest.mark.parametrize("name", ["loop closure", "rates", "second rates"])
 @pytest.mark.parametrize("phi", [0.3, 2.0, 5.0])
 def test_printed_geometry_holds_for_the_mechanism(name, phi):
-    found = model("inertia")
-    given, pose, _ = setting(found, phi)
+    second_model = model("inertia")
+    given, pose, _ = setting(second_model, phi)
     named = {plain(k): v for k, v in numbers(given, pose, phi).items()}
-    chosen = [equation.text for equation in beatup_equations.equations(found) if equation.name == name]
+    chosen = [equation.text for equation in beatup_equations.equations(second_model) if equation.name == name]
     assert len(chosen) == 2
     for text in chosen:
         left, right = (read(side) for side in text.split(" = "))
@@ -123,29 +129,29 @@ def test_printed_geometry_holds_for_the_mechanism(name, phi):
 
 
 def test_printed_dead_centres_are_the_mechanisms():
-    found = model("inertia")
-    given, pose, _ = setting(found, 1.0)
+    second_model = model("inertia")
+    given, pose, _ = setting(second_model, 1.0)
     named = numbers(given, pose, 1.0)
     expected = {"beta": given.values["beta"], "beta_r": given.values["beta_r"]}
     expected["psi''_FDC"] = beatup.shared_linkage(given).centres.psi_2_front
-    shown = dict(equation.text.split(" = ") for equation in beatup_equations.equations(found))
+    shown = dict(equation.text.split(" = ") for equation in beatup_equations.equations(second_model))
     for name, number in expected.items():
         assert value(read(shown[name]), named) == pytest.approx(number, rel=1e-13)
 
 
 def test_the_output_is_minus_psi():
-    found = model("inertia")
-    _, pose, _ = setting(found, 1.0)
-    assert "q = -psi" in [equation.text for equation in beatup_equations.equations(found)]
+    second_model = model("inertia")
+    _, pose, _ = setting(second_model, 1.0)
+    assert "q = -psi" in [equation.text for equation in beatup_equations.equations(second_model)]
     assert pose.q == -pose.joints.psi
 
 
 def test_printed_checks_are_the_effects():
-    found = model("inertia", "centrifugal")
-    given, pose, _ = setting(found, 2.0)
+    second_model = model("inertia", "centrifugal")
+    given, pose, _ = setting(second_model, 2.0)
     named = {plain(k): v for k, v in numbers(given, pose, 2.0).items()}
-    shown = dict(equation.text.split(" = ") for equation in beatup_equations.equations(found))
-    for check in found.checks:
+    shown = dict(equation.text.split(" = ") for equation in beatup_equations.equations(second_model))
+    for check in second_model.checks:
         for name, quantity in check.quantities.items():
             number = quantity(given.inputs(FLOAT, check, pose))
             assert value(read(shown[name]), named) == pytest.approx(number, rel=1e-12)
@@ -153,19 +159,23 @@ def test_printed_checks_are_the_effects():
 
 def test_printed_forces_in_joints_are_the_effects():
     """Each line is read back with the values of those above it."""
-    found = model("inertia", "gravity", "rod_inertia", "centrifugal", "joint_forces")
-    given, pose, switches = setting(found, 2.0)
+    second_model = model("inertia", "gravity", "rod_inertia", "centrifugal", "joint_forces")
+    given, pose, switches = setting(second_model, 2.0)
     named = {plain(k): v for k, v in numbers(given, pose, 2.0).items()} | {"chi": 0.1, "l4": NUMBERS["l4"]}
-    at = found.instant(FLOAT, given, Node(2.0, switches))
+    at = second_model.instant(FLOAT, given, Node(2.0, switches))
     named["M3"] = at.force
-    lines = [each.text for each in beatup_equations.equations(found) if each.name in ("centrifugal", "joint_forces")]
-    told = [tuple(line.split(" = ")) for line in lines]
-    assert len({name for name, _ in told}) == len(told)
-    for name, right in told:
+    lines = [
+        equation.text
+        for equation in beatup_equations.equations(second_model)
+        if equation.name in ("centrifugal", "joint_forces")
+    ]
+    texts = [tuple(line.split(" = ")) for line in lines]
+    assert len({name for name, _ in texts}) == len(texts)
+    for name, right in texts:
         named[name] = value(read(right), named)
-        if name in found.check_figures:
-            assert named[name] == pytest.approx(found.formula(name)(at), rel=1e-12)
-    assert {name for name, _ in told if name in found.check_figures} == found.check_figures.keys() - {
+        if name in second_model.check_figures:
+            assert named[name] == pytest.approx(second_model.formula(name)(at), rel=1e-12)
+    assert {name for name, _ in texts if name in second_model.check_figures} == second_model.check_figures.keys() - {
         *(f"force_{joint}" for joint in "ABCD"),
         "shaking_force",
     }
@@ -174,13 +184,13 @@ def test_printed_forces_in_joints_are_the_effects():
 @pytest.mark.parametrize("absent", [set(pair) for n in (1, 2) for pair in itertools.combinations(SYMBOLS, n)])
 def test_an_absent_effect_leaves_no_symbol_and_a_present_one_its_term(absent):
     present = [name for name in SYMBOLS if name not in absent]
-    found = beatup_equations.equations(model(*present))
-    kept = {"beta", "r4e", "m4e"}.union(*(SYMBOLS[name] for name in present))
-    forbidden = set().union(*(SYMBOLS[name] | {f"M_{name}"} for name in absent)) - kept
-    assert not words(found) & forbidden
-    assert {equation.name for equation in found} & SYMBOLS.keys() == set(present)
+    equations = beatup_equations.equations(model(*present))
+    remaining = {"beta", "r4e", "m4e"}.union(*(SYMBOLS[name] for name in present))
+    forbidden = set().union(*(SYMBOLS[name] | {f"M_{name}"} for name in absent)) - remaining
+    assert not words(equations) & forbidden
+    assert {equation.name for equation in equations} & SYMBOLS.keys() == set(present)
     for name in present:
-        assert SYMBOLS[name] | {f"M_{name}"} <= words(found)
+        assert SYMBOLS[name] | {f"M_{name}"} <= words(equations)
 
 
 def test_a_scene_without_counterweight_terms_does_not_print_them():
@@ -197,8 +207,8 @@ def test_a_scene_without_counterweight_terms_does_not_print_them():
     ],
 )
 def test_balance_and_crank_torque_list_what_is_on(names, lines):
-    found = beatup_equations.equations(model(*names))
-    shown = {equation.text for equation in found if equation.name in ("balance", "crank torque")}
+    equations = beatup_equations.equations(model(*names))
+    shown = {equation.text for equation in equations if equation.name in ("balance", "crank torque")}
     assert shown == lines
 
 
@@ -213,8 +223,8 @@ def test_a_term_with_corners_says_where_each_formula_holds():
 
 
 def test_all_effects_together_stay_short_and_their_symbols_apart():
-    found = beatup_equations.equations(model(*BEATUP))
-    assert sum(len(equation.name) + len(equation.text) + 2 for equation in found) < 5600
+    equations = beatup_equations.equations(model(*BEATUP))
+    assert sum(len(equation.name) + len(equation.text) + 2 for equation in equations) < 5600
     keys = [key for effect in BEATUP.values() for key in effect.table.model_fields if key != "model"]
     assert len(keys) == len(set(keys))
 
@@ -238,23 +248,23 @@ def test_latex_names_symbols_the_way_papers_do():
 def test_the_cranks_own_equation_of_motion_is_written_and_holds():
     """Read back and put together, the printed equations close at the solved speed, to rounding."""
     scene = registry.load("beatup").with_effect("speed_fluctuation")
-    found = registry.of(scene).views.equations(scene)
-    lines = [equation.text for equation in found if equation.name == "speed_fluctuation"]
+    equations = registry.of(scene).views.equations(scene)
+    lines = [equation.text for equation in equations if equation.name == "speed_fluctuation"]
     assert lines == [
         "M_motor = M_rated*(no_load_speed - omega)/(slip*speed)",
         "M_motor = J_f*omega_dot + Md",
         "omega_dot = omega*omega'",
     ]
-    (mean,) = [equation for equation in found if equation.name == "mean speed"]
+    (mean,) = [equation for equation in equations if equation.name == "mean speed"]
     assert mean.text == "Integral(1/omega(phi), (phi, 0, 2*pi)) = 2*pi/speed"
-    assert r"\dot{\omega}" in " ".join(equation.latex for equation in found)
+    assert r"\dot{\omega}" in " ".join(equation.latex for equation in equations)
     sampler = registry.of(scene).sampler(scene, {})
     node = Node(2.0, sampler.cycle.switch(sampler.cycle.place(2.0)[0]))
     pose = sampler.model.instant(FLOAT, sampler.given, node).pose
     named = {"omega": pose.omega, "omega_dot": pose.omega_dot, "q_1": pose.q1, "q_2": pose.q2, "J_f": 2.0, "slip": 0.08}
     named |= {"M_rated": 35.0, "no_load_speed": sampler.static["no_load_speed"], "speed": SPEED}
     named |= {"J4": 0.62, "m4e": 0.0, "r4e": 0.0, "M_resistance": 0.0}
-    shown = [tuple(equation.text.split(" = ")) for equation in found]
+    shown = [tuple(equation.text.split(" = ")) for equation in equations]
     for left in ("M_inertia", "M3", "Md"):
         (right,) = [right for name, right in shown if name == left]
         named[left] = value(read(right), named)

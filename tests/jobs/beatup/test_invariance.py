@@ -43,8 +43,8 @@ def in_units(length, mass="kg", angle="deg", speed="rpm"):
         match = re.fullmatch(r"(-?[\d.e+-]+) (mm|kg|deg|rpm)", text)
         if not match:
             return text
-        own, wanted, table = factors[match[2]]
-        return f"{float(match[1]) * (table[wanted] / table[own])!r} {wanted}"
+        values, wanted, table = factors[match[2]]
+        return f"{float(match[1]) * (table[wanted] / table[values])!r} {wanted}"
 
     return change
 
@@ -58,14 +58,14 @@ def known(answer):
     return {name: value for name, value in answer.figures.items() if value is not None}
 
 
-def same(one, other, rel=1e-9, scale=None):
+def same(first, other, rel=1e-9, scale=None):
     """Assert that two answers agree in status, design and figures; scale: what each length is multiplied by."""
-    assert one.status == other.status == "optimal"
-    for name, value in one.design.items():
+    assert first.status == other.status == "optimal"
+    for name, value in first.design.items():
         assert other.design[name] == pytest.approx(value * (scale or {}).get(name, 1.0), rel=rel, abs=1e-12), name
-    for name, value in known(one).items():
+    for name, value in known(first).items():
         assert known(other)[name] == pytest.approx(value * (scale or {}).get(name, 1.0), rel=rel, abs=1e-7), name
-    assert [price.limit for price in one.binding] == [price.limit for price in other.binding]
+    assert [price.limit for price in first.binding] == [price.limit for price in other.binding]
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -107,12 +107,12 @@ def test_a_machine_of_another_size_has_the_same_angles_and_torques(M0, factor):
 def test_torques_scale_with_the_square_of_the_speed(k, M0):
     scene = lo.load("beatup").set("operation.M0", f"{M0} N*m")
     faster = scene.update({"operation.speed": f"{600 * k!r} rpm", "operation.M0": f"{M0 * k**2!r} N*m"})
-    one, other = lo.solve(scene, starts=1), lo.solve(faster, starts=1)
-    assert one.status == other.status == "optimal"
-    for name, value in one.design.items():
+    first, other = lo.solve(scene, starts=1), lo.solve(faster, starts=1)
+    assert first.status == other.status == "optimal"
+    for name, value in first.design.items():
         assert other.design[name] == pytest.approx(value, rel=1e-9, abs=1e-12), name
     for name in ("M3_fdc", "peak_torque", "pulse_rms", "alpha_fdc"):
-        assert other.figures[name] == pytest.approx(k**2 * one.figures[name], rel=1e-9, abs=1e-7 * k**2), name
+        assert other.figures[name] == pytest.approx(k**2 * first.figures[name], rel=1e-9, abs=1e-7 * k**2), name
 
 
 def told(answer):
@@ -151,15 +151,15 @@ def reversed_tables(table):
 def test_the_order_in_which_a_scene_is_written_does_not_matter(target):
     scene = lo.load("beatup-heavy").with_effect("gravity").with_effect("rocker_inertia")
     turned = lo.scene(reversed_tables(plain(scene.document)))
-    one, other = lo.solve(scene, target, starts=1), lo.solve(turned, target, starts=1)
-    assert {price.limit for price in one.binding} == {price.limit for price in other.binding}
-    assert known(other) == pytest.approx(known(one), rel=1e-9, abs=1e-7)
+    first, other = lo.solve(scene, target, starts=1), lo.solve(turned, target, starts=1)
+    assert {price.limit for price in first.binding} == {price.limit for price in other.binding}
+    assert known(other) == pytest.approx(known(first), rel=1e-9, abs=1e-7)
 
 
 def test_what_is_off_does_not_matter():
     scene = lo.load("beatup")
     bare = lo.scene({name: table for name, table in plain(scene.document).items() if name != "available"})
-    ours, theirs = (lo.solve(one, starts=1).as_dict() | {"time": None, "scene": None} for one in (scene, bare))
+    ours, theirs = (lo.solve(item, starts=1).as_dict() | {"time": None, "scene": None} for item in (scene, bare))
     assert ours == theirs, "but for the scene itself, which is told"
 
 
@@ -184,7 +184,7 @@ def test_an_effect_of_nothing_is_as_good_as_none(effect):
     scene = lo.load("beatup")
     scene = scene.update({"mechanism.m4": "1e-9 kg"}) if effect == "gravity" else scene
     scene = scene.set("bounds.m4e", "0 kg") if effect == "gravity" else scene
-    one = lo.solve(scene, starts=1)
+    answer = lo.solve(scene, starts=1)
     other = lo.solve(scene.update({f"effects.{effect}.{key}": value for key, value in nothing.items()}), starts=1)
     assert other.status == "optimal"
-    assert other.figures["peak_torque"] == pytest.approx(one.figures["peak_torque"], rel=1e-8)
+    assert other.figures["peak_torque"] == pytest.approx(answer.figures["peak_torque"], rel=1e-8)

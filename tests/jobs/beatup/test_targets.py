@@ -47,9 +47,9 @@ def change(machine, weights=None):
 
 def best(values):
     """Return the least of what the starts found; SLSQP loses its way from some."""
-    found = [value for value in values if value is not None]
-    assert found
-    return min(found)
+    results = [value for value in values if value is not None]
+    assert results
+    return min(results)
 
 
 @pytest.mark.few(2)
@@ -86,8 +86,8 @@ def test_retrofit_is_the_best_slsqp_finds(weights, M0):
     squares, balanced = change(machine, weights), [lambda d: machine.static(d)["M3_fdc"] / 100]
     ends = [least(machine, squares, start, equal=balanced) for start in random_designs(machine, 8 * STARTS, 3)]
     # Where SLSQP ends beyond its limits, by as little as 1e-8, it is better than any machine by 1e-7.
-    kept = [end for end in ends if end and machine.excess(end) <= 1e-9 and abs(balanced[0](end)) <= 1e-9]
-    theirs = best([squares(end) for end in kept])
+    subset = [end for end in ends if end and machine.excess(end) <= 1e-9 and abs(balanced[0](end)) <= 1e-9]
+    theirs = best([squares(end) for end in subset])
     assert ours.status == "optimal"
     assert abs(machine.static(ours.design)["M3_fdc"]) <= 1e-9 * M0
     assert squares(ours.design) == pytest.approx(theirs, rel=1e-5)
@@ -96,13 +96,13 @@ def test_retrofit_is_the_best_slsqp_finds(weights, M0):
     assert machine.excess(ours.design) <= 1e-9
 
 
-@pytest.mark.parametrize("kept", ["l1", "l2", "l3", "l4"])
-def test_a_heavy_weight_keeps_a_length_as_it_is_today(kept):
+@pytest.mark.parametrize("remaining", ["l1", "l2", "l3", "l4"])
+def test_a_heavy_weight_keeps_a_length_as_it_is_today(remaining):
     scene = scene_of(745)
-    today, plain = scene.mechanism[kept], lo.solve(scene, "retrofit", starts=1).design[kept]
-    heavy = lo.solve(scene.set(f"targets.retrofit.weights.{kept}", 1e6), "retrofit", starts=1)
+    today, plain = scene.mechanism[remaining], lo.solve(scene, "retrofit", starts=1).design[remaining]
+    heavy = lo.solve(scene.set(f"targets.retrofit.weights.{remaining}", 1e6), "retrofit", starts=1)
     assert heavy.status == "optimal"
-    assert abs(heavy.design[kept] - today) <= 1e-4 * abs(plain - today)
+    assert abs(heavy.design[remaining] - today) <= 1e-4 * abs(plain - today)
     assert abs(heavy.figures["M3_fdc"]) <= 1e-9 * 745
     assert heavy.solver["error_estimate"] <= 1e-10, "Newton's method ends where slopes are steep too"
 
@@ -208,8 +208,8 @@ def test_worth_of_a_fixed_value_has_the_sign_of_its_side(key, value):
     scene, step = scene_of(745), STEP[key.split(".")[1]]
 
     def fixed(at):
-        held = f"{at!r} {unit}"
-        return lo.solve(scene.set(key, held if unit == "m" else {"min": held, "max": held}), starts=1)
+        constraint = f"{at!r} {unit}"
+        return lo.solve(scene.set(key, constraint if unit == "m" else {"min": constraint, "max": constraint}), starts=1)
 
     (price,) = [price for price in fixed(value).binding if price.limit == name]
     outward = step if price.side == "max" else -step

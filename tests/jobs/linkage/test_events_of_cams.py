@@ -47,17 +47,17 @@ def figures(**changes):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_top_without_a_far_dwell_is_where_the_rise_ends(law):
-    found = figures(parts={"sley": {"law": law}})
-    assert found["angle.front"] == pytest.approx(math.radians(65), abs=RIGHT)
-    assert found["moment.front"] == 300.0
+    second_figures = figures(parts={"sley": {"law": law}})
+    assert second_figures["angle.front"] == pytest.approx(math.radians(65), abs=RIGHT)
+    assert second_figures["moment.front"] == 300.0
 
 
 @pytest.mark.parametrize("begins", ["0 deg", "-65 deg", "300 deg", "-400 deg"])
 def test_the_top_is_told_within_one_turn(begins):
-    found = figures(parts={"sley": {"begins": begins}})
+    second_figures = figures(parts={"sley": {"begins": begins}})
     top = (float(begins.split()[0]) + 65) % 360
-    assert found["angle.front"] == pytest.approx(math.radians(top), abs=1e-13)
-    assert found["moment.front"] == 300.0
+    assert second_figures["angle.front"] == pytest.approx(math.radians(top), abs=1e-13)
+    assert second_figures["moment.front"] == 300.0
 
 
 @pytest.mark.parametrize(
@@ -78,26 +78,26 @@ def test_at_a_far_dwell_the_event_is_the_end_of_the_rise_or_the_begin_of_the_ret
     )
     assert lo.evaluate(scene).figures["angle.front"] == pytest.approx(math.radians(angle), abs=RIGHT)
     ends = "the rise of sley ends" if angle == 65 else "the return of sley begins"
-    told = registry.of(scene).views.remarks(scene, {})
-    assert f"front is where {ends}: the output rests from 65 deg to 105 deg" in told
+    report = registry.of(scene).views.remarks(scene, {})
+    assert f"front is where {ends}: the output rests from 65 deg to 105 deg" in report
 
 
 def test_the_lower_dwell_is_one_lowest_place():
-    found = figures(events={"front": {"extreme": "max"}, "rear": {"extreme": "min", "rest": "ends"}})
-    assert found["angle.rear"] == pytest.approx(0.0, abs=RIGHT)
-    assert found["swing"] == pytest.approx(math.radians(7), rel=1e-15)
-    found = figures(events={"rear": {"extreme": "min"}, "front": {"extreme": "max"}})
-    assert found["angle.rear"] == pytest.approx(math.radians(130), abs=RIGHT)
+    second_figures = figures(events={"front": {"extreme": "max"}, "rear": {"extreme": "min", "rest": "ends"}})
+    assert second_figures["angle.rear"] == pytest.approx(0.0, abs=RIGHT)
+    assert second_figures["swing"] == pytest.approx(math.radians(7), rel=1e-15)
+    second_figures = figures(events={"rear": {"extreme": "min"}, "front": {"extreme": "max"}})
+    assert second_figures["angle.rear"] == pytest.approx(math.radians(130), abs=RIGHT)
 
 
 def test_a_lever_on_a_cam_stands_highest_where_the_cam_does():
     document = hanging_parts.scene("cam", "dyad")
     low = document["output"]["angle"]
     assert low == "lever1"
-    found = lo.evaluate(
+    second_figures = lo.evaluate(
         lo.scene({**document, "events": {"up": {"extreme": "max"}, "down": {"extreme": "min"}}})
     ).figures
-    ends = {round(math.degrees(found[f"angle.{name}"]), 10) for name in ("up", "down")}
+    ends = {round(math.degrees(second_figures[f"angle.{name}"]), 10) for name in ("up", "down")}
     assert ends == {160.0, 320.0}
 
 

@@ -32,8 +32,8 @@ def named(tables, name):
 
 def raw(tables):
     """Return the raw tables of the four-bar with others in place of its own targets."""
-    own = {"targets": {"balance": {"least": ["peak_torque"]}, "torque": None}}
-    return changed(changed(FOUR_BAR, own), tables)
+    values = {"targets": {"balance": {"least": ["peak_torque"]}, "torque": None}}
+    return changed(changed(FOUR_BAR, values), tables)
 
 
 def document(tables):
@@ -43,9 +43,9 @@ def document(tables):
 
 @pytest.mark.parametrize("place", PLACES[:3] + PLACES[4:], ids=str)
 def test_a_scene_that_uses_the_former_name_is_the_scene_that_uses_the_name(place):
-    with pytest.warns(FormerNameWarning, match=r"force\.front is now moment\.front") as told:
+    with pytest.warns(FormerNameWarning, match=r"force\.front is now moment\.front") as report:
         former = registry.scene(raw(named(place, "force.front")))
-    assert len(told) == 1
+    assert len(report) == 1
     with warnings.catch_warnings():
         warnings.simplefilter("error", FormerNameWarning)
         now = registry.scene(raw(named(place, "moment.front")))
@@ -62,28 +62,28 @@ def test_most_of_a_former_name_is_refused_by_the_name():
 @pytest.mark.parametrize("place", NESTED, ids=str)
 def test_a_key_that_is_parted_at_its_dot_is_read_too(place):
     with pytest.warns(FormerNameWarning):
-        found = document(place)
+        result = document(place)
     (table,) = place
-    assert "force" not in found[table]
-    assert {f"moment.{event}" for event in place[table]["force"]} <= found[table].keys()
+    assert "force" not in result[table]
+    assert {f"moment.{event}" for event in place[table]["force"]} <= result[table].keys()
 
 
 @pytest.mark.parametrize("now", [{"moment.front": {"max": "2 kN*m"}}, {"moment": {"front": {"max": "2 kN*m"}}}])
 def test_both_names_at_once_are_refused(now):
-    with pytest.raises(BadInput, match="both are given") as told:
+    with pytest.raises(BadInput, match="both are given") as caught:
         registry.scene(raw({"limits": {"force.front": {"max": "1 kN*m"}, **now}}))
-    assert told.value.key == "limits.force.front"
+    assert caught.value.key == "limits.force.front"
 
 
 def test_what_a_call_sets_under_the_former_name_is_set_under_the_name():
     scene = four_bar(limits={"moment.front": {"min": "-1 N*m"}})
     with pytest.warns(FormerNameWarning):
-        found = scene.update({"limits.force.front.max": "1 kN*m", "limits.force.rear.max": "2 kN*m"})
-    assert found == scene.update({"limits.moment.front.max": "1 kN*m", "limits.moment.rear.max": "2 kN*m"})
-    assert (found.limits["moment.front"].min, found.limits["moment.front"].max) == (-1.0, 1000.0)
-    assert set(found.call.set) == {"limits.moment.front.max", "limits.moment.rear.max"}
+        second_scene = scene.update({"limits.force.front.max": "1 kN*m", "limits.force.rear.max": "2 kN*m"})
+    assert second_scene == scene.update({"limits.moment.front.max": "1 kN*m", "limits.moment.rear.max": "2 kN*m"})
+    assert (second_scene.limits["moment.front"].min, second_scene.limits["moment.front"].max) == (-1.0, 1000.0)
+    assert set(second_scene.call.set) == {"limits.moment.front.max", "limits.moment.rear.max"}
     with pytest.warns(FormerNameWarning):
-        assert "moment.rear" not in found.without_limit("force.rear", ["max"]).limits
+        assert "moment.rear" not in second_scene.without_limit("force.rear", ["max"]).limits
 
 
 def test_axes_and_ranges_of_a_front_and_keys_of_a_sweep_take_the_former_name():
@@ -92,8 +92,8 @@ def test_axes_and_ranges_of_a_front_and_keys_of_a_sweep_take_the_former_name():
         ranges = front.si(scene, {"force.front": "0:5 N*m"})
     assert ranges == {"force.front": (0.0, 5.0)}
     with pytest.warns(FormerNameWarning):
-        found = front.trade(scene, ("force.front", "mass"), "torque", minimise="force.front", ranges=ranges)
-    assert found.key == front.trade(scene, ("moment.front", "mass"), "torque", ranges={"moment.front": (0.0, 5.0)}).key
+        trade = front.trade(scene, ("force.front", "mass"), "torque", minimise="force.front", ranges=ranges)
+    assert trade.key == front.trade(scene, ("moment.front", "mass"), "torque", ranges={"moment.front": (0.0, 5.0)}).key
     with pytest.warns(FormerNameWarning):
         sweep = plan_sweep(scene, {"limits.force.front.max": ["1 N*m", "2 N*m"]}, "torque")
     assert [axis.key for axis in sweep.axes] == ["limits.moment.front.max"]
@@ -107,11 +107,11 @@ def test_the_command_line_remarks_once_upon_a_former_name(tmp_path, capsys):
     file.write_text(now.replace("moment.front", "force.front"), encoding="utf-8")
     for _ in range(2):
         assert run(["evaluate", str(file), "--set", "limits.force.front.max=9 kN*m", "--json"]) == 0
-        told = capsys.readouterr()
-        assert told.err.count("Remark: force.front is now moment.front; the old name goes in the next version.") == 1
-        found = json.loads(told.out)
-        assert found["units"]["moment.front"] == "N*m"
-        assert "moment.front" in [limit["name"] for limit in found["limits"]]
+        output = capsys.readouterr()
+        assert output.err.count("Remark: force.front is now moment.front; the old name goes in the next version.") == 1
+        data = json.loads(output.out)
+        assert data["units"]["moment.front"] == "N*m"
+        assert "moment.front" in [limit["name"] for limit in data["limits"]]
 
 
 def test_an_output_that_slides_keeps_its_force():

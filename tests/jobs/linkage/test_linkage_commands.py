@@ -23,8 +23,8 @@ SIX = lo.load("sixbar-sley")
 
 def test_limits_and_claims_are_proven_at_every_crank_angle():
     scene = four_bar()
-    found = lo.prove(scene, lo.solve(scene, starts=1))
-    proofs = {proof.limit: proof.status for proof in found.proofs}
+    second_proofs = lo.prove(scene, lo.solve(scene, starts=1))
+    proofs = {proof.limit: proof.status for proof in second_proofs.proofs}
     assert set(proofs.values()) == {"proven"}
     assert {"swing", "mu.beat", "beat: B to D < rod + rocker"} <= set(proofs)
 
@@ -39,8 +39,8 @@ def test_a_linkage_moves_as_rigid_links_about_pivots_that_stand_still(name):
     sliding = {part.word("through") for part in parts if part.kind == "slot"}
     rigid = [ends for ends in moving.links if not sliding & set(ends)]
     assert rigid
-    for one, other in rigid:
-        length = np.hypot(*(at[one] - at[other]).T)
+    for item, other in rigid:
+        length = np.hypot(*(at[item] - at[other]).T)
         np.testing.assert_allclose(length, length[0], rtol=1e-12)
     (crank,) = (part for part in parts if part.kind == "crank")
     arm = at[crank.word("pin")] - at[crank.word("at")]
@@ -78,19 +78,19 @@ def test_it_is_exported_as_csv_and_dxf(tmp_path):
 
 
 def test_its_equations_close_each_part_and_name_numbers_of_named_effects_apart():
-    told: dict[str, list[str]] = {}
-    for each in JOB.views.equations(SIX):
-        told.setdefault(each.name, []).append(each.text)
-    assert told["drive: loop closure"] == [
+    record: dict[str, list[str]] = {}
+    for equation in JOB.views.equations(SIX):
+        record.setdefault(equation.name, []).append(equation.text)
+    assert record["drive: loop closure"] == [
         "l1*cos(crank) + l2*cos(rod) = l3*cos(rocker) + l4",
         "l1*sin(crank) + l2*sin(rod) = l3*sin(rocker)",
     ]
-    assert told["output"] == ["q = sley"]
-    assert "mass_rod" in told["mass.rod"][0]
-    assert "mass*omega^2*q''*radius^2" in told["counterweight"][0]
-    assert "mass_link" in told["gravity"][0]
-    assert told["crank torque"] == ["Md = M_gravity + M_mass_link + M_mass_rocker + M_mass_rod + Q*q'"]
-    press = [each.text for each in JOB.views.equations(lo.load("knuckle-press"))]
+    assert record["output"] == ["q = sley"]
+    assert "mass_rod" in record["mass.rod"][0]
+    assert "mass*omega^2*q''*radius^2" in record["counterweight"][0]
+    assert "mass_link" in record["gravity"][0]
+    assert record["crank torque"] == ["Md = M_gravity + M_mass_link + M_mass_rocker + M_mass_rod + Q*q'"]
+    press = [equation.text for equation in JOB.views.equations(lo.load("knuckle-press"))]
     assert "lower*sin(strut) + upper*sin(arm) = -ram" in press
 
 
@@ -112,9 +112,9 @@ def test_a_front_holds_the_levels_before_what_is_traded():
 
 def test_what_is_sought_may_be_a_transmission_angle():
     scene = four_bar(targets={"open": {"most": ["mu.beat"]}})
-    found = lo.solve(scene, "open", starts=1)
-    assert found.status == "optimal"
-    assert found.figures["mu.beat"] > lo.evaluate(scene).figures["mu.beat"]
+    answer = lo.solve(scene, "open", starts=1)
+    assert answer.status == "optimal"
+    assert answer.figures["mu.beat"] > lo.evaluate(scene).figures["mu.beat"]
 
 
 @pytest.mark.slow
@@ -154,10 +154,10 @@ def rested(scene, end):
 def test_a_front_tells_how_long_a_rest_costs_how_much_torque():
     """The end of the rest is freed as an axis, and its most is sought, as a target of the scene does."""
     scene = with_a_rest()
-    found = lo.pareto(scene, ("peak_torque", "end"), target="torque", points=3)
-    assert "between the most end and the least peak_torque" in found.findings.message
-    assert all(row.certified for row in found.rows)
-    ends, torques = zip(*((row.design["end"], row.figures["peak_torque"]) for row in found.rows), strict=True)
+    second_front = lo.pareto(scene, ("peak_torque", "end"), target="torque", points=3)
+    assert "between the most end and the least peak_torque" in second_front.findings.message
+    assert all(row.certified for row in second_front.rows)
+    ends, torques = zip(*((row.design["end"], row.figures["peak_torque"]) for row in second_front.rows), strict=True)
     assert len(ends) >= 3
     assert torques[0] == pytest.approx(rested(scene, math.radians(175)), rel=1e-9), "the least of no rest"
     assert rested(scene, ends[0] + 1e-3) > torques[0] * (1 + 1e-3), "and the longest rest that costs nothing"

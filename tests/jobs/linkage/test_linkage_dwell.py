@@ -59,11 +59,11 @@ def test_an_event_may_be_an_extreme_of_another_link():
     angle = lo.evaluate(scene).figures["angle.turn"]
     sampler = registry.find("linkage").sampler(scene, {})
     for step in (-1e-4, 1e-4):
-        place, beside = (
+        place, neighbour = (
             linkage_of(sampler.model).at(FLOAT, sampler.given, phi).joints.vector("rocker")
             for phi in (angle, angle + step)
         )
-        turned = math.atan2(place.x * beside.y - place.y * beside.x, place.x * beside.x + place.y * beside.y)
+        turned = math.atan2(place.x * neighbour.y - place.y * neighbour.x, place.x * neighbour.x + place.y * neighbour.y)
         assert -1e-7 < turned < 0.0
 
 
@@ -80,11 +80,11 @@ def test_an_event_may_be_an_extreme_of_another_link():
     ],
 )
 def test_windows_and_events_that_mean_nothing_are_refused_in_one_line(changes, key, problem):
-    with pytest.raises(lo.BadInput) as told:
+    with pytest.raises(lo.BadInput) as caught:
         resting(SIX, **changes)
-    assert key in str(told.value)
-    assert problem in str(told.value)
-    assert "\n" not in str(told.value)
+    assert key in str(caught.value)
+    assert problem in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def plain_six(speed):

@@ -64,14 +64,14 @@ def in_folder(tmp_path, document, **tables):
 
     def text(value):
         if isinstance(value, dict):
-            return "{" + ", ".join(f'"{key}" = {text(each)}' for key, each in value.items()) + "}"
+            return "{" + ", ".join(f'"{key}" = {text(item)}' for key, item in value.items()) + "}"
         if isinstance(value, list):
             return "[" + ", ".join(map(text, value)) + "]"
         return (
             str(value).lower() if isinstance(value, bool) else f'"{value}"' if isinstance(value, str) else repr(value)
         )
 
-    (tmp_path / "scene.toml").write_text("\n".join(f"{key} = {text(each)}" for key, each in document.items()))
+    (tmp_path / "scene.toml").write_text("\n".join(f"{key} = {text(item)}" for key, item in document.items()))
     return lo.load(tmp_path / "scene.toml")
 
 
@@ -79,8 +79,8 @@ def test_a_resistance_may_be_a_table_about_its_event(tmp_path):
     rows = ["angle [deg],M [N*m],corner", *(",".join(map(str, row)) for row in FRONT_TABLE), "90,0,", "-90,0,"]
     document = changed(FOUR_BAR, {"effects": {"resistance": None}})
     document["effects"]["resistance"] = {"at": "front", "table": "cloth.csv"}
-    found = in_folder(tmp_path, document, cloth=rows)
-    assert JOB.figures(found, {})["moment.front"] == pytest.approx(
+    result = in_folder(tmp_path, document, cloth=rows)
+    assert JOB.figures(result, {})["moment.front"] == pytest.approx(
         JOB.figures(four_bar(), {})["moment.front"], abs=1e-9
     )
 
@@ -90,8 +90,8 @@ def test_a_load_on_a_joint_may_be_a_table_of_both_components(tmp_path):
     rows = ["angle [deg],x [N],y [N]", *(f"{a},{100 * math.cos(math.radians(a))},{-40}" for a in angles)]
     document = changed(FOUR_BAR, BARE)
     document["effects"]["load"] = {"C": {"table": "force.csv"}}
-    found = in_folder(tmp_path, document, force=rows)
-    sampler = JOB.sampler(found, {})
+    result = in_folder(tmp_path, document, force=rows)
+    sampler = JOB.sampler(result, {})
     for phi in (0.1, 1.0, 2.0, 5.5):
         node = Node(phi, sampler.cycle.switch(sampler.cycle.place(phi)[0]))
         at = sampler.model.instant(FLOAT, sampler.given, node)
@@ -107,6 +107,6 @@ def test_a_number_of_a_named_effect_is_bounded_in_full_and_found():
         effects={"mass": {"rod": {"mass": "2 kg", "along": "30 mm"}}},
         bounds={"mass.rod.mass": {"min": "1 kg", "max": "3 kg"}},
     )
-    found = lo.solve(scene, "torque", starts=1)
-    assert found.status == "optimal"
-    assert 1.0 - 1e-9 <= found.design["rod.mass"] <= 3.0 + 1e-9
+    answer = lo.solve(scene, "torque", starts=1)
+    assert answer.status == "optimal"
+    assert 1.0 - 1e-9 <= answer.design["rod.mass"] <= 3.0 + 1e-9

@@ -72,11 +72,11 @@ def test_prices_are_those_of_the_beat_up(M0):
 @pytest.mark.parametrize("design", [{}, {"l1": 0.032, "l2": 0.083, "l3": 0.149, "l4": 0.161}])
 def test_curves_are_those_of_the_beat_up(design):
     other = registry.find("linkage").sampler(four_bar(), design)
-    own = registry.find("beatup").sampler(BEATUP, design)
+    sampler = registry.find("beatup").sampler(BEATUP, design)
     phi = np.linspace(0.0, 2 * math.pi, 97)
-    for cycle_of, name in ((own, "peak_torque"), (other, "peak_torque")):
+    for cycle_of, name in ((sampler, "peak_torque"), (other, "peak_torque")):
         assert cycle_of.cycle.pieces == 2, name
-    torque, chained = (each.at("peak_torque", *each.cycle.located(phi)) for each in (own, other))
+    torque, chained = (item.at("peak_torque", *item.cycle.located(phi)) for item in (sampler, other))
     assert np.max(np.abs(torque - chained)) <= 1e-12 * np.max(np.abs(torque))
 
 

@@ -47,18 +47,18 @@ def sampler(scene):
     return job.sampler(scene, job.today(scene))
 
 
-def joints(found, at):
-    (check,) = [check for check in found.model.checks if check.joints]
+def joints(result, at):
+    (check,) = [check for check in result.model.checks if check.joints]
     return at.joints(check)
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_main_shaft_takes_what_power_says(name):
-    found = sampler(lo.load(name).with_effect("joint_forces"))
-    pieces, u = found.grid(720)
-    at = found.model.instant(systems.numpy(), found.given, found.node(pieces, u))
+    second_sampler = sampler(lo.load(name).with_effect("joint_forces"))
+    pieces, u = second_sampler.grid(720)
+    at = second_sampler.model.instant(systems.numpy(), second_sampler.given, second_sampler.node(pieces, u))
     torque = at.crank_torque
-    assert np.max(np.abs(joints(found, at).walk.torque - torque)) <= 1e-12 * np.max(np.abs(torque))
+    assert np.max(np.abs(joints(second_sampler, at).walk.torque - torque)) <= 1e-12 * np.max(np.abs(torque))
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -66,37 +66,37 @@ def test_every_pin_has_a_figure_and_components(name):
     scene = lo.load(name).with_effect("joint_forces")
     figures, frame = lo.evaluate(scene).figures, lo.simulate(scene)
     linked = registry.of(scene).model(scene).kinematics.chain  # type: ignore[attr-defined]
-    told = {f"force_{each}" for each in names(linked).values()}
-    assert told <= set(figures)
-    for each in (*told, "shaking_force"):
-        x, y, size = (frame[f"{each}{part} [N]"].to_numpy() for part in ("_x", "_y", ""))
+    texts = {f"force_{item}" for item in names(linked).values()}
+    assert texts <= set(figures)
+    for item in (*texts, "shaking_force"):
+        x, y, size = (frame[f"{item}{part} [N]"].to_numpy() for part in ("_x", "_y", ""))
         assert np.hypot(x, y) == pytest.approx(size, rel=1e-13)
-        assert np.max(size) == pytest.approx(figures[each], rel=1e-12)
+        assert np.max(size) == pytest.approx(figures[item], rel=1e-12)
 
 
 def test_a_beat_up_told_as_a_linkage_has_the_forces_of_the_beat_up():
-    own = sampler(lo.scene(REED))
+    own_sampler = sampler(lo.scene(REED))
     beatup = lo.load("beatup").with_effect("joint_forces", "rod_inertia").without_effect("resistance")
     other = sampler(beatup.set("effects.rod_inertia.model", "exact"))
     for name in ("force_A", "force_B", "force_C", "force_D", "shaking_force", "shaking_moment"):
-        assert own.peak(name) == pytest.approx(other.peak(name), rel=1e-11), name
+        assert own_sampler.peak(name) == pytest.approx(other.peak(name), rel=1e-11), name
     phi = np.linspace(0.1, 6.2, 50)
     for name in ("force_A", "force_C", "force_D", "shaking_force"):
         for axis in "xy":
-            values = [each.at_angles(f"{name}_{axis}", phi) for each in (own, other)]
+            values = [item.at_angles(f"{name}_{axis}", phi) for item in (own_sampler, other)]
             assert values[0] == pytest.approx(values[1], rel=1e-10, abs=1e-9 * other.peak(name))
 
 
 def test_the_frame_feels_no_more_than_masses_and_weight():
-    found = sampler(lo.load("sixbar-sley").with_effect("joint_forces"))
-    pieces, u = found.grid(360)
-    at = found.model.instant(systems.numpy(), found.given, found.node(pieces, u))
-    walk, loads = joints(found, at).walk, at.joints(found.model.checks[-1]).loading.applied
+    second_sampler = sampler(lo.load("sixbar-sley").with_effect("joint_forces"))
+    pieces, u = second_sampler.grid(360)
+    at = second_sampler.model.instant(systems.numpy(), second_sampler.given, second_sampler.node(pieces, u))
+    walk, loads = joints(second_sampler, at).walk, at.joints(second_sampler.model.checks[-1]).loading.applied
     frame = [walk.forces["A", "crank"], walk.forces["D", "drive"], walk.forces["G", "beat"]]
     for axis in "xy":
         total = sum(getattr(force, axis) for force in frame)
         total = total + sum(getattr(load.force, axis) for load in loads if load.force is not None)
-        assert np.max(np.abs(total)) <= 1e-11 * found.peak("force_D")
+        assert np.max(np.abs(total)) <= 1e-11 * second_sampler.peak("force_D")
 
 
 GEARED = {

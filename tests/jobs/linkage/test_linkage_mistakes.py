@@ -146,9 +146,9 @@ SLIDING = changed(
 
 
 def test_what_slides_has_masses_and_forces():
-    found = registry.scene(SLIDING)
-    assert found.full("mass") == "inertia.mass"
-    assert registry.find("linkage").figures(found, {})["force.front"] is not None
+    scene = registry.scene(SLIDING)
+    assert scene.full("mass") == "inertia.mass"
+    assert registry.find("linkage").figures(scene, {})["force.front"] is not None
     with pytest.raises(BadInput, match='unknown effect "counterweight"'):
         registry.scene(changed(SLIDING, {"effects": {"counterweight": {"mass": "1 kg", "radius": "1 mm"}}}))
     with pytest.raises(BadInput, match="force"):
@@ -166,8 +166,8 @@ def test_an_output_that_jumps_at_half_a_turn_is_refused_with_the_direction_that_
         registry.scene(document)
     assert error.value.key == "output.angle"
     zero = error.value.remedy.split('"')[1]
-    found = registry.scene(changed(document, {"output": {"zero": zero}}))
-    curves = lo.simulate(found)
+    scene = registry.scene(changed(document, {"output": {"zero": zero}}))
+    curves = lo.simulate(scene)
     assert np.abs(np.diff(curves["q [rad]"])).max() < 0.1
 
 
@@ -189,17 +189,17 @@ def test_a_cam_that_rests_is_farthest_where_its_rise_ends():
         "targets": {"torque": {"least": ["peak_torque"]}},
     }
     assert registry.find("linkage").figures(registry.scene(document), {})["peak_torque"] > 0
-    found = lo.evaluate(registry.scene({**document, "events": {"top": {"extreme": "max"}}})).figures
-    assert found["angle.top"] == pytest.approx(math.radians(100), abs=1e-14)
+    figures = lo.evaluate(registry.scene({**document, "events": {"top": {"extreme": "max"}}})).figures
+    assert figures["angle.top"] == pytest.approx(math.radians(100), abs=1e-14)
 
 
 @pytest.mark.parametrize("near", [66, 20, 110])
 def test_events_of_an_answer_are_those_of_a_scan_of_the_whole_turn(near):
     scene = four_bar(events={"front": {"near": f"{near} deg"}})
-    found = lo.solve(scene, "torque", starts=1)
-    curves = registry.find("linkage").curves(scene, dict(found.design), 7200)
+    answer = lo.solve(scene, "torque", starts=1)
+    curves = registry.find("linkage").curves(scene, dict(answer.design), 7200)
     top = curves["phi [rad]"][int(np.argmax(curves["q [rad]"]))]
-    assert found.figures["angle.front"] == pytest.approx(top, abs=2e-3)
+    assert answer.figures["angle.front"] == pytest.approx(top, abs=2e-3)
 
 
 def test_the_command_ends_with_one_line(capsys, tmp_path):

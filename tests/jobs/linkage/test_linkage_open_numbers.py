@@ -43,7 +43,7 @@ def test_the_end_of_a_rest_that_no_level_seeks_is_not_crept_along():
     assert answer.figures["peak_torque"] == pytest.approx(156.9927548, rel=1e-8)
     assert "end: serves no level, least change from today" in answer.certificate.tie_breaks
     assert not answer.certificate.open
-    limit = next(each for each in answer.limits if each.name == "travel.rest")
+    limit = next(item for item in answer.limits if item.name == "travel.rest")
     assert limit.value == pytest.approx(limit.max, rel=1e-6)
 
 
@@ -63,4 +63,4 @@ def test_without_its_timing_a_path_is_met_closer_and_where_the_crank_starts_says
     missed = np.abs(P[:, None] - places).min(axis=0)
     assert np.sqrt(np.mean(missed**2)) == pytest.approx(answer.figures["path_rms"], rel=1e-4)
     assert answer.figures["path_rms"] < 0.0223965, "than with the timing"
-    assert any("start" in said for said in answer.certificate.tie_breaks + tuple(answer.certificate.open))
+    assert any("start" in message for message in answer.certificate.tie_breaks + tuple(answer.certificate.open))

@@ -28,15 +28,15 @@ def six(**changes):
 
 @functools.cache
 def solved(target="", **changes):
-    return lo.solve(six(**{name: dict(each) for name, each in changes.items()}), target or None)
+    return lo.solve(six(**{name: dict(change) for name, change in changes.items()}), target or None)
 
 
 @pytest.mark.slow
 def test_the_sley_is_balanced_without_its_rest():
-    found = solved()
-    assert found.status == "optimal"
-    assert found.figures["peak_torque"] == pytest.approx(156.9927548, rel=1e-9)
-    assert abs(found.figures["moment.front"]) <= 1e-7
+    solution = solved()
+    assert solution.status == "optimal"
+    assert solution.figures["peak_torque"] == pytest.approx(156.9927548, rel=1e-9)
+    assert abs(solution.figures["moment.front"]) <= 1e-7
 
 
 @pytest.mark.slow
@@ -45,24 +45,24 @@ def test_the_sley_is_balanced_without_its_rest():
     [("torque", "peak_torque", 85.95624778), ("smooth", "peak_acceleration", 0.3712768937)],
 )
 def test_what_else_is_sought_of_it(target, figure, value):
-    found = solved(target)
-    assert found.status == "optimal"
-    assert found.figures[figure] == pytest.approx(value, rel=1e-9)
+    solution = solved(target)
+    assert solution.status == "optimal"
+    assert solution.figures[figure] == pytest.approx(value, rel=1e-9)
 
 
 @pytest.mark.slow
 def test_joints_keep_out_of_a_box():
-    found = lo.solve(six(limits={"x_max": {"E": {"max": "265 mm"}}, "y_min": {"F": {"min": "270 mm"}}}))
-    assert found.figures["peak_torque"] == pytest.approx(157.244860, abs=1e-6)
-    assert found.figures["x_max.E"] == pytest.approx(0.265, abs=1e-9)
-    assert found.figures["y_min.F"] >= 0.27 - 1e-9
+    answer = lo.solve(six(limits={"x_max": {"E": {"max": "265 mm"}}, "y_min": {"F": {"min": "270 mm"}}}))
+    assert answer.figures["peak_torque"] == pytest.approx(157.244860, abs=1e-6)
+    assert answer.figures["x_max.E"] == pytest.approx(0.265, abs=1e-9)
+    assert answer.figures["y_min.F"] >= 0.27 - 1e-9
 
 
 @pytest.mark.slow
 def test_the_least_torque_with_a_rest_and_the_longest_rest():
-    found = lo.solve(SIX)
-    assert found.figures["peak_torque"] == pytest.approx(168.0868528, rel=1e-9)
-    assert found.figures["travel.rest"] == pytest.approx(math.radians(0.25), rel=1e-9)
+    answer = lo.solve(SIX)
+    assert answer.figures["peak_torque"] == pytest.approx(168.0868528, rel=1e-9)
+    assert answer.figures["travel.rest"] == pytest.approx(math.radians(0.25), rel=1e-9)
     longest = lo.solve(SIX, "dwell")
     assert math.degrees(longest.design["end"]) == pytest.approx(256.8786297, abs=1e-7)
     freed = lo.solve(SIX.free(["end"]), "dwell")
@@ -71,15 +71,15 @@ def test_the_least_torque_with_a_rest_and_the_longest_rest():
 
 @pytest.mark.slow
 def test_a_press_needs_the_least_torque():
-    found = lo.solve(lo.load("knuckle-press"))
-    assert found.status == "optimal"
-    assert found.figures["peak_torque"] == pytest.approx(6721.970155, rel=1e-9)
+    answer = lo.solve(lo.load("knuckle-press"))
+    assert answer.status == "optimal"
+    assert answer.figures["peak_torque"] == pytest.approx(6721.970155, rel=1e-9)
 
 
 def test_a_point_follows_its_path_as_least_squares_have_it():
     scene = lo.load("path-18")
-    found = lo.solve(scene)
-    square = 18 * found.figures["path_rms"] ** 2
+    answer = lo.solve(scene)
+    square = 18 * answer.figures["path_rms"] ** 2
     assert square == pytest.approx(0.009028884631, rel=1e-9)
     names = list(scene.mechanism)
     path = np.loadtxt(scene.paths.folder / "path-18.csv", delimiter=",", skiprows=1)
@@ -95,7 +95,7 @@ def test_a_point_follows_its_path_as_least_squares_have_it():
         away = P - (path[:, 1] + 1j * path[:, 2])
         return np.concatenate([away.real, away.imag])
 
-    start = [found.design[name] * 1.003 for name in names]
+    start = [answer.design[name] * 1.003 for name in names]
     other = scipy.optimize.least_squares(missed, start, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     assert 2 * other.cost == pytest.approx(square, rel=1e-9)
 
@@ -112,9 +112,9 @@ def turned(x, y):
 
 
 def least(scene, target="torque"):
-    found = lo.solve(scene, target)
-    assert found.status == "optimal"
-    return found.figures["peak_torque"]
+    answer = lo.solve(scene, target)
+    assert answer.status == "optimal"
+    return answer.figures["peak_torque"]
 
 
 @functools.cache
@@ -154,7 +154,7 @@ def in_other_units(document, length, torque, inertia, force=(1.0, "kN")):
 
     def text(value):
         if isinstance(value, dict):
-            return {key: text(each) for key, each in value.items()}
+            return {key: text(item) for key, item in value.items()}
         if not isinstance(value, str):
             return value
         for unit, (factor, other) in {" mm": length, " N*m": torque, " kg*m^2": inertia, " kN": force}.items():
@@ -162,7 +162,7 @@ def in_other_units(document, length, torque, inertia, force=(1.0, "kN")):
                 return f"{float(value.removesuffix(unit)) * factor!r} {other}"
         return value
 
-    return {key: each if key in ("parts", "problem") else text(each) for key, each in document.items()}
+    return {key: item if key in ("parts", "problem") else text(item) for key, item in document.items()}
 
 
 @pytest.mark.slow
@@ -206,9 +206,9 @@ def chain_reference(name, without=""):
 
 def once(scene):
     # One start of the press ends in another basin, which one rounding chooses: it is searched.
-    found = lo.solve(scene, "torque", starts=None if "knuckle" in scene.name else 1)
-    assert found.status == "optimal"
-    return found.figures["peak_torque"]
+    answer = lo.solve(scene, "torque", starts=None if "knuckle" in scene.name else 1)
+    assert answer.status == "optimal"
+    return answer.figures["peak_torque"]
 
 
 def turned_pivot(x, y):

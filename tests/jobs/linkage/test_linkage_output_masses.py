@@ -31,13 +31,13 @@ def plain(scene, weighed):
     at["C"] = meeting(at["B"], D, v["l2"], v["l3"], 1)
     at["E"] = D + v["e"] * (at["C"] - D) / v["l3"] * np.exp(1j * v["epsilon"])
     at["F"] = meeting(at["E"], G, v["l5"], v["l6"], 1)
-    own, other = scene.effects["inertia"], scene.effects["counterweight"]
-    reed, turn = own.centre * np.exp(1j * (own.offset or 0.0)), np.pi if other.angle is None else other.angle
+    values, other = scene.effects["inertia"], scene.effects["counterweight"]
+    reed, turn = values.centre * np.exp(1j * (values.offset or 0.0)), np.pi if other.angle is None else other.angle
     bodies = [  # link, mass, place along its line and across it, inertia about that place
         ("rod", 1.5, 0.0627, 0.002),
         ("rocker", 4.0, 0.06, 0.01),
         ("link", 2.5, 0.107, 0.0096),
-        ("sley", own.m, reed, own.J - own.m * own.centre**2),
+        ("sley", values.m, reed, values.J - values.m * values.centre**2),
         ("sley", other.mass, other.radius * np.exp(1j * turn), 0.0),
     ]
     omega, names = SixBar.OMEGA, list(LINKS)
@@ -68,9 +68,9 @@ def plain(scene, weighed):
             matrix[:, 3 * k + 2, column] = -sign * at[joint].imag
             matrix[:, 3 * k + 2, column + 1] = sign * at[joint].real
     matrix[:, 2, 14] = 1.0
-    found = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
-    forces = {f"force_{joint}": abs(found[:, 2 * k] + 1j * found[:, 2 * k + 1]) for k, joint in enumerate(joints)}
-    return forces | {"shaking_force": abs(shaken), "shaking_moment": turned, "Md": found[:, 14]}
+    result = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+    forces = {f"force_{joint}": abs(result[:, 2 * k] + 1j * result[:, 2 * k + 1]) for k, joint in enumerate(joints)}
+    return forces | {"shaking_force": abs(shaken), "shaking_moment": turned, "Md": result[:, 14]}
 
 
 @pytest.mark.parametrize("weighed", [True, False], ids=["weighed", "weightless"])
@@ -79,9 +79,9 @@ def test_every_joint_holds_the_masses_of_the_output(keys, weighed):
     scene = SIX.update(keys).with_effect("joint_forces")
     scene = scene if weighed else scene.without_effect("gravity")
     job = registry.of(scene)
-    found, expected = job.sampler(scene, job.today(scene)), plain(scene, weighed)
+    result, expected = job.sampler(scene, job.today(scene)), plain(scene, weighed)
     for name, values in expected.items():
-        read = found.at_angles(TORQUE if name == "Md" else name, PHI)
+        read = result.at_angles(TORQUE if name == "Md" else name, PHI)
         size = abs(values) if name != "Md" and name != "shaking_moment" else values
         assert np.max(abs(read - size)) <= 1e-9 * np.max(abs(values)), name
 
@@ -123,10 +123,10 @@ def yoke(output, **more):
 def test_what_slides_is_weighed_along_its_way(output):
     scene = yoke(output)
     job = registry.of(scene)
-    found = job.sampler(scene, job.today(scene))
+    sampler = job.sampler(scene, job.today(scene))
     place = Series(0.1 * np.sin(PHI) + np.sqrt(0.16 - (0.1 * np.cos(PHI)) ** 2))
     expected = 20 * ((4 * np.pi) ** 2 * place.over(2) + GRAVITY * np.sin(np.pi / 3)) * place.over(1)
-    assert found.at_angles(TORQUE, PHI) == pytest.approx(expected, abs=1e-10 * max(abs(expected)))
+    assert sampler.at_angles(TORQUE, PHI) == pytest.approx(expected, abs=1e-10 * max(abs(expected)))
 
 
 def test_what_leaves_a_mass_out_says_so():
@@ -151,18 +151,18 @@ def remarks(scene):
 
 
 @pytest.mark.parametrize(
-    ("keys", "told"),
+    ("keys", "report"),
     [({"effects.inertia.centre": None}, "centre is missing"), ({"effects.inertia.J": "0.1 kg*m^2"}, "J is less than")],
     ids=["no centre", "little J"],
 )
-def test_a_mass_without_a_place_is_refused(keys, told):
-    with pytest.raises(BadInput, match=told):
+def test_a_mass_without_a_place_is_refused(keys, report):
+    with pytest.raises(BadInput, match=report):
         SIX.update(keys)
 
 
 def test_a_mass_on_an_axis_that_moves_is_refused():
     tables = {name: SIX.document[name] for name in ("problem", "operation", "mechanism", "parts", "windows", "events")}
     tables |= {"output": {"angle": "link"}, "effects": {"inertia": SIX.document["effects"]["inertia"]}}
-    tables["mechanism"] = {name: own for name, own in tables["mechanism"].items() if name != "end"}
+    tables["mechanism"] = {name: table for name, table in tables["mechanism"].items() if name != "end"}
     with pytest.raises(BadInput, match=r"fixed axis.*effects.mass.link"):
         lo.scene({**tables, "windows": {}, "events": {}})

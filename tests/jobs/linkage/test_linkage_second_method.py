@@ -89,17 +89,17 @@ def box(scene, freed):
 
 @pytest.mark.slow
 def test_plain_formulas_have_the_figures_of_the_packaged_optima():
-    found = lo.solve(SIX)
-    six = SixBar(dict(found.design))
-    assert max(peak(six)) == pytest.approx(found.figures["peak_torque"], rel=1e-7)
-    assert max(bending(six)) == pytest.approx(found.figures["peak_acceleration"], rel=1e-7)
-    assert six.swing == pytest.approx(found.figures["swing"], abs=1e-12)
+    result = lo.solve(SIX)
+    six = SixBar(dict(result.design))
+    assert max(peak(six)) == pytest.approx(result.figures["peak_torque"], rel=1e-7)
+    assert max(bending(six)) == pytest.approx(result.figures["peak_acceleration"], rel=1e-7)
+    assert six.swing == pytest.approx(result.figures["swing"], abs=1e-12)
     assert six.balance == pytest.approx(0.0, abs=1e-7)
-    assert math.acos(max(tops(six.beat))) == pytest.approx(found.figures["mu.beat"], abs=1e-7)
-    assert max(tops(six.travel(REST), closed=False)) == pytest.approx(found.figures["travel.rest"], rel=1e-6)
-    machine, found = Press(dict((answer := lo.solve(PRESS)).design)), answer
-    assert max(abs(machine.forming)) == pytest.approx(found.figures["peak_torque"], rel=1e-9)
-    assert machine.swing == pytest.approx(found.figures["swing"], rel=1e-12)
+    assert math.acos(max(tops(six.beat))) == pytest.approx(result.figures["mu.beat"], abs=1e-7)
+    assert max(tops(six.travel(REST), closed=False)) == pytest.approx(result.figures["travel.rest"], rel=1e-6)
+    machine, result = Press(dict((answer := lo.solve(PRESS)).design)), answer
+    assert max(abs(machine.forming)) == pytest.approx(result.figures["peak_torque"], rel=1e-9)
+    assert machine.swing == pytest.approx(result.figures["swing"], rel=1e-12)
 
 
 @pytest.mark.slow

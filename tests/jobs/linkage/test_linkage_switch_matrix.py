@@ -72,10 +72,10 @@ def test_force_and_torque_are_the_sums_of_single_effects(names):
         assert all(np.all(np.isfinite(curve)) for curve in curves_of(names))
         return
     loads = [curves_of((name,)) for name in names if isinstance(EFFECTS[name], Load)]
-    for found, *singles in zip(curves_of(names), *loads, strict=True):
+    for result, *singles in zip(curves_of(names), *loads, strict=True):
         total = sum(singles, np.zeros(len(PHI)))
         size = max((np.max(np.abs(single)) for single in singles), default=0.0)
-        assert np.max(np.abs(found - total)) <= 1e-12 * size
+        assert np.max(np.abs(result - total)) <= 1e-12 * size
 
 
 @every

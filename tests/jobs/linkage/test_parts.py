@@ -36,8 +36,8 @@ def linked(raw, names):
 
 def with_part(name, given, **changed):
     """Return the four-bar with one more part, some of its keys changed or (None) taken out."""
-    own = {key: value for key, value in (given | changed).items() if value is not None}
-    return FOUR_BAR | {name: own}
+    values = {key: value for key, value in (given | changed).items() if value is not None}
+    return FOUR_BAR | {name: values}
 
 
 def changed(name, **keys):
@@ -266,7 +266,7 @@ def test_several_mistakes_are_a_line_each():
     wrong = changed("crank", length="l7", at=3) | {"E": {"kind": "pint", "on": "rod"}}
     with pytest.raises(BadInput) as caught:
         linked(wrong, NAMES)
-    assert {each.key for each in caught.value.faults} == {"parts.crank.at", "parts.crank.length", "parts.E.kind"}
+    assert {fault.key for fault in caught.value.faults} == {"parts.crank.at", "parts.crank.length", "parts.E.kind"}
 
 
 DOCUMENT = {
@@ -289,7 +289,7 @@ def test_what_nothing_reads_is_refused_and_what_a_table_names_is_read():
     chain, _ = linked(idle, NAMES)
     with pytest.raises(BadInput) as caught:
         parts.demand_used(chain, DOCUMENT)
-    assert [each.key for each in caught.value.faults] == ["parts.slotted", "parts.fast", "parts.I"]
+    assert [fault.key for fault in caught.value.faults] == ["parts.slotted", "parts.fast", "parts.I"]
     assert "part slotted is not used" in str(caught.value)
 
 

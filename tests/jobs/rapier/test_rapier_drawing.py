@@ -30,8 +30,8 @@ def paper():
     given = Dimensions(**printed, l5=math.nan, C0x=math.nan, C0y=math.nan, phi40=math.nan)
     swing = Sley(systems.FLOAT, given).centres.swing
     layout = rapier_drive.construct(systems.FLOAT, given, given.phi30 - swing, math.radians(24.35))
-    found = {"C0x": layout.C0x, "C0y": layout.C0y, "l5": layout.reach - given.l4, "phi40": layout.phi40}
-    return dataclasses.asdict(given) | found
+    results = {"C0x": layout.C0x, "C0y": layout.C0y, "l5": layout.reach - given.l4, "phi40": layout.phi40}
+    return dataclasses.asdict(given) | results
 
 
 PAPER = paper()
@@ -81,12 +81,12 @@ def test_crank_and_rod_are_in_line_in_both_dead_centres():
 
 @pytest.mark.parametrize("design", [PAPER, WIDER])
 def test_the_hand_over_is_where_the_travel_is_greatest(design):
-    found = rapier_drawing.of(design)
+    result = rapier_drawing.of(design)
     S, _ = travel(design, np.linspace(0, 2 * np.pi, 100_001))
-    at, rate = travel(design, np.array(found.phi1[OVER]))
+    at, rate = travel(design, np.array(result.phi1[OVER]))
     assert abs(rate) < 1e-12
     assert 0 <= at - S.max() < 1e-8
-    assert found.phi63 * found.dimensions.travel == pytest.approx(float(at), rel=1e-12)
+    assert result.phi63 * result.dimensions.travel == pytest.approx(float(at), rel=1e-12)
 
 
 def test_labels_carry_lengths_angles_the_stroke_and_the_three_positions():
@@ -127,8 +127,8 @@ def test_joints_are_written_in_mm_with_every_digit():
     assert len(at) == len(rows) == 3 + 3 * 5
     for position, prime in PRIMES.items():
         assert {row["joint"] for row in rows if row["position"] == position} >= {f"A{prime}", f"D{prime}"}
-        for (one, other), name in zip(LINKS, SIZES, strict=True):
-            ends = [at[joint if joint in at and joint.endswith("0") else joint + prime] for joint in (one, other)]
+        for (item, other), name in zip(LINKS, SIZES, strict=True):
+            ends = [at[joint if joint in at and joint.endswith("0") else joint + prime] for joint in (item, other)]
             assert math.dist(*ends) == pytest.approx(1e3 * PAPER[name], rel=1e-11)
 
 

@@ -37,8 +37,8 @@ def numbers(phi1):
     pose, front = (RapierPose(FLOAT, BUILT, stand, angle) for angle in (phi1, 0.0))
     joints = pose.joints
 
-    def direction(one, other):
-        return math.atan2(joints[other].y - joints[one].y, joints[other].x - joints[one].x)
+    def direction(first, other):
+        return math.atan2(joints[other].y - joints[first].y, joints[other].x - joints[first].x)
 
     named = dict(vars(BUILT)) | {"phi1": phi1, "beta": stand.beta, "beta_r": Sley(FLOAT, BUILT).centres.beta_r}
     named |= {
@@ -67,8 +67,8 @@ def value(text, named):
     return float(expression.subs({s: sp.Float(known[s.name], 30) for s in expression.free_symbols}))
 
 
-def shown(found, name):
-    return [equation.text for equation in found if equation.name == name]
+def shown(result, name):
+    return [equation.text for equation in result if equation.name == name]
 
 
 @pytest.fixture(scope="module")
@@ -129,9 +129,9 @@ def test_printed_head_inertia_is_the_effects(phi1):
 
 
 def test_friction_is_printed_for_both_ways_of_the_head():
-    (found,) = [e for e in rapier_equations.equations(model("tape_friction")) if e.name == "tape_friction"]
-    assert found.text == "Q_tape_friction = force for S' > 0, -force for S' < 0"
-    assert r"\begin{cases}" in found.latex
+    (result,) = [e for e in rapier_equations.equations(model("tape_friction")) if e.name == "tape_friction"]
+    assert result.text == "Q_tape_friction = force for S' > 0, -force for S' < 0"
+    assert r"\begin{cases}" in result.latex
 
 
 @pytest.mark.parametrize(
@@ -143,9 +143,9 @@ def test_friction_is_printed_for_both_ways_of_the_head():
     ],
 )
 def test_balance_and_crank_torque_list_what_is_on(effects, lines):
-    found = rapier_equations.equations(model(*effects))
-    assert [e.text for e in found if e.name in ("balance", "crank torque")] == lines
-    words = " ".join(e.text for e in found)
+    equations = rapier_equations.equations(model(*effects))
+    assert [e.text for e in equations if e.name in ("balance", "crank torque")] == lines
+    words = " ".join(e.text for e in equations)
     assert ("mass" in words) == ("head_inertia" in effects)
     assert ("force" in words) == ("tape_friction" in effects)
 

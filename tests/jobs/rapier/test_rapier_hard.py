@@ -62,7 +62,7 @@ def test_what_cannot_be_had_is_said_with_relaxations_that_help(name):
     assert not answer.admissible
     assert all(math.isfinite(value) for value in numbers(answer))
     assert answer.relaxation
-    together = [one for one in answer.relaxation if not one.alone] or [answer.relaxation[0]]
+    together = [relaxation for relaxation in answer.relaxation if not relaxation.alone] or [answer.relaxation[0]]
     helped = lo.solve(granted(scene, together, 1e-3), starts=1)
     assert helped.status in ("optimal", "uncertified"), helped.message
     assert helped.admissible

@@ -40,9 +40,9 @@ def test_derivatives_are_those_of_the_travel_in_many_digits(design):
     for phi in np.linspace(0, TURN, 17):
         at = MANY.number(float(phi))
         after, before = pose(MANY, many, at + h), pose(MANY, many, at - h)
-        here, found = pose(MANY, many, at), pose(systems.FLOAT, sampled.given, float(phi))
+        here, result = pose(MANY, many, at), pose(systems.FLOAT, sampled.given, float(phi))
         slopes = [(getattr(after, name) - getattr(before, name)) / (2 * h) for name in ("q", "q1", "q2")]
-        rows.append([(found.q, here.q), *zip((found.q1, found.q2, found.q3), slopes, strict=True)])
+        rows.append([(result.q, here.q), *zip((result.q1, result.q2, result.q3), slopes, strict=True)])
     values = np.array(rows, dtype=float)
     away = np.max(np.abs(values[..., 0] - values[..., 1]), axis=0)
     assert np.max(away / np.max(np.abs(values[..., 1]), axis=0)) <= 1e-12
@@ -60,7 +60,7 @@ def test_a_turn_and_both_its_derivatives_are_those_of_implicit_differentiation(k
     turn = sampled.model.given(systems.casadi(), numbers).values["turns"][k]
     hessian, gradient = ca.hessian(turn, symbols)
     today = [sampled.values[name] for name in MOVED]
-    slope, bend = (found.full() for found in ca.Function("t", [symbols], [gradient, hessian])(today))
+    slope, bend = (result.full() for result in ca.Function("t", [symbols], [gradient, hessian])(today))
     h = MANY.number(10) ** -12
 
     def root(*steps):
@@ -131,8 +131,8 @@ def test_dwells_are_pieces_on_their_own_side_of_front_dead_centre():
         for piece in np.flatnonzero(on):
             middle = float(sampled.cycle.angles(np.array([piece]), np.array([0.5]))[0])
             assert math.copysign(1, math.remainder(middle, TURN)) == side
-    one = rapier.dwells(((AFTER, "dwell_after"),))
-    assert one.corners(systems.FLOAT, sampled.given) == (sampled.given.values["dwell_after"], 0)
+    first = rapier.dwells(((AFTER, "dwell_after"),))
+    assert first.corners(systems.FLOAT, sampled.given) == (sampled.given.values["dwell_after"], 0)
     assert rapier.dwells(()).corners(systems.FLOAT, sampled.given) == ()
 
 

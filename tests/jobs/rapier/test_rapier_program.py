@@ -19,7 +19,9 @@ FIVE_BAR = ("l4", "l5", "l6", "l3p", "C0x", "C0y")
 
 def limits(program, name):
     return [
-        (each.sign, each.row, type(each), getattr(each, "where", None)) for each in program.limits if each.name == name
+        (limit.sign, limit.row, type(limit), getattr(limit, "where", None))
+        for limit in program.limits
+        if limit.name == name
     ]
 
 
@@ -36,19 +38,19 @@ def named(program):
     ],
 )
 def test_what_targets_keep_are_variables_without_room_and_what_follows_is_free(target, objective, more):
-    found = JOB.program(SCENE, target)
-    assert [(each.row, type(each), each.power) for each in found.objectives] == [objective]
-    kept = {"stroke", "s_dwell"} | (more - {"dwell"})
-    assert all(named(found)[name].lower == named(found)[name].upper == SCENE.operation[name] for name in kept)
-    assert named(found)["phi_stroke"] == Variable("phi_stroke", 0.0, 2 * math.pi, 1.0, (0.0, 2 * math.pi))
-    assert {"phi_stroke", *more, *kept} <= set(named(found))
-    assert limits(found, "head at rest at phi_stroke") == [(0, "rest", DesignLimit, None)]
-    assert limits(found, "stroke is reached") == [(0, "stroke_short", DesignLimit, None)]
+    program = JOB.program(SCENE, target)
+    assert [(item.row, type(item), item.power) for item in program.objectives] == [objective]
+    remaining = {"stroke", "s_dwell"} | (more - {"dwell"})
+    assert all(named(program)[name].lower == named(program)[name].upper == SCENE.operation[name] for name in remaining)
+    assert named(program)["phi_stroke"] == Variable("phi_stroke", 0.0, 2 * math.pi, 1.0, (0.0, 2 * math.pi))
+    assert {"phi_stroke", *more, *remaining} <= set(named(program))
+    assert limits(program, "head at rest at phi_stroke") == [(0, "rest", DesignLimit, None)]
+    assert limits(program, "stroke is reached") == [(0, "stroke_short", DesignLimit, None)]
 
 
 def test_stroke_gives_way_both_ways_s_dwell_upward_and_dwells_downward():
-    found = JOB.program(SCENE, "stroke-dwell")
-    signs = {name: limits(found, name)[0][0] for name in ("stroke", "s_dwell", "dwell_after", "dwell_before")}
+    program = JOB.program(SCENE, "stroke-dwell")
+    signs = {name: limits(program, name)[0][0] for name in ("stroke", "s_dwell", "dwell_after", "dwell_before")}
     assert signs == {"stroke": 0, "s_dwell": 1, "dwell_after": -1, "dwell_before": -1}
 
 
@@ -61,26 +63,29 @@ def test_a_dwell_is_a_limit_on_the_travel_over_its_own_pieces(target):
 
 def test_dyads_close_with_a_margin_and_the_sleys_only_where_it_may_change():
     free = JOB.program(SCENE.free("sley"), "stroke-dwell")
-    held = JOB.program(SCENE, "stroke-dwell")
-    assert sum(each.name.startswith("five-bar: ") for each in held.limits) == 2
-    assert [sum("l71" in each.name and each.name != "l71" for each in program.limits) for program in (held, free)] == [
+    second_program = JOB.program(SCENE, "stroke-dwell")
+    assert sum(limit.name.startswith("five-bar: ") for limit in second_program.limits) == 2
+    assert [
+        sum("l71" in limit.name and limit.name != "l71" for limit in program.limits)
+        for program in (second_program, free)
+    ] == [
         0,
         3,
     ]
-    assert not any(each.relaxable for each in free.limits if each.name.startswith(("five-bar: ", "assembly")))
+    assert not any(limit.relaxable for limit in free.limits if limit.name.startswith(("five-bar: ", "assembly")))
 
 
 def test_effects_are_in_the_program_only_where_something_of_theirs_is_asked():
     loaded = SCENE.with_effect("head_inertia")
     assert JOB.program(loaded, "stroke-dwell").model.loads == ()
-    asked = JOB.program(loaded.set("limits.tape_force.max", "1 kN"), "stroke-dwell")
-    assert [load.name for load in asked.model.loads] == ["head_inertia"]
-    assert limits(asked, "tape_force") == [(1, "tape_force", CycleLimit, None)]
+    program = JOB.program(loaded.set("limits.tape_force.max", "1 kN"), "stroke-dwell")
+    assert [load.name for load in program.model.loads] == ["head_inertia"]
+    assert limits(program, "tape_force") == [(1, "tape_force", CycleLimit, None)]
 
 
 def test_a_limit_on_the_transmission_angle_is_one_on_what_it_lacks_of_a_right_angle():
-    found = JOB.program(SCENE.set("limits.mu_min.min", "40 deg"), "stroke-dwell")
-    (limit,) = (each for each in found.cycle_limits.values() if each.name == "mu_min")
+    program = JOB.program(SCENE.set("limits.mu_min.min", "40 deg"), "stroke-dwell")
+    (limit,) = (cycle_limit for cycle_limit in program.cycle_limits.values() if cycle_limit.name == "mu_min")
     assert (limit.row, limit.sign, limit.complement) == ("obliquity", -1, math.pi / 2)
     assert limit.bound == pytest.approx(math.radians(50))
     both = JOB.program(SCENE.set("limits.sley_mu_min.min", "40 deg"), "stroke-dwell")
@@ -109,9 +114,9 @@ def test_what_follows_from_the_drive_is_its_hand_over_and_its_least_dwell():
     program = JOB.program(SCENE, "dwell")
     reading = read(JOB.sampler(SCENE, {}))
     today = {name: SCENE.mechanism[name] for name in named(program) if name in SCENE.mechanism}
-    found = program.completed(today)
-    assert found["phi_stroke"] == pytest.approx(reading.phi_stroke, abs=1e-12)
-    assert found["dwell"] == pytest.approx(min(reading.dwell_after, reading.dwell_before), abs=1e-12)
+    result = program.completed(today)
+    assert result["phi_stroke"] == pytest.approx(reading.phi_stroke, abs=1e-12)
+    assert result["dwell"] == pytest.approx(min(reading.dwell_after, reading.dwell_before), abs=1e-12)
     with pytest.raises(ValueError, match="does not assemble"):
         program.completed(today | {"l5": 0.7})
 
@@ -141,9 +146,9 @@ def test_a_limit_on_a_force_that_nothing_makes_is_refused():
 )
 def test_a_hand_over_that_is_traded_without_a_stroke_is_a_top_outside_the_dwells(axes, alone):
     """Front dead centre is a rest too, and there the head may turn back as well."""
-    asked = {name: next(iter(SCENE.schema.axes[name].senses)) for name in axes}
-    found, _ = JOB.traded(SCENE, None, asked)
-    told = limits(found, "head turns back at phi_stroke") + limits(found, "phi_stroke lies outside the dwells")
-    assert told == ([(1, "turning", DesignLimit, None), (-1, "reach", DesignLimit, None)] if alone else [])
-    least = [each.value for each in found.limits if each.row == "reach"]
+    request = {name: next(iter(SCENE.schema.axes[name].senses)) for name in axes}
+    result, _ = JOB.traded(SCENE, None, request)
+    report = limits(result, "head turns back at phi_stroke") + limits(result, "phi_stroke lies outside the dwells")
+    assert report == ([(1, "turning", DesignLimit, None), (-1, "reach", DesignLimit, None)] if alone else [])
+    least = [limit.value for limit in result.limits if limit.row == "reach"]
     assert least == ([SCENE.operation["s_dwell"]] if alone else [])

@@ -30,14 +30,14 @@ DEGREE = math.pi / 180
 @functools.cache
 def random_designs():
     """Return twenty drives that turn, around today's; seeded."""
-    random, found = np.random.default_rng(17), list[dict[str, float]]()
+    random, result = np.random.default_rng(17), list[dict[str, float]]()
     today = {name: SCENE.mechanism[name] for name in ("l4", "l5", "l6", "l3p", "alpha", "C0x", "C0y", "phi40")}
     widths = {"alpha": 0.3, "phi40": 0.35, "C0x": 0.05, "C0y": 0.05}
-    while len(found) < 20:
+    while len(result) < 20:
         design = {name: value + random.uniform(-1, 1) * widths.get(name, 0.25 * value) for name, value in today.items()}
         if not rapier_drive.fault_of({**SCENE.mechanism, **design}):
-            found.append(design)
-    return found
+            result.append(design)
+    return result
 
 
 class Drive:
@@ -52,8 +52,8 @@ class Drive:
         self.front = MP.expj(self.angle(MP.mpf(0)))
 
     @staticmethod
-    def corner(opposite, one, other):
-        return MP.acos((one**2 + other**2 - opposite**2) / (2 * one * other))
+    def corner(opposite, first, other):
+        return MP.acos((first**2 + other**2 - opposite**2) / (2 * first * other))
 
     def angle(self, phi):
         d = self.d
@@ -126,24 +126,24 @@ def read(design, s_dwell=None):
 @pytest.mark.few(3)
 @pytest.mark.parametrize("which", designs())
 def test_stroke_and_dwells_are_those_of_thirty_digits(which):
-    found, exact = read(design_of(which)), drive(which)
+    result, exact = read(design_of(which)), drive(which)
     stroke, phi = exact.stroke()
-    assert found.stroke == pytest.approx(float(max(stroke, 0)), abs=1e-11)
-    assert found.phi_stroke == pytest.approx(float(phi), abs=1e-10)
+    assert result.stroke == pytest.approx(float(max(stroke, 0)), abs=1e-11)
+    assert result.phi_stroke == pytest.approx(float(phi), abs=1e-10)
     room = MP.mpf(SCENE.operation["s_dwell"])
-    assert found.dwell_after == pytest.approx(float(exact.dwell(room, 1)), abs=1e-10)
-    assert found.dwell_before == pytest.approx(float(exact.dwell(room, -1)), abs=1e-10)
+    assert result.dwell_after == pytest.approx(float(exact.dwell(room, 1)), abs=1e-10)
+    assert result.dwell_before == pytest.approx(float(exact.dwell(room, -1)), abs=1e-10)
 
 
 @pytest.mark.parametrize("which", designs())
 def test_turning_points_are_those_of_thirty_digits_the_first_onto_its_way_out(which):
     sampled = JOB.sampler(SCENE, design_of(which))
     drive_ = sampled.model.kinematics
-    found = turning_points.turns(lambda phi: drive_.pose(systems.numpy(), sampled.given, Node(phi, {})).q1)
+    result = turning_points.turns(lambda phi: drive_.pose(systems.numpy(), sampled.given, Node(phi, {})).q1)
     exact = drive(which)
-    assert np.sort(np.mod(found, TURN)) == pytest.approx([float(phi) for phi in exact.turning], abs=1e-10)
-    assert exact.slope(found[0] + 1e-4) > 0 > exact.slope(found[0] - 1e-4)
-    assert np.count_nonzero(np.diff(np.append(found, found[0])) < 0) == 1, "in the order of the turn"
+    assert np.sort(np.mod(result, TURN)) == pytest.approx([float(phi) for phi in exact.turning], abs=1e-10)
+    assert exact.slope(result[0] + 1e-4) > 0 > exact.slope(result[0] - 1e-4)
+    assert np.count_nonzero(np.diff(np.append(result, result[0])) < 0) == 1, "in the order of the turn"
 
 
 def dip(side):
@@ -160,10 +160,10 @@ def test_a_travel_that_only_touches_s_dwell_stays_in_the_dwell():
     assert float(height) == pytest.approx(0.00032, abs=5e-6)
     exact = drive(None)
     for share in (1.0, 1.0 + 1e-12, 1.0 - 1e-12):
-        found = read({}, float(height) * share).dwell_before
+        result = read({}, float(height) * share).dwell_before
         beyond = exact.dwell(height * (1 + MP.mpf(10) ** -9), -1)
-        assert found == pytest.approx(float(beyond), abs=1e-7)
-        assert found > float(touched) + 0.01
+        assert result == pytest.approx(float(beyond), abs=1e-7)
+        assert result > float(touched) + 0.01
     cut = read({}, float(height) * (1 - 1e-6)).dwell_before
     assert cut == pytest.approx(float(exact.dwell(height * (1 - MP.mpf(10) ** -6), -1)), abs=1e-7)
     assert cut < float(touched)
@@ -171,8 +171,8 @@ def test_a_travel_that_only_touches_s_dwell_stays_in_the_dwell():
 
 @pytest.mark.parametrize("s_dwell", [1e-9, 1e-6, 1e-4, 0.01, 0.3, 0.84])
 def test_dwells_of_any_s_dwell_below_the_stroke(s_dwell):
-    found = read({}, s_dwell)
-    for side, dwell in ((1, found.dwell_after), (-1, found.dwell_before)):
+    result = read({}, s_dwell)
+    for side, dwell in ((1, result.dwell_after), (-1, result.dwell_before)):
         expected = drive(None).dwell(MP.mpf(s_dwell), side)
         assert dwell == pytest.approx(float(expected), abs=1e-10 + 1e-15 / s_dwell)
 
@@ -180,8 +180,8 @@ def test_dwells_of_any_s_dwell_below_the_stroke(s_dwell):
 def test_an_s_dwell_beyond_the_stroke_is_a_dwell_of_the_whole_turn():
     stroke = read({}).stroke
     for s_dwell in (stroke * (1 + 1e-9), 1.0):
-        found = read({}, s_dwell)
-        assert (found.dwell_after, found.dwell_before) == (TURN, TURN)
+        result = read({}, s_dwell)
+        assert (result.dwell_after, result.dwell_before) == (TURN, TURN)
     under = read({}, stroke * (1 - 1e-6))
     assert under.dwell_after < read({}).phi_stroke < TURN - under.dwell_before
 
@@ -191,10 +191,10 @@ def test_the_scene_without_s_dwell_has_a_stroke_and_no_dwell():
     values = {name: value for name, value in sampled.given.values.items() if isinstance(value, float)}
     del values["s_dwell"]
     model = dataclasses.replace(sampled.model, arcs=())
-    found = rapier_model.read(Sampler(model, values))
-    assert found.stroke == read({}).stroke
-    assert math.isnan(found.dwell_after)
-    assert math.isnan(found.dwell_before)
+    result = rapier_model.read(Sampler(model, values))
+    assert result.stroke == read({}).stroke
+    assert math.isnan(result.dwell_after)
+    assert math.isnan(result.dwell_before)
 
 
 def test_a_drive_that_locks_has_no_stroke():

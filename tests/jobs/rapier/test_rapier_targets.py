@@ -92,10 +92,10 @@ def test_gain_at_the_papers_own_stroke_dwells_and_transmission_angle_is_four_per
     today = lo.evaluate(scene).figures
     keys = {"operation.stroke": "stroke", "limits.mu_min.min": "mu_min"}
     keys |= {f"operation.{name}": name for name in ("dwell_after", "dwell_before")}
-    asked = scene.update({key: f"{today[n]!r} {'m' if n == 'stroke' else 'rad'}" for key, n in keys.items()})
-    answer = lo.solve(asked, starts=1)
+    second_scene = scene.update({key: f"{today[n]!r} {'m' if n == 'stroke' else 'rad'}" for key, n in keys.items()})
+    answer = lo.solve(second_scene, starts=1)
     assert answer.status == "optimal"
-    assert_held(asked, answer)
+    assert_held(second_scene, answer)
     assert Drive(scene, answer.design).peak(2) / PAPER_PEAK == pytest.approx(0.96, abs=0.005)
 
 
@@ -122,10 +122,10 @@ def test_a_limit_on_jerk_force_or_torque_is_held_and_priced(scene, best, name):
     loaded = scene.with_effect("head_inertia").with_effect("tape_friction")
     text, unit = LOADED[name]
     limit = float(text)
-    asked = [loaded.set(f"limits.{name}.max", f"{limit * share!r} {unit}") for share in (1.0, 1 - 1e-5, 1 + 1e-5)]
-    answer = lo.solve(asked[0], starts=1)
-    tight, loose = (lo.solve(each, warm_start=answer) for each in asked[1:])
-    assert [each.status for each in (tight, answer, loose)] == ["optimal"] * 3
+    requests = [loaded.set(f"limits.{name}.max", f"{limit * share!r} {unit}") for share in (1.0, 1 - 1e-5, 1 + 1e-5)]
+    answer = lo.solve(requests[0], starts=1)
+    tight, loose = (lo.solve(item, warm_start=answer) for item in requests[1:])
+    assert [item.status for item in (tight, answer, loose)] == ["optimal"] * 3
     drive = Drive(loaded, answer.design)
     size = {"peak_jerk": lambda: drive.peak(3), "peak_torque": drive.peak_torque, "tape_force": drive.peak_force}[
         name
@@ -157,10 +157,10 @@ def test_a_neighbours_answer_does_not_keep_an_optimum_from_its_certificate(scene
 @pytest.mark.slow
 def test_a_limit_on_the_torque_of_the_head_alone_is_held_and_priced(scene, best):
     loaded, limit = scene.with_effect("head_inertia"), 2.95
-    asked = [loaded.set("limits.peak_torque.max", f"{limit * share!r} N*m") for share in (1.0, 1 - 1e-5, 1 + 1e-5)]
-    answer = lo.solve(asked[0], starts=1)
-    tight, loose = (lo.solve(each, warm_start=answer) for each in asked[1:])
-    assert [each.status for each in (tight, answer, loose)] == ["optimal"] * 3
+    requests = [loaded.set("limits.peak_torque.max", f"{limit * share!r} N*m") for share in (1.0, 1 - 1e-5, 1 + 1e-5)]
+    answer = lo.solve(requests[0], starts=1)
+    tight, loose = (lo.solve(item, warm_start=answer) for item in requests[1:])
+    assert [item.status for item in (tight, answer, loose)] == ["optimal"] * 3
     assert Drive(loaded, answer.design).peak_torque() == pytest.approx(limit, rel=1e-9)
     assert_held(loaded, answer)
     (price,) = [price for price in answer.binding if price.limit == "peak_torque"]
@@ -170,8 +170,8 @@ def test_a_limit_on_the_torque_of_the_head_alone_is_held_and_priced(scene, best)
 
 def test_the_neighbours_answer_is_no_trap(scene, best):
     """Warm from a neighbour is what cold gives."""
-    asked = scene.update({"operation.stroke": "820 mm", "operation.dwell_after": "34 deg"})
-    warm, cold = lo.solve(asked, warm_start=best), lo.solve(asked, starts=1)
+    second_scene = scene.update({"operation.stroke": "820 mm", "operation.dwell_after": "34 deg"})
+    warm, cold = lo.solve(second_scene, warm_start=best), lo.solve(second_scene, starts=1)
     assert warm.status == cold.status == "optimal"
     assert warm.figures["peak_acceleration"] == pytest.approx(cold.figures["peak_acceleration"], rel=1e-9)
 
@@ -207,13 +207,13 @@ def test_a_machine_of_another_size_has_the_scaled_optimum(scene, best, factor):
 @pytest.mark.parametrize(("stroke", "dwell"), [(700, 20), (700, 40), (780, 35), (850, 22), (900, 20), (900, 40)])
 @pytest.mark.few(1)
 def test_other_strokes_and_dwells_are_optimal_and_certified(scene, stroke, dwell):
-    asked = scene.update(
+    second_scene = scene.update(
         {
             "operation.stroke": f"{stroke} mm",
             **{f"operation.dwell_{side}": f"{dwell} deg" for side in ("after", "before")},
         }
     )
-    answer = lo.solve(asked, starts=1)
+    answer = lo.solve(second_scene, starts=1)
     assert answer.status == "optimal", answer.message
     assert answer.certificate.passed
-    assert_held(asked, answer)
+    assert_held(second_scene, answer)

@@ -90,7 +90,7 @@ def test_every_figure_of_the_coils_is_plain_arithmetic_and_every_demand_is_held(
     changes = {"any": {"effects__coil__sizes": "any"}, "short": {"effects__coil__spring_length": "200 mm"}}
     answer = coiled("shedding", operation__speed="300 rpm") if name == "slow" else coiled(**changes.get(name, {}))
     assert answer.status == "optimal"
-    v, found, cam = answer.design, answer.figures, answer.scene.operation["speed"] / (2 * math.pi)
+    v, result, cam = answer.design, answer.figures, answer.scene.operation["speed"] / (2 * math.pi)
     travel = answer.scene.mechanism["travel"]
     d, D, n, initial = (v[key] for key in ("wire", "diameter", "turns", "initial_tension"))
     F, stretch = v["K1"] * (v["X0"] + travel) / 2, v["X0"] + travel
@@ -107,7 +107,7 @@ def test_every_figure_of_the_coils_is_plain_arithmetic_and_every_demand_is_held(
         "K1": 2 * rate(STEEL, d, D, n),
     }
     for key, value in expected.items():
-        assert found[key] == pytest.approx(value, rel=1e-9), key
+        assert result[key] == pytest.approx(value, rel=1e-9), key
     least, most = winding(d, D)
     small = 1e-9
     assert 4 - small <= expected["coil_index"] <= 12 + small
@@ -117,7 +117,7 @@ def test_every_figure_of_the_coils_is_plain_arithmetic_and_every_demand_is_held(
     assert expected["spring_length"] <= space * (1 + small)
     assert least * (1 - small) <= initial <= min(most, v["K1"] * v["X0"] / 2) * (1 + small)
     assert all(limit.ok for limit in answer.limits)
-    assert found["contact_min"] >= -1e-9 * found["contact_max"]
+    assert result["contact_min"] >= -1e-9 * result["contact_max"]
 
 
 def test_todays_coils_that_do_not_give_k1_are_shown_as_not_held():
@@ -130,7 +130,7 @@ def test_todays_coils_that_do_not_give_k1_are_shown_as_not_held():
     assert not limits[RATE].ok
     assert not limits["initial tension: no less than winding gives"].ok
     assert winding(0.006, 0.045)[0] > 100
-    kept = (
+    subset = (
         "coil_index",
         "shear_share",
         "bending_share",
@@ -138,7 +138,7 @@ def test_todays_coils_that_do_not_give_k1_are_shown_as_not_held():
         "spring_length",
         "coils are drawn open at the top",
     )
-    assert all(limits[name].ok for name in kept)
+    assert all(limits[name].ok for name in subset)
     right = lo.evaluate(scene.set("mechanism.K1", f"{given!r} N/m"))
     assert next(limit for limit in right.limits if limit.name == RATE).ok
 
@@ -179,11 +179,11 @@ def test_the_least_relaxations_help_when_granted_and_not_when_cut_short(name, ch
 @pytest.mark.slow
 def test_the_fastest_cam_that_any_coil_keeps_up_with_is_that_found_by_hand():
     """The thickest wire; by hand some diameter will do just below the speed, none just above it."""
-    (relaxation,) = [each for each in coiled("shedding").relaxation if each.limit == "speed"]
+    (relaxation,) = [item for item in coiled("shedding").relaxation if item.limit == "speed"]
     rpm = relaxation.needed / RPM
-    for share, kept in ((0.9995, True), (1.0005, False)):
+    for share, remaining in ((0.9995, True), (1.0005, False)):
         contact = Contact(replace(plain.PAPER, rpm=rpm * share))
-        assert any(softest(STEEL, contact, wire, 10_001) for wire in (0.009, 0.0094, 0.0095)) is kept
+        assert any(softest(STEEL, contact, wire, 10_001) for wire in (0.009, 0.0094, 0.0095)) is remaining
 
 
 @pytest.mark.few(1)
@@ -267,8 +267,8 @@ TODAY = {"wire": "7.5 mm", "diameter": "45 mm", "turns": "8", "initial_tension":
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("ratio", "stops"), [("13", "contact"), ("18", "surge")])
 def test_the_highest_speed_of_todays_coils_is_where_contact_ends_or_they_surge(ratio, stops):
-    own = {f"effects__coil__{key}": value for key, value in TODAY.items()} | {"effects__coil__surge_ratio": ratio}
-    answer = coiled(target="speed", mechanism__X0="25 mm", **own)
+    values = {f"effects__coil__{key}": value for key, value in TODAY.items()} | {"effects__coil__surge_ratio": ratio}
+    answer = coiled(target="speed", mechanism__X0="25 mm", **values)
     K1 = 2 * rate(STEEL, 0.0075, 0.045, 8)
     contact = float(plain.contact_speed(replace(plain.PRINTED, X0=0.025), K1))
     surging = 60 * surge(STEEL, 0.0075, 0.045, 8) / float(ratio)

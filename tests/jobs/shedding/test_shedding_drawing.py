@@ -80,16 +80,16 @@ def drawn(scene, design, tmp_path):
 
 def polyline(document, layer):
     """Return the one closed polyline of a layer, (n, 2) mm."""
-    (found,) = document.modelspace().query(f'LWPOLYLINE[layer=="{layer}"]')
-    assert found.closed
-    assert not found.has_arc
-    return np.array([point[:2] for point in found.get_points()])
+    (result,) = document.modelspace().query(f'LWPOLYLINE[layer=="{layer}"]')
+    assert result.closed
+    assert not result.has_arc
+    return np.array([point[:2] for point in result.get_points()])
 
 
 def promised(texts):
     """Return the chord tolerance, mm, that a drawing's or a table's texts state."""
-    (found,) = [re.search(r"chord.tolerance\D*([0-9.]+) mm", text) for text in texts if "chord" in text]
-    return float(found[1])
+    (result,) = [re.search(r"chord.tolerance\D*([0-9.]+) mm", text) for text in texts if "chord" in text]
+    return float(result[1])
 
 
 @pytest.mark.slow
@@ -141,14 +141,14 @@ def test_each_roller_touches_the_profile_and_cuts_no_sound_cam(tmp_path):
 def test_the_positions_are_the_dwells_and_the_least_cam_force():
     scene = lo.load("shedding")
     least = lo.evaluate(scene).figures["contact_angle"]
-    found = shedding_drawing.picture(cam_curves.cam(scene, {}), least)
-    assert found.theta == {
+    result = shedding_drawing.picture(cam_curves.cam(scene, {}), least)
+    assert result.theta == {
         "near dwell": 0.0,
         "far dwell": pytest.approx(math.radians(150)),
         "least cam force": least,
     }
-    _, centre, profile, *_ = plain(scene, CYCLOIDAL, np.array(list(found.theta.values())))
-    for at, middle, touched in zip(found.skeleton.joints.values(), centre, profile, strict=True):
+    _, centre, profile, *_ = plain(scene, CYCLOIDAL, np.array(list(result.theta.values())))
+    for at, middle, touched in zip(result.skeleton.joints.values(), centre, profile, strict=True):
         assert at["C"] == pytest.approx(tuple(middle / 1e3), abs=1e-12)
         assert at["T"] == pytest.approx(tuple(touched / 1e3), abs=1e-12)
 
@@ -246,8 +246,8 @@ def test_the_sketch_stands_clear_of_the_cam(tmp_path):
 
 def test_the_table_tells_the_spring_of_the_design():
     head = table(lo.load("shedding"), {"K1": 1e4, "X0": 0.05})[0]
-    told = {"# K1: 10000 N/m, all return springs together", "# X0: 50 mm of preload", "# preload: 500 N = K1 X0"}
-    assert told <= set(head)
+    texts = {"# K1: 10000 N/m, all return springs together", "# X0: 50 mm of preload", "# preload: 500 N = K1 X0"}
+    assert texts <= set(head)
 
 
 def test_the_table_says_where_it_comes_from_and_what_the_workshop_must_know():
@@ -300,7 +300,7 @@ def test_an_undercut_cam_is_drawn_as_it_is_and_says_so():
 
 
 def without(scene, *names):
-    document = {table: dict(own) for table, own in scene.document.items()}
+    document = {table: dict(values) for table, values in scene.document.items()}
     for name in names:
         del document["mechanism"][name]
     return lo.scene(document)
@@ -314,8 +314,8 @@ def test_a_scene_without_its_follower_is_refused_by_its_missing_keys(names):
     for draw in (view.linkage, view.joints_csv):
         with pytest.raises(BadInput) as caught:
             draw(scene, {})
-        said = str(caught.value).split(":")[1]
-        assert {key.strip() for key in said.split(",")} == {f"mechanism.{name}" for name in names}
+        message = str(caught.value).split(":")[1]
+        assert {key.strip() for key in message.split(",")} == {f"mechanism.{name}" for name in names}
 
 
 def test_a_follower_that_cannot_work_is_refused():
@@ -328,8 +328,8 @@ def test_tracing_a_machine_of_any_size_ends():
     scene = lo.load("shedding")
     for factor in (1e-3, 1e6):
         sizes = {f"mechanism.{k}": f"{factor * scene.mechanism[k]:.12g} m" for k in FOLLOWER if k != "arm_swing"}
-        found = cam_curves.traced(cam_curves.cam(scene.update(sizes), {}))
-        assert 30 < len(found.theta) < 30_000
+        result = cam_curves.traced(cam_curves.cam(scene.update(sizes), {}))
+        assert 30 < len(result.theta) < 30_000
 
 
 def test_the_least_force_of_a_design_is_where_its_figures_say(tmp_path):

@@ -12,8 +12,8 @@ STATIC = lo.load("shedding-static")
 
 def least(dwells, n_min):
     """K1, N/m, by statics: K1 (X0 + X) = N_min + G + T in each dwell that is there."""
-    found = {"far_dwell": (n_min + G - T2) / (X0 + H), "near_dwell": (n_min + G + T1) / X0}
-    return max(found[name] for name in dwells)
+    results = {"far_dwell": (n_min + G - T2) / (X0 + H), "near_dwell": (n_min + G + T1) / X0}
+    return max(results[name] for name in dwells)
 
 
 @pytest.mark.parametrize("n_min", [0.0, 5.0])
@@ -21,15 +21,15 @@ def least(dwells, n_min):
 @pytest.mark.parametrize("gone", ["near_dwell", "far_dwell"])
 @pytest.mark.few(4)
 def test_a_dwell_counts_from_the_least_length_that_floats_tell_from_none(gone, length, n_min):
-    kept = "far_dwell" if gone == "near_dwell" else "near_dwell"
+    remaining = "far_dwell" if gone == "near_dwell" else "near_dwell"
     turned = {f"mechanism.{gone}": f"{length} deg", "mechanism.return": f"{180 - float(length)!r} deg"}
     scene = STATIC.update({**turned, "operation.N_min": f"{n_min} N"})
-    there = (kept, gone) if float(length) > 5.8e-11 else (kept,)
+    there = (remaining, gone) if float(length) > 5.8e-11 else (remaining,)
     answer = lo.solve(scene, prove=True)
     assert answer.status == "optimal", answer.message
     assert answer.figures["K1"] == pytest.approx(least(there, n_min), rel=1e-12)
     assert answer.figures["contact_min"] == pytest.approx(n_min, abs=1e-9)
-    words = "in both dwells" if len(there) > 1 else f"in the {kept.removesuffix('_dwell')} dwell"
+    words = "in both dwells" if len(there) > 1 else f"in the {remaining.removesuffix('_dwell')} dwell"
     assert words in answer.message
 
 
@@ -37,7 +37,7 @@ def test_a_travel_that_would_better_be_longer_has_a_price_of_that_side():
     """Without a near dwell, more travel stretches the spring: what is kept binds on its other side."""
     scene = STATIC.update({"mechanism.near_dwell": "0 deg", "mechanism.return": "180 deg"})
     answer = lo.solve(scene)
-    (price,) = [each for each in answer.binding if each.limit == "travel"]
+    (price,) = [item for item in answer.binding if item.limit == "travel"]
     longer = lo.solve(scene.set("mechanism.travel", "65.601 mm")).figures["K1"]
     assert price.text == "travel <= 65.6 mm"
     assert price.side == "max"

@@ -91,12 +91,12 @@ def test_a_spline_law_is_printed_on_the_interval_between_two_knots():
     knots = cycloid_like(10)
     scene = SCENE.update({"mechanism.law": "spline", "mechanism.law_coefficients": list(knots)})
     kind = "cam law spline, k = 0 ... 9"
-    found = dict(text.split(" = ") for text in printed(scene, kind))
+    result = dict(text.split(" = ") for text in printed(scene, kind))
     made, k, u = spline(FLOAT, knots), 3, 0.337
     known = {f"{letter}_k": getattr(made, letter)[k] for letter in "sva"} | {"a_next": made.a[k + 1]}
-    known["t"] = value(found["t"], u=u, k=k)
+    known["t"] = value(result["t"], u=u, k=k)
     for name, exact in zip(("s", "s'", "s''"), made.at(FLOAT, u, k), strict=False):
-        assert value(found[name], **known) == pytest.approx(exact, rel=1e-12)
+        assert value(result[name], **known) == pytest.approx(exact, rel=1e-12)
     assert printed(scene, "cam law, at rest at both ends") == ["s_0 = 0", "v_0 = 0", "s_10 = 1", "v_10 = 0"]
 
 
@@ -104,8 +104,8 @@ def test_a_law_from_a_table_says_so(tmp_path):
     rows = "\n".join(f"{12 * k},{65.6 * (k / 10 - math.sin(2 * math.pi * k / 10) / 2 / math.pi)!r}" for k in range(11))
     (tmp_path / "law.csv").write_text(f"angle [deg],s [mm]\n{rows}\n")
     scene = SCENE.update({"mechanism.law": "table", "mechanism.law_table": str(tmp_path / "law.csv")})
-    (said,) = printed(scene, "cam law table")
-    assert said == "s(u): the C2 cubic through the table's 11 points (u, s), s' = 0 at both ends"
+    (message,) = printed(scene, "cam law table")
+    assert message == "s(u): the C2 cubic through the table's 11 points (u, s), s' = 0 at both ends"
 
 
 @pytest.mark.parametrize("theta", [0.4, 1.3, 2.6, 4.0, 5.6])
@@ -143,14 +143,14 @@ def test_segments_that_are_not_there_are_not_printed():
 
 @pytest.mark.parametrize("on", [(), ("weight",), ("warp_tension", "inertia"), LOADS, (*LOADS, "coil")])
 def test_an_effect_has_its_term_and_its_symbols_exactly_when_it_is_on(on):
-    found = registry.of(SCENE).views.equations(with_effects(*on))
-    names = [equation.name for equation in found]
+    equations = registry.of(SCENE).views.equations(with_effects(*on))
+    names = [equation.name for equation in equations]
     assert "return_spring" in names
-    (balance,) = (equation.text for equation in found if equation.name == "balance")
+    (balance,) = (equation.text for equation in equations if equation.name == "balance")
     terms = {f"N_{name}" for name in ("return_spring", *on) if name != "coil"}
     assert set(balance.removeprefix("N = ").split(" + ")) == terms
     words = set(
-        " ".join(f" {equation.text} " for equation in found).translate(str.maketrans("*/^()+-,", " " * 8)).split()
+        " ".join(f" {equation.text} " for equation in equations).translate(str.maketrans("*/^()+-,", " " * 8)).split()
     )
     for effect, symbols in OWN.items():
         assert (effect in names) == (effect in on)
@@ -209,7 +209,7 @@ def test_the_printed_follower_is_the_kernels():
 
 
 def test_without_follower_nothing_of_it_is_printed():
-    document = {table: dict(own) for table, own in SCENE.document.items()}
+    document = {table: dict(values) for table, values in SCENE.document.items()}
     del document["mechanism"]["arm"]
     scene = lo.scene(document)
     names = {equation.name for equation in registry.of(scene).views.equations(scene)}
@@ -231,8 +231,8 @@ def test_printed_rows_of_the_coil_are_its_figures_and_what_it_keeps():
         name, formula = text.split(" = ")
         needed = {key: number for key, number in known.items() if key in plain(formula)}
         assert value(formula, **needed) == pytest.approx(figures[name], rel=1e-9), name
-    kept = [text for text in printed(scene, "coil") if " = " not in text]
-    assert kept == [
+    subset = [text for text in printed(scene, "coil") if " = " not in text]
+    assert subset == [
         "coil_index >= 4",
         "coil_index <= 12",
         "shear_share <= shear_share_max",

@@ -82,7 +82,7 @@ def test_n_min_is_a_level_and_so_are_the_rollers_own_curvature_and_the_laws_limi
         ("pitch curvature [1/m]", "undercut", 50),
         ("acceleration s'' of the cam law s_2", "law_acceleration <= 7", 7),
     ):
-        assert any(text in each for each in said(panels[title]))
+        assert any(text in item for item in said(panels[title]))
         levels = [line.get_ydata() for line in panels[title].lines if len(line.get_ydata()) == 2]
         assert any(np.allclose(ends, level) for ends in levels)
 
@@ -118,7 +118,7 @@ def test_no_curve_runs_back_across_the_figure(name):
 
 
 def test_a_scene_without_follower_has_no_panels_of_it():
-    document = {table: dict(own) for table, own in lo.load("shedding").document.items()}
+    document = {table: dict(values) for table, values in lo.load("shedding").document.items()}
     del document["mechanism"]["arm"]
     assert len(axes_of(lo.scene(document), {})) == 7
 

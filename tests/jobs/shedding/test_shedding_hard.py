@@ -62,8 +62,8 @@ def assert_helped(scene, answer, target="stiffness"):
     values = [*answer.design.values(), *(value for value in answer.figures.values() if value is not None)]
     assert all(map(math.isfinite, values))
     assert answer.relaxation
-    together = [one for one in answer.relaxation if not one.alone]
-    sets = [[one] for one in answer.relaxation if one.alone] + ([together] if together else [])
+    together = [relaxation for relaxation in answer.relaxation if not relaxation.alone]
+    sets = [[relaxation] for relaxation in answer.relaxation if relaxation.alone] + ([together] if together else [])
     for relaxations in sets:
         helped = lo.solve(granted(scene, relaxations, target), target)
         assert helped.status == "optimal", (relaxations, helped.message)
@@ -78,7 +78,7 @@ def test_what_cannot_be_had_is_said_with_relaxations_that_help(name):
         warnings.simplefilter("error")
         answer = lo.solve(scene)
     assert_helped(scene, answer)
-    assert {one.limit for one in answer.relaxation} <= {*KEY, *FIGURE_UNITS}
+    assert {relaxation.limit for relaxation in answer.relaxation} <= {*KEY, *FIGURE_UNITS}
 
 
 @pytest.mark.parametrize(
@@ -90,14 +90,14 @@ def test_no_relaxation_asks_the_cam_to_pull(target, changes):
     """The paper's own spring at 600 rpm; and a spring that does not even hold at rest."""
     scene = lo.load("shedding").update(changes)
     answer = lo.solve(scene, target)
-    assert all(one.needed >= 0 for one in answer.relaxation)
+    assert all(relaxation.needed >= 0 for relaxation in answer.relaxation)
     assert_helped(scene, answer, target)
 
 
 def test_the_papers_spring_is_told_what_each_limit_by_itself_would_have_to_give():
     """102602.6 N/m, 144.51 rpm; 13.16 kN is what the cam force lacks: the values found on other ways."""
     scene = lo.load("shedding").set("bounds.K1.max", "8029.14 N/m")
-    alone = {one.limit: one.needed for one in lo.solve(scene).relaxation if one.alone}
+    alone = {relaxation.limit: relaxation.needed for relaxation in lo.solve(scene).relaxation if relaxation.alone}
     assert alone["K1"] == pytest.approx(102602.609425357, rel=1e-6)
     assert alone["speed"] * 30 / math.pi == pytest.approx(144.508702549, rel=1e-6)
     assert softest(PAPER, alone["X0"]) == pytest.approx(8029.14, rel=1e-6)
@@ -184,8 +184,8 @@ def test_dwells_that_may_vanish_do(angles, damping):
     turn = replace(PAPER, angles=(180, 0, 180, 0))
     half = float(plain.least_stiffness(replace(turn, C=damping))[0])
     assert answer.figures["K1"] == pytest.approx(half, rel=1e-9) if not damping else answer.figures["K1"] < half
-    found = plain.least_stiffness(replace(turn, C=damping, angles=(rise, 0, back, 0)))[0]
-    assert answer.figures["K1"] == pytest.approx(float(found), rel=1e-7)
+    result = plain.least_stiffness(replace(turn, C=damping, angles=(rise, 0, back, 0)))[0]
+    assert answer.figures["K1"] == pytest.approx(float(result), rel=1e-7)
     assert back >= rise - 1e-6
 
 
@@ -201,9 +201,9 @@ def test_the_certificate_refuses_a_spring_a_millionth_off(target, name, share):
     answer = solved(scene, target)
     x = job.values(program, answer.design)
     assert certify(program, x, 1e-8).passed
-    found = certify(program, x | {"K1": x["K1"] * (1 + share)}, 1e-8)
-    assert not found.passed
-    assert ("N_min" in found.reasons[0]) == (share < 0)
+    certificate = certify(program, x | {"K1": x["K1"] * (1 + share)}, 1e-8)
+    assert not certificate.passed
+    assert ("N_min" in certificate.reasons[0]) == (share < 0)
 
 
 def test_the_certificate_refuses_contact_lost_by_a_hundred_millionth():
@@ -211,6 +211,6 @@ def test_the_certificate_refuses_contact_lost_by_a_hundred_millionth():
     job = registry.of(scene)
     program = job.program(scene, "stiffness")
     x = job.values(program, solved(scene).design)
-    found = certify(program, x | {"K1": x["K1"] * (1 - 1e-8)}, 1e-8)
-    assert not found.passed
-    assert found.feasibility > 1e-9
+    certificate = certify(program, x | {"K1": x["K1"] * (1 - 1e-8)}, 1e-8)
+    assert not certificate.passed
+    assert certificate.feasibility > 1e-9

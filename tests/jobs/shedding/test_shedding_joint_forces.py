@@ -37,9 +37,9 @@ def sampler(case):
     return job.sampler(scene, {**job.today(scene), "K1": CASES[case][2]})
 
 
-def at(found, name, theta, piece):
-    node = Node(theta, found.cycle.switch(piece))
-    return float(found.model.quantity(systems.FLOAT, found.given, name, node))
+def at(result, name, theta, piece):
+    node = Node(theta, result.cycle.switch(piece))
+    return float(result.model.quantity(systems.FLOAT, result.given, name, node))
 
 
 NAMES = {
@@ -59,26 +59,26 @@ TAKEN = ("F_P_x", "F_P_y")
 
 @pytest.mark.parametrize("case", CASES)
 def test_forces_are_those_of_the_reference(case):
-    found, checked = sampler(case), set()
+    result, checked = sampler(case), set()
     for row in (row for row in REFERENCE if row["case"] == case):
-        what, value = row["quantity"], float(row["value"])
-        place = next((each for each in sorted(NAMES, key=len)[::-1] if what.startswith(each)), "")
-        name, kind = NAMES.get(place, ""), what.removeprefix(place).strip()
+        subject, value = row["quantity"], float(row["value"])
+        place = next((item for item in sorted(NAMES, key=len)[::-1] if subject.startswith(item)), "")
+        name, kind = NAMES.get(place, ""), subject.removeprefix(place).strip()
         if kind == "peak":
             size = math.radians(value) if row["unit"] == "deg" else value
-            assert found.peak(name) == pytest.approx(size, rel=1e-12), what
+            assert result.peak(name) == pytest.approx(size, rel=1e-12), subject
         elif kind == "peak angle" and name != "shaking_force":
             # The reference's own search ends within 2e-8 of a top; of tops that mirror each other it took one.
-            tops = found.extremes(name)
+            tops = result.extremes(name)
             alike = (top for top in tops if top.height > (1 - 1e-9) * tops[0].height)
-            angles = [math.degrees(found.angle(top)) % 360 for top in alike]
-            assert any(angle == pytest.approx(value, rel=1e-7) for angle in angles), what
+            angles = [math.degrees(result.angle(top)) % 360 for top in alike]
+            assert any(angle == pytest.approx(value, rel=1e-7) for angle in angles), subject
         elif kind.startswith("at ") and name:
             theta = math.radians(float(kind.split()[1]))
             # The frame begins to rise at 0: the reference has no dry friction there, the mean of both sides.
-            pieces = {found.cycle.piece_before(theta), *([found.cycle.place(theta)[0]] if theta == 0.0 else [])}
-            own = [at(found, name, theta, piece) * (-1 if place in TAKEN else 1) for piece in pieces]
-            assert sum(own) / len(own) == pytest.approx(value, rel=1e-11, abs=1e-9), what
+            pieces = {result.cycle.piece_before(theta), *([result.cycle.place(theta)[0]] if theta == 0.0 else [])}
+            values = [at(result, name, theta, piece) * (-1 if place in TAKEN else 1) for piece in pieces]
+            assert sum(values) / len(values) == pytest.approx(value, rel=1e-11, abs=1e-9), subject
         else:
             continue
         checked.add(name)
@@ -87,29 +87,29 @@ def test_forces_are_those_of_the_reference(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_the_cam_s_torque_is_that_of_the_roller_s_force(case):
-    found = sampler(case)
-    pieces, u = found.grid(1440)
-    instant = found.model.instant(systems.numpy(), found.given, found.node(pieces, u))
-    contact = instant.pose.contact(follower(found.given.values))
-    place, normal, force = contact.centre(0), contact.normal(0), found.at("roller_force", pieces, u)
+    second_sampler = sampler(case)
+    pieces, u = second_sampler.grid(1440)
+    instant = second_sampler.model.instant(systems.numpy(), second_sampler.given, second_sampler.node(pieces, u))
+    contact = instant.pose.contact(follower(second_sampler.given.values))
+    place, normal, force = contact.centre(0), contact.normal(0), second_sampler.at("roller_force", pieces, u)
     # The normal points to the cam: the roller pushes it there.
     torque = -force * (place.x * normal.y - place.y * normal.x)
     expected = instant.force * instant.pose.q1
     assert np.max(np.abs(torque - expected)) <= 1e-12 * np.max(np.abs(expected))
     # Of the frame on the lever: with the roller's and the rod's force nothing is left.
-    rod = instant.force * found.given.values["travel"] / found.given.values["arm_swing"] / 0.15
-    pivot = [found.at(f"lever_pivot_force_{axis}", pieces, u) for axis in "xy"]
+    rod = instant.force * second_sampler.given.values["travel"] / second_sampler.given.values["arm_swing"] / 0.15
+    pivot = [second_sampler.at(f"lever_pivot_force_{axis}", pieces, u) for axis in "xy"]
     angle = math.radians(80)
     assert np.max(np.abs(pivot[0] - force * normal.x + rod * math.cos(angle))) <= 1e-12 * np.max(force)
     assert np.max(np.abs(pivot[1] - force * normal.y + rod * math.sin(angle))) <= 1e-12 * np.max(force)
-    side, couple = found.at("roller_side", pieces, u), found.at("lever_couple", pieces, u)
-    assert np.hypot(side, couple / found.given.values["arm"]) == pytest.approx(np.abs(force), rel=1e-12)
+    side, couple = second_sampler.at("roller_side", pieces, u), second_sampler.at("lever_couple", pieces, u)
+    assert np.hypot(side, couple / second_sampler.given.values["arm"]) == pytest.approx(np.abs(force), rel=1e-12)
 
 
 def test_where_contact_is_lost_there_is_no_force():
     scene = scene_of("shedding")
-    found = lo.evaluate(scene)
-    assert found.figures["contact_min"] < -1e4
+    evaluation = lo.evaluate(scene)
+    assert evaluation.figures["contact_min"] < -1e4
     frame = lo.simulate(scene)
     lost = frame["N [N]"] < 0
     assert lost.any()
@@ -117,18 +117,18 @@ def test_where_contact_is_lost_there_is_no_force():
         column = frame[f"{name} [{unit}]"]
         assert (column[lost] == 0.0).all()
         # The figure is refined between the rows of the curve.
-        assert found.figures[name] == pytest.approx(column.abs().max(), rel=1e-4)
-        assert found.figures[name] >= column.abs().max() * (1 - 1e-12)
+        assert evaluation.figures[name] == pytest.approx(column.abs().max(), rel=1e-4)
+        assert evaluation.figures[name] >= column.abs().max() * (1 - 1e-12)
     assert frame["shaking_force [N]"][lost].abs().max() > 0.0
 
 
 def test_a_figure_without_its_numbers_is_undefined_and_says_why():
     scene = scene_of("shedding")
-    found = lo.evaluate(scene)
-    assert found.figures["lever_pivot_force"] is None
+    evaluation = lo.evaluate(scene)
+    assert evaluation.figures["lever_pivot_force"] is None
     keys = "mechanism.lever.arm and mechanism.lever.direction"
-    assert set(found.undefined) == {"lever_pivot_force", "friction_loss"}
-    assert found.undefined["lever_pivot_force"] == f"lever_pivot_force needs {keys}"
+    assert set(evaluation.undefined) == {"lever_pivot_force", "friction_loss"}
+    assert evaluation.undefined["lever_pivot_force"] == f"lever_pivot_force needs {keys}"
     with pytest.raises(BadInput, match=f"limits.lever_pivot_force: lever_pivot_force needs {keys}") as refused:
         lo.solve(scene.set("limits.lever_pivot_force.max", "50 kN"))
     assert "follower" not in str(refused.value)
@@ -136,18 +136,18 @@ def test_a_figure_without_its_numbers_is_undefined_and_says_why():
     with pytest.raises(BadInput, match="Give the follower"):
         lo.solve(lo.scene(removed(limited.document, ["mechanism", "arm"])))
     bare = lo.load("shedding-static").with_effect("joint_forces")
-    told = lo.evaluate(bare).undefined
-    assert {"shaking_force", "lever_pivot_force"} <= set(told)
-    assert told["shaking_force"] == "shaking_force needs effects.inertia.M"
+    report = lo.evaluate(bare).undefined
+    assert {"shaking_force", "lever_pivot_force"} <= set(report)
+    assert report["shaking_force"] == "shaking_force needs effects.inertia.M"
     assert lo.evaluate(scene.update(LEVER)).figures["lever_pivot_force"] > 0.0
 
 
 def test_as_figures_alone_they_change_nothing_of_a_solve():
-    plain, own = (lo.solve(scene) for scene in (lo.load("shedding"), scene_of("shedding")))
-    assert own.figures["K1"] == plain.figures["K1"]
-    assert own.solver["designs"] == plain.solver["designs"], "still one optimum, which needs no search"
-    assert own.figures["roller_force"] == pytest.approx(54464.968609901, rel=1e-11)
-    assert own.figures["lever_couple"] == pytest.approx(6782.235694604, rel=1e-11)
+    plain, values = (lo.solve(scene) for scene in (lo.load("shedding"), scene_of("shedding")))
+    assert values.figures["K1"] == plain.figures["K1"]
+    assert values.solver["designs"] == plain.solver["designs"], "still one optimum, which needs no search"
+    assert values.figures["roller_force"] == pytest.approx(54464.968609901, rel=1e-11)
+    assert values.figures["lever_couple"] == pytest.approx(6782.235694604, rel=1e-11)
 
 
 @pytest.mark.slow

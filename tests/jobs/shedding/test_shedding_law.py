@@ -241,10 +241,10 @@ def slope(sampled, piece, corner):
     warp = next(load for load in sampled.model.loads if load.name == "warp_tension")
     start, end = sampled.cycle.starts[piece : piece + 2]
     inside, switch = (1 if start >= corner - 1e-9 else -1), sampled.cycle.switch(piece)
-    found = []
+    results = []
     for away in (0.0, 1e-4):
         node = Node(corner + inside * away * (end - start), switch)
         pose = sampled.model.instant(systems.FLOAT, sampled.given, node).pose
         pull = -warp.force(sampled.given.inputs(systems.FLOAT, warp, pose, switch))
-        found.append((pose.q, pull))
-    return (found[1][1] - found[0][1]) / (found[1][0] - found[0][0])
+        results.append((pose.q, pull))
+    return (results[1][1] - results[0][1]) / (results[1][0] - results[0][0])

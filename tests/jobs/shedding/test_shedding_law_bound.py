@@ -30,11 +30,11 @@ def small(**changes):
 @pytest.mark.parametrize("travel", TRAVELS)
 def test_the_spring_falls_as_the_bound_is_loosened_which_each_law_uses_to_the_full(travel):
     case, factors = TRAVELS[travel], (0.9, 1, 1.5, 2)
-    found = [freed(case, 8, bound=factor * CYCLOID).figures for factor in factors]
-    for factor, figures in zip(factors, found, strict=True):
+    results = [freed(case, 8, bound=factor * CYCLOID).figures for factor in factors]
+    for factor, figures in zip(factors, results, strict=True):
         assert figures["law_acceleration"] == pytest.approx(factor * CYCLOID, rel=1e-9)
         assert figures["K1"] == pytest.approx(programmed(case, 8, bound=factor * CYCLOID), rel=1e-9)
-    springs = [figures["K1"] for figures in found]
+    springs = [figures["K1"] for figures in results]
     assert springs == sorted(springs, reverse=True)
     assert springs[-1] < 0.8 * springs[1]
 
@@ -49,10 +49,10 @@ def test_without_a_bound_there_is_no_least_spring(travel):
     case = TRAVELS[travel]
     infimum = plain.unbounded_law(case)
     assert infimum == pytest.approx({"65.6 mm": 35567.226902713526, "14.5 mm": 14132.952938368744}[travel], rel=1e-12)
-    found = [freed(case, n, bound=8 * CYCLOID).figures for n in (8, 16)]
-    peaks = [figures["law_acceleration"] / CYCLOID for figures in found]
+    results = [freed(case, n, bound=8 * CYCLOID).figures for n in (8, 16)]
+    peaks = [figures["law_acceleration"] / CYCLOID for figures in results]
     assert 2 < peaks[0] < 3 < 4.5 < peaks[1] < 8
-    above = [figures["K1"] / infimum - 1 for figures in found]
+    above = [figures["K1"] / infimum - 1 for figures in results]
     above += [programmed(case, n, bound=64 * CYCLOID) / infimum - 1 for n in (32, 64)]
     assert above[1] == pytest.approx(programmed(case, 16, bound=64 * CYCLOID) / infimum - 1, rel=1e-8)
     assert all(0 < fine < 0.6 * coarse for coarse, fine in itertools.pairwise(above))
@@ -73,9 +73,9 @@ def test_a_bound_no_law_keeps_exits_with_what_it_must_be():
 def test_a_limit_on_the_figure_overrides_the_targets_own_bound():
     both = small(**{"targets.law.acceleration": 7.0, "limits.law_acceleration.max": "8"})
     alone = small(**{"targets.law.acceleration": 8.0})
-    found = [lo.solve(scene, "law") for scene in (both, alone)]
-    assert found[0].design == found[1].design
-    assert found[0].figures["law_acceleration"] == pytest.approx(8, rel=1e-9)
+    results = [lo.solve(scene, "law") for scene in (both, alone)]
+    assert results[0].design == results[1].design
+    assert results[0].figures["law_acceleration"] == pytest.approx(8, rel=1e-9)
 
 
 PRICED = {
@@ -129,26 +129,26 @@ LAW = ("shedding-printed-travel", "--set", "targets.law.intervals=8")
 
 
 def test_a_found_law_goes_round_by_file_and_as_the_scenes_own(cli, tmp_path):
-    found = answered(cli, "solve", *LAW, "--target", "law")
-    assert isinstance(found["design"]["law"], list)
-    assert len(found["design"]["law"]) == 9
-    assert found["units"]["law"] == "1"
+    result = answered(cli, "solve", *LAW, "--target", "law")
+    assert isinstance(result["design"]["law"], list)
+    assert len(result["design"]["law"]) == 9
+    assert result["units"]["law"] == "1"
     file = tmp_path / "answer.json"
-    for content in (found, found["design"]):
+    for content in (result, result["design"]):
         file.write_text(json.dumps(content), encoding="utf-8")
         again = answered(cli, "evaluate", *LAW, "--design", file)
-        assert (again["design"], again["figures"]) == (found["design"], found["figures"])
+        assert (again["design"], again["figures"]) == (result["design"], result["figures"])
     text, scene = problems()["shedding-printed-travel"].read_text(encoding="utf-8"), tmp_path / "own.toml"
-    own = f'law = "spline"\nlaw_coefficients = {found["design"]["law"]}\n#'
+    values = f'law = "spline"\nlaw_coefficients = {result["design"]["law"]}\n#'
     assert text.count('law = "cycloidal"') == 1
-    scene.write_text(text.replace('law = "cycloidal"', own), encoding="utf-8")
+    scene.write_text(text.replace('law = "cycloidal"', values), encoding="utf-8")
     solved = answered(cli, "solve", scene)
-    assert solved["figures"]["K1"] == pytest.approx(found["figures"]["K1"], rel=1e-9)
-    file.write_text(json.dumps({"K1": found["design"]["K1"], "X0": found["design"]["X0"]}), encoding="utf-8")
+    assert solved["figures"]["K1"] == pytest.approx(result["figures"]["K1"], rel=1e-9)
+    file.write_text(json.dumps({"K1": result["design"]["K1"], "X0": result["design"]["X0"]}), encoding="utf-8")
     evaluated = answered(cli, "evaluate", scene, "--design", file)["figures"]
-    size = found["figures"]["contact_max"]
-    assert evaluated.keys() == found["figures"].keys()
-    for name, value in ((name, value) for name, value in found["figures"].items() if value is not None):
+    size = result["figures"]["contact_max"]
+    assert evaluated.keys() == result["figures"].keys()
+    for name, value in ((name, value) for name, value in result["figures"].items() if value is not None):
         assert evaluated[name] == pytest.approx(value, rel=1e-9, abs=1e-12 * size), name
 
 
@@ -192,6 +192,6 @@ def test_with_the_angles_freed_rise_and_return_take_all_they_may(travel):
 
 def test_the_shorter_of_rise_and_return_governs():
     """Mirrored, an undamped law needs the same spring whichever of the two is the shorter."""
-    found = [freed(replace(plain.PAPER, angles=angles), 8).figures["K1"] for angles in (UNEVEN, (130, 60, 100, 70))]
+    results = [freed(replace(plain.PAPER, angles=angles), 8).figures["K1"] for angles in (UNEVEN, (130, 60, 100, 70))]
     alike = freed(replace(plain.PAPER, angles=(100, 80, 100, 80)), 8).figures["K1"]
-    assert found == pytest.approx([alike, alike], rel=1e-9)
+    assert results == pytest.approx([alike, alike], rel=1e-9)

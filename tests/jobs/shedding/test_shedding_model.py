@@ -96,17 +96,17 @@ def test_derivatives_are_those_of_the_displacement_in_many_digits(scene):
     """Central differences in 60 digits, of each order from the one below it."""
     physics, sampled, h = JOB.model(scene), JOB.sampler(scene, {}), MANY.number(1e-15)
     given = in_system(scene, MANY, sampled)
-    found, expected = [], []
+    result, expected = [], []
     for angle, switches in nodes(sampled):
         here = physics.kinematics.pose(systems.FLOAT, sampled.given, Node(angle, switches))
         assert isinstance(here, FrameMotion)
         around = [Node(MANY.number(angle) + step, switches) for step in (h, 0, -h)]
         after, middle, before = (physics.kinematics.pose(MANY, given, node) for node in around)
-        found.append([here.q, here.q1, here.q2, here.q3])
+        result.append([here.q, here.q1, here.q2, here.q3])
         slopes = [(getattr(after, name) - getattr(before, name)) / (2 * h) for name in ("q", "q1", "q2")]
         expected.append([float(middle.q), *map(float, slopes)])
     size = np.max(np.abs(expected), axis=0)
-    assert np.max(np.abs(np.array(found) - expected) / size) <= 1e-12
+    assert np.max(np.abs(np.array(result) - expected) / size) <= 1e-12
 
 
 def test_derivatives_are_those_casadi_takes(scene):
@@ -121,8 +121,8 @@ def test_derivatives_are_those_casadi_takes(scene):
         both = ca.Function("both", [theta], [taken, ca.vertcat(pose.q1, pose.q2, pose.q3)])
         for share in (0.0, 0.3, 0.9):
             angle = sampled.cycle.angles(np.array([piece]), np.array([share]))[0]
-            slopes, own = (value.full().ravel() for value in both(angle))
-            sizes, away = np.maximum(sizes, np.abs(own)), np.maximum(away, np.abs(slopes - own))
+            slopes, values = (value.full().ravel() for value in both(angle))
+            sizes, away = np.maximum(sizes, np.abs(values)), np.maximum(away, np.abs(slopes - values))
     assert np.max(away / sizes) <= 1e-12
 
 
@@ -150,8 +150,8 @@ def test_every_quantity_is_the_same_in_every_number_system(scene):
                     float(physics.quantity(MANY, many, name, Node(MANY.number(angle), switches))),
                 ]
             )
-        found = np.array(rows)
-        assert np.max(np.abs(found - found[:, 3:])) <= 1e-12 * np.max(np.abs(found)), name
+        result = np.array(rows)
+        assert np.max(np.abs(result - result[:, 3:])) <= 1e-12 * np.max(np.abs(result)), name
 
 
 def test_travel_ends_and_rests_exactly(scene):
@@ -188,8 +188,8 @@ def test_corners_are_where_segments_begin_the_law_changes_and_the_shed_is_half_o
     scene = ruled(turned(FULL, 100, 70, 130, 60), law)
     breaks = sorted({*map(float, LAWS[law].breaks), HALF})
     expected = [0, 100, 170, 300, *(100 * u for u in breaks), *(300 - 130 * u for u in breaks)]
-    found = np.degrees(JOB.sampler(scene, {}).cycle.starts[:-1])
-    assert np.sort(found % 360) == pytest.approx(sorted(expected), abs=1e-10)
+    result = np.degrees(JOB.sampler(scene, {}).cycle.starts[:-1])
+    assert np.sort(result % 360) == pytest.approx(sorted(expected), abs=1e-10)
     without = scene.set("effects.warp_tension.shape", "step")
     expected = [0, 100, 170, 300, *(s for u in map(float, LAWS[law].breaks) for s in (100 * u, 300 - 130 * u))]
     assert np.sort(np.degrees(JOB.sampler(without, {}).cycle.starts[:-1])) == pytest.approx(sorted(expected), abs=1e-10)
@@ -243,11 +243,11 @@ def implicit(law, many, coefficients, hints):
         here = at(coefficients, u)
         u = u - (here.s - many.number(0.5)) / here.s1
     here, count = at(coefficients, u), len(coefficients)
-    each = [at([float(k == j) for j in range(count)], u) for k in range(1, count - 1)]
-    slope = [-one.s / here.s1 for one in each]
+    items = [at([float(k == j) for j in range(count)], u) for k in range(1, count - 1)]
+    slope = [-item.s / here.s1 for item in items]
     bend = [
-        [-(one.s1 * du + other.s1 * dv + here.s2 * du * dv) / here.s1 for other, du in zip(each, slope, strict=True)]
-        for one, dv in zip(each, slope, strict=True)
+        [-(item.s1 * du + other.s1 * dv + here.s2 * du * dv) / here.s1 for other, du in zip(items, slope, strict=True)]
+        for item, dv in zip(items, slope, strict=True)
     ]
     return np.array(slope, dtype=float), np.array(bend, dtype=float)
 
@@ -289,10 +289,10 @@ def power(sampled, name, nodes_=48):
     for piece in range(sampled.cycle.pieces):
         start, end = sampled.cycle.starts[piece : piece + 2]
         theta = start + (places + 1) / 2 * (end - start)
-        switches = {each: np.full(theta.shape, value) for each, value in sampled.cycle.switch(piece).items()}
+        switches = {item: np.full(theta.shape, value) for item, value in sampled.cycle.switch(piece).items()}
         pose = physics.kinematics.pose(systems.numpy(), sampled.given, Node(theta, switches))
-        values, own = sampled.given.values, sampled.given.tables[name]
-        term = load.force(Inputs(systems.numpy(), values, own, pose, switches.get(name, 0)))
+        values, parameters = sampled.given.values, sampled.given.tables[name]
+        term = load.force(Inputs(systems.numpy(), values, parameters, pose, switches.get(name, 0)))
         work += (end - start) / 2 * np.sum(weights * term * pose.q1)
         size += (end - start) / 2 * np.sum(weights * np.abs(term * pose.q1))
     return work, size

@@ -20,7 +20,7 @@ COIL = registry.load("shedding-printed-travel").with_effect("coil")
 
 
 def limits(program, name):
-    return [(each.sign, each.value, each.row, type(each)) for each in program.limits if each.name == name]
+    return [(limit.sign, limit.value, limit.row, type(limit)) for limit in program.limits if limit.name == name]
 
 
 def named(program):
@@ -37,17 +37,17 @@ def named(program):
     ],
 )
 def test_objectives_are_the_targets_levels(target, objective):
-    (found,) = JOB.program(SCENE, target).objectives
-    assert (found.figure, found.row, type(found), found.power) == objective
+    (result,) = JOB.program(SCENE, target).objectives
+    assert (result.figure, result.row, type(result), result.power) == objective
 
 
 def test_contact_is_one_limit_all_round_and_never_gives_way_itself():
-    found = JOB.program(SCENE, "stiffness")
-    assert limits(found, "N_min") == [(-1, 0.0, "lift", CycleLimit)]
-    (own,) = (each for each in found.cycle_limits.values() if each.name == "N_min")
-    assert (own.relaxable, own.hidden, own.where) == (False, False, None)
-    asked = JOB.program(SCENE.set("operation.N_min", "50 N"), "stiffness")
-    more, contact = (next(each for each in asked.limits if each.name == name) for name in ("N_min", "contact"))
+    second_program = JOB.program(SCENE, "stiffness")
+    assert limits(second_program, "N_min") == [(-1, 0.0, "lift", CycleLimit)]
+    (values,) = (item for item in second_program.cycle_limits.values() if item.name == "N_min")
+    assert (values.relaxable, values.hidden, values.where) == (False, False, None)
+    request = JOB.program(SCENE.set("operation.N_min", "50 N"), "stiffness")
+    more, contact = (next(item for item in request.limits if item.name == name) for name in ("N_min", "contact"))
     assert (more.value, more.relaxable, contact.value, contact.relaxable, contact.hidden) == (
         50.0,
         True,
@@ -64,20 +64,20 @@ def test_where_the_warps_pull_is_known_in_the_dwells_contact_is_judged_there():
 
 
 def test_what_a_target_keeps_is_a_variable_without_room_that_gives_way_downward():
-    found = JOB.program(SCENE, "stiffness")
+    second_program = JOB.program(SCENE, "stiffness")
     for name in ("travel", "speed"):
-        assert named(found)[name].lower == named(found)[name].upper
-        assert limits(found, name)[0][0] == -1
+        assert named(second_program)[name].lower == named(second_program)[name].upper
+        assert limits(second_program, name)[0][0] == -1
     still = JOB.program(SCENE.without_effect("inertia"), "stiffness")
     assert "speed" not in named(still), "nothing needs it"
 
 
 def test_target_speed_keeps_the_spring_and_starts_below_what_it_survives():
-    found = JOB.program(SCENE, "speed")
+    second_program = JOB.program(SCENE, "speed")
     survived = JOB.figures(SCENE, JOB.today(SCENE))["contact_speed"]
-    assert [named(found)[name].upper for name in ("K1", "X0")] == [8029.14, 0.08]
-    assert found.starts[0]["speed"] == pytest.approx(0.9 * survived)
-    assert named(found)["speed"].scale == pytest.approx(survived)
+    assert [named(second_program)[name].upper for name in ("K1", "X0")] == [8029.14, 0.08]
+    assert second_program.starts[0]["speed"] == pytest.approx(0.9 * survived)
+    assert named(second_program)["speed"].scale == pytest.approx(survived)
 
 
 def test_starts_are_stiff_enough_for_contact():
@@ -91,48 +91,51 @@ def test_starts_are_stiff_enough_for_contact():
 @pytest.mark.parametrize("symmetric", [False, True])
 def test_a_free_law_has_its_inner_knots_for_variables_and_stays_a_law(symmetric):
     scene = SCENE.update({"targets.law.symmetric": symmetric, "targets.law.intervals": 8})
-    found, knots = JOB.program(scene, "law"), range(1, 4 if symmetric else 8)
-    assert [name for name in named(found) if name.startswith("law_")] == [f"law_{k}" for k in knots]
-    assert limits(found, "law_end") == [(0, 1.0, "law_end", DesignLimit)]
-    assert limits(found, "law_end_slope") == ([] if symmetric else [(0, 0.0, "law_end_slope", DesignLimit)])
-    assert [row for name in ("law_slope_1", "law_slope_4") for _, _, row, _ in limits(found, name)] == [
+    result, knots = JOB.program(scene, "law"), range(1, 4 if symmetric else 8)
+    assert [name for name in named(result) if name.startswith("law_")] == [f"law_{k}" for k in knots]
+    assert limits(result, "law_end") == [(0, 1.0, "law_end", DesignLimit)]
+    assert limits(result, "law_end_slope") == ([] if symmetric else [(0, 0.0, "law_end_slope", DesignLimit)])
+    assert [row for name in ("law_slope_1", "law_slope_4") for _, _, row, _ in limits(result, name)] == [
         "law_slope_1",
         "law_slope_4",
     ]
-    peak = {value for _, value, _, _ in limits(found, "law_acceleration")}
+    peak = {value for _, value, _, _ in limits(result, "law_acceleration")}
     assert peak == {2 * math.pi}, "the cycloid's own"
     other = JOB.program(scene.set("limits.law_acceleration.max", 8), "law")
     assert {value for _, value, _, _ in limits(other, "law_acceleration")} == {8.0}
     start = cycloid_like(8)
-    assert [found.starts[0].get(f"law_{k}") for k in knots] == pytest.approx([start[k] for k in knots], rel=1e-12)
+    assert [result.starts[0].get(f"law_{k}") for k in knots] == pytest.approx([start[k] for k in knots], rel=1e-12)
 
 
 def test_freed_segments_leave_the_rest_to_the_near_dwell():
-    found = JOB.program(SCENE.free("rise"), "stiffness")
+    second_program = JOB.program(SCENE.free("rise"), "stiffness")
     ends = [
         (sign, pytest.approx(math.radians(value)), "near_dwell", DesignLimit) for sign, value in ((-1, 50), (1, 90))
     ]
-    assert limits(found, "near_dwell") == ends
-    assert {"rise", "far_dwell", "return"} <= set(named(found))
-    assert "near_dwell" not in named(found)
+    assert limits(second_program, "near_dwell") == ends
+    assert {"rise", "far_dwell", "return"} <= set(named(second_program))
+    assert "near_dwell" not in named(second_program)
     assert limits(JOB.program(SCENE, "stiffness"), "near_dwell") == []
-    held = JOB.program(SCENE.set("bounds.rise.free", True), "stiffness")
-    assert limits(held, "near_dwell") == [(0, pytest.approx(math.radians(60)), "near_dwell", DesignLimit)]
-    document = {table: dict(own) for table, own in SCENE.document.items()}
+    fixed = JOB.program(SCENE.set("bounds.rise.free", True), "stiffness")
+    assert limits(fixed, "near_dwell") == [(0, pytest.approx(math.radians(60)), "near_dwell", DesignLimit)]
+    document = {table: dict(values) for table, values in SCENE.document.items()}
     del document["bounds"]["near_dwell"]
     unbound = registry.scene(document).set("bounds.rise.free", True)
-    (least,) = (each for each in JOB.program(unbound, "stiffness").limits if each.name == "near_dwell")
+    (least,) = (limit for limit in JOB.program(unbound, "stiffness").limits if limit.name == "near_dwell")
     assert (least.sign, least.value, least.relaxable) == (-1, 0.0, False)
 
 
 def test_what_coils_demand_is_in_the_program_and_their_mass_comes_after_the_spring():
-    found = JOB.program(COIL, "stiffness")
-    assert [each.row for each in found.objectives] == ["K1", "spring_mass"]
-    assert limits(found, "coil_index") == [(-1, 4.0, "coil_index", DesignLimit), (1, 12.0, "coil_index", DesignLimit)]
-    assert limits(found, "coils give K1") == [(0, 0.0, "coils give K1", DesignLimit)]
-    own = {each.name: each.relaxable for each in found.limits}
-    assert (own["surge_ratio"], own["coil_index"], own["coils give K1"]) == (True, False, False)
-    moves = [(move.name, move.along) for move in found.moves]
+    second_program = JOB.program(COIL, "stiffness")
+    assert [item.row for item in second_program.objectives] == ["K1", "spring_mass"]
+    assert limits(second_program, "coil_index") == [
+        (-1, 4.0, "coil_index", DesignLimit),
+        (1, 12.0, "coil_index", DesignLimit),
+    ]
+    assert limits(second_program, "coils give K1") == [(0, 0.0, "coils give K1", DesignLimit)]
+    values = {item.name: item.relaxable for item in second_program.limits}
+    assert (values["surge_ratio"], values["coil_index"], values["coils give K1"]) == (True, False, False)
+    moves = [(move.name, move.along) for move in second_program.moves]
     assert moves == [("preload", ("X0",)), ("initial tension", ("coil.initial_tension",))]
     assert list(JOB.sizes(COIL)) == ["wire"]
     assert JOB.sizes(COIL.set("effects.coil.sizes", "any")) == {}
@@ -168,10 +171,10 @@ def test_a_design_with_a_law_is_adopted_as_the_scenes_own():
 
 
 def test_a_spring_that_is_too_soft_is_not_asked_whether_it_just_holds(monkeypatch):
-    roots, settled = [], program._refined_speed
+    roots, final = [], program._refined_speed
 
-    def counted(*asked):
-        roots.append(settled(*asked))
+    def counted(*request):
+        roots.append(final(*request))
         return roots[-1]
 
     monkeypatch.setattr(program, "_refined_speed", counted)

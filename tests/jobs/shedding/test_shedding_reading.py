@@ -59,9 +59,9 @@ def turned(scene, *degrees):
 @pytest.mark.few(2)
 def test_at_the_contact_speed_the_spring_is_the_least_one(name):
     reference, K1 = CASES[name]
-    found = JOB.figures(product(reference), {"K1": float(K1)})["contact_speed"] / RPM
+    result = JOB.figures(product(reference), {"K1": float(K1)})["contact_speed"] / RPM
     needed = [
-        plain.least_stiffness(dataclasses.replace(reference, rpm=found * share))[0] for share in (0.999, 1, 1.001)
+        plain.least_stiffness(dataclasses.replace(reference, rpm=result * share))[0] for share in (0.999, 1, 1.001)
     ]
     assert float(needed[1]) == pytest.approx(K1, rel=1e-11)
     assert needed[0] <= K1 < needed[2]
@@ -77,8 +77,10 @@ def test_the_contact_speed_is_the_root_in_thirty_digits(name):
 
 
 def test_the_contact_speed_does_not_depend_on_the_speed_it_is_asked_at():
-    found = [JOB.figures(FULL.set("operation.speed", f"{rpm} rpm"), {})["contact_speed"] for rpm in (1, 137, 600, 5000)]
-    assert found == [pytest.approx(found[0], rel=1e-11)] * 4
+    results = [
+        JOB.figures(FULL.set("operation.speed", f"{rpm} rpm"), {})["contact_speed"] for rpm in (1, 137, 600, 5000)
+    ]
+    assert results == [pytest.approx(results[0], rel=1e-11)] * 4
 
 
 def test_without_contact_at_rest_there_is_no_speed_and_without_motion_no_limit():

@@ -45,12 +45,12 @@ FLOATS = re.compile(
 def test_a_roller_without_force_over_a_stretch_is_said_to_float(name, target, spans):
     """A near dwell at rest, and a free law, which follows the spring as far as it can."""
     answer = lo.solve(name, target, starts=1)
-    (remark,) = (said for said in remarks(answer.scene, answer.design) if "floats" in said)
-    found = FLOATS.match(remark)
-    assert found
-    told = [float(each) for each in re.findall(r"(\S+) deg", found["spans"])]
-    assert told == pytest.approx([end for span in spans for end in span], abs=0.2)
-    assert float(found["whole"]) == pytest.approx(sum(end - begin for begin, end in spans), abs=0.5)
+    (remark,) = (message for message in remarks(answer.scene, answer.design) if "floats" in message)
+    result = FLOATS.match(remark)
+    assert result
+    texts = [float(item) for item in re.findall(r"(\S+) deg", result["spans"])]
+    assert texts == pytest.approx([end for span in spans for end in span], abs=0.2)
+    assert float(result["whole"]) == pytest.approx(sum(end - begin for begin, end in spans), abs=0.5)
     frame = answer.curves()
     force, angle = frame["N [N]"], np.degrees(frame["phi [rad]"])
     most = answer.figures["spring_force_max"]
@@ -68,9 +68,11 @@ def test_a_force_that_touches_zero_or_a_least_force_asked_for_needs_no_remark(ta
 def test_a_remark_is_in_the_units_of_the_scene():
     scene = lo.load("shedding-static").set("display.angle", "rad")
     answer = lo.solve(scene, starts=1)
-    assert any("from 5.236 rad to 6.283 rad" in said for said in remarks(scene, answer.design))
+    assert any("from 5.236 rad to 6.283 rad" in message for message in remarks(scene, answer.design))
     degrees = {"rise": 40, "far_dwell": 20, "return": 30, "near_dwell": 270}
-    (remark,) = remarks(inch.scene("shedding", **{f"mechanism__{key}": f"{each} deg" for key, each in degrees.items()}))
+    (remark,) = remarks(
+        inch.scene("shedding", **{f"mechanism__{key}": f"{degree} deg" for key, degree in degrees.items()})
+    )
     assert re.search(r"a radius of \S+ in, \S+ in less than roller_radius = 0\.787402 in", remark)
 
 
@@ -123,9 +125,9 @@ def test_levels_with_what_acts_in_the_moves_is_remarked_upon(on, named):
     scene = SCENE.update(LEVELS).without_effect("inertia")
     for effect in on:
         scene = scene.with_effect(effect)
-    found = remarks(scene)
-    assert len(found) == (named is not None)
-    assert all(f"{named}." in remark and '"linear" or "step"' in remark for remark in found)
+    result = remarks(scene)
+    assert len(result) == (named is not None)
+    assert all(f"{named}." in remark and '"linear" or "step"' in remark for remark in result)
 
 
 @pytest.mark.parametrize("shape", ["linear", "step"])
@@ -138,7 +140,7 @@ def test_a_pull_that_is_known_all_round_is_not_remarked_upon(shape):
 def test_both_remarks_stand_beside_each_other_and_a_scene_without_follower_has_no_cam_to_remark_upon():
     scene = narrow(**LEVELS)
     assert [remark.split()[0] for remark in remarks(scene)] == ["warp_tension", "the"]
-    document = {table: dict(own) for table, own in scene.document.items()}
+    document = {table: dict(values) for table, values in scene.document.items()}
     del document["mechanism"]["roller_radius"]
     assert len(remarks(lo.scene(document))) == 1
 

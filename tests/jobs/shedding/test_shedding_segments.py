@@ -23,7 +23,7 @@ SEGMENTS = [
 
 def several(segments, scene=PACKAGED, **changes):
     """Return the packaged scene, its motion in segments."""
-    document = {name: dict(own) for name, own in scene.document.items()}
+    document = {name: dict(values) for name, values in scene.document.items()}
     document["mechanism"] = {k: v for k, v in document["mechanism"].items() if k not in (*FOUR, "travel")}
     document["mechanism"] |= {"segments": segments, **changes}
     document["bounds"] = {k: v for k, v in document["bounds"].items() if k not in FOUR}
@@ -86,7 +86,7 @@ def test_a_segment_is_set_and_swept_by_its_place_counted_from_1():
 
 
 @pytest.mark.parametrize(
-    ("segments", "told"),
+    ("segments", "report"),
     [
         ([{"angle": "60 deg", "to": "20 mm"}, {"angle": "60 deg", "to": "0 mm"}], "add to 120 deg"),
         ([{"angle": "180 deg"}, {"angle": "180 deg"}], "move nothing"),
@@ -97,15 +97,15 @@ def test_a_segment_is_set_and_swept_by_its_place_counted_from_1():
         ("30 deg", "not a list"),
     ],
 )
-def test_segments_that_are_no_motion_are_refused(segments, told):
-    with pytest.raises(BadInput, match=told):
+def test_segments_that_are_no_motion_are_refused(segments, report):
+    with pytest.raises(BadInput, match=report):
         several(segments)
 
 
 def test_segments_and_a_rise_are_refused_and_a_motion_without_either_asks_for_the_rise():
     with pytest.raises(BadInput, match="define the same quantity twice"):
         several(SEGMENTS, rise="60 deg")
-    document = {name: dict(own) for name, own in PACKAGED.document.items()}
+    document = {name: dict(values) for name, values in PACKAGED.document.items()}
     del document["mechanism"]["rise"]
     with pytest.raises(BadInput, match="rise is missing"):
         lo.scene(document)
@@ -144,8 +144,8 @@ def test_the_cam_is_drawn_and_its_equations_name_every_segment(tmp_path):
 
     scene = several(SEGMENTS)
     views = registry.of(scene).views
-    told = "\n".join(each.text for each in views.equations(scene))
-    assert all(f"in segment {k}" in told for k in range(1, 7))
+    text = "\n".join(equation.text for equation in views.equations(scene))
+    assert all(f"in segment {k}" in text for k in range(1, 7))
     answer = lo.evaluate(scene)
     for name in ("cam.svg", "cam.dxf", "cam.csv"):
         assert answer.export(tmp_path / name).stat().st_size > 1000

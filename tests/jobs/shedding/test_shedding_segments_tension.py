@@ -25,11 +25,11 @@ def scene(segments, tension, **mechanism):
 def test_four_segments_have_the_optimum_of_rise_dwell_return_dwell():
     segments = {"segments": [DOWN, DWELL, UP, DWELL]}
     plain = {"travel": "70 mm", "rise": "130 deg", "far_dwell": "50 deg", "return": "130 deg", "near_dwell": "50 deg"}
-    found, other = lo.solve(scene(segments, TENSION)), lo.solve(scene({}, TENSION, **plain))
-    assert (found.status, other.status) == ("optimal", "optimal")
-    assert found.figures["contact_max"] == pytest.approx(other.figures["contact_max"], rel=1e-9)
+    result, other = lo.solve(scene(segments, TENSION)), lo.solve(scene({}, TENSION, **plain))
+    assert (result.status, other.status) == ("optimal", "optimal")
+    assert result.figures["contact_max"] == pytest.approx(other.figures["contact_max"], rel=1e-9)
     for name in ("K1", "X0"):
-        assert found.design[name] == pytest.approx(other.design[name], rel=1e-8)
+        assert result.design[name] == pytest.approx(other.design[name], rel=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_levels_follow_from_where_the_frame_is(order):
 
 
 @pytest.mark.parametrize(
-    ("segments", "tension", "told"),
+    ("segments", "tension", "report"),
     [
         ([DOWN, DWELL, UP, DWELL], {**TENSION, "shape": "step"}, "shape must be linear"),
         (
@@ -58,6 +58,6 @@ def test_levels_follow_from_where_the_frame_is(order):
         ),
     ],
 )
-def test_what_levels_do_not_tell_is_refused(segments, tension, told):
-    with pytest.raises(BadInput, match=told):
+def test_what_levels_do_not_tell_is_refused(segments, tension, report):
+    with pytest.raises(BadInput, match=report):
         scene({"segments": segments}, tension)

@@ -46,17 +46,17 @@ def assert_least(reference, scene=None, rel=1e-9):
 
 def needed_at(reference, degrees):
     """Return the most that any stretch at a cam angle, deg, needs, N/m."""
-    found = []
+    results = []
     for stretch in plain.stretches(reference):
         sense, start, span, low, high, _ = stretch
         turned = (degrees - start) % 360
         if sense:
             u = turned / span if sense > 0 else 1 - turned / span
             if low - 1e-9 <= u <= high + 1e-9:
-                found.append(plain.needed(np, reference, stretch, np.float64(u)))
+                results.append(plain.needed(np, reference, stretch, np.float64(u)))
         elif turned <= span + 1e-9 or turned >= 360 - 1e-9:
-            found.append(plain.needed(np, reference, stretch, np.float64(low)))
-    return max(found)
+            results.append(plain.needed(np, reference, stretch, np.float64(low)))
+    return max(results)
 
 
 @pytest.mark.parametrize("travel", PACKAGED)
@@ -81,8 +81,8 @@ def test_with_the_papers_damping_the_return_governs(travel, K1):
 def test_contact_speeds_of_the_papers_springs(travel, K1):
     """119.21, 177.46, 144.51 and 227.45 rpm."""
     expected = SPEEDS[K1][travel == "14.5 mm"]
-    found = lo.evaluate(lo.load(PACKAGED[travel]), {"K1": K1}).figures["contact_speed"] / RPM
-    assert found == pytest.approx(expected, rel=1e-12)
+    result = lo.evaluate(lo.load(PACKAGED[travel]), {"K1": K1}).figures["contact_speed"] / RPM
+    assert result == pytest.approx(expected, rel=1e-12)
 
 
 def test_statics_and_dynamics_give_different_springs():

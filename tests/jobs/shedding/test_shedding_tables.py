@@ -89,13 +89,13 @@ def test_a_frame_with_dwells_has_the_spring_of_the_true_law(tmp_path, step, digi
 
 def test_precision_misfit_change_and_uncertainty_are_told(tmp_path):
     scene = heald(written(tmp_path / "law.csv", cycloid, 60, 120, 2, 3))
-    (told,) = lo.evaluate(scene).as_dict()["tables"]
-    assert told["key"] == "mechanism.law_table"
-    assert told["rows"] == 61
-    assert told["precision"] == {"angle": 0.0, "s": pytest.approx(5e-7)}
-    assert 0 < told["misfit"]["s"] < 2e-6
-    assert 0 < told["change"] < 1.3 * 5e-7
-    assert 0 < told["uncertainty"] < 0.02
+    (report,) = lo.evaluate(scene).as_dict()["tables"]
+    assert report["key"] == "mechanism.law_table"
+    assert report["rows"] == 61
+    assert report["precision"] == {"angle": 0.0, "s": pytest.approx(5e-7)}
+    assert 0 < report["misfit"]["s"] < 2e-6
+    assert 0 < report["change"] < 1.3 * 5e-7
+    assert 0 < report["uncertainty"] < 0.02
     remark = registry.of(scene).views.remarks(scene, {})[0]
     assert "s to ±0.0005 mm" in remark
     assert "uncertain by" in remark
@@ -115,9 +115,9 @@ def test_a_table_that_cannot_tell_accelerations_is_refused_where_they_are_read(t
     path = written(tmp_path / "law.csv", modified_sine, 10, 100, 1, 2)
     scene = heald(path).set("mechanism.travel", "10 mm")
     needed = r"s'' is uncertain by 2\d % of its peak.*s to 3 decimals of mm instead of 2"
-    with pytest.raises(BadInput, match=needed) as told:
+    with pytest.raises(BadInput, match=needed) as caught:
         lo.solve(scene)
-    assert told.value.key == "mechanism.law_table"
+    assert caught.value.key == "mechanism.law_table"
     assert lo.evaluate(scene).as_dict()["tables"][0]["uncertainty"] > 0.1
     registry.of(scene).demand(scene.without_effect("inertia"), "stiffness")
 

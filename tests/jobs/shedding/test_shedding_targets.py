@@ -60,8 +60,8 @@ def test_prices_of_the_least_stiffness_are_its_derivatives_in_closed_form(name):
     """Envelope theorem: −dk/dX0, dk/dN_min, dk/dtravel, dk/dω, the term of the governing angle alone."""
     reference = FRAMES[name]
     expected = {key: abs(float(value)) for key, value in plain.worths(reference).items()}
-    found = worths(solved(framed(reference)))
-    assert found == {
+    result = worths(solved(framed(reference)))
+    assert result == {
         "X0": pytest.approx(expected["X0"], rel=1e-8),
         "N_min": pytest.approx(expected["N_min"], rel=1e-8),
         "travel": pytest.approx(expected["travel"], rel=1e-8),
@@ -71,8 +71,8 @@ def test_prices_of_the_least_stiffness_are_its_derivatives_in_closed_form(name):
 
 def test_prices_of_the_packaged_scene_are_the_known_ones():
     """3196.19 N/m per rad/s, 739.68 N/m per mm of preload, 7.2092 per m, 868.65 N/m per mm of travel."""
-    found = worths(solved(lo.load("shedding")))
-    assert found == {
+    result = worths(solved(lo.load("shedding")))
+    assert result == {
         "speed": pytest.approx(3196.191836106885, rel=1e-9),
         "X0": pytest.approx(739681.6814820211, rel=1e-9),
         "N_min": pytest.approx(7.20918976256772, rel=1e-9),
@@ -186,8 +186,8 @@ def test_prices_of_the_highest_speed_are_those_of_the_least_stiffness_turned_rou
     answer = solved(scene, "speed")
     slopes = plain.worths(replace(reference, rpm=answer.figures["contact_speed"] / RPM))
     expected = {"K1": 1 / slopes["w"]} | {name: -slopes[name] / slopes["w"] for name in ("X0", "travel", "N_min")}
-    found = worths(answer)
-    assert found == {name: pytest.approx(abs(float(value)), rel=1e-7) for name, value in expected.items()}
+    result = worths(answer)
+    assert result == {name: pytest.approx(abs(float(value)), rel=1e-7) for name, value in expected.items()}
     confirmed(scene, "speed", "speed", ("K1", "X0", "travel", "N_min"), 1e-5)
 
 
@@ -203,8 +203,8 @@ def test_starting_at_an_answer_gives_it_again(target):
 def test_freed_angles_soften_the_spring_and_still_make_a_turn():
     """Rise and return take what the dwells can give: 130° each, dwells at their least of 50°, by symmetry."""
     scene = lo.load("shedding")
-    answer, held = solved(scene.free("rise")), solved(scene)
-    assert answer.figures["K1"] < 0.9 * held.figures["K1"]
+    answer, fixed = solved(scene.free("rise")), solved(scene)
+    assert answer.figures["K1"] < 0.9 * fixed.figures["K1"]
     angles = [math.degrees(answer.design[name]) for name in ("rise", "far_dwell", "return", "near_dwell")]
     assert sum(angles) == pytest.approx(360, rel=1e-12)
     assert [angles[1], angles[3]] == pytest.approx([50, 50], abs=1e-6)
@@ -249,5 +249,5 @@ def test_the_speed_a_spring_chosen_by_statics_survives_is_that_at_which_inertia_
 def test_a_bound_that_is_really_broken_at_rest_is_held_at_no_speed(excess):
     """K1 X0 = 540 N holds exactly what N_min, weight and warp ask; a thousandth less does not."""
     scene = lo.load("shedding").update({**TIED, "operation.speed": "145 rpm", "mechanism.X0": "0.12 m"})
-    found = lo.evaluate(scene.set("mechanism.K1", f"{4500.0 * (1 + excess)!r} N/m"))
-    assert (found.figures["contact_speed"] == 0.0) == (excess < 0.0)
+    evaluation = lo.evaluate(scene.set("mechanism.K1", f"{4500.0 * (1 + excess)!r} N/m"))
+    assert (evaluation.figures["contact_speed"] == 0.0) == (excess < 0.0)

@@ -48,5 +48,5 @@ def followed(scene, design=None):
 
 
 def figures(scene):
-    found = lo.evaluate(scene).figures
-    return {figure.name: found[figure.name] for figure in separation.EFFECT.figures}
+    second_figures = lo.evaluate(scene).figures
+    return {figure.name: second_figures[figure.name] for figure in separation.EFFECT.figures}

@@ -160,5 +160,5 @@ for _job in ("beatup", "rapier", "shedding"):
 
 def points(group):
     """Return the entry points by which they are found."""
-    told = NAMES.items() if group == "loomopt.effects" else ()
-    return tuple(EntryPoint(name, f"{__name__}:{value}", group) for name, value in told)
+    report = NAMES.items() if group == "loomopt.effects" else ()
+    return tuple(EntryPoint(name, f"{__name__}:{value}", group) for name, value in report)

@@ -45,23 +45,23 @@ def test_wire_comes_in_preferred_sizes_unless_any_will_do():
 
 def test_the_bound_it_explains_by_is_below_the_shear_of_every_coil_that_surges_late_enough():
     """tau >= 2 K_W (X0 + travel) f sqrt(2 G rho), with equality where rate, surge and force are all just met."""
-    one, f = own(), 13 * KNOWN["speed"] / (2 * math.pi)
+    first, f = own(), 13 * KNOWN["speed"] / (2 * math.pi)
     for wire, index in ((0.004, 6.0), (0.006, 9.0), (0.009, 12.0)):
         D = index * wire
-        turns = wire * math.sqrt(one.shear_modulus / (2 * one.density)) / (2 * math.pi * D**2 * f)
-        made = coil.coil({**one.model_dump(), "wire": wire, "diameter": D, "turns": turns})
+        turns = wire * math.sqrt(first.shear_modulus / (2 * first.density)) / (2 * math.pi * D**2 * f)
+        made = coil.coil({**first.model_dump(), "wire": wire, "diameter": D, "turns": turns})
         stretch = BOUNDS["X0"][1] + KNOWN["travel"]
-        bound = 2 * made.wahl * stretch * f * math.sqrt(2 * one.shear_modulus * one.density)
+        bound = 2 * made.wahl * stretch * f * math.sqrt(2 * first.shear_modulus * first.density)
         assert made.surge_frequency(systems.FLOAT) == pytest.approx(f, rel=1e-12)
         assert made.shear_stress(systems.FLOAT, made.rate * stretch) == pytest.approx(bound, rel=1e-12)
 
 
 def test_it_explains_surge_against_stress_with_both_numbers_and_else_says_nothing():
-    said = coil.explain(KNOWN, BOUNDS, own(), CLASH)
+    message = coil.explain(KNOWN, BOUNDS, own(), CLASH)
     slimmest = (4 * 12 - 1) / (4 * 12 - 4) + 0.615 / 12
     least = 2 * slimmest * 0.1456 * 130 * math.sqrt(2 * 77.2e9 * 7850) / 1e6
-    assert f"carry at least {least:.4g} MPa" in said
-    assert f"the wire allows {0.5 * 1974 / 6**0.108:.4g} MPa" in said
+    assert f"carry at least {least:.4g} MPa" in message
+    assert f"the wire allows {0.5 * 1974 / 6**0.108:.4g} MPa" in message
     assert coil.explain(KNOWN, BOUNDS, own(), CLASH[:1]) == ""
     assert coil.explain(KNOWN, BOUNDS, own(), ("N_min", CLASH[1])) == ""
     assert coil.explain(KNOWN, BOUNDS, own(surge_ratio=1.0), CLASH) == ""

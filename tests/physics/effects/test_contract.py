@@ -42,8 +42,8 @@ def worth_by_solving(scene_at, value, figure):
     """Return what loosening is worth by solving beside it on both sides, to fourth order."""
     h = 2e-5 * abs(value)
     at = [solve(scene_at(value + k * h)) for k in (-2, -1, 1, 2)]
-    assert {each.status for each in at} == {"optimal"}
-    low2, low, high, high2 = (each.figures[figure] for each in at)
+    assert {item.status for item in at} == {"optimal"}
+    low2, low, high, high2 = (item.figures[figure] for item in at)
     return (8 * (high - low) - (high2 - low2)) / (12 * h)
 
 
@@ -60,14 +60,14 @@ def test_figures_are_told_of_today_and_of_an_answer(job):
     scene = scene_of(job)
     answer, check = solve(scene), scene.schema.effects["made_up_check"]
     assert (answer.status, answer.certificate.passed) == ("optimal", True)
-    for found in (lo.evaluate(scene), answer):
-        sampled = sampler(scene, found.design)
+    for result in (lo.evaluate(scene), answer):
+        sampled = sampler(scene, result.design)
         pieces, u = sampled.grid(20000)
         pose = sampled.model.instant(systems.numpy(), sampled.given, sampled.node(pieces, u)).pose
         values = check.quantities["made_up_peak"](Inputs(systems.numpy(), sampled.given.values, {}, pose))
-        assert found.figures["made_up_peak"] == pytest.approx(np.max(np.abs(values)), rel=1e-6)
+        assert result.figures["made_up_peak"] == pytest.approx(np.max(np.abs(values)), rel=1e-6)
         size = check.rows["made_up_size"](Inputs(systems.FLOAT, sampled.given.values, {}, None))
-        assert found.figures["made_up_size"] == pytest.approx(size, rel=1e-14)
+        assert result.figures["made_up_size"] == pytest.approx(size, rel=1e-14)
 
 
 @every_job
@@ -137,7 +137,7 @@ def test_curves_have_columns_of_loads_and_quantities_with_both_sides_of_corners(
 @every_job
 def test_loads_are_in_the_force_and_in_the_torque(job):
     scene, without = scene_of(job), lo.load(job)
-    both = [sampler(each) for each in (scene, without)]
+    both = [sampler(item) for item in (scene, without)]
     for phi in (0.4, 1.9, 4.0):
         nodes = [Node(phi, s.cycle.switch(s.cycle.place(phi)[0])) for s in both]
         at, before = (s.model.instant(systems.FLOAT, s.given, n) for s, n in zip(both, nodes, strict=True))
@@ -181,10 +181,10 @@ def test_equations_have_a_term_and_a_reading(job, capsys):
 def test_proofs_read_its_quantity_and_its_demands(job):
     scene, answer = scene_of(job), solve(scene_of(job))
     proofs = lo.prove(scene, answer.design).proofs
-    told = {proof.text: proof.status for proof in proofs if proof.text.startswith("made_up")}
-    assert told.pop("made_up_peak as claimed") == "proven"
-    assert sorted(told) == ["made_up_peak <= 1e+06 mm", "made_up_size <= 1e+06 mm"]
-    assert set(told.values()) == {"proven"}
+    record = {proof.text: proof.status for proof in proofs if proof.text.startswith("made_up")}
+    assert record.pop("made_up_peak as claimed") == "proven"
+    assert sorted(record) == ["made_up_peak <= 1e+06 mm", "made_up_size <= 1e+06 mm"]
+    assert set(record.values()) == {"proven"}
     for key, name in KEYS.items():
         value = TIGHT * answer.figures[name]
         proofs = lo.prove(scene_of(job, **{key: f"{value!r} m"}), answer.design).proofs
@@ -209,8 +209,8 @@ def test_an_event_that_an_effect_calls_in_is_there_and_parts_the_cycle(job):
     angles = load.corners(Inputs(systems.FLOAT, sampled.given.values, {}, None))
     events = angles[: {"beatup": 1, "shedding": 2}.get(job)]
 
-    def at(angle, beside=0.0):
-        node = Node(angle, sampled.cycle.switch(sampled.cycle.place(angle + beside)[0]))
+    def at(angle, neighbour=0.0):
+        node = Node(angle, sampled.cycle.switch(sampled.cycle.place(angle + neighbour)[0]))
         return sampled.model.instant(systems.FLOAT, sampled.given, node)
 
     assert all(abs(EVENT[job](at(angle).pose)) < 1e-12 for angle in events)
@@ -260,7 +260,7 @@ def test_every_target_still_certifies_with_made_up_effects_on(job):
 
 
 @pytest.mark.parametrize(
-    ("declared", "said"),
+    ("declared", "message"),
     [
         ({"figures": ()}, "made_up_peak is no figure"),
         ({"figures": (Figure("made_up_peak", "length", ""),)}, "made_up_peak has no least"),
@@ -270,9 +270,9 @@ def test_every_target_still_certifies_with_made_up_effects_on(job):
         ({"least": "another"}, "another is neither a row nor a key of the table"),
     ],
 )
-def test_a_check_that_no_job_could_keep_is_refused_where_it_is_declared(declared, said):
-    own = {
+def test_a_check_that_no_job_could_keep_is_refused_where_it_is_declared(declared, message):
+    values = {
         name: getattr(made_up.BEATUP, name) for name in ("name", "summary", "table", "quantities", "rows", "figures")
     }
-    with pytest.raises(ValueError, match=said):
-        Check(**own | declared)
+    with pytest.raises(ValueError, match=message):
+        Check(**values | declared)

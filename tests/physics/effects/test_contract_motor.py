@@ -48,7 +48,7 @@ def test_every_pose_has_the_speed_that_a_motor_gives_the_shaft(job):
     assert np.max(np.abs(sampled.at("motor_torque", pieces, u) - line)) < 1e-9 * size
     x, weights = np.polynomial.legendre.leggauss(100)
     seconds = [sampled.at("omega", np.full(100, k), (x + 1) / 2) for k in range(len(widths))]
-    whole = sum(width / 2 * float(weights @ (1 / each)) for width, each in zip(widths, seconds, strict=True))
+    whole = sum(width / 2 * float(weights @ (1 / item)) for width, item in zip(widths, seconds, strict=True))
     assert whole == pytest.approx(2 * math.pi / speed, rel=1e-9)
     assert pose.acceleration == pytest.approx(pose.q2 * pose.omega**2 + pose.q1 * pose.omega_dot, rel=1e-12)
 
@@ -57,24 +57,24 @@ def test_every_pose_has_the_speed_that_a_motor_gives_the_shaft(job):
 @every_job
 def test_what_a_motor_gives_is_told_drawn_and_written(job):
     scene = turned(job)
-    found, frame = lo.evaluate(scene), tables.curves(scene, {})
-    assert found.figures["made_up_fastest"] == pytest.approx(frame["omega [rad/s]"].max(), rel=1e-5)
+    result, frame = lo.evaluate(scene), tables.curves(scene, {})
+    assert result.figures["made_up_fastest"] == pytest.approx(frame["omega [rad/s]"].max(), rel=1e-5)
     power = frame["motor_torque [N*m]"] * frame["omega [rad/s]"]
     assert (power - frame["motor_power [W]"]).abs().max() < 1e-9 * power.abs().max()
     assert registry.of(scene).views.panels(scene, {}, [str(column) for column in frame.columns])
     written = {equation.name: equation.text for equation in registry.of(scene).views.equations(scene)}
     assert "omega_dot" in written["head_inertia" if job == "rapier" else "inertia"]
     assert "omega_dot" in " ".join(
-        each.text for each in registry.of(scene).views.equations(scene) if "wheel" in each.text
+        item.text for item in registry.of(scene).views.equations(scene) if "wheel" in item.text
     )
     assert written["mean speed"].startswith("Integral(1/omega(")
 
 
 @every_job
 def test_a_shaft_at_a_speed_of_its_own_is_neither_sought_nor_proven(job):
-    for asked in (lo.solve, lo.prove):
+    for request in (lo.solve, lo.prove):
         with pytest.raises(lo.BadInput, match="does not cover effect made_up_motor"):
-            asked(turned(job))
+            request(turned(job))
 
 
 def test_two_motors_on_one_shaft_are_refused_naming_both():

@@ -59,7 +59,7 @@ def scenes(job, folder):
     for effect in plain.schema.effects.values():
         for example in effect.examples:
             companions = {f"effects.{n}": dict(plain.schema.effects[n].examples[0]) for n in effect.companions}
-            away = [each.effect for each in effect.clashes if not each.key and each.effect in plain.effects]
+            away = [clashe.effect for clashe in effect.clashes if not clashe.key and clashe.effect in plain.effects]
             yield plain.change({**companions, f"effects.{effect.name}": dict(example)}, off=away)
     if job == "beatup":
         yield plain.set("effects.resistance.table", tabled(folder, "M", "N*m", 300.0))
@@ -84,8 +84,8 @@ def sampler(scene):
 def read(model, system, given, node):
     """Return what is there at a node: output and derivatives, every term, every quantity."""
     at = model.instant(system, given, node)
-    found = {name: getattr(at.pose, name) for name in ("q", "q1", "q2")} | at.terms()
-    return found | {name: model.quantity(system, given, name, node) for name in model.quantities}
+    result = {name: getattr(at.pose, name) for name in ("q", "q1", "q2")} | at.terms()
+    return result | {name: model.quantity(system, given, name, node) for name in model.quantities}
 
 
 @pytest.mark.parametrize("job", ["beatup", "rapier"])
@@ -125,16 +125,16 @@ def test_a_cycle_begins_where_the_motion_s_own_arcs_do(job, tmp_path, nothing):
     """So that a load's corners bring no formula of a motion onto another turn."""
     for scene in scenes(job, tmp_path):
         sampled = sampler(scene.set("effects.nothing.at", 1.0))
-        own = [angle for arc in sampled.model.kinematics.arcs for angle in arc.corners(systems.FLOAT, sampled.given)]
-        assert not own or sampled.cycle.starts[0] == own[0]
+        values = [angle for arc in sampled.model.kinematics.arcs for angle in arc.corners(systems.FLOAT, sampled.given)]
+        assert not values or sampled.cycle.starts[0] == values[0]
 
 
 @pytest.fixture
 def nothing(monkeypatch):
     """Bring the load of nothing, to every job."""
     points = tuple(EntryPoint(f"{job}.nothing", f"{__name__}:NOTHING", registry.EFFECTS) for job in JOBS)
-    own = {registry.EFFECTS: points}
-    monkeypatch.setattr(registry, "entry_points", lambda group: own.get(group, ()))
+    values = {registry.EFFECTS: points}
+    monkeypatch.setattr(registry, "entry_points", lambda group: values.get(group, ()))
 
 
 LATE = [pytest.param(degrees, marks=pytest.mark.slow) for degrees in (3.0, 210.0, 355.0)]
@@ -146,8 +146,8 @@ LATE = [pytest.param(degrees, marks=pytest.mark.slow) for degrees in (3.0, 210.0
 def test_a_load_of_nothing_changes_nothing_wherever_its_corner_lies(job, degrees, tmp_path, nothing):
     """The cycle begins at the first corner that is declared, and the others follow in the order they lie in."""
     for scene in scenes(job, tmp_path):
-        own, companions = registry.of(scene), scene.set("effects.nothing.at", math.radians(degrees))
-        before, after = (own.figures(each, own.today(each)) for each in (scene, companions))
+        values, companions = registry.of(scene), scene.set("effects.nothing.at", math.radians(degrees))
+        before, after = (values.figures(item, values.today(item)) for item in (scene, companions))
         for name, value in before.items():
             # A load is what a figure of torque or force is told for.
             assert value is None or after[name] == alike(value), (scene, name)
@@ -157,7 +157,7 @@ def test_a_load_of_nothing_changes_nothing_wherever_its_corner_lies(job, degrees
 def test_an_optimum_is_the_same_with_a_load_of_nothing(degrees, nothing):
     """A pulse of 328.777 N·m rms was told as 350.824 with a corner at 100 deg, and certified."""
     scene = lo.load("beatup")
-    answers = [lo.solve(each) for each in (scene, scene.set("effects.nothing.at", math.radians(degrees)))]
+    answers = [lo.solve(item) for item in (scene, scene.set("effects.nothing.at", math.radians(degrees)))]
     assert [answer.certificate.passed for answer in answers] == [True, True]
     for name, value in answers[0].figures.items():
         assert answers[1].figures[name] == alike(value), name

@@ -88,16 +88,16 @@ def driving(effect):
 CASES = {label: (function, own) for label, function, own in cases()}
 
 
-def setting(number, phi, omega_dot, own):
+def setting(number, phi, omega_dot, values):
     """Return pose, scene numbers and own values in one number system; number(name, float) makes each of them."""
     given = {name: number(name, value) for name, value in GIVEN.items()}
-    mine = {key: value if isinstance(value, str) else number(f"own.{key}", value) for key, value in own.items()}
+    mine = {key: value if isinstance(value, str) else number(f"own.{key}", value) for key, value in values.items()}
     return number("phi", phi), given, mine, None if omega_dot is None else number("omega_dot", omega_dot)
 
 
-def value(system, function, own, phi, omega_dot=None):
+def value(system, function, values, phi, omega_dot=None):
     """Return a term with the paper's linkage at crank angle φ."""
-    angle, given, mine, rate = setting(lambda name, x: system.number(x), phi, omega_dot, own)
+    angle, given, mine, rate = setting(lambda name, x: system.number(x), phi, omega_dot, values)
     joints = crank_rocker.CrankRockerPose(system, crank_rocker.Lengths(*(given[f"l{k}"] for k in (1, 2, 3, 4))), angle)
     pose = Pose(angle, given["speed"], -joints.psi, -joints.psi_1, -joints.psi_2, joints, rate)
     return float(function(Inputs(system, given, mine, pose)))
@@ -117,8 +117,8 @@ def test_the_same_number_in_every_system(label, omega_dot):
     for phi in (0.2, 1.15, 2.4, 4.0, 5.9):
         reference = value(systems.FLOAT, *CASES[label], phi, omega_dot)
         for system in SYSTEMS:
-            found = value(system, *CASES[label], phi, omega_dot)
-            assert found == pytest.approx(reference, rel=1e-12, abs=1e-12), system.name
+            result = value(system, *CASES[label], phi, omega_dot)
+            assert result == pytest.approx(reference, rel=1e-12, abs=1e-12), system.name
 
 
 Q, Q1, Q2, PHI, SPEED, RATE = -1.7, 0.31, -0.27, 1.3, 60.0, 25.0
@@ -143,48 +143,50 @@ EXPECTED = {
 
 @pytest.mark.parametrize("label", EXPECTED)
 def test_a_term_is_its_formula(label):
-    function, own = CASES[label]
-    assert function(Inputs(systems.FLOAT, GIVEN, own, PLAIN)) == pytest.approx(EXPECTED[label], rel=1e-14, abs=0)
+    function, values = CASES[label]
+    assert function(Inputs(systems.FLOAT, GIVEN, values, PLAIN)) == pytest.approx(EXPECTED[label], rel=1e-14, abs=0)
 
 
 @pytest.mark.parametrize("label", CASES)
 def test_terms_take_arrays_of_crank_angles(label):
-    function, own = CASES[label]
+    function, values = CASES[label]
     phi = np.array([0.2, 1.15, 2.4, 4.0, 5.9])
     joints = crank_rocker.CrankRockerPose(
         systems.numpy(), crank_rocker.Lengths(*(GIVEN[f"l{k}"] for k in (1, 2, 3, 4))), phi
     )
     pose = Pose(phi, GIVEN["speed"], -joints.psi, -joints.psi_1, -joints.psi_2, joints)
-    found = np.broadcast_to(function(Inputs(systems.numpy(), GIVEN, own, pose)), phi.shape)
-    assert found == pytest.approx([value(systems.FLOAT, function, own, angle) for angle in phi], rel=1e-12, abs=1e-12)
+    result = np.broadcast_to(function(Inputs(systems.numpy(), GIVEN, values, pose)), phi.shape)
+    assert result == pytest.approx(
+        [value(systems.FLOAT, function, values, angle) for angle in phi], rel=1e-12, abs=1e-12
+    )
 
 
-def names_read(function, own):
+def names_read(function, values):
     """Return the names of all symbols that a term's CasADi expression holds."""
     symbols: dict[str, ca.SX] = {}
 
     def number(name, _):
         return symbols.setdefault(name, ca.SX.sym(name))
 
-    angle, given, mine, rate = setting(number, 0.0, 0.0, own)
+    angle, given, mine, rate = setting(number, 0.0, 0.0, values)
     rod = {name: number(f"joints.{name}", 0) for name in ("rod_1", "rod_2", "cos_crank_rod", "sin_crank_rod")}
     joints = type("Joints", (), rod)
     pose = Pose(angle, given["speed"], number("q", 0), number("q1", 0), number("q2", 0), joints, rate)
-    found = function(Inputs(systems.casadi(), given, mine, pose))
-    return {symbol.name() for symbol in ca.symvar(found)}
+    result = function(Inputs(systems.casadi(), given, mine, pose))
+    return {symbol.name() for symbol in ca.symvar(result)}
 
 
 @pytest.mark.parametrize("label", [label for label in CASES if "switch 0" not in label])
 def test_an_effect_reads_what_it_declares_and_nothing_else(label):
-    function, own = CASES[label]
-    effect, found = BEATUP[label.split(":")[0]], names_read(function, own)
+    function, values = CASES[label]
+    effect, result = BEATUP[label.split(":")[0]], names_read(function, values)
     events = {"front dead centre", "rear dead centre"}
-    assert found & {"s", "m4e", "r4e"} == set(effect.reads) - events
+    assert result & {"s", "m4e", "r4e"} == set(effect.reads) - events
     assert set(effect.reads) & events == (events if label.startswith("bearing_friction") else set())
     scene = {"operation.speed": "speed", "operation.M0": "M0", "mechanism.m4": "m4", "mechanism.r4": "r4"}
-    assert {key for key, name in scene.items() if name in found} == set(effect.needs)
+    assert {key for key, name in scene.items() if name in result} == set(effect.needs)
     unread = {"JS2", "model"} if label == "rod_inertia: lumped" else {"model"}
-    assert {name.removeprefix("own.") for name in found if name.startswith("own.")} == own.keys() - unread
+    assert {name.removeprefix("own.") for name in result if name.startswith("own.")} == values.keys() - unread
 
 
 @pytest.mark.parametrize("name", [name for name, effect in BEATUP.items() if isinstance(effect, Load)])

@@ -53,20 +53,20 @@ def slope(function, phi, step=STEP):
 @given(angles, small, small)
 @REPEATABLE
 def test_gravity_is_the_slope_of_the_potential(phi, tilt, offset):
-    own = {"tilt": tilt, "offset": offset}
+    values = {"tilt": tilt, "offset": offset}
 
     def potential(psi):
         reed = MP.mpf(GIVEN["m4"]) * GIVEN["r4"] * MP.sin(psi + MP.mpf(offset) + MP.mpf(tilt))
         opposite = psi + MP.mpf(offset) + MP.pi + MP.mpf(tilt)
         return MP.mpf("9.80665") * (reed + MP.mpf(GIVEN["m4e"]) * GIVEN["r4e"] * MP.sin(opposite))
 
-    found = gravity.force(Inputs(systems.FLOAT, GIVEN, own, pose(phi)))
-    assert found == pytest.approx(-float(slope(potential, joints(MP.mpf(phi))[2])), rel=0, abs=1e-12 * 24)
+    force = gravity.force(Inputs(systems.FLOAT, GIVEN, values, pose(phi)))
+    assert force == pytest.approx(-float(slope(potential, joints(MP.mpf(phi))[2])), rel=0, abs=1e-12 * 24)
 
 
-def rod_energy_at(phi, own, model):
+def rod_energy_at(phi, values, model):
     """Return twice the rod's kinetic energy over ω² — its share of Je, kg·m² — from differences of positions."""
-    ratio, m2 = MP.mpf(own["s2"]) / MP.mpf(GIVEN["today.l2"]), MP.mpf(own["m2"])
+    ratio, m2 = MP.mpf(values["s2"]) / MP.mpf(GIVEN["today.l2"]), MP.mpf(values["m2"])
 
     def square(of):
         return slope(lambda p: of(p)[0], phi) ** 2 + slope(lambda p: of(p)[1], phi) ** 2
@@ -82,33 +82,33 @@ def rod_energy_at(phi, own, model):
         b, c, _ = joints(p)
         return MP.atan2(c[1] - b[1], c[0] - b[0])
 
-    return m2 * square(centre) + MP.mpf(own["JS2"]) * slope(angle, phi) ** 2
+    return m2 * square(centre) + MP.mpf(values["JS2"]) * slope(angle, phi) ** 2
 
 
 @pytest.mark.parametrize("model", ["lumped", "exact"])
 @given(angles, st.floats(-0.02, 0.1), st.floats(-500, 500))
 @REPEATABLE
 def test_the_rods_torque_is_half_the_slope_of_its_inertia_plus_inertia_times_acceleration(model, phi, s2, omega_dot):
-    own = {"m2": 4.0, "s2": s2, "JS2": 0.004, "model": model}
+    values = {"m2": 4.0, "s2": s2, "JS2": 0.004, "model": model}
     phi_mp, wide = MP.mpf(phi), MP.mpf(10) ** -9
-    Je = rod_energy_at(phi_mp, own, model)
-    half_slope = slope(lambda p: rod_energy_at(p, own, model), phi_mp, wide) / 2
-    steady = rod_inertia.force(Inputs(systems.FLOAT, GIVEN, own, pose(phi)))
+    Je = rod_energy_at(phi_mp, values, model)
+    half_slope = slope(lambda p: rod_energy_at(p, values, model), phi_mp, wide) / 2
+    steady = rod_inertia.force(Inputs(systems.FLOAT, GIVEN, values, pose(phi)))
     assert steady == pytest.approx(float(half_slope) * SPEED**2, rel=1e-12, abs=1e-12 * 0.01 * SPEED**2)
-    changing = rod_inertia.force(Inputs(systems.FLOAT, GIVEN, own, pose(phi, omega_dot)))
+    changing = rod_inertia.force(Inputs(systems.FLOAT, GIVEN, values, pose(phi, omega_dot)))
     assert changing - steady == pytest.approx(float(Je) * omega_dot, rel=1e-11, abs=1e-12 * 0.01 * SPEED**2)
 
 
 def test_a_rod_whose_inertia_is_that_of_its_point_masses_has_one_model_only():
     """JS2 = m2 s2 (l2 − s2) at today's length: what the lumped model leaves out is zero."""
     same = GIVEN | {"l2": GIVEN["today.l2"]}
-    own = {"m2": 4.0, "s2": 0.03, "JS2": 4.0 * 0.03 * (0.065 - 0.03)}
+    values = {"m2": 4.0, "s2": 0.03, "JS2": 4.0 * 0.03 * (0.065 - 0.03)}
     lengths = crank_rocker.Lengths(LENGTHS[0], 0.065, LENGTHS[2], LENGTHS[3])
     for phi in np.linspace(0, TURN, 50):
         rod = crank_rocker.CrankRockerPose(systems.FLOAT, lengths, float(phi))
         here = ReedMotion(phi, SPEED, rod, 30.0)
         lumped, exact = (
-            rod_inertia.MODELS[name](Inputs(systems.FLOAT, same, own, here)) for name in ("lumped", "exact")
+            rod_inertia.MODELS[name](Inputs(systems.FLOAT, same, values, here)) for name in ("lumped", "exact")
         )
         assert lumped == pytest.approx(exact, rel=1e-12, abs=1e-11)
 
@@ -116,27 +116,27 @@ def test_a_rod_whose_inertia_is_that_of_its_point_masses_has_one_model_only():
 @given(angles, st.floats(0, 300))
 @REPEATABLE
 def test_centrifugal_forces_are_those_of_the_centres_of_mass(phi, omega_dot):
-    moving, own = pose(phi, omega_dot), dict[str, float]()
+    moving, values = pose(phi, omega_dot), dict[str, float]()
     moment = 56.8 * 0.045 - 3.0 * 0.05
     phi_mp = MP.mpf(phi)
     rate = slope(lambda p: joints(p)[2], phi_mp) * SPEED
     bend = slope(lambda p: slope(lambda r: joints(r)[2], p), phi_mp, MP.mpf(10) ** -10) * SPEED**2
     bend += slope(lambda p: joints(p)[2], phi_mp) * omega_dot
-    found = centrifugal.reed_centrifugal(Inputs(systems.FLOAT, GIVEN, own, moving))
-    assert found == pytest.approx(float(moment * rate**2), rel=1e-11, abs=1e-12)
+    result = centrifugal.reed_centrifugal(Inputs(systems.FLOAT, GIVEN, values, moving))
+    assert result == pytest.approx(float(moment * rate**2), rel=1e-11, abs=1e-12)
     inertia = moment * MP.hypot(rate**2, bend)
     loaded = Loaded(systems.FLOAT, (), moving, Given(GIVEN, {}), {})
     assert centrifugal.EFFECT.joints is not None
-    force = centrifugal.EFFECT.joints(Inputs(systems.FLOAT, GIVEN, own, moving), loaded).shaking_force
+    force = centrifugal.EFFECT.joints(Inputs(systems.FLOAT, GIVEN, values, moving), loaded).shaking_force
     assert math.hypot(*force) == pytest.approx(float(inertia), rel=1e-12)
 
 
 def test_the_pulse_is_a_half_cosine_of_height_M0_and_area_two_over_pi():
-    own = {"pulse": 0.52}
-    begin, end = resistance.corners(Inputs(systems.FLOAT, GIVEN, own, None))
+    values = {"pulse": 0.52}
+    begin, end = resistance.corners(Inputs(systems.FLOAT, GIVEN, values, None))
     assert ((begin + end) / 2, end - begin) == (pytest.approx(GIVEN["beta"]), pytest.approx(0.52))
     phi = np.linspace(begin, end, 2001)
-    inside = resistance.force(Inputs(systems.numpy(), GIVEN, own, pose(phi, system=systems.numpy()), 1))
+    inside = resistance.force(Inputs(systems.numpy(), GIVEN, values, pose(phi, system=systems.numpy()), 1))
     assert inside[1000] == np.max(inside) == pytest.approx(745.0, rel=1e-14)
     assert (inside[0], inside[-1]) == pytest.approx((0, 0), abs=1e-11)
     assert inside == pytest.approx(inside[::-1], abs=1e-10)
@@ -163,5 +163,5 @@ def test_friction_always_opposes_the_motion():
         here = pose(float(phi))
         switch = bearing_friction.switch(float(phi), corners)
         assert switch == math.copysign(1, here.q1)
-        for own in ({"coulomb": 2.0, "viscous": 0.0}, {"coulomb": 0.0, "viscous": 0.3}):
-            assert bearing_friction.force(Inputs(systems.FLOAT, GIVEN, own, here, switch)) * here.velocity > 0
+        for entry in ({"coulomb": 2.0, "viscous": 0.0}, {"coulomb": 0.0, "viscous": 0.3}):
+            assert bearing_friction.force(Inputs(systems.FLOAT, GIVEN, entry, here, switch)) * here.velocity > 0

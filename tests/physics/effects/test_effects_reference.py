@@ -76,29 +76,29 @@ def lacked(job, effect):
 def test_every_effect_has_its_rows(job, name):
     # What a check tells may depend on the scene.
     effect = registry.load(packaged_of(job)).schema.effects[name]
-    told = asked(effect) - set(lacked(job, effect))
-    expected = {(str(k), what) for k in range(len(effect.examples)) for what in told}
+    report = asked(effect) - set(lacked(job, effect))
+    expected = {(str(k), subject) for k in range(len(effect.examples)) for subject in report}
     assert {(row[2], row[5]) for row in ROWS if row[:2] == (job, name)} == expected
 
 
 @pytest.mark.parametrize("row", ROWS, ids=" ".join)
 def test_an_effect_says_what_its_row_does(row):
-    job, effect, example, design, angle, what, value = row
-    found = sampled(job, effect, int(example), design)
+    job, effect, example, design, angle, subject, value = row
+    sampler = sampled(job, effect, int(example), design)
     if isinstance(EFFECTS[job, effect], Event):
-        read = registry.find(job).parted(scene_of(job, effect, int(example)), found).figures[what]
+        read = registry.find(job).parted(scene_of(job, effect, int(example)), sampler).figures[subject]
     elif not angle:
-        read = found.static[what]
+        read = sampler.static[subject]
     else:
         phi = math.radians(float(angle))
-        node = Node(phi, found.cycle.switch(found.cycle.place(phi)[0]))
-        instant = found.model.instant(systems.FLOAT, found.given, node)
-        read = instant.terms()[called(job, effect)] if what == "term" else quantity(found, what, node)
+        node = Node(phi, sampler.cycle.switch(sampler.cycle.place(phi)[0]))
+        instant = sampler.model.instant(systems.FLOAT, sampler.given, node)
+        read = instant.terms()[called(job, effect)] if subject == "term" else quantity(sampler, subject, node)
     assert float(read) == pytest.approx(float(value), rel=1e-11, abs=1e-12)
 
 
-def quantity(found, name, node):
-    return found.model.quantity(systems.FLOAT, found.given, name, node)
+def quantity(result, name, node):
+    return result.model.quantity(systems.FLOAT, result.given, name, node)
 
 
 @pytest.mark.parametrize(
@@ -111,9 +111,9 @@ def quantity(found, name, node):
 )
 def test_a_row_is_what_plain_formulas_say_in_many_digits(row):
     """Rows of an effect that plain_effects.py does not know stand for themselves."""
-    job, effect, example, design, angle, what, value = row
+    job, effect, example, design, angle, subject, value = row
     values = EFFECTS[job, effect].examples[int(example)]
-    assert float(value) == plain_effects.value(job, effect, values, design, angle, what)
+    assert float(value) == plain_effects.value(job, effect, values, design, angle, subject)
 
 
 def test_no_two_rows_are_of_one_thing():

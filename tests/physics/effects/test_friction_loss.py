@@ -38,18 +38,20 @@ def test_the_sum_of_all_pins():
 @pytest.mark.parametrize("effects", [(), ("speed_fluctuation",)])
 def test_it_is_the_sum_of_small_steps(effects):
     scene = scene_of(*effects)
-    found = registry.of(scene).sampler(scene, registry.of(scene).today(scene))
+    sampler = registry.of(scene).sampler(scene, registry.of(scene).today(scene))
     # Midpoints on each piece: forces may jump between them.
-    steps, pieces = 40_000, len(found.cycle.starts) - 1
+    steps, pieces = 40_000, len(sampler.cycle.starts) - 1
     where, u = np.repeat(np.arange(pieces), steps), np.tile((np.arange(steps) + 0.5) / steps, pieces)
-    weights = np.repeat(np.diff(found.cycle.starts) / steps, steps) / (2 * math.pi)
-    values, phi = found.given.values, found.cycle.angles(where, u)
+    weights = np.repeat(np.diff(sampler.cycle.starts) / steps, steps) / (2 * math.pi)
+    values, phi = sampler.given.values, sampler.cycle.angles(where, u)
     _, rocker, _, _, rod, _ = plain.motion({name: values[name] for name in plain.DESIGN}, phi)
     turned = {"A": 1.0, "B": rod - 1, "C": rocker - rod, "D": rocker}
-    read = {pin: 0.1 * r / 1000 * found.at(f"force_{pin}", where, u) * np.abs(turned[pin]) for pin, r in RADII.items()}
-    rate = 1 / np.dot(weights, found.at("slowness", where, u))
+    read = {
+        pin: 0.1 * r / 1000 * sampler.at(f"force_{pin}", where, u) * np.abs(turned[pin]) for pin, r in RADII.items()
+    }
+    rate = 1 / np.dot(weights, sampler.at("slowness", where, u))
     assert rate == pytest.approx(values["speed"], rel=0.01 if effects else 1e-12)
-    power = [np.dot(weights, each) for each in read.values()]
+    power = [np.dot(weights, item) for item in read.values()]
     assert lo.evaluate(scene).figures["friction_loss"] == pytest.approx(sum(power) * rate, rel=3e-6)
 
 
@@ -57,10 +59,10 @@ def test_where_a_number_is_missing_it_is_null_and_says_which():
     scene = scene_of()
     missing = {name: keys for name, keys in PINS.items() if not name.endswith("C")}
     some = lo.load("beatup").with_effect("joint_forces").update(missing)
-    found = lo.evaluate(some)
-    assert found.figures["friction_loss"] is None
-    said = "friction_loss needs effects.joint_forces.pins.C.mu and effects.joint_forces.pins.C.radius"
-    assert found.as_dict()["undefined"] == {"friction_loss": said}
+    evaluation = lo.evaluate(some)
+    assert evaluation.figures["friction_loss"] is None
+    message = "friction_loss needs effects.joint_forces.pins.C.mu and effects.joint_forces.pins.C.radius"
+    assert evaluation.as_dict()["undefined"] == {"friction_loss": message}
     bare = lo.load("beatup").with_effect("joint_forces")
     assert lo.evaluate(bare).undefined == {"friction_loss": "friction_loss needs effects.joint_forces.pins"}
     assert "undefined" not in lo.evaluate(scene).as_dict()
@@ -73,13 +75,13 @@ def test_where_a_number_is_missing_it_is_null_and_says_which():
 
 def test_it_is_a_figure_only():
     """Nothing of the solve knows of it: the same answer to the last bit, and its equation beside the others."""
-    plain_answer, told = (
-        lo.solve(each, starts=1) for each in (lo.load("beatup").with_effect("joint_forces"), scene_of())
+    plain_answer, report = (
+        lo.solve(item, starts=1) for item in (lo.load("beatup").with_effect("joint_forces"), scene_of())
     )
-    assert plain_answer.figures["peak_torque"] == told.figures["peak_torque"]
-    assert told.figures["friction_loss"] > 0.0
+    assert plain_answer.figures["peak_torque"] == report.figures["peak_torque"]
+    assert report.figures["friction_loss"] > 0.0
     with pytest.raises(BadInput, match="this figure cannot be limited"):
         scene_of().set("limits.friction_loss.max", "800 W")
-    texts = [each.text for each in scene_of().equations() if "friction_loss" in each.text]
+    texts = [item.text for item in scene_of().equations() if "friction_loss" in item.text]
     assert len(texts) == 1
     assert all(f"force_{pin}" in texts[0] for pin in RADII)

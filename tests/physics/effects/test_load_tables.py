@@ -30,7 +30,7 @@ def resisted(tmp_path):
 
 def curve_of(scene, column, phi):
     frame = registry.of(scene).curves(scene, registry.of(scene).today(scene), also=phi)
-    at = [int(np.argmin(np.abs(frame["phi [rad]"] - each))) for each in phi]
+    at = [int(np.argmin(np.abs(frame["phi [rad]"] - item))) for item in phi]
     return frame[column][at]
 
 
@@ -47,8 +47,8 @@ def test_an_optimum_with_the_sampled_pulse_is_that_of_the_pulse(resisted, target
     first, second = (lo.solve(scene, target) for scene in (lo.load("beatup"), resisted))
     assert second.certificate.passed
     for name in ("peak_torque", "pulse_rms", "l2", "m4e"):
-        told = [{**each.design, **each.figures}[name] for each in (first, second)]
-        assert told[1] == pytest.approx(told[0], rel=2e-5), name
+        texts = [{**item.design, **item.figures}[name] for item in (first, second)]
+        assert texts[1] == pytest.approx(texts[0], rel=2e-5), name
 
 
 def test_limits_are_proven_with_a_sampled_pulse(resisted):
@@ -58,26 +58,26 @@ def test_limits_are_proven_with_a_sampled_pulse(resisted):
 def test_a_rocking_shaft_answers_the_samples_as_it_answers_the_pulse(tmp_path):
     twisted = {"effects.shaft_torsion.stiffness": "2 MN*m/rad", "effects.shaft_torsion.damping": "45 N*m*s/rad"}
     written = lo.load("beatup").update(twisted)
-    found = []
+    results = []
     for count in (11, 41):
         sampled = written.set("effects.resistance.table", pulse(tmp_path / f"{count}.csv", count))
         figures = [lo.evaluate(scene).figures for scene in (written, sampled)]
-        found.append(max(abs(figures[1][k] / figures[0][k] - 1) for k in ("twist_peak", "shaft_peak", "M3_fdc")))
+        results.append(max(abs(figures[1][k] / figures[0][k] - 1) for k in ("twist_peak", "shaft_peak", "M3_fdc")))
     # Fourth order: samples four times as dense lie 256 times as near, but for the corners.
-    assert found[1] < 1e-6
-    assert found[1] < found[0] / 50
+    assert results[1] < 1e-6
+    assert results[1] < results[0] / 50
 
 
 def test_M0_is_not_read_beside_a_table_and_that_is_said(resisted):
     other = resisted.set("operation.M0", "100 N*m")
     assert lo.evaluate(other).figures == lo.evaluate(resisted).figures
-    told = " ".join(registry.of(other).views.remarks(other, {}))
-    assert "21 samples with 2 corners" in told
-    assert "operation.M0 is not read" in told
+    text = " ".join(registry.of(other).views.remarks(other, {}))
+    assert "21 samples with 2 corners" in text
+    assert "operation.M0 is not read" in text
 
 
 def test_a_scene_without_M0_has_its_torque_from_the_table(tmp_path):
-    document = {name: dict(own) for name, own in lo.load("beatup").document.items()}
+    document = {name: dict(values) for name, values in lo.load("beatup").document.items()}
     del document["operation"]["M0"]
     document["effects"] = {
         "inertia": document["effects"]["inertia"],
@@ -92,7 +92,7 @@ def test_setting_a_table_takes_the_place_of_the_pulse_and_back(resisted):
 
 
 @pytest.mark.parametrize(
-    ("rows", "told"),
+    ("rows", "report"),
     [
         ("angle [deg],M [N*m]\n0,1\n5,2\n", "2 rows"),
         ("angle [deg],M [N*m]\n0,1\n5,2\n9,1\n", "mark both as corners"),
@@ -101,10 +101,10 @@ def test_setting_a_table_takes_the_place_of_the_pulse_and_back(resisted):
         ("angle [deg],T [N*m]\n0,1\n5,2\n9,1\n", "no column M [(]line 1: holds"),
     ],
 )
-def test_a_table_that_is_no_curve_is_refused_when_the_scene_is_read(tmp_path, rows, told):
+def test_a_table_that_is_no_curve_is_refused_when_the_scene_is_read(tmp_path, rows, report):
     path = tmp_path / "bad.csv"
     path.write_text(rows)
-    with pytest.raises(BadInput, match=told):
+    with pytest.raises(BadInput, match=report):
         lo.load("beatup").set("effects.resistance.table", str(path))
 
 
@@ -115,17 +115,19 @@ def test_both_a_table_and_a_pulse_are_refused(tmp_path):
 
 
 def test_a_resistance_without_anything_asks_for_the_pulse():
-    document = {name: dict(own) for name, own in lo.load("beatup").document.items()}
+    document = {name: dict(values) for name, values in lo.load("beatup").document.items()}
     document["effects"] = {**document["effects"], "resistance": {}}
     with pytest.raises(BadInput, match="pulse is missing"):
         lo.scene(document)
 
 
 def test_the_equations_say_what_the_curve_is(resisted):
-    told = [each.text for each in registry.of(resisted).views.equations(resisted) if each.name == "resistance"]
-    assert len(told) == 1
-    assert "21 samples" in told[0]
-    assert "2 corners" in told[0]
+    texts = [
+        equation.text for equation in registry.of(resisted).views.equations(resisted) if equation.name == "resistance"
+    ]
+    assert len(texts) == 1
+    assert "21 samples" in texts[0]
+    assert "2 corners" in texts[0]
 
 
 @pytest.mark.parametrize(
@@ -151,17 +153,19 @@ def test_a_curve_is_the_same_on_every_turn(resisted, turns):
     from loomopt.physics.effects.beatup import resistance
 
     ((_, curve),) = curves(resisted).items()
-    given, own = {"beta": 1.1}, {"table": curve}
-    corners = resistance.corners(Inputs(systems.FLOAT, given, own, None))
+    given, values = {"beta": 1.1}, {"table": curve}
+    corners = resistance.corners(Inputs(systems.FLOAT, given, values, None))
     for phi in np.linspace(0.0, 2 * math.pi, 50):
         turned = float(phi) + 2 * math.pi * turns
-        found = [
+        results = [
             resistance.force(
-                Inputs(systems.FLOAT, given, own, SimpleNamespace(phi=angle), resistance.EFFECT.switch(angle, corners))
+                Inputs(
+                    systems.FLOAT, given, values, SimpleNamespace(phi=angle), resistance.EFFECT.switch(angle, corners)
+                )
             )
             for angle in (float(phi), turned)
         ]
-        assert found[1] == pytest.approx(found[0], abs=1e-9)
+        assert results[1] == pytest.approx(results[0], abs=1e-9)
 
 
 @pytest.mark.slow

@@ -111,29 +111,29 @@ def test_the_packaged_head_draws_back_a_little_on_both_sides_of_front_dead_centr
 
 @DESIGNS
 def test_the_curves_are_the_formulas(design):
-    found, omega = lo.simulate(BOTH, design), TURN
+    result, omega = lo.simulate(BOTH, design), TURN
     assert BOTH.operation["speed"] == pytest.approx(omega, rel=1e-14)
-    inertia, friction = found["head_inertia [N]"], found["tape_friction [N]"]
-    scale = np.abs(found["Q [N]"]).max()
-    assert np.abs(inertia - 0.35 * found["S_2 [m/rad^2]"] * omega**2).max() <= 1e-12 * scale
+    inertia, friction = result["head_inertia [N]"], result["tape_friction [N]"]
+    scale = np.abs(result["Q [N]"]).max()
+    assert np.abs(inertia - 0.35 * result["S_2 [m/rad^2]"] * omega**2).max() <= 1e-12 * scale
     assert set(np.abs(friction)) == {15.0}
-    assert (friction * found["S_1 [m/rad]"] >= -1e-11).all()
-    assert np.abs(found["Q [N]"] - inertia - friction).max() <= 1e-12 * scale
-    assert np.abs(found["Md [N*m]"] - found["Q [N]"] * found["S_1 [m/rad]"]).max() <= 1e-12 * scale
+    assert (friction * result["S_1 [m/rad]"] >= -1e-11).all()
+    assert np.abs(result["Q [N]"] - inertia - friction).max() <= 1e-12 * scale
+    assert np.abs(result["Md [N*m]"] - result["Q [N]"] * result["S_1 [m/rad]"]).max() <= 1e-12 * scale
 
 
 @DESIGNS
 def test_the_figures_are_the_peaks_of_the_curves(design):
-    found = JOB.figures(BOTH, design)
+    figures = JOB.figures(BOTH, design)
     curves = lo.simulate(BOTH, design)
     for name, column in (("tape_force", "Q [N]"), ("peak_torque", "Md [N*m]")):
         sampled = np.abs(curves[column]).max()
-        assert sampled * (1 - 1e-13) <= found[name] <= sampled * (1 + 1e-4)
+        assert sampled * (1 - 1e-13) <= figures[name] <= sampled * (1 + 1e-4)
 
 
 def test_inertia_alone_pulls_the_tape_with_the_peak_acceleration():
-    found = JOB.figures(INERTIA, {})
-    assert found["tape_force"] == pytest.approx(0.35 * found["peak_acceleration"] * TURN**2, rel=1e-12)
+    figures = JOB.figures(INERTIA, {})
+    assert figures["tape_force"] == pytest.approx(0.35 * figures["peak_acceleration"] * TURN**2, rel=1e-12)
 
 
 def test_twice_the_speed_is_four_times_the_inertia_and_the_same_friction():
@@ -145,7 +145,7 @@ def test_twice_the_speed_is_four_times_the_inertia_and_the_same_friction():
 
 
 def test_friction_alone_pulls_the_tape_with_its_force():
-    found = JOB.figures(FRICTION, {})
-    assert found["tape_force"] == 15.0
+    figures = JOB.figures(FRICTION, {})
+    assert figures["tape_force"] == 15.0
     greatest = np.abs(lo.simulate(RAPIER)["S_1 [m/rad]"]).max()
-    assert found["peak_torque"] == pytest.approx(15.0 * greatest, rel=1e-4)
+    assert figures["peak_torque"] == pytest.approx(15.0 * greatest, rel=1e-4)

@@ -23,7 +23,7 @@ from loomopt.studies.accuracy import accuracy
 def test_curves_show_frame_and_cam_apart():
     table = lo.simulate(SLOW)
     phi, gap, N = (table[name].to_numpy() for name in ("phi [rad]", "gap [m]", "N [N]"))
-    found = figures(SLOW)
+    second_figures = figures(SLOW)
     assert (phi[0], phi[-1]) == (0.0, 2 * math.pi)
     assert np.all(np.diff(phi) >= 0)
     assert np.array_equal(np.maximum(table["X [m]"] - table["X_cam [m]"], 0), gap)
@@ -31,13 +31,13 @@ def test_curves_show_frame_and_cam_apart():
     assert flying.any()
     assert np.all(N[flying] == 0)
     assert np.all(table["cam_torque [N*m]"][flying] == 0)
-    assert gap[phi < found["lift_off"] - 1e-9].max() == 0
-    assert gap.max() == pytest.approx(found["gap_max"], rel=1e-4)
+    assert gap[phi < second_figures["lift_off"] - 1e-9].max() == 0
+    assert gap.max() == pytest.approx(second_figures["gap_max"], rel=1e-4)
     terms = sum(table[f"{name} [N]"] for name in ("return_spring", "weight", "warp_tension", "inertia"))
     assert np.abs(terms - N).max() <= 1e-11 * np.abs(table["inertia [N]"]).max(), "the equation of motion"
-    at = np.flatnonzero(np.abs(phi - found["landing"]) < 1e-12)
+    at = np.flatnonzero(np.abs(phi - second_figures["landing"]) < 1e-12)
     before, after = table["X_t [m/s]"].to_numpy()[at[[0, -1]]]
-    assert before == pytest.approx(found["landing_speed"], rel=1e-12), "the cam dwells there"
+    assert before == pytest.approx(second_figures["landing_speed"], rel=1e-12), "the cam dwells there"
     assert after == pytest.approx(-0.3 * before, rel=1e-12)
     even = table[(phi > 2.0) & (phi < 2.9)].drop_duplicates("phi [rad]")
     slopes = np.gradient(even["X [m]"], even["phi [rad]"])[1:-1]
@@ -70,7 +70,7 @@ def test_curves_of_a_frame_that_stays_on_are_those_without_the_effect():
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"effects.warp_tension.shape": "step"}, "separation and warp_tension with shape step cannot be on together"),
         ({"effects.warp_tension.shape": "levels"}, "separation and warp_tension with shape levels cannot be"),
@@ -80,8 +80,8 @@ def test_curves_of_a_frame_that_stays_on_are_those_without_the_effect():
         ({"limits.gap_max.max": "1 mm"}, "this figure cannot be limited"),
     ],
 )
-def test_what_cannot_be_followed_is_refused(changes, said):
-    with pytest.raises(BadInput, match=said):
+def test_what_cannot_be_followed_is_refused(changes, message):
+    with pytest.raises(BadInput, match=message):
         lo.evaluate(ON.update(changes))
 
 
@@ -135,23 +135,23 @@ def test_a_sweep_carries_the_figures():
 
 
 def test_proofs_and_the_study_of_accuracy_say_what_they_leave_out():
-    stiff, told = ON.set("mechanism.K1", "2e5 N/m"), "separation, which is simulated (lift_off, landing,"
+    stiff, report = ON.set("mechanism.K1", "2e5 N/m"), "separation, which is simulated (lift_off, landing,"
     proofs = lo.prove(stiff)
     assert proofs.passed
-    assert told in "".join(proofs.uncovered)
-    assert told in proofs.as_dict()["uncovered"][0]
-    assert f"Not covered: {told}" in accuracy.summarise(ON, []).advice
+    assert report in "".join(proofs.uncovered)
+    assert report in proofs.as_dict()["uncovered"][0]
+    assert f"Not covered: {report}" in accuracy.summarise(ON, []).advice
     without = stiff.without_effect("separation")
     assert "uncovered" not in lo.prove(without).as_dict()
 
 
 def test_the_scenes_own_equations_have_flight_and_landing():
-    told = dict(text.split("\n    ", 1) for text in scenes.equations(RUBBED.with_effect("spring_inertia")))
+    report = dict(text.split("\n    ", 1) for text in scenes.equations(RUBBED.with_effect("spring_inertia")))
     terms = "N_damping + N_dry_friction + N_inertia + N_return_spring + N_spring_inertia + N_warp_tension + N_weight"
-    assert told["flight"].startswith(f"{terms} = 0 while X > X_cam")
-    assert "X'_after = X'_cam - restitution*(X'_before - X'_cam)" in told["landing"]
-    assert told["at rest in flight"].endswith("no more than F")
-    assert told["landing_energy"] == "landing_energy = landing_speed^2*(M + m_s/3)/2"
+    assert report["flight"].startswith(f"{terms} = 0 while X > X_cam")
+    assert "X'_after = X'_cam - restitution*(X'_before - X'_cam)" in report["landing"]
+    assert report["at rest in flight"].endswith("no more than F")
+    assert report["landing_energy"] == "landing_energy = landing_speed^2*(M + m_s/3)/2"
     plain = dict(text.split("\n    ", 1) for text in scenes.equations(ON))
     assert "at rest in flight" not in plain
     assert not {"flight", "landing"} & {

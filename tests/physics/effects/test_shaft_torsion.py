@@ -50,24 +50,24 @@ def digits(value):
 
 @every
 def test_reference_figures_in_floats_and_in_40_digits(case):
-    found = sampler(*case)
-    many = found.read(systems.mpmath())
-    own = {
-        "M3_fdc": (found.static["M3_fdc"], many.single("M3_fdc")),
-        "z": (float(twist(found, CENTRES.beta)), None),
-        "peak_torque": (found.peak("peak_torque"), peak(found, many, "peak_torque")),
-        "shaft_peak": (found.peak("shaft_peak"), peak(found, many, "shaft_peak")),
+    second_sampler = sampler(*case)
+    many = second_sampler.read(systems.mpmath())
+    values = {
+        "M3_fdc": (second_sampler.static["M3_fdc"], many.single("M3_fdc")),
+        "z": (float(twist(second_sampler, CENTRES.beta)), None),
+        "peak_torque": (second_sampler.peak("peak_torque"), peak(second_sampler, many, "peak_torque")),
+        "shaft_peak": (second_sampler.peak("shaft_peak"), peak(second_sampler, many, "shaft_peak")),
     }
-    for expected, (value, many_digits) in zip(TABLE[case], own.values(), strict=True):
+    for expected, (value, many_digits) in zip(TABLE[case], values.values(), strict=True):
         if expected is not None:
             assert value == pytest.approx(expected, rel=0, abs=digits(expected))
         if many_digits is not None:
             assert value == pytest.approx(float(many_digits), rel=1e-11)
 
 
-def peak(found, many, name):
+def peak(result, many, name):
     """Return |quantity| in many digits where it is largest."""
-    top = found.extremes(name)[0]
+    top = result.extremes(name)[0]
     return abs(many.at(name, top.piece, many.maths.number(top.u)))
 
 
@@ -94,10 +94,10 @@ def shot(case, ends):
     k, c, resisted = case
     nodes, weights, matrix = collocation()
     free = np.array([[0.0, 1.0], [-k / J4, -c / J4]]) / OMEGA
-    y, found = np.eye(2, 3), []
+    y, result = np.eye(2, 3), []
     for begin, end in zip(ends, (*ends[1:], ends[0] + TURN), strict=True):
         inside = abs(math.remainder((begin + end) / 2 - CENTRES.beta, TURN)) < HALF
-        found.append(y)
+        result.append(y)
         count = math.ceil((end - begin) * max(1.0, math.sqrt(k / J4) / OMEGA) / STRIDE)
         h = (end - begin) / count
         whole = np.eye(2 * STAGES) - h * np.kron(matrix, free)
@@ -110,56 +110,58 @@ def shot(case, ends):
             rates = np.linalg.solve(whole, (free @ y + pushed).reshape(-1, 3)).reshape(STAGES, 2, 3)
             y = y + h * np.tensordot(weights, rates, axes=1)
     start = np.linalg.solve(np.eye(2) - y[:, :2], y[:, 2])
-    return [each @ np.array([*start, 1.0]) for each in found]
+    return [item @ np.array([*start, 1.0]) for item in result]
 
 
 @every
 def test_reference_figures_by_shooting_with_an_integrator(case):
     """At front dead centre and where the product has its peaks, z, M3 and the crank torque are those of the ODE."""
     k, c, _ = case
-    found = sampler(*case)
-    tops = {name: found.extremes(name)[0] for name in ("peak_torque", "shaft_peak")}
-    at = {name: found.angle(top) % TURN for name, top in tops.items()} | {"M3_fdc": CENTRES.beta}
+    second_sampler = sampler(*case)
+    tops = {name: second_sampler.extremes(name)[0] for name in ("peak_torque", "shaft_peak")}
+    at = {name: second_sampler.angle(top) % TURN for name, top in tops.items()} | {"M3_fdc": CENTRES.beta}
     ends = sorted({*at.values(), CENTRES.beta - HALF, CENTRES.beta + HALF})
     shots = dict(zip(ends, shot(case, tuple(ends)), strict=True))
     expected = dict(zip(("M3_fdc", "z", "peak_torque", "shaft_peak"), TABLE[case], strict=True))
     for name, phi in at.items():
         z, speed = shots[phi]
         torque = k * z + c * speed
-        shown = found.static["M3_fdc"] if name == "M3_fdc" else found.peak(name)
+        shown = second_sampler.static["M3_fdc"] if name == "M3_fdc" else second_sampler.peak(name)
         if name == "peak_torque":
             torque *= plain_turn.rocker(phi)[0]
         size = 1.0 if name == "M3_fdc" else math.copysign(1.0, torque)
         assert size * torque == pytest.approx(shown, rel=1e-11)
         if expected[name] is not None:
             assert size * torque == pytest.approx(expected[name], rel=0, abs=digits(expected[name]))
-    assert shots[CENTRES.beta][0] == pytest.approx(float(twist(found, CENTRES.beta)), rel=1e-11)
+    assert shots[CENTRES.beta][0] == pytest.approx(float(twist(second_sampler, CENTRES.beta)), rel=1e-11)
     if expected["z"] is not None:
         assert shots[CENTRES.beta][0] == pytest.approx(expected["z"], rel=0, abs=digits(expected["z"]))
 
 
 @every
 def test_no_angle_exceeds_a_peak(case):
-    found = sampler(*case)
+    second_sampler = sampler(*case)
     for name in ("peak_torque", "shaft_peak", "twist_peak"):
-        pieces, u = found.grid(20000)
-        values = np.abs(found.at(name, pieces, u))
-        assert found.peak(name) * (1 - 1e-4) < values.max() <= found.peak(name) * (1 + 1e-13)
+        pieces, u = second_sampler.grid(20000)
+        values = np.abs(second_sampler.at(name, pieces, u))
+        assert second_sampler.peak(name) * (1 - 1e-4) < values.max() <= second_sampler.peak(name) * (1 + 1e-13)
 
 
 @pytest.mark.few(2)
 @pytest.mark.parametrize(("k", "ratio"), [(2e6, 1.3), (2e6, 3.0), (5e5, 10.0), (3e5, 43.0)])
 def test_peaks_of_an_overdamped_shaft_are_found_beside_the_corners_of_the_pulse(k, ratio):
     """What decays there does so 2 ratio times as fast as the shaft would swing."""
-    found = sampler(k, 2 * ratio * math.sqrt(k * J4))
-    pieces, u = found.grid(400_000)
-    values = np.abs(found.at("shaft_peak", pieces, u))
-    assert values.max() <= found.peak("shaft_peak") * (1 + 1e-10)
+    second_sampler = sampler(k, 2 * ratio * math.sqrt(k * J4))
+    pieces, u = second_sampler.grid(400_000)
+    values = np.abs(second_sampler.at("shaft_peak", pieces, u))
+    assert values.max() <= second_sampler.peak("shaft_peak") * (1 + 1e-10)
 
 
 def test_the_largest_torque_of_the_packaged_shaft_is_where_it_was_found():
-    found = sampler(2e6, 45.0)
-    assert math.degrees(found.angle(found.extremes("shaft_peak")[0])) % 360 == pytest.approx(82.02645, abs=5e-6)
+    second_sampler = sampler(2e6, 45.0)
+    assert math.degrees(second_sampler.angle(second_sampler.extremes("shaft_peak")[0])) % 360 == pytest.approx(
+        82.02645, abs=5e-6
+    )
     scene = PLAIN.with_effect("shaft_torsion")
     assert lo.evaluate(scene).figures["M3_fdc"] == pytest.approx(-85.4233569678, rel=1e-9)
 
@@ -210,33 +212,33 @@ NODES = [(0, 0.0), (0, 0.37), (0, 1.0), (1, 0.0), (1, 0.11), (1, 0.6), (1, 1.0)]
 QUANTITIES = ("peak_torque", "shaft_peak", "twist_peak", "reed_front")
 
 
-def traced(found):
+def traced(result):
     """Return the quantities at nodes as CasADi has them."""
-    system, symbols = systems.casadi(), {name: ca.SX.sym(name) for name in found.values}
-    given, phi, inside = found.model.given(system, symbols), ca.SX.sym("phi"), ca.SX.sym("inside")
-    values = [found.model.quantity(system, given, name, Node(phi, {"resistance": inside})) for name in QUANTITIES]
+    system, symbols = systems.casadi(), {name: ca.SX.sym(name) for name in result.values}
+    given, phi, inside = result.model.given(system, symbols), ca.SX.sym("phi"), ca.SX.sym("inside")
+    values = [result.model.quantity(system, given, name, Node(phi, {"resistance": inside})) for name in QUANTITIES]
     function = ca.Function("f", [ca.vertcat(*symbols.values()), phi, inside], [ca.vertcat(*values)])
-    numbers = [found.values[name] for name in symbols]
-    angles = [float(found.cycle.angles(np.array([p]), np.array([u]))[0]) for p, u in NODES]
-    switches = [float(found.cycle.switch(p)["resistance"]) for p, _ in NODES]
+    numbers = [result.values[name] for name in symbols]
+    angles = [float(result.cycle.angles(np.array([p]), np.array([u]))[0]) for p, u in NODES]
+    switches = [float(result.cycle.switch(p)["resistance"]) for p, _ in NODES]
     return np.array([np.ravel(function(numbers, a, s).full()) for a, s in zip(angles, switches, strict=True)]).T
 
 
 def test_every_number_system_gives_the_same():
     for case in ((2e6, 45.0), (2e5, 7.0), (1e5, 700.0)):
-        found = sampler(*case)
-        many = found.read(systems.mpmath())
-        symbols, balls = traced(found), found.read(systems.balls())
+        second_sampler = sampler(*case)
+        many = second_sampler.read(systems.mpmath())
+        symbols, balls = traced(second_sampler), second_sampler.read(systems.balls())
         for name, in_symbols in zip(QUANTITIES, symbols, strict=True):
             true = [float(many.at(name, p, many.maths.number(u))) for p, u in NODES]
             size = 1e-12 * max(map(abs, true))
-            floats = [found.read(FLOAT).at(name, p, u) for p, u in NODES]
-            arrays = found.at(name, *map(np.array, zip(*NODES, strict=True)))
+            floats = [second_sampler.read(FLOAT).at(name, p, u) for p, u in NODES]
+            arrays = second_sampler.at(name, *map(np.array, zip(*NODES, strict=True)))
             for values in (floats, arrays, in_symbols):
                 assert np.asarray(values, dtype=float) == pytest.approx(true, rel=1e-12, abs=size)
             for (p, u), value in zip(NODES[1:5:3], true[1:5:3], strict=True):
                 angle = balls.starts[p] + u * (balls.starts[p + 1] - balls.starts[p])
-                ball = balls.quantity(name, angle, {"resistance": float(found.cycle.switch(p)["resistance"])})
+                ball = balls.quantity(name, angle, {"resistance": float(second_sampler.cycle.switch(p)["resistance"])})
                 series = systems.ball_series(0.0, 0.0) * 0 + ball
                 assert abs(series[0] - value) < 1e-9 * max(map(abs, true))
 
@@ -244,32 +246,34 @@ def test_every_number_system_gives_the_same():
 def test_recordings_give_the_same_bits():
     from loomopt.model.reading import Quantities
 
-    found = sampler(2e6, 45.0)
-    plain = found.model.together(FLOAT, found.given, Node(1.0, {"resistance": 1.0}))
-    own = Quantities(found.model, (FLOAT, FLOAT), found.given)
+    second_sampler = sampler(2e6, 45.0)
+    plain = second_sampler.model.together(FLOAT, second_sampler.given, Node(1.0, {"resistance": 1.0}))
+    values = Quantities(second_sampler.model, (FLOAT, FLOAT), second_sampler.given)
     for _ in range(70):
-        last = own(QUANTITIES, Node(1.0, {"resistance": 1.0}))
+        last = values(QUANTITIES, Node(1.0, {"resistance": 1.0}))
     assert list(last) == [plain(name) for name in QUANTITIES]
-    assert own._bound
+    assert values._bound
 
 
 def test_jets_have_the_slopes_and_curvatures_of_40_digits():
-    found, many = sampler(2e6, 45.0), systems.mpmath()
+    result, many = sampler(2e6, 45.0), systems.mpmath()
     names = ("l1", "l2", "l3", "l4", "m4e", "shaft_torsion.stiffness")
-    start = {**found.values, "m4e": 2.0, "r4e": 0.07}
+    start = {**result.values, "m4e": 2.0, "r4e": 0.07}
     sizes = np.diag([abs(start[name]) for name in names])
     moving = dict(zip(names, variables([start[name] for name in names], sizes, True), strict=True))
-    given = found.model.given(systems.jets(), {**start, **moving})
+    given = result.model.given(systems.jets(), {**start, **moving})
     phi = np.array([0.5, 2.0, 5.0])
     node = Node(phi, {"resistance": np.zeros(3)})
-    jet = found.model.quantity(systems.jets(), given, "shaft_peak", node)
+    jet = result.model.quantity(systems.jets(), given, "shaft_peak", node)
     assert isinstance(jet, Jet)
     step = many.number(10) ** -12
 
     def at(angle, **shares):
         values = {name: many.number(value) for name, value in start.items()}
         values |= {name: values[name] * (1 + share) for name, share in shares.items()}
-        return found.model.quantity(many, found.model.given(many, values), "shaft_peak", Node(angle, {"resistance": 0}))
+        return result.model.quantity(
+            many, result.model.given(many, values), "shaft_peak", Node(angle, {"resistance": 0})
+        )
 
     for k, name in enumerate(names):
         low, mid, high = (at(many.number(2.0), **{name: sign * step}) for sign in (-1, 0, 1))
@@ -281,14 +285,16 @@ def test_jets_have_the_slopes_and_curvatures_of_40_digits():
 
 
 def test_many_designs_at_once_are_each_of_them():
-    found = sampler(2e6, 45.0)
+    second_sampler = sampler(2e6, 45.0)
     l2 = np.array([0.062, 0.065, 0.07])
-    given = found.model.given(systems.numpy(), {**found.values, "l2": l2})
+    given = second_sampler.model.given(systems.numpy(), {**second_sampler.values, "l2": l2})
     node = Node(np.array([[2.0], [5.0]]), {"resistance": 0})
-    at_once = found.model.quantity(systems.numpy(), given, "shaft_peak", node)
+    at_once = second_sampler.model.quantity(systems.numpy(), given, "shaft_peak", node)
     for k, value in enumerate(l2):
-        one = found.model.given(FLOAT, {**found.values, "l2": float(value)})
-        single = [found.model.quantity(FLOAT, one, "shaft_peak", Node(a, {"resistance": 0})) for a in (2.0, 5.0)]
+        first = second_sampler.model.given(FLOAT, {**second_sampler.values, "l2": float(value)})
+        single = [
+            second_sampler.model.quantity(FLOAT, first, "shaft_peak", Node(a, {"resistance": 0})) for a in (2.0, 5.0)
+        ]
         assert at_once[:, k] == pytest.approx(single, rel=1e-13)
 
 
@@ -298,16 +304,18 @@ def test_many_designs_at_once_are_each_of_them():
 @pytest.mark.parametrize(("k", "c"), [(2e6, 45.0), (2e5, 7.0), (1e5, 700.0)])
 def test_what_the_crank_gives_is_what_the_cloth_and_the_damper_take(k, c):
     """∮ Md dφ = ∮ M_R dq_r + ∮ c z˙² dt, with z˙ from the torque itself: k z + c z˙."""
-    found = sampler(k, c)
+    second_sampler = sampler(k, c)
     x, weights = np.polynomial.legendre.leggauss(400)
     crank = cloth = damper = 0.0
     for piece in range(2):
         u = (x + 1) / 2
-        at = found.model.instant(systems.numpy(), found.given, found.node(np.full(400, piece), u))
-        (state,) = found.model.states
+        at = second_sampler.model.instant(
+            systems.numpy(), second_sampler.given, second_sampler.node(np.full(400, piece), u)
+        )
+        (state,) = second_sampler.model.states
         z, torque = model.read_at(state, at).coordinate(), at.force
         rate = (torque - k * z) / c
-        width = np.diff(found.cycle.starts)[piece] * weights / 2
+        width = np.diff(second_sampler.cycle.starts)[piece] * weights / 2
         crank += float(width @ at.crank_torque)
         cloth += float(width @ (at.terms()["resistance"] * (at.pose.q1 - rate / OMEGA)))
         damper += float(width @ (c * rate**2)) / OMEGA

@@ -22,12 +22,14 @@ from loomopt.physics.effects.kinds import Load
 def test_the_rocker_s_own_inertia_stays_with_the_rocker():
     base, more = shaft(2e6, 45.0), shaft(2e6, 45.0).with_effect("rocker_inertia")
     phi = np.linspace(0.1, 6.0, 7)
-    found = [registry.of(scene).sampler(scene, {}) for scene in (base, more)]
-    pieces, u = found[0].cycle.located(phi)
-    acceleration = found[0].model.instant(systems.numpy(), found[0].given, found[0].node(pieces, u)).pose.acceleration
-    forces = [each.at("shaft_peak", pieces, u) for each in found]
+    results = [registry.of(scene).sampler(scene, {}) for scene in (base, more)]
+    pieces, u = results[0].cycle.located(phi)
+    acceleration = (
+        results[0].model.instant(systems.numpy(), results[0].given, results[0].node(pieces, u)).pose.acceleration
+    )
+    forces = [item.at("shaft_peak", pieces, u) for item in results]
     assert forces[1] - forces[0] == pytest.approx(0.05 * acceleration, rel=1e-11)
-    assert twist(found[1], phi) == pytest.approx(twist(found[0], phi), rel=1e-14)
+    assert twist(results[1], phi) == pytest.approx(twist(results[0], phi), rel=1e-14)
 
 
 def test_the_counterweight_moves_with_the_reed():
@@ -41,9 +43,9 @@ def test_the_counterweight_moves_with_the_reed():
             "mechanism.r4e": "0.09486832980505138 m",
         }
     )
-    one, other = (lo.evaluate(scene).figures for scene in (whole, parts))
+    first, other = (lo.evaluate(scene).figures for scene in (whole, parts))
     for name in ("M3_fdc", "peak_torque", "shaft_peak", "twist_peak", "reed_front"):
-        assert one[name] == pytest.approx(other[name], rel=1e-11)
+        assert first[name] == pytest.approx(other[name], rel=1e-11)
 
 
 REFUSED = {
@@ -55,8 +57,8 @@ REFUSED = {
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_has_no_steady_state_to_trust_is_refused_by_name(case):
-    table, said = REFUSED[case]
-    with pytest.raises(lo.BadInput, match=said) as error:
+    table, message = REFUSED[case]
+    with pytest.raises(lo.BadInput, match=message) as error:
         lo.evaluate(PLAIN.set("effects.shaft_torsion", table))
     assert error.value.key.startswith("effects.shaft_torsion")
     if case == "practically rigid":
@@ -106,9 +108,9 @@ def test_sharper_machines_have_more_harmonics_and_the_digits_of_more_still():
     assert count > 32
     more = _with(model, tuple((e, k, str(2 * count) if k == "harmonics" else w) for e, k, w in model.words), ())
     assert with_words_fixed(more, values) is more
-    one, other = Sampler(model, values), Sampler(more, values)
+    first, other = Sampler(model, values), Sampler(more, values)
     for name in ("shaft_peak", "twist_peak", "peak_torque"):
-        assert one.peak(name) == pytest.approx(other.peak(name), rel=1e-12)
+        assert first.peak(name) == pytest.approx(other.peak(name), rel=1e-12)
 
 
 def test_means_resolve_what_rings_on_their_pieces():
@@ -140,9 +142,9 @@ def test_curves_show_reed_and_shaft_and_where_the_reed_is_nearest_to_the_fell():
 def test_a_reed_that_twists_away_while_it_beats_up_is_remarked_upon(k, share):
     scene = shaft(k, 45.0 if k == 2e6 else 22.0)
     remarks = registry.of(scene).views.remarks(scene, {})
-    found = sampler(k, 45.0 if k == 2e6 else 22.0)
+    second_sampler = sampler(k, 45.0 if k == 2e6 else 22.0)
     phi = np.linspace(CENTRES.beta - HALF, CENTRES.beta + HALF, 4001)
-    largest, travel = np.abs(twist(found, phi)).max(), np.ptp(read(found, phi).pose.q)
+    largest, travel = np.abs(twist(second_sampler, phi)).max(), np.ptp(read(second_sampler, phi).pose.q)
     assert (largest > 0.1 * travel) == bool(share) == bool(remarks)
     if share:
         assert f"{100 * largest / travel:.3g} % of the rocker's travel there" in remarks[0]
@@ -159,19 +161,19 @@ def test_the_remark_stands_wherever_figures_or_curves_are_shown(command, capsys)
 
 def test_equations_are_the_effect_s_own_and_the_product_obeys_them():
     scene = shaft(2e6, 45.0).with_effect("rocker_inertia")
-    written = [each for each in registry.of(scene).views.equations(scene) if each.name == "shaft_torsion"]
-    assert [each.text for each in written] == [
+    written = [equation for equation in registry.of(scene).views.equations(scene) if equation.name == "shaft_torsion"]
+    assert [equation.text for equation in written] == [
         "c*omega*z' + k*z + omega^2*z''*(J4 + m4e*r4e^2) = M_inertia + M_resistance",
         "z = -psi + psi_r after every turn the same",
         "M_shaft_torsion = c*omega*z' + k*z",
     ]
-    balance = next(each for each in registry.of(scene).views.equations(scene) if each.name == "balance")
+    balance = next(equation for equation in registry.of(scene).views.equations(scene) if equation.name == "balance")
     assert balance.text == "M3 = M_rocker_inertia + M_shaft_torsion"
-    found, h = sampler(2e6, 45.0), 2e-4
+    result, h = sampler(2e6, 45.0), 2e-4
     for phi in (0.5, 1.2, 2.5, 4.0):
-        low, z, high = (float(twist(found, phi + sign * h)) for sign in (-1, 0, 1))
-        pieces, u = found.cycle.located(np.array([phi]))
-        terms = found.model.instant(systems.numpy(), found.given, found.node(pieces, u)).terms()
+        low, z, high = (float(twist(result, phi + sign * h)) for sign in (-1, 0, 1))
+        pieces, u = result.cycle.located(np.array([phi]))
+        terms = result.model.instant(systems.numpy(), result.given, result.node(pieces, u)).terms()
         carried = sum(float(np.ravel(value)[0]) for name, value in terms.items() if name != "shaft_torsion")
         left = J4 * OMEGA**2 * (high - 2 * z + low) / h**2 + 45.0 * OMEGA * (high - low) / (2 * h) + 2e6 * z
         assert left == pytest.approx(carried, abs=2e-2)
@@ -185,6 +187,6 @@ def test_an_inch_machine_at_350_rpm_is_told_in_its_own_units():
         "display.torque": "lbf*ft",
     }
     inches = metric.update(changes)
-    one, other = lo.evaluate(metric).figures, lo.evaluate(inches).figures
-    assert other["shaft_peak"] == pytest.approx(one["shaft_peak"], rel=1e-14)
+    first, other = lo.evaluate(metric).figures, lo.evaluate(inches).figures
+    assert other["shaft_peak"] == pytest.approx(first["shaft_peak"], rel=1e-14)
     assert "lbf*ft" in repr(lo.evaluate(inches))

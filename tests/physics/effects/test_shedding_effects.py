@@ -84,8 +84,8 @@ def test_inertia_is_mass_times_acceleration(mass, q1, q2, omega):
 @given(st.floats(0, 1e3), st.floats(-5, 5), st.floats(1, 100))
 @REPEATABLE
 def test_damping_pushes_against_the_velocity(damping, q1, omega):
-    found = frame_damping.force(Inputs(systems.FLOAT, {}, {"C": damping}, moving(q1, 0.0, omega)))
-    assert found == pytest.approx(damping * q1 * omega, rel=1e-14)
+    force = frame_damping.force(Inputs(systems.FLOAT, {}, {"C": damping}, moving(q1, 0.0, omega)))
+    assert force == pytest.approx(damping * q1 * omega, rel=1e-14)
 
 
 @given(force_values)
@@ -97,8 +97,8 @@ def test_weight_relieves_the_cam_and_a_negative_one_presses(value):
 @given(st.floats(0, 1e6), st.floats(0, 1), st.floats(0, 1))
 @REPEATABLE
 def test_the_return_spring_is_its_stiffness_times_its_whole_elongation(stiffness, lowered, preload):
-    found = spring_force(Inputs(systems.FLOAT, {"K1": stiffness, "X0": preload}, {}, pose(q=lowered)))
-    assert found == pytest.approx(stiffness * (lowered + preload), rel=1e-15)
+    result = spring_force(Inputs(systems.FLOAT, {"K1": stiffness, "X0": preload}, {}, pose(q=lowered)))
+    assert result == pytest.approx(stiffness * (lowered + preload), rel=1e-15)
 
 
 @given(st.floats(0, 1e4), shares, st.sampled_from([-1, 1]))
@@ -113,19 +113,19 @@ def test_dry_friction_opposes_the_motion_and_is_the_worst_in_dwells(friction, u,
 @given(st.floats(0, 1e4), st.floats(0, 1e4), shares)
 @REPEATABLE
 def test_linear_tension_is_proportional_to_the_shed_on_either_side_of_its_middle(up, down, lowered):
-    own = {"T1": up, "T2": down, "shape": "linear"}
+    values = {"T1": up, "T2": down, "shape": "linear"}
     below = lowered > 0.5
-    found = warp_tension.force(Inputs(systems.FLOAT, {}, own, pose(lowered=lowered), float(below)))
+    force = warp_tension.force(Inputs(systems.FLOAT, {}, values, pose(lowered=lowered), float(below)))
     pull = -down * (2 * lowered - 1) if below else up * (1 - 2 * lowered)
-    assert abs(found + pull) <= 1e-14 * max(up, down)
+    assert abs(force + pull) <= 1e-14 * max(up, down)
 
 
 @given(st.floats(0, 1e4), st.floats(0, 1e4), shares)
 @REPEATABLE
 def test_stepped_tension_is_the_papers_cubic_step(up, down, u):
     """STEP: y0 + (y1 − y0)u²(3 − 2u) from T1 to −T2 [Qiu21, eq 8]."""
-    found = warp_tension.force(Inputs(systems.FLOAT, {}, {"T1": up, "T2": down, "shape": "step"}, pose(u=u)))
-    assert abs(found + (up + (-down - up) * u * u * (3 - 2 * u))) <= 1e-14 * (up + down)
+    force = warp_tension.force(Inputs(systems.FLOAT, {}, {"T1": up, "T2": down, "shape": "step"}, pose(u=u)))
+    assert abs(force + (up + (-down - up) * u * u * (3 - 2 * u))) <= 1e-14 * (up + down)
 
 
 def test_a_step_starts_and_ends_level_and_is_halfway_in_the_middle():
@@ -138,16 +138,18 @@ def test_a_step_starts_and_ends_level_and_is_halfway_in_the_middle():
 
 
 def test_levels_pull_in_the_dwells_only():
-    own = {"T1": 5.0, "T2": 3.0, "shape": "levels"}
-    found = [warp_tension.force(Inputs(systems.FLOAT, {}, own, pose(segment=k))) for k in (RISE, FAR, RETURN, NEAR)]
-    assert found == [0, 3.0, 0, -5.0]
+    values = {"T1": 5.0, "T2": 3.0, "shape": "levels"}
+    results = [
+        warp_tension.force(Inputs(systems.FLOAT, {}, values, pose(segment=k))) for k in (RISE, FAR, RETURN, NEAR)
+    ]
+    assert results == [0, 3.0, 0, -5.0]
 
 
 @pytest.mark.parametrize("shape", ["linear", "step", "levels"])
 def test_the_shapes_agree_in_the_dwells(shape):
     """T1 pulls down with the shed open upward, T2 up with it open downward."""
-    found = lo.simulate(MOVING.set("effects.warp_tension.shape", shape).without_effect("inertia"))
-    angle, term = np.degrees(found["phi [rad]"]), found["warp_tension [N]"]
+    curves = lo.simulate(MOVING.set("effects.warp_tension.shape", shape).without_effect("inertia"))
+    angle, term = np.degrees(curves["phi [rad]"]), curves["warp_tension [N]"]
     assert list(term[(angle > 120.1) & (angle < 179.9)].unique()) == pytest.approx([T2], rel=1e-14)
     assert list(term[angle > 300.1].unique()) == pytest.approx([-T1], rel=1e-14)
 
@@ -160,20 +162,20 @@ def test_every_effect_gives_the_same_number_in_every_system(system):
 
     at = pose(lowered=wrap(0.37), u=wrap(0.41), q=wrap(0.024), segment=2, worst=-1)
     at.velocity, at.acceleration = wrap(-0.9), wrap(31.0)
-    own = {"G": wrap(G), "T1": wrap(T1), "T2": wrap(T2), "M": wrap(M), "C": wrap(C), "F": wrap(F)}
+    values = {"G": wrap(G), "T1": wrap(T1), "T2": wrap(T2), "M": wrap(M), "C": wrap(C), "F": wrap(F)}
     given_ = {"K1": wrap(K1), "X0": wrap(X0)}
-    linear, loads = own | {"shape": "linear"}, [SHEDDING[name] for name in LOADS]
-    found = {
+    linear, loads = values | {"shape": "linear"}, [SHEDDING[name] for name in LOADS]
+    results = {
         load.name: plain(load.force(Inputs(system, given_, linear, at))) for load in loads if isinstance(load, Load)
     }
-    found["spring"] = plain(spring_force(Inputs(system, given_, {}, at)))
-    found["step"] = plain(warp_tension.force(Inputs(system, given_, own | {"shape": "step"}, at)))
-    found["below"] = plain(
-        warp_tension.force(Inputs(system, {}, own | {"shape": "linear"}, pose(lowered=wrap(0.8)), 1))
+    results["spring"] = plain(spring_force(Inputs(system, given_, {}, at)))
+    results["step"] = plain(warp_tension.force(Inputs(system, given_, values | {"shape": "step"}, at)))
+    results["below"] = plain(
+        warp_tension.force(Inputs(system, {}, values | {"shape": "linear"}, pose(lowered=wrap(0.8)), 1))
     )
     expected = {"weight": -G, "warp_tension": -T1 * 0.26, "inertia": M * 31, "damping": -C * 0.9, "dry_friction": -F}
     expected |= {"spring": K1 * 0.104, "step": (T1 + T2) * 0.41**2 * 2.18 - T1, "below": T2 * 0.6}
-    assert found == {name: pytest.approx(value, rel=1e-12) for name, value in expected.items()}
+    assert results == {name: pytest.approx(value, rel=1e-12) for name, value in expected.items()}
 
 
 def cycloid(degrees):
@@ -191,8 +193,8 @@ def cycloid(degrees):
 @pytest.mark.parametrize("degrees", [7.0, 31.0, 59.0, 61.0, 88.5, 119.0, 150.0, 181.0, 230.0, 241.0, 299.0, 330.0])
 def test_the_cam_force_balances_the_heald_frame_in_one_sign_convention(degrees):
     """M X¨ + C X˙ + K1 (X + X0) = G + N + T − F sgn X˙, X down positive [Qiu21, eq 4]."""
-    found = lo.simulate(FULL)
-    row = found.iloc[(found["phi [rad]"] - math.radians(degrees)).abs().argmin()]
+    curves = lo.simulate(FULL)
+    row = curves.iloc[(curves["phi [rad]"] - math.radians(degrees)).abs().argmin()]
     X, X_1, X_2, T, sense = cycloid(degrees)
     assert [row["X [m]"], row["X_1 [m/rad]"], row["X_2 [m/rad^2]"]] == pytest.approx(
         [X, X_1, X_2], rel=1e-12, abs=1e-14
@@ -212,9 +214,9 @@ def test_what_pulls_the_frame_down_relieves_the_cam(names, pull):
 def test_dry_friction_widens_the_range_of_the_cam_force_in_dwells_on_both_sides():
     """At rest everywhere but for the spring: least in the upper dwell with −F, largest at the bottom with +F."""
     scene = scene_of(("dry_friction",))
-    found = JOB.figures(scene, {})
-    assert found["contact_min"] == pytest.approx(K1 * X0 - F, rel=1e-14)
-    assert found["contact_max"] == pytest.approx(K1 * (X0 + H) + F, rel=1e-14)
+    figures = JOB.figures(scene, {})
+    assert figures["contact_min"] == pytest.approx(K1 * X0 - F, rel=1e-14)
+    assert figures["contact_max"] == pytest.approx(K1 * (X0 + H) + F, rel=1e-14)
     sampled = JOB.sampler(scene, {})
     low = [-sampled.at("lift", np.array([p]), np.array([0.5]))[0] for p in range(sampled.cycle.pieces)]
     high = [sampled.at("cam_force", np.array([p]), np.array([0.5]))[0] for p in range(sampled.cycle.pieces)]

@@ -32,9 +32,9 @@ TABLE = {
 NAMES = ("fluctuation", "speed_fdc", "M3_fdc", "peak_torque", "no_load_speed")
 
 
-def turned(flywheel=2.0, scene=ON, **own):
+def turned(flywheel=2.0, scene=ON, **parameters):
     """Return the scene with a flywheel, kg·m², and other values of the effect."""
-    values = {"flywheel": f"{flywheel!r} kg*m^2", **own}
+    values = {"flywheel": f"{flywheel!r} kg*m^2", **parameters}
     return scene.update({f"effects.speed_fluctuation.{key}": value for key, value in values.items()})
 
 
@@ -48,21 +48,21 @@ def sampler_of(scene, design=None):
 
 @pytest.mark.parametrize("flywheel", TABLE)
 def test_the_reference_figures(flywheel):
-    found = figures(turned(float(flywheel)))
-    assert [found[name] for name in NAMES] == pytest.approx(TABLE[flywheel], rel=1e-9)
+    second_figures = figures(turned(float(flywheel)))
+    assert [second_figures[name] for name in NAMES] == pytest.approx(TABLE[flywheel], rel=1e-9)
 
 
 @pytest.mark.parametrize("flywheel", TABLE)
 def test_shooting_with_another_integrator_finds_the_same(flywheel):
-    shot, found = plain_turn.figures(flywheel), figures(turned(float(flywheel)))
-    assert shot == pytest.approx({name: found[name] for name in shot}, rel=1e-9)
+    shot, result = plain_turn.figures(flywheel), figures(turned(float(flywheel)))
+    assert shot == pytest.approx({name: result[name] for name in shot}, rel=1e-9)
 
 
 def test_a_light_flywheel_and_a_weak_motor_too():
     shot = plain_turn.figures(0.05, 5.0, 0.3)
-    found = figures(turned(0.05, motor_torque="5 N*m", slip="0.3"))
-    assert found["fluctuation"] > 0.2
-    assert shot == pytest.approx({name: found[name] for name in shot}, rel=1e-8)
+    second_figures = figures(turned(0.05, motor_torque="5 N*m", slip="0.3"))
+    assert second_figures["fluctuation"] > 0.2
+    assert shot == pytest.approx({name: second_figures[name] for name in shot}, rel=1e-8)
 
 
 def test_a_heavy_flywheel_leaves_the_rigid_machine_and_a_share_that_falls_with_it():
@@ -78,8 +78,8 @@ def test_a_heavy_flywheel_leaves_the_rigid_machine_and_a_share_that_falls_with_i
     share = -2 * plain_turn.J4 * plain_turn.rocker(plain_turn.BETA)[1] * plain_turn.SPEED * at_front
     assert share == pytest.approx(-8.5755, abs=5e-5)
     for flywheel, near in ((1e4, 1e-3), (1e6, 1e-5)):
-        found = figures(turned(flywheel))["M3_fdc"]
-        assert flywheel * (found - rigid) == pytest.approx(share, rel=near)
+        figure = figures(turned(flywheel))["M3_fdc"]
+        assert flywheel * (figure - rigid) == pytest.approx(share, rel=near)
 
 
 def test_the_fluctuation_falls_as_one_over_the_flywheel():
@@ -94,12 +94,14 @@ def test_without_load_and_with_hardly_a_motor_its_energy_is_kept():
     root = plain_turn.SPEED * np.mean(np.sqrt(squares))
     most, least = root / math.sqrt(2), root / math.sqrt(squares.max())
     free = ON.set("operation.M0", "0 N*m")
-    found = figures(turned(2.0, free, motor_torque="1e-4 N*m"))
-    assert (found["fluctuation"], found["speed_fdc"]) == pytest.approx((0.00801950197487, 63.0410272579466), rel=1e-7)
-    assert found["fluctuation"] == pytest.approx((most - least) / plain_turn.SPEED, rel=1e-6)
-    assert found["speed_fdc"] == pytest.approx(most, rel=1e-9)
+    second_figures = figures(turned(2.0, free, motor_torque="1e-4 N*m"))
+    assert (second_figures["fluctuation"], second_figures["speed_fdc"]) == pytest.approx(
+        (0.00801950197487, 63.0410272579466), rel=1e-7
+    )
+    assert second_figures["fluctuation"] == pytest.approx((most - least) / plain_turn.SPEED, rel=1e-6)
+    assert second_figures["speed_fdc"] == pytest.approx(most, rel=1e-9)
     finer = figures(turned(2.0, free, motor_torque="1e-5 N*m"))
-    closer = (found["fluctuation"] - 0.00801950197487) / (finer["fluctuation"] - 0.00801950197487)
+    closer = (second_figures["fluctuation"] - 0.00801950197487) / (finer["fluctuation"] - 0.00801950197487)
     assert closer == pytest.approx(10, rel=1e-2)
 
 
@@ -127,8 +129,8 @@ def test_what_the_motor_gives_in_a_turn_is_what_the_loads_take(scene):
     given = float(weights @ sampler.at("motor_torque", pieces, u))
     size = float(weights @ np.abs(at.crank_torque))
     lost = {name: work for name, work in works.items() if name in ("resistance", "bearing_friction")}
-    kept = [abs(work) for name, work in works.items() if name not in lost]
-    assert max(kept) < 1e-9 * size
+    subset = [abs(work) for name, work in works.items() if name not in lost]
+    assert max(subset) < 1e-9 * size
     assert given == pytest.approx(sum(lost.values()), abs=1e-9 * size)
     assert given == pytest.approx(float(weights @ at.crank_torque), abs=1e-9 * size)
     assert float(weights @ (1 / pose.omega)) == pytest.approx(2 * math.pi / plain_turn.SPEED, rel=1e-12)
@@ -157,9 +159,11 @@ def test_everything_that_reads_the_speed_reads_that_of_its_angle():
     assert known["alpha_fdc"] == pytest.approx(at_rest["alpha_fdc"] * faster**2, rel=1e-14)
     phi = 2.0
     pieces, u = (np.array([part]) for part in sampler.cycle.place(phi))
-    found, before = ({name: one.at(name, pieces, u)[0] for name in ("reed_centrifugal",)} for one in (sampler, steady))
+    result, before = (
+        {name: item.at(name, pieces, u)[0] for name in ("reed_centrifugal",)} for item in (sampler, steady)
+    )
     ratio = sampler.at("omega", pieces, u)[0] / plain_turn.SPEED
-    assert found["reed_centrifugal"] == pytest.approx(before["reed_centrifugal"] * ratio**2, rel=1e-12)
+    assert result["reed_centrifugal"] == pytest.approx(before["reed_centrifugal"] * ratio**2, rel=1e-12)
     curves = lo.simulate(scene)
     assert curves["psi_t [rad/s]"].to_numpy() == pytest.approx(
         (curves["psi_1 [1]"] * curves["omega [rad/s]"]).to_numpy()
@@ -169,12 +173,12 @@ def test_everything_that_reads_the_speed_reads_that_of_its_angle():
 
 
 def test_extremes_are_true_between_samples_and_at_corners():
-    found = sampler_of(turned(0.1))
-    dense = found.grid(200_000)
+    result = sampler_of(turned(0.1))
+    dense = result.grid(200_000)
     for name in ("peak_torque", "peak_power"):
-        values = np.abs(found.at(name, *dense))
-        assert found.peak(name) == pytest.approx(values.max(), rel=1e-8)
-        assert found.peak(name) >= values.max() * (1 - 1e-12)
+        values = np.abs(result.at(name, *dense))
+        assert result.peak(name) == pytest.approx(values.max(), rel=1e-8)
+        assert result.peak(name) >= values.max() * (1 - 1e-12)
 
 
 def test_both_sides_of_a_corner_have_their_own_change_of_speed():
@@ -192,22 +196,22 @@ def test_both_sides_of_a_corner_have_their_own_change_of_speed():
 
 
 def test_an_inch_machine_at_350_rpm_is_the_same_machine():
-    own = {"operation.speed": "350 rpm", "effects.speed_fluctuation.flywheel": "6000 lb*in^2"}
-    own |= {"effects.speed_fluctuation.motor_torque": "300 lbf*in", "effects.speed_fluctuation.slip": "0.05"}
-    imperial = inch.scene("beatup").with_effect("speed_fluctuation").update(own)
-    metric = ON.update(own)
-    found, expected = lo.evaluate(imperial), lo.evaluate(metric)
+    values = {"operation.speed": "350 rpm", "effects.speed_fluctuation.flywheel": "6000 lb*in^2"}
+    values |= {"effects.speed_fluctuation.motor_torque": "300 lbf*in", "effects.speed_fluctuation.slip": "0.05"}
+    imperial = inch.scene("beatup").with_effect("speed_fluctuation").update(values)
+    metric = ON.update(values)
+    result, expected = lo.evaluate(imperial), lo.evaluate(metric)
     known = {name: value for name, value in expected.figures.items() if value is not None}
-    assert {name: found.figures[name] for name in known} == pytest.approx(known, rel=1e-12)
-    table = found.table()
+    assert {name: result.figures[name] for name in known} == pytest.approx(known, rel=1e-12)
+    table = result.table()
     assert table.loc["speed_fdc", "unit"] == "rpm"
     assert table.loc["motor_torque_max", "unit"] == "lbf*in"
     assert float(str(table.loc["speed_fdc", "design"])) == pytest.approx(351, abs=1)
-    assert found.figures["fluctuation"] == pytest.approx(0.0091, abs=2e-3)
+    assert result.figures["fluctuation"] == pytest.approx(0.0091, abs=2e-3)
 
 
 @pytest.mark.parametrize(
-    "asked",
+    "request",
     [
         lo.solve,
         lo.prove,
@@ -217,9 +221,9 @@ def test_an_inch_machine_at_350_rpm_is_the_same_machine():
     ],
     ids=["solve", "prove", "sweep", "front", "accuracy"],
 )
-def test_what_seeks_or_proves_refuses_it_by_name(asked):
+def test_what_seeks_or_proves_refuses_it_by_name(request):
     with pytest.raises(BadInput, match="does not cover effect speed_fluctuation") as error:
-        asked(ON)
+        request(ON)
     assert error.value.key == "effects.speed_fluctuation"
     assert "without it, evaluate with it" in str(error.value)
     assert "--without speed_fluctuation" in str(error.value)
@@ -227,10 +231,10 @@ def test_what_seeks_or_proves_refuses_it_by_name(asked):
 
 def test_the_answer_without_it_is_evaluated_with_it():
     design = {"l1": 0.03, "l2": 0.084, "l3": 0.1513, "l4": 0.167}
-    steady, found = lo.evaluate(BEATUP, design), lo.evaluate(ON, design)
-    assert found.design == steady.design
-    assert found.figures["M3_fdc"] != steady.figures["M3_fdc"]
-    assert "fluctuation" in found.table().index
+    steady, result = lo.evaluate(BEATUP, design), lo.evaluate(ON, design)
+    assert result.design == steady.design
+    assert result.figures["M3_fdc"] != steady.figures["M3_fdc"]
+    assert "fluctuation" in result.table().index
 
 
 def test_a_flywheel_that_is_too_light_is_refused_in_one_message():
@@ -250,8 +254,8 @@ def test_a_motor_that_makes_no_sense_is_refused(key, value):
 
 
 def test_its_figures_may_be_limited():
-    kept, broken = (lo.evaluate(ON.set("limits.fluctuation.max", most)) for most in ("0.01", "0.005"))
-    assert kept.admissible
+    remaining, broken = (lo.evaluate(ON.set("limits.fluctuation.max", most)) for most in ("0.01", "0.005"))
+    assert remaining.admissible
     assert [limit.name for limit in broken.limits if not limit.ok] == ["fluctuation"]
     with pytest.raises(BadInput, match="effect speed_fluctuation is off: it gives fluctuation"):
         lo.evaluate(BEATUP.set("limits.fluctuation.max", "0.01"))
@@ -313,10 +317,10 @@ ALGEBRAIC = {
 def test_a_scene_of_algebraic_effects_has_not_a_node_more(job, off):
     on = [name for name in ALGEBRAIC[job] if name not in off]
     scene = functools.reduce(lambda scene, name: scene.with_effect(name), on, lo.load(job))
-    own, system = registry.of(scene), systems.casadi()
-    sampler = own.sampler(scene, own.today(scene))
+    values, system = registry.of(scene), systems.casadi()
+    sampler = values.sampler(scene, values.today(scene))
     model, phi = sampler.model, ca.SX.sym("phi")
-    numbers = {name: ca.SX.sym(name) for name in own.numbers(scene)}
+    numbers = {name: ca.SX.sym(name) for name in values.numbers(scene)}
     given = model.given(system, {**sampler.hints, **numbers})
     graphs = [*model.corners(system, given), *model.static(system, given, sampler.stills).values()]
     for piece in range(sampler.cycle.pieces):

@@ -15,11 +15,11 @@ JOB = registry.of(ON)
 
 
 def test_the_packaged_head_overruns_by_its_inertia_over_the_tapes_stiffness():
-    found = lo.evaluate(ON).figures
-    assert found["head_overrun"] == pytest.approx(0.121473913e-3, rel=1e-8)
+    figures = lo.evaluate(ON).figures
+    assert figures["head_overrun"] == pytest.approx(0.121473913e-3, rel=1e-8)
     sampler = JOB.sampler(ON, {})
-    (bend,) = sampler.at_angle(("peak_acceleration",), found["phi_stroke"])
-    assert found["head_overrun"] == pytest.approx(-0.35 * bend * (2 * math.pi) ** 2 / 1e5, rel=1e-10)
+    (bend,) = sampler.at_angle(("peak_acceleration",), figures["phi_stroke"])
+    assert figures["head_overrun"] == pytest.approx(-0.35 * bend * (2 * math.pi) ** 2 / 1e5, rel=1e-10)
 
 
 def test_the_full_equation_of_motion_says_nearly_the_same():
@@ -59,5 +59,5 @@ def test_a_head_that_swings_too_slowly_is_remarked_upon(stiffness, remarked):
 
 
 def test_its_equation_is_written():
-    told = dict(text.split("\n    ", 1) for text in scenes.equations(ON))
-    assert told["tape_stretch"] == "head_overrun = -S''_stroke*head_inertia_mass*omega^2/stiffness"
+    report = dict(text.split("\n    ", 1) for text in scenes.equations(ON))
+    assert report["tape_stretch"] == "head_overrun = -S''_stroke*head_inertia_mass*omega^2/stiffness"

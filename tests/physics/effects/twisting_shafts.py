@@ -37,13 +37,13 @@ def sampler(k, c, resisted=True):
     return registry.of(scene).sampler(scene, {})
 
 
-def twist(found, phi):
+def twist(result, phi):
     """Return z, rad, at crank angles, rad."""
-    return read(found, phi).coordinate()
+    return read(result, phi).coordinate()
 
 
-def read(found, phi):
-    pieces, u = found.cycle.located(np.asarray(phi))
-    at = found.model.instant(systems.numpy(), found.given, found.node(pieces, u))
-    (state,) = found.model.states
+def read(result, phi):
+    pieces, u = result.cycle.located(np.asarray(phi))
+    at = result.model.instant(systems.numpy(), result.given, result.node(pieces, u))
+    (state,) = result.model.states
     return model.read_at(state, at)

@@ -127,13 +127,13 @@ def test_the_pressure_angle_is_the_one_between_normal_and_path(motion, theta):
     phi = there.motion[0]
     before, after = (there.centre(there.theta, phi + k * H) for k in (-1, 1))
     path = [(q - p) / (2 * H * there.follower.arm) for p, q in zip(before, after, strict=True)]
-    found = there.contact().pressure_angle
-    assert abs(MP.cos(found) - inner(outward, path)) < 1e-25
-    assert abs(MP.sin(found) - cross(path, outward)) < 1e-25
+    result = there.contact().pressure_angle
+    assert abs(MP.cos(result) - inner(outward, path)) < 1e-25
+    assert abs(MP.sin(result) - cross(path, outward)) < 1e-25
     a, arm, b = there.follower.centre_distance, there.follower.arm, there.arm(phi)
     tangent = (arm * (1 + there.motion[1]) - a * MP.cos(b)) / (a * MP.sin(b))
-    assert abs(MP.sin(found) - tangent * MP.cos(found)) < 1e-45
-    assert abs(found) < MP.pi / 2
+    assert abs(MP.sin(result) - tangent * MP.cos(result)) < 1e-45
+    assert abs(result) < MP.pi / 2
 
 
 @given(motions(), angles)
@@ -204,10 +204,10 @@ def test_the_start_angle_keeps_its_digits_folded_and_stretched(reach, sign, marg
     a, side, r0 = (MP.number(value) for value in (1.0, arm, follower.base_radius))
     cosine = (a**2 + side**2 - r0**2) / (2 * a * side)
     known = MP.atan2(MP.sqrt(1 - cosine**2), cosine)
-    found = follower.start_angle(systems.FLOAT)
+    result = follower.start_angle(systems.FLOAT)
     room = min(r0 - abs(a - side), a + side - r0)
     rounded = 2.0**-52 * (a + side) / room * min(known, MP.pi - known)
-    assert abs(found - known) < 4 * (2.0**-52 * known + rounded)
+    assert abs(result - known) < 4 * (2.0**-52 * known + rounded)
 
 
 @given(motions(), st.floats(-3, 3))
@@ -232,10 +232,12 @@ def test_a_whole_cam_turns_its_tangent_once(name):
     total = 2 * math.pi / 3
     for piece, (begin, end) in enumerate(itertools.pairwise(bounds)):
         u = begin + (end - begin) * (1 + nodes) / 2
-        found = law.formula(systems.numpy(), u, np.full(u.shape, float(piece)))
+        result = law.formula(systems.numpy(), u, np.full(u.shape, float(piece)))
         parts = weights * (end - begin) / 2 * angle
         for slope in (1, -1):
-            swing = (SHEDDING.arm_swing * value for value in (found.s, slope * found.s1 / angle, found.s2 / angle**2))
+            swing = (
+                SHEDDING.arm_swing * value for value in (result.s, slope * result.s1 / angle, result.s2 / angle**2)
+            )
             contact = Contact(systems.numpy(), SHEDDING, *swing)
             total += parts @ (contact.curvature * contact.speed)
     assert total == pytest.approx(2 * math.pi, rel=0, abs=1e-11)

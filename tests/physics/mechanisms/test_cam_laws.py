@@ -148,8 +148,8 @@ def test_displacement_is_the_textbook_one_in_50_digits(name, u):
 @given(u=shares)
 @REPEATABLE
 def test_acceleration_is_the_textbook_shape_in_50_digits(name, u):
-    found = digits(LAWS[name], exact(u), piece_at(LAWS[name], u)).s2
-    assert abs(found - PEAKS[name][1] * ACCELERATIONS[name](Fraction(u))) < 1e-50
+    result = digits(LAWS[name], exact(u), piece_at(LAWS[name], u)).s2
+    assert abs(result - PEAKS[name][1] * ACCELERATIONS[name](Fraction(u))) < 1e-50
 
 
 @pytest.mark.few(5)
@@ -166,9 +166,9 @@ def test_each_derivative_is_that_of_the_one_before(law, u):
 @every_law
 def test_derivatives_agree_with_automatic_differentiation(law):
     u, piece = ca.SX.sym("u"), ca.SX.sym("piece")
-    found = law.formula(systems.casadi(), u, piece)
-    by_ad = ca.vertcat(*(ca.jacobian(ca.SX(value), u) for value in found[:3]))
-    both = ca.Function("both", [u, piece], [by_ad, ca.vertcat(*found[1:])])
+    result = law.formula(systems.casadi(), u, piece)
+    by_ad = ca.vertcat(*(ca.jacobian(ca.SX(value), u) for value in result[:3]))
+    both = ca.Function("both", [u, piece], [by_ad, ca.vertcat(*result[1:])])
     for place in np.linspace(0, 1, 81):
         ad, formula = (np.array(value).ravel() for value in both(place, piece_at(law, place)))
         assert ad == pytest.approx(formula, rel=0, abs=1e-12 * float(PEAKS[law.name][2]))
@@ -217,8 +217,8 @@ def test_velocity_integrates_to_the_rise_and_acceleration_to_rest(law):
     for piece, (begin, end) in enumerate(zip(ends(law), ends(law)[1:], strict=False)):
         half = float(end - begin) / 2
         u = float(begin) + half * (1 + nodes)
-        found = law.formula(systems.numpy(), u, np.full(u.shape, float(piece)))
-        totals += [half * weights @ np.broadcast_to(value, u.shape) for value in (found.s1, found.s2)]
+        result = law.formula(systems.numpy(), u, np.full(u.shape, float(piece)))
+        totals += [half * weights @ np.broadcast_to(value, u.shape) for value in (result.s1, result.s2)]
     assert totals == pytest.approx([1, 0], rel=0, abs=1e-13)
 
 
@@ -244,10 +244,10 @@ def test_peaks_are_those_in_print(name):
 @REPEATABLE
 def test_floats_keep_1e_15_of_each_peak(law, u):
     piece = piece_at(law, u)
-    found, known = law.formula(systems.FLOAT, u, piece), digits(law, exact(u), piece)
-    assert abs(found.s - known.s) < 1e-15
+    result, known = law.formula(systems.FLOAT, u, piece), digits(law, exact(u), piece)
+    assert abs(result.s - known.s) < 1e-15
     for order in (1, 2, 3):
-        assert abs(found[order] - known[order]) < 4e-15 * PEAKS[law.name][order - 1]
+        assert abs(result[order] - known[order]) < 4e-15 * PEAKS[law.name][order - 1]
 
 
 @pytest.mark.few(5)
@@ -256,9 +256,9 @@ def test_floats_keep_1e_15_of_each_peak(law, u):
 @REPEATABLE
 def test_floats_keep_1e_15_at_both_ends(law, rest):
     for u, piece in ((rest, 0.0), (1 - rest, float(len(law.breaks)))):
-        found, known = law.formula(systems.FLOAT, u, piece), digits(law, exact(u), piece)
+        result, known = law.formula(systems.FLOAT, u, piece), digits(law, exact(u), piece)
         for order in (0, 1, 2):
-            assert abs(found[order] - known[order]) < 1e-15 * max(1, abs(known[order]))
+            assert abs(result[order] - known[order]) < 1e-15 * max(1, abs(known[order]))
 
 
 @pytest.mark.few(5)
@@ -273,12 +273,12 @@ def test_every_number_system_gives_the_same_numbers(law):
         known = [float(value) for value in digits(law, exact(place), number)]
         constant = ca.Function("law", [u], [ca.vertcat(*law.formula(systems.casadi(), u, number))])
         sympy = law.formula(systems.sympy(), systems.sympy().number(place), number)
-        for found in (
+        for result in (
             law.formula(systems.FLOAT, place, number),
             [np.broadcast_to(value, places.shape)[k] for value in arrays],
             np.array(symbols(place, number)).ravel(),
             np.array(constant(place)).ravel(),
             [float(value) for value in sympy],
         ):
-            for value, reference, scale in zip(found, known, (1, *PEAKS[law.name]), strict=True):
+            for value, reference, scale in zip(result, known, (1, *PEAKS[law.name]), strict=True):
                 assert value == pytest.approx(reference, rel=0, abs=1e-12 * float(scale))

@@ -73,8 +73,8 @@ def test_a_law_is_sampled_at_knots_wherever_its_own_breaks_are(name):
 
 
 def test_a_spline_law_sampled_at_its_own_knots_is_itself():
-    own = cycloid_like(8)
-    assert accelerations(Spline(8), named_knots(own), 8) == pytest.approx(own, abs=1e-14)
+    values = cycloid_like(8)
+    assert accelerations(Spline(8), named_knots(values), 8) == pytest.approx(values, abs=1e-14)
 
 
 def test_segments_and_pieces_are_read_by_cam_angle():
@@ -153,11 +153,11 @@ def test_the_least_slope_inside_an_interval_counts():
 def test_each_knot_follows_from_the_one_before_it(mirror):
     """With s and s' of all knots given, each is what one interval makes of the knot before."""
     law, values = Spline(8, mirror), named_knots(cycloid_like(8))
-    own = law.prepared(FLOAT, values)
+    parameters = law.prepared(FLOAT, values)
     assert law.recurrent == tuple(name for k in range(1, 9) for name in (f"law_s_{k}", f"law_v_{k}"))
-    again = law.followed(FLOAT, {**values, **{name: own[name] for name in law.recurrent}})
+    again = law.followed(FLOAT, {**values, **{name: parameters[name] for name in law.recurrent}})
     assert tuple(again) == law.recurrent
-    assert again == pytest.approx({name: own[name] for name in law.recurrent}, abs=1e-15)
+    assert again == pytest.approx({name: parameters[name] for name in law.recurrent}, abs=1e-15)
     given = {name: 0.1 * k for k, name in enumerate(law.recurrent)}
     read = law.prepared(FLOAT, {**values, **given})
     assert {name: read[name] for name in law.recurrent} == given, "as they are"

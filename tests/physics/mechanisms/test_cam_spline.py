@@ -45,47 +45,47 @@ def uneven_rises(draw):
 @given(accelerations)
 @REPEATABLE
 def test_the_spline_is_the_one_scipy_puts_through_its_knots(values):
-    found = spline(systems.FLOAT, values)
-    knots = np.array([0, *found.breaks, 1], dtype=float)
-    known = CubicSpline(knots, found.s, bc_type=((1, 0.0), (1, found.end[1])))
+    second_spline = spline(systems.FLOAT, values)
+    knots = np.array([0, *second_spline.breaks, 1], dtype=float)
+    known = CubicSpline(knots, second_spline.s, bc_type=((1, 0.0), (1, second_spline.end[1])))
     u = np.setdiff1d(GRID, knots)
     for order, scale in enumerate((1, 1, len(values), len(values) ** 2)):
-        assert sampled(found, u)[order] == pytest.approx(known(u, order), rel=0, abs=1e-11 * scale)
+        assert sampled(second_spline, u)[order] == pytest.approx(known(u, order), rel=0, abs=1e-11 * scale)
 
 
 @given(accelerations)
 @REPEATABLE
 def test_the_spline_has_the_given_second_derivatives_at_its_knots_from_either_side(values):
-    found = spline(systems.FLOAT, values)
-    n = found.intervals
-    assert found.a == tuple(values)
-    assert len(found.breaks) == n - 1
+    second_spline = spline(systems.FLOAT, values)
+    n = second_spline.intervals
+    assert second_spline.a == tuple(values)
+    assert len(second_spline.breaks) == n - 1
     for k in range(n + 1):
-        known = (found.s[k], found.v[k], found.a[k])
+        known = (second_spline.s[k], second_spline.v[k], second_spline.a[k])
         for piece in {max(k - 1, 0), min(k, n - 1)}:
-            here = found.at(systems.FLOAT, k / n, float(piece))
+            here = second_spline.at(systems.FLOAT, k / n, float(piece))
             assert here[:3] == pytest.approx(known, rel=0, abs=1e-13)
 
 
 @given(accelerations)
 @REPEATABLE
 def test_the_spline_starts_at_rest_and_ends_at_the_integrals_of_its_second_derivative(values):
-    found = spline(systems.FLOAT, values)
+    second_spline = spline(systems.FLOAT, values)
     nodes, weights = np.polynomial.legendre.leggauss(4)
-    u = np.concatenate([(k + (1 + nodes) / 2) / found.intervals for k in range(found.intervals)])
-    parts = np.tile(weights / 2 / found.intervals, found.intervals)
+    u = np.concatenate([(k + (1 + nodes) / 2) / second_spline.intervals for k in range(second_spline.intervals)])
+    parts = np.tile(weights / 2 / second_spline.intervals, second_spline.intervals)
     bend = np.interp(u, np.linspace(0, 1, len(values)), values)
-    assert (found.s[0], found.v[0]) == (0, 0)
-    assert found.end == pytest.approx((parts @ ((1 - u) * bend), parts @ bend), rel=0, abs=1e-13)
+    assert (second_spline.s[0], second_spline.v[0]) == (0, 0)
+    assert second_spline.end == pytest.approx((parts @ ((1 - u) * bend), parts @ bend), rel=0, abs=1e-13)
 
 
 @pytest.mark.parametrize("n", [3, 8, 12])
 def test_each_derivative_of_the_spline_is_that_of_the_one_before_in_50_digits(n):
-    found = spline(MP, [MP.number(k * k % 7 - 3.0) / 3 for k in range(n + 1)])
+    second_spline = spline(MP, [MP.number(k * k % 7 - 3.0) / 3 for k in range(n + 1)])
     h = MP.number(1) / 10**15
     for piece in range(n):
         u = (MP.number(piece) + MP.number(0.375)) / n
-        before, here, after = (found.at(MP, u + k * h, float(piece)) for k in (-1, 0, 1))
+        before, here, after = (second_spline.at(MP, u + k * h, float(piece)) for k in (-1, 0, 1))
         for order in (0, 1, 2):
             assert abs((after[order] - before[order]) / (2 * h) - here[order + 1]) < 1e-27
 
@@ -98,26 +98,26 @@ def test_the_spline_of_symbols_is_the_spline_of_numbers(values):
     symbolic = spline(systems.casadi(), ca.vertsplit(a))
     at = ca.Function("at", [a, u, piece], [ca.vertcat(*symbolic.at(systems.casadi(), u, piece))])
     known = sampled(spline(systems.FLOAT, values))
-    found = np.array(at(values, GRID[None, :], pieces(symbolic)[None, :]))
-    assert found == pytest.approx(known, rel=0, abs=1e-12 * len(values) ** 2)
+    result = np.array(at(values, GRID[None, :], pieces(symbolic)[None, :]))
+    assert result == pytest.approx(known, rel=0, abs=1e-12 * len(values) ** 2)
     fixed = ca.Function("at", [a, u], [ca.vertcat(*symbolic.at(systems.casadi(), u, 0.0))])
     assert np.array(fixed(values, 0.0)).ravel() == pytest.approx(known[:, 0], rel=0, abs=1e-12 * len(values) ** 2)
 
 
 def test_the_spline_is_linear_in_its_accelerations():
     a, u = ca.SX.sym("a", 9), ca.SX.sym("u")
-    found = spline(systems.casadi(), ca.vertsplit(a))
-    at = found.at(systems.casadi(), u, 5.0)
-    rows = ca.vertcat(*found.end, *at)
+    second_spline = spline(systems.casadi(), ca.vertsplit(a))
+    at = second_spline.at(systems.casadi(), u, 5.0)
+    rows = ca.vertcat(*second_spline.end, *at)
     assert not ca.depends_on(ca.jacobian(rows, a), a)
     assert ca.jacobian(at.s2, a).nnz() == 2, "the second derivative depends on the two knots beside it alone"
 
 
 def test_the_spline_of_symbols_differentiates_to_its_own_derivatives():
     a, u, piece = ca.SX.sym("a", 7), ca.SX.sym("u"), ca.SX.sym("piece")
-    found = spline(systems.casadi(), ca.vertsplit(a)).at(systems.casadi(), u, piece)
-    by_ad = ca.vertcat(*(ca.jacobian(value, u) for value in found[:3]))
-    both = ca.Function("both", [a, u, piece], [by_ad, ca.vertcat(*found[1:])])
+    result = spline(systems.casadi(), ca.vertsplit(a)).at(systems.casadi(), u, piece)
+    by_ad = ca.vertcat(*(ca.jacobian(value, u) for value in result[:3]))
+    both = ca.Function("both", [a, u, piece], [by_ad, ca.vertcat(*result[1:])])
     for k in range(6):
         ad, formula = both([0, 5, 3, -1, -4, -2, 0], (k + 0.3) / 6, float(k))
         assert np.array(ad) == pytest.approx(np.array(formula), rel=0, abs=1e-12)
@@ -133,12 +133,12 @@ def test_the_spline_keeps_exact_numbers_exact():
 @given(st.lists(st.floats(-20, 20), min_size=1, max_size=8))
 @REPEATABLE
 def test_a_mirrored_spline_is_its_own_mirror_image_and_ends_at_rest(half):
-    found = spline(systems.FLOAT, mirrored(half))
-    height, slope = found.end
-    assert found.intervals == 2 * len(half)
+    second_spline = spline(systems.FLOAT, mirrored(half))
+    height, slope = second_spline.end
+    assert second_spline.intervals == 2 * len(half)
     assert slope == pytest.approx(0, abs=1e-13)
-    inside = np.setdiff1d(GRID, [float(place) for place in found.breaks])
-    here, there = sampled(found, inside), sampled(found, 1 - inside)
+    inside = np.setdiff1d(GRID, [float(place) for place in second_spline.breaks])
+    here, there = sampled(second_spline, inside), sampled(second_spline, 1 - inside)
     for order, (value, sign) in enumerate([(height, 1), (0, -1), (0, 1), (0, -1)]):
         scale = 1 if order < 2 else len(half) ** (order - 1)
         assert here[order] + sign * there[order] == pytest.approx(value, rel=0, abs=1e-12 * scale)
@@ -149,22 +149,22 @@ def test_mirroring_works_on_symbols():
     assert mirrored([a, b, c]) == (a, b, c, 0, -c, -b, -a)
     halves = ca.SX.sym("a", 4)
     height, slope = spline(systems.casadi(), mirrored(ca.vertsplit(halves))).end
-    found = ca.Function("end", [halves], [height, slope])([0, 5, 6, 5])
-    assert [float(value) for value in found] == pytest.approx(
+    result = ca.Function("end", [halves], [height, slope])([0, 5, 6, 5])
+    assert [float(value) for value in result] == pytest.approx(
         spline(systems.FLOAT, mirrored([0, 5, 6, 5])).end, abs=1e-14
     )
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 6, 7, 8, 16, 33, 64, 128])
 def test_the_start_rises_from_rest_to_rest(n):
-    found = cycloid_like(n)
-    law = spline(systems.FLOAT, found)
+    result = cycloid_like(n)
+    law = spline(systems.FLOAT, result)
     assert law.intervals == n
     assert law.end == pytest.approx((1, 0), rel=0, abs=1e-14)
-    assert (found[0], found[-1]) == (0, 0)
-    assert all(value == -mirror for value, mirror in zip(found, reversed(found), strict=True))
+    assert (result[0], result[-1]) == (0, 0)
+    assert all(value == -mirror for value, mirror in zip(result, reversed(result), strict=True))
     assert (sampled(law)[1] > -1e-15).all()
-    assert max(found) < 2 * math.pi * (1 + 5 / n**2)
+    assert max(result) < 2 * math.pi * (1 + 5 / n**2)
 
 
 def test_the_start_tends_to_the_cycloid_at_second_order():
@@ -185,27 +185,27 @@ def test_two_intervals_cannot_start():
 @REPEATABLE
 def test_the_table_is_the_clamped_cubic_of_scipy(points):
     u, s = points
-    found, known = tabulated(u, s), CubicSpline(u, s, bc_type="clamped")
+    result, known = tabulated(u, s), CubicSpline(u, s, bc_type="clamped")
     between = np.setdiff1d(GRID, u)
-    assert found.breaks == tuple(u[1:-1].tolist())
+    assert result.breaks == tuple(u[1:-1].tolist())
     for order, tolerance in enumerate((1e-13, 1e-12, 1e-10, 1e-8)):
-        assert sampled(found, between)[order] == pytest.approx(known(between, order), rel=0, abs=tolerance)
-    assert found.v == pytest.approx(known(u, 1), rel=0, abs=1e-12)
-    assert found.a == pytest.approx(known(u, 2), rel=0, abs=1e-10)
+        assert sampled(result, between)[order] == pytest.approx(known(between, order), rel=0, abs=tolerance)
+    assert result.v == pytest.approx(known(u, 1), rel=0, abs=1e-12)
+    assert result.a == pytest.approx(known(u, 2), rel=0, abs=1e-10)
 
 
 @given(uneven_rises())
 @REPEATABLE
 def test_the_table_meets_its_points_from_either_side_with_one_slope_and_one_second_derivative(points):
     u, s = points
-    found = tabulated(u, s)
+    result = tabulated(u, s)
     for k, place in enumerate(u.tolist()):
         for piece in {max(k - 1, 0), min(k, len(u) - 2)}:
-            here = found.at(systems.FLOAT, place, float(piece))
+            here = result.at(systems.FLOAT, place, float(piece))
             assert here.s == pytest.approx(s[k], rel=0, abs=1e-14)
-            assert here.s1 == pytest.approx(found.v[k], rel=0, abs=1e-12)
-            assert here.s2 == pytest.approx(found.a[k], rel=0, abs=1e-10)
-    assert (found.v[0], found.v[-1]) == (0, 0)
+            assert here.s1 == pytest.approx(result.v[k], rel=0, abs=1e-12)
+            assert here.s2 == pytest.approx(result.a[k], rel=0, abs=1e-10)
+    assert (result.v[0], result.v[-1]) == (0, 0)
 
 
 @pytest.mark.parametrize("lean", [0, 0.4])
@@ -226,16 +226,16 @@ def test_a_table_tends_to_its_law_at_fourth_order(lean):
 @given(uneven_rises())
 @REPEATABLE
 def test_every_number_system_reads_the_same_table(points):
-    found = tabulated(*points)
+    result = tabulated(*points)
     u, piece = ca.SX.sym("u"), ca.SX.sym("piece")
-    symbols = ca.Function("at", [u, piece], [ca.vertcat(*found.at(systems.casadi(), u, piece))])
-    known = sampled(found)
+    symbols = ca.Function("at", [u, piece], [ca.vertcat(*result.at(systems.casadi(), u, piece))])
+    known = sampled(result)
     scale = np.abs(known).max(axis=1)
     for k in range(0, len(GRID), 12):
-        place, number = float(GRID[k]), float(pieces(found)[k])
+        place, number = float(GRID[k]), float(pieces(result)[k])
         for values in (
-            found.at(systems.FLOAT, place, number),
-            found.at(MP, MP.number(place), number),
+            result.at(systems.FLOAT, place, number),
+            result.at(MP, MP.number(place), number),
             np.array(symbols(place, number)).ravel(),
         ):
             off = [abs(float(value) - reference) for value, reference in zip(values, known[:, k], strict=True)]

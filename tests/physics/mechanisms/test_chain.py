@@ -204,7 +204,7 @@ def test_derivatives_are_those_of_the_places_in_60_digits(case):
 
     def everything(phi):
         pose = only.pose(digits, {}, phi)
-        return dict(readings(pose, 0, only)) | {name: found[0] for name, found in linear(pose, only)}
+        return dict(readings(pose, 0, only)) | {name: result[0] for name, result in linear(pose, only)}
 
     for angle in ANGLES:
         pose = only.pose(systems.FLOAT, {}, angle)
@@ -212,8 +212,8 @@ def test_derivatives_are_those_of_the_places_in_60_digits(case):
         for order in range(4):
             exact = {name: difference(order, [at[name] for at in around]) for name in around[2]}
             size = max(map(abs, exact.values()))
-            found = dict(readings(pose, order, only)) | {name: at[order] for name, at in linear(pose, only)}
-            for name, value in found.items():
+            result = dict(readings(pose, order, only)) | {name: at[order] for name, at in linear(pose, only)}
+            for name, value in result.items():
                 assert abs(value - exact[name]) <= 1e-12 * size, (angle, order, name)
 
 
@@ -239,8 +239,8 @@ def test_two_number_systems_say_the_same(case):
     symbols = only.pose(systems.casadi(), {}, phi)
     for order in range(4):
         by_arrays = dict(readings(arrays, order, only))
-        names, found = zip(*readings(symbols, order, only), strict=True)
-        read = ca.Function("f", [phi], [ca.vertcat(*found)])
+        names, result = zip(*readings(symbols, order, only), strict=True)
+        read = ca.Function("f", [phi], [ca.vertcat(*result)])
         by_symbols = dict(zip(names, np.array(read.map(len(ANGLES))(np.array(ANGLES)[None])), strict=True))
         size = max(float(np.max(np.abs(value))) for value in by_symbols.values())
         for name, value in by_arrays.items():
@@ -275,19 +275,23 @@ def test_balls_and_boxes_hold_what_60_digits_say(case):
         pose = only.pose(digits, {}, digits.number(angle))
         exact = [dict(readings(pose, order, only)) for order in range(4)]
         for order in range(4):
-            for name, found in readings(boxed, order, only):
-                assert holds(found, exact[order][name]), (angle, order, name)
-            for name, found in readings(ball, order, only):
-                assert found == exact[order][name] or found.overlaps(enclosed(exact[order][name])), (angle, order, name)
+            for name, result in readings(boxed, order, only):
+                assert holds(result, exact[order][name]), (angle, order, name)
+            for name, result in readings(ball, order, only):
+                assert result == exact[order][name] or result.overlaps(enclosed(exact[order][name])), (
+                    angle,
+                    order,
+                    name,
+                )
         for order in range(2):
-            for name, found in readings(series, order, only):
-                terms = found.terms if isinstance(found, interval_series.IntervalSeries) else (found,)
+            for name, result in readings(series, order, only):
+                terms = result.terms if isinstance(result, interval_series.IntervalSeries) else (result,)
                 for more, term in enumerate(terms):
                     assert holds(term, exact[order + more][name] / (1 + (more == 2))), (angle, order, more, name)
 
 
-def holds(found, value):
-    box = intervals.interval(found)
+def holds(result, value):
+    box = intervals.interval(result)
     ends = zip(np.ravel(box.low), np.ravel(box.high), strict=True)
     return all((low == -math.inf or low <= value) and (high == math.inf or value <= high) for low, high in ends)
 
@@ -307,8 +311,8 @@ def test_equations_of_every_part_can_be_printed_and_derived(case):
     symbolic, floats = only.pose(systems.sympy(), {}, phi).joints["P"], only.pose(systems.FLOAT, {}, 1.2).joints["P"]
     assert sp.latex(symbolic.place.x)
     for order in (0, 1):
-        for found, right in zip(symbolic.at(order), floats.at(order), strict=True):
-            assert float(found.subs(phi, 1.2)) == pytest.approx(right, rel=1e-12, abs=1e-13)
+        for result, right in zip(symbolic.at(order), floats.at(order), strict=True):
+            assert float(result.subs(phi, 1.2)) == pytest.approx(right, rel=1e-12, abs=1e-13)
     assert float(sp.diff(symbolic.place.x, phi).subs(phi, 1.2)) == pytest.approx(floats.at(1).x, rel=1e-12, abs=1e-13)
 
 
@@ -319,15 +323,15 @@ TURN = np.linspace(0, 2 * math.pi, 400)
 @pytest.mark.parametrize(("side", "sign"), [("left", 1), ("right", -1)])
 def test_a_four_bar_as_a_chain_is_the_crank_rocker(side, sign):
     pose = four_bar(*LENGTHS, side).pose(systems.numpy(), {}, TURN)
-    own = crank_rocker.CrankRockerPose(systems.numpy(), crank_rocker.Lengths(*LENGTHS, sign), TURN)
+    values = crank_rocker.CrankRockerPose(systems.numpy(), crank_rocker.Lengths(*LENGTHS, sign), TURN)
     rocker, unit = pose.links["rocker"], pose.links["rocker"].unit()
-    assert np.allclose(np.arctan2(unit.y, unit.x), own.psi, rtol=0, atol=4 * EPS)
-    for order, right in enumerate((own.psi_1, own.psi_2, own.psi_3), 1):
+    assert np.allclose(np.arctan2(unit.y, unit.x), values.psi, rtol=0, atol=4 * EPS)
+    for order, right in enumerate((values.psi_1, values.psi_2, values.psi_3), 1):
         assert np.allclose(rocker.rates(order), right, rtol=0, atol=16 * EPS * np.max(np.abs(right)))
-    for order, right in ((1, own.rod_1), (2, own.rod_2)):
+    for order, right in ((1, values.rod_1), (2, values.rod_2)):
         assert np.allclose(pose.links["rod"].rates(order), right, rtol=0, atol=16 * EPS * np.max(np.abs(right)))
-    assert np.allclose(pose.obliquity("drive"), own.obliquity, rtol=0, atol=8 * EPS)
-    lengths, spans = own.lengths, pose.margins["drive"].spans
+    assert np.allclose(pose.obliquity("drive"), values.obliquity, rtol=0, atol=8 * EPS)
+    lengths, spans = values.lengths, pose.margins["drive"].spans
     for name, right in (("span_far", crank_rocker.span_far), ("span_near", crank_rocker.span_near)):
         assert np.allclose(spans[name](), right(systems.numpy(), lengths, TURN), rtol=16 * EPS)
 
@@ -343,7 +347,7 @@ def test_a_rapier_drive_as_a_chain_is_the_rapier_drive():
     """Within 1e-14 of the largest value of each kind, the rounding of both."""
     d = BUILT
     stand = rapier_drive.Sley(systems.FLOAT, d).stand
-    own = rapier_drive.RapierPose(systems.numpy(), d, stand, TURN)
+    values = rapier_drive.RapierPose(systems.numpy(), d, stand, TURN)
     A0 = rapier_drive.polar(systems.FLOAT, -d.l71, stand.frame_angle)
     drive = chain(
         {
@@ -371,27 +375,28 @@ def test_a_rapier_drive_as_a_chain_is_the_rapier_drive():
     )
     pose = drive.pose(systems.numpy(), {}, TURN)
     sley, driving = pose.links["sley"], pose.links["driving"]
-    found = {
-        "phi3_1": (sley.rates(1), own.phi3_1),
-        "phi3_2": (sley.rates(2), own.phi3_2),
-        "phi3_3": (sley.rates(3), own.phi3_3),
-        "phi63_1": (driving.rates(1) - sley.rates(1), own.phi63_1),
-        "phi63_2": (driving.rates(2) - sley.rates(2), own.phi63_2),
-        "phi63_3": (driving.rates(3) - sley.rates(3), own.phi63_3),
-        "obliquity": (pose.obliquity("five"), own.obliquity),
+    results = {
+        "phi3_1": (sley.rates(1), values.phi3_1),
+        "phi3_2": (sley.rates(2), values.phi3_2),
+        "phi3_3": (sley.rates(3), values.phi3_3),
+        "phi63_1": (driving.rates(1) - sley.rates(1), values.phi63_1),
+        "phi63_2": (driving.rates(2) - sley.rates(2), values.phi63_2),
+        "phi63_3": (driving.rates(3) - sley.rates(3), values.phi63_3),
+        "obliquity": (pose.obliquity("five"), values.obliquity),
     }
     for name in ("A", "B1", "B2", "C", "D"):
-        found |= {
-            f"{name}.{axis}": (getattr(pose.joints[name].place, axis), getattr(own.joints[name], axis)) for axis in "xy"
+        results |= {
+            f"{name}.{axis}": (getattr(pose.joints[name].place, axis), getattr(values.joints[name], axis))
+            for axis in "xy"
         }
-    for name, (here, right) in found.items():
+    for name, (here, right) in results.items():
         assert np.allclose(here, right, rtol=0, atol=1e-13 * np.max(np.abs(right))), name
 
 
 def told(parts):
     """Return what a chain's fault says, and at which crank angle, deg."""
-    said, _, angle = fault(parts, {}).partition(" fails at crank angle ")
-    return said, float(angle.removesuffix(" deg"))
+    message, _, angle = fault(parts, {}).partition(" fails at crank angle ")
+    return message, float(angle.removesuffix(" deg"))
 
 
 def test_a_closed_chain_has_no_fault_and_one_that_does_not_names_part_and_crank_angle():
@@ -403,8 +408,8 @@ def test_a_closed_chain_has_no_fault_and_one_that_does_not_names_part_and_crank_
 @pytest.mark.parametrize("start", [0.0, 0.004363, 1.0, 2.5])
 def test_a_dyad_that_only_touches_its_singular_position_between_samples_is_told(start):
     """A change point: l1 + l4 = l2 + l3 stretches it in one position; what closes by 1e-9 does not touch."""
-    said, angle = told(four_bar(1, 2, 3, 4, start=start))
-    assert said == "drive: B to D < rod + rocker"
+    message, angle = told(four_bar(1, 2, 3, 4, start=start))
+    assert message == "drive: B to D < rod + rocker"
     assert angle == pytest.approx(math.degrees(math.pi - start), abs=1e-3)
     assert fault(four_bar(1, 2 + 1e-9, 3, 4, start=start), {}) == ""
 
@@ -421,8 +426,8 @@ def test_a_slot_whose_pin_passes_over_its_pivot_is_told_in_any_unit():
         )
 
     for size in (1e-3, 1.0, 1e3):
-        said, angle = told(slotted(size, 0.3))
-        assert said == "slot: B keeps away from O"
+        message, angle = told(slotted(size, 0.3))
+        assert message == "slot: B keeps away from O"
         assert angle == pytest.approx(math.degrees(2 * math.pi - 1), abs=1e-3)
         assert fault(slotted(size, 0.299), {}) == ""
 
@@ -445,8 +450,8 @@ def test_a_gear_that_counts_past_its_end_or_does_not_come_back_is_told():
     assert fault(geared(ratio=-1.375, zero=1.9, **{"with": "rocker"}), {}) == ""
     unit = linked({}).pose(systems.FLOAT, {}, 2.0).links["rocker"].unit()
     passed = math.atan2(unit.y, unit.x)
-    said, angle = told(geared(ratio=-1.375, zero=passed + math.pi, **{"with": "rocker"}))
-    assert said == "wheel: rocker keeps within half a turn of zero"
+    message, angle = told(geared(ratio=-1.375, zero=passed + math.pi, **{"with": "rocker"}))
+    assert message == "wheel: rocker keeps within half a turn of zero"
     unit = linked({}).pose(systems.FLOAT, {}, math.radians(angle)).links["rocker"].unit()
     assert math.atan2(unit.y, unit.x) == pytest.approx(passed, abs=0.01)
     told_ = fault(geared(ratio=0.5, **{"with": "crank"}), {})

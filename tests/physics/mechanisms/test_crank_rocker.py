@@ -79,7 +79,7 @@ def triangles(side):
     return centres
 
 
-def assert_few_ulp(found, reference, data, ulps):
+def assert_few_ulp(result, reference, data, ulps):
     """Compare floats with a reference of many digits, to `ulps` times condition."""
     exact = [MP.mpf(x) for x in data]
     values = reference(*exact)
@@ -88,7 +88,7 @@ def assert_few_ulp(found, reference, data, ulps):
         step = MP.mpf(10) ** -12
         moved = reference(*exact[:k], x * (1 + step), *exact[k + 1 :])
         sizes = [size + abs(m - value) / step for size, m, value in zip(sizes, moved, values, strict=True)]
-    for number, value, size in zip(found, values, sizes, strict=True):
+    for number, value, size in zip(result, values, sizes, strict=True):
         assert abs(MP.mpf(number) - value) <= ulps * EPS * size
 
 
@@ -96,8 +96,8 @@ def assert_few_ulp(found, reference, data, ulps):
 @REPEATABLE
 def test_psi_and_its_derivatives_to_four_ulp_times_condition(lengths, phi):
     pose = CrankRockerPose(systems.FLOAT, lengths, phi)
-    found = (pose.psi, pose.psi_1, pose.psi_2)
-    assert_few_ulp(found, motion(lengths.side), [*numbers(lengths), phi], 4)
+    results = (pose.psi, pose.psi_1, pose.psi_2)
+    assert_few_ulp(results, motion(lengths.side), [*numbers(lengths), phi], 4)
 
 
 @given(linkages(), angles)
@@ -107,8 +107,8 @@ def test_closed_forms_to_twenty_digits(lengths, phi):
     exact = [MP.mpf(x) for x in (*numbers(lengths), phi)]
     l1, l2, l3, l4, angle = exact
     pose = CrankRockerPose(system, Lengths(l1, l2, l3, l4, lengths.side), angle)
-    for found, value in zip((pose.psi, pose.psi_1, pose.psi_2), motion(lengths.side)(*exact), strict=True):
-        assert abs(found - value) <= MP.mpf(10) ** -20 * (1 + abs(value))
+    for result, value in zip((pose.psi, pose.psi_1, pose.psi_2), motion(lengths.side)(*exact), strict=True):
+        assert abs(result - value) <= MP.mpf(10) ** -20 * (1 + abs(value))
 
 
 def automatic():
@@ -140,8 +140,8 @@ def test_both_dead_centres_to_eight_ulp_times_condition(crank):
     @REPEATABLE
     def check(lengths):
         centres = dead_centres(systems.FLOAT, lengths)
-        found = [getattr(centres, name) for name in CENTRES]
-        assert_few_ulp(found, triangles(lengths.side), numbers(lengths), 8)
+        results = [getattr(centres, name) for name in CENTRES]
+        assert_few_ulp(results, triangles(lengths.side), numbers(lengths), 8)
 
     check()
 
@@ -249,8 +249,8 @@ def test_synthesis_is_the_papers_eq_13_to_15_with_l1_plus_l2(theta, beta):
     l1 = -half * MP.cos(sweep / 2 + beta) / MP.sin((sweep - swing) / 2)
     l2 = half * MP.sin(sweep / 2 + beta) / MP.cos((sweep - swing) / 2)
     l3 = MP.sqrt((l1 + l2) ** 2 - 2 * (l1 + l2) * MP.cos(beta) + 1)
-    found = crank_rocker_synthesis.synthesis(systems.FLOAT, float(theta), float(beta), float(swing))
-    assert found == pytest.approx([float(l1), float(l2), float(l3)], rel=1e-14)
+    result = crank_rocker_synthesis.synthesis(systems.FLOAT, float(theta), float(beta), float(swing))
+    assert result == pytest.approx([float(l1), float(l2), float(l3)], rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -282,9 +282,9 @@ def test_a_change_of_scale_changes_no_angle(lengths, phi, power):
     first, second = CrankRockerPose(systems.FLOAT, lengths, phi), CrankRockerPose(systems.FLOAT, scaled, phi)
     assert (first.psi_1, first.psi_2) == (second.psi_1, second.psi_2)
     assert first.psi == pytest.approx(second.psi, rel=EPS, abs=0)
-    one, two = dead_centres(systems.FLOAT, lengths), dead_centres(systems.FLOAT, scaled)
+    item, two = dead_centres(systems.FLOAT, lengths), dead_centres(systems.FLOAT, scaled)
     for name in CENTRES:
-        assert getattr(one, name) == pytest.approx(getattr(two, name), rel=2 * EPS, abs=0)
+        assert getattr(item, name) == pytest.approx(getattr(two, name), rel=2 * EPS, abs=0)
 
 
 @given(linkages(), angles)
@@ -293,13 +293,13 @@ def test_the_mirror_image_turned_the_other_way_moves_alike(lengths, phi):
     mirrored = lengths._replace(side=-lengths.side)
     first, second = CrankRockerPose(systems.FLOAT, lengths, phi), CrankRockerPose(systems.FLOAT, mirrored, -phi)
     assert (second.psi, second.psi_1, second.psi_2) == (-first.psi, first.psi_1, -first.psi_2)
-    one, two = dead_centres(systems.FLOAT, lengths), dead_centres(systems.FLOAT, mirrored)
+    item, two = dead_centres(systems.FLOAT, lengths), dead_centres(systems.FLOAT, mirrored)
     signs = {"swing": 1}
-    assert [getattr(two, name) for name in CENTRES] == [signs.get(n, -1) * getattr(one, n) for n in CENTRES]
+    assert [getattr(two, name) for name in CENTRES] == [signs.get(n, -1) * getattr(item, n) for n in CENTRES]
 
 
 def test_curves_are_the_poses_whatever_the_shape_and_the_chunk():
     phi = np.linspace(-7, 7, 60).reshape(3, 4, 5)
     pose = CrankRockerPose(systems.numpy(), PAPER, phi)
-    for found, whole in zip(crank_rocker.curves(PAPER, phi, chunk=7), (pose.psi, pose.psi_1, pose.psi_2), strict=True):
-        assert found == pytest.approx(whole, rel=1e-14)
+    for result, whole in zip(crank_rocker.curves(PAPER, phi, chunk=7), (pose.psi, pose.psi_1, pose.psi_2), strict=True):
+        assert result == pytest.approx(whole, rel=1e-14)

@@ -93,8 +93,8 @@ def test_the_message_names_an_inequality_that_fails_and_only_then(l1, l2, l3, l4
     ],
 )
 def test_messages(mm, message):
-    found = fault(*(length / 1e3 for length in mm))
-    assert found == message if not message else message in found
+    result = fault(*(length / 1e3 for length in mm))
+    assert result == message if not message else message in result
 
 
 @pytest.mark.parametrize(

@@ -48,11 +48,11 @@ def area_and_condition(base, r1, r2):
 @REPEATABLE
 def test_links_have_their_lengths_and_meet_at_one_point(triangle):
     base, r1, r2, side = triangle
-    found, size = dyad.close(systems.FLOAT, base, r1, r2, side), r1 + r2
-    assert math.hypot(found.link1.x, found.link1.y) == pytest.approx(r1, rel=0, abs=4 * EPS * size)
-    assert math.hypot(found.link2.x, found.link2.y) == pytest.approx(r2, rel=0, abs=4 * EPS * size)
-    assert found.link1.x - found.link2.x == pytest.approx(base.x, rel=0, abs=2 * EPS * size)
-    assert found.link1.y - found.link2.y == pytest.approx(base.y, rel=0, abs=2 * EPS * size)
+    result, size = dyad.close(systems.FLOAT, base, r1, r2, side), r1 + r2
+    assert math.hypot(result.link1.x, result.link1.y) == pytest.approx(r1, rel=0, abs=4 * EPS * size)
+    assert math.hypot(result.link2.x, result.link2.y) == pytest.approx(r2, rel=0, abs=4 * EPS * size)
+    assert result.link1.x - result.link2.x == pytest.approx(base.x, rel=0, abs=2 * EPS * size)
+    assert result.link1.y - result.link2.y == pytest.approx(base.y, rel=0, abs=2 * EPS * size)
 
 
 @pytest.mark.slow
@@ -61,8 +61,8 @@ def test_links_have_their_lengths_and_meet_at_one_point(triangle):
 def test_the_area_is_exact_to_four_ulp_times_its_condition(triangle):
     base, r1, r2, side = triangle
     area, condition = area_and_condition(base, r1, r2)
-    found = dyad.close(systems.FLOAT, base, r1, r2, side)
-    assert abs(MP.mpf(found.area4) - side * area) <= 4 * EPS * condition * area
+    close = dyad.close(systems.FLOAT, base, r1, r2, side)
+    assert abs(MP.mpf(close.area4) - side * area) <= 4 * EPS * condition * area
     a = MP.sqrt(MP.mpf(base.x) ** 2 + MP.mpf(base.y) ** 2)
     assert abs(dyad.heron(systems.mpmath(50), a, MP.mpf(r1), MP.mpf(r2)) - area) <= MP.mpf(10) ** -30 * area
 
@@ -71,10 +71,10 @@ def test_the_area_is_exact_to_four_ulp_times_its_condition(triangle):
 @REPEATABLE
 def test_the_area_is_twice_the_cross_product_and_the_joint_lies_on_the_asked_side(triangle):
     base, r1, r2, side = triangle
-    found = dyad.close(systems.FLOAT, base, r1, r2, side)
-    left = base.x * found.link1.y - base.y * found.link1.x
-    assert 2 * left == pytest.approx(found.area4, rel=0, abs=16 * EPS * (r1 + r2) ** 2)
-    assert math.copysign(1, found.area4) == side
+    close = dyad.close(systems.FLOAT, base, r1, r2, side)
+    left = base.x * close.link1.y - base.y * close.link1.x
+    assert 2 * left == pytest.approx(close.area4, rel=0, abs=16 * EPS * (r1 + r2) ** 2)
+    assert math.copysign(1, close.area4) == side
 
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-6, 1e-9, 1e-12])
@@ -82,8 +82,8 @@ def test_a_needle_keeps_the_digits_that_the_square_of_its_cosine_loses(gap):
     """Sides 1 and 1 over a base of `gap`: exact while sqrt(1 − cos²) has nothing left."""
     exact = MP.sqrt(4 - MP.mpf(gap) ** 2) * MP.mpf(gap)
     assert dyad.heron(systems.FLOAT, gap, 1.0, 1.0) == pytest.approx(float(exact), rel=4 * EPS)
-    found = dyad.close(systems.FLOAT, Vector(gap, 0.0), 1.0, 1.0, 1)
-    assert found.area4 == pytest.approx(float(exact), rel=4 * EPS)
+    close = dyad.close(systems.FLOAT, Vector(gap, 0.0), 1.0, 1.0, 1)
+    assert close.area4 == pytest.approx(float(exact), rel=4 * EPS)
     cosine = 1 - gap**2 / 2
     naive = 2 * math.sqrt(1 - cosine**2)
     assert (abs(naive / float(exact) - 1) > 1e-6) == (gap <= 1e-6)
@@ -110,12 +110,12 @@ def rates_by_differentiation():
     x0, y0, x1, y1, x2, y2, r1, r2 = ca.vertsplit(constants)
     side = ca.SX.sym("side")
     base = Vector(x0 + x1 * t + x2 * t**2 / 2, y0 + y1 * t + y2 * t**2 / 2)
-    found = dyad.close(systems.casadi(), base, r1, r2, side)
-    rates = dyad.rates(found, Vector(x1 + x2 * t, y1 + y2 * t))
-    second_1 = dyad.second_rate_1(found, Vector(x2, y2), *rates, r2)
-    second_2 = dyad.second_rate_2(found, Vector(x2, y2), *rates, r1)
+    close = dyad.close(systems.casadi(), base, r1, r2, side)
+    rates = dyad.rates(close, Vector(x1 + x2 * t, y1 + y2 * t))
+    second_1 = dyad.second_rate_1(close, Vector(x2, y2), *rates, r2)
+    second_2 = dyad.second_rate_2(close, Vector(x2, y2), *rates, r1)
     closed = [*rates, second_1, second_2]
-    angles = [ca.atan2(link.y, link.x) for link in (found.link1, found.link2)]
+    angles = [ca.atan2(link.y, link.x) for link in (close.link1, close.link2)]
     first = [ca.jacobian(angle, t) for angle in angles]
     automatic = [*first, *(ca.jacobian(rate, t) for rate in first)]
     condition = [ca.norm_1(ca.jacobian(f, ca.vertcat(constants, t)).T * ca.vertcat(constants, t)) for f in closed]
@@ -141,9 +141,9 @@ def test_a_power_of_a_ball_around_zero_encloses_the_powers_of_all_in_it(power, n
     system = systems.balls()
     for centre, radius in ((0.0, 1e-18), (1e-3, 2e-3), (-0.4, 0.1)):
         ball = system.number(0) + type(system.pi)(centre, radius)
-        found = getattr(dyad, name)(ball)
-        assert all(found.contains((centre + share * radius) ** power) for share in (-0.9, 0.0, 0.5, 0.9))
-        assert float(found.rad()) <= 2 * power * (abs(centre) + radius) ** (power - 1) * radius
+        result = getattr(dyad, name)(ball)
+        assert all(result.contains((centre + share * radius) ** power) for share in (-0.9, 0.0, 0.5, 0.9))
+        assert float(result.rad()) <= 2 * power * (abs(centre) + radius) ** (power - 1) * radius
 
 
 def test_a_link_at_rest_for_an_instant_has_a_third_rate_in_balls():

@@ -176,9 +176,9 @@ def test_a_parallelogram_keeps_its_coupler_parallel_between_its_change_points():
 
 def cam(law, **changed):
     """Return a follower that a cam turns, with a dwell between 7.6 and 8.3 rad."""
-    own = {"start": 0.3, "lift": 0.5, "begins": 5.0, "rise": 1.9, "far_dwell": 0.7, "return": 1.5} | changed
+    values = {"start": 0.3, "lift": 0.5, "begins": 5.0, "rise": 1.9, "far_dwell": 0.7, "return": 1.5} | changed
     return chain(
-        {"A": {"kind": "pivot"}, "arm": {"kind": "cam", "at": "A", "pin": "P", "length": 0.2, "law": law} | own}
+        {"A": {"kind": "pivot"}, "arm": {"kind": "cam", "at": "A", "pin": "P", "length": 0.2, "law": law} | values}
     )
 
 
@@ -195,13 +195,13 @@ def test_a_cam_turns_its_link_by_its_law_and_rests_in_its_dwells(law):
     follower, shape = cam(law), LAWS[law]
     pose = follower.pose(ARRAYS, {}, TURN, follower.switch({}, TURN))
     angle = np.arctan2(pose.links["arm"].unit().y, pose.links["arm"].unit().x)
-    for phi, found, *rates in zip(TURN, angle, *(pose.links["arm"].rates(k) for k in (1, 2, 3)), strict=True):
+    for phi, result, *rates in zip(TURN, angle, *(pose.links["arm"].rates(k) for k in (1, 2, 3)), strict=True):
         since = (phi - 5.0) % (2 * math.pi)
         u = since / 1.9 if since < 1.9 else (4.1 - since) / 1.5 if 2.6 <= since < 4.1 else float(since < 2.6)
         grows = 1 / 1.9 if since < 1.9 else -1 / 1.5 if 2.6 <= since < 4.1 else 0.0
         piece = float(sum(u > at for at in shape.breaks))
         exact = shape.formula(FLOAT, u, piece)
-        assert found == pytest.approx(0.3 + 0.5 * exact.s, abs=1e-13)
+        assert result == pytest.approx(0.3 + 0.5 * exact.s, abs=1e-13)
         for order, rate in enumerate(rates, 1):
             assert rate == pytest.approx(0.5 * exact[order] * grows**order, rel=1e-10, abs=1e-11)
 
@@ -223,7 +223,7 @@ def test_a_cams_stretches_are_the_same_wherever_the_turn_is_counted_from():
     angles = np.linspace(0.01, 6.2, 97)
     for turns in (-1, 1, 3):
         moved = angles + turns * 2 * math.pi
-        here, there = (follower.pose(ARRAYS, {}, each, follower.switch({}, each)) for each in (angles, moved))
+        here, there = (follower.pose(ARRAYS, {}, item, follower.switch({}, item)) for item in (angles, moved))
         assert np.allclose(here.joints["P"].place.x, there.joints["P"].place.x, rtol=0, atol=1e-14)
     (part,) = follower.cams
     corners = follower.corners(part, FLOAT, {})
@@ -244,6 +244,6 @@ def test_a_cam_runs_in_casadi_with_its_stretch_as_data_and_in_boxes():
         at = intervals.Interval(np.array([angle]), np.array([angle + 1e-9]))
         boxed = follower.pose(systems.boxes(), {}, at, {"cam arm": float(switch["cam arm"])}).links["arm"]
         for order in (1, 2, 3):
-            found = intervals.interval(boxed.rates(order))
-            assert np.all(found.low <= link.rates(order)), (angle, order)
-            assert np.all(link.rates(order) <= found.high), (angle, order)
+            result = intervals.interval(boxed.rates(order))
+            assert np.all(result.low <= link.rates(order)), (angle, order)
+            assert np.all(link.rates(order) <= result.high), (angle, order)

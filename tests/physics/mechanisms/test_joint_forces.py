@@ -43,9 +43,9 @@ def solved(bodies, unknown):
     for name, count in unknown.items():
         places[name], size = size, size + count
     matrix, right = np.zeros((size, size)), np.zeros(size)
-    for k, (force, moment, held) in enumerate(bodies):
+    for k, (force, moment, bodie) in enumerate(bodies):
         right[3 * k : 3 * k + 3] = [-force[0], -force[1], -moment]
-        for name, sign, arm in held:
+        for name, sign, arm in bodie:
             at = places[name]
             if unknown[name] == 2:
                 matrix[3 * k, at] = matrix[3 * k + 1, at + 1] = sign
@@ -56,8 +56,8 @@ def solved(bodies, unknown):
                 (x, y), direction = arm
                 matrix[3 * k : 3 * k + 2, at] = sign * np.asarray(direction)
                 matrix[3 * k + 2, at] = sign * cross((x, y), direction)
-    found = np.linalg.solve(matrix, right)
-    return {name: found[places[name] : places[name] + count] for name, count in unknown.items()}
+    answer = np.linalg.solve(matrix, right)
+    return {name: answer[places[name] : places[name] + count] for name, count in unknown.items()}
 
 
 def drawn(random):
@@ -78,8 +78,8 @@ def test_two_links_are_each_in_equilibrium(random):
         (force2, moment2, [("H2", 1, (0, 0)), ("R", 1, r2)]),
     ]
     expected = solved(bodies, {"H1": 2, "H2": 2, "R": 2})
-    found = two_links(closed(r1, r2), Wrench(vector(force1), moment1), Wrench(vector(force2), moment2))
-    for name, value in (("R", found.inner), ("H1", found.outer1), ("H2", found.outer2)):
+    result = two_links(closed(r1, r2), Wrench(vector(force1), moment1), Wrench(vector(force2), moment2))
+    for name, value in (("R", result.inner), ("H1", result.outer1), ("H2", result.outer2)):
         assert value == pytest.approx(tuple(expected[name]), rel=1e-10, abs=1e-12)
 
 
@@ -88,10 +88,10 @@ def test_a_link_without_a_load_is_a_two_force_member(random):
     r1, r2, (force1, moment1), (force2, moment2) = drawn(random)
     group, nothing = closed(r1, r2), Wrench(Vector(0.0, 0.0), 0.0)
     loads = [Wrench(vector(force1), moment1), Wrench(vector(force2), moment2)]
-    for own in ([loads[0], None], [None, loads[1]], [None, None]):
-        whole = two_links(group, *(each or nothing for each in own))
-        found = two_links(group, *own)
-        assert np.ravel(found) == pytest.approx(np.ravel(whole), rel=1e-14, abs=1e-15)
+    for entry in ([loads[0], None], [None, loads[1]], [None, None]):
+        whole = two_links(group, *(item or nothing for item in entry))
+        result = two_links(group, *entry)
+        assert np.ravel(result) == pytest.approx(np.ravel(whole), rel=1e-14, abs=1e-15)
     alone = two_links(group, None, loads[1])
     assert cross(alone.inner, r1) == pytest.approx(0.0, abs=1e-12)
     assert alone.outer1 == alone.inner
@@ -108,10 +108,10 @@ def test_a_link_and_its_slider_are_each_in_equilibrium(random):
         (force2, 0.0, [("R", 1, (0, 0)), ("guide", 1, ((0, 0), across)), ("couple", 1, None)]),
     ]
     expected = solved(bodies, {"H1": 2, "R": 2, "guide": 1, "couple": 1})
-    found = link_and_slider(vector(r1), vector(along), Wrench(vector(force1), moment1), vector(force2))
-    assert found.inner == pytest.approx(tuple(expected["R"]), rel=1e-10, abs=1e-12)
-    assert found.outer1 == pytest.approx(tuple(expected["H1"]), rel=1e-10, abs=1e-12)
-    assert found.outer2 == pytest.approx(tuple(expected["guide"][0] * np.array(across)), rel=1e-10, abs=1e-12)
+    result = link_and_slider(vector(r1), vector(along), Wrench(vector(force1), moment1), vector(force2))
+    assert result.inner == pytest.approx(tuple(expected["R"]), rel=1e-10, abs=1e-12)
+    assert result.outer1 == pytest.approx(tuple(expected["H1"]), rel=1e-10, abs=1e-12)
+    assert result.outer2 == pytest.approx(tuple(expected["guide"][0] * np.array(across)), rel=1e-10, abs=1e-12)
     assert expected["couple"][0] == pytest.approx(0.0, abs=1e-12)
 
 
@@ -125,10 +125,10 @@ def test_a_slotted_lever_and_its_block_are_each_in_equilibrium(random):
         (force2, moment2, [("H2", 1, (0, 0)), ("slot", 1, ((0, 0), across)), ("couple", 1, None)]),
     ]
     expected = solved(bodies, {"H1": 2, "H2": 2, "slot": 1, "couple": 1})
-    found = slotted_lever(vector(arm), vector(along), Wrench(vector(force1), moment1), Wrench(vector(force2), moment2))
-    assert found.outer1 == pytest.approx(tuple(expected["H1"]), rel=1e-10, abs=1e-12)
-    assert found.outer2 == pytest.approx(tuple(expected["H2"]), rel=1e-10, abs=1e-12)
-    assert found.inner == pytest.approx(tuple(expected["slot"][0] * np.array(across)), rel=1e-10, abs=1e-12)
+    result = slotted_lever(vector(arm), vector(along), Wrench(vector(force1), moment1), Wrench(vector(force2), moment2))
+    assert result.outer1 == pytest.approx(tuple(expected["H1"]), rel=1e-10, abs=1e-12)
+    assert result.outer2 == pytest.approx(tuple(expected["H2"]), rel=1e-10, abs=1e-12)
+    assert result.inner == pytest.approx(tuple(expected["slot"][0] * np.array(across)), rel=1e-10, abs=1e-12)
 
 
 @pytest.mark.parametrize("random", RANDOM[:6])
@@ -140,24 +140,24 @@ def test_inertia_is_that_of_a_hundred_point_masses(random):
     accelerations = carried + change * points @ [[0, 1], [-1, 0]] - speed**2 * points
     forces = -masses[:, None] * accelerations
     moment = float((points[:, 0] * forces[:, 1] - points[:, 1] * forces[:, 0]).sum())
-    found = inertia(float(masses.sum()), vector(first), second, (speed, change), vector(carried))
-    assert found.force == pytest.approx(tuple(forces.sum(axis=0)), rel=1e-12, abs=1e-12)
-    assert found.moment == pytest.approx(moment, rel=1e-12, abs=1e-12)
+    result = inertia(float(masses.sum()), vector(first), second, (speed, change), vector(carried))
+    assert result.force == pytest.approx(tuple(forces.sum(axis=0)), rel=1e-12, abs=1e-12)
+    assert result.moment == pytest.approx(moment, rel=1e-12, abs=1e-12)
     still = inertia(float(masses.sum()), vector(first), second, (speed, change))
     assert still == inertia(0.0, vector(first), second, (speed, change), Vector(0.0, 0.0))
 
 
 def test_what_acts_on_one_link_adds_up():
     assert together([]) is None
-    one, other = Wrench(Vector(1.0, 2.0), 3.0), Wrench(Vector(-4.0, 5.0), 6.0)
-    assert together([one, other]) == Wrench(Vector(-3.0, 7.0), 9.0)
+    first, other = Wrench(Vector(1.0, 2.0), 3.0), Wrench(Vector(-4.0, 5.0), 6.0)
+    assert together([first, other]) == Wrench(Vector(-3.0, 7.0), 9.0)
 
 
 def test_teeth_push_across_the_line_of_centres_with_the_torque_s_lever():
     centres = Vector(0.6, 0.8)
-    found = tooth_force(3.0, 0.5, centres)
-    assert dyad.dot(found, centres) == pytest.approx(0.0, abs=1e-15)
-    assert cross((0.5 * centres.x, 0.5 * centres.y), found) == pytest.approx(3.0, rel=1e-15)
+    result = tooth_force(3.0, 0.5, centres)
+    assert dyad.dot(result, centres) == pytest.approx(0.0, abs=1e-15)
+    assert cross((0.5 * centres.x, 0.5 * centres.y), result) == pytest.approx(3.0, rel=1e-15)
 
 
 def test_a_crank_in_line_with_its_rod_needs_no_torque():
@@ -193,5 +193,5 @@ def test_groups_run_in_every_number_system(name):
         yield tooth_force(of(3.0), of(0.5), own(along))
 
     for value, expected in zip(forces(number), forces(float), strict=True):
-        for one, plain in zip(value, expected, strict=True):
-            assert float(np.ravel(one)[0] if name == "numpy" else one) == pytest.approx(plain, rel=1e-13, abs=1e-14)
+        for item, plain in zip(value, expected, strict=True):
+            assert float(np.ravel(item)[0] if name == "numpy" else item) == pytest.approx(plain, rel=1e-13, abs=1e-14)

@@ -50,9 +50,9 @@ def pose(d, degrees):
 def opens(d, degrees):
     """Say at which crank angles the head has no position; where it has one, its derivatives are finite too."""
     with np.errstate(invalid="ignore"):
-        found = pose(d, degrees)
-        lost = np.isnan(found.phi63(found.relative))
-        assert np.isfinite(found.phi63_3[~lost]).all()
+        result = pose(d, degrees)
+        lost = np.isnan(result.phi63(result.relative))
+        assert np.isfinite(result.phi63_3[~lost]).all()
     return lost
 
 

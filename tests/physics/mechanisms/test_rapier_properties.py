@@ -62,10 +62,10 @@ def scaled(d, names, factor):
     return dataclasses.replace(d, **{name: factor * getattr(d, name) for name in names})
 
 
-def assert_alike(found, expected, rel=1e-12):
+def assert_alike(result, expected, rel=1e-12):
     """Compare curves: each to a share of its own largest value (of 1 rad for the angle)."""
-    for one, other in zip(found, expected, strict=True):
-        assert np.abs(one - other).max() <= rel * max(1.0, np.abs(other).max())
+    for item, other in zip(result, expected, strict=True):
+        assert np.abs(item - other).max() <= rel * max(1.0, np.abs(other).max())
 
 
 def condition(d):
@@ -137,10 +137,10 @@ def automatic():
     d = Dimensions(*ca.vertsplit(numbers))
     stand = Sley(system, d).stand
     angle = RapierPose(system, d, stand, phi).phi63(RapierPose(system, d, stand, 0).relative)
-    found = [angle]
+    results = [angle]
     for _ in range(3):
-        found.append(ca.gradient(found[-1], phi))
-    return ca.Function("travel", [numbers, phi], found)
+        results.append(ca.gradient(results[-1], phi))
+    return ca.Function("travel", [numbers, phi], results)
 
 
 @given(drives())
@@ -161,8 +161,8 @@ def test_float64_is_forty_digits_to_rounding(d):
     for phi in PHI[1::9]:
         many = [float(value) for value in curves(exact(d), DIGITS.number(float(phi)), DIGITS)]
         few = [float(value) for value in curves(d, float(phi), systems.FLOAT)]
-        for one, other in zip(few, many, strict=True):
-            assert one == pytest.approx(other, rel=1e-12, abs=1e-12 * condition(d))
+        for item, other in zip(few, many, strict=True):
+            assert item == pytest.approx(other, rel=1e-12, abs=1e-12 * condition(d))
 
 
 def angle_by_the_law_of_cosines(d, phi):
@@ -172,8 +172,8 @@ def angle_by_the_law_of_cosines(d, phi):
     mp = mpmath.MPContext()
     mp.dps = 40
 
-    def corner(opposite, one, other):
-        return mp.acos((one**2 + other**2 - opposite**2) / (2 * one * other))
+    def corner(opposite, first, other):
+        return mp.acos((first**2 + other**2 - opposite**2) / (2 * first * other))
 
     phi30 = d.phi30
     frame = phi30 - corner(d.l1 + d.l2, d.l3, d.l71)

@@ -96,8 +96,8 @@ def test_shigleys_shear_stresses_with_the_factors_it_rounds_or_takes_instead():
 def test_wire_strengths_of_shigleys_examples(inches, kpsi, exponent, printed):
     """Examples 10-6 (hard-drawn) and 10-1 (music wire), from the strength of 1 in wire."""
     of_1_mm = kpsi * 1e3 * PSI * 25.4**exponent
-    found = strength(FLOAT, inches * INCH, of_1_mm, exponent) / (1e3 * PSI)
-    assert f"{found:.{len(printed.partition('.')[2])}f}" == printed
+    result = strength(FLOAT, inches * INCH, of_1_mm, exponent) / (1e3 * PSI)
+    assert f"{result:.{len(printed.partition('.')[2])}f}" == printed
 
 
 @pytest.mark.parametrize(
@@ -230,12 +230,12 @@ def test_a_tighter_coil_is_stressed_more_and_takes_more_initial_stress(coil):
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("own", [{}, {"hook_length": 0.04, "correction": "EN 13906"}])
+@pytest.mark.parametrize("parameters", [{}, {"hook_length": 0.04, "correction": "EN 13906"}])
 @given(coil=coils(), force=forces)
 @settings(REPEATABLE, max_examples=20)
-def test_every_number_system_gives_the_same_figures(own, coil, force):
-    coil = dataclasses.replace(coil, **own)
-    numbers = [each.name for each in dataclasses.fields(Coil) if isinstance(getattr(coil, each.name), int | float)]
+def test_every_number_system_gives_the_same_figures(parameters, coil, force):
+    coil = dataclasses.replace(coil, **parameters)
+    numbers = [field.name for field in dataclasses.fields(Coil) if isinstance(getattr(coil, field.name), int | float)]
     data = [*(getattr(coil, name) for name in numbers), force]
 
     def made(values):
@@ -248,8 +248,8 @@ def test_every_number_system_gives_the_same_figures(own, coil, force):
         (systems.sympy(), sp.Rational),
     ):
         *values, own_force = map(convert, data)
-        found = [float(np.ravel(value)[-1]) for value in map(_evaluated, figures(system, made(values), own_force))]
-        assert found == pytest.approx(reference, rel=1e-12)
+        results = [float(np.ravel(value)[-1]) for value in map(_evaluated, figures(system, made(values), own_force))]
+        assert results == pytest.approx(reference, rel=1e-12)
     symbols = ca.SX.sym("x", len(data))
     *values, own_force = ca.vertsplit(symbols)
     function = ca.Function("figures", [symbols], [ca.vertcat(*figures(systems.casadi(), made(values), own_force))])

@@ -53,9 +53,9 @@ def cam_of(body):
 
 
 def course(body, restitution=0.0, turns=30):
-    found = follow(body, cam_of(body), restitution, turns)
-    assert found.parted
-    return found
+    result = follow(body, cam_of(body), restitution, turns)
+    assert result.parted
+    return result
 
 
 def flown(body, begin):
@@ -76,8 +76,8 @@ def flown(body, begin):
     while True:
         place = sum(state[0] > corner or (state[0] == corner and state[1] > 0) for corner in body.corners)
         corners: list[Any] = [lambda t, y, at=at: y[0] - at for at in body.corners[max(place - 1, 0) : place + 1]]
-        for each in corners:
-            each.terminal = True
+        for item in corners:
+            item.terminal = True
         done = solve_ivp(slope, (t, end), state, "DOP853", events=(gap, parting, *corners), rtol=1e-13, atol=1e-16)
         largest = max([largest, *(gap(at, y) for at, y in zip(done.t_events[1], done.y_events[1], strict=True))])
         t, state = done.t[-1], done.y[:, -1]
@@ -89,41 +89,41 @@ def flown(body, begin):
 
 @every
 def test_a_flight_ends_where_an_integrator_says(body):
-    found = course(body)
-    begin, end = found.first
+    second_course = course(body)
+    begin, end = second_course.first
     angle, speed, largest = flown(body, begin)
     assert pushed(body, begin) == pytest.approx(0.0, abs=1e-9 * body.mass * STROKE * OMEGA**2)
     assert end == pytest.approx(angle, abs=1e-9)
-    assert found.first_landing.speed == pytest.approx(speed, rel=1e-8)
-    assert found.gap_max == pytest.approx(largest, rel=1e-8)
+    assert second_course.first_landing.speed == pytest.approx(speed, rel=1e-8)
+    assert second_course.gap_max == pytest.approx(largest, rel=1e-8)
 
 
 @every
 @pytest.mark.parametrize("restitution", [0.0, 0.4])
 def test_a_body_is_never_inside_its_cam_and_never_jumps(body, restitution):
-    found = course(body, restitution)
-    landings = {landing.angle for turn in found.turns for landing in turn.landings}
-    for turn in found.turns:
+    second_course = course(body, restitution)
+    landings = {landing.angle for turn in second_course.turns for landing in turn.landings}
+    for turn in second_course.turns:
         assert (turn.stretches[0].begin, turn.stretches[-1].end) == (0.0, TURN)
         for stretch in turn.stretches:
             if stretch.piece:
                 angles = np.linspace(stretch.begin, stretch.end, 50)
-                gaps = [found.free(stretch, angle).x - face(angle).x for angle in angles]
+                gaps = [second_course.free(stretch, angle).x - face(angle).x for angle in angles]
                 assert min(gaps) > -1e-12 * STROKE
-        for one, other in itertools.pairwise(turn.stretches):
-            assert one.end == other.begin
-            if one.piece and other.piece:
-                before, after = found.free(one, one.end), found.free(other, one.end)
+        for item, other in itertools.pairwise(turn.stretches):
+            assert item.end == other.begin
+            if item.piece and other.piece:
+                before, after = second_course.free(item, item.end), second_course.free(other, item.end)
                 assert before.x == pytest.approx(after.x, abs=1e-12)
-                if one.end not in landings:
+                if item.end not in landings:
                     assert before.v == pytest.approx(after.v, abs=1e-9)
 
 
 @every
 def test_on_the_cam_nothing_has_to_pull(body):
-    found = course(body)
+    second_course = course(body)
     largest = max(abs(pushed(body, angle)) for angle in np.linspace(0, TURN, 50))
-    for stretch in (each for turn in found.turns for each in turn.stretches if not each.piece):
+    for stretch in (stretche for turn in second_course.turns for stretche in turn.stretches if not stretche.piece):
         forces = [pushed(body, angle) for angle in np.linspace(stretch.begin, stretch.end, 200)]
         assert min(forces) > -1e-9 * largest
 
@@ -131,13 +131,13 @@ def test_on_the_cam_nothing_has_to_pull(body):
 @every
 @pytest.mark.parametrize("restitution", [0.2, 0.6])
 def test_a_landing_turns_the_relative_speed_round_by_the_restitution(body, restitution):
-    found = course(body, restitution)
+    second_course = course(body, restitution)
     counted = 0
-    for turn in found.turns:
+    for turn in second_course.turns:
         flights = {stretch.begin: stretch for stretch in turn.stretches if stretch.piece}
         for landing in turn.landings:
             if landing.flies and landing.angle in flights:
-                away = found.free(flights[landing.angle], landing.angle).v - face(landing.angle).v
+                away = second_course.free(flights[landing.angle], landing.angle).v - face(landing.angle).v
                 if away > 0.0:  # else the cam falls away from under it
                     assert away == pytest.approx(-restitution * landing.speed, rel=1e-9)
                     counted += 1
@@ -147,31 +147,31 @@ def test_a_landing_turns_the_relative_speed_round_by_the_restitution(body, resti
 @pytest.mark.parametrize("name", ["spring alone", "weight alone", "a stiffer spring farther up"])
 def test_without_damping_a_flight_keeps_its_energy(name):
     body = BODIES[name]
-    found = course(body)
+    second_course = course(body)
 
     def energy(at):
         stored = body.zones[0].stiffness * at.x**2 / 2 + body.zones[0].force * at.x
         beyond = [at.x - corner for corner in body.corners if at.x > corner]
-        more = sum((body.zones[1].stiffness - body.zones[0].stiffness) * each**2 / 2 for each in beyond)
+        more = sum((body.zones[1].stiffness - body.zones[0].stiffness) * item**2 / 2 for item in beyond)
         return body.mass * at.v**2 / 2 + stored + more
 
-    begin, end = found.first
-    flights = [s for s in found.turns[0].stretches if s.piece and begin <= s.begin < end]
-    values = [energy(found.free(s, angle)) for s in flights for angle in np.linspace(s.begin, s.end, 20)]
+    begin, end = second_course.first
+    flights = [s for s in second_course.turns[0].stretches if s.piece and begin <= s.begin < end]
+    values = [energy(second_course.free(s, angle)) for s in flights for angle in np.linspace(s.begin, s.end, 20)]
     assert values == pytest.approx([values[0]] * len(values), rel=1e-12)
 
 
 def test_a_body_held_by_enough_never_leaves_and_repeats_at_once():
     body = Body(3.0, 0.0, 0.0, (), (Zone(1500.0, 1.1 * 3.0 * STROKE / 2 * OMEGA**2),))
-    found = follow(body, cam_of(body), 0.0, 30)
-    assert not found.parted
-    assert (found.period, len(found.turns), found.first_landing) == (1, 1, None)
+    result = follow(body, cam_of(body), 0.0, 30)
+    assert not result.parted
+    assert (result.period, len(result.turns), result.first_landing) == (1, 1, None)
 
 
 def test_a_harder_spring_brings_a_body_back_sooner_and_lower():
     flights = [course(Body(3.0, 0.0, 0.0, (), (Zone(k, 30.0),))) for k in (500.0, 1000.0, 1500.0)]
-    begins, ends = zip(*(each.first for each in flights), strict=True)
+    begins, ends = zip(*(flight.first for flight in flights), strict=True)
     assert list(begins) == sorted(begins), "it is held on longer"
     assert list(ends) == sorted(ends, reverse=True)
-    tops = [each.gap_max for each in flights]
+    tops = [flight.gap_max for flight in flights]
     assert tops == sorted(tops, reverse=True)

@@ -33,16 +33,16 @@ def plain(sigma, kappa, time):
     def grown(rate):
         return (MP.exp(rate * t) - 1) / rate if rate else t
 
-    return [float(MP.re(each)) for each in ((grown(slow) - grown(fast)) / (2 * root), speed)]
+    return [float(MP.re(item)) for item in ((grown(slow) - grown(fast)) / (2 * root), speed)]
 
 
 @pytest.mark.parametrize("regime", REGIMES)
 @pytest.mark.parametrize("time", [1e-9, 1e-4, 3e-3, 0.02, 0.07, 0.3, 1.0])
 def test_the_response_is_that_of_many_digits(regime, time):
     sigma, kappa = REGIMES[regime]
-    found = response(sigma, kappa, time)
+    result = response(sigma, kappa, time)
     size = min(time, 1 / max(sigma, math.sqrt(kappa), 1e-9))
-    for value, exact, scale in zip(found, plain(sigma, kappa, time), (size**2, size), strict=True):
+    for value, exact, scale in zip(result, plain(sigma, kappa, time), (size**2, size), strict=True):
         assert value == pytest.approx(exact, rel=2e-13, abs=4e-15 * scale)
 
 

@@ -41,10 +41,10 @@ def oscillator(system, damped):
 def answer(system, damped, phi):
     """Return z and z˙ in answer to the pulse at a crank angle, rad, in any turn."""
     given = {name: system.number(value) for name, value in GIVEN.items()}
-    own = {name: system.number(value) for name, value in OWN.items()}
+    values = {name: system.number(value) for name, value in OWN.items()}
     inside = float(abs(math.remainder(float(phi) - GIVEN["beta"], 2 * math.pi)) < OWN["pulse"] / 2)
     pose: Any = Pose(phi, system.number(OMEGA), None, None, None)
-    return resistance.response(Inputs(system, given, own, pose, inside), oscillator(system, damped))
+    return resistance.response(Inputs(system, given, values, pose, inside), oscillator(system, damped))
 
 
 def pulse(phi):
@@ -85,8 +85,8 @@ def test_the_answer_is_that_of_an_integrator_over_a_turn(damped):
     """From z and z˙ at the pulse's beginning, piece by piece, over the turn that follows."""
     k, c, _ = DAMPED[damped]
     begin, end = (GIVEN["beta"] + side * OWN["pulse"] / 2 for side in (-1, 1))
-    begun = [float(each) for each in answer(systems.FLOAT, damped, begin + 1e-12)]
-    state, found, exact = begun, list[list[float]](), list[list[float]]()
+    begun = [float(item) for item in answer(systems.FLOAT, damped, begin + 1e-12)]
+    state, result, exact = begun, list[list[float]](), list[list[float]]()
     for low, high, pushed in ((begin, end, GIVEN["M0"]), (end, begin + 2 * math.pi, 0.0)):
 
         def slope(phi, state, pushed=pushed):
@@ -95,11 +95,11 @@ def test_the_answer_is_that_of_an_integrator_over_a_turn(damped):
 
         angles = np.linspace(low, high, 41)
         done = solve_ivp(slope, (low, high), state, "DOP853", t_eval=angles, rtol=1e-12, atol=1e-16)
-        found += done.y.T[1:-1].tolist()
-        exact += [[float(each) for each in answer(systems.FLOAT, damped, phi)] for phi in angles[1:-1]]
+        result += done.y.T[1:-1].tolist()
+        exact += [[float(item) for item in answer(systems.FLOAT, damped, phi)] for phi in angles[1:-1]]
         state = done.y[:, -1]
-    largest = np.abs(found).max(axis=0)
-    assert np.abs((np.array(found) - np.array(exact)) / largest).max() < 1e-8
+    largest = np.abs(result).max(axis=0)
+    assert np.abs((np.array(result) - np.array(exact)) / largest).max() < 1e-8
     assert state / largest == pytest.approx(begun / largest, abs=1e-8), "it repeats"
 
 
@@ -107,9 +107,9 @@ def test_the_answer_is_that_of_an_integrator_over_a_turn(damped):
 @pytest.mark.parametrize("system", [systems.FLOAT, systems.numpy(), systems.balls()], ids=lambda system: system.name)
 def test_floats_and_balls_are_right_to_twelve_digits(damped, system):
     for phi in (0.3, 1.0, 1.15, 1.3, 2.0, 5.5):
-        exact, found = answer(EXACT, damped, EXACT.number(phi)), answer(system, damped, system.number(phi))
+        exact, result = answer(EXACT, damped, EXACT.number(phi)), answer(system, damped, system.number(phi))
         size = max(abs(answer(EXACT, damped, EXACT.number(x))[0]) for x in (1.15, 1.3, 2.0))
-        for value, true, scale in zip(found, exact, (size, size * math.sqrt(DAMPED[damped][0] / J)), strict=True):
+        for value, true, scale in zip(result, exact, (size, size * math.sqrt(DAMPED[damped][0] / J)), strict=True):
             assert abs(float(value) - float(true)) <= 1e-12 * float(scale), phi
 
 
@@ -117,12 +117,12 @@ def test_what_is_nearly_critical_goes_over_into_what_is():
     """The formulas meet: the share by which damping counts as critical is what they differ by."""
     k = 1.24e4
     c = 2 * math.sqrt(k * J)
-    found = []
+    results = []
     for regime, factor in (("under", 1 - 1e-10), ("critical", 1.0), ("over", 1 + 1e-10)):
         constants = harmonic.constants(systems.FLOAT, regime, J, c * factor, k, OMEGA)
-        found.append(harmonic.Oscillator(systems.FLOAT, regime, constants).ringing((1e-3, 0.2), 0.01))
-    for one, other in itertools.pairwise(found):
-        assert other == pytest.approx(one, rel=1e-9)
+        results.append(harmonic.Oscillator(systems.FLOAT, regime, constants).ringing((1e-3, 0.2), 0.01))
+    for item, other in itertools.pairwise(results):
+        assert other == pytest.approx(item, rel=1e-9)
 
 
 def test_a_kick_once_a_turn_adds_up_all_that_is_left_of_those_before():
@@ -192,8 +192,8 @@ def test_the_answer_to_harmonics_is_where_an_integrator_comes_back_to(damped):
     exact = np.array([[z.at(systems.FLOAT, phi), OMEGA * rate.at(systems.FLOAT, phi)] for phi in angles]).T
     sizes = np.abs(exact).max(axis=1)[:, None]
     assert np.abs((done.y - exact) / sizes).max() < 1e-8
-    held = k * done.y[0] + c * done.y[1]
-    assert [torque.at(systems.FLOAT, phi) for phi in angles] == pytest.approx(held, abs=1e-7 * np.abs(held).max())
+    fixed = k * done.y[0] + c * done.y[1]
+    assert [torque.at(systems.FLOAT, phi) for phi in angles] == pytest.approx(fixed, abs=1e-7 * np.abs(fixed).max())
 
 
 @every
@@ -201,10 +201,10 @@ def test_what_the_load_gives_in_a_turn_the_damping_takes(damped):
     _, force, z, torque = answered(damped)
     rate = slopes(z)
     phi = np.arange(512) * 2 * math.pi / 512
-    load, held, speed = ([series.at(systems.FLOAT, angle) for angle in phi] for series in (force, torque, rate))
+    load, fixed, speed = ([series.at(systems.FLOAT, angle) for angle in phi] for series in (force, torque, rate))
     given, taken = np.mean(np.multiply(load, speed)), DAMPED[damped][1] * OMEGA * np.mean(np.square(speed))
     assert given == pytest.approx(taken, rel=1e-9)
-    assert np.mean(np.multiply(held, speed)) == pytest.approx(taken, rel=1e-9), "the inertia takes nothing"
+    assert np.mean(np.multiply(fixed, speed)) == pytest.approx(taken, rel=1e-9), "the inertia takes nothing"
     assert torque.cosines[0] == pytest.approx(force.cosines[0], rel=1e-14), "nor the mean"
 
 

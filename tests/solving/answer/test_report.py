@@ -23,17 +23,17 @@ def evaluated(limits, x, **more):
 
 def findings(limits, x, **more):
     """Return each limit's value, sides and verdict; the toy's own far limit left out."""
-    found = evaluated(limits, x, **more).limits
-    return [(each.name, each.value, each.min, each.max, each.ok) for each in found]
+    result = evaluated(limits, x, **more).limits
+    return [(item.name, item.value, item.min, item.max, item.ok) for item in result]
 
 
 def test_a_design_with_its_figures():
-    found = evaluated((), {"x": 2.0, "y": -3.0})
-    assert (found.problem, found.effects) == ("toy", ())
-    assert found.design == {"x": 2.0, "y": -3.0}
-    assert found.figures == pytest.approx({"x": 2.0, "y": -3.0, "f": 4.0, "p": -1.0, "w": 2.0})
-    assert set(found.units.values()) == {"1"}
-    assert found.admissible
+    evaluation = evaluated((), {"x": 2.0, "y": -3.0})
+    assert (evaluation.problem, evaluation.effects) == ("toy", ())
+    assert evaluation.design == {"x": 2.0, "y": -3.0}
+    assert evaluation.figures == pytest.approx({"x": 2.0, "y": -3.0, "f": 4.0, "p": -1.0, "w": 2.0})
+    assert set(evaluation.units.values()) == {"1"}
+    assert evaluation.admissible
 
 
 def test_the_tightest_side_of_each_limit_is_told():
@@ -53,8 +53,8 @@ def test_an_equality_has_both_sides():
 @pytest.mark.parametrize(("size", "excess", "ok"), [(1.0, 0.9e-9, True), (1.0, 1.1e-9, False), (100.0, 0.9e-7, True)])
 def test_a_limit_holds_to_a_billionth_of_its_size(size, excess, ok):
     for sign in (1, -1):
-        found = findings((("p", sign, 5.0),), {"x": 2.0, "y": 3.0 + sign * excess}, sizes={"p": size})
-        assert found[0][4] == ok
+        result = findings((("p", sign, 5.0),), {"x": 2.0, "y": 3.0 + sign * excess}, sizes={"p": size})
+        assert result[0][4] == ok
 
 
 def test_a_whole_cycle_limit_stands_beside_its_peak():
@@ -67,14 +67,14 @@ def test_a_limit_of_the_complement_is_told_as_what_is_asked():
     limits = tuple(replace(limit, complement=1.0) if limit.row == "w" else limit for limit in program.limits)
     assert limits[0].bound == 0.75
     job = toy.ToyJob(replace(program, limits=limits))
-    found = report.evaluation(toy.scene_of(job), job, job.own, {"x": 0.7, "y": 0.0}).limits[0]
-    assert (found.name, found.min, found.ok) == ("w", 0.25, True)
-    assert found.value == pytest.approx(0.3)
+    result = report.evaluation(toy.scene_of(job), job, job.own, {"x": 0.7, "y": 0.0}).limits[0]
+    assert (result.name, result.min, result.ok) == ("w", 0.25, True)
+    assert result.value == pytest.approx(0.3)
 
 
 def test_a_bound_is_held_to_its_own_size_and_hidden_limits_are_not_told():
-    found = findings((), {"x": 100 + 0.9e-7, "y": 0.0}, bounds={"x": (-100.0, 100.0)})
-    assert found[0][2:] == (-100.0, 100.0, True)
+    result = findings((), {"x": 100 + 0.9e-7, "y": 0.0}, bounds={"x": (-100.0, 100.0)})
+    assert result[0][2:] == (-100.0, 100.0, True)
     assert not findings((), {"x": 100 + 1.1e-7, "y": 0.0}, bounds={"x": (-100.0, 100.0)})[0][4]
     program = toy.program("xy", ROWS, limits=(("p", 1, 5.0),))
     hidden = replace(program, limits=tuple(replace(limit, hidden=True) for limit in program.limits))
@@ -130,7 +130,7 @@ def relaxed(text, alone):
 
 
 @pytest.mark.parametrize(
-    ("relaxations", "said"),
+    ("relaxations", "message"),
     [
         ((relaxed("a", False), relaxed("b", False)), "The least relaxation that helps: a, b."),
         ((relaxed("a", True),), "The least relaxation that helps: a."),
@@ -144,28 +144,28 @@ def relaxed(text, alone):
         ),
     ],
 )
-def test_an_infeasible_target_says_what_clashes_and_what_helps(relaxations, said):
+def test_an_infeasible_target_says_what_clashes_and_what_helps(relaxations, message):
     here = evaluated((), {"x": 1.0, "y": 1.0})
     clash = Clash({"p <= 1": "p", "x >= 9": "x"}, relaxations)
     answer = report.without_optimum("least", here, clash, {"status": "Restoration_Failed"}, here, "Physics.")
     assert answer.status == "infeasible"
     head = "No admissible design exists near any start. Limits that clash: p <= 1, x >= 9."
-    assert answer.message == f"{head} {said} Physics."
+    assert answer.message == f"{head} {message} Physics."
     assert (answer.clash, answer.explanation) == (("p <= 1", "x >= 9"), "Physics.")
 
 
 @pytest.mark.parametrize(
-    ("status", "said"),
+    ("status", "message"),
     [
         ("Diverging_Iterates", "The objective falls without end; bound every variable."),
         ("Never_Heard_Of", "try more starts, such as 20."),
     ],
 )
-def test_a_failure_passes_on_the_solvers_word_with_advice(status, said):
+def test_a_failure_passes_on_the_solvers_word_with_advice(status, message):
     here = evaluated((), {"x": 1.0, "y": 1.0})
     answer = report.without_optimum("least", here, Clash(), {"status": status}, here, "Physics.")
     assert (answer.status, answer.explanation) == ("failed", "")
-    assert answer.message == f"The solver failed ({status}): {said}"
+    assert answer.message == f"The solver failed ({status}): {message}"
 
 
 # Limits that bear another name than what they read -----------------------------------------------------------------
@@ -176,8 +176,8 @@ def named(kind, name, row, sign, value):
     program = toy.program("xy", ROWS, WAVES)
     limit = kind(name, sign, row, value, 1.0)
     job = toy.ToyJob(replace(program, limits=(limit,)))
-    found = report.evaluation(toy.scene_of(job), job, job.own, {"x": 2.0, "y": 3.0}).limits
-    return [(each.name, each.value, each.ok) for each in found]
+    result = report.evaluation(toy.scene_of(job), job, job.own, {"x": 2.0, "y": 3.0}).limits
+    return [(item.name, item.value, item.ok) for item in result]
 
 
 def test_a_whole_cycle_limit_may_bear_its_own_name():
@@ -191,8 +191,8 @@ def test_a_bound_of_a_variable_that_the_design_does_not_name_is_not_told():
 
 @pytest.mark.parametrize(("excess", "ok"), [(0.9e-12, True), (1.1e-12, False)])
 def test_a_limit_of_a_small_quantity_is_held_to_its_size(excess, ok):
-    found = findings((("p", 1, 0.0),), {"x": excess, "y": 0.0}, sizes={"p": 1e-3})
-    assert found[0][4] == ok
+    result = findings((("p", 1, 0.0),), {"x": excess, "y": 0.0}, sizes={"p": 1e-3})
+    assert result[0][4] == ok
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -204,5 +204,5 @@ def test_a_limit_may_be_missed_by_just_a_billionth(sign):
 def test_a_weighed_limit_is_held_to_a_billionth_of_one(excess, ok):
     program = toy.program("xy", ROWS, WAVES)
     job = toy.ToyJob(replace(program, limits=(RatioLimit("p", 1, "p", 0.0, 50.0, "y"),)))
-    found = report.evaluation(toy.scene_of(job), job, job.own, {"x": excess, "y": 0.0}).limits
-    assert [each.ok for each in found] == [ok]
+    result = report.evaluation(toy.scene_of(job), job, job.own, {"x": excess, "y": 0.0}).limits
+    assert [item.ok for item in result] == [ok]

@@ -33,15 +33,15 @@ def retyped(answer, count, **changed):
 @pytest.mark.few(1)
 def test_a_design_typed_again_exceeds_limits_by_rounding_only(answers, case, count):
     answer = answers[case]
-    found = lo.evaluate(answer.scene, retyped(answer, count), answer.target)
-    assert all(limit.ok or limit.rounding for limit in found.limits)
-    assert not any(limit.ok and limit.rounding for limit in found.limits)
+    second_evaluation = lo.evaluate(answer.scene, retyped(answer, count), answer.target)
+    assert all(limit.ok or limit.rounding for limit in second_evaluation.limits)
+    assert not any(limit.ok and limit.rounding for limit in second_evaluation.limits)
 
 
 def test_each_case_has_limits_that_rounding_exceeds(answers):
     for case, answer in answers.items():
-        found = [lo.evaluate(answer.scene, retyped(answer, count), answer.target) for count in (5, 6, 8)]
-        assert any(limit.rounding for each in found for limit in each.limits), case
+        results = [lo.evaluate(answer.scene, retyped(answer, count), answer.target) for count in (5, 6, 8)]
+        assert any(limit.rounding for item in results for limit in item.limits), case
 
 
 @pytest.mark.parametrize("case", CASES, ids=" ".join)
@@ -50,24 +50,24 @@ def test_a_number_that_is_off_by_much_more_than_its_last_digit_is_a_violation(an
     answer = answers[case]
     name = "K1" if case[0] == "shedding" else "l4"
     moved = [retyped(answer, 6, **{name: answer.design[name] * (1 + shift)}) for shift in (3e-4, -3e-4)]
-    found = [lo.evaluate(answer.scene, design, answer.target) for design in moved]
-    assert any(not limit.ok and not limit.rounding for each in found for limit in each.limits)
+    results = [lo.evaluate(answer.scene, design, answer.target) for design in moved]
+    assert any(not limit.ok and not limit.rounding for item in results for limit in item.limits)
 
 
 def test_the_same_excess_in_full_digits_is_a_violation(answers):
     """Nothing was rounded there: 1e-9 relative beyond what binds is no rounding of 16 digits."""
     answer = answers["beatup-heavy", "torque"]
     shift = math.sqrt(2) * 1e-6
-    found = lo.evaluate(answer.scene, {n: v * (1 + shift) for n, v in answer.design.items()}, answer.target)
-    assert [limit for limit in found.limits if not limit.ok]
-    assert not [limit for limit in found.limits if limit.rounding]
+    second_evaluation = lo.evaluate(answer.scene, {n: v * (1 + shift) for n, v in answer.design.items()}, answer.target)
+    assert [limit for limit in second_evaluation.limits if not limit.ok]
+    assert not [limit for limit in second_evaluation.limits if limit.rounding]
 
 
 def test_nominal_numbers_are_meant_as_they_stand():
     """40 mm is 5 mm too much of l1, not half a unit of its one digit."""
-    found = lo.evaluate(LIGHT, {"l1": 0.04})
-    assert [limit.name for limit in found.limits if limit.rounding] == []
-    assert "l1" in [limit.name for limit in found.limits if not limit.ok]
+    second_evaluation = lo.evaluate(LIGHT, {"l1": 0.04})
+    assert [limit.name for limit in second_evaluation.limits if limit.rounding] == []
+    assert "l1" in [limit.name for limit in second_evaluation.limits if not limit.ok]
 
 
 def test_numbers_typed_into_the_scene_count_as_well(answers):
@@ -81,8 +81,8 @@ def test_numbers_typed_into_the_scene_count_as_well(answers):
     }
     by_scene = lo.evaluate(answer.scene.update(typed), None, answer.target)
     by_design = lo.evaluate(answer.scene, retyped(answer, 5), answer.target)
-    told = [[(limit.name, limit.ok, limit.rounding) for limit in each.limits] for each in (by_scene, by_design)]
-    assert told[0] == told[1]
+    texts = [[(limit.name, limit.ok, limit.rounding) for limit in item.limits] for item in (by_scene, by_design)]
+    assert texts[0] == texts[1]
     assert any(limit.rounding for limit in by_scene.limits)
 
 
@@ -111,15 +111,15 @@ def test_all_numbers_have_the_digits_of_the_longest_and_half_a_unit_of_the_last(
 
 def test_a_reader_and_a_script_see_the_difference(answers):
     answer = answers["rapier", "stroke-dwell"]
-    scene, found = answer.scene, lo.evaluate(answer.scene, retyped(answer, 6), answer.target)
-    rounded = [limit.name for limit in found.limits if limit.rounding]
-    shown = layout.render(evaluation(found.result, scene, None), 120)
-    held = "all limits held, but for the rounding of the digits given"
-    assert shown.startswith(f"rapier: {held}: {', '.join(rounded)}\n")
+    scene, result = answer.scene, lo.evaluate(answer.scene, retyped(answer, 6), answer.target)
+    rounded = [limit.name for limit in result.limits if limit.rounding]
+    shown = layout.render(evaluation(result.result, scene, None), 120)
+    fixed = "all limits held, but for the rounding of the digits given"
+    assert shown.startswith(f"rapier: {fixed}: {', '.join(rounded)}\n")
     assert shown.count("<- exceeded by rounding") == len(rounded)
     assert "not held" not in shown
-    told = {limit["name"]: limit for limit in found.as_dict()["limits"]}
-    assert {name for name, limit in told.items() if limit.get("rounding")} == set(rounded)
-    assert all(list(limit) == ["name", "value", "min", "max", "ok"] for limit in told.values() if limit["ok"])
+    record = {limit["name"]: limit for limit in result.as_dict()["limits"]}
+    assert {name for name, limit in record.items() if limit.get("rounding")} == set(rounded)
+    assert all(list(limit) == ["name", "value", "min", "max", "ok"] for limit in record.values() if limit["ok"])
     worse = lo.evaluate(scene, {**retyped(answer, 6), "C0x": 0.39}, answer.target)
     assert layout.render(evaluation(worse.result, scene, None), 120).startswith("rapier: NOT admissible: C0x")

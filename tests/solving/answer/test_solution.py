@@ -19,15 +19,15 @@ def test_other_optima_are_told_only_where_there_are_any():
     best, other = ({"f": 2.0}, 3), ({"f": math.inf}, 1)
     assert "optima" not in solution().as_dict()
     assert "optima" not in solution(optima=(best,)).as_dict()
-    told = solution(optima=(best, other)).as_dict()["optima"]
-    assert told == [{"figures": {"f": 2.0}, "starts": 3}, {"figures": {"f": None}, "starts": 1}]
+    report = solution(optima=(best, other)).as_dict()["optima"]
+    assert report == [{"figures": {"f": 2.0}, "starts": 3}, {"figures": {"f": None}, "starts": 1}]
 
 
 def test_what_helps_is_told_only_where_limits_clash():
     assert "clash" not in solution(clash=("p",)).as_dict()
     relaxation = Relaxation("p", "max", 1.0, 2.0, True, "p <= 1 -> 2")
-    told = solution(clash=("p <= 1",), relaxation=(relaxation,)).as_dict()
-    assert (told["clash"], told["relaxation"]) == (["p <= 1"], [relaxation._asdict()])
+    report = solution(clash=("p <= 1",), relaxation=(relaxation,)).as_dict()
+    assert (report["clash"], report["relaxation"]) == (["p <= 1"], [relaxation._asdict()])
 
 
 @pytest.mark.parametrize(("limits", "admissible"), [((), True), ((HELD,), True), ((HELD, BROKEN), False)])

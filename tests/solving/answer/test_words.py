@@ -111,10 +111,10 @@ def test_a_compound_unit_stands_in_brackets_after_the_stroke():
     ],
 )
 def test_a_relaxation_says_how_far_a_limit_must_give_way(words, sign, need, side, needed, text):
-    found = words.relaxation(limit(sign=sign), need, alone=True)
-    assert (found.limit, found.value, found.alone, found.text) == ("l1", 0.03, True, text)
-    assert found.needed == pytest.approx(needed, rel=1e-12)
-    assert found.side == side
+    result = words.relaxation(limit(sign=sign), need, alone=True)
+    assert (result.limit, result.value, result.alone, result.text) == ("l1", 0.03, True, text)
+    assert result.needed == pytest.approx(needed, rel=1e-12)
+    assert result.side == side
 
 
 @pytest.mark.parametrize(
@@ -131,17 +131,17 @@ def test_a_relaxation_says_how_far_a_limit_must_give_way(words, sign, need, side
 )
 def test_more_than_three_widths_are_out_of_proportion(words, name, sign, value, need, fair):
     """Bounds of 5 mm by their width, a figure by its limit, and what should vanish by its scale (50 N m)."""
-    found = words.relaxation(limit(name, sign, value, scale=50.0), need, alone=True)
-    assert found.in_proportion == fair
-    assert found.text.endswith(")" if fair else ", out of proportion)")
-    assert ("out of proportion" in found.text) != fair
+    result = words.relaxation(limit(name, sign, value, scale=50.0), need, alone=True)
+    assert result.in_proportion == fair
+    assert result.text.endswith(")" if fair else ", out of proportion)")
+    assert ("out of proportion" in result.text) != fair
 
 
 @pytest.mark.parametrize(("noise", "text"), [(1e-9, "-> 0 N"), (-1e-9, "-> 0 N"), (0.5, "-> -0.5 N")])
 def test_a_relaxation_that_ends_at_rounding_ends_at_zero(noise, text):
-    found = UnitFormatter(lo.load("shedding")).relaxation(limit("N_min", -1, 9000.0), 9000.0 + noise, alone=True)
-    assert text in found.text
-    assert (found.needed == 0.0) == (abs(noise) < 0.1)
+    result = UnitFormatter(lo.load("shedding")).relaxation(limit("N_min", -1, 9000.0), 9000.0 + noise, alone=True)
+    assert text in result.text
+    assert (result.needed == 0.0) == (abs(noise) < 0.1)
 
 
 def told(limit, fair, alone):
@@ -160,8 +160,8 @@ def told(limit, fair, alone):
 )
 def test_what_is_out_of_proportion_is_told_last(relaxations, order):
     """Capitals are out of proportion; joined by a comma, limits give way together."""
-    found = [told(n, n.islower(), "," not in group) for group in relaxations.split() for n in group.split(",")]
-    assert [tuple(each.limit for each in remedy) for remedy in remedies(found)] == order
+    results = [told(n, n.islower(), "," not in group) for group in relaxations.split() for n in group.split(",")]
+    assert [tuple(item.limit for item in remedy) for remedy in remedies(results)] == order
 
 
 @pytest.mark.parametrize(("side", "text"), [(-1, "76.9041 N*m"), (1, "76.9042 N*m")])

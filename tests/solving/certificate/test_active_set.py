@@ -34,14 +34,14 @@ def limited(sign, value=1.0):
     ],
 )
 def test_a_row_that_touches_or_is_exceeded_is_active_and_an_equality_always(sign, x, touched):
-    found = active(limited(sign), {"x": x})
-    assert found.limits == int(touched)
+    result = active(limited(sign), {"x": x})
+    assert result.limits == int(touched)
     expected = 1 - x if sign < 0 else x - 1
-    assert found.excess[0] == pytest.approx(abs(expected) if sign == 0 else expected, abs=1e-15)
+    assert result.excess[0] == pytest.approx(abs(expected) if sign == 0 else expected, abs=1e-15)
     if touched:
-        assert found.rows[0].excess == pytest.approx(expected, abs=1e-15)
-        assert (found.rows[0].name, found.rows[0].reads, found.rows[0].place) == ("x", "x", 0)
-        assert (found.rows[0].sign, found.rows[0].scale, found.rows[0].node) == (1.0, 1.0, None)
+        assert result.rows[0].excess == pytest.approx(expected, abs=1e-15)
+        assert (result.rows[0].name, result.rows[0].reads, result.rows[0].place) == ("x", "x", 0)
+        assert (result.rows[0].sign, result.rows[0].scale, result.rows[0].node) == (1.0, 1.0, None)
 
 
 WAVES = {
@@ -53,8 +53,8 @@ WAVES = {
 
 def test_every_touching_extreme_of_a_whole_cycle_limit_is_a_row():
     program = toy.program("xy", {"f": lambda v: v["x"]}, WAVES, limits=(("a", 1, 1.0), ("b", 1, 1.0), ("c", 1, 1.0)))
-    found = active(program, {"x": 1.0, "y": 1 - 2e-8})
-    rows = found.rows[: found.limits]
+    result = active(program, {"x": 1.0, "y": 1 - 2e-8})
+    rows = result.rows[: result.limits]
     assert sorted(row.name for row in rows) == ["a"] * 3 + ["b"] * 4, "a at both ends of the turn and at its middle"
     assert sorted(row.sign for row in rows) == [-1.0] * 3 + [1.0] * 4
     assert all(row.excess == pytest.approx(-2e-8 if row.name == "b" else 0.0, abs=1e-12) for row in rows)
@@ -63,8 +63,8 @@ def test_every_touching_extreme_of_a_whole_cycle_limit_is_a_row():
 
 def pieces(objective, x, rows=None, waves=None):
     program = toy.program("xy", rows, waves, objectives=(objective,))
-    found = active(program, x)
-    return [(found.rows[k].reads, found.rows[k].sign) for k in found.levels[0]]
+    result = active(program, x)
+    return [(result.rows[k].reads, result.rows[k].sign) for k in result.levels[0]]
 
 
 ROWS = {"p": lambda v: v["x"], "q": lambda v: v["y"]}
@@ -99,8 +99,8 @@ def test_peaks_of_an_objective_compete():
 
 def test_how_far_a_piece_stands_below_the_largest_is_told():
     program = toy.program("xy", ROWS, objectives=("p, q",))
-    found = active(program, {"x": 2.0, "y": 2 - 5e-8})
-    assert [found.rows[k].excess for k in found.levels[0]] == pytest.approx([0.0, -5e-8], abs=1e-15)
+    result = active(program, {"x": 2.0, "y": 2 - 5e-8})
+    assert [result.rows[k].excess for k in result.levels[0]] == pytest.approx([0.0, -5e-8], abs=1e-15)
 
 
 def test_a_limit_whose_weight_vanishes_keeps_its_row_from_below_only():
@@ -109,9 +109,9 @@ def test_a_limit_whose_weight_vanishes_keeps_its_row_from_below_only():
         first = program.limits[0]
         limit = RatioLimit(first.name, sign, first.row, 0.0, first.scale, "w")
         weighed = toy.program("x", {"f": lambda v: v["x"], "w": lambda v: 0 * v["x"]})
-        found = active(replace(weighed, limits=(limit,)), {"x": 0.0})
-        assert found.limits == rows
-        assert all(row.limit.sign == -1 for row in found.rows[:rows])
+        result = active(replace(weighed, limits=(limit,)), {"x": 0.0})
+        assert result.limits == rows
+        assert all(row.limit.sign == -1 for row in result.rows[:rows])
 
 
 @pytest.mark.parametrize("size", [4.0, 0.25])
@@ -122,8 +122,8 @@ def test_what_touches_is_told_in_natural_sizes(size):
         program = toy.program("xy", ROWS, objectives=("p, q",), sizes=sizes)
         assert len(active(program, {"x": 2.0, "y": below}).levels[0]) == count
         program = toy.program("xy", ROWS, objectives=("|p|",), sizes=sizes)
-        found = active(program, {"x": share * 1e-9 * size, "y": 0.0})
-        assert (len(found.levels[0]), found.zero) == (count, (count == 2,))
+        result = active(program, {"x": share * 1e-9 * size, "y": 0.0})
+        assert (len(result.levels[0]), result.zero) == (count, (count == 2,))
 
 
 def test_an_objective_is_zero_where_all_its_magnitudes_are():

@@ -42,34 +42,39 @@ def beside(program, x, share, count):
         }
         for row in drawn
     ]
-    return [dict(x), *({**x, **each} for each in moved)]
+    return [dict(x), *({**x, **item} for item in moved)]
 
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("job", "target"), TASKS)
 def test_derivatives_are_those_of_each_design_alone(job, target):
     program, x = optimum(job, target)
-    places = [(each, prepare(program, each, ACCURACY)) for each in beside(program, x, 1e-9, 4)]
-    asked = [batch_certificate.DesignAt(program, each, sampler, active.rows) for each, (sampler, active) in places]
-    for of, found in zip(asked, batch_certificate.derivatives(asked), strict=True):
+    places = [(item, prepare(program, item, ACCURACY)) for item in beside(program, x, 1e-9, 4)]
+    requests = [batch_certificate.DesignAt(program, item, sampler, active.rows) for item, (sampler, active) in places]
+    for of, result in zip(requests, batch_certificate.derivatives(requests), strict=True):
         alone = JetDerivatives(program, of.x, of.sampler, of.rows)
         basis = np.linalg.qr(np.random.default_rng(2).standard_normal((len(alone.names), 3)))[0]
-        for mine, own in ((found.gradients(), alone.gradients()), (found.curvatures(basis), alone.curvatures(basis))):
-            assert np.abs(mine - own).max() <= ROUNDED * max(1.0, np.abs(own).max())
+        for mine, values in (
+            (result.gradients(), alone.gradients()),
+            (result.curvatures(basis), alone.curvatures(basis)),
+        ):
+            assert np.abs(mine - values).max() <= ROUNDED * max(1.0, np.abs(values).max())
 
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("job", "target"), TASKS)
 def test_derivatives_are_the_same_bits_in_batches_of_any_size(job, target):
     program, x = optimum(job, target)
-    places = [(each, prepare(program, each, ACCURACY)) for each in beside(program, x, 1e-9, 10)]
-    asked = [batch_certificate.DesignAt(program, each, sampler, active.rows) for each, (sampler, active) in places]
-    whole = batch_certificate.derivatives(list(itertools.islice(itertools.cycle(asked), 200)))
+    places = [(entry, prepare(program, entry, ACCURACY)) for entry in beside(program, x, 1e-9, 10)]
+    requests = [batch_certificate.DesignAt(program, entry, sampler, active.rows) for entry, (sampler, active) in places]
+    whole = batch_certificate.derivatives(list(itertools.islice(itertools.cycle(requests), 200)))
     for size in (1, 8):
-        parts = [batch_certificate.derivatives(asked[begin : begin + size]) for begin in range(0, len(asked), size)]
-        for one, other in zip(itertools.chain(*parts), whole[: len(asked)], strict=True):
-            assert one.gradients().tobytes() == other.gradients().tobytes()
-            assert one.bends.tobytes() == other.bends.tobytes()
+        parts = [
+            batch_certificate.derivatives(requests[begin : begin + size]) for begin in range(0, len(requests), size)
+        ]
+        for item, other in zip(itertools.chain(*parts), whole[: len(requests)], strict=True):
+            assert item.gradients().tobytes() == other.gradients().tobytes()
+            assert item.bends.tobytes() == other.bends.tobytes()
 
 
 @pytest.mark.few(1)
@@ -83,17 +88,17 @@ def test_derivatives_are_the_same_bits_in_batches_of_any_size(job, target):
 def test_adversaries_are_refused_in_batches_as_they_are_alone(job, target, count):
     """The optimum, and designs a millionth and a ten-thousandth off it: the same digits in batches of 1 and more."""
     program, x = optimum(job, target)
-    asked = [(program, each) for share in (1e-6, 1e-4) for each in beside(program, x, share, 2)]
-    several = list(itertools.islice(itertools.cycle(asked), count))
+    requests = [(program, item) for share in (1e-6, 1e-4) for item in beside(program, x, share, 2)]
+    several = list(itertools.islice(itertools.cycle(requests), count))
     whole = batch_certificate.certify_batch(several, ACCURACY)
-    for k, (_, each) in enumerate(asked):
-        assert verdict(whole[k]) == verdict(certify(program, each, ACCURACY))
-        assert whole[k].passed == (each == x)
-        assert whole[k] == batch_certificate.certify_batch([asked[k]], ACCURACY)[0]
-    assert all(whole[k] == whole[k % len(asked)] for k in range(count))
+    for k, (_, item) in enumerate(requests):
+        assert verdict(whole[k]) == verdict(certify(program, item, ACCURACY))
+        assert whole[k].passed == (item == x)
+        assert whole[k] == batch_certificate.certify_batch([requests[k]], ACCURACY)[0]
+    assert all(whole[k] == whole[k % len(requests)] for k in range(count))
 
 
 def verdict(certificate):
     """Return what a certificate says, without its numbers."""
-    said = [re.sub(r"[0-9][-+0-9.e]*", "#", reason) for reason in certificate.reasons]
-    return certificate.passed, certificate.minimum, certificate.unique, certificate.by, said
+    texts = [re.sub(r"[0-9][-+0-9.e]*", "#", reason) for reason in certificate.reasons]
+    return certificate.passed, certificate.minimum, certificate.unique, certificate.by, texts

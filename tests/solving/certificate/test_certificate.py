@@ -32,7 +32,7 @@ def judged(scene, target, design):
 def refused(certificate, reason):
     """Assert that a certificate did not pass, for a reason that names what is wrong."""
     assert not certificate.passed
-    assert any(reason in said for said in certificate.reasons), certificate.reasons
+    assert any(reason in message for message in certificate.reasons), certificate.reasons
 
 
 @pytest.fixture(scope="module")
@@ -105,8 +105,8 @@ def test_a_common_factor_of_the_lengths_within_its_bounds_is_no_perturbation(bes
 @pytest.mark.few(2)
 def test_the_best_of_a_tighter_limit_is_not_the_best(M0, key, value):
     """The optimum moved along all other active limits, each of them still held exactly."""
-    held = {"min": value, "max": value} if key.startswith("limits") and key.count(".") == 1 else value
-    tighter = lo.solve(scene_of(M0).set(key, held))
+    fixed = {"min": value, "max": value} if key.startswith("limits") and key.count(".") == 1 else value
+    tighter = lo.solve(scene_of(M0).set(key, fixed))
     assert tighter.status == "optimal"
     figure = "M3_fdc" if M0 in (600, 900) else "peak_torque"
     refused(judged(scene_of(M0), "balance", tighter.design), f"{figure} can still fall")
@@ -124,8 +124,8 @@ def test_an_optimum_of_36_points_is_refused():
     scene, coarse = scene.set("limits.mu_min.min", "30 deg"), np.linspace(0, 2 * np.pi, 36, endpoint=False)
     machine = Machine(scene)
     room = [lambda d: 0.0745 - machine.static(d)["M3_fdc"] / 100, lambda d: 0.0745 + machine.static(d)["M3_fdc"] / 100]
-    found = [least(machine, "peak_torque", start, room, offsets=coarse) for start in random_designs(machine, 3, 0)]
-    design = next(design for design in found if design)
+    results = [least(machine, "peak_torque", start, room, offsets=coarse) for start in random_designs(machine, 3, 0)]
+    design = next(design for design in results if design)
     refused(judged(scene, "torque", design), "peak_torque can still fall")
 
 
@@ -251,10 +251,10 @@ def test_a_peak_is_least_where_its_pieces_balance(x, passes):
 def test_an_extreme_that_moves_with_the_design_curves_the_objective():
     """The peak of |x cos + y sin| is the hypotenuse: at (1, 0) it falls toward the origin, not along y."""
     waves = {"w": lambda m, v, phi: v["x"] * m.cos(phi) + v["y"] * m.sin(phi)}
-    held = toy.program("xy", {"x": lambda v: v["x"]}, waves, (("x", -1, 1.0),), ("peak w",))
-    assert certify(held, {"x": 1.0, "y": 0.0}, ACCURACY).passed
-    assert certify(held, {"x": 1.0, "y": 0.0}, ACCURACY).unique
-    refused(certify(held, {"x": 1.0, "y": 1e-3}, ACCURACY), "w can still fall")
+    program = toy.program("xy", {"x": lambda v: v["x"]}, waves, (("x", -1, 1.0),), ("peak w",))
+    assert certify(program, {"x": 1.0, "y": 0.0}, ACCURACY).passed
+    assert certify(program, {"x": 1.0, "y": 0.0}, ACCURACY).unique
+    refused(certify(program, {"x": 1.0, "y": 1e-3}, ACCURACY), "w can still fall")
 
 
 LEVELS = {"a": lambda v: v["x"] - 1, "b": lambda v: (v["x"] - 3) ** 2 + (v["y"] - 2) ** 2}
@@ -343,8 +343,8 @@ def test_a_draft_is_the_certificate_but_for_what_lies_between_the_points(best, m
     draft = certificates.draft_certificate(program, x, ACCURACY)
     assert (scans, draft.partial.passed, draft.partial.violation) == ([], True, 0.0)
     assert draft.with_rules(()) is draft
-    said = draft.with_rules(("a rule",))
-    assert (said.partial.tie_breaks, said.whole.tie_breaks) == (("a rule",), ("a rule",))
+    message = draft.with_rules(("a rule",))
+    assert (message.partial.tie_breaks, message.whole.tie_breaks) == (("a rule",), ("a rule",))
     assert draft.whole is draft.whole
     assert len(scans) == 2
-    assert replace(said.whole, tie_breaks=()) == draft.whole == certify(program, x, ACCURACY)
+    assert replace(message.whole, tie_breaks=()) == draft.whole == certify(program, x, ACCURACY)

@@ -26,23 +26,23 @@ def judged(program, x):
     assert (slow.by, slow.clear) == ("40 digits", True)
     if quick.clear:
         assert verdict(quick) == verdict(slow)
-    found = certify(program, x, ACCURACY)
-    assert found == (quick if quick.clear else slow)
-    alone, *several = [each for count in (1, 9) for each in certify_batch([(program, x)] * count, ACCURACY)]
-    assert verdict(alone) == verdict(found)
-    assert all(each == alone for each in several)
-    return found
+    certificate = certify(program, x, ACCURACY)
+    assert certificate == (quick if quick.clear else slow)
+    alone, *several = [item for count in (1, 9) for item in certify_batch([(program, x)] * count, ACCURACY)]
+    assert verdict(alone) == verdict(certificate)
+    assert all(item == alone for item in several)
+    return certificate
 
 
 def verdict(certificate):
     """Return what a certificate says, without its numbers."""
-    said = [re.sub(r"[0-9][-+0-9.e]*", "#", reason) for reason in certificate.reasons]
-    return certificate.passed, certificate.minimum, certificate.unique, said
+    texts = [re.sub(r"[0-9][-+0-9.e]*", "#", reason) for reason in certificate.reasons]
+    return certificate.passed, certificate.minimum, certificate.unique, texts
 
 
 def assert_refused(certificate, reason):
     assert not certificate.passed
-    assert any(reason in said for said in certificate.reasons), certificate.reasons
+    assert any(reason in message for message in certificate.reasons), certificate.reasons
 
 
 def plane(rows, limits=(), objectives=("f",), waves=None, names="xy"):
@@ -157,8 +157,8 @@ def test_a_limit_held_on_a_grid_only_is_seen(points):
     """The disc's tangents at so many points leave a polygon: its corner lies 1/cos(half a step) out."""
     half = math.pi / points
     program, corner = toward(half), 1 / math.cos(half)
-    held = np.cos(2 * half * np.arange(points) - half) * corner
-    assert np.all(np.abs(held) <= 1 + 1e-12), "held at every point of the grid"
+    fixed = np.cos(2 * half * np.arange(points) - half) * corner
+    assert np.all(np.abs(fixed) <= 1 + 1e-12), "held at every point of the grid"
     certificate = judged(program, xy(corner * math.cos(half), corner * math.sin(half)))
     assert_refused(certificate, "limit w" + EXCEEDED)
     assert certificate.feasibility == pytest.approx(corner - 1, rel=1e-6)

@@ -43,11 +43,11 @@ def objectives(program, x):
     """Return a design's objectives, in order, in units of their scale."""
     sampler = sampler_at(program, x)
     assert sampler is not None
-    found = []
+    results = []
     for o in program.objectives:
         value = sampler.peak(o.row) if o.quantities else sampler.figures[o.row]
-        found.append((abs(value) if o.is_magnitude else value) / o.scale)
-    return found
+        results.append((abs(value) if o.is_magnitude else value) / o.scale)
+    return results
 
 
 def nudged(program, x, name, share):
@@ -106,15 +106,15 @@ def test_a_spring_a_millionth_too_soft_lets_the_roller_off(name):
     program, x = optimum(name)
     soft = certify(program, nudged(program, x, "K1", -MILLIONTH), ACCURACY)
     assert not soft.passed
-    assert any("limit N_min is exceeded" in said for said in soft.reasons), soft.reasons
+    assert any("limit N_min is exceeded" in reason for reason in soft.reasons), soft.reasons
     stiff = certify(program, nudged(program, x, "K1", MILLIONTH), ACCURACY)
     assert not stiff.passed
-    assert any("K1 can still fall" in said for said in stiff.reasons), stiff.reasons
+    assert any("K1 can still fall" in reason for reason in stiff.reasons), stiff.reasons
 
 
 def test_a_machine_a_millionth_too_fast_lets_the_roller_off():
     program, x = optimum("shedding speed")
     fast = certify(program, nudged(program, x, "speed", MILLIONTH), ACCURACY)
-    assert any("limit N_min is exceeded" in said for said in fast.reasons), fast.reasons
+    assert any("limit N_min is exceeded" in reason for reason in fast.reasons), fast.reasons
     slow = certify(program, nudged(program, x, "speed", -MILLIONTH), ACCURACY)
-    assert any("speed can still fall" in said for said in slow.reasons), slow.reasons
+    assert any("speed can still fall" in reason for reason in slow.reasons), slow.reasons

@@ -73,12 +73,12 @@ def quadratics(draw):
     rows = np.array([draw(several.filter(any)) for _ in range(active + slack)]).reshape(active + slack, size)
     prices = np.array([draw(eighths(0, 2)) for _ in range(active)] + [0.0] * slack)
     bound = rows @ best + np.array([0.0] * active + [0.25] * slack)
-    box, held = [], np.zeros(size)
+    box, constraint = [], np.zeros(size)
     for k, x in enumerate(best):
         side = draw(st.sampled_from((-1, 0, 1)))
         box.append((float(x) - (0.0 if side < 0 else 1.0), float(x) + (0.0 if side > 0 else 1.0)))
-        held[k] = side * draw(eighths(0, 2)) if side else 0.0
-    gradient = -(hessian @ best + rows.T @ prices + held)
+        constraint[k] = side * draw(eighths(0, 2)) if side else 0.0
+    gradient = -(hessian @ best + rows.T @ prices + constraint)
     return Quadratic(best, hessian, gradient, rows, bound, prices, tuple(box))
 
 
@@ -145,8 +145,8 @@ def _check_least(problem, certificate, pull):
         touched |= {(f"x{k}", s): s * unit for s, end in zip((-1, 1), ends, strict=True) if end == problem.best[k]}
     for binding in certificate.binding:
         cost = [float(key == (binding.limit.row, binding.side)) for key in touched]
-        found = linprog(cost, A_eq=np.array(list(touched.values())).T, b_eq=-pull)
-        assert binding.worth == pytest.approx(found.fun, abs=1e-7)
+        optimum = linprog(cost, A_eq=np.array(list(touched.values())).T, b_eq=-pull)
+        assert binding.worth == pytest.approx(optimum.fun, abs=1e-7)
 
 
 @settings(fixed, max_examples=25)

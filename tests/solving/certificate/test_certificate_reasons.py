@@ -72,8 +72,8 @@ def test_residuals_may_be_as_large_as_is_allowed():
 def test_the_last_level_that_falls_is_named():
     falls, fails = Curvature(higher="falls"), Curvature(minimum=False)
     assert not_least(judged(falls)) == ["second order does not decide"]
-    said = list(certificate._optimality_reasons([judged(falls), judged(falls, objective="g"), judged(Curvature())]))
-    assert said == ["second order does not decide: g falls along a direction without curvature"]
+    message = list(certificate._optimality_reasons([judged(falls), judged(falls, objective="g"), judged(Curvature())]))
+    assert message == ["second order does not decide: g falls along a direction without curvature"]
     assert not_least(judged(fails), judged()) == ["second order fails"]
 
 
@@ -97,26 +97,26 @@ def local(objectives=("f",), limits=TOUCHING, **x):
     return Local(program, x, sampler, active, exact, exact.gradients())
 
 
-def tried(monkeypatch, of, found):
-    """Return the multipliers that are kept, and the rows left out on the way; found: row -> residual, curvature."""
+def tried(monkeypatch, of, result):
+    """Return the multipliers that are kept, and the rows left out on the way; result: row -> residual, curvature."""
     left_out: list[int] = []
     worst = Curvature(minimum=False, unique=False)
 
     def solved(gradients, system):
         row = next(k for k in (0, 1, 2) if k not in system.inequalities)
         left_out.append(row)
-        return LevelMultipliers(np.full(4, float(row)), found[row][0])
+        return LevelMultipliers(np.full(4, float(row)), result[row][0])
 
     def curved(place, level, system, multipliers):
-        return worst if multipliers is first else found[int(multipliers.values[0])][1]
+        return worst if multipliers is first else result[int(multipliers.values[0])][1]
 
     first = LevelMultipliers(np.array(of), 0.0)
     monkeypatch.setattr(kkt, "solve_system", solved)
     monkeypatch.setattr(second_order, "second_order_of", curved)
     here = local()
     system = kkt.System((3,), (0, 1, 2), (), np.zeros((0, 4)))
-    kept, _ = certificate._best_multipliers(here, 0, system, first)
-    return ("first" if kept is first else int(kept.values[0])), left_out
+    remaining, _ = certificate._best_multipliers(here, 0, system, first)
+    return ("first" if remaining is first else int(remaining.values[0])), left_out
 
 
 def test_rows_that_bind_are_left_out_in_turn_until_the_curvature_is_better(monkeypatch):
@@ -131,10 +131,10 @@ def test_rows_that_bind_are_left_out_in_turn_until_the_curvature_is_better(monke
 def test_residuals_name_the_dearest_limit():
     here = local(x=-3e-8, y=2e-8)
     system = kkt.system(here.active, 0, [])
-    found = certificate._residuals(here, 0, system, LevelMultipliers(np.array([0.5, -2.0, 0.25, 1.0]), 9.0), 0.125)
-    assert (found.objective, found.stationarity, found.price, found.dearest) == ("f", 0.125, 2.0, "y")
-    assert found.complementarity == pytest.approx(4e-8)
-    assert found.higher_levels == 0.0
+    result = certificate._residuals(here, 0, system, LevelMultipliers(np.array([0.5, -2.0, 0.25, 1.0]), 9.0), 0.125)
+    assert (result.objective, result.stationarity, result.price, result.dearest) == ("f", 0.125, 2.0, "y")
+    assert result.complementarity == pytest.approx(4e-8)
+    assert result.higher_levels == 0.0
     bare = kkt.System((3,), (), (), np.zeros((0, 4)))
     none = certificate._residuals(here, 0, bare, LevelMultipliers(np.zeros(4), 0.0), 0.0)
     assert (none.complementarity, none.price, none.dearest) == (0.0, 0.0, "")
@@ -143,8 +143,8 @@ def test_residuals_name_the_dearest_limit():
 def test_a_later_level_tells_what_the_earlier_ones_are_held_by():
     here = local(("f", "g"))
     system = kkt.system(here.active, 1, [LevelMultipliers(np.zeros(5), 0.0)])
-    found = certificate._residuals(here, 1, system, LevelMultipliers(np.array([0, 0, 0, -3.0, 1.0]), 0.0), 0.0)
-    assert (found.objective, found.higher_levels) == ("g", 3.0)
+    result = certificate._residuals(here, 1, system, LevelMultipliers(np.array([0, 0, 0, -3.0, 1.0]), 0.0), 0.0)
+    assert (result.objective, result.higher_levels) == ("g", 3.0)
 
 
 def test_a_limit_is_worth_what_the_first_objective_it_moves_would_fall():
@@ -153,22 +153,25 @@ def test_a_limit_is_worth_what_the_first_objective_it_moves_would_fall():
         CertifiedLevel(judged().level, LevelMultipliers(np.array([0.0, POSITIVE, 1.0, 0.0]), 0.0)),
         CertifiedLevel(judged().level, LevelMultipliers(np.array([3.0, 2.0, 0.0, 1.0]), 0.0)),
     ]
-    found = [
-        (each.limit.row, each.objective.figure, each.worth) for each in certificate._price_limits(here, levels).binding
+    results = [
+        (price.limit.row, price.objective.figure, price.worth)
+        for price in certificate._price_limits(here, levels).binding
     ]
-    assert found == [("x", "slope", 3.0), ("y", "slope", 2.0)]
+    assert results == [("x", "slope", 3.0), ("y", "slope", 2.0)]
 
 
 # Proportion ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("x", "size", "said"), [(1e8, 1.0, 0), (1.01e8, 1.0, 1), (-1.01e8, 1.0, 1), (1.01e8, 2.0, 0)])
-def test_variables_count_in_their_own_size(x, size, said):
+@pytest.mark.parametrize(
+    ("x", "size", "message"), [(1e8, 1.0, 0), (1.01e8, 1.0, 1), (-1.01e8, 1.0, 1), (1.01e8, 2.0, 0)]
+)
+def test_variables_count_in_their_own_size(x, size, message):
     made = toy.program("xy", sizes={"x": size})
     here: Any = SimpleNamespace(
         program=made, x={"x": x, "y": 0.0, "other": 1e30}, active=SimpleNamespace(excess=(0.0,))
     )
-    assert len(list(certificate._design_reasons(here, 0.0))) == said
+    assert len(list(certificate._design_reasons(here, 0.0))) == message
 
 
 def test_the_limit_that_is_exceeded_most_is_named():
@@ -183,26 +186,26 @@ def test_the_limit_that_is_exceeded_most_is_named():
 
 def test_newtons_step_is_told_in_si_and_its_length_in_natural_sizes():
     made = toy.program("xy", {"f": lambda v: (v["x"] - 4) ** 2 + v["y"] ** 2}, sizes={"x": 4.0})
-    found = certify(made, {"x": 4.0 + 4e-9, "y": 1e-9}, 1e-8)
-    assert found.correction == pytest.approx({"x": -4e-9, "y": -1e-9}, rel=1e-6)
-    assert found.step == pytest.approx(1e-9, rel=1e-6)
+    second_certificate = certify(made, {"x": 4.0 + 4e-9, "y": 1e-9}, 1e-8)
+    assert second_certificate.correction == pytest.approx({"x": -4e-9, "y": -1e-9}, rel=1e-6)
+    assert second_certificate.step == pytest.approx(1e-9, rel=1e-6)
     there = certify(made, {"x": 4.0, "y": 0.0}, 1e-8)
     assert (there.step, there.correction) == (0.0, {})
 
 
 def test_what_is_no_number_is_no_certificate():
     made = toy.program("x", formulas={"f": lambda m, v: 1 / v["x"]})
-    found = certify(made, {"x": 0.0}, 1e-8)
-    assert (found.passed, found.minimum, found.unique) == (False, False, False)
-    assert (found.feasibility, found.violation) == (float("inf"), float("inf"))
-    assert found.reasons == ("a value or a slope is not a number here (ZeroDivisionError)",)
+    second_certificate = certify(made, {"x": 0.0}, 1e-8)
+    assert (second_certificate.passed, second_certificate.minimum, second_certificate.unique) == (False, False, False)
+    assert (second_certificate.feasibility, second_certificate.violation) == (float("inf"), float("inf"))
+    assert second_certificate.reasons == ("a value or a slope is not a number here (ZeroDivisionError)",)
 
 
 def test_a_level_after_one_that_settles_the_design_has_no_residual():
     rows = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "g": lambda v: 3 * v["x"]}
-    found = certify(toy.program("xy", rows, objectives=("f", "g")), {"x": 0.0, "y": 0.0}, 1e-8)
-    assert found.passed
-    assert found.levels[1] == Level("g", 0.0, 0.0, 0.0)
+    second_certificate = certify(toy.program("xy", rows, objectives=("f", "g")), {"x": 0.0, "y": 0.0}, 1e-8)
+    assert second_certificate.passed
+    assert second_certificate.levels[1] == Level("g", 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(("residual", "raises"), [(STATIONARY, True), (1.001 * STATIONARY, False)])
@@ -217,8 +220,8 @@ def test_without_second_derivatives_only_a_slope_that_is_left_decides(residual, 
         with pytest.raises(ZeroDivisionError):
             certificate._certify_level(local(), 0, [])
     else:
-        found = certificate._certify_level(local(), 0, [])
-        assert (found.multipliers, found.curvature, found.level.stationarity) == (first, None, residual)
+        result = certificate._certify_level(local(), 0, [])
+        assert (result.multipliers, result.curvature, result.level.stationarity) == (first, None, residual)
 
 
 @pytest.mark.parametrize(("bound", "by"), [("proven", "bounded"), ("undecided", "refined"), ("violated", "refined")])
@@ -234,15 +237,15 @@ def test_what_floats_decide_is_judged_by_jets_and_the_rest_in_40_digits():
     bowl = toy.program("xy", {"f": lambda v: v["x"] ** 2 + v["y"] ** 2})
     cases = (0.0, "jets", True), (2e-7, "40 digits", True), (8e-7, "40 digits", False), (1e-3, "jets", False)
     for x, by, passed in cases:
-        found = certify(bowl, {"x": x, "y": 0.0}, 1e-8)
-        assert (found.by, found.clear, found.passed) == (by, True, passed)
+        second_certificate = certify(bowl, {"x": x, "y": 0.0}, 1e-8)
+        assert (second_certificate.by, second_certificate.clear, second_certificate.passed) == (by, True, passed)
 
 
 def test_where_floats_have_no_slope_40_digits_have_one():
     """√x at 0: jets have no number there; a difference of 40 digits says that it can still rise, not fall."""
     root = toy.program("x", formulas={"f": lambda m, v: m.sqrt(v["x"])})
-    quick, found = certify_by(JetDerivatives, root, {"x": 0.0}, 1e-8), certify(root, {"x": 0.0}, 1e-8)
+    quick, result = certify_by(JetDerivatives, root, {"x": 0.0}, 1e-8), certify(root, {"x": 0.0}, 1e-8)
     assert (quick.passed, quick.clear, quick.by) == (False, False, "jets")
     assert "not a number" in quick.reasons[0]
-    assert (found.passed, found.clear, found.by) == (False, True, "40 digits")
-    assert "can still fall" in found.reasons[0]
+    assert (result.passed, result.clear, result.by) == (False, True, "40 digits")
+    assert "can still fall" in result.reasons[0]

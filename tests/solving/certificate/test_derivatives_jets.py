@@ -56,9 +56,9 @@ def assert_alike(program, x):
     jets, digits = both(program, x)
     assert (jets.by, digits.by) == ("jets", "40 digits")
     basis = np.linalg.qr(np.random.default_rng(3).normal(size=(len(jets.names), 2)))[0]
-    for found, wanted in ((jets.gradients(), digits.gradients()), (jets.curvatures(basis), digits.curvatures(basis))):
+    for result, wanted in ((jets.gradients(), digits.gradients()), (jets.curvatures(basis), digits.curvatures(basis))):
         sizes = np.abs(wanted).reshape(len(wanted), -1).max(axis=1, initial=1.0)
-        off = np.abs(found - wanted).reshape(len(wanted), -1).max(axis=1, initial=0.0)
+        off = np.abs(result - wanted).reshape(len(wanted), -1).max(axis=1, initial=0.0)
         assert (off / sizes).max() <= JET_ERROR / 50
 
 
@@ -159,18 +159,18 @@ def test_all_whole_cycle_rows_are_read_in_one_pass_whatever_their_quantities(mon
         return whole(self, names, pieces, u)
 
     monkeypatch.setattr(JetReading, "along", counted)
-    found = JetDerivatives(program, x, sampler, rows)
-    found.gradients()
-    found.curvatures(np.eye(len(found.names)))
-    assert len(found.groups) > 1
-    assert read == [tuple(found.groups)]
+    result = JetDerivatives(program, x, sampler, rows)
+    result.gradients()
+    result.curvatures(np.eye(len(result.names)))
+    assert len(result.groups) > 1
+    assert read == [tuple(result.groups)]
     # Of many variables in three: for the extremes, for slopes, and along the few directions that are asked.
     monkeypatch.setattr(derivatives, "AT_ONCE", 0)
-    apart, basis = JetDerivatives(program, x, sampler, rows), np.eye(len(found.names))[:, :2]
-    sizes = np.abs(found.gradients()).max(axis=1, initial=1.0)
-    assert np.abs(apart.gradients() - found.gradients()).max(axis=1) == pytest.approx(0.0 * sizes, abs=1e-12)
-    assert apart.curvatures(basis) == pytest.approx(found.curvatures(basis), rel=1e-10, abs=1e-8)
-    assert read == [tuple(found.groups)] * 4
+    apart, basis = JetDerivatives(program, x, sampler, rows), np.eye(len(result.names))[:, :2]
+    sizes = np.abs(result.gradients()).max(axis=1, initial=1.0)
+    assert np.abs(apart.gradients() - result.gradients()).max(axis=1) == pytest.approx(0.0 * sizes, abs=1e-12)
+    assert apart.curvatures(basis) == pytest.approx(result.curvatures(basis), rel=1e-10, abs=1e-8)
+    assert read == [tuple(result.groups)] * 4
 
 
 def test_an_extreme_that_stands_beside_its_place_is_read_again_there():
@@ -178,7 +178,7 @@ def test_an_extreme_that_stands_beside_its_place_is_read_again_there():
     sampler = Sampler(program.model, {"x": 1.0})
     rows = active_set(program, sampler).rows
     off = [row._replace(node=row.node._replace(u=row.node.u + 1e-5)) for row in rows]
-    there, beside = (JetDerivatives(program, {"x": 1.0}, sampler, each) for each in (rows, off))
-    assert beside.u["w"] == pytest.approx(there.u["w"], abs=1e-15)
-    assert beside.gradients() == pytest.approx(there.gradients(), abs=1e-14)
-    assert beside.curvatures(np.eye(1)) == pytest.approx(there.curvatures(np.eye(1)), abs=1e-13)
+    there, neighbour = (JetDerivatives(program, {"x": 1.0}, sampler, item) for item in (rows, off))
+    assert neighbour.u["w"] == pytest.approx(there.u["w"], abs=1e-15)
+    assert neighbour.gradients() == pytest.approx(there.gradients(), abs=1e-14)
+    assert neighbour.curvatures(np.eye(1)) == pytest.approx(there.curvatures(np.eye(1)), abs=1e-13)

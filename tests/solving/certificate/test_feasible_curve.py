@@ -26,18 +26,18 @@ def test_what_falls_along_the_tangent_alone_is_level(angle):
     x = {"x": float(np.cos(angle)), "y": float(np.sin(angle))}
     tangent = {"x": -x["y"], "y": x["x"]}
     assert Lagrangian(circle, x, 0, {0: 2.0}, {}).falls(tangent, 0.0)
-    found = certify(circle, x, 1e-8)
-    assert found.reasons == ()
-    assert (found.minimum, found.unique) == (True, False)
+    certificate = certify(circle, x, 1e-8)
+    assert certificate.reasons == ()
+    assert (certificate.minimum, certificate.unique) == (True, False)
 
 
 @pytest.mark.parametrize(("tilt", "falls"), [(0.0, False), (1.0, True), (-1.0, True)])
 def test_what_falls_along_the_curve_is_refused(tilt, falls):
     """On the circle y³ is odd: it falls to one side of (1, 0)."""
     rows = ROUND | {"f": lambda v: ROUND["f"](v) + tilt * v["y"] ** 3}
-    found = reasons(toy.program("xy", rows, limits=(("r", 0, 1.0),)), x=1.0, y=0.0)
-    said = ("second order does not decide: f falls along a direction without curvature",)
-    assert found == (said if falls else ())
+    result = reasons(toy.program("xy", rows, limits=(("r", 0, 1.0),)), x=1.0, y=0.0)
+    texts = ("second order does not decide: f falls along a direction without curvature",)
+    assert result == (texts if falls else ())
 
 
 def test_a_fall_within_the_first_probe_alone_is_left_open():
@@ -58,31 +58,31 @@ def curve(rows, limits, sums, curved=(), waves=None, **x):
     basis = np.linalg.svd(jacobian)[2][len(sums) :].T if len(sums) else np.eye(len(x))
     vectors = np.array(curved).reshape(-1, basis.shape[1]).T
     bends = np.full(vectors.shape[1], 2.0)
-    found = FeasibleCurve(program, x, active.rows, dict.fromkeys(x, 1.0), sums, jacobian, basis, vectors, bends)
-    return program, found
+    result = FeasibleCurve(program, x, active.rows, dict.fromkeys(x, 1.0), sums, jacobian, basis, vectors, bends)
+    return program, result
 
 
 @pytest.mark.parametrize("step", [1e-2, -0.3])
 def test_steps_are_corrected_onto_what_binds(step):
-    _, found = curve(ROUND, (("r", 0, 1.0),), [[1.0]], x=0.6, y=0.8)
-    there = found.at(np.array([step]))
+    _, result = curve(ROUND, (("r", 0, 1.0),), [[1.0]], x=0.6, y=0.8)
+    there = result.at(np.array([step]))
     assert np.hypot(there["x"], there["y"]) == pytest.approx(1.0, abs=1e-12)
-    way = found.basis[:, 0]
+    way = result.basis[:, 0]
     assert (np.array([there["x"], there["y"]]) - [0.6, 0.8]) @ way == pytest.approx(step, abs=1e-14)
 
 
 def test_no_design_is_made_up_where_nothing_keeps_what_binds():
-    _, found = curve(ROUND, (("r", 0, 1.0),), [[1.0]], x=0.6, y=0.8)
-    assert found.at(np.array([2.0])) is None
+    _, result = curve(ROUND, (("r", 0, 1.0),), [[1.0]], x=0.6, y=0.8)
+    assert result.at(np.array([2.0])) is None
 
 
 @pytest.mark.parametrize(("fourth", "verdict"), [(0.9, "falls"), (1.1, "holds")])
 def test_directions_that_are_curved_move_to_where_the_least_is(fourth, verdict):
     """v² − 2 v w² + c w⁴ is (c − 1) w⁴ at v = w², though c w⁴ > 0 straight along w."""
     rows = {"f": lambda z: z["v"] ** 2 - 2 * z["v"] * z["w"] ** 2 + fourth * z["w"] ** 4}
-    program, found = curve(rows, (), [], [[1.0, 0.0]], v=0.0, w=0.0)
+    program, result = curve(rows, (), [], [[1.0, 0.0]], v=0.0, w=0.0)
     lagrangian = Lagrangian(program, {"v": 0.0, "w": 0.0}, 0, {}, {})
-    assert found.verdict(lagrangian, np.array([0.0, 1.0]), 0.0) == verdict
+    assert result.verdict(lagrangian, np.array([0.0, 1.0]), 0.0) == verdict
 
 
 def wave(m, v, phi):
@@ -93,9 +93,9 @@ def wave(m, v, phi):
 def test_extremes_of_the_cycle_move_along(sign):
     """Its peak is r, whose place moves with y: at a frozen angle another curve than the circle would be kept."""
     sums = [[float(k == sign) for k in range(2)]]
-    _, found = curve({"f": ROUND["f"]}, (("wave", 1, 1.0),), sums, waves={"wave": wave}, x=1.0, y=0.0)
-    assert [row.sign for row in found.rows[:2]] in ([1.0, -1.0], [-1.0, 1.0])
-    assert found.at(np.array([0.02]))["x"] == pytest.approx(np.sqrt(1 - 0.02**2), abs=1e-12)
+    _, result = curve({"f": ROUND["f"]}, (("wave", 1, 1.0),), sums, waves={"wave": wave}, x=1.0, y=0.0)
+    assert [row.sign for row in result.rows[:2]] in ([1.0, -1.0], [-1.0, 1.0])
+    assert result.at(np.array([0.02]))["x"] == pytest.approx(np.sqrt(1 - 0.02**2), abs=1e-12)
 
 
 @pytest.mark.slow

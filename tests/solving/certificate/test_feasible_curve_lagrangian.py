@@ -12,8 +12,8 @@ PROGRAM = toy.program(
 X = {"x": 1.0, "y": 3.0}
 
 
-def falls(slope=0.0, direction=None, prices=None, held=None):
-    return Lagrangian(PROGRAM, X, 0, prices or {}, held or {}).falls(direction or {"x": 1.0}, slope)
+def falls(slope=0.0, direction=None, prices=None, fixed=None):
+    return Lagrangian(PROGRAM, X, 0, prices or {}, fixed or {}).falls(direction or {"x": 1.0}, slope)
 
 
 @pytest.mark.parametrize(("price", "expected"), [(4.9, True), (5.1, False)])
@@ -28,9 +28,9 @@ def test_limits_are_read_in_their_natural_size_and_sense(price, expected):
     assert falls(prices={1: price}) == expected
 
 
-@pytest.mark.parametrize(("held", "expected"), [(4.9, True), (5.1, False)])
-def test_earlier_levels_are_held_by_their_multipliers(held, expected):
-    assert falls(held={1: held}) == expected
+@pytest.mark.parametrize(("fixed", "expected"), [(4.9, True), (5.1, False)])
+def test_earlier_levels_are_held_by_their_multipliers(fixed, expected):
+    assert falls(fixed={1: fixed}) == expected
 
 
 def test_a_fall_that_the_slope_left_explains_is_none():

@@ -30,12 +30,12 @@ LEAN = {"f": lambda v: 3 * v["x"] + 2 * v["y"]}
 
 def test_limits_share_a_slope_by_their_own():
     program = toy.program("xy", LEAN, limits=(("x", -1, 0.0), ("y", -1, 0.0), ("y", 1, 0.0)))
-    _, system, found = level(program, XY)
+    _, system, result = level(program, XY)
     assert system.inequalities == (0, 1, 2)
     assert system.equalities == ()
-    assert found.values == pytest.approx([3.0, 2.0, 0.0, 1.0])
-    assert found.residual < 1e-14
-    assert found.positive == {0, 1, 3}
+    assert result.values == pytest.approx([3.0, 2.0, 0.0, 1.0])
+    assert result.residual < 1e-14
+    assert result.positive == {0, 1, 3}
     without = system.without(1)
     assert (without.inequalities, without.pieces) == ((0, 2), system.pieces)
     assert kkt.solve_system(at(program, XY)[1], without).residual > 0.5
@@ -44,20 +44,20 @@ def test_limits_share_a_slope_by_their_own():
 def test_an_equality_may_pull_either_way_and_a_limit_may_not():
     for value in (3.0, -3.0):
         rows = {"f": lambda v, value=value: value * v["x"] + v["y"] ** 2}
-        _, _, found = level(toy.program("xy", rows, limits=(("x", 0, 0.0),)), XY)
-        assert found.values == pytest.approx([-value, 1.0])
-    _, _, found = level(toy.program("xy", LEAN, limits=(("x", 1, 0.0), ("y", -1, 0.0))), XY)
-    assert found.residual > 0.5
-    assert found.values[0] == 0.0
+        _, _, result = level(toy.program("xy", rows, limits=(("x", 0, 0.0),)), XY)
+        assert result.values == pytest.approx([-value, 1.0])
+    _, _, result = level(toy.program("xy", LEAN, limits=(("x", 1, 0.0), ("y", -1, 0.0))), XY)
+    assert result.residual > 0.5
+    assert result.values[0] == 0.0
 
 
 def test_pieces_of_an_objective_share_a_multiplier_of_one():
     """max(x, −2 x + y, −y) at 0: weights 2/4, 1/4, 1/4."""
     rows = {"p": lambda v: v["x"], "q": lambda v: -2 * v["x"] + v["y"], "r": lambda v: -v["y"]}
-    _, system, found = level(toy.program("xy", rows, objectives=("p, q, r",)), XY)
+    _, system, result = level(toy.program("xy", rows, objectives=("p, q, r",)), XY)
     assert system.pieces == (0, 1, 2)
-    assert found.values == pytest.approx([0.5, 0.25, 0.25])
-    assert found.residual < 1e-14
+    assert result.values == pytest.approx([0.5, 0.25, 0.25])
+    assert result.residual < 1e-14
 
 
 def multipliers(*of):
@@ -81,15 +81,15 @@ def test_what_binds_at_one_level_is_an_equality_at_the_next():
 def test_a_peak_of_several_pieces_is_held_piece_by_piece():
     program = toy.program("xy", TWO, objectives=("a, b", "c"))
     active, _ = at(program, XY)
-    held = kkt.system(active, 1, [multipliers(0.5, 0.5, 0.0)]).higher_levels
-    assert held.tolist() == [[1, 0, 0], [0, 1, 0]]
+    fixed = kkt.system(active, 1, [multipliers(0.5, 0.5, 0.0)]).higher_levels
+    assert fixed.tolist() == [[1, 0, 0], [0, 1, 0]]
     assert kkt.system(active, 1, [multipliers(1.0, 0.0, 0.0)]).higher_levels.tolist() == [[1, 0, 0]]
 
 
 def test_both_pieces_of_a_magnitude_that_vanishes_are_held():
     active, _ = at(toy.program("xy", TWO, objectives=("|a|", "c")), XY)
-    held = kkt.system(active, 1, [multipliers(1.0, 0.0, 0.0)]).higher_levels
-    assert held.tolist() == [[1, 0, 0], [0, 1, 0]]
+    fixed = kkt.system(active, 1, [multipliers(1.0, 0.0, 0.0)]).higher_levels
+    assert fixed.tolist() == [[1, 0, 0], [0, 1, 0]]
 
 
 def test_a_row_binds_above_a_hundred_millionth():
@@ -113,13 +113,13 @@ def test_a_row_is_replaceable_where_others_can_do_without_it(seed):
     slopes = rng.normal(size=(rows, size)) * 10.0 ** rng.integers(-3, 4, (rows, 1))
     prices = 10.0 ** rng.integers(-4, 2, rows)
     gradients = np.vstack([slopes, -prices @ slopes])
-    one = System((rows,), tuple(range(rows)), (), np.zeros((0, rows + 1)))
-    found = solve_system(gradients, one)
-    named = replaceable_rows(gradients, one, found, STATIONARY)
+    first = System((rows,), tuple(range(rows)), (), np.zeros((0, rows + 1)))
+    result = solve_system(gradients, first)
+    named = replaceable_rows(gradients, first, result, STATIONARY)
     without = [
         k
         for k in range(rows)
-        if found.values[k] > POSITIVE and solve_system(gradients, one.without(k)).residual <= STATIONARY
+        if result.values[k] > POSITIVE and solve_system(gradients, first.without(k)).residual <= STATIONARY
     ]
     assert set(without) <= set(named)
     if rows <= size and np.linalg.svd(gradients[:rows], compute_uv=False)[-1] * prices.min() > 1e-4:
@@ -129,9 +129,9 @@ def test_a_row_is_replaceable_where_others_can_do_without_it(seed):
 def test_a_row_apart_from_those_that_depend_on_each_other_is_not_replaceable():
     """Slopes (1, 0), twice that, and (0, 1): the first two can stand for each other, the third for none."""
     gradients = np.array([[1.0, 0.0], [2.0, 0.0], [0.0, 1.0], [-2.0, -1.0]])
-    one = System((3,), (0, 1, 2), (), np.zeros((0, 4)))
-    found = LevelMultipliers(np.array([1.0, 0.5, 1.0, 1.0]), 0.0)
-    assert replaceable_rows(gradients, one, found, STATIONARY) == [0, 1]
+    first = System((3,), (0, 1, 2), (), np.zeros((0, 4)))
+    result = LevelMultipliers(np.array([1.0, 0.5, 1.0, 1.0]), 0.0)
+    assert replaceable_rows(gradients, first, result, STATIONARY) == [0, 1]
 
 
 def test_a_piece_of_an_earlier_level_that_nothing_holds_may_not_rise():
@@ -140,16 +140,16 @@ def test_a_piece_of_an_earlier_level_that_nothing_holds_may_not_rise():
     program = toy.program("xy", rows, objectives=("p, q", "f"), limits=(("x", -1, 0.0),))
     _, _, first = level(program, XY)
     assert first.values[:3] == pytest.approx([1.0, 1.0, 0.0])
-    active, system, found = level(program, XY, 1, [first])
-    (beside,) = (k for k in active.levels[0] if not first.values[k])
-    assert beside in system.inequalities
-    assert found.residual < 1e-14
-    assert found.values[beside] == pytest.approx(1.0)
+    active, system, result = level(program, XY, 1, [first])
+    (neighbour,) = (k for k in active.levels[0] if not first.values[k])
+    assert neighbour in system.inequalities
+    assert result.residual < 1e-14
+    assert result.values[neighbour] == pytest.approx(1.0)
 
 
 def test_a_magnitude_that_vanishes_is_balanced_by_its_own_pieces():
-    slope, beside = np.array([0.3, -2.0, 0.5]), np.array([0.3, -2.0, 0.4])
+    slope, neighbour = np.array([0.3, -2.0, 0.5]), np.array([0.3, -2.0, 0.4])
     pieces = kkt.System((1, 2), (0,), (), np.zeros((0, 3)))
-    found, least = kkt.vanishing_multipliers(pieces, 3), kkt.solve_system(np.array([beside, slope, -slope]), pieces)
-    assert found.values == pytest.approx(least.values, abs=1e-15)
-    assert least.residual == pytest.approx(found.residual, abs=1e-15)
+    result, least = kkt.vanishing_multipliers(pieces, 3), kkt.solve_system(np.array([neighbour, slope, -slope]), pieces)
+    assert result.values == pytest.approx(least.values, abs=1e-15)
+    assert least.residual == pytest.approx(result.residual, abs=1e-15)

@@ -37,7 +37,7 @@ def valley(bend):
 
 
 @pytest.mark.parametrize(
-    ("bend", "minimum", "unique", "settled"),
+    ("bend", "minimum", "unique", "final"),
     [
         (1.0, True, True, True),
         (1e-7, True, True, True),
@@ -48,9 +48,9 @@ def valley(bend):
         (-1.0, False, False, False),
     ],
 )
-def test_curvature_counts_above_1e_7(bend, minimum, unique, settled):
-    found = curvature(valley(bend), x=0.0, y=0.0)
-    assert (found.minimum, found.unique, found.determined) == (minimum, unique, settled)
+def test_curvature_counts_above_1e_7(bend, minimum, unique, final):
+    second_curvature = curvature(valley(bend), x=0.0, y=0.0)
+    assert (second_curvature.minimum, second_curvature.unique, second_curvature.determined) == (minimum, unique, final)
 
 
 def test_a_touching_limit_closes_a_way_that_falls():
@@ -60,25 +60,25 @@ def test_a_touching_limit_closes_a_way_that_falls():
     assert not curvature(toy.program("xy", falls, limits=(("y", -1, 0.0),)), x=0.0, y=0.0).minimum
     assert curvature(toy.program("xy", falls, limits=(("y", 0, 0.0),)), x=0.0, y=0.0).minimum
     shut = (("y", -1, 0.0), ("y", 1, 0.0))
-    found = curvature(toy.program("xy", falls, limits=shut), x=0.0, y=0.0)
-    assert (found.minimum, found.unique) == (True, True)
+    second_curvature = curvature(toy.program("xy", falls, limits=shut), x=0.0, y=0.0)
+    assert (second_curvature.minimum, second_curvature.unique) == (True, True)
 
 
 @pytest.mark.parametrize(("bend", "off"), [(1.0, 1e-6), (2e-3, 1e-4), (2e-5, 1e-3)])
 def test_newtons_step_leads_to_the_bottom_of_a_bowl_however_shallow(bend, off):
-    found = curvature(of(lambda v: bend * (v["x"] - 1) ** 2 / 2 + (v["y"] - 2) ** 2), x=1 + off, y=2.0)
-    assert found.step == pytest.approx([-off, 0.0], rel=1e-9, abs=1e-12)
+    second_curvature = curvature(of(lambda v: bend * (v["x"] - 1) ** 2 / 2 + (v["y"] - 2) ** 2), x=1 + off, y=2.0)
+    assert second_curvature.step == pytest.approx([-off, 0.0], rel=1e-9, abs=1e-12)
 
 
 def test_newtons_step_does_not_follow_what_is_nearly_level():
-    found = curvature(of(lambda v: 5e-6 * (v["x"] - 1) ** 2 / 2 + (v["y"] - 2) ** 2), x=1.001, y=2.0)
-    assert len(found.step) == 0 or found.step == pytest.approx([0.0, 0.0], abs=1e-12)
+    second_curvature = curvature(of(lambda v: 5e-6 * (v["x"] - 1) ** 2 / 2 + (v["y"] - 2) ** 2), x=1.001, y=2.0)
+    assert len(second_curvature.step) == 0 or second_curvature.step == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
 def test_newtons_step_leads_back_onto_what_binds():
     program = of(lambda v: -v["x"] + (v["y"] - 1) ** 2, x=(1, 3.0))
-    found = curvature(program, x=3 - 4e-8, y=1 + 1e-5)
-    assert found.step == pytest.approx([4e-8, -1e-5], rel=1e-9)
+    second_curvature = curvature(program, x=3 - 4e-8, y=1 + 1e-5)
+    assert second_curvature.step == pytest.approx([4e-8, -1e-5], rel=1e-9)
     assert len(curvature(program, x=3.0, y=1.0).step) == 0
 
 
@@ -111,8 +111,8 @@ def cubic(v):
 
 
 def test_a_fall_of_third_order_is_found_by_probing():
-    found = curvature(of(cubic), x=0.0, y=0.0)
-    assert (found.minimum, found.higher) == (True, "falls")
+    second_curvature = curvature(of(cubic), x=0.0, y=0.0)
+    assert (second_curvature.minimum, second_curvature.higher) == (True, "falls")
     assert curvature(of(lambda v: v["x"] ** 2 + v["y"] ** 4), x=0.0, y=0.0).higher == "holds"
     assert curvature(of(cubic, y=(-1, 0.0)), x=0.0, y=0.0).higher == "holds", "the way that falls is shut"
     assert curvature(of(lambda v: cubic(v) + 4e-5 * v["y"] ** 2), x=0.0, y=0.0).higher == "falls"

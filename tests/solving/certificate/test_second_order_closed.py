@@ -18,9 +18,9 @@ def levels(first, second, names="ab", limits=(), third=None):
 
 
 def passed(program, **x):
-    found = certify(program, x, 1e-8)
-    assert found.passed, found.reasons
-    return found
+    certificate = certify(program, x, 1e-8)
+    assert certificate.passed, certificate.reasons
+    return certificate
 
 
 BOWL = levels(lambda v: v["a"] ** 2, lambda v: (v["a"] - 1) ** 2 + (v["b"] - 2) ** 2)
@@ -28,18 +28,18 @@ BOWL = levels(lambda v: v["a"] ** 2, lambda v: (v["a"] - 1) ** 2 + (v["b"] - 2) 
 
 def test_a_later_level_moves_only_what_an_earlier_one_leaves_level():
     """f is least at a = 0 alone, with no slope there to price a step toward a = 1, which g would take."""
-    found = passed(BOWL, a=0.0, b=2.0)
-    assert (found.minimum, found.unique) == (True, True)
-    assert found.levels[1].higher_levels == pytest.approx(0.0, abs=1e-6)
+    result = passed(BOWL, a=0.0, b=2.0)
+    assert (result.minimum, result.unique) == (True, True)
+    assert result.levels[1].higher_levels == pytest.approx(0.0, abs=1e-6)
     assert not certify(BOWL, {"a": 0.0, "b": 1.9}, 1e-8).passed, "b is free for g"
     assert not certify(BOWL, {"a": 0.1, "b": 2.0}, 1e-8).passed, "f comes first"
 
 
 def test_rounding_in_a_slope_gives_no_price_without_measure():
     """Where f's slope along a is 1e-10 only, g's of 2 would cost 2e10 of it."""
-    found = passed(BOWL, a=5e-11, b=2.0)
-    assert max(level.price for level in found.levels) < 10.0
-    assert max(level.higher_levels for level in found.levels) < 10.0
+    result = passed(BOWL, a=5e-11, b=2.0)
+    assert max(level.price for level in result.levels) < 10.0
+    assert max(level.higher_levels for level in result.levels) < 10.0
 
 
 @pytest.mark.parametrize("turn", [0.3, 1.1])

@@ -74,13 +74,13 @@ def test_a_touching_row_counts_above_a_slope_of_a_ten_millionth(slope, counts):
 
 
 def test_where_nothing_is_open_the_step_leads_back_onto_the_vertex():
-    found = curvature(
+    second_curvature = curvature(
         toy.program("xy", {"f": lambda v: v["x"] + v["y"]}, limits=(("x", -1, 1.0), ("y", -1, 2.0))),
         x=1 + 3e-8,
         y=2 - 4e-8,
     )
-    assert found.determined
-    assert found.step == pytest.approx([-3e-8, 4e-8], rel=1e-6)
+    assert second_curvature.determined
+    assert second_curvature.step == pytest.approx([-3e-8, 4e-8], rel=1e-6)
 
 
 def test_the_step_onto_a_slanted_row_is_the_shortest():
@@ -107,8 +107,8 @@ def test_newtons_step_goes_down_the_slope_and_back():
 
 def test_a_level_plane_is_looked_at_along_its_axes_and_both_diagonals():
     half = math.sqrt(0.5)
-    found = second_order._lines(np.eye(2))
-    assert np.array(found) == pytest.approx(np.array([[1, 0], [0, 1], [half, half], [-half, half]]))
+    result = second_order._lines(np.eye(2))
+    assert np.array(result) == pytest.approx(np.array([[1, 0], [0, 1], [half, half], [-half, half]]))
     space = second_order._lines(np.eye(3))
     assert len(space) == 3 + 2 * 3
     assert [np.linalg.norm(line) for line in space] == pytest.approx([1.0] * 9)
@@ -116,11 +116,11 @@ def test_a_level_plane_is_looked_at_along_its_axes_and_both_diagonals():
 
 
 def test_of_a_line_the_ways_are_open_that_no_touching_row_shuts():
-    one, both = np.array([[1.0, 0.0]]), np.array([[1.0, 0.0], [-1.0, 0.0]])
+    first, both = np.array([[1.0, 0.0]]), np.array([[1.0, 0.0], [-1.0, 0.0]])
     line = np.array([1.0, 0.0])
-    for slopes, count in ((np.zeros((0, 2)), 2), (one, 1), (both, 0), (1e-7 * both, 2), (1.1e-7 * both, 0)):
+    for slopes, count in ((np.zeros((0, 2)), 2), (first, 1), (both, 0), (1e-7 * both, 2), (1.1e-7 * both, 0)):
         assert len(CriticalCone(np.eye(2), np.zeros(2), slopes).directions(line)) == count
-    assert CriticalCone(np.eye(2), np.zeros(2), one).directions(line)[0].tolist() == [-1.0, 0.0]
+    assert CriticalCone(np.eye(2), np.zeros(2), first).directions(line)[0].tolist() == [-1.0, 0.0]
 
 
 # Prices -------------------------------------------------------------------------------------------------------------
@@ -129,27 +129,29 @@ def test_of_a_line_the_ways_are_open_that_no_touching_row_shuts():
 @pytest.fixture
 def read(monkeypatch):
     """Return what the Lagrangian is asked: prices, held levels, directions and the slope that is left."""
-    asked = []
+    requests = []
 
     class Told:
-        def __init__(self, program, x, level, prices, held):
-            self.of = level, prices, held
+        def __init__(self, program, x, level, prices, fixed):
+            self.of = level, prices, fixed
 
         def falls(self, direction, slope):
-            asked.append((*self.of, direction, slope))
+            requests.append((*self.of, direction, slope))
             return False
 
     monkeypatch.setattr(second_order, "Lagrangian", Told)
-    return asked
+    return requests
 
 
-def higher(local, level, found, ways):
+def higher(local, level, result, ways):
     """Return what higher orders do where nothing falls along a straight line: no design beside is asked for."""
     cone = second_order.CriticalCone(
         np.eye(2), np.zeros(2), np.zeros((0, 2)), sums=np.zeros((0, len(local.active.rows)))
     )
     curve = second_order._curve(local, cone, np.zeros((2, 0)), np.zeros(0))
-    return second_order._higher(second_order._lagrangian(local, level, found), curve, ways, found.residual, every=False)
+    return second_order._higher(
+        second_order._lagrangian(local, level, result), curve, ways, result.residual, every=False
+    )
 
 
 def test_rows_of_one_limit_add_up_and_pieces_of_the_objective_have_no_price(read):
@@ -159,19 +161,19 @@ def test_rows_of_one_limit_add_up_and_pieces_of_the_objective_have_no_price(read
     limits = (("y", 1, 5.0), ("w", 1, 1.0))
     local = local_at(toy.program("xy", rows, waves, limits=limits, sizes={"y": 2.0}), x=1.0, y=0.0)
     assert (local.active.limits, len(local.active.rows)) == (3, 4)
-    found = LevelMultipliers(np.array([0.25, 0.5, 0.0, 1.0]), 0.125)
-    assert higher(local, 0, found, [np.array([0.0, 1.0])]) == "holds"
+    result = LevelMultipliers(np.array([0.25, 0.5, 0.0, 1.0]), 0.125)
+    assert higher(local, 0, result, [np.array([0.0, 1.0])]) == "holds"
     assert read == [(0, {1: 0.75}, {}, {"x": 0.0, "y": 2.0}, 0.125)]
 
 
 def test_earlier_levels_are_held_by_what_their_pieces_carry(read):
     rows = {"p": lambda v: v["x"], "q": lambda v: v["y"], "g": lambda v: v["x"] - v["y"]}
     local = local_at(toy.program("xy", rows, objectives=("p, q", "g")), x=1.0, y=1.0)
-    found = LevelMultipliers(np.array([3.0, 5.0, 1.0]), 0.0)
-    assert second_order.level_multiplier(local.active, 0, found) == 8.0
-    higher(local, 1, found, [np.array([1.0, 0.0])])
-    higher(local, 0, found, [np.array([1.0, 0.0])])
-    assert [(level, held) for level, _, held, _, _ in read] == [(1, {0: 8.0}), (0, {})]
+    result = LevelMultipliers(np.array([3.0, 5.0, 1.0]), 0.0)
+    assert second_order.level_multiplier(local.active, 0, result) == 8.0
+    higher(local, 1, result, [np.array([1.0, 0.0])])
+    higher(local, 0, result, [np.array([1.0, 0.0])])
+    assert [(level, fixed) for level, _, fixed, _, _ in read] == [(1, {0: 8.0}), (0, {})]
 
 
 # Moves --------------------------------------------------------------------------------------------------------------
@@ -184,16 +186,16 @@ def sliding(bend):
     return toy.program("xyz", rows, objectives=("f", "g"), moves=(move,), sizes={"z": 3.0})
 
 
-@pytest.mark.parametrize(("bend", "settled"), [(1.0, True), (1e-7, True), (4e-8, False), (0.0, False)])
-def test_what_is_left_beside_a_move_must_curve(bend, settled):
-    assert curvature(sliding(bend), x=0.0, y=0.0, z=1.0).determined == settled
+@pytest.mark.parametrize(("bend", "final"), [(1.0, True), (1e-7, True), (4e-8, False), (0.0, False)])
+def test_what_is_left_beside_a_move_must_curve(bend, final):
+    assert curvature(sliding(bend), x=0.0, y=0.0, z=1.0).determined == final
 
 
-@pytest.mark.parametrize(("bend", "settled"), [(FLAT, False), (1.001 * FLAT, True)])
-def test_what_is_left_beside_a_move_curves_by_more_than_none(bend, settled):
+@pytest.mark.parametrize(("bend", "final"), [(FLAT, False), (1.001 * FLAT, True)])
+def test_what_is_left_beside_a_move_curves_by_more_than_none(bend, final):
     local = local_at(sliding(1.0), x=0.0, y=0.0, z=1.0)
     basis = np.eye(3)[:, 1:]
-    assert second_order._determined_except_moves(local, 0, basis, np.diag([bend, 0.0])) == settled
+    assert second_order._determined_except_moves(local, 0, basis, np.diag([bend, 0.0])) == final
 
 
 @pytest.mark.parametrize(("off", "is_open"), [(0.0, True), (0.9e-7, True), (1.1e-7, False)])

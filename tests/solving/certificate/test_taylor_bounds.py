@@ -51,8 +51,8 @@ def check(sampled, boxes, name, sign=1.0):
     below, limit = tried(sampled, boxes, name, sign, -1e-6)
     assert below.status == "violated", name
     piece, u = sampled.cycle.place(below.angle)
-    beside = [(piece, u), ((piece - 1) % sampled.cycle.pieces, 1.0), ((piece + 1) % sampled.cycle.pieces, 0.0)]
-    places, shares = np.array([p for p, _ in beside]), np.array([u for _, u in beside])
+    neighbours = [(piece, u), ((piece - 1) % sampled.cycle.pieces, 1.0), ((piece + 1) % sampled.cycle.pieces, 0.0)]
+    places, shares = np.array([p for p, _ in neighbours]), np.array([u for _, u in neighbours])
     there = np.abs((sampled.cycle.angles(places, shares) - below.angle + math.pi) % (2 * math.pi) - math.pi) < 1e-9
     assert max(sign * sampled.at(name, places[there], shares[there])) > limit, name
 
@@ -178,9 +178,9 @@ def test_a_spike_between_the_samples_is_refuted_and_the_certificate_says_so(wave
 
 def test_the_angle_of_the_spike_is_found():
     made = program(spiked)
-    found = Boxes(Sampler(made.model, {"x": 0.0})).bound("wave", 1.0, 1.2)
-    assert found.status == "violated"
-    assert found.angle == pytest.approx(PLACE, abs=2e-5)
+    bound = Boxes(Sampler(made.model, {"x": 0.0})).bound("wave", 1.0, 1.2)
+    assert bound.status == "violated"
+    assert bound.angle == pytest.approx(PLACE, abs=2e-5)
 
 
 def test_without_the_spike_the_same_design_passes():

@@ -116,10 +116,10 @@ def test_a_parabola_is_kept_below_its_highest_value_and_no_lower(slope, bend, pl
     ball, h = flint.arb, np.linspace(low - at, high - at, 2001)
     highest = max(float((s * h + (bend + blur) * h * h).max()) for s in (slope - blur, slope + blur))
     here = [ball(0.25), ball(slope, blur)]
-    for margin, kept in ((1e-6, True), (-1e-6, False)):
+    for margin, remaining in ((1e-6, True), (-1e-6, False)):
         limit = 0.25 + highest + margin
-        if blur == 0.0 or not kept:
-            assert _is_below(here, ball(bend, blur), AngleBox(low, high), at, limit) is kept
+        if blur == 0.0 or not remaining:
+            assert _is_below(here, ball(bend, blur), AngleBox(low, high), at, limit) is remaining
     assert _is_below(here, ball(bend, blur), AngleBox(low, high), at, 0.25 + highest + 3 * blur + 1e-6)
 
 
@@ -169,15 +169,15 @@ def blind():
 )
 def test_boxes_are_halved_from_the_left_until_one_breaks_the_limit(blind, limit, expected):
     """u² ≤ 0.6: the turn is open, its left half holds, of the right half 0.75² does too, and 0.875² does not."""
-    found = boxes().bound("square", 1.0, limit)
-    assert (found.status, found.boxes) == expected[:2]
-    assert found.angle == (None if expected[2] is None else pytest.approx(expected[2]))
+    bound = boxes().bound("square", 1.0, limit)
+    assert (bound.status, bound.boxes) == expected[:2]
+    assert bound.angle == (None if expected[2] is None else pytest.approx(expected[2]))
 
 
 def test_a_refined_top_is_looked_at_first():
     """u² is highest at the end of the turn, sin 2πu at a quarter: what these break needs one box."""
-    found = boxes().bound("square", 1.0, 0.6)
-    assert (found.status, found.boxes, found.angle) == ("violated", 1, pytest.approx(TURN))
+    bound = boxes().bound("square", 1.0, 0.6)
+    assert (bound.status, bound.boxes, bound.angle) == ("violated", 1, pytest.approx(TURN))
     low = boxes().bound("sine", 1.0, 1 - 1e-9)
     assert (low.status, low.boxes, low.angle) == ("violated", 1, pytest.approx(TURN / 4))
     with mock.patch.object(Boxes, "_tops", return_value=[]):
@@ -212,8 +212,8 @@ def test_readings_are_counted_and_kept_for_the_other_sign(blind):
 
 def test_a_bound_is_given_up_after_as_many_boxes_as_allowed(blind, monkeypatch):
     monkeypatch.setattr(taylor_bounds, "MOST_BOXES", 3)
-    found = boxes().bound("square", 1.0, 0.6)
-    assert (found.status, found.boxes, found.angle) == ("undecided", 3, None)
+    bound = boxes().bound("square", 1.0, 0.6)
+    assert (bound.status, bound.boxes, bound.angle) == ("undecided", 3, None)
     monkeypatch.setattr(taylor_bounds, "MOST_BOXES", 1)
     assert boxes().bound("square", 1.0, 0.6).boxes == 1
 
@@ -256,7 +256,7 @@ def test_both_signs_count_unless_a_quantity_has_one():
 
 
 @pytest.mark.parametrize(
-    ("statuses", "said"),
+    ("statuses", "message"),
     [
         (("proven", "proven"), "proven"),
         (("proven", "undecided"), "undecided"),
@@ -264,10 +264,10 @@ def test_both_signs_count_unless_a_quantity_has_one():
         (("violated", "proven"), "violated"),
     ],
 )
-def test_the_worst_of_all_rows_is_said(statuses, said):
-    found = [taylor_bounds.CycleBound(status, 1) for status in statuses]
-    with mock.patch.object(Boxes, "bound", side_effect=found):
-        assert peaks_verdict(sampler_of(signed=True), [("level", 1.0, None), ("hill", 1.0, None)], 1e-9) == said
+def test_the_worst_of_all_rows_is_said(statuses, message):
+    results = [taylor_bounds.CycleBound(status, 1) for status in statuses]
+    with mock.patch.object(Boxes, "bound", side_effect=results):
+        assert peaks_verdict(sampler_of(signed=True), [("level", 1.0, None), ("hill", 1.0, None)], 1e-9) == message
 
 
 def test_a_scan_tells_the_excess_over_the_refined_peak_in_the_rows_size():

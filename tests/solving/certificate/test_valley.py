@@ -20,8 +20,8 @@ both = pytest.mark.parametrize("derivatives", [JetDerivatives, MpmathDerivatives
 def local_by(derivatives, program, x):
     sampler = toy.Sampler(program.model, {**program.parameters, **x})
     active = active_set(program, sampler)
-    found = derivatives(program, x, sampler, active.rows)
-    return Local(program, x, sampler, active, found, found.gradients())
+    result = derivatives(program, x, sampler, active.rows)
+    return Local(program, x, sampler, active, result, result.gradients())
 
 
 # Third derivatives --------------------------------------------------------------------------------------------------
@@ -31,12 +31,12 @@ def local_by(derivatives, program, x):
 def test_third_derivatives_of_polynomials(derivatives):
     """x² y along x, then x and y; scales 2 and 3 count."""
     program = toy.program("xy", {"f": lambda v: v["x"] ** 2 * v["y"] + v["y"] ** 5}, sizes={"x": 2.0, "y": 3.0})
-    found = local_by(derivatives, program, {"x": 0.3, "y": 0.4}).derivatives
-    thirds, errors = found.thirds(np.array([1.0, 0.0]), np.eye(2))
+    result = local_by(derivatives, program, {"x": 0.3, "y": 0.4}).derivatives
+    thirds, errors = result.thirds(np.array([1.0, 0.0]), np.eye(2))
     expected = np.array([[0.0, 2 * 4 * 3], [2 * 4 * 3, 0.0]])
     assert thirds[-1] == pytest.approx(expected, rel=1e-11, abs=1e-10)
     assert np.abs(thirds[-1] - expected).max() <= errors[-1] + 1e-15
-    along_y, _ = found.thirds(np.array([0.0, 1.0]), np.eye(2))
+    along_y, _ = result.thirds(np.array([0.0, 1.0]), np.eye(2))
     assert along_y[-1] == pytest.approx(np.array([[2 * 4 * 3, 0.0], [0.0, 60 * 0.4**2 * 27]]), rel=1e-11, abs=1e-9)
 
 
@@ -65,7 +65,7 @@ def test_third_derivatives_in_floats_are_those_of_40_digits_to_their_own_error(e
     job = registry.of(scene)
     program = job.program(scene, "balance")
     x = {v.name: value for v in program.variables for value in [program.starts[0][v.name]]}
-    quick, exact = (local_by(each, program, x).derivatives for each in (JetDerivatives, MpmathDerivatives))
+    quick, exact = (local_by(item, program, x).derivatives for item in (JetDerivatives, MpmathDerivatives))
     line, basis = np.eye(len(quick.names))[0], np.eye(len(quick.names))[:, 1:3]
     (one, error), (other, _) = quick.thirds(line, basis), exact.thirds(line, basis)
     assert np.abs(other).max() > 1.0
@@ -75,11 +75,11 @@ def test_third_derivatives_in_floats_are_those_of_40_digits_to_their_own_error(e
 # How a valley bends -------------------------------------------------------------------------------------------------
 
 
-def valley(pull, own, fourth=0.0, bend=1.0, higher=0.0):
+def valley(pull, values, fourth=0.0, bend=1.0, higher=0.0):
     """On a = b² + c b³, where f is least, g = own b² − p a + fourth b⁴."""
     rows = {
         "f": lambda v: bend * (v["a"] - v["b"] ** 2 - higher * v["b"] ** 3) ** 2,
-        "g": lambda v: own * v["b"] ** 2 - pull * v["a"] + fourth * v["b"] ** 4,
+        "g": lambda v: values * v["b"] ** 2 - pull * v["a"] + fourth * v["b"] ** 4,
     }
     return toy.program("ab", rows, objectives=("f", "g"))
 
@@ -93,9 +93,9 @@ def second(program, derivatives=JetDerivatives, **x):
 @pytest.mark.parametrize("bend", [1.0, 1e-2, 1e-4])
 def test_a_curvature_that_following_a_valley_cancels_is_none(derivatives, bend):
     """3 b² − 3 a is 0 all along a = b²: by differences of 3e-3 its sign was chance."""
-    found = second(valley(3.0, 3.0, bend=bend), derivatives, a=0.0, b=0.0)
-    assert (found.minimum, found.unique, found.higher) == (True, False, "holds")
-    assert found.error < 4e-9 / bend
+    result = second(valley(3.0, 3.0, bend=bend), derivatives, a=0.0, b=0.0)
+    assert (result.minimum, result.unique, result.higher) == (True, False, "holds")
+    assert result.error < 4e-9 / bend
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.4, 1.3])
@@ -115,30 +115,30 @@ def test_the_verdict_is_the_same_turned_and_in_other_units(turn, size):
         "g": lambda m, v: b(v) ** 2 + 1 - m.exp(a(v)),
     }
     program = toy.program("xy", formulas=formulas, objectives=("f", "g"), sizes={"x": size, "y": size})
-    found = certify(program, {"x": 0.0, "y": 0.0}, 1e-8)
-    assert (found.reasons, found.minimum, found.unique) == ((), True, False)
+    certificate = certify(program, {"x": 0.0, "y": 0.0}, 1e-8)
+    assert (certificate.reasons, certificate.minimum, certificate.unique) == ((), True, False)
 
 
 @pytest.mark.parametrize("less", [3e-7, 1e-5, 1e-3, 1.0])
 def test_a_true_saddle_along_a_valley_is_still_found(less):
     """g = −less b² along it: smaller than the differences erred by that decided before."""
-    found = certify(valley(3.0, 3.0 - less), {"a": 0.0, "b": 0.0}, 1e-8)
-    assert not found.minimum
-    assert any("saddle" in reason for reason in found.reasons)
+    certificate = certify(valley(3.0, 3.0 - less), {"a": 0.0, "b": 0.0}, 1e-8)
+    assert not certificate.minimum
+    assert any("saddle" in reason for reason in certificate.reasons)
 
 
 @pytest.mark.parametrize("more", [3e-7, 1e-5, 1e-3, 1.0])
 def test_a_level_that_rises_along_a_valley_has_a_single_design(more):
-    found = certify(valley(3.0, 3.0 + more), {"a": 0.0, "b": 0.0}, 1e-8)
-    assert (found.reasons, found.unique) == ((), True)
+    certificate = certify(valley(3.0, 3.0 + more), {"a": 0.0, "b": 0.0}, 1e-8)
+    assert (certificate.reasons, certificate.unique) == ((), True)
 
 
 @pytest.mark.parametrize(("fourth", "reasons"), [(1.0, ()), (0.0, ()), (-1.0, (SECOND_ORDER_OPEN,))])
 def test_higher_orders_are_read_along_the_valley(fourth, reasons):
     """g = fourth b⁴ there, while along the straight line b it is 3 b²."""
-    found = certify(valley(3.0, 3.0, fourth), {"a": 0.0, "b": 0.0}, 1e-8)
-    assert found.reasons == reasons
-    assert found.minimum
+    certificate = certify(valley(3.0, 3.0, fourth), {"a": 0.0, "b": 0.0}, 1e-8)
+    assert certificate.reasons == reasons
+    assert certificate.minimum
 
 
 def test_a_fall_of_third_order_along_the_valley_is_no_optimum():
@@ -156,8 +156,8 @@ def test_a_valley_bends_with_the_rows_that_bind(derivatives, pull, minimum):
         "q": lambda v: v["a"] ** 2 + v["b"] ** 2 + v["a"] * v["c"] - v["r"],
     }
     program = toy.program("abcr", rows, limits=(("q", 0, 0.0), ("r", 1, 1.0)), objectives=("f", "g"))
-    found = second(program, derivatives, a=0.0, b=1.0, c=0.0, r=1.0)
-    assert found.minimum == minimum
+    result = second(program, derivatives, a=0.0, b=1.0, c=0.0, r=1.0)
+    assert result.minimum == minimum
 
 
 @pytest.mark.parametrize(
@@ -186,9 +186,9 @@ def test_a_fall_within_a_valleys_error_is_doubted_only_if_it_grows_as_a_fall_doe
 def test_an_error_that_reaches_the_threshold_is_no_saddle():
     """Where f curves by 2e-6 only and the design is 1e-4 beside its least, nothing is known of g to 1e-7."""
     program = valley(3.0, 3.0 - 1e-5, bend=1e-6)
-    found = second(program, MpmathDerivatives, a=1e-4, b=0.0)
-    assert found.error > 1e-5
-    assert found.minimum
+    result = second(program, MpmathDerivatives, a=1e-4, b=0.0)
+    assert result.error > 1e-5
+    assert result.minimum
     assert second(program, MpmathDerivatives, a=0.0, b=0.0).minimum is False
     assert not certify_by(JetDerivatives, program, {"a": 1e-4, "b": 0.0}, 1e-8).clear
 
@@ -220,9 +220,9 @@ def test_a_common_scale_that_neither_level_sees_is_left_open(make):
     scene = make("beatup-light").update(LIGHT).with_effect("shaft_torsion")
     study = front.trade(scene, ("pulse_rms", "m4e"), None, points=3)
     program = study.solver.program(Subproblem(0, (None, None), 2))
-    found = certify(program, LEAST, 1e-8)
-    assert (found.reasons, found.minimum, found.unique) == ((), True, False)
-    assert found.by == "jets"
+    certificate = certify(program, LEAST, 1e-8)
+    assert (certificate.reasons, certificate.minimum, certificate.unique) == ((), True, False)
+    assert certificate.by == "jets"
 
 
 WIDE = {
@@ -252,5 +252,5 @@ def test_a_counterweight_of_which_only_its_inertia_counts_is_no_saddle(make):
     """Along m4e r4e² both levels are level, while either's straight line bends by 0.15: differences left −4e-5."""
     scene = make("beatup").update(WIDE).with_effect("shaft_torsion", "rod_inertia")
     study = front.trade(scene, ("pulse_rms", "peak_torque"), "pulse", points=3)
-    found = certify(study.solver.program(Subproblem(0, (None, None), 2)), TURNED, 1e-8)
-    assert (found.reasons, found.minimum, found.unique) == ((), True, False)
+    certificate = certify(study.solver.program(Subproblem(0, (None, None), 2)), TURNED, 1e-8)
+    assert (certificate.reasons, certificate.minimum, certificate.unique) == ((), True, False)

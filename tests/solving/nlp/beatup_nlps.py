@@ -25,7 +25,7 @@ def put(program, elastic=False):
     x = {variable.name: DESIGN[variable.name] for variable in program.variables}
     sampler = sampler_at(program, x)
     calls = Calls(program, Settings(), Elastic() if elastic else None)
-    nodes = [found[:2] for found in calls.peaks(sampler)]
+    nodes = [peak[:2] for peak in calls.peaks(sampler)]
     nlp, _ = transcribe(program, sampler, 6, elastic)
     nlp.solver(False, Settings())
     extra = calls.first_extra(nlp, sampler)

@@ -26,12 +26,12 @@ HALF = 0.1, 3.3
 
 def heights(maths: Maths, values: Values, bend: float) -> dict[str, Number]:
     """Return h of every step, which follows from the one before: h' = h/2 + bend h² + x."""
-    found: dict[str, Number] = {}
+    results: dict[str, Number] = {}
     before = maths.number(0.0)
-    for name, own in zip(HEIGHTS, NAMES, strict=True):
-        found[name] = before / 2 + bend * before**2 + values[own]
-        before = values.get(name, found[name])
-    return found
+    for name, parameters in zip(HEIGHTS, NAMES, strict=True):
+        results[name] = before / 2 + bend * before**2 + values[parameters]
+        before = values.get(name, results[name])
+    return results
 
 
 @dataclass(frozen=True)

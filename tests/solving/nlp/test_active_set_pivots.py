@@ -46,11 +46,11 @@ def test_an_answer_is_its_own_neighbour():
 @pytest.mark.parametrize("least", [1.9, 2.05, 2.15])
 def test_nodes_move_with_their_extremes(least):
     near, task = solved(program([("y", -1, 2.0)], PEAK)), program([("y", -1, least)], PEAK)
-    found = followed(task, near)
-    assert found.x == pytest.approx({"x": (10 - 2 * least) / 6, "y": least}, abs=1e-9)
-    assert found.x == pytest.approx(solved(task).x, abs=1e-9)
-    sampler = Sampler(task.model, found.x)
-    for family, nodes in zip(("circle", "shifted"), found.binding, strict=True):
+    result = followed(task, near)
+    assert result.x == pytest.approx({"x": (10 - 2 * least) / 6, "y": least}, abs=1e-9)
+    assert result.x == pytest.approx(solved(task).x, abs=1e-9)
+    sampler = Sampler(task.model, result.x)
+    for family, nodes in zip(("circle", "shifted"), result.binding, strict=True):
         assert nodes
         for node in nodes:
             assert node.u == pytest.approx(min((e.u for e in sampler.extremes(family)), key=lambda u: abs(u - node.u)))
@@ -59,12 +59,12 @@ def test_nodes_move_with_their_extremes(least):
 
 def test_limits_may_come_to_bind_and_let_go_on_the_way():
     """The least of |(x, y)| and |(x − 3, y − 1)| is at (1.5, 0.5) until a limit on x + y stands in the way."""
-    free, held = program([("sum", -1, 1.95)], PEAK), program([("sum", -1, 2.1)], PEAK)
-    one, other = solved(free), solved(held)
-    assert one.x == pytest.approx({"x": 1.5, "y": 0.5}, abs=1e-4)
-    for task, near, far in ((held, one, other), (free, other, one)):
-        found = followed(task, near)
-        assert found is None or found.x == pytest.approx(far.x, abs=1e-4)
+    free, fixed = program([("sum", -1, 1.95)], PEAK), program([("sum", -1, 2.1)], PEAK)
+    first, other = solved(free), solved(fixed)
+    assert first.x == pytest.approx({"x": 1.5, "y": 0.5}, abs=1e-4)
+    for task, near, far in ((fixed, first, other), (free, other, first)):
+        result = followed(task, near)
+        assert result is None or result.x == pytest.approx(far.x, abs=1e-4)
 
 
 def test_what_lies_too_far_is_not_followed():
@@ -195,7 +195,7 @@ def test_multipliers_of_bounds_keep_their_signs():
         return replace(task, variables=(task.variables[0], task.variables[1]._replace(lower=least)))
 
     near, cold = solved(bounded(2.0)), solved(bounded(2.1))
-    found = followed(bounded(2.1), near)
-    assert found.x == pytest.approx(cold.x, abs=1e-9)
-    assert found.multipliers.lam_x == pytest.approx(cold.multipliers.lam_x, abs=1e-6)
-    assert found.multipliers.lam_x[1] < -0.1
+    result = followed(bounded(2.1), near)
+    assert result.x == pytest.approx(cold.x, abs=1e-9)
+    assert result.multipliers.lam_x == pytest.approx(cold.multipliers.lam_x, abs=1e-6)
+    assert result.multipliers.lam_x[1] < -0.1

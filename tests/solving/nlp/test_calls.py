@@ -155,12 +155,12 @@ def test_a_solve_that_falls_at_an_earlier_level_is_not_beaten_by_what_the_next_o
 
 def test_nodes_known_to_bind_come_after_a_starts_own():
     task = program([("sum", 1, -5.0), ("wave", 1, 1.0)])
-    known, own = Extreme(0, 0.9, 2.0), [Extreme(0, k / 10, 9.0 - k) for k in range(8)]
+    known, values = Extreme(0, 0.9, 2.0), [Extreme(0, k / 10, 9.0 - k) for k in range(8)]
     calls = Calls(task, Settings(), known=Known(((known,),)))
-    first = calls.first_nodes([own])
-    assert first == (tuple(own[: calls.leading]),), "the first round's are its own"
+    first = calls.first_nodes([values])
+    assert first == (tuple(values[: calls.leading]),), "the first round's are its own"
     assert calls.with_known(first) == ((*first[0], known),)
-    assert calls.with_known([own]) == (tuple(own),), "no more than there is room for"
+    assert calls.with_known([values]) == (tuple(values),), "no more than there is room for"
     assert Calls(task, Settings()).with_known(first) == first
 
 
@@ -181,10 +181,10 @@ def test_more_equalities_than_free_variables_leave_nothing_to_solve():
     for limits, over in (([("sum", 0, 1.0), ("apart", 0, 0.0)], False), ([("x", 0, 1.0)] * 3, True)):
         calls, _, arguments, _ = put(program(limits))
         assert calls.is_overdetermined(arguments) is over
-    held = replace(
+    fixed = replace(
         program([("sum", 0, 1.0)]), variables=(Variable("x", 1, 1, 1, (1, 1)), Variable("y", 1, 1, 1, (1, 1)))
     )
-    calls, _, arguments, _ = put(held)
+    calls, _, arguments, _ = put(fixed)
     assert calls.is_overdetermined(arguments) is True
 
 

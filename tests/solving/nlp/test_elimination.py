@@ -45,7 +45,7 @@ def test_rows_and_derivatives_are_those_without_lifted_variables(bend, elastic):
     mine, others = shared(nlp), shared(plain)
     assert rows[mine] == pytest.approx(np.asarray(expected).ravel()[others], rel=1e-14, abs=1e-14)
     assert slopes[mine] == pytest.approx(np.asarray(wanted)[others], rel=1e-13, abs=1e-13)
-    (value, slope), (least, steepest) = (each.gradient(a["x0"], a["p"]) for each, a in ((nlp, ours), (plain, theirs)))
+    (value, slope), (least, steepest) = (item.gradient(a["x0"], a["p"]) for item, a in ((nlp, ours), (plain, theirs)))
     assert value == pytest.approx(float(least), rel=1e-14)
     assert slope == pytest.approx(np.asarray(steepest).ravel(), rel=1e-13, abs=1e-13)
     prices, other = np.zeros(nlp.rows.size), np.zeros(plain.rows.size)
@@ -102,19 +102,19 @@ def test_a_warm_start_has_the_multipliers_of_what_is_lifted():
     """They follow from those of the rows; from the answer itself IPOPT has nothing to do."""
     _, nlp, arguments, _ = put(True, 0.05)
     solver = nlp.solver(False, Settings())
-    said = solver(**arguments)
+    message = solver(**arguments)
     assert solver.stats()["success"]
     warm = nlp.solver(True, Settings())
-    again = warm(**{**arguments, "x0": said["x"], "lam_x0": said["lam_x"], "lam_g0": said["lam_g"]})
+    again = warm(**{**arguments, "x0": message["x"], "lam_x0": message["lam_x"], "lam_g0": message["lam_g"]})
     assert warm.stats()["iter_count"] <= 2 < solver.stats()["iter_count"]
-    assert again["x"] == pytest.approx(said["x"], abs=1e-9)
-    full = np.concatenate([said["x"], nlp.jacobian.__self__.start(said["x"], arguments["p"])])
+    assert again["x"] == pytest.approx(message["x"], abs=1e-9)
+    full = np.concatenate([message["x"], nlp.jacobian.__self__.start(message["x"], arguments["p"])])
     of = nlp.jacobian.__self__
-    prices = np.concatenate([said["lam_g"], of.prices(said["x"], arguments["p"], 1.0, said["lam_g"])])
+    prices = np.concatenate([message["lam_g"], of.prices(message["x"], arguments["p"], 1.0, message["lam_g"])])
     slopes = np.asarray(of.functions["jac_g"](full, arguments["p"])[1])
     slope = np.asarray(of.functions["grad_f"](full, arguments["p"])[1]).ravel()
     left = slope + prices @ slopes
-    left[: len(said["x"])] += said["lam_x"]
+    left[: len(message["x"])] += message["lam_x"]
     assert np.abs(left).max() < 1e-8
 
 

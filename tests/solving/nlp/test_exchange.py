@@ -298,18 +298,18 @@ def test_no_more_random_starts_are_drawn_than_are_worth_it(monkeypatch):
 
 
 def test_iterations_are_those_of_all_rounds(monkeypatch):
-    told: list[int] = []
+    texts: list[int] = []
 
     def counted(*arguments):
         answer = ipopt.run(*arguments)
-        told.append(answer.iterations)
+        texts.append(answer.iterations)
         return answer
 
     monkeypatch.setattr(exchange, "run", counted)
     task = program(limits=(("circle", 1, 1.0),))
     point = solved(task, polish=False)
-    assert len(told) > 2
-    assert point.iterations == sum(told)
+    assert len(texts) > 2
+    assert point.iterations == sum(texts)
 
 
 def test_an_elastic_solve_may_end_in_its_first_round_whatever_is_known():

@@ -24,14 +24,14 @@ def solved(built, **more):
 
 @pytest.fixture
 def runs(monkeypatch):
-    found = []
+    results = []
 
     def counted(calls, nlp, sampler, *more):
-        found.append(sampler.hints["hint"])
+        results.append(sampler.hints["hint"])
         return ipopt.run(calls, nlp, sampler, *more)
 
     monkeypatch.setattr(exchange, "run", counted)
-    return found
+    return results
 
 
 @pytest.mark.parametrize("start", [0.1, 1.0, 6.0])

@@ -104,7 +104,7 @@ def test_a_neighbour_s_answer_leads_where_a_cold_start_does():
 
 
 def test_the_rows_of_an_objective_are_part_of_the_structure():
-    one = program((), (objective("circle", "peak", ("shifted",)),))
-    other = replace(one, objectives=(objective("circle", "peak", ("wave",)),))
-    fewer = replace(one, objectives=(objective("circle", "peak"),))
-    assert len({one.structure, other.structure, fewer.structure}) == 3
+    second_program = program((), (objective("circle", "peak", ("shifted",)),))
+    other = replace(second_program, objectives=(objective("circle", "peak", ("wave",)),))
+    fewer = replace(second_program, objectives=(objective("circle", "peak"),))
+    assert len({second_program.structure, other.structure, fewer.structure}) == 3

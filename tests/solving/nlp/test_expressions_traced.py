@@ -23,12 +23,14 @@ def made(bend=0.05):
 
 def value(expression, symbols, lifts, place=None, number=0.0):
     """Return an expression at X, each lifted variable at what it is worth, and a place at a number."""
-    lifted = [each.symbol for each in lifts.variables]
-    (found,) = (
-        ca.substitute([expression], lifted, [each.formula for each in lifts.variables]) if lifted else [expression]
+    lifted = [variable.symbol for variable in lifts.variables]
+    (result,) = (
+        ca.substitute([expression], lifted, [variable.formula for variable in lifts.variables])
+        if lifted
+        else [expression]
     )
     read = ca.vertcat(*symbols.values()), ca.SX.sym("none") if place is None else place
-    return float(ca.Function("f", list(read), [found])([{**X, "raise": 1.25}[name] for name in symbols], number))
+    return float(ca.Function("f", list(read), [result])([{**X, "raise": 1.25}[name] for name in symbols], number))
 
 
 @pytest.mark.parametrize("name", ["wave", "swing"])
@@ -48,7 +50,7 @@ def test_a_formula_is_traced_once_and_reads_what_it_needs():
     quantities, symbols, _ = made()
     first = quantities.at("wave", 0.1, {"step": 0.0, "raised": 0.0})
     traced = quantities._traced["wave"]
-    assert {each.name() for each in ca.symvar(first)} == {"x0", "x1"}
+    assert {item.name() for item in ca.symvar(first)} == {"x0", "x1"}
     assert traced.numbers.numel() == 1, "raise; the heights are chosen"
     assert [choice.switch for choice in traced.choices] == ["step", "step"]
     quantities.at("wave", 0.2, {"step": 3.0, "raised": 1.0})

@@ -24,10 +24,10 @@ def made(count=FEW_CHOICES + 1):
 
 def at(made, value, place):
     """Return a value at x = (2, 3, 5), each lifted variable at what it is worth, and a place."""
-    symbols = [each.symbol for each in made.lifts.variables]
-    worth = [each.formula for each in made.lifts.variables]
-    (found,) = ca.substitute([ca.SX(value)], symbols, worth) if symbols else [ca.SX(value)]
-    return float(ca.Function("f", [made.x, made.place], [found])([2.0, 3.0, 5.0], place))
+    symbols = [variable.symbol for variable in made.lifts.variables]
+    worth = [variable.formula for variable in made.lifts.variables]
+    (result,) = ca.substitute([ca.SX(value)], symbols, worth) if symbols else [ca.SX(value)]
+    return float(ca.Function("f", [made.x, made.place], [result])([2.0, 3.0, 5.0], place))
 
 
 @pytest.mark.parametrize("count", [2, FEW_CHOICES, FEW_CHOICES + 1, 30])
@@ -57,7 +57,7 @@ def test_one_choice_is_one_variable_however_often_it_is_asked_for():
     assert identity(case.lifts.choose(case.place, Options(case.values))) == identity(first)
     other = case.lifts.choose(case.place, case.values[::-1])
     elsewhere = case.lifts.choose(ca.SX.sym("other"), case.values)
-    assert len({identity(each) for each in (first, other, elsewhere)}) == len(case.lifts.choices) == 3
+    assert len({identity(item) for item in (first, other, elsewhere)}) == len(case.lifts.choices) == 3
     assert case.lifts.choices[0].options is case.lifts.choices[2].options, "one column, whose slopes are taken once"
 
 
@@ -76,10 +76,10 @@ def built(lifted, **changes):
 
 def test_a_chain_is_lifted_value_by_value_each_from_those_before_it():
     written = built(lifted=True)
-    symbols = [each.symbol.name() for each in written.lifts.chained_values]
+    symbols = [chained_value.symbol.name() for chained_value in written.lifts.chained_values]
     assert symbols == list(HEIGHTS)
-    for k, each in enumerate(written.lifts.chained_values):
-        read = {symbol.name() for symbol in ca.symvar(each.formula)} & set(HEIGHTS)
+    for k, chained_value in enumerate(written.lifts.chained_values):
+        read = {symbol.name() for symbol in ca.symvar(chained_value.formula)} & set(HEIGHTS)
         assert read == ({HEIGHTS[k - 1]} if k else set())
     assert built(lifted=False).lifts.chained_values == []
 
@@ -90,13 +90,13 @@ def test_rows_read_a_few_variables():
     counts = read(written)
     assert len(counts) == 1 + COUNT + 2, "the row of h3, the stations, two slots"
     assert (max(counts), counts[-2:]) == (2, [2, 2])
-    assert [len(each.lifts.choices) for each in (written, plain)] == [4, 4], "two heights a slot"
+    assert [len(item.lifts.choices) for item in (written, plain)] == [4, 4], "two heights a slot"
     assert read(plain) == [4, 2, 2], "h3 hangs on x0 to x3"
 
 
 def read(written):
     """Return how many variables each row reads."""
-    variables = ca.vertcat(written.x, *(each.symbol for each in written.lifts.variables))
+    variables = ca.vertcat(written.x, *(variable.symbol for variable in written.lifts.variables))
     return np.diff(ca.jacobian(written.g, variables).sparsity().T.colind()).tolist()
 
 
@@ -105,8 +105,8 @@ def test_what_hangs_on_no_variable_is_no_chain():
     rise = Variable("raise", 1.0, 2.0, 1.0, (1, 2))
     task = replace(program(), variables=(rise,), parameters=dict.fromkeys(NAMES, 0.5))
     calls = Calls(task, Settings())
-    own = structure(task, calls.sampler({"raise": 1.5}), 2)
-    assert (own.chained_values, own.stations, own.station_rows) == ((), (), [[]])
-    assert expressions(own).lifts.variables == []
+    values = structure(task, calls.sampler({"raise": 1.5}), 2)
+    assert (values.chained_values, values.stations, values.station_rows) == ((), (), [[]])
+    assert expressions(values).lifts.variables == []
     assert (calls.slots, calls.leading) == (FIRST_SLOTS, LEADING)
     assert (Calls(program(), Settings()).slots, BESIDE_STATIONS) == (2, (2, 1))

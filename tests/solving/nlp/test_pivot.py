@@ -104,10 +104,10 @@ def bound(rows, upper=(), lower=()):
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_pivots_reach_the_optimum(case, nlp, arguments, first, expected):
-    found = pivot_to_kkt(nlp, arguments, first, farthest=5.0)
-    assert found.x == pytest.approx(expected, abs=1e-14)
-    assert found.lam_g.min(initial=0.0) >= -1e-9
-    assert np.all(np.where(found.active.at_lower, -1, 1) * found.lam_x >= -1e-9)
+    result = pivot_to_kkt(nlp, arguments, first, farthest=5.0)
+    assert result.x == pytest.approx(expected, abs=1e-14)
+    assert result.lam_g.min(initial=0.0) >= -1e-9
+    assert np.all(np.where(result.active.at_lower, -1, 1) * result.lam_x >= -1e-9)
 
 
 @pytest.mark.parametrize(
@@ -144,8 +144,8 @@ def equal(arguments, *places):
 def test_a_slope_a_hair_outside_the_others_is_one_of_its_own():
     """x = 1 and x + 1e-5 y ≤ 1 − 1e-6 meet at y = −0.1: nothing can give way, and nothing need."""
     nlp = programme([0, 0], 0, [[1, 0], [1, 1e-5]], [1, 1 - 1e-6])
-    found = pivot_to_kkt(nlp, equal(call([1, 0], rows=2), 0), bound([1, 0]), 5.0)
-    assert found.x == pytest.approx([1, -0.1], abs=1e-9)
+    result = pivot_to_kkt(nlp, equal(call([1, 0], rows=2), 0), bound([1, 0]), 5.0)
+    assert result.x == pytest.approx([1, -0.1], abs=1e-9)
 
 
 def test_a_slope_within_rounding_of_the_others_depends_on_them():
@@ -155,20 +155,20 @@ def test_a_slope_within_rounding_of_the_others_depends_on_them():
 
 def test_a_slight_curvature_says_how_far_to_slide():
     """1e-4 y²/2 − 1e-5 y is least at y = 0.1."""
-    found = pivot_to_kkt(
+    result = pivot_to_kkt(
         curved([0, -1e-5], [[1, 0], [0, 1e-4]], [[1, 0]], [0.0]), call([0, 0], rows=1), bound([1]), 5.0
     )
-    assert found.x == pytest.approx([0, 0.1], abs=1e-6)
+    assert result.x == pytest.approx([0, 0.1], abs=1e-6)
 
 
 def test_a_slight_curvature_says_how_far_a_limit_lets_go():
     nlp = curved([-1, -1e-5], [[0, 0], [0, 1e-4]], [[1, 0], [0, 1]], [1.0, 0.0])
-    found = pivot_to_kkt(nlp, call([1, 0], rows=2), bound([1, 1]), 5.0)
-    assert found.x == pytest.approx([1, 0], abs=1e-12), "it pulls upward: the limit holds"
+    result = pivot_to_kkt(nlp, call([1, 0], rows=2), bound([1, 1]), 5.0)
+    assert result.x == pytest.approx([1, 0], abs=1e-12), "it pulls upward: the limit holds"
     nlp = curved([-1, 1e-5], [[0, 0], [0, 1e-4]], [[1, 0], [0, 1]], [1.0, 0.0])
-    found = pivot_to_kkt(nlp, call([1, 0], rows=2), bound([1, 1]), 5.0)
-    assert found.x == pytest.approx([1, -0.1], abs=1e-6)
-    assert list(found.active.rows) == [True, False]
+    result = pivot_to_kkt(nlp, call([1, 0], rows=2), bound([1, 1]), 5.0)
+    assert result.x == pytest.approx([1, -0.1], abs=1e-6)
+    assert list(result.active.rows) == [True, False]
 
 
 @pytest.mark.parametrize("slope", [1e-8, -1e-8])
@@ -178,19 +178,19 @@ def test_no_curvature_says_nothing(slope):
 
 
 def test_a_slope_of_a_ten_millionth_is_followed_and_a_negative_multiplier_of_that_size_lets_go():
-    found = pivot_to_kkt(curved([0, -1e-7], np.eye(2), [[1, 0]], [0.0]), call([0, 0], rows=1), bound([1]), 5.0)
-    assert found.x == pytest.approx([0, 1e-7], abs=1e-13)
-    found = pivot_to_kkt(
+    result = pivot_to_kkt(curved([0, -1e-7], np.eye(2), [[1, 0]], [0.0]), call([0, 0], rows=1), bound([1]), 5.0)
+    assert result.x == pytest.approx([0, 1e-7], abs=1e-13)
+    result = pivot_to_kkt(
         curved([-1, 1e-7], np.eye(2), [[1, 0], [0, 1]], [0.5, 0.0]), call([0.5, 0], rows=2), bound([1, 1]), 5.0
     )
-    assert found.x == pytest.approx([0.5, -1e-7], abs=1e-13)
+    assert result.x == pytest.approx([0.5, -1e-7], abs=1e-13)
 
 
 def test_a_row_broken_by_a_ten_billionth_is_seen():
     nlp = programme([-2, -1], 0, [[1, 0], [0, 1], [1, 1]], [1, 1, 2 - 1e-10])
-    found = pivot_to_kkt(nlp, call([1, 1], rows=3), bound([1, 1, 0]), 5.0)
-    assert found.x == pytest.approx([1, 1 - 1e-10], abs=1e-14)
-    assert list(found.active.rows) == [True, False, True]
+    result = pivot_to_kkt(nlp, call([1, 1], rows=3), bound([1, 1, 0]), 5.0)
+    assert result.x == pytest.approx([1, 1 - 1e-10], abs=1e-14)
+    assert list(result.active.rows) == [True, False, True]
 
 
 def polygon(sides):
@@ -207,14 +207,14 @@ def test_corner_after_corner_is_taken_to_the_best(sides):
     flags = np.zeros(sides)
     flags[[lowest, (lowest + 1) % sides]] = 1
     start = np.linalg.solve(rows[flags == 1], np.ones(2))
-    found = pivot_to_kkt(nlp, call(start, rows=sides), bound(flags), 5.0)
+    result = pivot_to_kkt(nlp, call(start, rows=sides), bound(flags), 5.0)
     best = max(
         (np.linalg.solve(rows[[k, (k + 1) % sides]], np.ones(2)) for k in range(sides)), key=lambda x: x @ [1, 2]
     )
-    assert found.x == pytest.approx(best, abs=1e-12)
-    assert found.lam_g @ rows == pytest.approx([1, 2], abs=1e-12)
-    assert np.count_nonzero(found.lam_g) == 2
-    assert not found.lam_x.any()
+    assert result.x == pytest.approx(best, abs=1e-12)
+    assert result.lam_g @ rows == pytest.approx([1, 2], abs=1e-12)
+    assert np.count_nonzero(result.lam_g) == 2
+    assert not result.lam_x.any()
 
 
 def test_rows_may_curve_and_prices_are_those_of_the_meeting():
@@ -228,9 +228,9 @@ def test_rows_may_curve_and_prices_are_those_of_the_meeting():
         gradient=lambda x, p: (0.0, np.array([-1.0, -1.0])),
         curvature=lambda x, p, weight, prices: 2 * prices[0] * np.eye(2),
     )
-    found = pivot_to_kkt(nlp, call([0.7, 0.5], rows=2), bound([1, 1]), 5.0)
-    assert found.x == pytest.approx([0.8, 0.6], abs=1e-12)
-    assert found.lam_g == pytest.approx([1 / 1.6, 1 - 0.6 / 0.8], abs=1e-9)
+    result = pivot_to_kkt(nlp, call([0.7, 0.5], rows=2), bound([1, 1]), 5.0)
+    assert result.x == pytest.approx([0.8, 0.6], abs=1e-12)
+    assert result.lam_g == pytest.approx([1 / 1.6, 1 - 0.6 / 0.8], abs=1e-9)
     loose = pivot_to_kkt(nlp, call([0.7, 0.5], rows=2), bound([1, 0]), 5.0)
     assert loose.x == pytest.approx([0.8, 0.6], abs=1e-12)
 
@@ -239,11 +239,11 @@ def test_held_variables_stay_active_and_give_way_to_none():
     nlp = programme([-2, -1], 0, [[1, 1]], [1.5])
     arguments = call([1, 0.5], rows=1)
     arguments["lbx"][0] = arguments["ubx"][0] = 1.25
-    found = pivot_to_kkt(nlp, arguments, bound([1]), 5.0)
-    assert found.x == pytest.approx([1.25, 0.25], abs=1e-12)
-    assert list(map(list, found.active)) == [[True], [False, False], [True, False]]
-    assert found.lam_g == pytest.approx([1], abs=1e-12)
-    assert found.lam_x == pytest.approx([1, 0], abs=1e-12)
+    result = pivot_to_kkt(nlp, arguments, bound([1]), 5.0)
+    assert result.x == pytest.approx([1.25, 0.25], abs=1e-12)
+    assert list(map(list, result.active)) == [[True], [False, False], [True, False]]
+    assert result.lam_g == pytest.approx([1], abs=1e-12)
+    assert result.lam_x == pytest.approx([1, 0], abs=1e-12)
 
 
 def test_a_step_along_curvature_is_newton_s(monkeypatch):
@@ -254,8 +254,8 @@ def test_a_step_along_curvature_is_newton_s(monkeypatch):
     let_go = curved([-1, 1e-5], [[0, 0], [0, 1e-4]], [[1, 0], [0, 1]], [1.0, 0.0])
     assert pivot_to_kkt(let_go, call([1, 0], rows=2), bound([1, 1]), 5.0).x == pytest.approx([1, -0.1], abs=1e-9)
     first_in_the_way = programme([-2, -1], 0, [[1, 0], [0, 1], [-1, 0]], [0.3, 1, 0])
-    found = pivot_to_kkt(first_in_the_way, call([0, 1], rows=3), bound([0, 1, 1]), 5.0)
-    assert found.x == pytest.approx([0.3, 1], abs=1e-12)
+    result = pivot_to_kkt(first_in_the_way, call([0, 1], rows=3), bound([0, 1, 1]), 5.0)
+    assert result.x == pytest.approx([0.3, 1], abs=1e-12)
     stopped = programme([-1, -1], 2, [[1, -1], [1, 1]], [0.0, 0.6])
     assert pivot_to_kkt(stopped, call([0.1, 0.1], rows=2), bound([1, 0]), 5.0).x == pytest.approx([0.3, 0.3], abs=1e-12)
 
@@ -264,16 +264,16 @@ def test_the_limit_whose_multiplier_is_brought_to_zero_first_gives_way(monkeypat
     monkeypatch.setattr(active_set_pivots, "PIVOTS", 2)
     for prices, expected in (((0.9, 0.2), [1, 0.5]), ((0.2, 0.9), [0.5, 1])):
         nlp = programme([-price for price in prices], 0, [[1, 0], [0, 1], [1, 1]], [1, 1, 1.5])
-        found = pivot_to_kkt(nlp, call([1, 1], rows=3), bound([1, 1, 0]), 5.0)
-        assert found.x == pytest.approx(expected, abs=1e-12)
+        result = pivot_to_kkt(nlp, call([1, 1], rows=3), bound([1, 1, 0]), 5.0)
+        assert result.x == pytest.approx(expected, abs=1e-12)
 
 
 def test_the_objective_s_curvature_has_weight_1(monkeypatch):
     monkeypatch.setattr(active_set_pivots, "PIVOTS", 2)
     nlp = curved([-1, -1], 2 * np.eye(2), [[-1, 0]], [0.0])
     nlp.curvature = lambda x, p, weight, prices: 2 * weight * np.eye(2)
-    found = pivot_to_kkt(nlp, call([0.5, 0.1], rows=1), bound([0]), 5.0)
-    assert found.x == pytest.approx([0.5, 0.5], abs=1e-12)
+    result = pivot_to_kkt(nlp, call([0.5, 0.1], rows=1), bound([0]), 5.0)
+    assert result.x == pytest.approx([0.5, 0.5], abs=1e-12)
 
 
 @pytest.mark.slow

@@ -135,10 +135,10 @@ def test_newton_s_steps_meet_a_curved_row():
 
     arguments = bare() | {"lbg": np.zeros(1)}
     start = np.array([0.6, 0.8]) + 3e-7
-    met = holds(circle, arguments, start, lam_g=(1.0,))
-    assert met @ met == pytest.approx(1.0, abs=1e-15)
-    assert np.abs(met - start).max() < 1e-6
-    assert abs((met - start) @ np.array([0.8, -0.6])) < 1e-12, "the least change"
+    contact = holds(circle, arguments, start, lam_g=(1.0,))
+    assert contact @ contact == pytest.approx(1.0, abs=1e-15)
+    assert np.abs(contact - start).max() < 1e-6
+    assert abs((contact - start) @ np.array([0.8, -0.6])) < 1e-12, "the least change"
 
 
 def test_what_just_binds_is_met_though_ipopt_leaves_it_far_off():

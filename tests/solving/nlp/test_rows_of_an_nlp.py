@@ -117,14 +117,14 @@ def test_the_first_nodes_of_each_family_bind_and_of_other_rows_those_with_a_mult
     lam_g = np.zeros(rows.size)
     rows.limit_rows(lam_g)[:] = 0.0, 2e-6
     rows.node_rows(lam_g)[0] = 1.0
-    found = Multipliers(rows, np.array([2e-6, -2e-6, *[0.0] * rows.extras]), lam_g).binding(
+    result = Multipliers(rows, np.array([2e-6, -2e-6, *[0.0] * rows.extras]), lam_g).binding(
         row_map(PLAIN, 3), [0, 1, 2, 3]
     )
     grown = row_map(PLAIN, 3)
-    assert grown.limit_rows(found.rows).tolist() == [False, True]
-    assert grown.node_rows(found.rows).tolist() == grown.used_slots([0, 1, 2, 3]).tolist()
+    assert grown.limit_rows(result.rows).tolist() == [False, True]
+    assert grown.node_rows(result.rows).tolist() == grown.used_slots([0, 1, 2, 3]).tolist()
     assert grown.used_slots([0, 1, 2, 3]).sum(axis=1).tolist() == [0, 1, 2, 3]
-    assert (found.at_upper[0], found.at_lower[1], found.at_upper.sum(), found.at_lower.sum()) == (True, True, 1, 1)
+    assert (result.at_upper[0], result.at_lower[1], result.at_upper.sum(), result.at_lower.sum()) == (True, True, 1, 1)
 
 
 def test_multipliers_say_what_binds():

@@ -75,8 +75,8 @@ def test_signs_are_those_of_the_values_where_magnitudes_count(stood):
     assert at.signs(sampler, "wave").tolist() == [1.0] * COUNT, "signed"
     task = program()
     low = sampler_at(task, dict.fromkeys(task.starts[0], -0.5))
-    own = CycleStations(stations_of(low), low.cycle)
-    assert own.signs(low, "swing").tolist() == [-1.0] * COUNT
+    values = CycleStations(stations_of(low), low.cycle)
+    assert values.signs(low, "swing").tolist() == [-1.0] * COUNT
     assert CycleStations((), low.cycle).signs(low, "swing").tolist() == []
 
 
@@ -104,7 +104,7 @@ def test_nodes_are_for_what_no_station_holds():
     calls = Calls(task, Settings())
     sampler = calls.sampler(task.starts[0])
     (peaks,), (loose,) = (
-        found(sampler) for found in (calls.peaks, lambda s: calls.nodeless_extremes(s, calls.peaks(s)))
+        result(sampler) for result in (calls.peaks, lambda s: calls.nodeless_extremes(s, calls.peaks(s)))
     )
     corners = [e for e in peaks if e.u in (0.0, 1.0)]
     assert len(corners) > 5

@@ -22,11 +22,11 @@ def test_a_node_on_a_corner_keeps_its_side():
     node, cycle = nlp.structure.node, sampler.cycle
     pulse = int(np.flatnonzero(cycle.on(("resistance", 1.0)))[0])
     before = (pulse - 1) % cycle.pieces
-    one, other = node.write(cycle, before, 1.0), node.write(cycle, pulse, 0.0)
+    first, other = node.write(cycle, before, 1.0), node.write(cycle, pulse, 0.0)
     corners = np.mod([float(angle) for angle in sampler.model.corners(systems.FLOAT, sampler.given)], TURN)
-    angles = [node.read(row, corners).phi % TURN for row in (one, other)]
+    angles = [node.read(row, corners).phi % TURN for row in (first, other)]
     assert angles[0] == pytest.approx(angles[1], abs=1e-14)
-    assert [node.read(row, corners).switch["resistance"] for row in (one, other)] == [0.0, 1.0]
+    assert [node.read(row, corners).switch["resistance"] for row in (first, other)] == [0.0, 1.0]
 
 
 def turned(angle, corners):
@@ -135,9 +135,9 @@ def test_every_number_has_its_place():
 
 def test_structures_tell_what_differs():
     task, sampler = program((), (objective("circle", "peak"),)), Sampler(program().model, {"x": 1.0, "y": 0.5})
-    one = structure(task, sampler, 6)
-    assert structure(task, sampler, 6).key == one.key
-    assert len({one.key, structure(task, sampler, 12).key, structure(task, sampler, 6, elastic=True).key}) == 3
+    first = structure(task, sampler, 6)
+    assert structure(task, sampler, 6).key == first.key
+    assert len({first.key, structure(task, sampler, 12).key, structure(task, sampler, 6, elastic=True).key}) == 3
 
 
 def test_what_may_give_way_has_an_excess_and_a_row_of_its_own():

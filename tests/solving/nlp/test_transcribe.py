@@ -52,10 +52,10 @@ def test_a_buffered_function_is_the_function():
     g = ca.vertcat(x[0] * p[0], x[2] ** 2)
     for outputs in ([g, ca.jacobian(g, x)], [ca.triu(ca.hessian(g[1] * p[1], x)[0])], [ca.SX(2, 3)]):
         function = ca.Function("f", [x, p], outputs)
-        buffered, kept = Buffered(function), []
+        buffered, remaining = Buffered(function), []
         for seed in range(3):
             rng = np.random.default_rng(seed)
             given = rng.normal(size=3), rng.normal(size=2)
             wanted = function(*given) if len(outputs) > 1 else [function(*given)]
-            kept += [(np.array(want.full()), each) for want, each in zip(wanted, buffered(*given), strict=True)]
-        assert all(want.shape == each.shape and np.array_equal(want, each) for want, each in kept)
+            remaining += [(np.array(want.full()), item) for want, item in zip(wanted, buffered(*given), strict=True)]
+        assert all(want.shape == item.shape and np.array_equal(want, item) for want, item in remaining)

@@ -53,17 +53,17 @@ def quietly(text: str) -> None:
 def designs(program: Program, count: int, seed: int = 0):
     """Yield random designs (variables, SI) that keep every limit but for whole-cycle ones, with their samplers."""
     rng = np.random.default_rng(seed)
-    found = 0
-    while found < count:
+    result = 0
+    while result < count:
         shares = rng.random(len(program.variables))
         x = {v.name: v.range[0] + t * (v.range[1] - v.range[0]) for v, t in zip(program.variables, shares, strict=True)}
         if "s" in x:
             x["s"] = min(x["s"], max(limit.value for limit in program.limits if limit.name == "m4e") * x["r4e"] ** 2)
         try:
             sampler = Sampler(program.model, {**program.parameters, **x}, 180)
-            kept = all(limit.excess(sampler) <= 0 for limit in program.design_limits.values() if limit.sign)
+            remaining = all(limit.excess(sampler) <= 0 for limit in program.design_limits.values() if limit.sign)
         except (ArithmeticError, TypeError, ValueError):
             continue
-        if kept:
-            found += 1
+        if remaining:
+            result += 1
             yield x, sampler

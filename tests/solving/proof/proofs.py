@@ -39,7 +39,7 @@ def proofs_of(name, target=None):
 
 def found(proofs, limit):
     """Return the first proof of a limit: what it says itself comes before what it implies."""
-    return next(each for each in proofs.proofs if each.limit == limit)
+    return next(proof for proof in proofs.proofs if proof.limit == limit)
 
 
 def violated(proofs):

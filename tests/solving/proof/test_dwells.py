@@ -43,26 +43,26 @@ def cam(rise, far_dwell, back, begins):
     ids=str,
 )
 def test_dwells_of_any_length_are_proven(rise, far_dwell, back, begins):
-    found = lo.prove(cam(rise, far_dwell, back, begins))
-    assert {proof.limit: proof.status for proof in found.proofs if proof.status != "proven"} == {}
-    assert sum(proof.boxes for proof in found.proofs) < 4000
+    proofs = lo.prove(cam(rise, far_dwell, back, begins))
+    assert {proof.limit: proof.status for proof in proofs.proofs if proof.status != "proven"} == {}
+    assert sum(proof.boxes for proof in proofs.proofs) < 4000
 
 
 def test_what_is_left_open_says_from_where_and_after_how_many_boxes(monkeypatch):
     monkeypatch.setattr(taylor_bounds, "MOST_BOXES", 3)
-    found = lo.prove(four_bar())
-    open_ = [proof for proof in found.proofs if proof.status == "undecided"]
+    proofs = lo.prove(four_bar())
+    open_ = [proof for proof in proofs.proofs if proof.status == "undecided"]
     assert open_
     assert all(proof.open is not None and 0 <= proof.open < 2 * math.pi for proof in open_)
-    said = answers.proofs(found)[2]
-    assert re.fullmatch(r".* is left open from crank angle [\d.]+ deg on, after \d+ boxes\.", str(said))
+    message = answers.proofs(proofs)[2]
+    assert re.fullmatch(r".* is left open from crank angle [\d.]+ deg on, after \d+ boxes\.", str(message))
 
 
 def test_no_claim_gets_more_boxes_when_time_is_up(monkeypatch):
     monkeypatch.setattr(whole_cycle, "FIRST_BOXES", 5)
     monkeypatch.setattr(whole_cycle, "SECONDS", -1.0)
-    found = lo.prove(four_bar())
-    assert {proof.status for proof in found.proofs} == {"proven", "undecided"}
+    proofs = lo.prove(four_bar())
+    assert {proof.status for proof in proofs.proofs} == {"proven", "undecided"}
     monkeypatch.setattr(whole_cycle, "SECONDS", 1e9)
     begun = time.process_time()
     assert lo.prove(four_bar()).passed

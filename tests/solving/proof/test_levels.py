@@ -26,9 +26,9 @@ KNOWN = {
 
 
 def run(name, target, *changes, gap=1e-4):
-    found = solved(name, target, *changes)
+    solution = solved(name, target, *changes)
     began = time.process_time()
-    outcome = Levels(found.program, found.job, found.x, gap).run(FOREVER, quietly)
+    outcome = Levels(solution.program, solution.job, solution.x, gap).run(FOREVER, quietly)
     return outcome, time.process_time() - began
 
 
@@ -78,20 +78,20 @@ def test_other_targets_effects_bounds_and_jobs_are_proven_by_the_same_formulas(n
 
 
 def test_the_most_is_bounded_from_above():
-    found = solved("shedding", "speed", "bounds.speed.min=10 rpm", "bounds.speed.max=900 rpm")
-    (level,) = Levels(found.program, found.job, found.x, 1e-3).run(FOREVER, quietly).levels
+    solution = solved("shedding", "speed", "bounds.speed.min=10 rpm", "bounds.speed.max=900 rpm")
+    (level,) = Levels(solution.program, solution.job, solution.x, 1e-3).run(FOREVER, quietly).levels
     assert level.sense == "most"
-    assert level.best == pytest.approx(found.x["speed"], rel=1e-12)
+    assert level.best == pytest.approx(solution.x["speed"], rel=1e-12)
     assert level.bound == pytest.approx(level.best * (1 + 1e-3), rel=1e-12)
 
 
 def claimed(name, target, place, share):
     """Return the level of an answer whose objectives are said to be worse than they are by a share."""
-    found = solved(name, target)
-    task = reduced(found.program, monotone_slack(found.job, found.program), silent(found.program), {})
-    levels = Levels(found.program, found.job, found.x, 1e-6)
+    solution = solved(name, target)
+    task = reduced(solution.program, monotone_slack(solution.job, solution.program), silent(solution.program), {})
+    levels = Levels(solution.program, solution.job, solution.x, 1e-6)
     merits = [merit * (1 + share * (k == place)) for k, merit in enumerate(levels.merits)]
-    return _Level(task, found.x, merits, place, 1e-6)
+    return _Level(task, solution.x, merits, place, 1e-6)
 
 
 @pytest.mark.parametrize(
@@ -121,8 +121,8 @@ def test_a_much_worse_claim_turns_up_a_better_design():
 
 @pytest.mark.slow
 def test_a_timeout_has_a_true_gap_that_shrinks():
-    found = solved("beatup", "torque")
-    (level,) = Levels(found.program, found.job, found.x, 1e-5)._levels
+    solution = solved("beatup", "torque")
+    (level,) = Levels(solution.program, solution.job, solution.x, 1e-5)._levels
     gaps = [1.0]
     while gaps[-1] > 0.1:
         grown(level.tree, level.question)
@@ -153,8 +153,8 @@ def test_what_cannot_be_bounded_says_why():
         ("rapier", "stroke-dwell", "no global claim"),
         ("shedding", "speed", "speed is not bounded"),
     ):
-        found = solved(name, target)
-        outcome = Levels(found.program, found.job, found.x, 1e-3).run(FOREVER, quietly)
+        solution = solved(name, target)
+        outcome = Levels(solution.program, solution.job, solution.x, 1e-3).run(FOREVER, quietly)
         assert not outcome.proven
         assert word in outcome.why
         assert outcome.levels == ()
@@ -164,9 +164,9 @@ def test_what_cannot_be_bounded_says_why():
 def test_a_good_design_is_never_lost(target):
     """Whatever is better than a claim stays in some open box: here the optimum itself, under a claim 3 % worse."""
     name = "beatup-light" if target == "balance" else "beatup"
-    found, level = solved(name, target), claimed(name, target, 0, 0.03)
+    result, level = solved(name, target), claimed(name, target, 0, 0.03)
     level.question = replace(level.question, better=lambda middles: None)
-    at = level.task.place(found.x)
+    at = level.task.place(result.x)
     for _ in range(12):
         grown(level.tree, level.question)
         inside = (level.tree.low <= at[:, None] + 1e-15) & (at[:, None] - 1e-15 <= level.tree.high)
@@ -174,13 +174,13 @@ def test_a_good_design_is_never_lost(target):
 
 
 def test_a_formula_that_intervals_do_not_know_is_told(monkeypatch):
-    found = solved("beatup", "balance")
+    solution = solved("beatup", "balance")
 
     def unknown(self, power):
         raise TypeError("unsupported operand")
 
     monkeypatch.setattr(Enclosure, "__pow__", unknown)
-    outcome = Levels(found.program, found.job, found.x, 1e-3).run(FOREVER, quietly)
+    outcome = Levels(solution.program, solution.job, solution.x, 1e-3).run(FOREVER, quietly)
     assert not outcome.proven
     assert outcome.why == "a formula of this scene does not run in intervals"
 

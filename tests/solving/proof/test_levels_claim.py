@@ -26,11 +26,11 @@ def test_a_search_that_stands_elsewhere_is_led_to_the_optimum():
     here = narrow.best
     worse = replace(narrow, program=wide.program, candidates=(here,))
     assert worse.passed
-    found, bound = claimed(worse, GlobalProof(1e-3, 60.0))
+    result, bound = claimed(worse, GlobalProof(1e-3, 60.0))
     assert bound.proven
-    assert found.best is not None
-    assert found.best.objectives == pytest.approx(objectives(wide.program, wide.x), rel=1e-9)
-    assert found.best.objectives[0] < here.objectives[0] * (1 - 1e-3)
+    assert result.best is not None
+    assert result.best.objectives == pytest.approx(objectives(wide.program, wide.x), rel=1e-9)
+    assert result.best.objectives[0] < here.objectives[0] * (1 - 1e-3)
 
 
 def test_a_promising_box_is_tried_though_no_middle_of_one_is_admissible(monkeypatch):
@@ -40,18 +40,18 @@ def test_a_promising_box_is_tried_though_no_middle_of_one_is_admissible(monkeypa
     assert worse.search.best is not None
     here = replace(worse.search, program=wide.program, candidates=(worse.search.best,))
     monkeypatch.setattr(Levels, "run", lambda self, until, say: LevelOutcome(why="open", lowest=wide.x))
-    found, _ = claimed(here, GlobalProof(1e-3, 0.2))
-    assert found.best is not None
-    assert found.best.objectives[1] < here.best.objectives[1] - 1e-3
+    result, _ = claimed(here, GlobalProof(1e-3, 0.2))
+    assert result.best is not None
+    assert result.best.objectives[1] < here.best.objectives[1] - 1e-3
 
 
 def test_a_better_design_that_leads_to_no_certified_optimum_is_told():
-    found = solved("beatup", "balance")
-    better = LevelOutcome(better=found.x, why="a better design was found")
+    solution = solved("beatup", "balance")
+    better = LevelOutcome(better=solution.x, why="a better design was found")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Levels, "run", lambda self, until, say: better)
-        search, bound = claimed(found.search, GlobalProof())
-    assert search is found.search
+        search, bound = claimed(solution.search, GlobalProof())
+    assert search is solution.search
     assert not bound.proven
     assert "no certified optimum was reached" in bound.why
 
@@ -62,9 +62,9 @@ def test_time_that_is_up_leaves_the_gap_and_the_answer(monkeypatch):
     clock = SimpleNamespace(perf_counter=lambda: next(ticks))  # a machine that is busy elsewhere changes nothing
     monkeypatch.setattr("loomopt.solving.proof.levels.time", clock)
     monkeypatch.setattr("loomopt.solving.proof.reading.time", clock)
-    found = solved("beatup-light", "balance", "gravity")
-    said: list[str] = []
-    search, bound = claimed(found.search, GlobalProof(1e-5, 0.3, said.append))
+    solution = solved("beatup-light", "balance", "gravity")
+    texts: list[str] = []
+    search, bound = claimed(solution.search, GlobalProof(1e-5, 0.3, texts.append))
     assert search.best is not None
     assert not bound.proven
     assert bound.gap > 1e-5
@@ -72,30 +72,30 @@ def test_time_that_is_up_leaves_the_gap_and_the_answer(monkeypatch):
     assert bound.seconds < 5.0
     assert "M3_fdc is open, gap" in bound.why
     assert " s" in bound.why
-    assert any(text.startswith("proving M3_fdc") for text in said)
+    assert any(text.startswith("proving M3_fdc") for text in texts)
     assert bound.as_dict()["proven"] is False
 
 
 def test_nothing_is_claimed_without_a_certified_answer_or_where_it_is_refused():
-    found = solved("beatup", "balance")
-    empty = Search(found.job, found.program, Settings())
-    for search, refused, why in ((empty, "", "no certified answer"), (found.search, "sizes", "sizes")):
+    solution = solved("beatup", "balance")
+    empty = Search(solution.job, solution.program, Settings())
+    for search, refused, why in ((empty, "", "no certified answer"), (solution.search, "sizes", "sizes")):
         same, bound = claimed(search, GlobalProof(), refused)
         assert same is search
         assert why in bound.why
-        said = bound.as_dict()
-        assert (said["gap"], said["bound"], said["boxes"], said["band"]) == (None, {}, 0, {})
+        message = bound.as_dict()
+        assert (message["gap"], message["bound"], message["boxes"], message["band"]) == (None, {}, 0, {})
 
 
 @pytest.mark.slow
 def test_a_proof_says_all_that_scripts_read():
-    found = solved("beatup-light", "balance")
-    _, bound = claimed(found.search, GlobalProof(1e-3))
-    said = bound.as_dict()
-    assert set(said) == {"proven", "gap", "bound", "band", "boxes", "seconds", "why"}
-    assert said["proven"] is True
-    assert said["gap"] == 1e-3
-    assert said["bound"]["M3_fdc"] == pytest.approx(76.9041211, rel=1e-8)
-    assert said["bound"]["peak_torque"] == pytest.approx(82.33713853 * 0.999, rel=1e-8)
-    assert list(said["band"]) == ["M3_fdc"]
-    assert said["why"] is None
+    solution = solved("beatup-light", "balance")
+    _, bound = claimed(solution.search, GlobalProof(1e-3))
+    message = bound.as_dict()
+    assert set(message) == {"proven", "gap", "bound", "band", "boxes", "seconds", "why"}
+    assert message["proven"] is True
+    assert message["gap"] == 1e-3
+    assert message["bound"]["M3_fdc"] == pytest.approx(76.9041211, rel=1e-8)
+    assert message["bound"]["peak_torque"] == pytest.approx(82.33713853 * 0.999, rel=1e-8)
+    assert list(message["band"]) == ["M3_fdc"]
+    assert message["why"] is None

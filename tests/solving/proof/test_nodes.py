@@ -17,14 +17,14 @@ def own_layout(task, at):
 
 @pytest.mark.slow
 def test_the_worst_node_of_a_middle_is_close_to_its_true_peak():
-    found = solved("beatup", "balance", "bearing_friction")
-    task = found.task
-    for x, _ in designs(found.program, 20):
+    solution = solved("beatup", "balance", "bearing_friction")
+    task = solution.task
+    for x, _ in designs(solution.program, 20):
         at = task.place(x)
         layout = own_layout(task, at)
         spot = layout.worst(task, "peak_torque", at[:, None])
-        sampler = Sampler(found.program.model, task.values(at))
-        corners = found.program.model.corners(systems.FLOAT, sampler.given)
+        sampler = Sampler(solution.program.model, task.values(at))
+        corners = solution.program.model.corners(systems.FLOAT, sampler.given)
         angle = 2 * np.pi * spot.turns[0, 0] + sum(
             float(s[0, 0]) * c for s, c in zip(spot.shares, corners, strict=True)
         )
@@ -48,9 +48,9 @@ def test_middles_are_parted_by_the_order_of_their_corners():
 
 
 def test_an_order_is_certain_only_where_no_corner_can_pass_another():
-    found = solved("beatup", "balance")
-    task, model = found.task, found.program.model
-    at = task.place(found.x)
+    solution = solved("beatup", "balance")
+    task, model = solution.task, solution.program.model
+    at = task.place(solution.x)
     layout = own_layout(task, at)
     half = np.array([0.0, 1e-3, 3e-2])[None] * np.ones((4, 1)) * np.array([1.0, 1.0, 1.0, 0.0])[:, None]
     given = model.given(systems.boxes(), task.numbers(at[:, None] - half, at[:, None] + half))
@@ -59,9 +59,9 @@ def test_an_order_is_certain_only_where_no_corner_can_pass_another():
 
 
 def test_an_event_that_is_a_corner_is_where_it_always_is():
-    found = solved("beatup", "balance", "bearing_friction")
-    task, model = found.task, found.program.model
-    at = task.place(found.x)
+    solution = solved("beatup", "balance", "bearing_friction")
+    task, model = solution.task, solution.program.model
+    at = task.place(solution.x)
     layout = own_layout(task, at)
     given = model.given(systems.boxes(), task.numbers(at[:, None] - 1e-4, at[:, None] + 1e-4))
     corners = model.corners(systems.boxes(), given)

@@ -13,9 +13,9 @@ from loomopt.solving.proof.reading import LIMIT, LateError, Reader
     "given", [("beatup", "balance"), ("beatup", "balance", "bearing_friction"), ("beatup", "retrofit")]
 )
 def test_rows_hold_what_designs_in_the_box_are_worth(given):
-    found = solved(*given)
-    task, program = found.task, found.program
-    reader = Reader(task, len(program.objectives), task.place(found.x))
+    solution = solved(*given)
+    task, program = solution.task, solution.program
+    reader = Reader(task, len(program.objectives), task.place(solution.x))
     rng, count = np.random.default_rng(2), 150
     half = 0.5 * task.sizes[:, None] * 10.0 ** rng.uniform(-9, -0.5, (1, count))
     middle = task.low[:, None] + half + rng.random((len(task.low), count)) * (task.sizes[:, None] - 2 * half)
@@ -30,23 +30,23 @@ def test_rows_hold_what_designs_in_the_box_are_worth(given):
             continue
         merits = [objective.merit(sampler) / objective.scale for objective in program.objectives]
         for level, merit in enumerate(merits):
-            own = [row for row, of in enumerate(read.of) if of == level]
+            values = [row for row, of in enumerate(read.of) if of == level]
             # No piece exceeds the objective, by its values and by its slopes.
             slopes = np.minimum(
-                read.slope.low[:, own, k] * steps[:, None, k], read.slope.high[:, own, k] * steps[:, None, k]
+                read.slope.low[:, values, k] * steps[:, None, k], read.slope.high[:, values, k] * steps[:, None, k]
             )
             with np.errstate(invalid="ignore"):
-                lines = read.middle.low[own, k] + np.where(np.isnan(slopes), -np.inf, slopes).sum(axis=0)
-            assert np.all(read.value.low[own, k] <= merit * (1 + 1e-9) + 1e-12)
+                lines = read.middle.low[values, k] + np.where(np.isnan(slopes), -np.inf, slopes).sum(axis=0)
+            assert np.all(read.value.low[values, k] <= merit * (1 + 1e-9) + 1e-12)
             assert np.all(lines <= merit * (1 + 1e-9) + 1e-12)
             seen += bool(np.isfinite(lines).any())
     assert seen > 50
 
 
 def test_rows_that_depend_on_corners_are_open_where_their_order_is_not_sure():
-    found = solved("beatup", "balance")
-    task = found.task
-    reader = Reader(task, 2, task.place(found.x))
+    solution = solved("beatup", "balance")
+    task = solution.task
+    reader = Reader(task, 2, task.place(solution.x))
     read = reader.read(task.low[:, None], task.high[:, None])
     of = np.array(read.of)
     assert np.all(np.isinf(read.value.low[of >= 0]))
@@ -56,17 +56,17 @@ def test_rows_that_depend_on_corners_are_open_where_their_order_is_not_sure():
 
 def test_boxes_read_in_parts_are_the_same_bits_and_the_clock_is_looked_at_between_parts(monkeypatch):
     """A mean over the cycle takes as many strips as all boxes of the read ask for, whatever part they stand in."""
-    found = solved("beatup", "pulse")
-    task = found.task
-    reader = Reader(task, 1, task.place(found.x))
+    solution = solved("beatup", "pulse")
+    task = solution.task
+    reader = Reader(task, 1, task.place(solution.x))
     half = 0.5 * task.sizes[:, None] * np.linspace(1e-4, 0.2, 20)
-    middle = np.clip(task.place(found.x)[:, None], task.low[:, None] + half, task.high[:, None] - half)
+    middle = np.clip(task.place(solution.x)[:, None], task.low[:, None] + half, task.high[:, None] - half)
     whole = reader.read(middle - half, middle + half)
     monkeypatch.setattr(reading, "AT_ONCE", 7)
     parts = reader.read(middle - half, middle + half)
-    for one, other in zip(whole[:3], parts[:3], strict=True):
-        assert one.low.tobytes() == other.low.tobytes()
-        assert one.high.tobytes() == other.high.tobytes()
+    for item, other in zip(whole[:3], parts[:3], strict=True):
+        assert item.low.tobytes() == other.low.tobytes()
+        assert item.high.tobytes() == other.high.tobytes()
     clock = iter([2.0, 3.0])
     monkeypatch.setattr("loomopt.solving.proof.reading.time.perf_counter", lambda: next(clock))
     with pytest.raises(LateError):
@@ -75,9 +75,9 @@ def test_boxes_read_in_parts_are_the_same_bits_and_the_clock_is_looked_at_betwee
 
 
 def test_a_middle_without_a_cycle_leaves_what_speaks_of_the_design_alone():
-    found = solved("beatup", "balance", "rod_inertia", "bounds.l1.max=160 mm", "bounds.l2.min=10 mm")
-    task = found.task
-    reader = Reader(task, 1, task.place(found.x))
+    solution = solved("beatup", "balance", "rod_inertia", "bounds.l1.max=160 mm", "bounds.l2.min=10 mm")
+    task = solution.task
+    reader = Reader(task, 1, task.place(solution.x))
     at = task.low.copy()
     at[list(task.names).index("l1")], at[list(task.names).index("l2")] = 0.155, 0.012
     read = reader.read(at[:, None], at[:, None])

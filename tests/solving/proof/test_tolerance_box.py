@@ -58,7 +58,7 @@ def test_a_peak_is_nowhere_less_than_the_least():
     box, machines = box_of("beatup", ("l1", "l2", "l3", "l4"), 1e-3)
     peaks = machines.peak("peak_torque")
     width, tops = np.ptp(peaks), box.sampler.extremes("peak_torque")
-    nodes = [(each.piece, each.u, each.sign) for each in sorted(tops, key=lambda each: -each.height)[:4]]
+    nodes = [(item.piece, item.u, item.sign) for item in sorted(tops, key=lambda item: -item.height)[:4]]
     least = Peak(box, "peak_torque", nodes)
     assert tolerance_box.at_most(least, -(peaks.min() - 0.02 * width)).proven
     assert not tolerance_box.at_most(least, -(peaks.min() + 1e-6 * width), 600).proven
@@ -94,7 +94,7 @@ def test_corners_that_may_change_places_leave_a_box_open():
     name = next(key for key in known if key.endswith("pulse"))
     with pytest.raises(OpenError, match="change places"):
         NumberBox(job.model(scene), known, {name: (0.5, 6.25)})
-    own = registry.load("beatup").with_effect("shaft_torsion")
-    model, known = job.model(own), job.numbers(own)
+    own_scene = registry.load("beatup").with_effect("shaft_torsion")
+    model, known = job.model(own_scene), job.numbers(own_scene)
     with pytest.raises(OpenError, match="shaft_torsion"):
         NumberBox(model, known, {"l1": (0.03, 0.031)})

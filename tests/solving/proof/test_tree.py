@@ -37,7 +37,7 @@ class Written:
         ends = [
             [np.broadcast_to(getattr(row.g, end), (2, 1, low.shape[1])) for row in whole] for end in ("low", "high")
         ]
-        value, slope = stacked([row.v for row in whole]), Interval(*(np.concatenate(each, axis=1) for each in ends))
+        value, slope = stacked([row.v for row in whole]), Interval(*(np.concatenate(item, axis=1) for item in ends))
         if self.wild:
             value = Interval(np.full_like(value.low, -np.inf), np.full_like(value.high, np.inf))
             slope = Interval(np.full_like(slope.low, -np.inf), np.full_like(slope.high, np.inf))
@@ -45,8 +45,8 @@ class Written:
 
 
 def question(cut, reader=None, better=lambda middles: None):
-    own: Any = reader or Written()
-    return Question(own, 0, cut, np.zeros(2), (), better)
+    values: Any = reader or Written()
+    return Question(values, 0, cut, np.zeros(2), (), better)
 
 
 def whole():
@@ -64,11 +64,11 @@ def test_what_is_true_is_proven():
 
 
 def test_what_is_not_true_is_not_and_the_best_design_stays_in_an_open_box():
-    tree, asked = whole(), question(2.0 + 1e-6)
+    tree, request = whole(), question(2.0 + 1e-6)
     for _ in range(60):
-        grown(tree, asked)
-        held = (tree.low[0] <= 1.0) & (tree.high[0] >= 1.0) & (tree.low[1] <= 0.0) & (tree.high[1] >= 0.0)
-        assert held.any() or tree.stuck <= 2.0
+        grown(tree, request)
+        fixed = (tree.low[0] <= 1.0) & (tree.high[0] >= 1.0) & (tree.low[1] <= 0.0) & (tree.high[1] >= 0.0)
+        assert fixed.any() or tree.stuck <= 2.0
     assert tree.bound <= 2.0
 
 
@@ -88,11 +88,11 @@ def test_a_better_middle_ends_the_search():
         shown.append(middles)
         return middles[:, 0] if middles.shape[1] else None
 
-    tree, found = whole(), None
-    while found is None:
-        found = grown(tree, question(3.0, better=better))
-    assert found[0] >= 1.0 - 1e-9
-    assert found[0] ** 2 + found[1] ** 2 + 1 <= 3.0
+    tree, result = whole(), None
+    while result is None:
+        result = grown(tree, question(3.0, better=better))
+    assert result[0] >= 1.0 - 1e-9
+    assert result[0] ** 2 + result[1] ** 2 + 1 <= 3.0
 
 
 def test_boxes_of_which_nothing_is_known_are_halved_and_never_discarded():
@@ -131,14 +131,14 @@ def test_boxes_whose_read_is_given_up_stay_open_and_do_not_count():
         def read(self, low, high, until=math.inf):
             raise LateError
 
-    tree, asked = whole(), question(2.0 - 1e-6)
+    tree, request = whole(), question(2.0 - 1e-6)
     for _ in range(5):
-        grown(tree, asked)
+        grown(tree, request)
     boxes, bound, left = tree.boxes, tree.bound, tree.low.shape[1]
     assert grown(tree, question(2.0 - 1e-6, Late()), until=0.0) is None
     assert (tree.boxes, tree.bound, tree.low.shape[1]) == (boxes, bound, left)
     while not tree.closed:
-        grown(tree, asked)
+        grown(tree, request)
     assert math.isinf(tree.stuck)
 
 

@@ -10,9 +10,9 @@ from loomopt.solving.proof.tree import multipliers, with_cut
 
 @pytest.mark.parametrize(("name", "level"), [("beatup-light", 0), ("beatup-light", 1), ("beatup", 1)])
 def test_the_lagrangian_is_flat_at_the_answer_in_all_directions_that_bounds_leave(name, level):
-    found = solved(name, "balance")
-    task = found.task
-    at = task.place(found.x)
+    solution = solved(name, "balance")
+    task = solution.task
+    at = task.place(solution.x)
     reader = Reader(task, level + 1, at)
     weights = multipliers(reader, at, level)
     of = np.array(reader.of)
@@ -29,9 +29,9 @@ def test_the_lagrangian_is_flat_at_the_answer_in_all_directions_that_bounds_leav
 
 
 def test_a_sum_of_rows_has_the_sum_of_their_bounds():
-    found = solved("beatup-light", "balance")
-    task = found.task
-    at = task.place(found.x)
+    solution = solved("beatup-light", "balance")
+    task = solution.task
+    at = task.place(solution.x)
     reader = Reader(task, 1, at)
     read = reader.read(at[:, None] - 1e-4, at[:, None] + 1e-4)
     weights = np.zeros(len(reader.of))

@@ -71,16 +71,16 @@ def test_every_packaged_answer_is_proven_and_no_entry_is_missing(name, target):
     assert all(proof.boxes > 0 and (proof.slack > 0 or proof.margin == 1.0) for proof in proofs.proofs)
     named = {proof.limit for proof in proofs.proofs}
     known = name if name in CLOSED else scene.job
-    wanted = {*scene.limits, *CLOSED[known], *(f"peak {each}" for each in CLAIMED[known])}
+    wanted = {*scene.limits, *CLOSED[known], *(f"peak {item}" for item in CLAIMED[known])}
     free = {"swing", "theta", "sley_mu_min"} if scene.job == "rapier" else set()
-    kept = KEPT.get(target, set()) if scene.job in JOBS else set()
-    assert named >= (wanted | kept) - free
+    remaining = KEPT.get(target, set()) if scene.job in JOBS else set()
+    assert named >= (wanted | remaining) - free
     if answer.status == "optimal":
         assert proofs.passed, violated(proofs)
         assert {(proof.status, proof.angle) for proof in proofs.proofs} == {("proven", None)}
     else:
         assert violated(proofs) == {"swing"}, "of the limits that clash, the one the best point gives up"
-        assert {each.name for each in answer.limits if not each.ok} >= {"swing"}
+        assert {item.name for item in answer.limits if not item.ok} >= {"swing"}
 
 
 @each_pair
@@ -100,7 +100,7 @@ def test_margins_are_those_of_the_refined_figures(name, target):
 
 def test_the_margin_of_the_counterweights_mass_is_a_mass():
     answer = solved("beatup")
-    proof = next(each for each in proofs_of("beatup").proofs if each.text == "m4e <= 12.4 kg")
+    proof = next(item for item in proofs_of("beatup").proofs if item.text == "m4e <= 12.4 kg")
     assert proof.margin == pytest.approx(12.4 - answer.design["m4e"])
 
 
@@ -132,12 +132,12 @@ def test_proofs_take_no_longer_than_the_solves_they_follow():
 def test_the_slack_is_a_share_of_each_quantitys_largest_magnitude(job):
     answer = solved(job)
     tight, loose = proofs_of(job).proofs, lo.prove(lo.load(job), answer.design, slack=1e-5).proofs
-    for one, other in zip(tight, loose, strict=True):
-        assert other.slack == pytest.approx(1e3 * one.slack)
-        assert other.boxes <= one.boxes
-        if one.name in CLAIMED[job] - {"mu_min", "curvature_min"}:
-            figure = one.name
-            assert one.slack == pytest.approx(SLACK * abs(answer.figures[figure]), rel=1e-3), "sampled"
+    for item, other in zip(tight, loose, strict=True):
+        assert other.slack == pytest.approx(1e3 * item.slack)
+        assert other.boxes <= item.boxes
+        if item.name in CLAIMED[job] - {"mu_min", "curvature_min"}:
+            figure = item.name
+            assert item.slack == pytest.approx(SLACK * abs(answer.figures[figure]), rel=1e-3), "sampled"
 
 
 @pytest.mark.parametrize("slack", [0.0, -1e-8, 1e-14, 0.2, math.inf, math.nan])
@@ -170,7 +170,7 @@ def test_solve_with_prove_says_that_the_cycle_is_proven_and_changes_nothing_else
 @pytest.mark.parametrize("speed", ["520 rpm", "640 rpm"])
 def test_margin_and_angle_are_of_the_same_place(speed):
     scene = lo.load("shedding").set("operation.speed", speed)
-    (proof,) = [each for each in lo.prove(scene).proofs if each.status == "violated"]
+    (proof,) = [item for item in lo.prove(scene).proofs if item.status == "violated"]
     curves = lo.simulate(scene)
     there = np.interp(proof.angle, curves["phi [rad]"], curves["N [N]"])
     assert proof.margin == pytest.approx(lo.evaluate(scene).figures["contact_min"], rel=1e-9)

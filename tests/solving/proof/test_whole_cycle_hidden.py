@@ -95,13 +95,13 @@ def test_a_design_is_judged_by_its_own_numbers_whether_the_target_chooses_them_o
     design = {**solved(job).design, number: value}
     assert limit not in violated(proofs_of(job))
     assert limit in violated(lo.prove(scene, design))
-    assert not all(each.ok for each in lo.evaluate(scene, design).limits)
+    assert not all(item.ok for item in lo.evaluate(scene, design).limits)
 
 
 @pytest.mark.slow
 def test_a_free_sleys_answer_is_proven_without_freeing_it_again():
     answer = lo.solve(lo.load("rapier").free(["sley"]), starts=1)
-    assert all(each.ok for each in lo.evaluate(lo.load("rapier"), answer.design).limits)
+    assert all(limit.ok for limit in lo.evaluate(lo.load("rapier"), answer.design).limits)
     assert lo.prove(lo.load("rapier"), answer.design).passed
 
 

@@ -36,19 +36,19 @@ class Seeds:
 
 def test_reductions_are_applied_in_order_and_inverted_in_reverse():
     calls: list[str] = []
-    found: Any = solve_reduced(TASK, [Seeds("outer", calls), Seeds("inner", calls)], SEED)
+    result: Any = solve_reduced(TASK, [Seeds("outer", calls), Seeds("inner", calls)], SEED)
     assert calls == ["apply outer", "apply inner", "invert inner of 1", "invert outer of 0"]
-    assert found == [[2]]
+    assert result == [[2]]
 
 
 def test_a_further_task_of_an_outer_reduction_passes_the_inner_ones():
-    found: Any = solve_reduced(TASK, [Seeds("outer", [], 2), Seeds("inner", [])], SEED)
-    assert found == [[1 + 1], [10 + 1], [20 + 1]]
+    result: Any = solve_reduced(TASK, [Seeds("outer", [], 2), Seeds("inner", [])], SEED)
+    assert result == [[1 + 1], [10 + 1], [20 + 1]]
 
 
 def test_a_task_without_reductions_is_solved_as_it_is():
-    found: Any = solve_reduced(TASK, [], SEED)
-    assert found == 0
+    result: Any = solve_reduced(TASK, [], SEED)
+    assert result == 0
 
 
 class Twice:
@@ -64,10 +64,12 @@ class Twice:
 
 def test_the_seconds_of_a_solve_are_those_of_all_its_tasks():
     reduction: Any = Twice()
-    found = engine.solve(TASK.scene, reductions=[reduction])
+    second_answer = engine.solve(TASK.scene, reductions=[reduction])
     for part in ("build_s", "solve_s", "certify_s"):
-        assert found.time[part] == pytest.approx(sum(answer.time[part] for answer in reduction.answers), rel=1e-12)
-    assert found.time["total_s"] >= sum(answer.time["total_s"] for answer in reduction.answers)
+        assert second_answer.time[part] == pytest.approx(
+            sum(answer.time[part] for answer in reduction.answers), rel=1e-12
+        )
+    assert second_answer.time["total_s"] >= sum(answer.time["total_s"] for answer in reduction.answers)
 
 
 def test_steps_of_a_step_are_reported_below_it():

@@ -30,48 +30,48 @@ def rounded(problem, steps, target=None, **changes):
     ],
 )
 def test_the_whole_lattice_of_links(step, points, reaching, links, peak):
-    found = rounded("beatup", {"l*": step})
-    assert (found.status, found.rounded.points, found.rounded.reaching) == ("optimal", points, reaching)
-    assert [1e3 * found.design[name] for name in ("l1", "l2", "l3", "l4")] == pytest.approx(links, abs=1e-12)
-    assert found.figures["peak_torque"] == pytest.approx(peak, abs=6e-10)
-    assert found.certificate.passed
-    assert found.rounded.boxes == 0
-    assert f"None of the {points} points of the lattice is better" in found.message
+    result = rounded("beatup", {"l*": step})
+    assert (result.status, result.rounded.points, result.rounded.reaching) == ("optimal", points, reaching)
+    assert [1e3 * result.design[name] for name in ("l1", "l2", "l3", "l4")] == pytest.approx(links, abs=1e-12)
+    assert result.figures["peak_torque"] == pytest.approx(peak, abs=6e-10)
+    assert result.certificate.passed
+    assert result.rounded.boxes == 0
+    assert f"None of the {points} points of the lattice is better" in result.message
     if step == "0.5 mm":
-        assert found.design["m4e"] == pytest.approx(6.34638663, abs=6e-9)
-        assert found.as_dict()["rounded"]["cost"]["peak_torque"] == pytest.approx(0.0277938762, abs=2e-9)
-    bound = next(each for each in found.limits if each.name == "l1")
+        assert result.design["m4e"] == pytest.approx(6.34638663, abs=6e-9)
+        assert result.as_dict()["rounded"]["cost"]["peak_torque"] == pytest.approx(0.0277938762, abs=2e-9)
+    bound = next(limit for limit in result.limits if limit.name == "l1")
     assert (bound.min, bound.max) == (0.03, 0.035)
 
 
 def test_boxes_of_sizes_find_what_solving_every_point_finds():
     scene = registry.load("beatup").update({"bounds.l2": {"min": "75 mm", "max": "77 mm"}})
-    found = engine.solve(scene, "pulse", reductions=[SizeRounding({"l2": "1 mm"})])
-    each = [engine.solve(scene.set("bounds.l2", f"{size} mm"), "pulse") for size in (75, 76, 77)]
-    best = min(each, key=lambda one: one.figures["pulse_rms"] if one.status == "optimal" else float("inf"))
-    assert found.rounded.boxes > 0
-    assert found.rounded.gap == 0.0
-    assert found.design["l2"] == best.design["l2"]
-    assert found.figures["pulse_rms"] == pytest.approx(best.figures["pulse_rms"], rel=1e-9)
+    answer = engine.solve(scene, "pulse", reductions=[SizeRounding({"l2": "1 mm"})])
+    items = [engine.solve(scene.set("bounds.l2", f"{size} mm"), "pulse") for size in (75, 76, 77)]
+    best = min(items, key=lambda first: first.figures["pulse_rms"] if first.status == "optimal" else float("inf"))
+    assert answer.rounded.boxes > 0
+    assert answer.rounded.gap == 0.0
+    assert answer.design["l2"] == best.design["l2"]
+    assert answer.figures["pulse_rms"] == pytest.approx(best.figures["pulse_rms"], rel=1e-9)
 
 
 def test_sizes_that_are_sold():
-    found = rounded("shedding", None, stock={"X0": ["30 mm", "70 mm"]})
-    assert found.design["X0"] == 0.07
+    result = rounded("shedding", None, stock={"X0": ["30 mm", "70 mm"]})
+    assert result.design["X0"] == 0.07
     alone = engine.solve(registry.load("shedding").set("bounds.X0", "70 mm"))
-    assert found.figures["K1"] == pytest.approx(alone.figures["K1"], rel=1e-9)
-    assert found.rounded.cost(found)["K1"] > 0.0
+    assert result.figures["K1"] == pytest.approx(alone.figures["K1"], rel=1e-9)
+    assert result.rounded.cost(result)["K1"] > 0.0
 
 
 def test_from_python_and_the_scene():
     scene = registry.load("beatup").update({"steps": dict.fromkeys(("l1", "l2", "l3", "l4"), "1 mm")})
-    found = lo.solve(scene, round_to=True)
-    assert found.figures["peak_torque"] == pytest.approx(88.795301023, abs=6e-10)
-    assert found.evaluate().admissible
+    answer = lo.solve(scene, round_to=True)
+    assert answer.figures["peak_torque"] == pytest.approx(88.795301023, abs=6e-10)
+    assert answer.evaluate().admissible
 
 
 @pytest.mark.parametrize(
-    ("steps", "said"),
+    ("steps", "message"),
     [
         ({"q": "1 mm"}, "q is not a free number"),
         ({"l1": "20 mm"}, "no size of l1 lies within its bounds"),
@@ -80,8 +80,8 @@ def test_from_python_and_the_scene():
         (True, "no sizes are given"),
     ],
 )
-def test_what_cannot_be_rounded_is_refused(steps, said):
-    with pytest.raises(BadInput, match=said):
+def test_what_cannot_be_rounded_is_refused(steps, message):
+    with pytest.raises(BadInput, match=message):
         lo.solve("beatup", round_to=steps)
 
 
@@ -97,10 +97,10 @@ def test_a_proof_of_all_designs_is_none_of_those_in_sizes():
 
 
 def test_a_lattice_without_an_admissible_point():
-    found = rounded("beatup", {"l1": "15 mm", "l2": "1 mm", "l3": "70 mm", "l4": "1 mm"})
-    assert found.status == "infeasible"
-    assert "keeps all limits" in found.message
-    assert "the design told is the optimum without sizes" in found.message
+    result = rounded("beatup", {"l1": "15 mm", "l2": "1 mm", "l3": "70 mm", "l4": "1 mm"})
+    assert result.status == "infeasible"
+    assert "keeps all limits" in result.message
+    assert "the design told is the optimum without sizes" in result.message
 
 
 @pytest.mark.slow
@@ -109,25 +109,25 @@ def test_sizes_that_leave_a_goal_out_of_reach_ask_for_a_band():
     steps = {"m4e": "2 kg", "r4e": "40 mm"}
     with pytest.raises(BadInput, match=r"no sizes meet M3_fdc exactly.*within.*\[accept\] M3_fdc = \""):
         rounded("beatup", steps, **links)
-    found = rounded("beatup", steps, **links, **{"accept.M3_fdc": "50 N*m"})
-    assert found.status == "optimal"
-    assert (found.design["m4e"], found.design["r4e"]) == (6.0, 0.08)
+    result = rounded("beatup", steps, **links, **{"accept.M3_fdc": "50 N*m"})
+    assert result.status == "optimal"
+    assert (result.design["m4e"], result.design["r4e"]) == (6.0, 0.08)
 
 
 def test_sizes_are_no_limits_and_the_file_agrees_with_its_design(tmp_path):
     links = {"bounds.l1": "30 mm", "bounds.l3": "149 mm", "bounds.l4": "167 mm"}
-    found = rounded("beatup", {"l2": "0.5 mm"}, **links)
-    assert "l2" not in {price.limit for price in found.binding}
-    assert "m4e, r4e chosen so that M3_fdc is least" in found.message
+    result = rounded("beatup", {"l2": "0.5 mm"}, **links)
+    assert "l2" not in {price.limit for price in result.binding}
+    assert "m4e, r4e chosen so that M3_fdc is least" in result.message
     path = tmp_path / "rounded.json"
-    path.write_text(json.dumps(found.as_dict()))
+    path.write_text(json.dumps(result.as_dict()))
     assert answer_file.read_answer(path).doubts == ()
 
 
 def test_without_a_limit_beside_the_sizes():
-    found = rounded("shedding", {"K1": "500 N/m", "X0": "10 mm"})
-    assert found.binding == ()
-    assert answers.binding(found) == "No limit binds except the sizes."
+    result = rounded("shedding", {"K1": "500 N/m", "X0": "10 mm"})
+    assert result.binding == ()
+    assert answers.binding(result) == "No limit binds except the sizes."
 
 
 def test_a_pattern_leaves_what_is_held():
@@ -140,17 +140,17 @@ def test_a_pattern_leaves_what_is_held():
 
 def test_progress_says_boxes_best_and_gap_through_every_solve():
     """A box's own solves never take the line: what is said names the box, what is best and how much better may be."""
-    said: list[str] = []
+    texts: list[str] = []
     scene = registry.load("beatup").update({"bounds.l1": "30 mm", "bounds.l4": "167 mm"})
-    lo.solve(scene, "pulse", round_to={"l2": "2 mm", "l3": "2 mm"}, on_step=said.append)
-    boxes = [line for line in said if line.startswith("box ")]
+    lo.solve(scene, "pulse", round_to={"l2": "2 mm", "l3": "2 mm"}, on_step=texts.append)
+    boxes = [line for line in texts if line.startswith("box ")]
     assert boxes
     assert all("of sizes, 600 at most; " in line for line in boxes)
     assert any("no sizes found yet" in line for line in boxes)
     assert any(re.search(r"; best pulse_rms [\d.]+ N\*m; gap pulse_rms [\d.e-]+ N\*m", line) for line in boxes)
-    first, last = said.index(boxes[0]), len(said) - said[::-1].index(boxes[-1])
-    assert said[first:last] == boxes
-    assert said[-1].startswith("solving with the best sizes")
+    first, last = texts.index(boxes[0]), len(texts) - texts[::-1].index(boxes[-1])
+    assert texts[first:last] == boxes
+    assert texts[-1].startswith("solving with the best sizes")
 
 
 def test_a_step_of_the_call_that_meets_a_stock_of_the_file_is_told_by_the_files_key():
@@ -161,9 +161,9 @@ def test_a_step_of_the_call_that_meets_a_stock_of_the_file_is_told_by_the_files_
 
 
 @pytest.mark.parametrize(
-    ("change", "told"), [({"bounds.l1": "31 mm"}, r"bounds\.l1"), ({"bounds.l4.free": False}, r"bounds\.l4")]
+    ("change", "report"), [({"bounds.l1": "31 mm"}, r"bounds\.l1"), ({"bounds.l4.free": False}, r"bounds\.l4")]
 )
-def test_a_step_of_the_call_is_told_by_keys_of_the_file(change, told):
-    with pytest.raises(BadInput, match=told) as caught:
+def test_a_step_of_the_call_is_told_by_keys_of_the_file(change, report):
+    with pytest.raises(BadInput, match=report) as caught:
         lo.solve(registry.load("beatup").update(change), round_to={"l1": "0.5 mm", "l4": "50 mm"})
     assert "steps." not in str(caught.value)

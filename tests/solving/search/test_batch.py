@@ -25,7 +25,7 @@ CLOSE = 0.02
 def task(job, target, effects):
     scene = registry.load(job)
     for effect in effects:
-        scene = scene.with_effect(effect) if effect not in [one.name for one in scene.active] else scene
+        scene = scene.with_effect(effect) if effect not in [item.name for item in scene.active] else scene
     program = registry.of(scene).program(scene, target)
     starts = exchange.starts(program, 6, 1)
     return program, Batch(program, sampler_at(program, starts[0])), starts
@@ -69,9 +69,9 @@ def test_jets_are_the_slopes_of_the_floats(job, target, effects):
         ends = [batch.values(moved).residuals for moved in (up, down)]
         for jet, high, low in zip(jets.residuals, *ends, strict=True):
             slope = (high - low) / (2 * step)
-            own = jet.g[:, column] if hasattr(jet, "g") else np.zeros(len(x))
+            values = jet.g[:, column] if hasattr(jet, "g") else np.zeros(len(x))
             # At a node that another overtakes a slope is that of neither side.
-            assert own == pytest.approx(slope, rel=1e-4, abs=1e-4 * max(1.0, np.abs(slope).max()))
+            assert values == pytest.approx(slope, rel=1e-4, abs=1e-4 * max(1.0, np.abs(slope).max()))
 
 
 def test_a_design_that_does_not_assemble_is_worst_and_spoils_no_other():

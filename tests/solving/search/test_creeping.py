@@ -88,10 +88,10 @@ def test_equal_peaks_that_move_along_a_flat_direction_end_in_a_certificate(level
     program = job.program(scene, "t")
     program = replace(program, objectives=program.objectives[:levels])
     start = job.values(program, {**job.today(scene), **NEAR})
-    found = certify_best(solve_from(Search(job, program, Settings(), job.start(program, scene)), start))
-    assert found.passed, found.best.certificate.reasons
-    assert found.best.x["l2"] == pytest.approx(0.5382228, abs=1e-7)
-    assert found.best.x["l3"] == pytest.approx(0.6334228, abs=1e-7)
+    search = certify_best(solve_from(Search(job, program, Settings(), job.start(program, scene)), start))
+    assert search.passed, search.best.certificate.reasons
+    assert search.best.x["l2"] == pytest.approx(0.5382228, abs=1e-7)
+    assert search.best.x["l3"] == pytest.approx(0.6334228, abs=1e-7)
 
 
 @pytest.mark.slow

@@ -24,7 +24,9 @@ def found(limits, sizes=None, waves=None):
 
 
 def told(answer):
-    return {(one.limit, one.side, one.alone): one.needed for one in answer.relaxations}
+    return {
+        (relaxation.limit, relaxation.side, relaxation.alone): relaxation.needed for relaxation in answer.relaxations
+    }
 
 
 def test_either_of_two_limits_that_clash_would_do_alone():
@@ -48,14 +50,16 @@ def test_the_least_sum_is_in_natural_sizes():
 def test_limits_that_must_give_way_together_are_not_alone():
     clashing = (("x", -1, 2.0), ("x", 1, 1.0), ("y", -1, 2.0), ("y", 1, 1.0))
     answer = found(clashing)
-    assert {one.alone for one in answer.relaxations} == {False}
-    assert sum(abs(one.needed - one.value) for one in answer.relaxations) == pytest.approx(2.0, rel=1e-7)
-    assert {one.limit for one in answer.relaxations} == {"x", "y"}
+    assert {relaxation.alone for relaxation in answer.relaxations} == {False}
+    assert sum(abs(relaxation.needed - relaxation.value) for relaxation in answer.relaxations) == pytest.approx(
+        2.0, rel=1e-7
+    )
+    assert {relaxation.limit for relaxation in answer.relaxations} == {"x", "y"}
 
 
 def test_an_equality_gives_way_to_the_side_that_helps():
     answer = found((("x", 0, 3.0), ("x", 1, 1.0)))
-    sides = {(one.side, one.value): one.needed for one in answer.relaxations}
+    sides = {(relaxation.side, relaxation.value): relaxation.needed for relaxation in answer.relaxations}
     assert sides["min", 3.0] == pytest.approx(1.0, rel=1e-7)
     assert sides["max", 1.0] == pytest.approx(3.0, rel=1e-7)
 

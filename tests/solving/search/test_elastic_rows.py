@@ -59,8 +59,8 @@ def test_rows_at_corners_are_priced_with_their_limit():
     for place, named in ((0, True), (21, True), (22, False), (43, False), (44, True), (45, True), (46, False)):
         prices = np.zeros(len(single) + 2 * 22 + 2 * 2)
         prices[len(single) + place] = 1.0
-        found = elastic._clashing_limits(made, point_of(made, prices), UnitFormatter(scene))
-        assert found == ({"N_min >= 100 N": "N_min"} if named else {}), place
+        result = elastic._clashing_limits(made, point_of(made, prices), UnitFormatter(scene))
+        assert result == ({"N_min >= 100 N": "N_min"} if named else {}), place
 
 
 def test_without_multipliers_nothing_has_a_price():

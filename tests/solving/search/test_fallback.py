@@ -18,21 +18,21 @@ BOUNDS = {"x": (-2.0, 2.0)}
 
 
 def search(today, start=1.5, limits=()):
-    own = toy.program("x", ROWS, limits=limits, start={"x": start}, bounds=BOUNDS)
-    return Search(toy.ToyJob(own), own, Settings(), {"x": today})
+    program = toy.program("x", ROWS, limits=limits, start={"x": start}, bounds=BOUNDS)
+    return Search(toy.ToyJob(program), program, Settings(), {"x": today})
 
 
 def test_a_certified_optimum_worse_than_todays_machine_is_left_for_the_one_that_today_leads_to():
-    found = multistart.run_search(search(-0.8), starts=1)
-    assert found.passed
-    assert found.best.x["x"] == pytest.approx(LEAST, abs=1e-8)
-    assert not found.substitute
+    result = multistart.run_search(search(-0.8), starts=1)
+    assert result.passed
+    assert result.best.x["x"] == pytest.approx(LEAST, abs=1e-8)
+    assert not result.substitute
 
 
 def test_a_machine_of_today_that_breaks_a_limit_counts_for_nothing():
-    found = multistart.run_search(search(-0.8, limits=(("g", 1, 0.5),)), starts=1)
-    assert found.passed
-    assert found.best.x["x"] == pytest.approx(SECOND, abs=1e-8)
+    result = multistart.run_search(search(-0.8, limits=(("g", 1, 0.5),)), starts=1)
+    assert result.passed
+    assert result.best.x["x"] == pytest.approx(SECOND, abs=1e-8)
 
 
 @pytest.fixture
@@ -51,8 +51,8 @@ def stuck(monkeypatch):
 @pytest.mark.parametrize("reached", [False, True])
 def test_where_no_solve_ends_in_anything_better_the_answer_is_todays_machine_not_certified(stuck, reached):
     stuck(reached, 1.9)
-    own = toy.program("x", ROWS, start={"x": -0.8}, bounds=BOUNDS)
-    answer = toy.solve(own, starts=1)
+    program = toy.program("x", ROWS, start={"x": -0.8}, bounds=BOUNDS)
+    answer = toy.solve(program, starts=1)
     assert answer.status == "uncertified"
     assert answer.design == {"x": -0.8}
     assert answer.message.startswith("No solve ended in a better design that is certified; this is the best admissible")
@@ -65,7 +65,7 @@ def test_a_best_that_breaks_a_limit_gives_way_to_the_best_admissible_design_of_a
     ends = [-1.1, 1.8, 1.2]
     points = [Point({"x": x}, "Solve_Succeeded", True) for x in ends]
     candidates = tuple(Candidate(p, (ROWS["f"](p.x),), ROWS["f"](p.x)) for p in points)
-    found = fallback.no_worse(replace(begun, candidates=candidates, best=candidates[0]))
-    assert found.best.x == {"x": 1.2}
-    assert found.substitute
-    assert not found.passed
+    result = fallback.no_worse(replace(begun, candidates=candidates, best=candidates[0]))
+    assert result.best.x == {"x": 1.2}
+    assert result.substitute
+    assert not result.passed

@@ -21,14 +21,14 @@ ROWS = {
 
 
 def program(*limits, objectives=("f",), waves=None, any_numbers=True):
-    own = toy.program(
+    own_program = toy.program(
         ("x", "y", "z"), ROWS, waves, (("product", -1, 4.0), *limits), objectives, start=TODAY, bounds=BOUNDS
     )
-    return replace(own, any_numbers=any_numbers)
+    return replace(own_program, any_numbers=any_numbers)
 
 
-def solved(own):
-    answer = toy.solve(own, starts=None)
+def solved(values):
+    answer = toy.solve(values, starts=None)
     assert answer.certificate.passed
     return answer.design, answer.certificate
 
@@ -54,49 +54,51 @@ def test_a_number_that_serves_no_level_ends_as_near_to_todays_as_limits_allow(li
     "limits", [(("room", 1, 0.25), ("reach", -1, 3.0)), (("sum", 0, 7.0),)], ids=["both ways", "an equality"]
 )
 def test_where_limits_ask_both_more_and_less_of_it_it_is_sought_as_any_other(limits):
-    own = program(*limits)
-    design, certificate = solved(own)
-    assert not any("serves no level" in said for said in certificate.tie_breaks)
+    own_program = program(*limits)
+    design, certificate = solved(own_program)
+    assert not any("serves no level" in tie_break for tie_break in certificate.tie_breaks)
     assert design["x"] + design["y"] == pytest.approx(4, abs=1e-8)
-    plain, _ = solved(replace(own, any_numbers=False))
+    plain, _ = solved(replace(own_program, any_numbers=False))
     assert design == plain
 
 
 def test_a_number_that_only_moves_where_a_wave_is_read_serves_no_level():
     """The wave's own variables do; one that nothing reads does not, though all nodes move alike."""
     waves = {"wave": lambda m, v, phi: v["x"] * (2 + m.sin(phi)) + v["y"]}
-    own = program(objectives=("peak wave",), waves=waves)
-    design, certificate = solved(own)
+    own_program = program(objectives=("peak wave",), waves=waves)
+    design, certificate = solved(own_program)
     assert design["z"] == pytest.approx(5, abs=1e-9)
-    assert any("serves no level" in said for said in certificate.tie_breaks)
+    assert any("serves no level" in tie_break for tie_break in certificate.tie_breaks)
 
 
 def test_a_program_whose_every_number_serves_stays_itself_and_so_does_one_of_a_jobs_own_numbers():
-    asked: list[object] = []
+    requests: list[object] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            inactive_variables, "fix_inactive", functools.partial(_noted, asked, inactive_variables.fix_inactive)
+            inactive_variables, "fix_inactive", functools.partial(_noted, requests, inactive_variables.fix_inactive)
         )
         solved(program(objectives=("sum",), any_numbers=True))
         solved(program(any_numbers=False))
-    assert asked == [None]
+    assert requests == [None]
 
 
-def _noted(asked, function, search, unread):
-    found = function(search, unread)
-    asked.append(found)
-    return found
+def _noted(request, function, search, unread):
+    result = function(search, unread)
+    request.append(result)
+    return result
 
 
 def test_a_wrong_guess_costs_a_second_search_and_no_answer():
     """Held at the end where the limits ask most, the target has no answer; the whole program has."""
-    own = program(("room", 1, 0.25))
+    own_program = program(("room", 1, 0.25))
 
     def worst(search, unread):
-        fixed = (v._replace(lower=9.0, upper=9.0, range=(9.0, 9.0)) if v.name == "z" else v for v in own.variables)
+        fixed = (
+            v._replace(lower=9.0, upper=9.0, range=(9.0, 9.0)) if v.name == "z" else v for v in own_program.variables
+        )
         return replace(search.program, variables=tuple(fixed))
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(inactive_variables, "fix_inactive", worst)
-        design, _ = solved(own)
+        design, _ = solved(own_program)
     assert design["x"] + design["y"] == pytest.approx(4, abs=1e-8)

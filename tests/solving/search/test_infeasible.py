@@ -76,7 +76,7 @@ def assert_just_enough(scene, target, relaxations):
 
 def together(answer):
     """Return the relaxations that are meant to be granted at once."""
-    return [one for one in answer.relaxation if not one.alone] or list(answer.relaxation[:1])
+    return [relaxation for relaxation in answer.relaxation if not relaxation.alone] or list(answer.relaxation[:1])
 
 
 @pytest.mark.few(4)
@@ -125,10 +125,10 @@ def test_each_limit_that_would_do_by_itself_does_and_no_less_of_it(answer_of, na
 @pytest.mark.few(2)
 def test_the_least_relaxation_helps_as_it_is_printed(answer_of, name):
     """Six digits are shown: they must be rounded to the side that helps."""
-    printed = [as_printed(one) for one in together(answer_of(name))]
+    printed = [as_printed(item) for item in together(answer_of(name))]
     scene, target = scene_of(name)
-    found = lo.solve(*granted(scene, target, printed))
-    assert found.status != "infeasible", [one.text for one in printed]
+    answer = lo.solve(*granted(scene, target, printed))
+    assert answer.status != "infeasible", [item.text for item in printed]
 
 
 def as_printed(relaxation):
@@ -152,7 +152,7 @@ def as_printed(relaxation):
 )
 def test_a_limit_not_named_as_enough_by_itself_is_not_enough(answer_of, changes):
     """Loosened without measure, each of the others alone leaves the light cloth's reed torque out of tolerance."""
-    assert {one.limit for one in answer_of("light, torque").relaxation if one.alone} == {"M3_fdc"}
+    assert {relaxation.limit for relaxation in answer_of("light, torque").relaxation if relaxation.alone} == {"M3_fdc"}
     assert lo.solve(lo.load("beatup-light").update(changes), "torque").status == "infeasible"
 
 
@@ -160,21 +160,21 @@ def test_one_limit_with_two_sides_that_clash_with_each_other_needs_both_or_one()
     """M3 >= 20 N·m in [limits] against the target's own |M3| <= 7.45 N·m: either may give way, alone and fully."""
     answer = lo.solve(lo.load("beatup").set("limits.M3_fdc.min", "20 N*m"), "torque")
     assert answer.status == "infeasible"
-    together = {one.side: one.needed for one in answer.relaxation if not one.alone}
+    together = {relaxation.side: relaxation.needed for relaxation in answer.relaxation if not relaxation.alone}
     if set(together) == {"min", "max"}:
         assert together["min"] <= together["max"] * (1 + 1e-6)
-    for one in (one for one in answer.relaxation if one.alone):
-        other = 7.45 if one.side == "min" else 20.0
-        assert one.needed == pytest.approx(other, rel=1e-6), "by itself it must meet the other side"
+    for relaxation in (relaxation for relaxation in answer.relaxation if relaxation.alone):
+        other = 7.45 if relaxation.side == "min" else 20.0
+        assert relaxation.needed == pytest.approx(other, rel=1e-6), "by itself it must meet the other side"
 
 
 def test_a_scene_with_nothing_to_choose_is_judged_as_it_stands():
     """Without bounds today's machine is the only design: its M3 of 10 N·m is beyond the tolerance of 7.45."""
     scene = lo.load("beatup")
     document = {name: value for name, value in scene.document.items() if name != "bounds"}
-    held = lo.scene(document)
-    assert lo.solve(held, "torque").status == "infeasible"
-    free = lo.solve(held.set("targets.torque.M3_tolerance", "11 N*m"), "torque")
+    second_scene = lo.scene(document)
+    assert lo.solve(second_scene, "torque").status == "infeasible"
+    free = lo.solve(second_scene.set("targets.torque.M3_tolerance", "11 N*m"), "torque")
     assert free.status == "optimal"
     assert free.design == pytest.approx({name: scene.mechanism[name] for name in DESIGN}, rel=1e-12)
 
@@ -192,12 +192,12 @@ def test_infeasible_is_said_where_balance_stays_beyond_the_tolerance():
 def test_advice_out_of_all_proportion_is_told_last_and_so_called():
     """A reed of 9000 N m is balanced by more mass or none: a counterweight of a bit more, or machines no one builds."""
     answer = lo.solve(lo.load("beatup").set("operation.M0", "9000 N*m"), target="torque")
-    fair = [each.in_proportion for remedy in remedies(answer.relaxation) for each in remedy]
-    by_itself = [each.in_proportion for each in answer.relaxation if each.alone]
+    fair = [item.in_proportion for remedy in remedies(answer.relaxation) for item in remedy]
+    by_itself = [item.in_proportion for item in answer.relaxation if item.alone]
     assert by_itself == sorted(by_itself, reverse=True)
     assert by_itself[0]
     assert not all(fair)
-    assert [each.text for remedy in remedies(answer.relaxation) for each in remedy] == [
+    assert [item.text for remedy in remedies(answer.relaxation) for item in remedy] == [
         r.text for r in answer.relaxation
     ]
     assert f"The least relaxation that helps: {answer.relaxation[0].text}." in answer.message
@@ -206,6 +206,6 @@ def test_advice_out_of_all_proportion_is_told_last_and_so_called():
 
 def test_a_least_force_that_must_go_ends_at_zero_newtons():
     answer = lo.solve(lo.load("shedding").update({"operation.N_min": "9000 N", "bounds.K1.max": "20 kN/m"}))
-    (force,) = [each for each in answer.relaxation if each.limit == "N_min"]
+    (force,) = [relaxation for relaxation in answer.relaxation if relaxation.limit == "N_min"]
     assert force.needed == 0.0
     assert "N_min >= 9000 N -> 0 N" in answer.message

@@ -42,8 +42,8 @@ def freed(**changes):
 
 def uneven():
     """Return it with a rise that is too short for today's speed and the weakest spring, and a long return."""
-    own = {"mechanism.rise": "100 deg", "mechanism.return": "140 deg", "operation.speed": "125 rpm"}
-    return freed().update(own)
+    values = {"mechanism.rise": "100 deg", "mechanism.return": "140 deg", "operation.speed": "125 rpm"}
+    return freed().update(values)
 
 
 def degrees(answer):
@@ -123,9 +123,9 @@ def test_nothing_is_solved_where_nothing_is_left(moves, monkeypatch):
 def test_a_design_that_has_changed_least_already_stays_to_the_last_bit_and_is_not_certified_again(monkeypatch):
     certified = []
 
-    def counted(*asked):
-        certified.append(asked)
-        return certify(*asked)
+    def counted(*request):
+        certified.append(request)
+        return certify(*request)
 
     monkeypatch.setattr(least_change, "certify", counted)
     program = toy.program("xy", {"f": lambda v: v["x"]}, bounds={"x": (1.0, 9.0)})
@@ -176,10 +176,10 @@ def test_designs_that_change_share_one_model():
 
 
 def test_only_moves_along_the_level_are_looked_at(monkeypatch):
-    asked: list[set[str]] = []
+    requests: list[set[str]] = []
 
     def counted(directions):
-        asked.extend(set(direction.way) for direction in directions)
+        requests.extend(set(direction.way) for direction in directions)
         return [0.0] * len(directions)
 
     monkeypatch.setattr(tie_break, "_changes_along", counted)
@@ -188,11 +188,11 @@ def test_only_moves_along_the_level_are_looked_at(monkeypatch):
     certificate = certify(program, {"x": 0.0, "y": 1.0, "z": 1.0}, 1e-8)
     ways = least_change.open_directions(program, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ())
     assert len(ways) == 1, "y and z together are no move"
-    assert asked == []
+    assert requests == []
     flat = toy.program("xyz", {"f": lambda v: v["x"] ** 2}, moves=tuple(axes))
     certificate = certify(flat, {"x": 0.0, "y": 1.0, "z": 1.0}, 1e-8)
     assert len(least_change.open_directions(flat, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ("y",))) == 0
-    assert asked == [{"z"}], "y stays whatever it changes"
+    assert requests == [{"z"}], "y stays whatever it changes"
 
 
 # Machines --------------------------------------------------------------------------------------------------------
@@ -238,20 +238,20 @@ def test_no_angles_nearer_to_todays_hold_as_weak_a_spring(unsettled):
 def test_a_law_that_need_not_change_is_todays_sampled_but_for_its_end():
     scene = lo.load("shedding").set("operation.speed", "100 rpm")
     answer = lo.solve(scene, "law", starts=1)
-    own = np.array(answer.design["law"])
+    values = np.array(answer.design["law"])
     todays = 2 * math.pi * np.sin(2 * math.pi * np.arange(17) / 16)
     assert answer.certificate.tie_breaks == (f"law: {LEAST}",)
     assert answer.figures["K1"] == pytest.approx(6176.1875, rel=1e-12)
-    assert own == pytest.approx(todays, abs=0.1)
+    assert values == pytest.approx(todays, abs=0.1)
     # The spline through today's values ends at rest but not at 1: of all that end there this one is nearest, and
     # heights are linear in the values.
     heights = np.array([[float(end) for end in spline(FLOAT, tuple(row)).end] for row in np.eye(17)])
     inner = np.abs(todays) < 2 * math.pi - 1e-9
     inner[[0, -1]] = False
-    missed = np.array([1.0, 0.0]) - own[~inner] @ heights[~inner]
+    missed = np.array([1.0, 0.0]) - values[~inner] @ heights[~inner]
     gap = missed - todays[inner] @ heights[inner]
     nearest = todays[inner] + np.linalg.pinv(heights[inner].T) @ gap
-    assert own[inner] == pytest.approx(nearest, abs=1e-8)
+    assert values[inner] == pytest.approx(nearest, abs=1e-8)
 
 
 def test_a_rapier_turns_back_toward_today_as_far_as_its_bounds_allow(unsettled):
@@ -263,14 +263,14 @@ def test_a_rapier_turns_back_toward_today_as_far_as_its_bounds_allow(unsettled):
 
     def turned(angle):
         C0 = complex(answer.design["C0x"], answer.design["C0y"]) * np.exp(1j * angle)
-        own = {"C0x": C0.real, "C0y": C0.imag, "alpha": answer.design["alpha"] + angle}
-        return own | {"phi40": answer.design["phi40"] + angle}
+        values = {"C0x": C0.real, "C0y": C0.imag, "alpha": answer.design["alpha"] + angle}
+        return values | {"phi40": answer.design["phi40"] + angle}
 
-    def far(own):
-        return sum(((own[n] - scene.mechanism[n]) / (scene.bounds[n].max - scene.bounds[n].min)) ** 2 for n in names)
+    def far(values):
+        return sum(((values[n] - scene.mechanism[n]) / (scene.bounds[n].max - scene.bounds[n].min)) ** 2 for n in names)
 
-    def inside(own):
-        return all(scene.bounds[n].min - 1e-9 <= own[n] <= scene.bounds[n].max + 1e-9 for n in names)
+    def inside(values):
+        return all(scene.bounds[n].min - 1e-9 <= values[n] <= scene.bounds[n].max + 1e-9 for n in names)
 
     reached = [far(turned(angle)) for angle in np.linspace(-0.08, 0.08, 1601) if inside(turned(angle))]
     assert far(answer.design) <= min(reached) + 1e-7
@@ -292,7 +292,7 @@ def test_no_earlier_objective_changes(scene, target, monkeypatch):
 
     def kept(search):
         after = with_least_change(search)
-        seen.append([objectives(search.program, each.best.x) for each in (search, after)])
+        seen.append([objectives(search.program, item.best.x) for item in (search, after)])
         return after
 
     monkeypatch.setattr(least_change, "with_least_change", kept)

@@ -36,10 +36,10 @@ def test_what_is_worth_less_than_a_thousandth_is_left_out_and_told():
     assert answer.certificate.passed
     assert [level.objective for level in answer.certificate.levels] == ["M3_fdc", "peak_torque", "m4e"]
     assert "m4e: least added mass, every figure held to 0.1 %" in answer.certificate.choices
-    told = answer.as_dict()["indifference"]
-    assert (told["added"], told["share"], told["chosen"]) == ("m4e", 1e-3, True)
-    assert told["design"]["m4e"] == pytest.approx(off.design["m4e"], rel=1e-6)
-    assert told["changes"]["M3_fdc"] == pytest.approx(off.figures["M3_fdc"] - answer.figures["M3_fdc"], rel=1e-6)
+    report = answer.as_dict()["indifference"]
+    assert (report["added"], report["share"], report["chosen"]) == ("m4e", 1e-3, True)
+    assert report["design"]["m4e"] == pytest.approx(off.design["m4e"], rel=1e-6)
+    assert report["changes"]["M3_fdc"] == pytest.approx(off.figures["M3_fdc"] - answer.figures["M3_fdc"], rel=1e-6)
     assert "No m4e, for it is worth less than 0.1 % of each figure" in answer.message
     assert "The m4e is worth less than 0.1 % of each figure; 0 kg:" in off.message
     assert off.as_dict()["indifference"]["chosen"] is False

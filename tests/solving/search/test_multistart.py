@@ -23,20 +23,20 @@ def test_more_starts_are_tried_where_none_is_certified(certified, solved):
     calls, points = solved
     answers["all"] = BAD
     points += [Point({"x": float(k), "y": 0.0}, "Solve_Succeeded", True) for k in range(MORE_STARTS)]
-    told = []
-    found = search_starts(empty(), 2, 0, (), lambda number, count: told.append((number, count)))
-    assert told == [(1, 2), (2, 2), *((k, 8) for k in range(3, 9))]
-    assert (len(calls), len(found.candidates)) == (8, 8)
+    texts = []
+    search = search_starts(empty(), 2, 0, (), lambda number, count: texts.append((number, count)))
+    assert texts == [(1, 2), (2, 2), *((k, 8) for k in range(3, 9))]
+    assert (len(calls), len(search.candidates)) == (8, 8)
     assert len({tuple(start.items()) for start, _, _ in calls}) == 8
 
 
 def test_one_certified_start_is_enough(certified, solved):
     calls, points = solved
     points.append(Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, build_seconds=0.25))
-    found = search_starts(empty(), 1, 0, (), None)
-    assert (len(calls), found.passed, found.build_seconds) == (1, True, 0.25)
-    assert found.solve_seconds >= 0.0
-    assert found.certify_seconds > 0.0
+    search = search_starts(empty(), 1, 0, (), None)
+    assert (len(calls), search.passed, search.build_seconds) == (1, True, 0.25)
+    assert search.solve_seconds >= 0.0
+    assert search.certify_seconds > 0.0
 
 
 def test_a_neighbour_leads_on_or_is_forgotten(certified, solved):
@@ -48,8 +48,8 @@ def test_a_neighbour_leads_on_or_is_forgotten(certified, solved):
     assert calls == [({"x": 7.0, "y": 1.0}, 1000.0, near)]
     answers[7.0] = BAD
     points += [near, Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True)]
-    found = search_starts(empty(), 1, 0, (near,), None)
-    assert (len(found.candidates), found.passed, found.best.x["x"]) == (2, True, 1.0)
+    search = search_starts(empty(), 1, 0, (near,), None)
+    assert (len(search.candidates), search.passed, search.best.x["x"]) == (2, True, 1.0)
 
 
 # Many designs -----------------------------------------------------------------------------------------------------
@@ -69,25 +69,25 @@ def wide(program, **more):
 
 
 def test_the_deeper_basin_is_found_and_what_was_done_is_counted():
-    found = wide(hills())
-    assert found.best.x["x"] < -1.9
-    assert found.screened == DESIGNS
-    assert len(found.candidates) >= 7, "its own start, four designs, and each variable at its far end"
-    one = search_starts(Search(toy.ToyJob(hills()), hills(), Settings()), 1, 0, (), None)
-    assert one.best.x["x"] > 1.8
-    assert (len(one.candidates), one.screened) == (1, 0)
+    result = wide(hills())
+    assert result.best.x["x"] < -1.9
+    assert result.screened == DESIGNS
+    assert len(result.candidates) >= 7, "its own start, four designs, and each variable at its far end"
+    search = search_starts(Search(toy.ToyJob(hills()), hills(), Settings()), 1, 0, (), None)
+    assert search.best.x["x"] > 1.8
+    assert (len(search.candidates), search.screened) == (1, 0)
 
 
 def test_where_one_optimum_is_all_there_is_no_designs_are_looked_at():
-    found = wide(hills(single="because"))
-    assert (len(found.candidates), found.screened) == (1, 0)
-    assert found.best.x["x"] > 1.8, "the programme's word is taken"
+    result = wide(hills(single="because"))
+    assert (len(result.candidates), result.screened) == (1, 0)
+    assert result.best.x["x"] > 1.8, "the programme's word is taken"
 
 
 def test_starts_that_cannot_be_better_are_left():
-    found = wide(hills())
-    left = [c.point for c in found.candidates if c.point.status == "Beaten"]
-    least = min(c.objectives[0] for c in found.usable)
+    result = wide(hills())
+    left = [c.point for c in result.candidates if c.point.status == "Beaten"]
+    least = min(c.objectives[0] for c in result.usable)
     assert left
     assert all(point.value > least - 2 * BETTER for point in left)
 
@@ -105,19 +105,19 @@ def test_starts_that_cannot_be_better_are_left():
 def test_nothing_more_is_solved_where_no_design_can_be_better(objectives, least, alone):
     rows = {"f": lambda v: (v["x"] - 1) * (v["y"] - 1) + least if least else v["x"]}
     limits = (("f", -1, least),) if least else ()
-    found = wide(toy.program("xy", rows, limits=limits, objectives=objectives, bounds={"x": (0, 3), "y": (0, 1)}))
-    assert found.passed
-    assert (len(found.candidates) == 1) == alone
-    assert found.best.objectives == pytest.approx((least,) * len(objectives), abs=1e-9)
+    result = wide(toy.program("xy", rows, limits=limits, objectives=objectives, bounds={"x": (0, 3), "y": (0, 1)}))
+    assert result.passed
+    assert (len(result.candidates) == 1) == alone
+    assert result.best.objectives == pytest.approx((least,) * len(objectives), abs=1e-9)
 
 
 def test_each_start_is_told_with_how_many_there_are():
-    told = []
+    texts = []
     program = hills()
-    search_starts(Search(toy.ToyJob(program), program, Settings()), None, 0, (), lambda k, of: told.append((k, of)))
-    assert [k for k, _ in told] == list(range(1, len(told) + 1))
-    assert told[-1][0] == told[-1][1]
-    assert [of for _, of in told] == sorted(of for _, of in told)
+    search_starts(Search(toy.ToyJob(program), program, Settings()), None, 0, (), lambda k, of: texts.append((k, of)))
+    assert [k for k, _ in texts] == list(range(1, len(texts) + 1))
+    assert texts[-1][0] == texts[-1][1]
+    assert [of for _, of in texts] == sorted(of for _, of in texts)
 
 
 def test_where_limits_clash_no_more_starts_are_tried(certified, solved):
@@ -127,10 +127,10 @@ def test_where_limits_clash_no_more_starts_are_tried(certified, solved):
     nearest = Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, relaxation={0: 1.0}, extra=np.ones(1))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(elastic, "least", lambda *_: nearest)
-        found = wide(program)
+        result = wide(program)
     assert len(calls) == 1
-    assert found.clashes
-    assert found.nearest is nearest
+    assert result.clashes
+    assert result.nearest is nearest
 
 
 def test_where_a_design_needs_no_relaxation_it_is_solved_from_there(certified, solved):
@@ -141,10 +141,10 @@ def test_where_a_design_needs_no_relaxation_it_is_solved_from_there(certified, s
     nearest = Point({"x": 2.5, "y": 0.0}, "Solve_Succeeded", True, extra=np.zeros(1))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(elastic, "least", lambda *_: nearest)
-        found = wide(program)
+        result = wide(program)
     assert calls[1][0] == {"x": 2.5, "y": 0.0}
-    assert found.passed
-    assert not found.clashes
+    assert result.passed
+    assert not result.clashes
 
 
 def test_a_neighbours_basin_is_kept_to_and_said():
@@ -196,12 +196,12 @@ def test_random_beat_ups_are_as_good_as_from_sixteen_random_starts(count):
     generator, seen = random.Random(3), 0
     for _ in range(30):
         scene = scene_of(generator)
-        found = lo.solve(scene)
-        if found.status != "optimal":
+        answer = lo.solve(scene)
+        if answer.status != "optimal":
             continue
         seen += 1
         others = lo.solve(scene, starts=16)
-        ours, theirs = ([abs(one.figures["M3_fdc"]), one.figures["peak_torque"]] for one in (found, others))
+        ours, theirs = ([abs(item.figures["M3_fdc"]), item.figures["peak_torque"]] for item in (answer, others))
         assert ours[0] <= theirs[0] + 1e-4
         assert ours[0] < theirs[0] - 1e-4 or ours[1] <= theirs[1] * (1 + 1e-6)
         if seen == count:
@@ -211,13 +211,13 @@ def test_random_beat_ups_are_as_good_as_from_sixteen_random_starts(count):
 
 def test_of_several_neighbours_the_better_basin_counts():
     """Both points lead on; whichever comes first, the deeper of two valleys is the answer."""
-    found = search_starts(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, (), None)
-    best = found.best.point
-    other = next(c.point for c in found.usable if abs(c.objectives[0] - found.best.objectives[0]) > 1e-3)
+    search = search_starts(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, (), None)
+    best = search.best.point
+    other = next(c.point for c in search.usable if abs(c.objectives[0] - search.best.objectives[0]) > 1e-3)
     for near in ((other, best), (best, other)):
         again = search_starts(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, near, None)
         assert again.stayed
-        assert again.best.objectives == pytest.approx(found.best.objectives)
+        assert again.best.objectives == pytest.approx(search.best.objectives)
 
 
 # Basins that agree too soon -------------------------------------------------------------------------------------------
@@ -273,16 +273,16 @@ def test_a_little_less_of_the_first_objective_counts_more_than_much_of_the_secon
     assert answer.status == "optimal", answer.message
     assert answer.figures["M3_fdc"] == pytest.approx(-407.819780383, abs=1e-6)
     # The other one has its own certificate: what decides is the order of the objectives alone.
-    beside = lo.solve(scene.update({"bounds.l3.max": "161.9 mm"}), "balance")
-    assert beside.figures["M3_fdc"] == pytest.approx(-407.829786578, abs=1e-6)
-    assert beside.figures["peak_torque"] < 0.99 * answer.figures["peak_torque"]
+    second_answer = lo.solve(scene.update({"bounds.l3.max": "161.9 mm"}), "balance")
+    assert second_answer.figures["M3_fdc"] == pytest.approx(-407.829786578, abs=1e-6)
+    assert second_answer.figures["peak_torque"] < 0.99 * answer.figures["peak_torque"]
 
 
 def test_a_flip_changes_one_variable_alone():
     program = hills()
     screening = multistart._screening(Search(toy.ToyJob(program), program, Settings()), program.starts)
     flipped = screening.flipped({"x": 3.0, "y": 0.5})
-    assert [(round(each["x"], 2), round(each["y"], 2)) for each in flipped] == [(-2.88, 0.5), (3.0, -0.96)]
+    assert [(round(item["x"], 2), round(item["y"], 2)) for item in flipped] == [(-2.88, 0.5), (3.0, -0.96)]
 
 
 # Starts that end in what is known -------------------------------------------------------------------------------------
@@ -293,12 +293,12 @@ TWINS = {"f": lambda v: (v["x"] ** 2 - 4) ** 2 / 16 + v["y"] ** 2}
 
 def test_other_designs_may_be_as_good_where_solves_ended_there_but_not_where_they_failed():
     program = toy.program("xy", TWINS, bounds={"x": (-3.0, 3.0), "y": (-1.0, 1.0)}, start={"x": 2.5, "y": 0.1})
-    found = wide(program)
-    found = replace(found, candidates=(found.ranked[0],))
+    result = wide(program)
+    result = replace(result, candidates=(result.ranked[0],))
     lost = Point({"x": 0.5, "y": 0.5}, "Maximum_Iterations_Exceeded", False)
-    assert not multistart.may_be_tied(replace(found, candidates=(*found.candidates, Candidate(lost, (), -1.0))))
-    beaten = Candidate(replace(lost, status="Beaten"), (), found.best.value)
-    assert multistart.may_be_tied(replace(found, candidates=(*found.candidates, beaten)))
+    assert not multistart.may_be_tied(replace(result, candidates=(*result.candidates, Candidate(lost, (), -1.0))))
+    beaten = Candidate(replace(lost, status="Beaten"), (), result.best.value)
+    assert multistart.may_be_tied(replace(result, candidates=(*result.candidates, beaten)))
 
 
 def test_a_start_that_ends_beside_the_known_design_is_not_solved_again(monkeypatch):

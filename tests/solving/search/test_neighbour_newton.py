@@ -23,7 +23,7 @@ def ended(resistance, target="balance"):
 def asked(resistance, ends, optima, target="balance"):
     scene = lo.load("beatup").set("operation.M0", f"{resistance!r} N*m")
     share = (resistance - ends[0]) / (ends[1] - ends[0])
-    return neighbour_answer.begun(scene, target, 1e-8, [*(each.as_dict() for each in optima), share])
+    return neighbour_answer.begun(scene, target, 1e-8, [*(item.as_dict() for item in optima), share])
 
 
 @pytest.fixture(scope="module")
@@ -31,24 +31,24 @@ def optima():
     return [ended(resistance)[1] for resistance in ENDS]
 
 
-def digits(found):
-    return [(dict(each.best.x), each.best.certificate) for each in found]
+def digits(result):
+    return [(dict(item.best.x), item.best.certificate) for item in result]
 
 
 @pytest.mark.slow
 def test_what_comes_of_it_is_what_a_solve_alone_comes_to(optima):
     resistances = 755.0, 771.0
     made = neighbour_newton.solve_between([asked(resistance, ENDS, optima) for resistance in resistances])
-    for found, resistance in zip(made, resistances, strict=True):
+    for result, resistance in zip(made, resistances, strict=True):
         alone, _ = ended(resistance)
-        best = found.best
+        best = result.best
         assert best.certificate.passed
-        design = found.job.design(found.program, best.x)
+        design = result.job.design(result.program, best.x)
         for name, value in alone.design.items():
             assert design[name] == pytest.approx(value, rel=CLOSE, abs=CLOSE), name
-        prices = {each.limit.name: each.worth for each in best.certificate.binding}
-        for each in alone.binding:
-            assert prices[each.limit] == pytest.approx(sum(each.worth.values()), rel=1e-9)
+        prices = {price.limit.name: price.worth for price in best.certificate.binding}
+        for price in alone.binding:
+            assert prices[price.limit] == pytest.approx(sum(price.worth.values()), rel=1e-9)
 
 
 @pytest.mark.slow
@@ -60,7 +60,7 @@ def test_it_is_the_same_bits_in_batches_of_any_size(optima):
         parts = [
             neighbour_newton.solve_between(several[begin : begin + size]) for begin in range(0, len(several), size)
         ]
-        assert digits(whole[:10]) == digits([each for part in parts for each in part]) == digits(whole[-10:])
+        assert digits(whole[:10]) == digits([item for part in parts for item in part]) == digits(whole[-10:])
 
 
 def test_extremes_that_figures_read_are_found_with_the_certificates_and_not_again(optima, monkeypatch):
@@ -95,9 +95,9 @@ def test_beyond_a_change_of_what_binds_the_other_neighbours_rows_are_tried():
     kinds = [{row.kind for row in of.frame} for of in optima]
     assert kinds[0] != kinds[1]
     for resistance, kind in ((697.0, kinds[0]), (704.0, kinds[1])):
-        (found,) = neighbour_newton.solve_between([asked(resistance, ends, optima)])
-        assert found.passed
-        assert {row.kind for row in found.best.certificate.frame} == kind
+        (result,) = neighbour_newton.solve_between([asked(resistance, ends, optima)])
+        assert result.passed
+        assert {row.kind for row in result.best.certificate.frame} == kind
 
 
 def test_a_way_that_ends_at_no_optimum_is_left(optima):
@@ -108,5 +108,5 @@ def test_a_way_that_ends_at_no_optimum_is_left(optima):
 def test_an_optimum_is_read_as_it_was_written(optima):
     import json
 
-    for each in optima:
-        assert neighbour_newton.read_optimum(json.loads(json.dumps(each.as_dict()))) == each
+    for item in optima:
+        assert neighbour_newton.read_optimum(json.loads(json.dumps(item.as_dict()))) == item

@@ -21,7 +21,7 @@ __all__ = ["certified", "solved"]
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "order"),
+    ("first", "other", "order"),
     [
         ((1, 5), (2, 0), -1),
         ((2, 0), (1, 5), 1),
@@ -31,8 +31,8 @@ __all__ = ["certified", "solved"]
         ((1, math.inf), (1, math.inf), 0),
     ],
 )
-def test_candidates_are_ordered_level_by_level(one, other, order):
-    assert compare(candidate(*one), candidate(*other)) == order
+def test_candidates_are_ordered_level_by_level(first, other, order):
+    assert compare(candidate(*first), candidate(*other)) == order
 
 
 def test_two_objectives_agree_to_a_ten_millionth():
@@ -53,52 +53,52 @@ def test_objectives_are_in_natural_sizes_and_true_over_the_cycle():
 def test_the_best_that_was_reached_is_judged(certified):
     seen, _ = certified
     points = candidate(0, x=3.0, reached=False), candidate(2, x=1.0), candidate(1, x=2.0)
-    found = certify_best(empty(candidates=points))
+    search = certify_best(empty(candidates=points))
     assert seen == [2.0]
-    assert (found.best.point, found.passed) == (points[2].point, True)
-    assert found.ranked == [points[2], points[1]]
-    assert found.usable == [points[1], points[2]]
+    assert (search.best.point, search.passed) == (points[2].point, True)
+    assert search.ranked == [points[2], points[1]]
+    assert search.usable == [points[1], points[2]]
 
 
 def test_what_was_judged_is_not_judged_again(certified):
     seen, _ = certified
-    found = certify_best(empty(candidates=(candidate(1, x=1.0),)))
-    assert certify_best(found).best is found.best
-    more = replace(found, candidates=(*found.candidates, candidate(0.5, x=2.0)))
+    search = certify_best(empty(candidates=(candidate(1, x=1.0),)))
+    assert certify_best(search).best is search.best
+    more = replace(search, candidates=(*search.candidates, candidate(0.5, x=2.0)))
     assert certify_best(more).best.objectives == (0.5,)
     assert seen == [1.0, 2.0]
 
 
 def test_nothing_reached_is_nothing_judged(certified):
-    found = certify_best(empty(candidates=(candidate(0, reached=False),)))
-    assert (found.best, found.passed, certified[0]) == (None, False, [])
+    search = certify_best(empty(candidates=(candidate(0, reached=False),)))
+    assert (search.best, search.passed, certified[0]) == (None, False, [])
 
 
 def test_where_the_best_does_not_pass_others_with_its_objectives_may(certified):
     seen, answers = certified
     answers |= {1.0: BAD, 2.0: BAD}
     points = tuple(candidate(1, x=float(k)) for k in (1, 2, 3, 4))
-    found = certify_best(empty(candidates=points))
+    search = certify_best(empty(candidates=points))
     assert seen == [1.0, 2.0, 3.0]
-    assert (found.passed, found.best.point) == (True, points[2].point)
+    assert (search.passed, search.best.point) == (True, points[2].point)
 
 
 def test_a_few_of_them_are_tried_and_then_the_best_stays(certified):
     seen, answers = certified
     answers["all"] = BAD
     points = tuple(candidate(1, x=float(k)) for k in range(1, 10))
-    found = certify_best(empty(candidates=points))
+    search = certify_best(empty(candidates=points))
     assert MOST_ALIKE == 4
     assert seen == [1.0, 2.0, 3.0, 4.0, 5.0]
-    assert (found.passed, found.best.point) == (False, points[0].point)
+    assert (search.passed, search.best.point) == (False, points[0].point)
 
 
 def test_what_breaks_a_limit_is_no_design_whatever_the_solver_said(certified):
     seen, answers = certified
     answers[1.0] = replace(BAD, feasibility=2 * FEASIBLE)
-    found = certify_best(empty(candidates=(candidate(1, x=1.0), candidate(1.1, x=2.0))))
-    assert (seen, found.passed, found.best.point.x["x"]) == ([1.0, 2.0], True, 2.0)
-    assert [c.point.x["x"] for c in found.usable] == [2.0]
+    search = certify_best(empty(candidates=(candidate(1, x=1.0), candidate(1.1, x=2.0))))
+    assert (seen, search.passed, search.best.point.x["x"]) == ([1.0, 2.0], True, 2.0)
+    assert [c.point.x["x"] for c in search.usable] == [2.0]
     alone = certify_best(empty(candidates=(candidate(1, x=1.0),)))
     assert (alone.passed, alone.best.certificate.feasibility) == (False, 2 * FEASIBLE), "what there is to tell"
 
@@ -108,10 +108,10 @@ def test_where_a_level_falls_by_its_curvature_it_is_held_harder_from_there(certi
     answers, (calls, points) = certified[1], solved
     answers |= {1.0: replace(BAD, minimum=False), 0.0: second, -1.0: BAD}
     points += [Point({"x": x, "y": 0.0}, "Solve_Succeeded", True) for x in (0.0, -1.0)]
-    found = certify_best(empty(candidates=(candidate(1, x=1.0),)))
+    search = certify_best(empty(candidates=(candidate(1, x=1.0),)))
     assert [(start["x"], weight) for start, weight, _ in calls] == [(1.0, weight) for weight in weights]
-    assert (found.passed, found.best.point.x["x"]) == ((True, 0.0) if second.passed else (False, 1.0))
-    assert found.settings.penalty == 1e3, "other starts are weighed as before"
+    assert (search.passed, search.best.point.x["x"]) == ((True, 0.0) if second.passed else (False, 1.0))
+    assert search.settings.penalty == 1e3, "other starts are weighed as before"
 
 
 @pytest.mark.parametrize(
@@ -127,24 +127,24 @@ def test_where_a_slope_or_a_curvature_refuses_the_best_it_is_brought_closer_to_w
 ):
     seen, answers = certified
     answers[1.0] = replace(BAD, **why)
-    beside = replace(candidate(1, x=5.0).point, x={"x": 5.0, "y": 0.0})
-    monkeypatch.setattr(exchange, "refine_active_set", lambda *asked: beside)
-    found = certify_best(replace(empty(candidates=(candidate(1, x=1.0),)), settings=Settings(penalty=1e7)))
-    assert (seen, found.passed) == (([1.0, 5.0], True) if closer else ([1.0], False))
+    neighbour = replace(candidate(1, x=5.0).point, x={"x": 5.0, "y": 0.0})
+    monkeypatch.setattr(exchange, "refine_active_set", lambda *request: neighbour)
+    search = certify_best(replace(empty(candidates=(candidate(1, x=1.0),)), settings=Settings(penalty=1e7)))
+    assert (seen, search.passed) == (([1.0, 5.0], True) if closer else ([1.0], False))
 
 
 def test_worse_candidates_do_not_stand_for_the_best(certified):
     seen, answers = certified
     answers[1.0] = BAD
-    found = certify_best(empty(candidates=(candidate(1, x=1.0), candidate(1 + 1e-6, x=2.0))))
-    assert (seen, found.passed) == ([1.0], False)
+    search = certify_best(empty(candidates=(candidate(1, x=1.0), candidate(1 + 1e-6, x=2.0))))
+    assert (seen, search.passed) == ([1.0], False)
 
 
 # Weight between levels --------------------------------------------------------------------------------------------
 
 
-def gave_way(stationarity=0.0, held=0.0):
-    levels = Level("f", stationarity, 0.0, 0.0), Level("g", 0.0, 0.0, held)
+def gave_way(stationarity=0.0, fixed=0.0):
+    levels = Level("f", stationarity, 0.0, 0.0), Level("g", 0.0, 0.0, fixed)
     return replace(BAD, levels=levels)
 
 
@@ -153,8 +153,8 @@ def gave_way(stationarity=0.0, held=0.0):
     [
         (gave_way(stationarity=2e-6), True),
         (gave_way(stationarity=1e-6), False),
-        (gave_way(held=501.0), True),
-        (gave_way(held=499.0), False),
+        (gave_way(fixed=501.0), True),
+        (gave_way(fixed=499.0), False),
         (replace(GOOD, levels=(Level("f", 0.0, 0.0, 0.0), Level("g", 2e-6, 0.0, 0.0))), False),
     ],
 )
@@ -163,12 +163,12 @@ def test_a_level_that_gave_way_is_solved_again_with_a_stronger_weight(certified,
     calls, points = solved
     answers[1.0] = certificate
     points.append(Point({"x": 0.0, "y": -1.0}, "Solve_Succeeded", True))
-    found = certify_best(empty(candidates=(candidate(1, x=1.0),)))
+    search = certify_best(empty(candidates=(candidate(1, x=1.0),)))
     assert calls == ([({"x": 1.0, "y": 0.0}, 100_000.0, None)] if again else [])
     if again:
-        assert (found.passed, found.settings.penalty) == (True, 1e5)
-        assert [each.point.x["x"] for each in found.candidates] == [0.0], "in place of the one that gave way"
-        assert found.best.objectives == (0.0, -1.0)
+        assert (search.passed, search.settings.penalty) == (True, 1e5)
+        assert [item.point.x["x"] for item in search.candidates] == [0.0], "in place of the one that gave way"
+        assert search.best.objectives == (0.0, -1.0)
 
 
 def test_the_weight_grows_to_an_end(certified, solved):
@@ -176,10 +176,10 @@ def test_the_weight_grows_to_an_end(certified, solved):
     calls, points = solved
     answers["all"] = gave_way(stationarity=1.0)
     points += [Point({"x": 1.0, "y": -float(k)}, "Solve_Succeeded", True) for k in (1, 2, 3)]
-    found = certify_best(empty(candidates=(candidate(1, x=1.0),)))
+    search = certify_best(empty(candidates=(candidate(1, x=1.0),)))
     # At last the first level alone, of which no weight holds it against a later one.
     assert [weight for _, weight, _ in calls] == [1e5, 1e7, 1e3]
-    assert not found.passed
+    assert not search.passed
 
 
 def test_a_stronger_weight_that_leads_nowhere_leaves_the_best_as_it_was(certified, solved):
@@ -187,10 +187,10 @@ def test_a_stronger_weight_that_leads_nowhere_leaves_the_best_as_it_was(certifie
     calls, points = solved
     answers["all"] = gave_way(stationarity=1.0)
     points += [Point({"x": 9.0, "y": 0.0}, "Maximum_Iterations_Exceeded", False)] * 2
-    found = certify_best(empty(candidates=(candidate(1, x=1.0),)))
+    search = certify_best(empty(candidates=(candidate(1, x=1.0),)))
     assert [weight for _, weight, _ in calls] == [1e5, 1e3]
-    assert found.best.x == {"x": 1.0, "y": 0.0}
-    assert len(found.candidates) == 2
+    assert search.best.x == {"x": 1.0, "y": 0.0}
+    assert len(search.candidates) == 2
 
 
 def test_the_first_level_alone_keeps_the_rows_of_all_levels(certified, solved):
@@ -219,8 +219,8 @@ def followed(certified, *certificates):
     """Return where the search ends from x = 1, and what was certified on the way."""
     seen, answers = certified
     answers["all"] = lambda count: certificates[count - 1]
-    found = certify_best(empty(candidates=(candidate(1, x=1.0),)))
-    return found.best, seen
+    search = certify_best(empty(candidates=(candidate(1, x=1.0),)))
+    return search.best, seen
 
 
 def test_a_slope_is_followed_to_its_end(certified):
@@ -273,10 +273,10 @@ def test_of_several_candidates_the_last_says_whether_a_stronger_weight_led_on(ce
     calls, points = solved
     answers["all"] = gave_way(stationarity=1.0)
     points += [Point({"x": 9.0, "y": 0.0}, "Maximum_Iterations_Exceeded", False)] * 2
-    found = certify_best(empty(candidates=(candidate(1, x=1.0), candidate(2, x=2.0), candidate(3, x=3.0))))
+    search = certify_best(empty(candidates=(candidate(1, x=1.0), candidate(2, x=2.0), candidate(3, x=3.0))))
     assert [weight for _, weight, _ in calls] == [1e5, 1e3]
-    assert len(found.candidates) == 4
-    assert found.best.x["x"] == 1.0
+    assert len(search.candidates) == 4
+    assert search.best.x["x"] == 1.0
 
 
 def test_a_variable_that_a_step_does_not_name_stays():
@@ -316,9 +316,9 @@ def test_a_weight_grows_to_the_strongest_and_no_farther(penalty, weak):
     assert searching._is_too_weak(replace(Settings(), penalty=penalty), gave_way(stationarity=1.0)) == weak
 
 
-@pytest.mark.parametrize(("held", "weak"), [(500.0, True), (499.9, False)])
-def test_a_weight_must_exceed_what_it_holds_twice(held, weak):
-    assert searching._is_too_weak(replace(Settings(), penalty=1000.0), gave_way(held=held)) == weak
+@pytest.mark.parametrize(("fixed", "weak"), [(500.0, True), (499.9, False)])
+def test_a_weight_must_exceed_what_it_holds_twice(fixed, weak):
+    assert searching._is_too_weak(replace(Settings(), penalty=1000.0), gave_way(fixed=fixed)) == weak
     first = replace(BAD, levels=(Level("f", 0.0, 0.0, 9e9), Level("g", 0.0, 0.0, 0.0)))
     assert not searching._is_too_weak(Settings(), first), "what holds a level counts, not what the first one says"
 

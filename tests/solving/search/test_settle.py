@@ -83,8 +83,8 @@ def test_settling_changes_no_figure_of_the_target():
         raw = lo.evaluate(scene_of(M0), answer.design).figures
         for name in ("M3_fdc", "peak_torque"):
             assert answer.figures[name] == pytest.approx(raw[name], rel=1e-12, abs=1e-9)
-        found = next(iter(answer.optima))[0]
-        assert answer.figures["peak_torque"] == pytest.approx(found["peak_torque"], rel=1e-9)
+        result = next(iter(answer.optima))[0]
+        assert answer.figures["peak_torque"] == pytest.approx(result["peak_torque"], rel=1e-9)
 
 
 def test_today_s_own_values_are_kept_where_nothing_asks_for_others():
@@ -104,9 +104,9 @@ def test_today_s_own_values_are_kept_where_nothing_asks_for_others():
 def slid(rows, goal, limits=(), y=0.5):
     """Return y after the silent level that wants it at goal; f is the objective."""
     program = toy.program("xy", rows, limits=limits, moves=(slide(goal),))
-    x, said = apply_moves(program, {"x": 1.0, "y": y})
+    x, message = apply_moves(program, {"x": 1.0, "y": y})
     assert x["x"] == 1.0
-    return x["y"], said
+    return x["y"], message
 
 
 FLAT = {"f": lambda v: v["x"] ** 2}
@@ -128,10 +128,10 @@ def test_a_direction_flat_at_both_ends_only_is_not_followed():
 
 
 def test_a_limit_in_the_way_is_met_and_not_crossed():
-    y, said = slid(FLAT, 3.0, limits=(("y", 1, 2.0),))
+    y, message = slid(FLAT, 3.0, limits=(("y", 1, 2.0),))
     assert y == pytest.approx(2.0, abs=1e-11)
     assert y <= 2.0 + 1e-11
-    assert said == ("slide: tidier",)
+    assert message == ("slide: tidier",)
 
 
 def test_a_limit_already_met_stops_the_move_at_once():
@@ -147,8 +147,8 @@ def test_a_met_limit_that_hardly_rises_is_not_stepped_into(power):
 
 def test_a_met_limit_that_falls_first_stops_where_it_is_met_again():
     hollow = FLAT | {"h": lambda v: (v["y"] - 0.5) * (v["y"] - 2.0)}
-    y, said = slid(hollow, 3.0, limits=(("h", 1, 0.0),))
-    assert (y, said) == (pytest.approx(2.0, abs=1e-11), ("slide: tidier",))
+    y, message = slid(hollow, 3.0, limits=(("h", 1, 0.0),))
+    assert (y, message) == (pytest.approx(2.0, abs=1e-11), ("slide: tidier",))
 
 
 def test_nothing_is_said_to_be_settled_where_nothing_moved():
@@ -202,8 +202,8 @@ def test_a_scale_nearest_to_today_weighs_each_length_by_the_width_of_its_bound()
 
 
 def test_a_scale_without_room_or_size_stays():
-    held = a_move(ScaleMove, "today", ("x", "y"), bounds={"x": (2.0, 2.0), "y": (1.0, 5.0)})
-    assert held.goal(held.wishes[0], {"x": 2.0, "y": 4.0}) == {}
+    fixed = a_move(ScaleMove, "today", ("x", "y"), bounds={"x": (2.0, 2.0), "y": (1.0, 5.0)})
+    assert fixed.goal(fixed.wishes[0], {"x": 2.0, "y": 4.0}) == {}
     none = a_move(ScaleMove, "today", ("x", "y"), bounds=LENGTHY)
     assert none.goal(none.wishes[0], {"x": 0.0, "y": 0.0}) == {}
 
@@ -220,8 +220,8 @@ def test_the_first_wish_that_holds_is_followed():
         Preference("today", ""),
     )
     move = AxisMove("slide", ("y",), wishes, {"y": 1.0}, {"y": (0.0, 2.0)})
-    found = [move.wished({"x": x, "y": 1.0}).toward for x in (1.5, 1.0, 0.5)]
-    assert found == ["most", "least", "today"]
+    results = [move.wished({"x": x, "y": 1.0}).toward for x in (1.5, 1.0, 0.5)]
+    assert results == ["most", "least", "today"]
     assert AxisMove("slide", ("y",), wishes[:2], {}, {}).wished({"x": 0.0}) is None
 
 
@@ -232,10 +232,10 @@ def test_a_peak_is_compared_all_round_not_by_its_height():
     assert apply_moves(program, {"x": 1.0, "y": 0.5})[0]["y"] == 0.5
 
 
-@pytest.mark.parametrize(("size", "told"), [(1.0, True), (1e3, False), (1e-3, True)])
-def test_a_move_is_told_that_is_no_rounding_in_the_variables_own_size(size, told):
+@pytest.mark.parametrize(("size", "report"), [(1.0, True), (1e3, False), (1e-3, True)])
+def test_a_move_is_told_that_is_no_rounding_in_the_variables_own_size(size, report):
     program = toy.program("xy", FLAT, moves=(slide(0.5 + 1e-7),), sizes={"y": size})
-    assert bool(apply_moves(program, {"x": 1.0, "y": 0.5})[1]) == told
+    assert bool(apply_moves(program, {"x": 1.0, "y": 0.5})[1]) == report
 
 
 # To the last number -----------------------------------------------------------------------------------------------

@@ -15,10 +15,10 @@ BOUNDS = {"x": (-5.0, 5.0), "y": (-5.0, 5.0), "z": (-4.0, 5.0)}
 
 
 def test_the_first_level_is_0_and_the_second_is_least_beside_it():
-    own = toy.program(
+    program = toy.program(
         "xyz", {"g": lambda v: (v["z"] - 2) ** 2 + v["x"] + v["y"]}, WAVES, (), ("peak wave", "g"), None, BOUNDS
     )
-    answer = toy.solve(own)
+    answer = toy.solve(program)
     assert answer.status == "optimal"
     assert [answer.design[name] for name in "xyz"] == pytest.approx([1, 2, 2], abs=1e-9)
     assert answer.figures["wave"] <= 1e-9

@@ -80,8 +80,8 @@ def test_slope_of_the_counterweight(mass):
 
 
 def test_area_of_the_front(mass):
-    found = trade.read_front(*mass)
-    masses, peaks = plan.values(found.rows, "m4e"), plan.values(found.rows, "peak_torque")
+    second_front = trade.read_front(*mass)
+    masses, peaks = plan.values(second_front.rows, "m4e"), plan.values(second_front.rows, "peak_torque")
     assert masses[0] == 0.0
     assert masses[-1] == pytest.approx(6.286039692, rel=1e-8)
     corners = list(zip([*masses, 7.0], [97.0 - peak for peak in [*peaks, peaks[-1]]], strict=True))
@@ -90,20 +90,22 @@ def test_area_of_the_front(mass):
 
 
 def test_every_point_is_certified_and_none_is_as_good_as_another(mass):
-    found = trade.read_front(*mass)
-    assert len(found.rows) >= 40
-    assert all(row.certified and row.status == "optimal" for row in found.rows)
+    second_front = trade.read_front(*mass)
+    assert len(second_front.rows) >= 40
+    assert all(row.certified and row.status == "optimal" for row in second_front.rows)
     for axis, rising in (("m4e", 1), ("peak_torque", -1)):
-        assert all(rising * (b - a) > 0.0 for a, b in itertools.pairwise(plan.values(found.rows, axis)))
+        assert all(rising * (b - a) > 0.0 for a, b in itertools.pairwise(plan.values(second_front.rows, axis)))
 
 
 def test_multipliers_are_the_slope_between_neighbours(mass):
-    found = trade.read_front(*mass)
-    slopes = [row.multipliers[plan.sloped(("peak_torque", "m4e"))] for row in found.rows[:-1]]
-    points = list(zip(plan.values(found.rows, "m4e"), plan.values(found.rows, "peak_torque"), strict=True))
-    for (one, other), (left, right) in zip(itertools.pairwise(points[:-1]), itertools.pairwise(slopes), strict=True):
-        if other[0] - one[0] > 1e-3:
-            secant = (other[1] - one[1]) / (other[0] - one[0])
+    second_front = trade.read_front(*mass)
+    slopes = [row.multipliers[plan.sloped(("peak_torque", "m4e"))] for row in second_front.rows[:-1]]
+    points = list(
+        zip(plan.values(second_front.rows, "m4e"), plan.values(second_front.rows, "peak_torque"), strict=True)
+    )
+    for (item, other), (left, right) in zip(itertools.pairwise(points[:-1]), itertools.pairwise(slopes), strict=True):
+        if other[0] - item[0] > 1e-3:
+            secant = (other[1] - item[1]) / (other[0] - item[0])
             assert min(left, right) - 1e-5 < secant < max(left, right) + 1e-5
 
 
@@ -193,10 +195,12 @@ def test_slopes_against_reed_torque(torque):
 @pytest.mark.slow
 def test_the_counterweight_that_is_used_up_is_told():
     trade = front.trade(lo.load("beatup"), ("peak_torque", "M3_fdc"), ranges={"M3_fdc": (45.0, 46.0)}, points=5)
-    found = read_front(trade, run.run(trade))
-    torques = plan.values(found.rows, "M3_fdc")
+    second_front = read_front(trade, run.run(trade))
+    torques = plan.values(second_front.rows, "M3_fdc")
     assert (torques[0], torques[-1]) == pytest.approx((45.0, 46.0), abs=1e-7)
-    used, left = (next(c for c in found.changes if Side.read(name) in c.limits) for name in ("m4e min", "theta max"))
+    used, left = (
+        next(c for c in second_front.changes if Side.read(name) in c.limits) for name in ("m4e min", "theta max")
+    )
     assert used.between[0] < 45.3960098 < used.between[1]
     assert used.kind == "active set"
     assert left.between[0] < 45.639 < left.between[1]
@@ -207,10 +211,12 @@ def test_the_counterweight_that_is_used_up_is_told():
 @pytest.mark.parametrize(("most", "low", "high"), [((), 600.0, 800.0), (("M0",), 700.0, 950.0)])
 def test_reed_torque_against_resistance_in_closed_form(most, low, high):
     trade = front.trade(lo.load("beatup"), ("M3_fdc", "M0"), maximise=most, ranges={"M0": (low, high)}, points=4)
-    found = read_front(trade, run.run(trade))
-    for resistance, reed in zip(plan.values(found.rows, "M0"), plan.values(found.rows, "M3_fdc"), strict=True):
+    second_front = read_front(trade, run.run(trade))
+    for resistance, reed in zip(
+        plan.values(second_front.rows, "M0"), plan.values(second_front.rows, "M3_fdc"), strict=True
+    ):
         assert reed == pytest.approx(max(0.0, 676.981102 - resistance, resistance - 871.503394), abs=2e-6)
-    reached = plan.values(found.rows, "M0")
+    reached = plan.values(second_front.rows, "M0")
     assert (reached[-1] if not most else reached[0]) == pytest.approx(871.503394 if most else 676.981102, abs=2e-6)
 
 
@@ -241,8 +247,8 @@ def test_stiffness_against_preload(preload, preload_, stiffness):
 
 
 def test_statics_govern_a_short_spring(preload):
-    found = trade.read_front(*preload)
-    (change,) = found.changes
+    second_front = trade.read_front(*preload)
+    (change,) = second_front.changes
     assert change.kind == "kink"
     assert change.limits == (Side("N_min", "min"),)
     assert change.at == pytest.approx(2.096358e-3, abs=5e-10)
@@ -259,10 +265,10 @@ def test_stiffness_against_speed():
         row = at(trade, speed * RPM, rows[0])
         assert row.certified
         assert read(row, "K1") == pytest.approx(stiffness, rel=1e-10)
-    found = read_front(trade, rows)
-    assert found.changes[0].at / RPM == pytest.approx(119.2122, abs=1e-4)
-    assert found.changes[0].kind == "kink"
-    assert plan.values(found.rows, "speed")[-1] == pytest.approx(900 * RPM)
+    second_front = read_front(trade, rows)
+    assert second_front.changes[0].at / RPM == pytest.approx(119.2122, abs=1e-4)
+    assert second_front.changes[0].kind == "kink"
+    assert plan.values(second_front.rows, "speed")[-1] == pytest.approx(900 * RPM)
 
 
 def test_the_end_of_an_axis_that_has_one_need_not_be_named():
@@ -299,8 +305,8 @@ def test_a_range_that_no_point_lies_in_is_told(axis, low, high, reached):
 def test_the_moment_of_inertia_costs_what_its_counterweight_does(mass):
     """Of a counterweight at its largest radius J4 = J4⁰ + m4e r4e²: both fronts are one."""
     trade = front.trade(lo.load("beatup"), ("peak_torque", "J4"), "balance", points=4)
-    own, other = ends(trade), mass[1]
-    for row, same in zip(own, other[:2], strict=True):
+    values, other = ends(trade), mass[1]
+    for row, same in zip(values, other[:2], strict=True):
         assert row.certified
         assert read(row, "J4") == pytest.approx(0.62 + read(same, "m4e") * 0.08**2, abs=CLOSE)
         assert read(row, "J4") == pytest.approx(row.figures["J4"], rel=CLOSE)
@@ -311,10 +317,10 @@ def test_the_moment_of_inertia_costs_what_its_counterweight_does(mass):
 def test_what_the_least_change_from_today_buys():
     """Today's machine has no counterweight: its radius counts as a change, its largest does not stand for none."""
     trade = front.trade(lo.load("beatup"), ("peak_torque", "change"), points=3)
-    found = read_front(trade, run.run(trade))
-    assert all(row.certified for row in found.rows)
-    assert len(plan.values(found.rows, "change")) >= 3
-    for before, row in itertools.pairwise(found.rows):
+    second_front = read_front(trade, run.run(trade))
+    assert all(row.certified for row in second_front.rows)
+    assert len(plan.values(second_front.rows, "change")) >= 3
+    for before, row in itertools.pairwise(second_front.rows):
         assert row.figures["change"] == pytest.approx(read(row, "change"), abs=CLOSE)
         assert read(row, "peak_torque") < read(before, "peak_torque")
 
@@ -338,25 +344,25 @@ def test_a_free_law_whose_middle_counts_is_traded_against_the_speed_that_keeps_c
     """Today's machine has no such law: what follows from one is read from the law that the task begins with."""
     scene = lo.load("shedding").set("effects.warp_tension.shape", "step")
     trade = front.trade(scene, ("K1", "contact_speed"), "law", maximise=("contact_speed",), points=3)
-    found = read_front(trade, run.run(trade))
-    assert [row.status for row in found.rows] == ["optimal"] * len(found.rows)
-    stiff, fast = plan.values(found.rows, "K1"), plan.values(found.rows, "contact_speed")
+    second_front = read_front(trade, run.run(trade))
+    assert [row.status for row in second_front.rows] == ["optimal"] * len(second_front.rows)
+    stiff, fast = plan.values(second_front.rows, "K1"), plan.values(second_front.rows, "contact_speed")
     assert len(stiff) > 2
     assert sorted(stiff) == list(stiff)
     assert sorted(fast) == list(fast)
 
 
 @pytest.mark.parametrize(
-    ("certified", "angle", "told"), [(False, math.pi, True), (True, math.pi, False), (False, 3.0, False)]
+    ("certified", "angle", "report"), [(False, math.pi, True), (True, math.pi, False), (False, 3.0, False)]
 )
-def test_an_end_that_no_limit_stops_is_told(certified, angle, told):
+def test_an_end_that_no_limit_stops_is_told(certified, angle, report):
     """With the dwell sought, nothing reads how long it is to last after front dead centre: at most half a turn."""
     trade = front.trade(lo.load("rapier"), ("dwell", "dwell_after"), maximise=("dwell", "dwell_after"), points=3)
     program = trade.solver.base
     x = {v.name: v.lower for v in program.variables} | {"dwell": 1.0, "dwell_after": angle, "phi_stroke": 3.0}
     row = Row(0, {}, None, "", None, {}, {}, {}, {}, certified, 0.0, {"point": {"x": x}})
     wrong = "dwell_after goes as far towards it as it may be, and no limit stops it"
-    with pytest.raises(BadInput, match=wrong) if told else contextlib.nullcontext():
+    with pytest.raises(BadInput, match=wrong) if report else contextlib.nullcontext():
         trade._refuse({0: row, 1: row})
 
 
@@ -370,12 +376,12 @@ def test_an_end_that_no_limit_stops_is_told(certified, angle, told):
 )
 def test_a_range_ends_the_front(ranges, axis, reached):
     trade = front.trade(loose(), ("K1", "X0"), ranges=ranges, points=3)
-    found = read_front(trade, run.run(trade))
-    assert (plan.values(found.rows, axis)[0], plan.values(found.rows, axis)[-1]) == pytest.approx(reached)
+    second_front = read_front(trade, run.run(trade))
+    assert (plan.values(second_front.rows, axis)[0], plan.values(second_front.rows, axis)[-1]) == pytest.approx(reached)
 
 
 @pytest.mark.parametrize(
-    ("axes", "more", "said"),
+    ("axes", "more", "message"),
     [
         (("peak_torque", "nonsense"), {}, 'unknown axis "nonsense"'),
         (("peak_torque", "m4e"), {"maximise": ("peak_torque",)}, "it can only be minimised"),
@@ -389,6 +395,6 @@ def test_a_range_ends_the_front(ranges, axis, reached):
         (("peak_torque", "reed_centrifugal"), {}, "nothing in the scene gives reed_centrifugal"),
     ],
 )
-def test_bad_input_names_what_is_wrong(axes, more, said):
-    with pytest.raises(BadInput, match=said):
+def test_bad_input_names_what_is_wrong(axes, more, message):
+    with pytest.raises(BadInput, match=message):
         front.trade(lo.load("beatup"), axes, **more)

@@ -13,12 +13,12 @@ from loomopt.studies.run.rows import Row, Side
 SCALE = FrontScale(("a", "b"), (1, 1), (0.0, 0.0), (1.0, 1.0))
 
 
-def row(point, b, a, slope=-1.0, active=("l1 min",), asked=None, certified=True, again=None, parent=None, **more):
-    """Return a row at (b, a); asked: how much of b it might have had; more: what else it says of itself."""
+def row(point, b, a, slope=-1.0, active=("l1 min",), request=None, certified=True, again=None, parent=None, **more):
+    """Return a row at (b, a); request: how much of b it might have had; more: what else it says of itself."""
     warm: dict[str, object] = {"axes": {"a": a, "b": b}, "active": [[label, "", 1] for label in active]}
     warm |= {"again": again, "fine": False, "near": None, **more}
     status = "optimal" if certified else "failed"
-    place = {} if point < 2 else {"b": b if asked is None else asked}
+    place = {} if point < 2 else {"b": b if request is None else request}
     return Row(point, place, parent, status, None, {}, {}, {plan.sloped(("a", "b")): slope}, {}, certified, 0.0, warm)
 
 
@@ -26,21 +26,21 @@ ENDS = [row(0, 1.0, 0.0, 0.0), row(1, 0.0, 1.0)]
 
 
 def planned(rows, points=40):
-    return [each.b for each in plan.following(rows, SCALE, points)]
+    return [item.b for item in plan.following(rows, SCALE, points)]
 
 
 def computed(answer, points=40):
     """Return the rows of a front whose answer to so much of b is known: (b, a, slope, active)."""
 
-    def answered(point, asked, **more):
-        b, a, slope, active = answer(asked)
-        return row(point, b, a, slope if point else 0.0, active, asked=asked, **more)
+    def answered(point, request, **more):
+        b, a, slope, active = answer(request)
+        return row(point, b, a, slope if point else 0.0, active, request=request, **more)
 
     rows = [answered(0, 1.0), answered(1, 0.0)]
     while batch := plan.following(rows, SCALE, points):
-        for each in batch:
-            more = {"again": each.again, "fine": each.fine, "parent": each.near[0], "steps": each.steps}
-            rows.append(answered(len(rows), each.b, **more))
+        for item in batch:
+            more = {"again": item.again, "fine": item.fine, "parent": item.near[0], "steps": item.steps}
+            rows.append(answered(len(rows), item.b, **more))
     return rows
 
 
@@ -49,10 +49,10 @@ def told(rows):
 
 
 def test_the_first_round_is_spread_evenly_over_one_gap():
-    found = planned(ENDS)
-    assert len(found) == plan.BATCH
-    assert found == sorted(found)
-    assert max(b - a for a, b in itertools.pairwise([0.0, *found, 1.0])) <= 0.25
+    result = planned(ENDS)
+    assert len(result) == plan.BATCH
+    assert result == sorted(result)
+    assert max(b - a for a, b in itertools.pairwise([0.0, *result, 1.0])) <= 0.25
 
 
 def test_the_widest_gap_in_either_axis_is_halved_first():
@@ -67,18 +67,18 @@ def test_what_another_dominates_is_solved_again_from_it_once():
     first = plan.following(rows, SCALE, 40)[0]
     assert (first.again, first.near, first.b) == (3, (2,), 0.6)
     rows.append(row(4, 0.6, 0.3, again=3, parent=2))
-    assert all(each.again is None for each in plan.following(rows, SCALE, 40))
+    assert all(item.again is None for item in plan.following(rows, SCALE, 40))
     assert [spot.point for spot in plan.spots(rows, SCALE)[0]] == [1, 2, 4, 0]
 
 
 def test_a_row_that_was_lost_with_its_process_is_a_failed_row_and_not_asked_for_again():
     rows = [*ENDS, row(2, 0.5, 0.4), row(3, 0.6, 0.45)]
     rows.append(Row(4, {"b": 0.6}, 2, "failed", "the process that solved it died"))
-    found = plan.following(rows, SCALE, 40)
-    assert all(each.again is None for each in found)
-    assert 0.6 not in [each.b for each in found]
+    result = plan.following(rows, SCALE, 40)
+    assert all(item.again is None for item in result)
+    assert 0.6 not in [item.b for item in result]
     rest = plan.following([*ENDS, Row(2, {"b": 0.5}, 0, "failed", "it died")], SCALE, 3)
-    assert [(each.again, each.near) for each in rest] == [(1, (0,)), (0, (1,))]
+    assert [(item.again, item.near) for item in rest] == [(1, (0,)), (0, (1,))]
 
 
 def test_a_point_that_was_missed_is_not_asked_for_again():
@@ -89,7 +89,7 @@ def test_a_point_that_was_missed_is_not_asked_for_again():
 
 def test_both_neighbours_lend_their_designs_where_they_touch_others():
     rows = [*ENDS, row(2, 0.5, 0.5, active=("l2 max",)), row(3, 0.25, 0.75)]
-    near = {each.b: each.near for each in plan.following(rows, SCALE, 8)}
+    near = {item.b: item.near for item in plan.following(rows, SCALE, 8)}
     assert near[0.375] == (2, 3)
     assert near[0.75] == (0, 2)
 
@@ -103,10 +103,10 @@ def test_either_side_of_a_change_is_solved_from_the_other_before_it_is_narrowed_
         row(3, 0.6, 0.4, active=("l2 max",)),
         row(4, 0.8, 0.2, active=("l2 max",)),
     ]
-    found = plan.following(rows, SCALE, 5)
+    result = plan.following(rows, SCALE, 5)
     pairs = [(1, 2), (2, 1), (2, 3), (3, 2), (3, 4), (4, 3), (4, 0), (0, 4)]
-    assert [(each.again, *each.near) for each in found] == pairs
-    assert all(each.steps == 1 and not each.fine for each in found)
+    assert [(item.again, *item.near) for item in result] == pairs
+    assert all(item.steps == 1 and not item.fine for item in result)
     rows += [row(5 + k, 0.5, 0.0, certified=False, again=again, parent=by) for k, (again, by) in enumerate(pairs)]
     (middle,) = plan.following(rows, SCALE, 5)
     assert middle.fine
@@ -164,10 +164,10 @@ def test_a_plan_ends():
         return b, 1 - b, -1.0, (f"l{math.floor(1000 * b)} min",)
 
     rows = computed(answer, points=10)
-    asked = [each for each in rows if each.warm["again"] is None]
-    assert len(asked) <= plan.MOST_MORE * 10 + plan.BATCH
+    requests = [item for item in rows if item.warm["again"] is None]
+    assert len(requests) <= plan.MOST_MORE * 10 + plan.BATCH
     # The others are trials: each row from either neighbour, in one step and in short ones.
-    assert len(rows) <= 6 * len(asked)
+    assert len(rows) <= 6 * len(requests)
 
 
 def two_basins(b, basin):
@@ -182,13 +182,13 @@ def moved(points=6):
     """
     rows = [row(0, 0.8, 0.005, -2.0, active=("l2 max",)), row(1, 0.0, 1.1, -1.1)]
     while batch := plan.following(rows, SCALE, points):
-        for each in batch:
-            basin = rows[each.near[0]].warm["active"][0][0] if each.steps else "l1 min"
-            b, a, slope = two_basins(each.b, basin)
-            stands = each.steps and a > plan.value(rows[each.again], "a") - plan.ALIKE
-            more = {"apart": list(each.near)} if stands and a > plan.value(rows[each.again], "a") + plan.ALIKE else {}
-            said = {"again": each.again, "fine": each.fine, "parent": each.near[0], "steps": each.steps, **more}
-            rows.append(row(len(rows), b, a, slope, (basin,), asked=each.b, certified=not stands, **said))
+        for item in batch:
+            basin = rows[item.near[0]].warm["active"][0][0] if item.steps else "l1 min"
+            b, a, slope = two_basins(item.b, basin)
+            stands = item.steps and a > plan.value(rows[item.again], "a") - plan.ALIKE
+            more = {"apart": list(item.near)} if stands and a > plan.value(rows[item.again], "a") + plan.ALIKE else {}
+            record = {"again": item.again, "fine": item.fine, "parent": item.near[0], "steps": item.steps, **more}
+            rows.append(row(len(rows), b, a, slope, (basin,), request=item.b, certified=not stands, **record))
     return rows
 
 
@@ -223,12 +223,12 @@ def test_ends_that_are_one_have_no_width():
 
 
 def test_an_end_that_another_row_dominates_is_sought_again_from_it():
-    rows = [row(0, 1.0, 0.0, 0.0), row(1, 0.0, 1.0), row(2, 0.5, -0.2, asked=0.6, parent=1)]
-    again = next(each for each in plan.following(rows, SCALE, 3) if each.again == 0)
+    rows = [row(0, 1.0, 0.0, 0.0), row(1, 0.0, 1.0), row(2, 0.5, -0.2, request=0.6, parent=1)]
+    again = next(item for item in plan.following(rows, SCALE, 3) if item.again == 0)
     assert (again.near, again.end) == ((2,), 0)
     better = row(3, 0.7, -0.3, 0.0, again=0, parent=2)
     better = replace(better, place={})
-    scale = plan.scaled({each.point: each for each in (*rows, better)}, ("a", "b"), (1, 1), (1.0, 1.0))
+    scale = plan.scaled({item.point: item for item in (*rows, better)}, ("a", "b"), (1, 1), (1.0, 1.0))
     assert scale.origin == (-0.3, 0.0)
     assert scale.width == pytest.approx((1.3, 0.7))
 

@@ -19,14 +19,14 @@ def heavy():
 @pytest.mark.slow
 def test_ends_that_agree_to_the_accuracy_that_was_asked_do_not_conflict(heavy):
     trade = front.trade(heavy, AXES, accuracy=1e-6)
-    found = read_front(trade, run.run(trade))
-    assert len(found.rows) == 1
-    assert "do not conflict: one design is best in both. Its ends are 3e-07 of their size apart" in found.message
+    second_front = read_front(trade, run.run(trade))
+    assert len(second_front.rows) == 1
+    assert "do not conflict: one design is best in both. Its ends are 3e-07 of their size apart" in second_front.message
 
 
 @pytest.mark.slow
 def test_a_front_that_shown_digits_do_not_tell_from_one_design_says_so(heavy):
     trade = front.trade(heavy, AXES, points=4)
-    found = read_front(trade, run.run(trade))
-    assert len(found.rows) >= 4
-    assert found.message.endswith("Its ends are 3e-07 of their size apart; 1e-08 was asked.")
+    second_front = read_front(trade, run.run(trade))
+    assert len(second_front.rows) >= 4
+    assert second_front.message.endswith("Its ends are 3e-07 of their size apart; 1e-08 was asked.")

@@ -41,14 +41,14 @@ def shedding():
 
 
 def differences(folder, trade):
-    return [text for _, found in check.check_front(trade, check.read_reference(folder / NAME)) for text in found]
+    return [text for _, result in check.check_front(trade, check.read_reference(folder / NAME)) for text in result]
 
 
 def edited(folder, line, column, new):
     """Rewrite a cell of a front: its line, from the end where negative, its column's name, and text of the old one."""
     path = folder / NAME
     lines = path.read_text(encoding="utf-8").splitlines()
-    head = sum(each.startswith("#") for each in lines)
+    head = sum(item.startswith("#") for item in lines)
     place = next(k for k, name in enumerate(lines[head].split(",")) if name.split(" [")[0] == column)
     chosen = head + 1 + line if line >= 0 else line
     cells = lines[chosen].split(",")
@@ -60,13 +60,13 @@ def edited(folder, line, column, new):
 @pytest.mark.parametrize("name", KNOWN)
 def test_ends_of_the_fronts_are_the_published_ones(name):
     ((second, first, ends),) = KNOWN[name]
-    found = front(name)
-    paid, sought = ([float(value) for value in found[axis]] for axis in (second, first))
+    result = front(name)
+    paid, sought = ([float(value) for value in result[axis]] for axis in (second, first))
     assert paid == sorted(paid)
     assert [paid[0], paid[-1]] == pytest.approx(sorted(ends), rel=1e-6, abs=1e-9)
     assert [sought[0], sought[-1]] == pytest.approx([ends[key] for key in sorted(ends)], rel=2e-9)
-    assert set(found["status"]) == {"optimal"}
-    assert len(found) > check.POINTS
+    assert set(result["status"]) == {"optimal"}
+    assert len(result) > check.POINTS
 
 
 def test_a_front_stands_for_the_scene_that_is_named_after_its_job():
@@ -75,8 +75,8 @@ def test_a_front_stands_for_the_scene_that_is_named_after_its_job():
 
 
 def test_five_designs_are_solved_again_and_nothing_differs(shedding, copy):
-    found = list(check.check_front(shedding, check.read_reference(copy / NAME)))
-    assert found == [("optimal", [])] * 5
+    result = list(check.check_front(shedding, check.read_reference(copy / NAME)))
+    assert result == [("optimal", [])] * 5
 
 
 def larger(by):
@@ -96,18 +96,18 @@ def larger(by):
 )
 def test_a_number_that_is_changed_is_named_with_its_point(shedding, copy, line, column, new, named):
     edited(copy, line, column, new)
-    (found,) = differences(copy, shedding)
-    assert named in found
-    assert found.startswith("X0 ")
+    (result,) = differences(copy, shedding)
+    assert named in result
+    assert result.startswith("X0 ")
 
 
 def test_a_number_between_the_ends_counts_too(shedding, copy):
     values = [float(value) for value in check.read_reference(copy / NAME)["X0 [m]"]]
     middle = min(range(len(values)), key=lambda k: abs(values[k] - (values[0] + values[-1]) / 2))
     edited(copy, middle, "K1", larger(2e-8))
-    (found,) = differences(copy, shedding)
-    assert found.startswith("X0 40")
-    assert "K1 [N/m]" in found
+    (result,) = differences(copy, shedding)
+    assert result.startswith("X0 40")
+    assert "K1 [N/m]" in result
 
 
 def test_a_missing_front_or_column_is_named(shedding, copy, monkeypatch):
@@ -123,9 +123,9 @@ def test_a_missing_front_or_column_is_named(shedding, copy, monkeypatch):
 def test_the_check_names_front_point_and_column(copy, monkeypatch):
     edited(copy, -1, "K1", larger(-1e-6))
     monkeypatch.setattr(study, "available_targets", lambda scene: [])
-    said: list[str] = []
-    (outcome,) = study.check(["shedding"], copy, said.append)
-    assert said == ["solving shedding, K1 against X0"]
+    texts: list[str] = []
+    (outcome,) = study.check(["shedding"], copy, texts.append)
+    assert texts == ["solving shedding, K1 against X0"]
     assert (outcome.problem, outcome.target, outcome.status) == ("shedding", "K1 against X0", "optimal")
     assert outcome.differences[0].startswith("X0 80 mm: K1 [N/m]: ")
 
@@ -135,8 +135,8 @@ def test_a_front_is_written_beside_the_other_references(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "available_targets", lambda scene: [])
     assert study.write(tmp_path, ["shedding", "shedding-printed-travel"]) == [tmp_path / NAME]
     head = [line for line in (tmp_path / NAME).read_text(encoding="utf-8").splitlines() if line.startswith("# ")]
-    told = dict(line[2:].split(": ", 1) for line in head)
-    assert told["scene_hash"] == load("shedding").hash
-    assert (told["target"], told["points"]) == ("none", "12")
+    report = dict(line[2:].split(": ", 1) for line in head)
+    assert report["scene_hash"] == load("shedding").hash
+    assert (report["target"], report["points"]) == ("none", "12")
     (again,) = study.check(["shedding"], tmp_path)
     assert again.differences == ()

@@ -36,10 +36,10 @@ def at(trade, value, parent):
 def test_a_design_above_its_limit_is_uncertified_and_does_not_say_that_there_is_none(monkeypatch):
     solver = front.trade(lo.load("beatup"), ("peak_torque", "m4e"), "balance").solver
     asking = Subproblem(0, (None, 3.0))
-    found = solver.solve(asking, [], False)
-    assert found.status == "optimal"
+    answer = solver.solve(asking, [], False)
+    assert answer.status == "optimal"
     monkeypatch.setattr(solving, "FEASIBLE", -0.01)
-    above = solver.solve(asking, [found.warm], False)
+    above = solver.solve(asking, [answer.warm], False)
     assert (above.status, above.reason) == ("uncertified", "m4e comes out above what was asked")
 
 
@@ -70,10 +70,10 @@ def test_an_end_is_sought_in_every_basin_at_its_second_level_too(axes):
 def test_an_axis_that_a_limit_alone_stops_is_certified_after_the_other():
     """The least l3 needs the shortest crank, whose price what is held of l3 may carry too."""
     trade = front.trade(lo.load("beatup"), ("l1", "l3"))
-    found = read_front(trade, run.run(trade))
-    assert found.message.startswith("l1 and l3 do not conflict: one design is best in both.")
-    assert plan.values(found.rows, "l1") == pytest.approx([0.03])
-    assert plan.values(found.rows, "l3") == pytest.approx([0.147938261848])
+    second_front = read_front(trade, run.run(trade))
+    assert second_front.message.startswith("l1 and l3 do not conflict: one design is best in both.")
+    assert plan.values(second_front.rows, "l1") == pytest.approx([0.03])
+    assert plan.values(second_front.rows, "l3") == pytest.approx([0.147938261848])
 
 
 @pytest.mark.slow
@@ -87,9 +87,9 @@ def test_stiffness_against_the_speed_up_to_which_contact_holds():
         assert plan.value(row, "K1") == pytest.approx(stiffness, rel=1e-10)
         assert row.figures["contact_speed"] == pytest.approx(speed * RPM, rel=1e-10)
         assert row.figures["speed"] == pytest.approx(600 * RPM)
-    found = read_front(trade, rows)
-    assert found.changes[0].at / RPM == pytest.approx(119.2122, abs=1e-4)
-    assert found.changes[0].kind == "kink"
+    second_front = read_front(trade, rows)
+    assert second_front.changes[0].at / RPM == pytest.approx(119.2122, abs=1e-4)
+    assert second_front.changes[0].kind == "kink"
 
 
 @pytest.mark.slow
@@ -103,17 +103,17 @@ def test_stiffness_against_the_speed_up_to_which_contact_holds():
 def test_a_contact_speed_that_is_traded_is_the_rows_figure_and_the_others_are_read_at_the_scenes_speed(axes):
     scene = lo.load("shedding")
     trade = front.trade(scene, axes, points=4)
-    found = read_front(trade, run.run(trade))
-    assert len(found.rows) >= 4
-    assert all(row.certified for row in found.rows)
-    assert min(plan.values(found.rows, "contact_speed")) == pytest.approx(119.212195 * RPM, rel=1e-8)
-    for row in found.rows:
+    second_front = read_front(trade, run.run(trade))
+    assert len(second_front.rows) >= 4
+    assert all(row.certified for row in second_front.rows)
+    assert min(plan.values(second_front.rows, "contact_speed")) == pytest.approx(119.212195 * RPM, rel=1e-8)
+    for row in second_front.rows:
         there = lo.evaluate(scene, row.design).figures
         for axis in axes:
             assert plan.value(row, axis) == pytest.approx(row.figures[axis], rel=1e-9)
             assert there[axis] == pytest.approx(row.figures[axis], rel=1e-9)
-    for one, other in itertools.pairwise(plan.values(found.rows, axes[0])):
-        assert one < other
+    for item, other in itertools.pairwise(plan.values(second_front.rows, axes[0])):
+        assert item < other
 
 
 def test_an_answer_that_keeps_contact_up_to_a_speed_is_judged_and_proven_by_it():
@@ -122,7 +122,7 @@ def test_an_answer_that_keeps_contact_up_to_a_speed_is_judged_and_proven_by_it()
     ask = {"also": [], "held": parent.warm["held"], "wide": False}
     task = StudyTask(99, parent.point, {"contact_speed": 200 * RPM}, ask)
     answer = results.to_answer(trade.solve(task, parent), trade.scene)
-    limit = next(each for each in answer.limits if each.name == "contact_speed")
+    limit = next(item for item in answer.limits if item.name == "contact_speed")
     assert limit.min == pytest.approx(200 * RPM)
     assert limit.value == pytest.approx(200 * RPM)
     assert answer.admissible
@@ -131,7 +131,7 @@ def test_an_answer_that_keeps_contact_up_to_a_speed_is_judged_and_proven_by_it()
     softer = results.to_answer(
         replace(answer.result, design={**answer.design, "K1": 0.99 * answer.design["K1"]}), trade.scene
     ).evaluate()
-    assert [each.name for each in softer.limits if not each.ok] == ["contact_speed"]
+    assert [item.name for item in softer.limits if not item.ok] == ["contact_speed"]
 
 
 def test_a_contact_speed_that_nothing_limits_is_not_traded():
@@ -144,10 +144,10 @@ def test_where_no_row_leads_on_a_point_is_solved_from_an_admissible_machine_of_t
     today = lo.evaluate(scene)
     assert all(limit.ok for limit in today.limits)
     solver = front.trade(scene, ("peak_torque", "mass")).solver
-    found = solver.solve(Subproblem(0, (None, None)), [], None)
-    assert found.status == "optimal", found.reason
-    assert found.figures["peak_torque"] < today.figures["peak_torque"]
-    below = 0.9 * found.figures["peak_torque"]
+    answer = solver.solve(Subproblem(0, (None, None)), [], None)
+    assert answer.status == "optimal", answer.reason
+    assert answer.figures["peak_torque"] < today.figures["peak_torque"]
+    below = 0.9 * answer.figures["peak_torque"]
     none = solver.solve(Subproblem(1, (below, None)), [], None)
     assert (none.status, dict(none.design)) == ("failed", {}), "today's machine is not admissible there"
 

@@ -64,17 +64,17 @@ def test_killed_after_some_rows_and_resumed_by_two_processes_it_has_the_same_dig
     done = subprocess.run([sys.executable, script, store], env=os.environ | folder, capture_output=True, timeout=120)
     assert done.returncode == -signal.SIGKILL
     with Store(store) as opened:
-        kept = opened.rows(serial.study.key)
-    assert len(kept) == 6
+        rows = opened.rows(serial.study.key)
+    assert len(rows) == 6
     with pytest.raises(BadInput, match="holds 6 points of this study"):
         lo.pareto("beatup", AXES, target="balance", points=8, store=store)
     again = lo.pareto("beatup", AXES, target="balance", points=8, store=store, resume=True, workers=2)
     assert again.digest == serial.digest
-    assert {row.point: row.seconds for row in kept}.items() <= {row.point: row.seconds for row in again.solved}.items()
-    told = [json.loads(text) for text in stored(store)]
-    assert {data["study"] for data in told} == {"sweep 5", "pareto 7"}, "a sweep and a front share the file"
-    (own,) = (data for data in told if data["study"] == "pareto 7")
-    assert made_again(own).key == serial.study.key
+    assert {row.point: row.seconds for row in rows}.items() <= {row.point: row.seconds for row in again.solved}.items()
+    texts = [json.loads(text) for text in stored(store)]
+    assert {data["study"] for data in texts} == {"sweep 5", "pareto 7"}, "a sweep and a front share the file"
+    (values,) = (data for data in texts if data["study"] == "pareto 7")
+    assert made_again(values).key == serial.study.key
 
 
 def stored(path):
@@ -85,13 +85,13 @@ def stored(path):
         return [text for (text,) in file.execute("SELECT told FROM study ORDER BY rowid")]
 
 
-def made_again(told):
+def made_again(report):
     """Return the study that a store tells of."""
-    scene = registry.scene(told["document"])
-    most = [axis for axis, sense in told["axes"].items() if sense == "most"]
-    ranges = {axis: (low, high) for axis, (low, high) in told["ranges"].items()}
-    axes, settings = list(told["axes"]), {"points": told["points"], "accuracy": told["accuracy"]}
-    return front.trade(scene, axes, told["target"], maximise=most, ranges=ranges, **settings)
+    scene = registry.scene(report["document"])
+    most = [axis for axis, sense in report["axes"].items() if sense == "most"]
+    ranges = {axis: (low, high) for axis, (low, high) in report["ranges"].items()}
+    axes, settings = list(report["axes"]), {"points": report["points"], "accuracy": report["accuracy"]}
+    return front.trade(scene, axes, report["target"], maximise=most, ranges=ranges, **settings)
 
 
 @pytest.mark.slow
@@ -114,9 +114,9 @@ def test_a_dask_cluster_of_which_a_worker_is_killed_has_the_same_digest(serial):
     )
     with cluster, distributed.Client(cluster) as client:
         executor = client.get_executor(retries=3)
-        found = lo.pareto("beatup", AXES, target="balance", points=8, executor=executor, on_row=kill)
+        second_front = lo.pareto("beatup", AXES, target="balance", points=8, executor=executor, on_row=kill)
     assert killed
-    assert found.digest == serial.digest
+    assert second_front.digest == serial.digest
 
 
 def test_a_row_gives_its_whole_answer_again_with_the_limit_on_the_other_axis_among_its_limits(serial):
@@ -126,8 +126,8 @@ def test_a_row_gives_its_whole_answer_again_with_the_limit_on_the_other_axis_amo
     assert answer.status == "optimal"
     assert answer.certificate is not None
     assert answer.certificate.passed
-    own = next(limit for limit in answer.limits if limit.name == "m4e")
-    assert (own.min, own.max, own.ok) == (0.0, row.place["m4e"], True)
+    item = next(limit for limit in answer.limits if limit.name == "m4e")
+    assert (item.min, item.max, item.ok) == (0.0, row.place["m4e"], True)
     price = next(price for price in answer.binding if price.limit == "m4e")
     assert price.worth["peak_torque"] == pytest.approx(-row.multipliers[plan.sloped(("peak_torque", "m4e"))], rel=1e-9)
     assert price.text == f"m4e <= {row.place['m4e']:.6g} kg"
@@ -184,9 +184,9 @@ def test_limits_on_axes_are_told_as_limits_of_their_figures(problem, axes, more,
     task = trade.batch(rows)[0]
     parent = rows[task.parent]
     row, answer = trade.solved(task, parent), results.to_answer(trade.solve(task, parent), trade.scene)
-    own = next(each for each in answer.limits if each.name == axes[1])
-    assert getattr(own, side) == pytest.approx(row.place[axes[1]], rel=1e-14)
-    assert own.value == pytest.approx(row.place[axes[1]], rel=1e-8)
+    item = next(limit for limit in answer.limits if limit.name == axes[1])
+    assert getattr(item, side) == pytest.approx(row.place[axes[1]], rel=1e-14)
+    assert item.value == pytest.approx(row.place[axes[1]], rel=1e-8)
     assert answer.admissible
     assert dict(answer.figures) == dict(row.figures)
     price = next(price for price in answer.binding if price.limit == axes[1])
@@ -221,25 +221,27 @@ def test_failures_stay_rows_with_their_reason_and_dominated_ones_are_left_out(se
     failed = replace(
         serial.solved[2], point=99, status="failed", reason="it died", certified=False, design={}, figures={}, warm={}
     )
-    found = StudyTable(serial.study, (*serial.solved, failed))
-    assert found.rows[-1] == failed
-    table = found.table()
+    result = StudyTable(serial.study, (*serial.solved, failed))
+    assert result.rows[-1] == failed
+    table = result.table()
     assert table.loc[99, "reason"] == "it died"
     assert table.loc[99, "m4e [kg]"] == pytest.approx(failed.place["m4e"]), "the requested value"
     assert table["peak_torque [N*m]"].isna().tolist() == [False] * len(serial.rows) + [True]
 
 
 def test_a_front_that_has_only_begun_shows_what_there_is(serial):
-    found = StudyTable(serial.study, serial.solved[:1])
-    assert found.findings.message == "No front yet: an end is not solved."
-    assert found.rows == serial.solved[:1]
+    result = StudyTable(serial.study, serial.solved[:1])
+    assert result.findings.message == "No front yet: an end is not solved."
+    assert result.rows == serial.solved[:1]
 
 
 def test_one_design_that_is_best_in_both():
-    found = lo.pareto("beatup", AXES, "none")
-    assert found.findings.message == "peak_torque and m4e do not conflict: one design is best in both."
-    assert plan.values(found.rows, "m4e") == [0.0]
-    assert found.answer(found.rows[0].point).message.startswith("The least peak_torque, then the least m4e.")
+    second_front = lo.pareto("beatup", AXES, "none")
+    assert second_front.findings.message == "peak_torque and m4e do not conflict: one design is best in both."
+    assert plan.values(second_front.rows, "m4e") == [0.0]
+    assert second_front.answer(second_front.rows[0].point).message.startswith(
+        "The least peak_torque, then the least m4e."
+    )
 
 
 @pytest.mark.parametrize(

@@ -54,8 +54,8 @@ def of_beatup(sigmas):
     return solved(beatup(), sigmas)
 
 
-def close(found, value, se):
-    return abs(found.value - value) <= SE * math.hypot(found.se, se)
+def close(result, value, se):
+    return abs(result.value - value) <= SE * math.hypot(result.se, se)
 
 
 @pytest.mark.few(1)
@@ -68,33 +68,33 @@ def close(found, value, se):
     ],
 )
 def test_backed_off_beatup(sigmas, peak, share, se):
-    found = of_beatup(sigmas)
-    assert found.status == "optimal"
-    assert found.figures["peak_torque"] == pytest.approx(peak, rel=DIGITS)
-    assert abs(found.figures["M3_fdc"]) < 1e-9
-    assert close(found.robust.yields["all"], share, se)
-    assert close(found.robust.nominal_yields["all"], 0.307458, 16e-6)
-    assert found.certificate.passed
+    result = of_beatup(sigmas)
+    assert result.status == "optimal"
+    assert result.figures["peak_torque"] == pytest.approx(peak, rel=DIGITS)
+    assert abs(result.figures["M3_fdc"]) < 1e-9
+    assert close(result.robust.yields["all"], share, se)
+    assert close(result.robust.nominal_yields["all"], 0.307458, 16e-6)
+    assert result.certificate.passed
 
 
 @pytest.mark.slow
 def test_limits_and_backoff_stay_apart():
-    found = of_beatup(3.0)
-    swing = next(each for each in found.limits if each.name == "swing")
+    result = of_beatup(3.0)
+    swing = next(limit for limit in result.limits if limit.name == "swing")
     assert swing.max == pytest.approx(math.radians(23.4), rel=1e-15)
     assert swing.value == pytest.approx(swing.max - swing.backed_off, abs=1e-12)
-    price = next(each for each in found.binding if each.limit == "swing")
+    price = next(limit for limit in result.binding if limit.limit == "swing")
     assert price.value == pytest.approx(swing.max, rel=1e-15)
     assert price.backed_off == swing.backed_off
     assert price.text == "swing <= 23.4 deg, backed off by 0.04872 deg"
-    free = next(each for each in found.limits if each.name == "l1")
+    free = next(limit for limit in result.limits if limit.name == "l1")
     assert free.backed_off == 0.0
     assert "backed_off" not in free.as_dict()
-    told = found.as_dict()
-    assert told["yield"]["all"]["value"] == found.robust.yields["all"].value
-    assert told["robust"]["kept"] == ["M3_fdc"]
-    assert told["robust"]["cost"]["peak_torque"] == pytest.approx(88.7189424554 - 88.6894134918, abs=3e-8)
-    text = layout.render(answers.solution(found, found.scene), 120)
+    report = result.as_dict()
+    assert report["yield"]["all"]["value"] == result.robust.yields["all"].value
+    assert report["robust"]["kept"] == ["M3_fdc"]
+    assert report["robust"]["cost"]["peak_torque"] == pytest.approx(88.7189424554 - 88.6894134918, abs=3e-8)
+    text = layout.render(answers.solution(result, result.scene), 120)
     assert "22.9 ... 23.4, 0.04872 deg apart" in text
     assert "+0.0333 %" in text
 
@@ -119,12 +119,12 @@ def test_standard_deviations_are_those_of_the_optimum():
     ],
 )
 def test_yield_of_the_beatup(least, sigmas, peak):
-    found = solved(beatup(), least=least)
-    robust = found.robust
+    solution = solved(beatup(), least=least)
+    robust = solution.robust
     assert robust.linear == pytest.approx(sigmas, abs=6e-10)
     assert least <= robust.yields["all"].value <= least + robust.yields["all"].se + 1e-4
     assert robust.sigmas == pytest.approx(sigmas, abs=0.02)
-    assert found.figures["peak_torque"] == pytest.approx(peak, abs=2e-4)
+    assert solution.figures["peak_torque"] == pytest.approx(peak, abs=2e-4)
     assert solved(beatup(), robust.linear).figures["peak_torque"] == pytest.approx(peak, abs=6e-10)
 
 
@@ -138,17 +138,17 @@ def test_classes_of_the_links(standard, peak):
 
 
 def test_a_band_under_twice_the_backoff_is_infeasible():
-    found = solved(beatup().set("tolerances.l1", "5 mm"), 3.0)
-    assert found.status == "infeasible"
-    assert "the band of swing, 0.5 deg, is no wider than" in found.message
-    assert found.certificate is None
+    solution = solved(beatup().set("tolerances.l1", "5 mm"), 3.0)
+    assert solution.status == "infeasible"
+    assert "the band of swing, 0.5 deg, is no wider than" in solution.message
+    assert solution.certificate is None
 
 
 @pytest.mark.slow
 def test_a_goal_whose_band_loses_machines_leaves_a_yield_out_of_reach():
-    found = solved(beatup().set("accept.M3_fdc", "1 N*m"), least=0.99)
-    assert found.status == "infeasible"
-    assert "no margin for M3_fdc" in found.message
+    solution = solved(beatup().set("accept.M3_fdc", "1 N*m"), least=0.99)
+    assert solution.status == "infeasible"
+    assert "no margin for M3_fdc" in solution.message
 
 
 def loom(tolerance):
@@ -180,34 +180,34 @@ def loom(tolerance):
 @pytest.mark.slow
 def test_a_yield_whose_spread_falls_along_the_back_off_settles():
     """One side binds alone: 95 % are at the quantile of the normal distribution, 1.645 sigma of theta."""
-    found = lo.solve(loom("0.06 mm"), min_yield=0.95)
-    assert found.status == "optimal"
-    assert found.robust.linear == pytest.approx(1.6448536, abs=1e-6)
-    assert found.robust.sigmas == pytest.approx(1.6448536, abs=0.02)
-    assert 0.95 <= found.robust.yields["all"].value <= 0.95 + 2e-3
-    assert found.figures["peak_torque"] == pytest.approx(91.55727, abs=2e-4)
+    answer = lo.solve(loom("0.06 mm"), min_yield=0.95)
+    assert answer.status == "optimal"
+    assert answer.robust.linear == pytest.approx(1.6448536, abs=1e-6)
+    assert answer.robust.sigmas == pytest.approx(1.6448536, abs=0.02)
+    assert 0.95 <= answer.robust.yields["all"].value <= 0.95 + 2e-3
+    assert answer.figures["peak_torque"] == pytest.approx(91.55727, abs=2e-4)
 
 
 @pytest.mark.slow
 def test_where_a_band_has_no_more_room_the_other_limits_back_off_farther():
-    found = lo.solve(loom("1 mm"), min_yield=0.95)
-    assert found.status == "optimal"
-    assert 0.95 <= found.robust.yields["all"].value <= 0.95 + 2e-3
-    assert "swing by 1.9" in found.message
-    drawn = lo.tolerance(found.scene, found, worst=False, samples=2**16)
+    answer = lo.solve(loom("1 mm"), min_yield=0.95)
+    assert answer.status == "optimal"
+    assert 0.95 <= answer.robust.yields["all"].value <= 0.95 + 2e-3
+    assert "swing by 1.9" in answer.message
+    drawn = lo.tolerance(answer.scene, answer, worst=False, samples=2**16)
     assert drawn.yields["all"].value == pytest.approx(0.95, abs=3e-3)
 
 
 @pytest.mark.slow
 def test_a_yield_that_no_design_has_is_told_with_the_most_that_was_found():
     """Each of two bands, 1 and 4 deg wide, holds no more machines than it does with their middle in its own."""
-    found = lo.solve(loom("5 mm"), min_yield=0.5)
-    assert found.status == "infeasible"
-    most = float(re.search(r"the most that was found is ([\d.]+) %", found.message)[1]) / 100
-    drawn = lo.tolerance(found.scene, found, worst=False, samples=2**16)
+    answer = lo.solve(loom("5 mm"), min_yield=0.5)
+    assert answer.status == "infeasible"
+    most = float(re.search(r"the most that was found is ([\d.]+) %", answer.message)[1]) / 100
+    drawn = lo.tolerance(answer.scene, answer, worst=False, samples=2**16)
     assert drawn.yields["all"].value == pytest.approx(most, abs=3e-3)
     assert most > 0.26, "0.32 of swing, of which 0.81 of theta"
-    assert "the band of theta, 4 deg, is no wider than" in found.message
+    assert "the band of theta, 4 deg, is no wider than" in answer.message
 
 
 def test_what_cannot_be_asked_is_refused_in_one_line():
@@ -223,10 +223,10 @@ def test_what_cannot_be_asked_is_refused_in_one_line():
 
 @pytest.mark.slow
 def test_from_python():
-    found = lo.solve(beatup(), robust=1)
-    assert found.figures["peak_torque"] == of_beatup(1.0).figures["peak_torque"]
-    assert found.robust.yields == of_beatup(1.0).robust.yields
-    assert found.evaluate().admissible
+    answer = lo.solve(beatup(), robust=1)
+    assert answer.figures["peak_torque"] == of_beatup(1.0).figures["peak_torque"]
+    assert answer.robust.yields == of_beatup(1.0).robust.yields
+    assert answer.evaluate().admissible
 
 
 # Other jobs.
@@ -251,12 +251,12 @@ def rapier(**changes):
     ],
 )
 def test_backed_off_rapier_keeps_its_stroke(sigmas, peak, share, se):
-    found = solved(rapier(), sigmas, starts=1)
-    assert found.figures["peak_acceleration"] == pytest.approx(peak, rel=OF_A_FREE_DIRECTION)
-    assert found.figures["stroke"] == pytest.approx(0.85, rel=1e-12)
-    assert close(found.robust.yields["all"], share, se)
-    assert found.robust.exempt == ("stroke",)
-    dwell = next(each for each in found.limits if each.name == "dwell_after")
+    solution = solved(rapier(), sigmas, starts=1)
+    assert solution.figures["peak_acceleration"] == pytest.approx(peak, rel=OF_A_FREE_DIRECTION)
+    assert solution.figures["stroke"] == pytest.approx(0.85, rel=1e-12)
+    assert close(solution.robust.yields["all"], share, se)
+    assert solution.robust.exempt == ("stroke",)
+    dwell = next(limit for limit in solution.limits if limit.name == "dwell_after")
     assert dwell.min == pytest.approx(math.radians(30.0), rel=1e-14)
     assert dwell.value == pytest.approx(dwell.min + dwell.backed_off, abs=1e-9)
 
@@ -271,11 +271,11 @@ def test_backed_off_rapier_keeps_its_stroke(sigmas, peak, share, se):
 )
 def test_stroke_as_a_limit_is_backed_off(sigmas, peak, stroke):
     limits = {"limits.stroke": {"min": "849 mm", "max": "851 mm"}}
-    found = solved(rapier(**limits, **{"bounds.stroke": {"min": "800 mm", "max": "900 mm"}}), sigmas, starts=1)
-    assert found.figures["peak_acceleration"] == pytest.approx(peak, rel=OF_A_FREE_DIRECTION)
-    assert 1e3 * found.figures["stroke"] == pytest.approx(stroke, abs=2e-7)
-    assert close(found.robust.nominal_yields["all"], 0.0037, 5e-5)
-    assert found.robust.exempt == ()
+    solution = solved(rapier(**limits, **{"bounds.stroke": {"min": "800 mm", "max": "900 mm"}}), sigmas, starts=1)
+    assert solution.figures["peak_acceleration"] == pytest.approx(peak, rel=OF_A_FREE_DIRECTION)
+    assert 1e3 * solution.figures["stroke"] == pytest.approx(stroke, abs=2e-7)
+    assert close(solution.robust.nominal_yields["all"], 0.0037, 5e-5)
+    assert solution.robust.exempt == ()
 
 
 @pytest.mark.slow
@@ -307,33 +307,33 @@ def test_backed_off_spring(problem, made, stiffness):
     scene = registry.load(problem)
     scene = (scene.with_effect("dry_friction") if made is ALL else scene).update({"tolerances": made})
     for sigmas, expected in zip((1.0, 2.0, 3.0), stiffness, strict=True):
-        found = solved(scene, sigmas)
-        assert found.figures["K1"] == pytest.approx(expected, abs=6e-7)
-    force = next(each for each in found.limits if each.name == "N_min")
+        solution = solved(scene, sigmas)
+        assert solution.figures["K1"] == pytest.approx(expected, abs=6e-7)
+    force = next(limit for limit in solution.limits if limit.name == "N_min")
     assert force.min == scene.operation["N_min"]
-    assert found.figures["contact_min"] == pytest.approx(force.min + force.backed_off, abs=1e-6)
+    assert solution.figures["contact_min"] == pytest.approx(force.min + force.backed_off, abs=1e-6)
     if made is SPRING and problem == "shedding":
-        assert close(found.robust.yields["all"], 0.998655, 1e-5)
+        assert close(solution.robust.yields["all"], 0.998655, 1e-5)
     if made is ALL:
-        assert found.robust.nominal.figures["K1"] == pytest.approx(102746.793970, abs=6e-7)
+        assert solution.robust.nominal.figures["K1"] == pytest.approx(102746.793970, abs=6e-7)
 
 
 @pytest.mark.slow
 def test_a_number_that_is_its_own_limit_is_not_backed_off():
-    found = solved(registry.load("shedding").update({"tolerances": {"K1": "5 %", "speed": "1 %"}}), 3.0)
-    speed = next(each for each in found.limits if each.name == "speed")
+    solution = solved(registry.load("shedding").update({"tolerances": {"K1": "5 %", "speed": "1 %"}}), 3.0)
+    speed = next(limit for limit in solution.limits if limit.name == "speed")
     assert speed.backed_off == 0.0
-    assert "backed off" not in next(price.text for price in found.binding if price.limit == "speed")
+    assert "backed off" not in next(price.text for price in solution.binding if price.limit == "speed")
 
 
 @pytest.mark.slow
 def test_a_limit_of_a_target_is_backed_off():
     # |M3| at front dead centre within 1 % of M0: the target's own demand, which no table of limits holds.
-    found = solved(beatup(), 2.0, target="torque")
-    force = next(each for each in found.limits if each.name == "M3_fdc")
+    solution = solved(beatup(), 2.0, target="torque")
+    force = next(limit for limit in solution.limits if limit.name == "M3_fdc")
     assert force.max == pytest.approx(7.45, rel=1e-12)
     assert abs(force.value) == pytest.approx(force.max - force.backed_off, rel=1e-9)
-    assert found.robust.exempt == ()
+    assert solution.robust.exempt == ()
 
 
 @pytest.mark.slow
@@ -341,7 +341,7 @@ def test_a_figure_that_bends_takes_the_steeper_slope():
     # The dwell's largest travel stands at both of its ends: the mean of their slopes leaves 32 % of the machines.
     scene = registry.load("sixbar-sley")
     links = ("l1", "l2", "l3", "e", "l5", "l6", "Gx", "Gy")
-    found = solved(scene.update({"tolerances": dict.fromkeys(links, "0.06 mm")}), 3.0, starts=1)
-    assert found.robust.corners == ("travel.rest",)
-    assert found.robust.yields["all"].value > 0.99
-    assert found.robust.nominal_yields["all"].value < 0.01
+    solution = solved(scene.update({"tolerances": dict.fromkeys(links, "0.06 mm")}), 3.0, starts=1)
+    assert solution.robust.corners == ("travel.rest",)
+    assert solution.robust.yields["all"].value > 0.99
+    assert solution.robust.nominal_yields["all"].value < 0.01

@@ -120,15 +120,15 @@ if __name__ == "__main__":
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize(
-    ("deaths", "said"), slow.after(1, [(2, "7"), (9, "BrokenExecutor worker processes were killed 3"), (1, "7")])
+    ("deaths", "message"), slow.after(1, [(2, "7"), (9, "BrokenExecutor worker processes were killed 3"), (1, "7")])
 )
-def test_a_worker_that_is_killed_while_it_starts_costs_a_new_pool(tmp_path, deaths, said):
+def test_a_worker_that_is_killed_while_it_starts_costs_a_new_pool(tmp_path, deaths, message):
     script = tmp_path / "dying.py"
     script.write_text(DYING)
     folder = {"PYTHONPATH": str(Path(run.__file__).parents[3])}
     command = [sys.executable, script, tmp_path / "log", str(deaths)]
     done = subprocess.run(command, env=os.environ | folder, capture_output=True, text=True, timeout=120)
-    assert done.stdout.startswith(said), done.stderr
+    assert done.stdout.startswith(message), done.stderr
     assert len((tmp_path / "log").read_text()) >= min(deaths, 2) + 1
 
 
@@ -160,8 +160,8 @@ def test_ctrl_c_keeps_what_is_finished_and_a_resumed_run_repeats_a_sample(chain,
         store.begin(chain.key, {})
         with pytest.raises(KeyboardInterrupt):
             run.run(chain, make and make(1), store, stop)
-        kept = [row.point for row in store.rows(chain.key)]
-        assert set(range(12)) <= set(kept)
+        subset = [row.point for row in store.rows(chain.key)]
+        assert set(range(12)) <= set(subset)
     with Store(tmp_path / "s.db") as store:
         assert digest(run.run(chain, None, store)) == expected
     assert sorted({*chain.solves()}) == list(range(24))
@@ -176,8 +176,8 @@ def test_a_row_that_does_not_come_out_again_stops_a_resumed_run(chain, tmp_path,
         store.begin(chain.key, {})
         for row in run.run(replace(chain, count=1, log=tmp_path / "other")):
             store.add(chain.key, replace(row, **change))
-    said = r"s\.db: store: solving point 0 again does not give the row"
-    with Store(tmp_path / "s.db") as store, pytest.raises(BadInput, match=said):
+    message = r"s\.db: store: solving point 0 again does not give the row"
+    with Store(tmp_path / "s.db") as store, pytest.raises(BadInput, match=message):
         run.run(chain, None, store)
     assert chain.solves() == [0]
 

@@ -37,8 +37,10 @@ def test_rows_are_read_back_bit_by_bit_each_with_its_study(tmp_path):
 
 def test_the_journal_is_one_that_survives_a_crash_on_any_file_system(tmp_path):
     with Store(tmp_path / "s.db") as store:
-        asked = {name: store._file.execute(f"PRAGMA {name}").fetchone()[0] for name in ("journal_mode", "synchronous")}
-    assert asked == {"journal_mode": "delete", "synchronous": 2}
+        request = {
+            name: store._file.execute(f"PRAGMA {name}").fetchone()[0] for name in ("journal_mode", "synchronous")
+        }
+    assert request == {"journal_mode": "delete", "synchronous": 2}
 
 
 def test_others_can_read_the_tables(tmp_path):
@@ -58,22 +60,22 @@ def test_a_file_in_use_is_refused(tmp_path):
         pass
 
 
-@pytest.mark.parametrize("what", ["text", "tables", "version", "folder"])
-def test_what_is_no_store_is_left_as_it_is(tmp_path, what):
+@pytest.mark.parametrize("subject", ["text", "tables", "version", "folder"])
+def test_what_is_no_store_is_left_as_it_is(tmp_path, subject):
     path = tmp_path / "s.db"
-    if what == "folder":
+    if subject == "folder":
         path.mkdir()
-    elif what == "text":
+    elif subject == "text":
         path.write_bytes(b"a letter to a friend, long enough to be read as the head of a file" * 20)
     else:
         file = sqlite3.connect(path)
-        file.execute("CREATE TABLE mine (a)" if what == "tables" else "PRAGMA user_version = 7")
+        file.execute("CREATE TABLE mine (a)" if subject == "tables" else "PRAGMA user_version = 7")
         file.commit()
         file.close()
-    before = None if what == "folder" else path.read_bytes()
-    with pytest.raises(BadInput, match=r"s\.db: ") as told:
+    before = None if subject == "folder" else path.read_bytes()
+    with pytest.raises(BadInput, match=r"s\.db: ") as caught:
         Store(path)
-    assert len(str(told.value).splitlines()) == 1
+    assert len(str(caught.value).splitlines()) == 1
     assert before is None or path.read_bytes() == before
 
 
@@ -105,10 +107,10 @@ CELLS = [
 @pytest.mark.parametrize("cell", CELLS)
 def test_a_damaged_row_is_told_by_its_point(tmp_path, cell):
     damaged(made(tmp_path / "s.db"), f"UPDATE row SET {cell}")
-    with Store(tmp_path / "s.db") as store, pytest.raises(BadInput, match="the row of point 2 is damaged") as told:
+    with Store(tmp_path / "s.db") as store, pytest.raises(BadInput, match="the row of point 2 is damaged") as caught:
         store.rows("one")
-    assert len(str(told.value).splitlines()) == 1
-    assert "\x1b" not in str(told.value)
+    assert len(str(caught.value).splitlines()) == 1
+    assert "\x1b" not in str(caught.value)
 
 
 def test_a_row_of_another_study_or_point_is_damaged(tmp_path):
@@ -116,9 +118,9 @@ def test_a_row_of_another_study_or_point_is_damaged(tmp_path):
     with Store(tmp_path / "s.db") as store, pytest.raises(BadInput, match="damaged"):
         store.rows("other")
     damaged(made(tmp_path / "t.db"), "UPDATE row SET point = char(27) || 'x'")
-    with Store(tmp_path / "t.db") as store, pytest.raises(BadInput, match="damaged") as told:
+    with Store(tmp_path / "t.db") as store, pytest.raises(BadInput, match="damaged") as caught:
         store.rows("one")
-    assert "\x1b" not in str(told.value)
+    assert "\x1b" not in str(caught.value)
 
 
 WRONG = [
@@ -150,9 +152,9 @@ def test_what_no_row_holds_is_damage_whatever_its_checksum_says(tmp_path, wrong)
     file.execute(f"INSERT INTO row VALUES ({marks})", ("one", *cells, _checksum("one", cells)))
     file.commit()
     file.close()
-    with Store(path) as store, pytest.raises(BadInput, match="damaged") as told:
+    with Store(path) as store, pytest.raises(BadInput, match="damaged") as caught:
         store.rows("one")
-    assert str(told.value).isprintable()
+    assert str(caught.value).isprintable()
 
 
 ENDLESS = "WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT"
@@ -166,29 +168,29 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("what", OTHERS)
-def test_what_no_store_holds_is_refused_at_once(tmp_path, what):
+@pytest.mark.parametrize("subject", OTHERS)
+def test_what_no_store_holds_is_refused_at_once(tmp_path, subject):
     path = made(tmp_path / "s.db")
-    damaged(path, *(OTHERS[what]))
+    damaged(path, *(OTHERS[subject]))
     before = path.read_bytes()
-    name = {"view": "row", "trigger": "slow", "column": "row", "missing": "row"}.get(what, "mine")
+    name = {"view": "row", "trigger": "slow", "column": "row", "missing": "row"}.get(subject, "mine")
     with pytest.raises(BadInput, match=f"it has tables that no store has: {name}"):
         Store(path)
     assert path.read_bytes() == before
 
 
-@pytest.mark.parametrize("what", ["tables", "mine"])
-def test_a_refused_store_is_let_go(tmp_path, what):
+@pytest.mark.parametrize("subject", ["tables", "mine"])
+def test_a_refused_store_is_let_go(tmp_path, subject):
     path = made(tmp_path / "s.db")
-    damaged(path, "CREATE TABLE mine (a)" if what == "mine" else "PRAGMA user_version = 9")
+    damaged(path, "CREATE TABLE mine (a)" if subject == "mine" else "PRAGMA user_version = 9")
     gc.disable()
     try:
-        with pytest.raises(BadInput) as told:
+        with pytest.raises(BadInput) as caught:
             Store(path)
         damaged(path, "CREATE TABLE more (a)")  # while the error is at hand
     finally:
         gc.enable()
-    assert told
+    assert caught
 
 
 @pytest.mark.parametrize("name", [":memory:", "file:s.db?mode=memory", "file:s.db", "s?mode=ro.db", "%41.db"])

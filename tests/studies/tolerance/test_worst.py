@@ -148,8 +148,8 @@ def test_no_local_search_from_fifty_corners_is_worse(problem, name):
 
     def slopes(shares, sign):
         steps = np.where(shares < 0.5, 1e-4, -1e-4)
-        beside = read(np.vstack([shares, shares + np.diag(steps)]))
-        return sign * (beside[1:] - beside[0]) / steps / size
+        neighbour = read(np.vstack([shares, shares + np.diag(steps)]))
+        return sign * (neighbour[1:] - neighbour[0]) / steps / size
 
     corners = np.array(list(itertools.islice(itertools.product((0.02, 0.98), repeat=len(ends)), 1024)))
     chosen = corners[np.linspace(0, len(corners) - 1, min(50, len(corners))).astype(int)]
