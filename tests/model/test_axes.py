@@ -40,11 +40,11 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("name", "request"), CASES)
-def test_an_axis_is_the_figure_a_designer_reads(name, request):
+@pytest.mark.parametrize(("name", "ends"), CASES)
+def test_an_axis_is_the_figure_a_designer_reads(name, ends):
     """Also of the moment of inertia J4, a figure beside a number of the effect inertia that is called the same."""
     target = {"rapier": "stroke-dwell"}.get(name)
-    scene, program, axes = traded(name, target, **request)
+    scene, program, axes = traded(name, target, **ends)
     job = registry.of(scene)
     design = job.today(scene) | ({"m4e": 3.0, "r4e": 0.07} if name == "beatup" else {})
     known = {**design, **job.figures(scene, design)}
@@ -53,9 +53,9 @@ def test_an_axis_is_the_figure_a_designer_reads(name, request):
         assert axis.figure(axis.value(known[axis.axis.name])) == pytest.approx(known[axis.axis.name])
 
 
-@pytest.mark.parametrize(("name", "request"), CASES)
-def test_less_of_a_value_is_what_is_sought(name, request):
-    for axis in traded(name, {"rapier": "stroke-dwell"}.get(name), **request)[2]:
+@pytest.mark.parametrize(("name", "ends"), CASES)
+def test_less_of_a_value_is_what_is_sought(name, ends):
+    for axis in traded(name, {"rapier": "stroke-dwell"}.get(name), **ends)[2]:
         low, high = axis.value(0.5), axis.value(0.6)
         assert (low < high) == (axis.sense == "least")
         step = 1e-6

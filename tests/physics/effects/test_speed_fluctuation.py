@@ -211,7 +211,7 @@ def test_an_inch_machine_at_350_rpm_is_the_same_machine():
 
 
 @pytest.mark.parametrize(
-    "request",
+    "call",
     [
         lo.solve,
         lo.prove,
@@ -221,9 +221,9 @@ def test_an_inch_machine_at_350_rpm_is_the_same_machine():
     ],
     ids=["solve", "prove", "sweep", "front", "accuracy"],
 )
-def test_what_seeks_or_proves_refuses_it_by_name(request):
+def test_what_seeks_or_proves_refuses_it_by_name(call):
     with pytest.raises(BadInput, match="does not cover effect speed_fluctuation") as error:
-        request(ON)
+        call(ON)
     assert error.value.key == "effects.speed_fluctuation"
     assert "without it, evaluate with it" in str(error.value)
     assert "--without speed_fluctuation" in str(error.value)
