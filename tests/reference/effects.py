@@ -598,7 +598,9 @@ class Linkage(Shaft):
 
         def energy(at):
             joints = self.joints(at)
-            return values["stiffness"] * (abs(joints[values["ends"]] - joints[values["begins"]]) - values["free"]) ** 2 / 2
+            return (
+                values["stiffness"] * (abs(joints[values["ends"]] - joints[values["begins"]]) - values["free"]) ** 2 / 2
+            )
 
         return slope(energy, phi)
 

@@ -63,7 +63,9 @@ def test_an_event_may_be_an_extreme_of_another_link():
             linkage_of(sampler.model).at(FLOAT, sampler.given, phi).joints.vector("rocker")
             for phi in (angle, angle + step)
         )
-        turned = math.atan2(place.x * neighbour.y - place.y * neighbour.x, place.x * neighbour.x + place.y * neighbour.y)
+        turned = math.atan2(
+            place.x * neighbour.y - place.y * neighbour.x, place.x * neighbour.x + place.y * neighbour.y
+        )
         assert -1e-7 < turned < 0.0
 
 
