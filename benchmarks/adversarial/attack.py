@@ -8,11 +8,12 @@ referee died, raised is one that ends in a traceback. Each failure is printed wi
 "second order open" ends in exit status 1, and so do many lost ones.
 
     python benchmarks/adversarial/attack.py [--count N] [--seed S] [--jobs rapier,beatup,shedding,linkage] [--seconds T]
-                                [--first K] [--only K] [--compare] [--json]
+                                [--first K] [--only K] [--compare] [--global] [--json]
 
 --count: scenes of each job; --seconds: no scene is begun later. Scene K of a job and seed is always the same one:
 --first K begins with it, --only K draws it alone. --compare also solves with one and with eight starts, and counts who
-finds the best known.
+finds the best known. --global (with --jobs beatup) also proves that no design is better, and counts what is proven; a
+bound is false where an admissible design lies below it.
 """
 
 import argparse
@@ -39,6 +40,9 @@ BROKEN = 1e-7
 JOBS = ("rapier", "beatup", "shedding", "linkage")
 OPEN = "second order open"
 CALLS: dict[str, dict[str, Any]] = {"default": {}, "starts=1": {"starts": 1}, "starts=8": {"starts": 8}}
+GLOBAL_CALL: dict[str, dict[str, Any]] = {"global": {"global_proof": True}}
+ROUNDED = 1e-9
+"""What an objective of the referee may be off, in units of the scale."""
 COUNTED = (
     "tried",
     "optimal",
@@ -54,7 +58,7 @@ COUNTED = (
 )
 MOST_LOST = 0.05
 """Scenes whose referee may die, for each that was tried."""
-FAILURES = ("beaten", "broken", "refuted", "uncertified: other", "raised")
+FAILURES = ("beaten", "broken", "refuted", "false bound", "uncertified: other", "raised")
 
 
 def better(first: tuple[float, ...], other: tuple[float, ...]) -> bool:
@@ -90,17 +94,18 @@ class Trial:
         known = getattr(task, "document", None)
         self.scene = lo.scene(known) if known else lo.load(task.base).update(task.changes)
         self.found: tuple[dict[str, float], tuple[float, ...]] | None = None
+        self.admissible: list[tuple[float, ...]] = []
         self.answers: dict[str, Any] = {}
         self.verdicts: list[tuple[str, str]] = []
         self.matched = False
 
     def solved(self, names: Any) -> None:
-        """Solve by the public call in each of the ways named."""
+        """Solve by the public call in each of the ways named; the answer of the first is attacked."""
         import loomopt as lo
 
         for name in names:
-            self.answers[name] = lo.solve(self.scene, self.task.target, **CALLS[name])
-        self.answer = self.answers["default"]
+            self.answers[name] = lo.solve(self.scene, self.task.target, **(CALLS | GLOBAL_CALL)[name])
+        self.answer = next(iter(self.answers.values()))
 
     def judged(self) -> None:
         """Attack the answer and note what became of it."""
@@ -119,6 +124,7 @@ class Trial:
                 (f"uncertified: {OPEN if known else 'other'}", f"{answer.status}: {'; '.join(reasons)}")
             )
         self._attack(claimed)
+        self.verdicts += [("false bound", why) for why in self.false_bounds()]
         if self.found is None:
             return
         design, objectives = self.found
@@ -142,9 +148,21 @@ class Trial:
             if answer.status == "optimal":
                 self._keep(answer.design)
 
+    def false_bounds(self) -> Iterator[str]:
+        """Yield admissible designs below a proven bound, of a later level those within the bands of the earlier."""
+        levels = self.answer.global_bound.levels if self.answer.global_bound else ()
+        for objectives in self.admissible:
+            for value, level in zip(objectives, levels, strict=False):
+                scale = self.task.scales[level.objective]
+                if value < level.bound / scale - ROUNDED:
+                    yield f"{level.objective} is at least {level.bound / scale} but there is {objectives}"
+                if value > (level.best + level.band) / scale:
+                    break
+
     def _keep(self, design: Mapping[str, float]) -> None:
         if self.task.excess(design) <= HELD:
             objectives = self.task.objectives(design)
+            self.admissible.append(objectives)
             if self.found is None or better(objectives, self.found[1]):
                 self.found = dict(design), objectives
 
@@ -176,6 +194,7 @@ def parsed() -> argparse.Namespace:
     words.add_argument("--first", type=int, default=0)
     words.add_argument("--only", type=int)
     words.add_argument("--compare", action="store_true")
+    words.add_argument("--global", action="store_true", dest="is_global")
     words.add_argument("--json", action="store_true")
     return words.parse_args()
 
@@ -187,16 +206,18 @@ class Outcome(NamedTuple):
     lines: list[str]
 
 
-def outcome(job: str, seed: int, number: int, compare: bool) -> Outcome:
+def outcome(job: str, seed: int, number: int, compare: bool, is_global: bool = False) -> Outcome:
     """Return what becomes of a scene."""
     task = scene_of(job, seed, number)
     try:
         trial = Trial(task, number)
-        trial.solved(CALLS if compare else ["default"])
+        trial.solved([*(GLOBAL_CALL if is_global else ["default"]), *(CALLS if compare else [])])
         trial.judged()
     except Exception:
         return Outcome(["tried", "raised"], told(job, seed, number, task, [("raised", traceback.format_exc())]))
     counted = ["tried", trial.answer.status, *{kind for kind, _ in trial.verdicts}, *["matched"] * trial.matched]
+    if trial.answer.global_bound and trial.answer.status == "optimal":
+        counted.append("proven" if trial.answer.global_bound.proven else "open")
     if compare and trial.found is not None:
         counted += ["comparable", *(f"best by {name}" for name, hit in trial.hits().items() if hit)]
     verdicts = [(kind, f"{why}\n    answer {dict(trial.answer.design)}") for kind, why in trial.verdicts]
@@ -215,7 +236,7 @@ def outcomes(options: argparse.Namespace) -> Iterator[tuple[str, Outcome]]:
         if time.perf_counter() - began > options.seconds:
             break
         try:
-            yield job, pool.submit(outcome, job, options.seed, number, options.compare).result()
+            yield job, pool.submit(outcome, job, options.seed, number, options.compare, options.is_global).result()
         except BrokenProcessPool:
             print(f"lost (--jobs {job} --seed {options.seed} --only {number}): its process died", file=sys.stderr)
             yield job, Outcome(["lost"], [])
@@ -233,7 +254,8 @@ def main() -> None:
         for line in result.lines:
             failures.append(line)
             print(line, file=sys.stderr, flush=True)
-    columns = [*COUNTED, *(["comparable", *(f"best by {name}" for name in CALLS)] if options.compare else [])]
+    columns = [*COUNTED, *(["proven", "open", "false bound"] if options.is_global else [])]
+    columns += [*(["comparable", *(f"best by {name}" for name in CALLS)] if options.compare else [])]
     rows = [{"job": job, **{name: counts[job][name] for name in columns}} for job in counts]
     harness.show(rows, options.json, **({"failures": failures} if options.json else {}))
     failed = any(of[kind] for of in counts.values() for kind in FAILURES)

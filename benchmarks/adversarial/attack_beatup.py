@@ -43,6 +43,11 @@ class Machine:
         self.coarse = (np.concatenate([np.linspace(0, 2 * np.pi, COARSE, endpoint=False), self._corners]),)
 
     @property
+    def scales(self):
+        """Scale of each objective by its figure, SI."""
+        return {"M3_fdc": self.torque, "pulse_rms": self.torque, "peak_torque": self.peak, "change": 1.0}
+
+    @property
     def _M0(self):
         return self.hand.M0 if "resistance" in self.hand.own else 0.0
 

@@ -32,6 +32,29 @@ def attack():
     return importlib.import_module("benchmarks.adversarial.attack")
 
 
+@pytest.mark.parametrize(
+    ("admissible", "false"),
+    [((0.999, 2.5), 0), ((0.999, 0.0), 1), ((0.9, 9.0), 1), ((1.0, 1.9), 1), ((1.0, 2.1), 0), ((1.2, 1.9), 0)],
+    ids=str,
+)
+def test_a_bound_is_false_where_an_admissible_design_lies_below_it(attack, admissible, false):
+    """Level 1: best 10 with a bound of 9.99 and a band of 0.01; level 2: bound 4; the scales are 10 and 2."""
+    trial = attack.Trial(attack.scene_of("beatup", 35, 5), 0)
+    trial.task.torque, trial.task.peak = 10.0, 2.0
+    first = SimpleNamespace(objective="M3_fdc", best=10.0, bound=9.99, band=0.01)
+    second = SimpleNamespace(objective="peak_torque", best=4.01, bound=4.0, band=0.0)
+    trial.answer = SimpleNamespace(global_bound=SimpleNamespace(levels=(first, second)))
+    trial.admissible = [admissible]
+    assert len(list(trial.false_bounds())) == false
+
+
+@pytest.mark.slow
+def test_bounds_of_a_draw_are_proven_and_none_is_false(attack):
+    counted = attack.outcome("beatup", 35, 5, compare=False, is_global=True)
+    assert counted.lines == []
+    assert "proven" in counted.counted
+
+
 @pytest.mark.parametrize("job", COUNTS)
 def test_no_answer_of_the_draw_is_beaten_broken_refuted_or_left_uncertified(job):
     command = [
