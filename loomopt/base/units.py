@@ -260,15 +260,15 @@ def _letters(unit: str) -> str:
     return re.sub(r"[^a-z0-9]", "", ascii_unit(unit[:_LONGEST_UNIT]).lower())
 
 
-def _slips(one: str, other: str) -> int:
+def _slips(first: str, second: str) -> int:
     """Number of letters to insert, delete, change or exchange to make one word of another."""
     before: list[int] = []
-    row = list(range(len(other) + 1))
-    for i, a in enumerate(one):
+    row = list(range(len(second) + 1))
+    for i, a in enumerate(first):
         last, before, row = before, row, [i + 1]
-        for j, b in enumerate(other):
+        for j, b in enumerate(second):
             row.append(min(before[j] + (a != b), before[j + 1] + 1, row[j] + 1))
-            if i and j and a == other[j - 1] and b == one[i - 1]:
+            if i and j and a == second[j - 1] and b == first[i - 1]:
                 row[-1] = min(row[-1], last[j - 1] + 1)
     return row[-1]
 

@@ -116,7 +116,7 @@ class Task(abc.ABC):
             self.follow(),
             self.tops,
             self.today(),
-            self.single(),
+            self.uniqueness_reason(),
             self.goals(),
             None if self.traded else self.added(),
             self.any_numbers,
@@ -323,7 +323,7 @@ class Task(abc.ABC):
         """Today's values of variables that are no numbers of the scene."""
         return {}
 
-    def single(self) -> str:
+    def uniqueness_reason(self) -> str:
         """Why every local optimum is the best there is; "" where that is not so."""
         return ""
 

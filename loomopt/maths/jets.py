@@ -142,9 +142,9 @@ def _wide(values: Number) -> Number:
     return values[..., None] if isinstance(values, np.ndarray) else values
 
 
-def _mixed(one: Floats, other: Floats) -> Floats:
+def _mixed(first: Floats, second: Floats) -> Floats:
     """Symmetric product one_i other_j + one_j other_i."""
-    outer = one[..., :, None] * other[..., None, :]
+    outer = first[..., :, None] * second[..., None, :]
     return np.asarray(outer + outer.swapaxes(-1, -2))
 
 

@@ -376,8 +376,8 @@ def _in_order(model: JobModel, values: Values, like: Sampler) -> Iterator[tuple[
         same = real & (keys == keys[:, first : first + 1]).all(axis=0)
         real &= ~same
         places = np.flatnonzero(same)
-        one = {name: float(value) for name, value in _picked(values, first).items()}
-        leader = like if (keys[:, first] == like_keys[:, 0]).all() else Sampler(model, one)
+        numbers = {name: float(value) for name, value in _picked(values, first).items()}
+        leader = like if (keys[:, first] == like_keys[:, 0]).all() else Sampler(model, numbers)
         yield places, Machines(model, values if len(places) == count else _picked(values, places), leader)
 
 

@@ -239,7 +239,7 @@ class Program:
     """Of these, the crank angles where a whole-cycle quantity is largest: variable → quantity."""
     today: Numbers = field(default_factory=dict)
     """Today's values, SI, of variables that are no numbers of the scene."""
-    single: str = ""
+    uniqueness_reason: str = ""
     """Reason why every local optimum is global, where there is one."""
     goals: tuple[Goal, ...] = ()
     """Goals of the target for figures; they may be out of reach."""

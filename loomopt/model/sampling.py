@@ -387,10 +387,10 @@ class Sampler:
         return np.broadcast_to(np.asarray(force) >= 0.0, u.shape)
 
 
-def _is_same(one: Number, other: Number) -> bool:
+def _is_same(first: Number, second: Number) -> bool:
     """Whether two numbers are the same float, the sign of a zero included."""
-    floats = isinstance(one, float) and isinstance(other, float)
-    return floats and one == other and math.copysign(1.0, one) == math.copysign(1.0, other)
+    floats = isinstance(first, float) and isinstance(second, float)
+    return floats and first == second and math.copysign(1.0, first) == math.copysign(1.0, second)
 
 
 SAMPLERS, KEPT = "samplers", 256

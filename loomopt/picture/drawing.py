@@ -39,10 +39,10 @@ class Label(NamedTuple):
     also: tuple[Point, ...] = ()
 
 
-def along(layer: str, one: Point, other: Point, side: float, text: str) -> Label:
+def along(layer: str, first: Point, second: Point, side: float, text: str) -> Label:
     """Label of a link between two joints: beside its middle, else nearer to an end."""
     return Label(
-        layer, one.part(other), side, text, tuple(one.part(other, share) for share in (0.62, 0.38, 0.75, 0.25))
+        layer, first.part(second), side, text, tuple(first.part(second, share) for share in (0.62, 0.38, 0.75, 0.25))
     )
 
 
@@ -152,25 +152,25 @@ def mass(centre: Point, h: float) -> list[Primitive]:
     ]
 
 
-def spring(layer: str, one: Point, other: Point, width: float) -> Line:
+def spring(layer: str, first: Point, second: Point, width: float) -> Line:
     """A tension spring between two points as a zigzag of a width, m, with a straight hook at either end."""
-    along = math.atan2(other.y - one.y, other.x - one.x)
+    along = math.atan2(second.y - first.y, second.x - first.x)
     hook, turn = 0.1, (1.0 - 0.2) / (2 * COILS)
     zigzag = [
-        one.part(other, hook + turn * (k + 0.5)).towards(along + math.copysign(math.pi / 2, (-1) ** k), width / 2)
+        first.part(second, hook + turn * (k + 0.5)).towards(along + math.copysign(math.pi / 2, (-1) ** k), width / 2)
         for k in range(2 * COILS)
     ]
-    return Line(layer, (one, one.part(other, hook), *zigzag, one.part(other, 1 - hook), other))
+    return Line(layer, (first, first.part(second, hook), *zigzag, first.part(second, 1 - hook), second))
 
 
-def dimension(one: Point, other: Point, h: float) -> list[Primitive]:
+def dimension(first: Point, second: Point, h: float) -> list[Primitive]:
     """A straight dimension line with an arrow head at either end; nothing where the two points are one."""
-    length, along = math.dist(one, other), math.atan2(other.y - one.y, other.x - one.x)
+    length, along = math.dist(first, second), math.atan2(second.y - first.y, second.x - first.x)
     if not length:
         return []
     head = min(HEAD * h, length / 3)
-    heads = [arrow("dimensions", other, along, head), arrow("dimensions", one, along + math.pi, head)]
-    return [Line("dimensions", (one, other)), *heads]
+    heads = [arrow("dimensions", second, along, head), arrow("dimensions", first, along + math.pi, head)]
+    return [Line("dimensions", (first, second)), *heads]
 
 
 JOINT = 0.35
@@ -214,7 +214,9 @@ class Skeleton:
     def strokes(self, h: float) -> list[Primitive]:
         """Strokes that every drawing shows; h: text height, m."""
         frame = [link for link in self.links if set(link) <= set(self.pivots)]
-        primitives: list[Primitive] = [Line("paths", (self.pivots[one], self.pivots[other])) for one, other in frame]
+        primitives: list[Primitive] = [
+            Line("paths", (self.pivots[first], self.pivots[second])) for first, second in frame
+        ]
         for pivot in self.pivots.values():
             primitives += fixed_pivot(pivot, h)
         primitives += [
@@ -223,7 +225,9 @@ class Skeleton:
         primitives += self.traces
         for event, joints in self.joints.items():
             at = self.at(event)
-            primitives += [Line(event, (at[one], at[other])) for one, other in self.links if (one, other) not in frame]
+            primitives += [
+                Line(event, (at[first], at[second])) for first, second in self.links if (first, second) not in frame
+            ]
             primitives += [Circle(event, joints[name], radius) for name, radius in self.guides if name in joints]
             sizes = {name: self.sizes.get(name, JOINT) for name in joints if name not in self.masses}
             primitives += [Circle("joints", joints[name], size * h) for name, size in sizes.items() if size]

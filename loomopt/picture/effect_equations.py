@@ -150,11 +150,11 @@ def term(load: Acting, pose: Motion, inputs: Given, letter: str) -> Equation:
     if not inner:
         return equation(load.name, name, last)
     phi = symbol("phi")
-    parts = [f"{text(one)} for {text(a)} <= {text(phi)} <= {text(b)}" for one, (a, b) in inner]
-    lines = [rf"{latex(one)} & {latex(a)} \le {latex(phi)} \le {latex(b)}" for one, (a, b) in inner]
+    parts = [f"{text(case)} for {text(a)} <= {text(phi)} <= {text(b)}" for case, (a, b) in inner]
+    lines = [rf"{latex(case)} & {latex(a)} \le {latex(phi)} \le {latex(b)}" for case, (a, b) in inner]
     choice = r" \\ ".join([*lines, rf"{latex(last)} & \text{{else}}"])
     written = rf"{latex(name)} = \begin{{cases}} {choice} \end{{cases}}"
-    form = ((name, "="), *((one, (a, phi, b)) for one, (a, b) in inner), (last, "else"))
+    form = ((name, "="), *((case, (a, phi, b)) for case, (a, b) in inner), (last, "else"))
     return Equation(load.name, f"{text(name)} = {', '.join(parts)}, else {text(last)}", written, form)
 
 
@@ -288,7 +288,7 @@ def event_equations(model: JobModel, poses: tuple[Motion, Motion], inputs: Given
     forward, back = ([sp.expand(force(load, pose, inputs, 0)) for load in output] for pose in poses)
     total = sum(symbol(f"{letter}_{load.name}") for load in output)
     mass = sum(form.coeff(poses[0].q2) for form in forward) / omega**2
-    friction = sum((one - other) / 2 for one, other in zip(forward, back, strict=True))
+    friction = sum((first - second) / 2 for first, second in zip(forward, back, strict=True))
     terms = EventTerms(symbol, total, sp.simplify(friction), sp.simplify(mass))
     rules = [rule for event in model.effects if isinstance(event, Event) for rule in event.rules(terms)]
     return [relation(rule.name, sp.sympify(rule.left), rule.sign, sp.sympify(rule.right), rule.where) for rule in rules]

@@ -301,8 +301,8 @@ class Measure(NamedTuple):
     """A length between two points, m, and its name; band: its lower and upper deviation, m, both 0 where not said."""
 
     name: str
-    one: Point
-    other: Point
+    first: Point
+    second: Point
     band: tuple[float, float] = (0.0, 0.0)
 
 
@@ -352,8 +352,8 @@ def scale_drawing(drawing: Drawing, size: float) -> Drawing:
                 return replace(primitive, at=of(at))
 
     measures = tuple(
-        Measure(name, of(one), of(other), (size * band[0], size * band[1]))
-        for name, one, other, band in drawing.measures
+        Measure(name, of(first), of(second), (size * band[0], size * band[1]))
+        for name, first, second, band in drawing.measures
     )
     primitives = tuple(map(larger, drawing.primitives))
     return replace(drawing, height=size * drawing.height, primitives=primitives, measures=measures)

@@ -425,7 +425,7 @@ def plan_sweep(
     job = registry.of_target(base, name)
     job.demand(base, name)
     check_sought(base)
-    return Sweep(base, name, axes, float(accuracy), int(seed), bool(job.program(base, name).single))
+    return Sweep(base, name, axes, float(accuracy), int(seed), bool(job.program(base, name).uniqueness_reason))
 
 
 def _values(given: str | Sequence[str | float], key: str) -> Sequence[str | float]:

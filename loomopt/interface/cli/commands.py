@@ -39,10 +39,10 @@ def tell(
         layout.show(*parts())
 
 
-def write(paths: Sequence[Path] | None, one: Callable[[Path], object]) -> None:
+def write(paths: Sequence[Path] | None, write_file: Callable[[Path], object]) -> None:
     """Write the requested files, with a remark for each."""
     for path in paths or ():
-        one(path)
+        write_file(path)
         remark(f"Wrote {path}")
 
 

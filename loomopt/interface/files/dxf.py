@@ -102,14 +102,14 @@ def _add_dimensions(document: Any, space: Any, drawing: Drawing) -> list[tuple[f
     sizes = {"dimtxt": h, "dimasz": 0.8 * h, "dimexo": 0.5 * h, "dimexe": 0.5 * h, "dimgap": 0.4 * h}
     style = sizes | {"dimtxsty": _TEXT_STYLE, "dimdec": DECIMALS, "dimzin": 8, "dimtad": 1, "dimlunit": 2}
     style |= {"dimscale": 1.0, "dimclrd": MEASURED, "dimclre": MEASURED, "dimclrt": MEASURED}
-    ends = [point for measure in drawing.measures for point in (measure.one, measure.other)]
+    ends = [point for measure in drawing.measures for point in (measure.first, measure.second)]
     middle = [sum(axis) / len(ends) for axis in zip(*ends, strict=True)]
     for name, *both, band in drawing.measures:
-        one, other = sorted(both)  # from left to right, so that no text stands on its head
-        across = (other.x - one.x) * (middle[1] - one.y) - (other.y - one.y) * (middle[0] - one.x)
+        first, second = sorted(both)  # from left to right, so that no text stands on its head
+        across = (second.x - first.x) * (middle[1] - first.y) - (second.y - first.y) * (middle[0] - first.x)
         made = space.add_aligned_dim(
-            one,
-            other,
+            first,
+            second,
             distance=-AWAY * h if across > 0 else AWAY * h,
             text=f"{name} = <>{_band_text(band)}",
             dimstyle="STANDARD",

@@ -226,9 +226,9 @@ def _draw(
         pen.ellipse(
             (x - r, y - r, x + r, y + r), outline=GHOST if joint in motion.pivots or ghosted else piece, width=FINE
         )
-    for one, other in (*motion.links, *motion.springs):
-        thin = ghosted or (one, other) in motion.springs or (one in motion.pivots and other in motion.pivots)
-        pen.line([at[one], at[other]], fill=GHOST if thin else link, width=FINE if thin else 4 * FINE)
+    for first, second in (*motion.links, *motion.springs):
+        thin = ghosted or (first, second) in motion.springs or (first in motion.pivots and second in motion.pivots)
+        pen.line([at[first], at[second]], fill=GHOST if thin else link, width=FINE if thin else 4 * FINE)
     for name in at:
         if name not in motion.unnamed:
             (x, y), r = at[name], 3 * FINE

@@ -178,12 +178,12 @@ def _layer(motion: MechanismMotion, frame: Frame, kind: str, pose: int) -> str:
         still = "guide" if joint in motion.pivots else "ring"
         size = f'r="{radius * frame.size:.1f}"'
         marks.append(f'<circle class="{still}" data-ring="{place}" {_centre(joint, at)} {size}/>')
-    for one, other in motion.links:
-        still = " frame" if one in motion.pivots and other in motion.pivots else ""
-        ends = f'x1="{at[one][0]}" y1="{at[one][1]}" x2="{at[other][0]}" y2="{at[other][1]}"'
-        marks.append(f'<line class="link{still}" {_link_data(one, other)} {ends}/>')
-    for one, other in motion.springs:
-        marks.append(f'<path class="return-spring" {_link_data(one, other)} d="{_spring(at[one], at[other])}"/>')
+    for first, second in motion.links:
+        still = " frame" if first in motion.pivots and second in motion.pivots else ""
+        ends = f'x1="{at[first][0]}" y1="{at[first][1]}" x2="{at[second][0]}" y2="{at[second][1]}"'
+        marks.append(f'<line class="link{still}" {_link_data(first, second)} {ends}/>')
+    for first, second in motion.springs:
+        marks.append(f'<path class="return-spring" {_link_data(first, second)} d="{_spring(at[first], at[second])}"/>')
     marks += [f'<path class="ground" data-at="{escape(name)}" d="{_ground(*at[name])}"/>' for name in motion.pivots]
     marks += [f'<circle class="joint" {_centre(name, at)} r="{JOINT}"/>' for name in at if name not in motion.unnamed]
     if kind == "design":
@@ -216,8 +216,8 @@ def _piece(place: int, piece: Turning, at: Mapping[str, Floats], frame: Frame, p
     )
 
 
-def _link_data(one: str, other: str) -> str:
-    return f'data-a="{escape(one)}" data-b="{escape(other)}"'
+def _link_data(first: str, second: str) -> str:
+    return f'data-a="{escape(first)}" data-b="{escape(second)}"'
 
 
 def _ground(x: float, y: float) -> str:
@@ -236,9 +236,9 @@ def _path(points: Floats) -> str:
     return f'<polygon class="way" points="{coordinates}"/>'
 
 
-def _spring(one: Floats, other: Floats) -> str:
+def _spring(first: Floats, second: Floats) -> str:
     """A spring's sign between two points; the script draws the same."""
-    (x, y), (u, v) = one.tolist(), other.tolist()
+    (x, y), (u, v) = first.tolist(), second.tolist()
     long = math.hypot(u - x, v - y) or 1.0
     nx, ny = -(v - y) / long * 12, (u - x) / long * 12
     commands = [f"M{x:.1f} {y:.1f}"]

@@ -144,10 +144,10 @@ def _tolerance(quantity: Quantity) -> Json:
         "group": {"type": "string", "description": "what numbers are made together by"},
         "correlation": share | {"description": "with the others of the group"},
     }
-    one: Json = {"oneOf": [{"required": [form]} for form in FORMS]}
+    exactly_one_form: Json = {"oneOf": [{"required": [form]} for form in FORMS]}
     pairs = (("group", "correlation"), ("plus", "minus"))
     together = {"dependentRequired": {a: [b] for pair in pairs for a, b in (pair, pair[::-1])}}
-    return {"if": {"type": "object"}, "then": _closed_table(keys) | one | together, "else": half}
+    return {"if": {"type": "object"}, "then": _closed_table(keys) | exactly_one_form | together, "else": half}
 
 
 def _accept(schema: SceneSchema) -> Json:

@@ -96,7 +96,7 @@ def _values(scene: Scene) -> Iterator[tuple[str, str, float | str | Sequence[flo
         for name, value in given(scene.tables[table]).items():
             if isinstance(value, tuple) and value and isinstance(value[0], Table):
                 for k, number in enumerate(value, 1):
-                    yield from ((f"{table}.{name}.{k}.{key}", key, one) for key, one in given(number).items())
+                    yield from ((f"{table}.{name}.{k}.{key}", key, amount) for key, amount in given(number).items())
             else:
                 yield f"{table}.{name}", name, value
     for effect in scene.active:

@@ -785,8 +785,8 @@ def angle_difference(angle: float, reference: float) -> float:
 
 def extremes(places: tuple[EventRule, ...]) -> tuple[str, str]:
     """First event that is a maximum of q, and the first that is a minimum; "" without."""
-    own = [place for place in places if not place.of]
-    return tuple(next((p.name for p in own if p.extreme == kind), "") for kind in ("max", "min"))  # type: ignore[return-value]
+    output_events = [place for place in places if not place.of]
+    return tuple(next((p.name for p in output_events if p.extreme == kind), "") for kind in ("max", "min"))  # type: ignore[return-value]
 
 
 def _span(group: str, name: str, m: Maths, given: Given, phi: Number, pose: Callable[[], Any]) -> Number:

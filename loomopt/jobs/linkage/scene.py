@@ -89,7 +89,7 @@ FORMS = {"angle": "link", "slide": "slider or slot", "x": "joint", "y": "joint"}
 """Key of [output] → what it measures."""
 SCALE, TRAVEL = "what the output is multiplied by", "travel between {} and {before}{after}"
 OUTPUT_KEYS: parts.Keys = {
-    **{form: WordKey(what) for form, what in FORMS.items()},
+    **{form: WordKey(description) for form, description in FORMS.items()},
     "against": WordKey(parts.LINK),
     "sense": WordKey(parts.SENSE),
     "scale": NumberKey(PositiveNumber, SCALE),

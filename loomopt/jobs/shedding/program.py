@@ -533,7 +533,7 @@ class SheddingTask(Task):
             return {}
         return named_knots(accelerations(cam_law(self.scene), scene_numbers(self.scene), self.law.intervals))
 
-    def single(self) -> str:
+    def uniqueness_reason(self) -> str:
         """Why every local optimum is the best there is; "" where that is not so.
 
         Every force is linear in K1 and K1 X0, and in the speed's square, but power is not [Qiu21, eq 6]. With a free

@@ -118,7 +118,9 @@ class LawTarget(TargetTable):
     acceleration: PositiveNumber = Field(CYCLOID, description="largest |s''|")
 
 
-SAID = {name: field.description or "" for own in (Operation, HealdFrame) for name, field in own.model_fields.items()}
+SAID = {
+    name: field.description or "" for table in (Operation, HealdFrame) for name, field in table.model_fields.items()
+}
 """Descriptions of the scene's numbers, for figures of the same name."""
 
 VARIABLES = {"K1": "stiffness", "X0": "length"}

@@ -248,10 +248,10 @@ def _dyad(pose: ChainPose, part: Part) -> None:
     (first, second), names = (pose.joints[name] for name in part.names("joins")), part.names("links")
     r1, r2 = (pose.number(part, name) for name in names)
     group = TwoLinks(pose.maths, first, second, r1, r2, SIDES[part.word("side")])
-    one, other = group.links()
-    pose.links.update(zip(names, (one, other), strict=True))
+    begin, end = group.links()
+    pose.links.update(zip(names, (begin, end), strict=True))
     # The pin is reached over the second link: fewest terms where its joint is fixed.
-    pose.joints[part.word("pin")] = Joint(other.carried(other.heading))
+    pose.joints[part.word("pin")] = Joint(end.carried(end.heading))
     pose.margins[part.name] = group
 
 

@@ -157,12 +157,12 @@ def follow(body: Body, cam: Cam, restitution: float, turns: int) -> Course:
     return Course(body, cam, tuple(course), None)
 
 
-def _same(one: FlightState | None, other: FlightState | None, cam: Cam) -> bool:
+def _same(first: FlightState | None, second: FlightState | None, cam: Cam) -> bool:
     """Whether two states are equal."""
-    if one is None or other is None:
-        return one is other
-    near = abs(one.x - other.x) <= REPEATED * cam.stroke
-    return near and abs(one.v - other.v) <= REPEATED * cam.stroke * cam.omega
+    if first is None or second is None:
+        return first is second
+    near = abs(first.x - second.x) <= REPEATED * cam.stroke
+    return near and abs(first.v - second.v) <= REPEATED * cam.stroke * cam.omega
 
 
 @dataclass

@@ -314,8 +314,8 @@ def _sought(search: Search) -> str:
     """Extent of the search, as a sentence that claims no more than was done."""
     if search.stayed:
         return "Solved again near the given answer; other basins were not searched."
-    if search.program.single:
-        return f"Other basins were not searched: {search.program.single}."
+    if search.program.uniqueness_reason:
+        return f"Other basins were not searched: {search.program.uniqueness_reason}."
     solves, optima = len(search.candidates), len(_optima(search))
     reached = f"{solves} solve{'s' if solves > 1 else ''}"
     ended = f"Best of {optima} optima" if optima > 1 else "The only optimum"

@@ -303,12 +303,12 @@ def changed(member: Evaluated) -> str:
     return ", ".join(f"{key.split('.', 1)[-1]} {value}" for key, value in member.change.items())
 
 
-def demand_single(evaluation: Evaluated, what: str) -> None:
-    """Raise BadInput for a family, whose members each have their own; what: the requested data."""
+def demand_single(evaluation: Evaluated, data: str) -> None:
+    """Raise BadInput for a family, whose members each have their own; data: the requested data."""
     if evaluation.members:
         origin = evaluation.scene.origin if evaluation.scene else ""
         remedy = "Take one member: answer.members[0], or its numbers set and its own target"
-        raise refusal(f"a family has no {what}: each of its members has", origin, "target", FAMILY, remedy=remedy)
+        raise refusal(f"a family has no {data}: each of its members has", origin, "target", FAMILY, remedy=remedy)
 
 
 def _member_dict(member: Evaluated, whole: Scene | None) -> dict[str, Any]:

@@ -398,7 +398,7 @@ def search_basins(search: Search, seed: int, on_start: OnStart | None) -> Search
     job_starts = exchange.starts(search.program, 1, seed)
     search = at_step(search, "looking at designs")
     began = time.perf_counter()
-    screening = None if search.program.single else _screening(search, job_starts)
+    screening = None if search.program.uniqueness_reason else _screening(search, job_starts)
     screened = _complete_starts(search, screening.starts(seed)) if screening else []
     design_count, spent = screening.count if screening else 0, time.perf_counter() - began
     search = replace(search, screened=design_count, solve_seconds=search.solve_seconds + spent)

@@ -163,9 +163,9 @@ def objective_values(program: Program, x: Mapping[str, float]) -> Iterator[float
         yield math.inf if sampler is None else objective.merit(sampler) / objective.scale
 
 
-def compare(one: Candidate, other: Candidate) -> int:
+def compare(first: Candidate, second: Candidate) -> int:
     """Order candidates by their objectives, level by level."""
-    for a, b in zip(one.objectives, other.objectives, strict=True):
+    for a, b in zip(first.objectives, second.objectives, strict=True):
         if abs(a - b) > SAME_OBJECTIVE:
             return -1 if a < b else 1
     return 0

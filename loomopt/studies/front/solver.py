@@ -293,7 +293,7 @@ class Solver:
 
     def _spread(self, search: Search) -> Search:
         """A passed search after a search of other basins, if there may be any."""
-        return search if search.program.single else certify_best(search_basins(search, 0, None))
+        return search if search.program.uniqueness_reason else certify_best(search_basins(search, 0, None))
 
     def _priced(self, search: Search, request: Subproblem) -> bool:
         """Whether the limit on the other axis has a price at the level of the first."""

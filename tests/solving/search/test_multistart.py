@@ -79,7 +79,7 @@ def test_the_deeper_basin_is_found_and_what_was_done_is_counted():
 
 
 def test_where_one_optimum_is_all_there_is_no_designs_are_looked_at():
-    result = wide(hills(single="because"))
+    result = wide(hills(uniqueness_reason="because"))
     assert (len(result.candidates), result.screened) == (1, 0)
     assert result.best.x["x"] > 1.8, "the programme's word is taken"
 

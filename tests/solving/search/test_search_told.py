@@ -35,7 +35,7 @@ def test_what_was_done_is_told(made, sentence):
 
 def test_why_no_other_basin_was_looked_for():
     made = search()
-    made = replace(made, program=replace(made.program, single="it is linear"))
+    made = replace(made, program=replace(made.program, uniqueness_reason="it is linear"))
     assert report._sought(made) == "Other basins were not searched: it is linear."
 
 
