@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, create_model
 
 from loomopt.base.errors import Faults, refusal, unknown
-from loomopt.base.quantities import Angle, PositiveLength, PositiveNumber, PureNumber, Speed, read
+from loomopt.base.quantities import Angle, PositiveLength, PositiveNumber, PureNumber, Speed, Torque, read
 from loomopt.base.units import QuantityError, ShowValue, usual
 from loomopt.jobs.linkage import parts
 from loomopt.jobs.linkage.model import (
@@ -55,6 +55,7 @@ class Operation(Table):
     """Operation of the machine."""
 
     speed: Speed | None = Field(None, description="speed of the crank")
+    M0: Torque | None = Field(None, description="largest torque of the resistance, in place of its key torque")
 
 
 class LinkageTarget(TargetTable):
@@ -615,6 +616,7 @@ def _check_states(scene: Scene, linkage: Linkage) -> None:
 def _check_names(scene: Scene, known: LinkageScene) -> None:
     """Raise BadInput for a number that is called as something else is."""
     taken = dict.fromkeys(scene.schema.figures, "a figure") | {"speed": "the crank's speed"}
+    taken |= {"M0": "the resistance's torque"} if "M0" in scene.operation else {}
     taken |= dict.fromkeys(("omega", "omega_dot", "phi", "instance"), "a symbol of the equations")
     taken |= {
         kinds.label(effect, key): f"a number of effect {effect.name}"
@@ -647,11 +649,22 @@ def _check_effects(scene: Scene, known: LinkageScene) -> None:
                 faults.add(unknown(sort, value, places, scene.origin, f"{path}.{key}", "Add it, or correct the name"))
         with faults:
             _check_sense(effect, table.model_dump(), path, scene.origin)
+        with faults:
+            _check_resistance(scene, effect, table.model_dump(), path)
         if effect.name == "inertia" and getattr(table, "m", None) is not None and not known.linkage.output.carrier:
             problem = f"{path}.m needs a link of the output that turns about a fixed axis and counts from the frame"
             remedy = f"Take m out, and give the link's mass in [effects.mass.{known.linkage.output.name}]"
             faults.add(refusal(problem, scene.origin, f"{path}.m", remedy=remedy))
     faults.tell()
+
+
+def _check_resistance(scene: Scene, effect: kinds.Effect, values: Mapping[str, Any], path: str) -> None:
+    """Raise BadInput where the torque of the resistance is not given, or twice."""
+    if effect.name != PULSED or "torque" not in values or values["table"] is not None:
+        return
+    if (values["torque"] is None) == ("M0" not in scene.operation):
+        problem = "the torque of the resistance is " + ("missing" if values["torque"] is None else "given twice")
+        raise refusal(problem, scene.origin, f"{path}.torque", remedy="Give torque here, or operation.M0")
 
 
 def _check_sense(effect: kinds.Effect, values: Mapping[str, Any], path: str, origin: str) -> None:

@@ -110,3 +110,18 @@ def test_a_number_of_a_named_effect_is_bounded_in_full_and_found():
     answer = lo.solve(scene, "torque", starts=1)
     assert answer.status == "optimal"
     assert 1.0 - 1e-9 <= answer.design["rod.mass"] <= 3.0 + 1e-9
+
+
+def test_the_torque_of_the_resistance_is_given_once_under_either_name():
+    given = four_bar()
+    moved = four_bar(operation={"M0": "745 N*m"}, effects={"resistance": {"torque": None, "at": None}})
+    assert lo.evaluate(moved).figures["peak_torque"] == lo.evaluate(given).figures["peak_torque"]
+    assert lo.evaluate(moved.set("operation.M0", "800 N*m")).figures["moment.front"] == pytest.approx(
+        lo.evaluate(given.set("effects.resistance.torque", "800 N*m")).figures["moment.front"], rel=1e-14
+    )
+    for changes, problem in (
+        ({"operation": {"M0": "745 N*m"}}, "given twice"),
+        ({"effects": {"resistance": {"torque": None}}}, "missing"),
+    ):
+        with pytest.raises(lo.BadInput, match=f"resistance.torque: the torque of the resistance is {problem}"):
+            four_bar(**changes)

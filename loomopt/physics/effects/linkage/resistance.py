@@ -27,9 +27,9 @@ SAID = "CSV file of it instead: angle [deg] from the event, {}, corner"
 class Parameters(Table):
     """Values of the resistance, of an output that turns."""
 
-    torque: Torque | None = Field(None, description="largest torque")
+    torque: Torque | None = Field(None, description="largest torque; operation.M0 is the same number")
     pulse: PulseAngle | None = Field(None, description=PULSE)
-    at: Name = Field(description=AT)
+    at: Name = Field("front", description=AT)
     table: Name | None = Field(None, description=SAID.format("M [N*m]"))
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
@@ -39,7 +39,7 @@ class Sliding(Table):
 
     force: Force | None = Field(None, description="largest force")
     pulse: PulseAngle | None = Field(None, description=PULSE)
-    at: Name = Field(description=AT)
+    at: Name = Field("front", description=AT)
     table: Name | None = Field(None, description=SAID.format("F [N]"))
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
@@ -49,9 +49,16 @@ def corners(at: Inputs[object]) -> tuple[Number, ...]:
     return pulse.corners(at.maths, event_angle(at.values, at.table["at"]), at.table)
 
 
+def _largest(at: Inputs[LinkagePose]) -> Number:
+    """Largest resistance, N·m or N; None of a table."""
+    if "table" in at.table:
+        return None
+    key = next((key for key in ("torque", "force") if key in at.table), None)
+    return at.values["M0"] if key is None else at.table[key]
+
+
 def _pulse(at: Inputs[LinkagePose]) -> Pulse:
-    largest = None if "table" in at.table else at.table["torque" if "torque" in at.table else "force"]
-    return Pulse(at.maths, largest, event_angle(at.values, at.table["at"]), at.pose.phi, at.table, at.switch)
+    return Pulse(at.maths, _largest(at), event_angle(at.values, at.table["at"]), at.pose.phi, at.table, at.switch)
 
 
 def force(at: Inputs[LinkagePose]) -> Number:
@@ -75,7 +82,7 @@ EFFECT = Load(
     corners=corners,
     response=response,
     switch=pulse.switch,
-    tabulated=LoadTable("M", "torque", "counted from the event", ("torque", "pulse")),
+    tabulated=LoadTable("M", "torque", "counted from the event", ("pulse",), ("operation.M0",)),
     examples=({"torque": "745 N*m", "pulse": "29.8 deg", "at": "front"},),
 )
 SLIDING = replace(
