@@ -198,7 +198,7 @@ def source_tables(scene: Scene) -> list[str | TextTable]:
     """
     if not registry.is_packaged(scene):
         origin = f"source: {scene.source}" if scene.source else "source: not given"
-        return [f"{scene.name}: a scene of one's own; no printed figures are known of its machine", origin]
+        return [f"{scene.name}: a scene of your own; its machine has no published figures", origin]
     source = read(scene.job)
     lines = tuple(
         (

@@ -175,10 +175,10 @@ MISTAKES = {
     "unknown joint": (changed("crank", at="AA"), 'parts.crank.at: unknown joint "AA"'),
     "unknown link": (with_part("E", POINT, on="rockr"), 'parts.E.on: unknown link "rockr"'),
     "a link for a joint": (changed("drive", joins=["crank", "D"]), "parts.drive.joins: crank is a link, and a joint"),
-    "a joint for a link": (with_part("E", POINT, on="C"), "parts.E.on: C is a joint, and a link is wanted"),
+    "a joint for a link": (with_part("E", POINT, on="C"), "parts.E.on: C is a joint, but a link is needed"),
     "the frame for a joint": (
         changed("crank", at="frame"),
-        "parts.crank.at: frame is the frame, and a joint is wanted",
+        "parts.crank.at: frame is the frame, but a joint is needed",
     ),
     "a joint placed twice": (
         with_part("second", FOUR_BAR["drive"], links={"a": "l2", "b": "l3"}),
