@@ -138,8 +138,10 @@ class Jet:
 
 
 def _wide(values: Number) -> Number:
-    """Values with an axis for directions; a scalar is returned as it is."""
-    return values[..., None] if isinstance(values, np.ndarray) else values
+    """Values with an axis for directions; a single one as a scalar, which is quicker and gives the same bits."""
+    if not isinstance(values, np.ndarray):
+        return values
+    return values[..., None] if values.size != 1 else values.item()
 
 
 def _mixed(first: Floats, second: Floats) -> Floats:

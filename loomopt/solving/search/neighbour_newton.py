@@ -2,7 +2,7 @@
 
 Each program starts between the optima of two neighbours and is moved to the point at which their active rows hold and
 the slopes balance; extremes of the cycle are eliminated. All programs of a batch are evaluated in one pass
-(`certificate.batch_certificate`), and no result depends on the rest of the batch. The result is a candidate like that
+(`certificate.batch_derivatives`), and no result depends on the rest of the batch. The result is a candidate like that
 of every solve: tie-broken, certified and simplified. If a step fails there is no candidate, and the program is solved
 alone.
 """
@@ -20,14 +20,8 @@ from loomopt.model.reading import group_equal
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE, POSITIVE, PRECISE, ROUNDING
-from loomopt.solving.certificate.batch_certificate import (
-    DesignAt,
-    Designs,
-    RowDerivatives,
-    certify_batch,
-    shares,
-    without_extremes,
-)
+from loomopt.solving.certificate.batch_certificate import certify_batch
+from loomopt.solving.certificate.batch_derivatives import DesignAt, Designs, RowDerivatives, shares, without_extremes
 from loomopt.solving.certificate.kkt import ActiveRow
 from loomopt.solving.certificate.records import Certificate, FrameRow
 from loomopt.solving.certificate.taylor_bounds import cycle_rows
@@ -236,7 +230,7 @@ def _step(
     before; least-squares multipliers without them.
     """
     slope, _ = derivatives.along_u
-    share, bends = shares(derivatives, inner), without_extremes(derivatives, inner)
+    share, bends = shares(derivatives.bends, inner), without_extremes(derivatives.bends, inner)
     # To first order, each row's extreme is at the point where its slope along u vanishes.
     slopes = derivatives.slopes[:, :, :-1] - (share * slope)[:, :, None] * derivatives.bends[:, :, :-1, -1]
     values = derivatives.values - 0.5 * share * slope * slope

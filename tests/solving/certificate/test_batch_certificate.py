@@ -10,8 +10,9 @@ from loomopt.jobs import registry
 from loomopt.scenes import designs
 from loomopt.solving import engine
 from loomopt.solving.certificate import batch_certificate
+from loomopt.solving.certificate.batch_derivatives import DesignAt
 from loomopt.solving.certificate.certificate import certify, prepare
-from loomopt.solving.certificate.derivatives import JetDerivatives
+from loomopt.solving.certificate.derivatives import JetDerivatives, jet_derivatives
 
 ACCURACY, ROUNDED = 1e-8, 1e-12
 TASKS = [
@@ -50,8 +51,8 @@ def beside(program, x, share, count):
 def test_derivatives_are_those_of_each_design_alone(job, target):
     program, x = optimum(job, target)
     places = [(item, prepare(program, item, ACCURACY)) for item in beside(program, x, 1e-9, 4)]
-    requests = [batch_certificate.DesignAt(program, item, sampler, active.rows) for item, (sampler, active) in places]
-    for of, result in zip(requests, batch_certificate.derivatives(requests), strict=True):
+    requests = [DesignAt(program, item, sampler, active.rows) for item, (sampler, active) in places]
+    for of, result in zip(requests, jet_derivatives(requests), strict=True):
         alone = JetDerivatives(program, of.x, of.sampler, of.rows)
         basis = np.linalg.qr(np.random.default_rng(2).standard_normal((len(alone.names), 3)))[0]
         for mine, values in (
@@ -66,15 +67,14 @@ def test_derivatives_are_those_of_each_design_alone(job, target):
 def test_derivatives_are_the_same_bits_in_batches_of_any_size(job, target):
     program, x = optimum(job, target)
     places = [(entry, prepare(program, entry, ACCURACY)) for entry in beside(program, x, 1e-9, 10)]
-    requests = [batch_certificate.DesignAt(program, entry, sampler, active.rows) for entry, (sampler, active) in places]
-    whole = batch_certificate.derivatives(list(itertools.islice(itertools.cycle(requests), 200)))
+    requests = [DesignAt(program, entry, sampler, active.rows) for entry, (sampler, active) in places]
+    whole = jet_derivatives(list(itertools.islice(itertools.cycle(requests), 200)))
     for size in (1, 8):
-        parts = [
-            batch_certificate.derivatives(requests[begin : begin + size]) for begin in range(0, len(requests), size)
-        ]
+        parts = [jet_derivatives(requests[begin : begin + size]) for begin in range(0, len(requests), size)]
         for item, other in zip(itertools.chain(*parts), whole[: len(requests)], strict=True):
             assert item.gradients().tobytes() == other.gradients().tobytes()
-            assert item.bends.tobytes() == other.bends.tobytes()
+            basis = np.eye(len(item.names))
+            assert item.curvatures(basis).tobytes() == other.curvatures(basis).tobytes()
 
 
 @pytest.mark.few(1)

@@ -15,7 +15,8 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.tolerances import JET_ERROR
 from loomopt.solving.certificate import derivatives
-from loomopt.solving.certificate.derivatives import JetDerivatives, JetReading
+from loomopt.solving.certificate.batch_derivatives import DesignAt, Designs, JetReading
+from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import active_set
 
@@ -102,10 +103,11 @@ def test_tops_move_with_the_design(name):
 def test_an_extreme_is_settled_by_newtons_step_from_where_it_was_sampled():
     program = wave(lambda m, phi, x: x * m.cos(phi - 1), "x")
     jets, _ = both(program, {"x": 1.0})
-    assert sorted(jets.u["w"]) == pytest.approx([0.5 / math.pi, 0.5 / math.pi + 0.5], rel=1e-15)
+    assert sorted(jets.u) == pytest.approx([0.5 / math.pi, 0.5 / math.pi + 0.5], rel=1e-15)
+    batch = Designs([DesignAt(program, {"x": 1.0}, jets.sampler, jets.rows)])
     for off, settles in ((1e-6, True), (2e-2, False)):
-        u = np.array([0.5 / math.pi + off] * 2)
-        assert jets._newton_step({"w": u})["w"][0] == pytest.approx(0.5 / math.pi if settles else u[0], abs=1e-15)
+        u = np.array([[0.5 / math.pi + off] * 2])
+        assert batch.newton_step(batch.x, u)[0, 0] == pytest.approx(0.5 / math.pi if settles else u[0, 0], abs=1e-15)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
@@ -162,15 +164,16 @@ def test_all_whole_cycle_rows_are_read_in_one_pass_whatever_their_quantities(mon
     result = JetDerivatives(program, x, sampler, rows)
     result.gradients()
     result.curvatures(np.eye(len(result.names)))
-    assert len(result.groups) > 1
-    assert read == [tuple(result.groups)]
+    names = tuple(dict.fromkeys(row.reads for row in rows if row.node))
+    assert len(names) > 1
+    assert read == [names]
     # Of many variables in three: for the extremes, for slopes, and along the few directions that are asked.
     monkeypatch.setattr(derivatives, "AT_ONCE", 0)
     apart, basis = JetDerivatives(program, x, sampler, rows), np.eye(len(result.names))[:, :2]
     sizes = np.abs(result.gradients()).max(axis=1, initial=1.0)
     assert np.abs(apart.gradients() - result.gradients()).max(axis=1) == pytest.approx(0.0 * sizes, abs=1e-12)
     assert apart.curvatures(basis) == pytest.approx(result.curvatures(basis), rel=1e-10, abs=1e-8)
-    assert read == [tuple(result.groups)] * 4
+    assert read == [names] * 4
 
 
 def test_an_extreme_that_stands_beside_its_place_is_read_again_there():
@@ -179,6 +182,6 @@ def test_an_extreme_that_stands_beside_its_place_is_read_again_there():
     rows = active_set(program, sampler).rows
     off = [row._replace(node=row.node._replace(u=row.node.u + 1e-5)) for row in rows]
     there, neighbour = (JetDerivatives(program, {"x": 1.0}, sampler, item) for item in (rows, off))
-    assert neighbour.u["w"] == pytest.approx(there.u["w"], abs=1e-15)
+    assert neighbour.u == pytest.approx(there.u, abs=1e-15)
     assert neighbour.gradients() == pytest.approx(there.gradients(), abs=1e-14)
     assert neighbour.curvatures(np.eye(1)) == pytest.approx(there.curvatures(np.eye(1)), abs=1e-13)
