@@ -6,7 +6,7 @@ It uses only moves that are flat at this design: the objectives change by at mos
 import contextlib
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from loomopt.maths import systems
 from loomopt.maths.systems import Number
-from loomopt.model.limits import Limit, SingleLimit
+from loomopt.model.limits import CycleLimit, Limit, SingleLimit
 from loomopt.model.program import Move, Preference, Program
 from loomopt.model.reading import BatchReading, group_equal, plain, wide
 from loomopt.model.sampling import Sampler, sampled
@@ -188,25 +188,23 @@ def _read_paths(paths: Sequence[_Paths]) -> list[_PathReading]:
     """Values along paths; those of designs of one kind are read in one pass, and again one by one if that fails."""
     readings = [UNREADABLE] * len(paths)
     samplers = {k: sampler for k, path in enumerate(paths) if (sampler := _sampler(path))}
-    keys = [
-        (
-            sampler.batch_key,
-            sampler.grid(NODES)[0].tobytes(),
-            paths[k].program.structure,
-            tuple(map(tuple, paths[k].goals)),
-        )
-        for k, sampler in samplers.items()
-    ]
     places = list(samplers)
+    keys = [_batch_key(samplers[k], paths[k]) for k in places] if len(places) > 1 else [None] * len(places)
     for group in group_equal(keys):
         batch = [places[k] for k in group]
         for lanes in (batch, *([k] for k in batch)):
             with contextlib.suppress(ValueError, ZeroDivisionError):
-                for k, reading in zip(lanes, _read_batch(samplers[batch[0]], [paths[k] for k in lanes]), strict=True):
+                for k, reading in zip(lanes, _read_batch(samplers[lanes[0]], [paths[k] for k in lanes]), strict=True):
                     readings[k] = reading
                 if lanes is batch:
                     break
     return readings
+
+
+def _batch_key(sampler: Sampler, paths: _Paths) -> Hashable:
+    """Key of paths that can be read in one batch."""
+    nodes = sampler.grid(NODES)[0].tobytes()
+    return sampler.batch_key, nodes, paths.program.structure, tuple(map(tuple, paths.goals))
 
 
 def _sampler(paths: _Paths) -> Sampler | None:
@@ -237,19 +235,14 @@ def _read_batch(sampler: Sampler, batch: Sequence[_Paths]) -> list[_PathReading]
             ]
         )
         changes = np.abs(curves[:, :, 1:] - curves[:, :, :1]).max(axis=(0, 2))
-        excesses = np.empty((*shape, len(program.limits)))
-        for k, limit in enumerate(program.limits):
-            if k not in program.cycle_limits:
-                excess = _batch_excess(designs, [paths.program.limits[k] for paths in batch], shape[1])
-                excesses[:, :, k] = np.abs(excess) if limit.sign == 0 else excess
-    cycle_places = list(program.cycle_limits)
+        excesses = _batch_excesses(designs, [paths.program.limits for paths in batch], shape)
+    count, cycle_places = 1 + len(batch[0].goals), list(program.cycle_limits)
     for k, paths in enumerate(batch):
-        for row, design in zip(excesses[k], trials[k] if cycle_places else (), strict=False):
+        for row, design in zip(excesses[k], trials[k][:count] if cycle_places else (), strict=False):
             row[cycle_places] = _excesses(paths.program, design)[cycle_places]
     current().positions += curves.size
     # Where two corners of the cycle pass each other the nodes move: such a move counts as a change.
     same = (changes <= UNCHANGED) & np.all(np.diff(begins, axis=0) >= 0.0, axis=(0, 2))
-    count = 1 + len(batch[0].goals)
     return [
         _PathReading(change if is_same else math.inf, excess[:count])
         for change, is_same, excess in zip(changes.tolist(), same.tolist(), excesses, strict=True)
@@ -268,6 +261,8 @@ def _batch_values(sampler: Sampler, batch: Sequence[_Paths], trials: Sequence[Se
         ]
         hints = [model.hints(model.given(systems.FLOAT, design)) for design in full]
         values |= {name: np.array([design_hints[name] for design_hints in hints]) for name in sampler.hints}
+    if len(batch) == 1:
+        return {**numbers[0], **values}
     fixed = {name: [design[name] for design in numbers] for name in numbers[0] if name not in values}
     return {
         name: same[0] if all(value == same[0] for value in same) else np.repeat(same, count)
@@ -275,15 +270,22 @@ def _batch_values(sampler: Sampler, batch: Sequence[_Paths], trials: Sequence[Se
     } | values
 
 
-def _batch_excess(designs: BatchReading, limits: Sequence[Limit], count: int) -> Floats:
-    """Scaled excess (batch, trials) of a limit of each design of a batch, each with `count` trials."""
-    limit, bounds = limits[0], [limit.value for limit in limits]
-    if isinstance(limit, SingleLimit) and any(bound != bounds[0] for bound in bounds):
-        residual = limit.residual(designs, np.repeat(bounds, count))
-    else:
-        residual = limit.residual(designs)
-    excess = np.broadcast_to(plain(residual), designs.count).reshape(len(limits), count)
-    return np.asarray(excess / np.array([limit.scale for limit in limits])[:, None])
+def _batch_excesses(designs: BatchReading, limits: Sequence[Sequence[Limit]], shape: tuple[int, int]) -> Floats:
+    """Scaled excesses (batch, trials, limits) of all limits but those over the cycle; limits: of each design.
+
+    Of an equality the magnitude. shape: number of designs and of trials of each.
+    """
+    bounds = np.array([[limit.value for limit in row] for row in limits])
+    scales = np.array([[limit.scale for limit in row] for row in limits])
+    same = np.all(bounds == bounds[0], axis=0).tolist()
+    residuals = np.zeros((len(limits[0]), designs.count))
+    for k, limit in enumerate(limits[0]):
+        if isinstance(limit, SingleLimit) and not same[k]:
+            residuals[k] = plain(limit.residual(designs, np.repeat(bounds[:, k], shape[1])))
+        elif not isinstance(limit, CycleLimit):
+            residuals[k] = plain(limit.residual(designs))
+    excesses = residuals.T.reshape(*shape, len(limits[0])) / scales[:, None]
+    return np.asarray(np.where([limit.sign == 0 for limit in limits[0]], np.abs(excesses), excesses))
 
 
 def reachable_share(program: Program, x: Numbers, goal: Numbers) -> float:
