@@ -120,11 +120,11 @@ class Jet:
             h = _wide(slope) * self.h + _wide(_wide(second)) * (self.g[..., :, None] * self.g[..., None, :])
         return Jet(v, slope * self.g, h)
 
-    def sum(self) -> "Jet":
+    def sum(self, keepdims: bool = False) -> "Jet":
         """Sum over the values' last axis."""
         whole = self.whole()
-        h = None if whole.h is None else whole.h.sum(axis=-3)
-        return Jet(whole.v.sum(axis=-1), whole.g.sum(axis=-2), h)
+        h = None if whole.h is None else whole.h.sum(axis=-3, keepdims=keepdims)
+        return Jet(whole.v.sum(axis=-1, keepdims=keepdims), whole.g.sum(axis=-2, keepdims=keepdims), h)
 
     def whole(self) -> "Jet":
         """Number with derivatives of its value's own shape, where they were left to broadcast."""

@@ -85,14 +85,7 @@ def _total(values: Number, count: int) -> Number:
     """Sum over nodes, (designs, 1); a value that is equal at all nodes counts `count` times."""
     if np.ndim(_plain(values)) == 0 or np.shape(_plain(values))[-1] == 1:
         return count * values
-    if not isinstance(values, Jet):
-        return np.asarray(values).sum(axis=-1, keepdims=True)
-    whole = values.whole()
-    return Jet(
-        whole.v.sum(axis=-1, keepdims=True),
-        whole.g.sum(axis=-2, keepdims=True),
-        None if whole.h is None else whole.h.sum(axis=-3, keepdims=True),
-    )
+    return values.sum(axis=-1, keepdims=True) if isinstance(values, np.ndarray) else values.sum(keepdims=True)
 
 
 def _jet(value: Number, width: int) -> Jet:

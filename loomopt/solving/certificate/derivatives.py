@@ -33,7 +33,6 @@ class Derivatives(abc.ABC):
         self.program, self.sampler, self.rows = program, sampler, tuple(rows)
         self.names = [v.name for v in program.variables if v.name not in program.constants]
         self.x = {name: x[name] for name in self.names}
-        self.known = {**program.parameters, **{name: x[name] for name in program.constants}, **sampler.hints}
         sizes = {v.name: v.scale for v in program.variables}
         self.sizes = [sizes[name] for name in self.names]
 

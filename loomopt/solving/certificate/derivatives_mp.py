@@ -35,7 +35,8 @@ class MpmathDerivatives(Derivatives):
         self.maths = systems.mpmath(DIGITS)
         number: Callable[[Any], Number] = self.maths.number
         self.number = number
-        self.parameters = {name: number(value) for name, value in self.known.items()}
+        known = {**program.parameters, **{name: x[name] for name in program.constants}, **sampler.hints}
+        self.parameters = {name: number(value) for name, value in known.items()}
         self.scales = [number(size) for size in self.sizes]
         self.base: Vector = [number(self.x[n]) / scale for n, scale in zip(self.names, self.scales, strict=True)]
         here = self._reading(self.base)
