@@ -492,35 +492,105 @@ class Job(abc.ABC):
 
     @abc.abstractmethod
     def check(self, scene: Scene) -> None:
-        """Raise BadInput where today's machine is not one that this job can work on."""
+        """Check that the job can work on today's machine.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+
+        Raises
+        ------
+        BadInput : today's machine cannot be used, such as a linkage that does not assemble.
+        """
 
     @abc.abstractmethod
     def model(self, scene: Scene, design: Mapping[str, float] | None = None) -> JobModel:
-        """Mechanism with the effects the scene calls for; design: whose own parts take the scene's place."""
+        """Mechanism with the effects of a scene.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        design : design whose parts replace those of the scene, SI; None for the scene's own.
+
+        Returns
+        -------
+        Model, with one formula for each quantity.
+        """
 
     @abc.abstractmethod
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
-        """Sentence on an optimum of the target."""
+        """Sentence on an optimum of a target.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        target : name of a target of the scene.
+        figures : figures of the optimum by name, SI.
+
+        Returns
+        -------
+        One sentence with its full stop.
+        """
 
     def say_together(self, members: "Sequence[tuple[Scene, Numbers, Figures]]", member_numbers: frozenset[str]) -> str:
-        """Sentences on why members of a family cannot all reach their goal, "" where physics says nothing.
+        """Sentences on why members of a family cannot all reach their goal.
 
-        members: scene, design and figures, SI; member_numbers: numbers of a design that differ between members.
+        Parameters
+        ----------
+        members : scene, design and figures, SI, of each member.
+        member_numbers : names of the numbers of a design that differ between members.
+
+        Returns
+        -------
+        Sentences; "" where physics gives no reason.
         """
         return ""
 
     @abc.abstractmethod
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
-        """Curves of the motion over the cycle, and the names of force and torque."""
+        """Curves of the motion over the cycle, and the names of force and torque.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        sampler : design that is sampled.
+
+        Returns
+        -------
+        Columns, in the order of the table.
+        """
 
     # What few jobs say otherwise.
 
     def program(self, scene: Scene, target: str) -> Program:
-        """Target as a task: structure and numbers. Raises BadInput."""
+        """Program of a target: its structure and its numbers.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        target : name of a target of the scene.
+
+        Returns
+        -------
+        Program, the same object for the same scene and target.
+
+        Raises
+        ------
+        BadInput : the scene lacks what the target needs, or a limit cannot be met.
+        """
         return cached(scene, (self.name, target), lambda: self.task(scene, target).program())
 
     def schema(self, document: Mapping[str, Any]) -> SceneSchema:
-        """Schema of a scene; document: the raw scene, on which the schema may depend."""
+        """Schema of a scene.
+
+        Parameters
+        ----------
+        document : raw tables of the scene, on which the schema may depend.
+
+        Returns
+        -------
+        Schema: tables, variables, figures, targets, effects and axes.
+        """
         return self.own_schema
 
     @property
@@ -542,29 +612,95 @@ class Job(abc.ABC):
         return files(self.package)
 
     def demand(self, scene: Scene, target: str) -> None:
-        """Raise BadInput where a target speaks of what the scene does not have."""
+        """Check that a scene has what a target needs.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        target : name of a target of the scene.
+
+        Raises
+        ------
+        BadInput : a number or an effect is missing.
+        """
         demand(scene, target)
 
     def tables(self, scene: Scene, target: str) -> "tuple[Record, ...]":
-        """Remarks on the tables that are read for a target; "" for the scene's default. Raises BadInput."""
+        """Remarks on the tables that are read for a target.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        target : name of a target; "" for the scene's default.
+
+        Returns
+        -------
+        One record for each table.
+
+        Raises
+        ------
+        BadInput : a table cannot be read.
+        """
         return numbers.records(scene)
 
     def today(self, scene: Scene) -> dict[str, float]:
-        """Today's design by full names, with every other number that the scene frees."""
+        """Today's design.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+
+        Returns
+        -------
+        Design variables and every other free number by full name, SI.
+        """
         known, variables = self.numbers(scene), scene.schema.variables
         others = [scene.full(name) for name, bound in scene.bounds.items() if name not in variables and bound.free]
         return {name: known[name] for name in (*variables, *others)}
 
     def numbers(self, scene: Scene) -> dict[str, float]:
-        """Every number of the scene by full name."""
+        """All numbers of a scene.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+
+        Returns
+        -------
+        Numbers by full name, SI.
+        """
         return cached(scene, (self.name, "numbers"), lambda: Frozen(self.task(scene).known))
 
     def numbers_of(self, scene: Scene, design: Numbers) -> dict[str, float]:
-        """All numbers of a design, by any of their names; a number it does not name stays the scene's."""
+        """All numbers of a design.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        design : numbers of a design by any of their names, SI.
+
+        Returns
+        -------
+        Numbers by full name, SI; those that the design does not name are the scene's.
+        """
         return {**self.numbers(scene), **{scene.full(name): value for name, value in design.items()}}
 
     def sampler(self, scene: Scene, design: Numbers) -> Sampler:
-        """Design ready to be sampled, at the speed that the scene gives its crank. Raises BadInput."""
+        """Design ready to be sampled, at the crank speed of the scene.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        design : numbers of a design by full name, SI.
+
+        Returns
+        -------
+        Sampler of the design.
+
+        Raises
+        ------
+        BadInput : the crank has no periodic motion.
+        """
         sampler = sampled(self.model(scene, design), self.numbers_of(scene, design))
         if drive.motor(sampler.model.effects) is None:
             return sampler
@@ -575,7 +711,19 @@ class Job(abc.ABC):
     def curves(
         self, scene: Scene, design: Numbers, steps: int = STEPS, also: Sequence[float] = ()
     ) -> dict[str, Floats]:
-        """Curves of a design over one turn, units in the column names; peaks that are figures are rows."""
+        """Curves of a design over one turn.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        design : numbers of a design by full name, SI.
+        steps : number of equal steps over the turn.
+        also : further crank angles, rad, that are rows.
+
+        Returns
+        -------
+        Columns (rows,) by name with unit; each peak that is a figure is a row.
+        """
         sampler = self.sampler(scene, design)
         peaks = tops(sampler, self.peaks(sampler.model).values())
         kinds = {name: figure.kind for name, figure in scene.schema.figures.items()} | drive.KINDS
@@ -587,7 +735,17 @@ class Job(abc.ABC):
         return (parted.curves if parted else functools.partial(curves, sampler))(columns, steps, [*peaks, *also])
 
     def parted(self, scene: Scene, sampler: Sampler) -> "Parted | None":
-        """Sampled design, followed, where an effect of the scene may part its output from the mechanism."""
+        """Motion of a design whose output may separate from the mechanism.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        sampler : design that is sampled.
+
+        Returns
+        -------
+        Simulated motion; None where no effect of the scene separates the output.
+        """
         if not any(isinstance(effect, Event) for effect in scene.active):
             return None
         from loomopt.model.separation import followed
@@ -595,13 +753,32 @@ class Job(abc.ABC):
         return followed(scene, sampler)
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Design a person reads, by full names, from the NLP's variables: these themselves."""
+        """Design of the NLP's variables, as a person reads it.
+
+        Parameters
+        ----------
+        program : task of a scene and a target.
+        x : variables of the NLP by name, SI.
+
+        Returns
+        -------
+        Numbers by full name, SI; the variables themselves unless the job overrides it.
+        """
         return dict(x)
 
     def figures(self, scene: Scene, design: Numbers) -> Figures:
-        """Every figure of the job; None for one whose numbers the scene does not have.
+        """All figures of a design.
 
-        Figures over the cycle are computed when they are read, where not all extremes are known already.
+        Figures over the cycle are computed when they are first read, unless all extremes are known already.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        design : numbers of a design by full name, SI.
+
+        Returns
+        -------
+        Figures by name, SI; None for a figure whose numbers the scene does not have.
         """
         sampled = self.sampler(scene, design)
         late = self.over_cycle(sampled.model)
@@ -623,10 +800,18 @@ class Job(abc.ABC):
     def figures_of(
         self, scene: Scene, sampled: "Sampler | Machines", names: Container[str] = EVERY
     ) -> dict[str, Number]:
-        """Every figure of a machine, or of many at once, SI; None for one whose numbers the scene does not have.
+        """All figures of one machine or of many.
 
-        names: figures of `over_cycle`, all by default; the others are None or there too. What a motion of its
-        own tells is not among those of many (`machines.at_once`).
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        sampled : one sampled design, or many machines.
+        names : figures of `over_cycle` that are needed, all by default; the others may be None.
+
+        Returns
+        -------
+        Figures by name, SI; None for a figure whose numbers the scene does not have. Figures of a simulated motion are
+        not among those of many machines (`machines.at_once`).
         """
         figures = static_figures(scene, sampled, names)
         peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in names}
@@ -634,14 +819,35 @@ class Job(abc.ABC):
         return figures | {name: sampled.peak(quantity) for name, quantity in peaks.items()}
 
     def over_cycle(self, model: JobModel) -> Mapping[str, str]:
-        """Figures that are read over the cycle: the quantity of an extreme, "" for what is none."""
+        """Figures that are read over the cycle.
+
+        Parameters
+        ----------
+        model : mechanism with the effects of the scene.
+
+        Returns
+        -------
+        Quantity of each figure that is an extreme; "" for every other.
+        """
         means = [name for mean in model.integrals for name in (mean.name, mean.root)]
         return {**dict.fromkeys((*means, *model.worked), ""), **self.peaks(model)}
 
     def traded(self, scene: Scene, target: str | None, requests: "Requested") -> "tuple[Program, tuple[Traded, ...]]":
-        """Task whose levels are axes, after what a target holds (None: nothing), and the axes.
+        """Program whose levels are axes of a front.
 
-        Raises BadInput.
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        target : target whose demands hold; None for none.
+        requests : axes with their senses.
+
+        Returns
+        -------
+        Program, and the axes in the order of the requests.
+
+        Raises
+        ------
+        BadInput : an axis is unknown, or the scene lacks what the target needs.
         """
         from loomopt.model import axes
 
@@ -653,44 +859,128 @@ class Job(abc.ABC):
         return axes.with_axes(task.program(), known, requests, scene.full, task.size)
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
-        """NLP's variables of a design."""
+        """NLP's variables of a design.
+
+        Parameters
+        ----------
+        program : task of a scene and a target.
+        design : numbers of a design by full name, SI.
+
+        Returns
+        -------
+        Variables by name, SI.
+        """
         return program.completed({**program.parameters, **design})
 
     def start(self, program: Program, scene: Scene) -> dict[str, float]:
-        """Today's machine by the NLP's variables."""
+        """Today's machine as variables of the NLP.
+
+        Parameters
+        ----------
+        program : task of a scene and a target.
+        scene : scene with all its numbers, SI.
+
+        Returns
+        -------
+        Variables by name, SI.
+        """
         # What it has not, such as a free law, stands in the task: others may follow from that.
         return {**self.values(program, {**self.today(scene), **program.today}), **program.today}
 
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
-        """NLP's variables without what is only rounding."""
+        """NLP's variables without what is only rounding.
+
+        Parameters
+        ----------
+        program : task of a scene and a target.
+        x : variables of the NLP by name, SI.
+
+        Returns
+        -------
+        Variables by name, SI.
+        """
         return dict(x)
 
     def peaks(self, model: JobModel) -> Mapping[str, str]:
-        """Figures that are extremes over the cycle, with their quantities."""
+        """Figures that are extremes over the cycle.
+
+        Parameters
+        ----------
+        model : mechanism with the effects of the scene.
+
+        Returns
+        -------
+        Quantity of each figure by name.
+        """
         return {name: name for name in model.quantities}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
-        """Reading of each figure that can be read over a box of numbers."""
+        """Readings of the figures that can be bounded over a box of numbers.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        model : mechanism with the effects of the scene.
+
+        Returns
+        -------
+        Reading of each such figure by name.
+        """
         rows = {name: InBox((name,)) for name in scene.schema.figures if model.has_row(name)}
         return rows | {name: InBox(quantity=quantity) for name, quantity in self.peaks(model).items()}
 
     def studied(self, scene: Scene) -> Studied:
-        """Quantities that studies show: the default target, and figures that are the largest |value| of a quantity."""
+        """Quantities that studies of accuracy show.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+
+        Returns
+        -------
+        Targets, and the figures that are the largest value or magnitude of a quantity.
+        """
         peaks = {name: (name, False) for name in self.model(scene).quantities}
         return Studied((scene.schema.default_target,), peaks)
 
     def crossings(self, scene: Scene) -> Mapping[str, tuple[Crossing, ...]]:
-        """Figures that are read where a curve passes a level, and jump where it turns there."""
+        """Figures that are read where a curve crosses a level.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+
+        Returns
+        -------
+        Crossings of each such figure; the figure jumps where the curve turns at its level.
+        """
         return {}
 
     def adopted(self, scene: Scene, design: Mapping[str, Any], target: str) -> tuple[Scene, str]:
-        """Scene whose own are a design's lists, and the target whose limits it keeps."""
+        """Scene with the lists of a design, and the target whose limits it keeps.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        design : numbers of a design by full name, SI.
+        target : name of a target of the scene.
+
+        Returns
+        -------
+        Scene and name of the target.
+        """
         return scene, target
 
     def sizes(self, scene: Scene) -> Mapping[str, Sequence[float]]:
-        """Freed numbers, as a designer calls them, that come in sizes only, with those sold, ascending.
+        """Free numbers that come in stock sizes only.
 
-        Sizes of the scene's own [stock] take the place of those that a check knows.
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+
+        Returns
+        -------
+        Sizes by the designer's name of the number, SI, ascending. Sizes of [stock] replace those that a check knows.
         """
         choices: dict[str, Sequence[float]] = {}
         stock: Mapping[str, Sequence[float]] = {}
@@ -706,7 +996,17 @@ class Job(abc.ABC):
         return choices
 
     def explain(self, scene: Scene, clash: Collection[str]) -> str:
-        """Physical reason why the limits `clash` conflict; "" where there is none to give."""
+        """Physical reason why limits conflict.
+
+        Parameters
+        ----------
+        scene : scene with all its numbers, SI.
+        clash : names of the limits.
+
+        Returns
+        -------
+        Sentences; "" where there is no reason to give.
+        """
         known = self.numbers(scene)
         limited = numbers.bounds(scene, known)
         sentences = [check.explain(known, limited, table, clash, scene.show) for check, table in _checks(scene)]

@@ -157,7 +157,16 @@ class Scene(Shown):
         return self.schema.name
 
     def effect_table(self, model: type[_Table]) -> _Table | None:
-        """Table of an effect that is on, by the model of its values; None where it is off."""
+        """Table of an active effect.
+
+        Parameters
+        ----------
+        model : class of the effect's values.
+
+        Returns
+        -------
+        Table; None where the effect is off.
+        """
         return next((table for table in self.effects.values() if isinstance(table, model)), None)
 
     @lazy
@@ -171,13 +180,35 @@ class Scene(Shown):
         return []
 
     def table(self, model: type[_Table]) -> _Table:
-        """Table [operation], [mechanism] or that of a target, by its model."""
+        """Table [operation], [mechanism] or that of a target.
+
+        Parameters
+        ----------
+        model : class of the table's values.
+
+        Returns
+        -------
+        Table.
+        """
         return next(table for table in (*self.tables.values(), *self.targets.values()) if isinstance(table, model))
 
     def full(self, name: str) -> str:
-        """Full name of a number by what a designer calls it; any other name is one already.
+        """Full name of a number by the designer's name.
 
-        Where effects that are on have numbers of one name, it is the first that is given.
+        Parameters
+        ----------
+        name : such as "J4".
+
+        Returns
+        -------
+        Full name, of the first given number where several active effects have one of this name; any other name is
+        returned as it is.
+
+        Examples
+        --------
+        >>> import loomopt as lo
+        >>> lo.load("beatup").full("J4")
+        'inertia.J4'
         """
         arguments.text(name, "name", "the name of a number", 'Write "l1"')
         if name in self.mechanism or name in self.operation:
@@ -188,7 +219,22 @@ class Scene(Shown):
         return owned(*called[0][:2]) if called else name
 
     def given(self, key: str) -> str | None:
-        """Raw text of a dotted key such as "mechanism.l1"; None for a table or nothing."""
+        """Text of a number in the scene.
+
+        Parameters
+        ----------
+        key : dotted key, such as "mechanism.l1".
+
+        Returns
+        -------
+        Text as it is written; None for a table, or where the key is not set.
+
+        Examples
+        --------
+        >>> import loomopt as lo
+        >>> lo.load("beatup").given("operation.M0")
+        '745 N*m'
+        """
         value = looked_up(self.document, arguments.text(key, "key", *_KEY).split("."))
         if value is None or isinstance(value, Mapping):
             return None
@@ -200,7 +246,20 @@ class Scene(Shown):
         return display.units(self.document, self.schema, self.active, (self.bounds, self.limits))
 
     def shown_in(self, kind: str) -> str:
-        """Unit in which a person sees quantities of a kind."""
+        """Unit in which a person reads quantities of a kind.
+
+        Parameters
+        ----------
+        kind : such as "length".
+
+        Returns
+        -------
+        Unit.
+
+        Raises
+        ------
+        BadInput : the kind is unknown.
+        """
         return self.units[self._kind_of_quantity(kind)]
 
     def _kind_of_quantity(self, kind: str) -> str:
@@ -211,37 +270,141 @@ class Scene(Shown):
         return kind
 
     def unit_for(self, si: str) -> str:
-        """Unit in which a person sees what has an SI unit, such as a curve in m/rad."""
+        """Unit in which a person reads what has an SI unit.
+
+        Parameters
+        ----------
+        si : SI unit, such as "m/rad".
+
+        Returns
+        -------
+        Unit.
+
+        Raises
+        ------
+        BadInput : it is not text.
+        """
         return display.unit_for(arguments.text(si, "si", *_SI), self.units)
 
     def show(self, value: float, kind: str, digits: int = 6) -> str:
-        """An SI value as text with the unit in which a person sees its kind; digits: significant ones."""
+        """SI value as text, with the unit in which a person reads its kind.
+
+        Parameters
+        ----------
+        value : SI value.
+        kind : kind of quantity, such as "length".
+        digits : number of significant digits.
+
+        Returns
+        -------
+        Number and unit.
+
+        Raises
+        ------
+        BadInput : the kind or the number of digits is invalid.
+
+        Examples
+        --------
+        >>> import loomopt as lo
+        >>> lo.load("beatup").show(0.031, "length")
+        '31 mm'
+        """
         arguments.number(value, "value", "a number in SI", "Give a number")
         if not 1 <= arguments.whole(digits, "digits", *_DIGITS) <= _MOST_DIGITS:
             raise refusal("the number of digits is invalid", "", "digits", digits, *_DIGITS)
         return show(value, self.shown_in(kind), digits)
 
     def set(self, key: str, value: object) -> "Scene":
-        """Scene with one dotted key set, such as set("operation.M0", "800 N*m"): see `update`."""
+        """Scene with one number or word changed.
+
+        See also `update`.
+
+        Parameters
+        ----------
+        key : dotted key, such as "operation.M0".
+        value : its value; a quantity is text with its unit.
+
+        Returns
+        -------
+        New scene.
+
+        Raises
+        ------
+        BadInput : the key or the value is invalid.
+
+        Examples
+        --------
+        >>> import loomopt as lo
+        >>> lo.load("beatup").set("operation.M0", "800 N*m").given("operation.M0")
+        '800 N*m'
+        """
         return self.update({arguments.text(key, "key", *_KEY): value})
 
     def update(self, values: Mapping[str, object]) -> "Scene":
-        """Scene with several dotted keys set at once.
+        """Scene with several numbers or words changed at once.
 
-        A key of an effect that is off puts it on, with the other values from [available]. A bound that is one
+        A key of an effect that is off puts the effect on, with its other values from [available]. A bound that is one
         value becomes a range once its min and max are set.
+
+        Parameters
+        ----------
+        values : value of each dotted key.
+
+        Returns
+        -------
+        New scene.
+
+        Raises
+        ------
+        BadInput : a key or a value is invalid.
+
+        Examples
+        --------
+        >>> import loomopt as lo
+        >>> scene = lo.load("beatup").update({"bounds.l1.min": "31 mm", "operation.M0": "800 N*m"})
+        >>> scene.bounds["l1"].min
+        0.031
         """
         return self.change(values)
 
     def change(self, values: Mapping[str, object], on: Iterable[str] = (), off: Iterable[str] = ()) -> "Scene":
-        """Scene with keys set, then effects put on, then effects taken off: only the outcome has to hold."""
+        """Scene with keys set, then effects put on, then effects taken off.
+
+        Parameters
+        ----------
+        values : value of each dotted key.
+        on : names of effects.
+        off : names of effects.
+
+        Returns
+        -------
+        New scene.
+
+        Raises
+        ------
+        BadInput : the resulting scene is invalid; scenes between the steps may be.
+        """
         values = arguments.table(values, "values", "key of the scene → its value", 'Write {"operation.M0": "800 N*m"}')
         on, off = (arguments.names(names, "effects", ", ".join(self.schema.effects), _NAMES) for names in (on, off))
         changed = self.called(Call(values, tuple(on), tuple(off)), values)
         return self if changed.document is self.document else changed
 
     def called(self, call: Call, caller_keys: Iterable[str] = ()) -> "Scene":
-        """Scene with what a call changes; caller_keys: keys whose paths are the caller's, not the scene's."""
+        """Scene with the changes of a call.
+
+        Parameters
+        ----------
+        call : changes of the call.
+        caller_keys : keys whose paths are the caller's, not the scene's.
+
+        Returns
+        -------
+        New scene.
+
+        Raises
+        ------
+        BadInput : a change is invalid.
+        """
         keys = {key: former_names.current_key(key, self.schema.former_names) for key in call.set}
         values = Frozen({keys[key]: value for key, value in copied(call.set, self.origin).items()})
         document = self._off(self._on(self._set(values), call.on), call.off)
@@ -282,7 +445,26 @@ class Scene(Shown):
         return document
 
     def with_effect(self, *names: str) -> "Scene":
-        """Scene with effects put on together, their values from [available.NAME]."""
+        """Scene with effects put on together.
+
+        Parameters
+        ----------
+        *names : names of effects; their values are those of [available.NAME].
+
+        Returns
+        -------
+        New scene.
+
+        Raises
+        ------
+        BadInput : an effect is unknown, has no values, or cannot be combined with another.
+
+        Examples
+        --------
+        >>> import loomopt as lo
+        >>> "gravity" in lo.load("beatup").with_effect("gravity").effects
+        True
+        """
         return self.change({}, on=names)
 
     def _on(self, document: Mapping[str, Any], names: Iterable[str]) -> Mapping[str, Any]:
@@ -301,7 +483,26 @@ class Scene(Shown):
             raise refusal(f"effect {name} has no values", self.origin, f"available.{name}", remedy=remedy)
 
     def without_effect(self, *names: str) -> "Scene":
-        """Scene with effects taken off together; their values stay in [available.NAME]."""
+        """Scene with effects taken off together.
+
+        Parameters
+        ----------
+        *names : names of effects; their values stay in [available.NAME].
+
+        Returns
+        -------
+        New scene.
+
+        Raises
+        ------
+        BadInput : an effect is unknown, or another needs it.
+
+        Examples
+        --------
+        >>> import loomopt as lo
+        >>> "resistance" in lo.load("beatup").without_effect("resistance").effects
+        False
+        """
         return self.change({}, off=names)
 
     def _off(self, document: Mapping[str, Any], names: Iterable[str]) -> Mapping[str, Any]:
@@ -313,7 +514,20 @@ class Scene(Shown):
         return document
 
     def free(self, names: Iterable[str] | str) -> "Scene":
-        """Scene with bounds freed that `free = false` holds at today's value; names: "J4, M0"."""
+        """Scene with bounds freed that `free = false` fixes at today's value.
+
+        Parameters
+        ----------
+        names : names of bounds, as a list or as text such as "J4, M0".
+
+        Returns
+        -------
+        New scene.
+
+        Raises
+        ------
+        BadInput : a name is not that of a bound with two ends.
+        """
         single = names.replace(",", " ").split() if isinstance(names, str) else names
         named = arguments.names(single, "names", "names of bounds", 'Write ["J4"]')
         ranges = [name for name, bound in self.bounds.items() if bound.min < bound.max]
@@ -331,7 +545,17 @@ class Scene(Shown):
         return build(document, self.jobs, self.origin, self.paths, self.call.then(Call(free=tuple(named))))
 
     def without_limit(self, name: str, sides: Iterable[str]) -> "Scene":
-        """Scene without these sides, "min" and "max", of a limit that it has."""
+        """Scene without sides of a limit.
+
+        Parameters
+        ----------
+        name : name of a limit of the scene.
+        sides : "min", "max" or both.
+
+        Returns
+        -------
+        New scene.
+        """
         place = "limits", *former_names.current(name, self.schema.former_names).split(".")
         limit = looked_up(self.document, place)
         left = set(limit) - set(sides) if isinstance(limit, Mapping) else set()

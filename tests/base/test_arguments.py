@@ -18,9 +18,9 @@ OVER = {"operation.M0": ["600 N*m"]}
 AXES = ("peak_torque", "m4e")
 WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
     "sweep": [
-        ({"over": {"operation.M0": 600}}, r"operation\.M0: it is no list \(given: 600\).*600:900:25 N\*m"),
-        ({"over": {"operation.M0": {"600 N*m"}}}, "it is no list .given: set"),
-        ({"over": {"operation.M0": None}}, "it is no list .given: none"),
+        ({"over": {"operation.M0": 600}}, r"operation\.M0: it is not a list \(given: 600\).*600:900:25 N\*m"),
+        ({"over": {"operation.M0": {"600 N*m"}}}, "it is not a list .given: set"),
+        ({"over": {"operation.M0": None}}, "it is not a list .given: none"),
         ({"over": "operation.M0=600:700:10 N*m"}, "over: it is not a mapping"),
         ({"over": {3: ["600 N*m"]}}, "over: it is not text .given: 3"),
         ({"over": OVER, "workers": "2"}, r'workers: it is not a whole number \(given: "2"\). Allowed: 1 to 1024'),
@@ -42,7 +42,7 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
         ({"axes": AXES, "points": "ten"}, r'points: it is not a whole number \(given: "ten"\).*from 3 to 20000'),
         ({"axes": AXES, "points": 10.0}, "points: it is not a whole number"),
         ({"axes": AXES, "ranges": ["m4e=0:5 kg"]}, "ranges: it is not a mapping .given: a list"),
-        ({"axes": AXES, "ranges": {"m4e": 5}}, "m4e: it is no list .given: 5"),
+        ({"axes": AXES, "ranges": {"m4e": 5}}, "m4e: it is not a list .given: 5"),
         ({"axes": AXES, "ranges": {"m4e": ("0 kg", "5 kg")}}, 'm4e: it is not a number .given: "0 kg"'),
         ({"axes": AXES, "ranges": {"m4e": (None, 5)}}, "m4e: it is not a number .given: none"),
         ({"axes": AXES, "ranges": {"m4e": (1, 2, 3)}}, "m4e: a range has two ends"),

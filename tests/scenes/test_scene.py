@@ -1,6 +1,7 @@
 """Scenes: what is read, in which units, and how a scene is changed."""
 
 import copy
+import doctest
 import itertools
 import math
 import pickle
@@ -329,3 +330,14 @@ def test_an_effect_without_values_names_the_keys_to_set():
 @pytest.mark.parametrize("name", ["a", "7", "beatup-wide_2", "织机-1", "Webstuhl-Öl", "console", "nul-1", "a" * 64])
 def test_a_scene_may_be_named_as_a_file_anywhere(name):
     assert BEATUP.set("problem.name", name).name == name
+
+
+EXAMPLES = ["full", "given", "show", "set", "update", "with_effect", "without_effect"]
+"""Methods of a scene whose docstrings have an example."""
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_methods_of_a_scene_have_examples_that_run(name):
+    (example,) = doctest.DocTestFinder(recurse=False).find(getattr(Scene, name), name)
+    assert example.examples
+    assert doctest.DocTestRunner().run(example).failed == 0
