@@ -1,10 +1,11 @@
 """A mechanism that nobody builds, right at sight: a Scotch yoke with a mass, a spring and a cloth."""
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from support.toy import Still
 
 from loomopt.maths.systems import Maths, Number
-from loomopt.model.kinematics import Arcs, Group
 from loomopt.physics import balance
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
@@ -15,22 +16,13 @@ FRONT, REAR = "front", "rear"
 
 
 @dataclass(frozen=True)
-class Yoke:
+class Yoke(Still):
     """q = r (1 − cos φ); front at φ = π, rear at 0."""
 
     structure: str = "yoke"
-    groups: Mapping[str, Group] = field(default_factory=dict)
-    arcs: tuple[Arcs, ...] = ()
-    breaks: frozenset[str] = frozenset()
-
-    def linkage(self, maths: Maths, values: Values) -> None:
-        return None
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> Values:
         return {"stroke": 2 * given.values["r"]}
-
-    def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
-        return {}
 
     def pose(self, maths: Maths, given: Given, node: Node) -> balance.Pose:
         r, phi = given.values["r"], node.phi

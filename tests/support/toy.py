@@ -43,7 +43,10 @@ Numbers = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Still:
-    """A mechanism that does not move; structure: the formulas that stand in its place."""
+    """The toy mechanism: it does not move, and what a test needs of a motion it overrides.
+
+    structure: the formulas that stand in its place.
+    """
 
     structure: Hashable = ()
     groups: Mapping[str, Group] = field(default_factory=dict)

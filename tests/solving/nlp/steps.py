@@ -2,18 +2,19 @@
 
 import bisect
 import functools
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from support.toy import Still
 
 from loomopt.maths.systems import Maths, Number
-from loomopt.model.kinematics import Arcs, DerivedChain, Group
+from loomopt.model.kinematics import Arcs, DerivedChain
 from loomopt.model.limits import CycleLimit, DesignLimit
 from loomopt.model.model import CycleQuantity, DesignRow, JobModel
 from loomopt.model.objectives import Value
 from loomopt.model.program import Program, Variable
 from loomopt.physics.balance import Given
-from loomopt.physics.cycle import TURN, Node
-from loomopt.physics.effects.kinds import Motion
+from loomopt.physics.cycle import TURN
 from loomopt.physics.schema import Values
 
 COUNT = 12
@@ -35,41 +36,22 @@ def heights(maths: Maths, values: Values, bend: float) -> dict[str, Number]:
 
 
 @dataclass(frozen=True)
-class Steps:
-    """Twelve steps of one turn; bend: of what each follows from; lifted: whether they are told as a chain."""
+class Steps(Still):
+    """Twelve steps of one turn; bend: of what each follows from."""
 
-    bend: float
-    lifted: bool
-    structure: tuple[object, ...] = ()
-    groups: Mapping[str, Group] = field(default_factory=dict)
-    breaks: frozenset[str] = frozenset()
-
-    @property
-    def arcs(self) -> tuple[Arcs, ...]:
-        """One stretch for each step, after those of the half of the turn that is raised."""
-        stations = tuple({STEP: float(k)} for k in range(COUNT))
-        follow = DerivedChain(frozenset(NAMES), HEIGHTS, lambda m, v: heights(m, v, self.bend), stations)
-        raised = Arcs(RAISED, lambda maths, given: tuple(map(maths.number, HALF)), raised_at)
-        return raised, Arcs(STEP, corners, step_at, chain=follow if self.lifted else None)
-
-    def linkage(self, maths: Maths, values: Values) -> None:
-        return None
+    bend: float = 0.0
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> Values:
         values = given.values
         return {**heights(maths, values, self.bend), **{name: values[name] for name in HEIGHTS if name in values}}
 
-    def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
-        return {}
 
-    def pose(self, maths: Maths, given: Given, node: Node) -> Motion:
-        raise NotImplementedError
-
-    def still(self, maths: Maths, given: Given, event: str, switch: Values) -> Motion:
-        raise NotImplementedError
-
-    def events(self, maths: Maths, given: Given) -> Values:
-        return {}
+def arcs(bend: float, lifted: bool) -> tuple[Arcs, ...]:
+    """One stretch for each step, after those of the half of the turn that is raised; lifted: told as a chain."""
+    stations = tuple({STEP: float(k)} for k in range(COUNT))
+    follow = DerivedChain(frozenset(NAMES), HEIGHTS, lambda m, v: heights(m, v, bend), stations)
+    raised = Arcs(RAISED, lambda maths, given: tuple(map(maths.number, HALF)), raised_at)
+    return raised, Arcs(STEP, corners, step_at, chain=follow if lifted else None)
 
 
 def corners(maths: Maths, given: Given) -> tuple[Number, ...]:
@@ -107,7 +89,8 @@ def model(bend=0.0, lifted=True):
     rows = {name: DesignRow(functools.partial(at_design, name)) for name in HEIGHTS}
     rows["bowl"] = DesignRow(lambda at: sum((at.values[name] - 2) ** 2 for name in NAMES) + at.values[HEIGHTS[-1]])
     quantities = {"wave": CycleQuantity(wave, signed=True), "swing": CycleQuantity(swing)}
-    return JobModel(Steps(bend, lifted, ("steps", bend, lifted)), own_quantities=quantities, own_rows=rows)
+    mechanism = Steps(("steps", bend, lifted), arcs=arcs(bend, lifted), bend=bend)
+    return JobModel(mechanism, own_quantities=quantities, own_rows=rows)
 
 
 def program(bend=0.0, lifted=True, limits=(("wave", 1, 1.5), ("h3", 1, 1.2)), where=None):

@@ -1,51 +1,20 @@
 """Programs of a few formulas in place of a mechanism: their right answers are known in closed form."""
 
 import functools
-from collections.abc import Callable, Collection, Hashable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection
 
+from support.toy import Still
 from support.worst import objective_of
 
 from loomopt.maths.systems import Maths, Number
-from loomopt.model.kinematics import Arcs, Group
+from loomopt.model.kinematics import Arcs
 from loomopt.model.limits import CycleLimit, DesignLimit
 from loomopt.model.model import CycleQuantity, DesignRow, Instant, JobModel
 from loomopt.model.objectives import Objective
 from loomopt.model.program import Program, Variable
-from loomopt.physics.balance import Given
-from loomopt.physics.cycle import Node
-from loomopt.physics.effects.kinds import Motion
 from loomopt.physics.schema import Values
 
 Wave = Callable[[Maths, Values, Number], Number]
-
-
-@dataclass(frozen=True)
-class Still:
-    """A mechanism that does not move."""
-
-    structure: Hashable = "still"
-    groups: Mapping[str, Group] = field(default_factory=dict)
-    arcs: tuple[Arcs, ...] = ()
-    breaks: frozenset[str] = frozenset()
-
-    def linkage(self, maths: Maths, values: Values) -> None:
-        return None
-
-    def derived(self, maths: Maths, given: Given, called: Collection[str]) -> Values:
-        return {}
-
-    def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
-        return {}
-
-    def pose(self, maths: Maths, given: Given, node: Node) -> Motion:
-        raise NotImplementedError
-
-    def still(self, maths: Maths, given: Given, event: str, switch: Values) -> Motion:
-        raise NotImplementedError
-
-    def events(self, maths: Maths, given: Given) -> Values:
-        return {}
 
 
 def at_node(wave: Wave, at: Instant) -> Number:
