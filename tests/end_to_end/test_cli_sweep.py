@@ -41,7 +41,7 @@ def test_json_has_a_row_per_combination(cli):
 def test_tables_and_figures_are_written_with_their_provenance(cli, tmp_path):
     names = ("t.csv", "t.parquet", "f.png", "f.svg")
     files = [word for name in names for word in ("--figure" if name[0] == "f" else "--out", name)]
-    status, out, err = cli("beatup", *M0, *files)
+    status, out, err = cli("beatup", *M0, *files, "--store", "s.db")
     assert status == 0
     assert out.startswith("beatup, balance: 3 points, 3 optimal")
     assert err.splitlines() == [f"Wrote {name}" for name in names]
@@ -56,7 +56,7 @@ def test_tables_and_figures_are_written_with_their_provenance(cli, tmp_path):
     assert other.attrs["study"] == "sweep"
     assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "f.svg").read_text().count("operation.M0") == 5, "two columns of panels and three designs"
-    _, _, _ = cli("beatup", *M0, "--si", "--out", "si.csv")
+    _, _, _ = cli("beatup", *M0, "--si", "--out", "si.csv", "--store", "s.db", "--resume")
     assert "l2 [m]" in (tmp_path / "si.csv").read_text()
 
 
@@ -113,27 +113,24 @@ def test_what_is_finished_by_ctrl_c_is_written_too(cli, tmp_path, monkeypatch):
     assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_without_an_answer_the_table_is_written_and_no_figure(cli, tmp_path):
-    over = ("--over", "operation.M0=500:600:100 N*m", "--target", "torque")
-    status, _, err = cli("beatup", *over, "--out", "t.csv", "--figure", "f.png")
-    assert (status, err.splitlines()) == (3, ["Wrote t.csv", "f.png is not written: no row is certified"])
-    assert [item.name for item in tmp_path.iterdir()] == ["t.csv"]
-
-
 @pytest.mark.parametrize(
-    ("over", "more", "status", "statuses"),
+    ("over", "files", "status", "statuses"),
     [
-        ("operation.M0=500:600:100 N*m", ("--target", "torque"), 3, {"infeasible"}),
-        ("operation.M0=600:750:150 N*m", ("--target", "torque"), 0, {"infeasible", "optimal"}),
+        ("operation.M0=500:600:100 N*m", ("--out", "t.csv", "--figure", "f.png"), 3, {"infeasible"}),
+        ("operation.M0=600:750:150 N*m", (), 0, {"infeasible", "optimal"}),
     ],
-)  # fmt: skip
-def test_infeasible_rows_are_rows(cli, over, more, status, statuses):
-    result, out, _ = cli("beatup", "--over", over, *more, "--json")
+)
+def test_infeasible_rows_are_rows_and_without_an_answer_there_is_no_figure(
+    cli, tmp_path, over, files, status, statuses
+):
+    result, out, err = cli("beatup", "--over", over, "--target", "torque", "--json", *files)
     data = json.loads(out)
     assert {row["status"] for row in data["rows"]} == statuses
     assert result == status
     assert all(row["reason"].startswith("limits that clash: ") for row in data["rows"] if row["status"] == "infeasible")
     assert len(data["gaps"]) == 1
+    assert err.splitlines() == (["Wrote t.csv", "f.png is not written: no row is certified"] if files else [])
+    assert [item.name for item in tmp_path.iterdir()] == ["t.csv"][: len(files)]
 
 
 def test_a_combination_that_is_no_scene_is_a_failed_row_and_exit_4(cli):

@@ -109,6 +109,10 @@ def test_range_of_the_cloth_resistance_in_which_the_same_limits_bind():
     assert interval.number == "operation.M0"
     assert interval.range == pytest.approx((699.603990, 789.153301), abs=6e-7)
     assert interval.ends == ("m4e is reached", "m4e is reached")
+
+
+@pytest.mark.slow
+def test_a_spring_has_no_range_of_the_cloth_resistance():
     assert sensitivity("shedding").holds == ()
 
 
