@@ -64,7 +64,7 @@ def evaluated(cli, *arguments):
     ],
     ids=lambda value: value if isinstance(value, str) else " ".join(value),
 )
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_an_answer_is_read_as_it_was_solved(cli, solved, problem, changes):
     answer = solved(problem, *changes)
     assert answer["status"] == "optimal"

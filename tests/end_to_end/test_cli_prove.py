@@ -66,6 +66,7 @@ def test_an_answers_file_is_proven_and_the_json_has_these_keys_and_no_other(cli,
         assert proof["boxes"] > 0
 
 
+@pytest.mark.slow
 def test_the_design_object_alone_does_as_well_and_equals_the_python_call(cli, files, tmp_path):
     design = json.loads(files["shedding"].read_text())["design"]
     alone = tmp_path / "design.json"

@@ -145,7 +145,7 @@ MOMENTS = [
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="there are no groups of processes here")
-@pytest.mark.few(2, slow=10)
+@pytest.mark.few(1, slow=11)
 @pytest.mark.parametrize(("study", "count", "wait", "number", "group"), MOMENTS)
 def test_what_stops_a_study_whose_workers_start_leaves_no_traceback(tmp_path, study, count, wait, number, group):
     script = tmp_path / "study.py"
@@ -204,7 +204,7 @@ def test_a_stream_closed_from_the_start_is_bad_input(closed, words):
 
 
 @pytest.mark.parametrize("words", ["list", "solve beatup --json", "evaluate beatup", "simulate beatup", "--help"])
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 def test_a_reader_that_leaves_is_no_error(words):
     reading, writing = os.pipe()
     os.close(reading)

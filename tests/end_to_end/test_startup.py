@@ -45,7 +45,7 @@ def packages(modules):
     return {top for top in tops if top not in sys.stdlib_module_names and not top.startswith(("swig", "cython"))}
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(4)
 @pytest.mark.parametrize(
     ("arguments", "status", "more"),
     [

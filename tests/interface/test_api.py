@@ -398,7 +398,7 @@ def test_sympy_waits_until_equations_are_asked_for():
     assert done.stdout == "False\n"
 
 
-SLOW = ("accuracy", "effects", "sensitivity")
+SLOW = ("accuracy", "effects", "pareto", "sensitivity")
 """Functions whose example takes seconds."""
 QUICK = sorted(set(api.__all__) - {"Answer", "Evaluation", "Scene", "scene", *SLOW})
 

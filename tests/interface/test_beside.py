@@ -42,6 +42,7 @@ def test_angles_between_the_rows_of_curves_have_rows_of_their_own(tmp_path):
     assert frame["phi [rad]"][at] == pytest.approx(math.radians(12.345), abs=1e-15)
 
 
+@pytest.mark.slow
 def test_an_answer_is_drawn_beside_what_was_measured(measured):
     answer = lo.evaluate("beatup")
     figure = answer.plot(measured=measured)

@@ -167,7 +167,7 @@ def boxed_machines(scene, share, count, seed):
 
 
 @pytest.mark.parametrize("effect", ["", "gravity", "bearing_friction", "rod_inertia"])
-@pytest.mark.few(1)
+@pytest.mark.slow
 def test_a_loom_machine_in_a_box_has_its_torques_in_40_digits_inside(effect):
     scene = lo.load("beatup").with_effect(effect) if effect else lo.load("beatup")
     count = 2500

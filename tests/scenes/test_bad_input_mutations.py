@@ -80,6 +80,7 @@ def read_or_refused(call, *arguments):
     assert all(math.isfinite(value) for value in result.mechanism.values())
 
 
+@pytest.mark.slow
 @given(mutated())
 @settings(deadline=None, derandomize=True, max_examples=150)
 def test_mutated_tables_are_read_or_refused(document):

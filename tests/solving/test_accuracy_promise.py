@@ -110,7 +110,7 @@ def kept(answer, accuracy, truth):
 # Optima -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 @pytest.mark.parametrize("name", JOBS)
 def test_every_figure_of_an_optimum_is_as_accurate_as_asked(name, accuracy):
@@ -137,6 +137,7 @@ def test_the_best_answer_estimates_no_more_than_it_promises(name):
     assert answer.solver["error_estimate"] <= BEST
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["beatup", "rapier"])
 def test_the_best_optimum_has_the_digits_that_other_solvers_found(name):
     """Twelve digits, printed with the packaged scene: SciPy from many starts, 40-digit arithmetic."""

@@ -47,7 +47,7 @@ def told(result, name):
     return limit
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("degrees", "peak"), PEAKS.items())
 def test_a_limit_on_both_dwells_gives_the_known_drives(short, degrees, peak):
     answer = lo.solve(short.set("limits.dwell.min", f"{degrees} deg"), starts=1)

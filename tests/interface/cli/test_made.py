@@ -16,6 +16,7 @@ def called(capsys, *words):
     return status, out, err
 
 
+@pytest.mark.slow
 def test_tolerance_prints_one_object_and_a_table(capsys, tmp_path):
     few = ("tolerance", "beatup", *MADE, "--samples", "160")
     picture, table = tmp_path / "spread.svg", tmp_path / "spread.csv"

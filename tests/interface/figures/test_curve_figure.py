@@ -68,7 +68,7 @@ def curves_of(axes):
 
 
 @pytest.mark.parametrize(("name", "kind"), CASES)
-@pytest.mark.few(4)
+@pytest.mark.few(3)
 def test_nothing_runs_into_anything_and_all_panels_show_the_turn(name, kind):
     figure = drawn(name, kind)
     assert overlaps.found(figure) == []
@@ -82,7 +82,7 @@ def test_nothing_runs_into_anything_and_all_panels_show_the_turn(name, kind):
     assert below[-1] == "360"
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "kind"), slow.after(4, SIZED))
 def test_nothing_runs_into_anything_at_any_size(name, kind):
     assert overlaps.found_at_every_size(drawn(name, kind)) == []
@@ -101,7 +101,7 @@ def test_today_stands_dashed_in_every_panel_beside_a_design(name, kind):
     assert [text.get_text() for text in legend.get_texts()] == ["design", "today, dashed"]
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("name", "kind"), [case for case in CASES if case[1] in ("today", "solved")])
 def test_titles_are_alike_and_names_plain(name, kind):
     figure = drawn(name, kind)

@@ -25,6 +25,7 @@ def exported(folder, **options):
     return ezdxf.readfile(path)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("version", "code"), [("r12", "AC1009"), ("R2010", "AC1024")])
 def test_both_versions_are_sound_and_tell_what_they_cover(tmp_path, version, code):
     document = exported(tmp_path, version=version)

@@ -139,7 +139,7 @@ def test_simulate_takes_a_design(here, capsys):
 
 
 @pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])
-@pytest.mark.few(1)
+@pytest.mark.slow
 def test_pictures_are_what_their_names_say(here, capsys, ending):
     loom(capsys, "show", "beatup", "--figure", f"machine{ending}")
     loom(capsys, "simulate", "beatup", "--out", f"curves{ending}")

@@ -67,7 +67,7 @@ def test_a_folder_that_is_there_may_have_any_name(folder):
     assert (folder / "results.v2" / "answer.json").is_file()
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("words", "sheet"),
     [

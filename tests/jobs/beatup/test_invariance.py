@@ -120,7 +120,7 @@ def told(answer):
     return json.dumps(answer.as_dict() | {"time": None}, sort_keys=True)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("problem", "target"), slow.grid(["beatup", "beatup-light"], TARGETS))
 def test_the_same_scene_gives_the_same_digits_twice(problem, target):
     first = told(lo.solve(lo.load(problem), target))

@@ -186,7 +186,7 @@ def test_the_rod_as_a_rigid_body(target):
     assert_right(scene, lo.solve(scene, target, starts=1))
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "changes",
     slow.after(

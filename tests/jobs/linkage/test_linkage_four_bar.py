@@ -53,7 +53,7 @@ def test_the_optimum_is_that_of_the_beat_up(M0):
         assert chain.design[DESIGN.get(name, name)] == pytest.approx(beatup.design[name], rel=1e-10), name
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("M0", TORQUES)
 def test_prices_are_those_of_the_beat_up(M0):
     beatup, chain = solved(M0)
@@ -101,7 +101,7 @@ def with_effect(name):
     return BEATUP.update(tables), four_bar(effects={chained: table_of_chain})
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("design", DESIGNS)
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_effects_are_those_of_the_beat_up(effect, design):
@@ -113,7 +113,7 @@ def test_effects_are_those_of_the_beat_up(effect, design):
         assert chain[other] == pytest.approx(beatup[name], rel=1e-11, abs=1e-12 * size), name
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", [name for name in EFFECTS if name != "speed_fluctuation"])
 def test_the_optimum_with_an_effect_is_that_of_the_beat_up(effect):
     beatup, chain = (lo.solve(scene) for scene in with_effect(effect))

@@ -138,7 +138,7 @@ def test_a_limit_on_jerk_force_or_torque_is_held_and_priced(scene, best, name):
     assert price.worth["peak_acceleration"] == pytest.approx(slope, rel=1e-3)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("target", ["stroke-dwell", "dwell", "smooth", "match"])
 def test_starting_at_an_answer_gives_it_again(scene, target):
     """Objectives to 1e-9; designs to 1e-7, as an objective is flat at its optimum and its rounding shows as a root."""

@@ -63,7 +63,7 @@ def test_the_coils_of_the_printed_travel_are_the_softest_of_all_that_are_sold():
 
 
 @pytest.mark.parametrize("wire", [size for size in SOLD if size >= 0.0056])
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 def test_every_size_by_itself_is_as_soft_as_by_hand(wire):
     known = softest(STEEL, Contact(plain.PRINTED), wire)
     answer = coiled(effects__coil__sizes="any", bounds__wire=f"{wire!r} m")
@@ -84,7 +84,7 @@ def test_any_size_is_a_little_softer_than_those_sold():
     assert f"Any size would have wire {1e3 * free.design['wire']:.6g} mm" in sold.message
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["sold", "any", "short", "slow"])
 def test_every_figure_of_the_coils_is_plain_arithmetic_and_every_demand_is_held(name):
     changes = {"any": {"effects__coil__sizes": "any"}, "short": {"effects__coil__spring_length": "200 mm"}}
@@ -162,7 +162,7 @@ def test_at_600_rpm_and_the_long_travel_no_coil_will_do_and_the_reason_is_said()
     assert all(word in answer.explanation for word in ("lower speed", "less travel", "softer cam law"))
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "changes"), [("shedding", {}), ("shedding-printed-travel", {"bounds__wire": "6 mm"})])
 def test_the_least_relaxations_help_when_granted_and_not_when_cut_short(name, changes):
     answer = coiled(name, **changes)
@@ -248,6 +248,7 @@ def test_with_the_law_freed_the_coils_are_softer_and_the_softest_of_that_law():
     assert answer.figures["K1"] == pytest.approx(softest(STEEL, Contact(case), answer.design["wire"]), rel=1e-7)
 
 
+@pytest.mark.slow
 def test_the_least_peak_force_with_coils_is_less_than_with_the_softest_of_them():
     answer, softer = coiled(target="force"), coiled()
     assert (answer.status, answer.certificate.whole_cycle) == ("optimal", "bounded")
@@ -311,7 +312,7 @@ def machine(seed):
     )
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", slow.after(4, range(12)))
 def test_coils_of_random_machines_are_the_softest_and_then_the_lightest_that_are_sold(seed):
     case = machine(seed)

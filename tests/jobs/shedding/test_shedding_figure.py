@@ -132,7 +132,7 @@ def test_dwells_are_shaded_and_named(name):
     assert {text.get_text() for text in axes.texts} == {"far dwell", "near dwell", "least cam force"}
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "ending"),
     [

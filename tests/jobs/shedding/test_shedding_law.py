@@ -122,7 +122,7 @@ def test_the_law_converges_with_the_intervals_at_first_order():
     assert K1[0] > K1[1] > K1[2]
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("travel", TRAVELS)
 def test_how_much_softer_than_with_the_best_fixed_law(travel):
     """By the plain reference: 0.3138 and 0.2617 softer than the softest law of continuous s'' and no higher peak."""

@@ -147,7 +147,7 @@ def test_no_angle_exceeds_a_peak(case):
         assert second_sampler.peak(name) * (1 - 1e-4) < values.max() <= second_sampler.peak(name) * (1 + 1e-13)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("k", "ratio"), [(2e6, 1.3), (2e6, 3.0), (5e5, 10.0), (3e5, 43.0)])
 def test_peaks_of_an_overdamped_shaft_are_found_beside_the_corners_of_the_pulse(k, ratio):
     """What decays there does so 2 ratio times as fast as the shaft would swing."""

@@ -303,7 +303,7 @@ def enclosed(value):
     return flint.arb(near, max(abs(float(value - near)) * (1 + 1e-9), 1e-300))
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(3)
 @every_case
 def test_equations_of_every_part_can_be_printed_and_derived(case):
     sp = pytest.importorskip("sympy")

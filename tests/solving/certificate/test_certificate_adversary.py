@@ -207,7 +207,7 @@ def apex(sides, lowered):
     return -linprog([0, 0, 1], A_ub=-slopes, b_ub=-least, bounds=[(None, None)] * 3).fun
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("sides", [3, 4, 7, 24])
 def test_an_apex_where_more_limits_meet_than_there_are_directions_passes(sides):
     certificate = judged(pyramid(sides), xyz(0, 0, 0))

@@ -63,7 +63,7 @@ def test_the_optimum_itself_passes(name):
     assert certify(program, x, ACCURACY).passed
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("name", "share"),
     slow.after(

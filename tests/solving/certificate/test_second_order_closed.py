@@ -135,6 +135,7 @@ def test_a_reed_torque_that_curves_and_leaves_the_scale_open_has_no_price_withou
     assert "l1" in [price.limit for price in answer.binding if "peak_torque" in price.worth]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("least", [0.0, 0.5, 1.0])
 def test_a_point_that_curvature_alone_isolates_leaves_later_levels_nothing_to_choose(least):
     """l1, l4 and theta bind; along what is left |M3| curves, but for a radius that changes nothing."""

@@ -63,6 +63,7 @@ def test_the_least_is_the_one_known_in_closed_form(name):
     assert [point.x["x"], point.x["y"]] == pytest.approx(place, abs=1e-4)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", KNOWN)
 def test_no_neighbour_is_better(name):
     limits, level, _, value = KNOWN[name]

@@ -30,6 +30,7 @@ def cam(rise, far_dwell, back, begins):
     )
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize("begins", ["0 deg", "60 deg", "-170 deg"])
 @pytest.mark.parametrize(
     ("rise", "far_dwell", "back"),

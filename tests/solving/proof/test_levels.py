@@ -160,6 +160,7 @@ def test_what_cannot_be_bounded_says_why():
         assert outcome.levels == ()
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("target", ["torque", "balance"])
 def test_a_good_design_is_never_lost(target):
     """Whatever is better than a claim stays in some open box: here the optimum itself, under a claim 3 % worse."""

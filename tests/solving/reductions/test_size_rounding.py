@@ -22,6 +22,7 @@ def rounded(problem, steps, target=None, **changes):
     return engine.solve(scene, target, reductions=[SizeRounding(steps)])
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("step", "points", "reaching", "links", "peak"),
     [

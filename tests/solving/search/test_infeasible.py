@@ -105,14 +105,14 @@ def test_what_it_prints_holds_a_design_and_no_nan(answer_of, name):
     assert any(not limit["ok"] for limit in printed["limits"]), "the design shown cannot keep every limit"
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", slow.after(4, TIGHT))
 def test_the_least_relaxation_helps_and_no_less_does(answer_of, name):
     scene, target = scene_of(name)
     assert_just_enough(scene, target, together(answer_of(name)))
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", slow.after(4, TIGHT))
 def test_each_limit_that_would_do_by_itself_does_and_no_less_of_it(answer_of, name):
     (scene, target), answer = scene_of(name), answer_of(name)

@@ -34,6 +34,7 @@ def change(scene, design):
     return sum(((design[n] - today[n]) / (bounds[n].max - bounds[n].min)) ** 2 for n in LENGTHS)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("M0", [800, 900])
 def test_of_all_common_factors_the_lengths_take_the_one_nearest_today(M0):
     scene = scene_of(M0)

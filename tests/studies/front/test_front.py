@@ -237,7 +237,7 @@ def test_dwells_of_the_rapier():
 STIFFNESS = {0.080: 102602.609425, 0.060: 119901.395181, 0.040: 144270.372242, 0.020: 181234.597037}
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("preload_", "stiffness"), STIFFNESS.items())
 def test_stiffness_against_preload(preload, preload_, stiffness):
     trade, rows = preload
@@ -366,7 +366,7 @@ def test_an_end_that_no_limit_stops_is_told(certified, angle, report):
         trade._refuse({0: row, 1: row})
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ranges", "axis", "reached"),
     [

@@ -235,6 +235,7 @@ def test_a_front_that_has_only_begun_shows_what_there_is(serial):
     assert result.rows == serial.solved[:1]
 
 
+@pytest.mark.slow
 def test_one_design_that_is_best_in_both():
     second_front = lo.pareto("beatup", AXES, "none")
     assert second_front.findings.message == "peak_torque and m4e do not conflict: one design is best in both."

@@ -88,6 +88,7 @@ def test_without_tolerances_the_worst_case_is_the_nominal_figure():
     assert case.max == pytest.approx(plan.figures["peak_torque"], rel=3e-11)
 
 
+@pytest.mark.slow
 def test_the_range_of_a_number_is_its_tolerance():
     _, cases_by_name = cases("shedding")
     nominal = optimum("shedding")["K1"]
