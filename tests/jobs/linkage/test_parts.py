@@ -174,7 +174,7 @@ MISTAKES = {
     "a point without place": (with_part("E", POINT, radius=None), "parts.E: the point has no place"),
     "unknown joint": (changed("crank", at="AA"), 'parts.crank.at: unknown joint "AA"'),
     "unknown link": (with_part("E", POINT, on="rockr"), 'parts.E.on: unknown link "rockr"'),
-    "a link for a joint": (changed("drive", joins=["crank", "D"]), "parts.drive.joins: crank is a link, and a joint"),
+    "a link for a joint": (changed("drive", joins=["crank", "D"]), "parts.drive.joins: crank is a link, but a joint"),
     "a joint for a link": (with_part("E", POINT, on="C"), "parts.E.on: C is a joint, but a link is needed"),
     "the frame for a joint": (
         changed("crank", at="frame"),
