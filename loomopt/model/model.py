@@ -506,7 +506,16 @@ class JobModel:
         return self._quantities[name].square
 
     def has_quantity(self, name: str) -> bool:
-        """Whether a name is that of a whole-cycle quantity."""
+        """Whether a name is that of a whole-cycle quantity.
+
+        Parameters
+        ----------
+        name : any name.
+
+        Returns
+        -------
+        True or False.
+        """
         return name in self._quantities
 
     def has_row(self, name: str) -> bool:
@@ -579,15 +588,44 @@ class JobModel:
     # Numbers and corners.
 
     def given(self, maths: Maths, values: Values) -> Given:
-        """Scene's numbers and what follows from them at once, SI."""
+        """Scene's numbers with all that follows from them.
+
+        Parameters
+        ----------
+        maths : number system.
+        values : scene's numbers by name, SI.
+
+        Returns
+        -------
+        Numbers, SI, with the values of the states.
+        """
         return with_states_eliminated(maths, self.kinematics, self.loads, self.plain(maths, values))
 
     def samples(self, given: Given) -> int:
-        """Number of samples per turn that the states of a design need; 0 without states."""
+        """Number of samples per turn that the states of a design need.
+
+        Parameters
+        ----------
+        given : scene's numbers with all that follows from them, SI.
+
+        Returns
+        -------
+        Number of samples; 0 without states.
+        """
         return max((math.ceil(state.samples(given.inputs(FLOAT, state))) for state in self.states), default=0)
 
     def plain(self, maths: Maths, values: Values) -> Given:
-        """Scene's numbers with what follows from the mechanism alone, SI."""
+        """Scene's numbers with what follows from the mechanism alone.
+
+        Parameters
+        ----------
+        maths : number system.
+        values : scene's numbers by name, SI.
+
+        Returns
+        -------
+        Numbers, SI, without the values of the states.
+        """
         by_effect: dict[str, dict[str, Any]] = {}
         for effect, full in self._full.items():
             by_effect[effect] = {key: values[name] for key, name in full.items() if name in values}
@@ -612,47 +650,140 @@ class JobModel:
         return frozenset(name for name in self.switches if name not in arcs)
 
     def corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
-        """Corner angles of the cycle, rad, as declared one after the other."""
+        """Corners of the cycle.
+
+        Parameters
+        ----------
+        maths : number system.
+        given : scene's numbers with all that follows from them, SI.
+
+        Returns
+        -------
+        Crank angles, rad, in the order of declaration.
+        """
         return tuple(angle for arc in cornered(self, maths, given) for angle in arc.placed)
 
     def split(self, maths: Maths, given: Given) -> Cycle:
-        """Pieces of the cycle; maths: of floats."""
+        """Pieces of the cycle.
+
+        Parameters
+        ----------
+        maths : number system of floats.
+        given : scene's numbers with all that follows from them, SI.
+
+        Returns
+        -------
+        Cycle, with the switches of each piece.
+        """
         arcs = cornered(self, maths, given)
         corners = [angle for arc in arcs for angle in arc.placed]
         return cycle.split(corners, self.switches, lambda angle: [arc.switch(angle, arc.angles) for arc in arcs])
 
     def hints(self, given: Given) -> dict[str, float]:
-        """Angles of corners that no formula gives, by name of value: the start of `given`."""
+        """Angles of corners and events that no formula gives.
+
+        Parameters
+        ----------
+        given : scene's numbers with all that follows from them, SI.
+
+        Returns
+        -------
+        Starting angles, rad, by name of the value.
+        """
         return dict(self.kinematics.hints(given, self.called))
 
     def singular(self, squares: Squares) -> tuple[float, ...]:
-        """Crank angles, rad, where the mechanism nearly reaches a singular position."""
+        """Crank angles where the mechanism nearly reaches a singular position.
+
+        Parameters
+        ----------
+        squares : reader of squares of quantities by names and crank angles, rad.
+
+        Returns
+        -------
+        Angles, rad.
+        """
         groups = self.kinematics.groups.items()
         return tuple(angle for prefix, group in groups for angle in group.singular(prefix, squares))
 
     # Values.
 
     def instant(self, maths: Maths, given: Given, node: Node) -> Instant:
-        """Mechanism with its effects at a node."""
+        """Mechanism with its effects at a node.
+
+        Parameters
+        ----------
+        maths : number system.
+        given : scene's numbers with all that follows from them, SI.
+        node : node of the cycle.
+
+        Returns
+        -------
+        Instant, which computes its pose once.
+        """
         return Instant(self, maths, given, node)
 
     def formula(self, name: str) -> Formula:
-        """Formula of a whole-cycle quantity."""
+        """Formula of a whole-cycle quantity.
+
+        Parameters
+        ----------
+        name : name of a whole-cycle quantity.
+
+        Returns
+        -------
+        Function of an instant.
+        """
         return self._quantities[name].formula
 
     def quantity(self, maths: Maths, given: Given, name: str, node: Node) -> Number:
-        """Whole-cycle quantity, SI, at a node."""
+        """Whole-cycle quantity at a node.
+
+        Parameters
+        ----------
+        maths : number system.
+        given : scene's numbers with all that follows from them, SI.
+        name : name of a whole-cycle quantity.
+        node : node of the cycle.
+
+        Returns
+        -------
+        Value, SI.
+        """
         return self.together(maths, given, node)(name)
 
     def together(self, maths: Maths, given: Given, node: Node) -> Callable[[str], Number]:
-        """Reader of whole-cycle quantities by name, SI, at a node; it computes the pose once."""
+        """Reader of whole-cycle quantities at a node, which computes the pose once.
+
+        Parameters
+        ----------
+        maths : number system.
+        given : scene's numbers with all that follows from them, SI.
+        node : node of the cycle.
+
+        Returns
+        -------
+        Function from the name of a quantity to its value, SI.
+        """
         instant = Instant(self, maths, given, node)
         return lambda name: self._quantities[name].formula(instant)
 
     def static(
         self, maths: Maths, given: Given, stills: Stills, names: Collection[str] | None = None
     ) -> dict[str, Number]:
-        """Figures and rows that need one position only; all of them without names."""
+        """Figures and rows that need one position only.
+
+        Parameters
+        ----------
+        maths : number system.
+        given : scene's numbers with all that follows from them, SI.
+        stills : switches just before each event.
+        names : names of figures and rows; None for all whose numbers are known.
+
+        Returns
+        -------
+        Values by name, SI.
+        """
         if names is None:
             known = given.values
             names = [name for name, row in self._rows.items() if all(need in known for need in row.needs)]
@@ -667,7 +798,18 @@ class JobModel:
         return figures
 
     def event(self, maths: Maths, given: Given, name: str) -> Number:
-        """Crank angle of an event, rad."""
+        """Crank angle of an event.
+
+        Parameters
+        ----------
+        maths : number system.
+        given : scene's numbers with all that follows from them, SI.
+        name : name of the event.
+
+        Returns
+        -------
+        Angle, rad.
+        """
         return self.kinematics.events(maths, given)[name]
 
 

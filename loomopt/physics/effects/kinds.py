@@ -173,21 +173,29 @@ def model_of(effect: "Effect", table: Table) -> ModelNeeds:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Effect:
-    """What all kinds declare.
+    """Declaration that effects of all kinds share.
 
-    name: the table in a scene that turns it on; an instance of one that there may be many of is "kind.instance".
-    table: model of that table's values. rank: its place among the job's effects, the lowest first.
-    reads: design variables it depends on beside the mechanism's lengths, and events of the motion that it calls in.
-    needs: scene keys that must be given; companions: effects that must be on; clashes: those that must not.
-    examples: tables it may have, as a scene writes them, for tests and templates.
-    letters: keys of its table → their symbols in equations, a key's own name without one.
-    figures, margins: numbers a designer reads of it, and what every design keeps while it is on (phrase → kind).
-    least: what a job makes least where its own target leaves room: a key of its table, or of a check one of its rows.
-    axes: numbers of its table that may change nothing.
-    models: what it needs with each word of its key `model`, which its numbers differ by.
-    many: whether the table holds one table for each of several instances; kind, instance: of one of them its table.
-    alone: of such an effect what values mean that stand in its table by themselves; None where that is a mistake.
-    of_masses: what it tells that depends on where masses move, in words; "" for nothing.
+    Attributes
+    ----------
+    name : table of [effects] that turns the effect on; of an instance "kind.instance".
+    summary : what the effect is, in one line.
+    table : model of the values of the table.
+    rank : place among the effects of the job, the lowest first.
+    reads : design variables that it depends on besides the lengths of the mechanism, and events of the motion.
+    needs : scene keys that must be given.
+    companions : effects that must be on too.
+    clashes : effects that must be off.
+    examples : tables as a scene writes them, for tests and templates.
+    letters : symbol of each key of the table in equations; the key itself by default.
+    figures : figures of the effect.
+    margins : what every design must keep while the effect is on: phrase and kind of quantity.
+    least : what a job minimises where its own target leaves room: a key of the table, or a row of a check.
+    axes : numbers of the table that may change nothing.
+    models : needs of each word of the key `model`.
+    many : whether the table holds one table for each of several instances.
+    kind, instance : of an instance, its effect and its own name.
+    alone : effect whose values may stand in the table of several instances directly; None where that is a mistake.
+    of_masses : what the effect reports that depends on where masses move, in words; "" for nothing.
     """
 
     name: str
@@ -262,24 +270,27 @@ def required(effect: "Effect") -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Load(Effect, Generic[Pose]):
-    """An algebraic effect: one term of the force the output needs, or of the crank torque inside the drive.
+    """An algebraic effect: one term of the force that the output needs, or of the crank torque inside the drive.
 
-    acts: "output" (times q' it reaches the crank) or "drive" (it reaches the crank only).
-    force(at): the term, N or N·m.
-    corners(at): crank angles in rad where the formula changes; switch(angle, corners): which formula holds at a crank
-    angle inside a piece, as the number `at.switch`.
-    response(at, oscillator): z, rad or m, and z˙ of an oscillator that carries the load, in the periodic steady state;
-    a load with corners cannot be carried without.
-    known_in(words): where the term is known, by the words of its table; empty for all over the cycle.
-    inside(at): of an output term, what the effect takes inside the drive besides, N·m; None for nothing.
-    upon(at, loading): the term instead, where it depends on what all others do.
-    moved(at): the inertia, kg·m² or kg, that it adds to what moves with the output.
-    symbol: what its column of the curves is called, its name without one.
-    cases: switch → where that formula holds, in words for its equation; by its corners without them.
-    tabulated: the curve of one's own that it may be; None for none.
-    mass(at): what it moves of one link; push(at, term): the force on the output's link, N, that its term is the moment
-    or the work of, None where the table does not tell it; applied(at): its forces on links and joints, where those have
-    names. All of them are read for the forces in joints, and nowhere else.
+    Attributes
+    ----------
+    acts : "output" (times q' it reaches the crank) or "drive" (it reaches the crank only).
+    force(at) : the term, N or N·m.
+    inside(at) : of an output term, its further part inside the drive, N·m; None for nothing.
+    upon(at, loading) : the term where it depends on all other terms.
+    corners(at) : crank angles, rad, where the formula changes.
+    switch(angle, corners) : formula that is valid at a crank angle inside a piece, as the number `at.switch`.
+    known_in(words) : places where the term is known, by the words of its table; empty for the whole cycle.
+    moved(at) : inertia, kg·m² or kg, that it adds to what moves with the output.
+    response(at, oscillator) : z, rad or m, and z˙ of an oscillator that carries the load, in the periodic steady state;
+        a load with corners cannot be carried without it.
+    symbol : heading of its column of the curves; its name by default.
+    cases : for each switch, the range where its formula is valid, in words; by default the corners tell it.
+    tabulated : table of a curve that may replace its values; None for none.
+    mass(at) : the moving mass of one link.
+    push(at, term) : force on the link of the output, N, whose moment or work is the term; None where the table does not
+        tell it.
+    applied(at) : forces on links and joints, where those have names. The last three are read for joint forces only.
     """
 
     acts: Literal["output", "drive"]
@@ -357,24 +368,31 @@ def nothing_explained(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Check(Effect, Generic[Pose]):
-    """An effect that takes no part in the balance: figures and rows read from the solved motion, and their demands.
+    """An effect outside the balance: figures and rows that are read from the solved motion, and their demands.
 
-    quantities: name → value(at) over the cycle; the figure is the largest |value|.
-    rows: name → value(at) of the design alone; demands: what rows or quantities must keep while it is on.
-    sold(own): numbers of its table that come in sizes → those sold, SI, ascending.
-    joints(at, loading): an object whose attributes are read by their names: `vectors`, whose size
-    is the quantity and whose components stand beside it, and `scalars`; wanted: which of them, or of the quantities,
-    needs scene keys, and has no value without; between: inertia loads on links, with terms of their own in equations;
-    sides: force → the parts that it is between, of the first on the second one, "frame" for what does not move; their
-    unit directions are what `heading(part)` of the object returns.
-    directed: scalars that are sizes of a vector, each with the attribute that is it: its components are quantities too.
-    signed: scalars of which the largest value counts; pushes: those that are 0 where Q is negative: contact is lost
-    there. worked: figure, a mean power over a turn → what of them tells by each vector's name the work of
-    its size, per rad of the crank.
-    The same name in two checks is the same quantity. fitted(chain): the check of a linkage of one's own;
-    sentence: its equations in words, where the symbols of a pose do not tell its links.
-    remark(at, shown): what to know beside its figures, "" for nothing, in the reader's units.
-    explain(known, bounds, own, clash, shown): what physics says of why limits (names) clash, in the reader's units.
+    The same name in two checks is the same quantity.
+
+    Attributes
+    ----------
+    quantities : value(at) by name, over the cycle; the figure is the largest |value|.
+    rows : value(at) by name, of the design alone.
+    demands : what rows or quantities must keep while the effect is on.
+    sold(table) : stock sizes of numbers of its table, SI, ascending.
+    joints(at, loading) : object with the attributes `vectors` and `scalars`; unit directions are its `heading(part)`.
+    vectors : attributes whose size is the quantity, with their components.
+    scalars : attributes that are quantities themselves.
+    sides : for each force, the parts that it acts between, of the first on the second; "frame" for what does not move.
+    directed : for each scalar that is the size of a vector, the attribute of the vector: its components are quantities.
+    signed : scalars of which the largest value counts.
+    pushes : quantities that are 0 where Q is negative, for contact is lost there.
+    worked : for each figure that is a mean power over a turn, the attribute that gives the work of each vector's size,
+        per rad of the crank.
+    wanted : scene keys without which a vector, scalar or quantity has no value.
+    fitted(chain) : the check of a user's own linkage.
+    between : inertia loads on links, with terms of their own in equations.
+    sentence : its equations in words, where the symbols of a pose do not tell its links.
+    remark(at, shown) : sentence beside its figures, in the reader's units; "" for nothing.
+    explain(known, bounds, table, clash, shown) : physical reason why limits (names) clash, in the reader's units.
     """
 
     quantities: Mapping[str, Callable[[Inputs[Pose]], Number]] = field(default_factory=dict)
@@ -440,20 +458,25 @@ def no_oscillator(at: Inputs[None]) -> "SteadyOscillator":
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State(Effect):
-    """One linear coordinate between the output and the loads that move with it; eliminated before a formula reads it.
+    """One linear coordinate between the output and the loads that move with it, eliminated before a formula reads it.
 
-    carries: names of the loads that move with the coordinate: they leave the output force, and `force` stands there.
-    derived(at, carried): values that follow from the scene's numbers, in the steady state.
-    force(at, reply), coordinate(at, reply): Q's term, N or N·m, and z itself, of derived values; reply: z and z˙ in
-    answer to loads with corners. oscillator(at): what answers those loads, of derived values too.
-    fixed(at, carried): words that choose formulas at a design, in floats; `at.table` has those of its neighbours, if
-    any, and what serves them is kept. Raises UnsteadyError.
-    samples(at): of one turn, from which extremes are refined.
-    moved(at, coordinate, force, acceleration): the motion of what it carries, whose q¨ is known already.
-    peaks: figure → what it is of; columns: of the curves, with unit → what is read.
-    motion(written, own): both sides of its equation of motion; term(written, own): `force` in the same symbols.
-    between: the symbols that z is the difference of, what moves first. rests(own): what neither proofs nor studies of
-    accuracy cover of it, a sentence without its full stop.
+    Attributes
+    ----------
+    carries : names of the loads that move with the coordinate: `force` replaces them in the output force.
+    derived(at, carried) : values that follow from the scene's numbers, in the steady state.
+    force(at, reply) : term of Q, N or N·m, of derived values; reply is the response z and z˙ to loads with corners.
+    coordinate(at, reply) : the coordinate z.
+    oscillator(at) : oscillator that responds to loads with corners, of derived values too.
+    fixed(at, carried) : words that choose formulas at a design, in floats; `at.table` has those of a neighbour, and a
+        valid one is kept. Raises UnsteadyError.
+    samples(at) : number of samples of one turn, from which extremes are refined.
+    moved(at, coordinate, force, acceleration) : motion of the carried loads, whose q¨ is known already.
+    peaks : what each of its figures is the peak of.
+    columns : columns of the curves, with unit.
+    motion(written, table) : both sides of its equation of motion.
+    term(written, table) : `force` in the same symbols.
+    between : the symbols whose difference is z, the moving one first.
+    rests(table) : what neither proofs nor studies of accuracy cover, a sentence without its full stop.
     """
 
     carries: tuple[str, ...]
@@ -475,12 +498,15 @@ class State(Effect):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Speed(Effect):
-    """The crank's own motion: its speed changes over the turn as the motor gives what the crank takes.
+    """Motion of the crank: its speed changes over the turn as motor and load do.
 
-    motor(at, omega): the motor's torque, N·m, at a speed, rad/s; at.values["no_load_speed"] is the one that follows
-    from the mean speed over time. flywheel(at): inertia, kg·m², of all that turns with the crank.
-    rows: name → value(at, turning), SI, of the motion that is solved; most: the one that is the motor's largest
-    torque.
+    Attributes
+    ----------
+    motor(at, omega) : torque of the motor, N·m, at a speed, rad/s; at.values["no_load_speed"] follows from the
+        mean speed over time.
+    flywheel(at) : inertia, kg·m², of all that turns with the crank.
+    rows : value(at, turning) by name, SI, of the solved motion.
+    most : row that is the largest torque of the motor.
     """
 
     motor: Callable[[Inputs[None], Number], Number]
@@ -510,14 +536,18 @@ class EventTerms(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Event(Effect):
-    """What parts and meets again: contact of the output that is lost. Followed on a given design, never in a program.
+    """Loss and return of the output's contact, simulated for a given design and never inside a program.
 
-    force: the quantity that is the force of contact; least: the one that is largest where that is least.
-    free(given, q, velocity, acceleration, direction): the pose of the output on its own, as its loads read it; one
-    that reads more cannot be followed. direction: of its motion, between −1 and 1 at rest.
-    places(given): event of the motion that loads call in → the output there, m or rad.
-    follow(body, cam, own): its course from contact at crank angle 0 on; read(course): figures, where contact is lost.
-    rules(terms): its equation of motion and what holds when it meets the mechanism again.
+    Attributes
+    ----------
+    force : quantity that is the contact force.
+    least : quantity that is largest where the contact force is least.
+    free(given, q, velocity, acceleration, direction) : pose of the output in flight, as its loads read it; direction of
+        its motion, between −1 and 1 at rest.
+    places(given) : position of the output, m or rad, at each event of the motion that loads read.
+    follow(body, cam, table) : course of the motion from contact at crank angle 0 on.
+    read(course) : figures of a course where contact is lost.
+    rules(terms) : equation of motion, and the conditions of landing.
     """
 
     force: str
