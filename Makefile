@@ -8,6 +8,8 @@ COVER ?=
 COVERING := --cov loomopt --cov-report=
 # make docs-open: where the site is served.
 PORT ?= 8000
+# Bytecode is kept, whatever the environment says: else each worker of the suite compiles all tests anew, for ten seconds.
+unexport PYTHONDONTWRITEBYTECODE
 TOTAL = @echo "Coverage by $(1): $$($(BIN)/python -m coverage report --format=total) % of the lines of loomopt"
 
 .PHONY: solve test slow whole coverage lint types docs docs-open outputs notebooks benchmark locked clean
