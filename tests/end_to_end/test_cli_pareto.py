@@ -158,7 +158,7 @@ def test_an_end_without_a_least_asks_for_a_range(cli, tmp_path):
     arguments = ("loose.toml", "--minimise", "K1", "--against", "X0", "--points", "3")
     status, out, err = cli(*arguments)
     assert (status, out, err.count("\n")) == (2, "", 1)
-    assert "the least X0 is not reached: K1 grows without end towards it" in err
+    assert "the least X0 is not reached: K1 grows without limit" in err
     assert "Give --range of X0 or of K1" in err
     assert cli(*arguments, "--range", "X0=20:80 mm")[0] == 0
 

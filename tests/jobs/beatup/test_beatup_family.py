@@ -274,5 +274,5 @@ def test_the_ratio_of_what_balances_says_nothing_of_linkages_of_their_own():
 
 def test_effects_with_a_state_are_refused_by_name():
     scene = family((600, 745)).with_effect("shaft_torsion")
-    with pytest.raises(BadInput, match="a family of machines with shaft_torsion is not solved"):
+    with pytest.raises(BadInput, match="a family cannot be solved with shaft_torsion"):
         lo.solve(scene, "family")

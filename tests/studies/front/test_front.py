@@ -335,7 +335,7 @@ def loose():
 @pytest.mark.slow
 def test_an_end_without_a_least_asks_for_a_range():
     trade = front.trade(loose(), ("K1", "X0"), points=3)
-    with pytest.raises(BadInput, match=r"the least X0 is not reached: K1 grows without end.*--range of X0 or of K1"):
+    with pytest.raises(BadInput, match=r"the least X0 is not reached: K1 grows without limit.*--range of X0 or of K1"):
         trade.batch(ends(trade))
 
 
@@ -361,7 +361,7 @@ def test_an_end_that_no_limit_stops_is_told(certified, angle, report):
     program = trade.solver.base
     x = {v.name: v.lower for v in program.variables} | {"dwell": 1.0, "dwell_after": angle, "phi_stroke": 3.0}
     row = Row(0, {}, None, "", None, {}, {}, {}, {}, certified, 0.0, {"point": {"x": x}})
-    wrong = "dwell_after goes as far towards it as it may be, and no limit stops it"
+    wrong = "dwell_after reaches an end of its range, where no limit stops it"
     with pytest.raises(BadInput, match=wrong) if report else contextlib.nullcontext():
         trade._refuse({0: row, 1: row})
 

@@ -40,7 +40,7 @@ def test_a_design_above_its_limit_is_uncertified_and_does_not_say_that_there_is_
     assert answer.status == "optimal"
     monkeypatch.setattr(solving, "FEASIBLE", -0.01)
     above = solver.solve(asking, [answer.warm], False)
-    assert (above.status, above.reason) == ("uncertified", "m4e comes out above what was asked")
+    assert (above.status, above.reason) == ("uncertified", "m4e comes out above its limit")
 
 
 @pytest.mark.slow
