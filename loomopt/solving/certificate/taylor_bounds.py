@@ -7,7 +7,7 @@ inside the balls.
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,9 @@ from loomopt.physics.cycle import Node, Where
 MOST_BOXES, MEAN_BOXES = 20_000, 2048
 """Boxes of crank angle after which a bound is undecided (every packaged row takes under 2000), and boxes of a mean: the
 cube of a width of 1/2048 is 1e-10."""
+
+SHARED_BOXES = 2000
+"""Boxes over which several quantities are read at once: their poses are computed once, but all series are kept."""
 
 NEAR_TOP = 1.5
 """Widths between a box's middle and a refined top within which the box is expanded at the top, or at its end toward it.
@@ -76,12 +79,24 @@ class Boxes(Reading):
         self._centred = Quantities(model, (system, systems.centred_balls()), self.given)
         self._read: dict[tuple[int, float, float], Number] = {}
         self._read_of = ""
+        self._together: tuple[str, ...] = ()
+        self._shared: dict[tuple[int, float, float], dict[str, Number]] = {}
+        self._middles: dict[tuple[int, float], dict[str, Number]] = {}
 
     @lazy
     def _switches(self) -> list[dict[str, float]]:
         """Switches on each piece."""
         pieces = map(self.cycle.switch, range(self.cycle.pieces))
         return [{name: float(value) for name, value in switch.items()} for switch in pieces]
+
+    def share(self, names: Iterable[str]) -> None:
+        """Read these quantities together over every box, because several of them are to be bounded."""
+        self._together = tuple(dict.fromkeys(self._row(name) for name in names))
+        self._shared, self._middles = {}, {}
+
+    def _row(self, name: str) -> str:
+        """Row by which a quantity is bounded: its square where it has a corner at 0."""
+        return self.model.square(name) or name
 
     def bound(
         self,
@@ -97,8 +112,8 @@ class Boxes(Reading):
         undecided after that number of boxes; MOST_BOXES without it.
         """
         is_over = stop or (lambda boxes: boxes >= MOST_BOXES)
-        cycle, box_count, square = self.cycle, 0, self.model.square(name)
-        row, limit = (square, limit * abs(limit)) if square else (name, limit)
+        cycle, box_count, row = self.cycle, 0, self._row(name)
+        limit = limit if row == name else limit * abs(limit)
         for piece in map(int, np.flatnonzero(self.sampler.on(name, where))):
             tops = self._tops(name, sign, piece)
             boxes = [AngleBox(0.0, 1.0)]
@@ -132,7 +147,7 @@ class Boxes(Reading):
         ball = piece, centre, half
         if ball not in self._read:
             self.sampler.session.positions += 1
-            self._read[ball] = self._narrow_series(name, *ball) if half else self._series(name, *ball)
+            self._read[ball] = self._box_series(name, *ball) if half else self._point_series(name, piece, centre)
         return sign * self._read[ball]
 
     def mean(self, integral: Integral) -> Number:
@@ -160,11 +175,27 @@ class Boxes(Reading):
         value = self.quantity(name, angle, self._switches[piece])
         return systems.ball_series(0.0, 0.0) * 0 + value
 
-    def _narrow_series(self, name: str, piece: int, centre: float, half: float) -> Number:
+    def _point_series(self, name: str, piece: int, at: float) -> Number:
+        """Taylor series at a point; one at the middle of a box over which quantities were read together is known."""
+        known = self._middles.get((piece, at), {}).get(name)
+        return known.middle if isinstance(known, CentredSeries) else self._series(name, piece, at, 0.0)
+
+    def _box_series(self, name: str, piece: int, centre: float, half: float) -> Number:
         """Taylor series as `_series`, narrowed by that at the middle: three times the work, and far fewer boxes."""
-        angle = self._angle(piece, systems.centred_ball_series(centre, half))
-        value = self._centred((name,), Node(angle, self._switches[piece]))[0]
+        box = piece, centre, half
+        if name in self._together and box not in self._shared and len(self._shared) < SHARED_BOXES:
+            try:
+                self._shared[box] = self._middles[piece, centre] = self._centred_series(self._together, *box)
+            except (ValueError, ZeroDivisionError):  # of one of them: each is read by itself
+                self._shared[box] = {}
+        known = self._shared.get(box, {})
+        value = known[name] if name in known else self._centred_series((name,), *box)[name]
         return value.narrowed() if isinstance(value, CentredSeries) else systems.ball_series(0.0, 0.0) * 0 + value
+
+    def _centred_series(self, names: tuple[str, ...], piece: int, centre: float, half: float) -> dict[str, Number]:
+        """Quantities over a box, as far as they depend on u with the series at its middle."""
+        angle = self._angle(piece, systems.centred_ball_series(centre, half))
+        return dict(zip(names, self._centred(names, Node(angle, self._switches[piece])), strict=True))
 
     def _angle(self, piece: int, u: Number) -> Number:
         """Crank angle, rad, of a share of a piece."""

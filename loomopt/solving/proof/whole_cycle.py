@@ -85,6 +85,8 @@ def _decided(program: Program, job: Job, formatter: UnitFormatter, reads: "tuple
         return boxes >= most or is_late()
 
     claims = list(_claims(program, job, formatter, *reads))
+    for read in reads:
+        read.boxes.share(claim[1].quantity for claim in claims if not isinstance(claim, Proof) and claim[0] is read)
     proofs = [claim if isinstance(claim, Proof) else _over_cycle(*claim, first_stop) for claim in claims]
     while most < taylor_bounds.MOST_BOXES and not is_late():
         most = min(GROWTH * most, taylor_bounds.MOST_BOXES)

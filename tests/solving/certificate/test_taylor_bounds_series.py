@@ -285,3 +285,28 @@ def test_a_quantity_counts_once_with_its_size():
     sizes = {"hill": 4.0}
     program = toy.program("x", {}, WAVES, limits=limits, objectives=("peak hill", "x"), sizes=sizes)
     assert cycle_rows(program) == [("hill", 4.0, None), ("square", 1.0, None)]
+
+
+def test_quantities_read_together_are_bounded_as_each_by_itself():
+    """The same boxes and verdicts; what cannot be enclosed over a box takes nothing from the others."""
+    names = ["sine", "square", "hill", "bump", "level"]
+    alone, together = boxes(), boxes()
+    together.share(names)
+    for name in names:
+        for limit in (-0.5, 0.3, 1.0 + 1e-9, 7.0):
+            bounds = [made.bound(name, 1.0, limit) for made in (alone, together)]
+            assert bounds[0] == bounds[1], (name, limit)
+    assert together._shared
+
+
+def test_a_quantity_without_an_enclosure_leaves_the_others_theirs(monkeypatch):
+    made, whole = boxes(), Boxes._centred_series
+
+    def refuses(self, names, *box):
+        if len(names) > 1:
+            raise ValueError("a ball of angles lies across the branch cut")
+        return whole(self, names, *box)
+
+    monkeypatch.setattr(Boxes, "_centred_series", refuses)
+    made.share(["sine", "hill"])
+    assert made.bound("sine", 1.0, 1.0 + 1e-9) == boxes().bound("sine", 1.0, 1.0 + 1e-9)

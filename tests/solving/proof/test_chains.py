@@ -77,6 +77,16 @@ def test_five_dyads_in_a_row_are_proven(monkeypatch, sizes):
     assert sum(proof.boxes for proof in found.proofs) < 10_000
 
 
+@pytest.mark.slow
+def test_a_long_chain_with_little_time_says_what_is_open(monkeypatch):
+    """Time is up at once: every claim has its first boxes, those that are open have no more."""
+    monkeypatch.setattr(whole_cycle, "SECONDS", -1.0)
+    proofs = lo.prove(chain(*CHAINS[0])).proofs
+    assert {proof.status for proof in proofs} == {"proven", "undecided"}
+    assert all(proof.open is not None for proof in proofs if proof.status == "undecided")
+    assert max(proof.boxes for proof in proofs) <= 4 * (whole_cycle.LEAST_BOXES + 1)
+
+
 def test_a_chain_beyond_its_boxes_is_undecided_and_says_where(monkeypatch):
     monkeypatch.setattr(whole_cycle, "SECONDS", -1.0)
     monkeypatch.setattr(whole_cycle, "FIRST_BOXES", 20)
