@@ -352,8 +352,22 @@ class Answer(Evaluation):
     @property
     def before(self) -> Evaluation | None:
         """Former name of `today`."""
-        warnings.warn("before is now today; the old name goes in the next version", DeprecationWarning, stacklevel=2)
-        return self.today
+        return self._former("before", "today")
+
+    @property
+    def asked(self) -> str | None:
+        """Former name of `named_target`."""
+        return self._former("asked", "named_target")
+
+    @property
+    def beside(self) -> "solution.Alternative | None":
+        """Former name of `alternative`."""
+        return self._former("beside", "alternative")
+
+    def _former(self, name: str, current: str) -> Any:
+        text = f"{name} is now {current}; the old name goes in the next version"
+        warnings.warn(text, DeprecationWarning, stacklevel=3)
+        return getattr(self, current)
 
     def __str__(self) -> str:
         from loomopt.interface.text import answers, layout

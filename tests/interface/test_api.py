@@ -166,6 +166,8 @@ METHODS = {
     "Answer": {
         *(
             "admissible",
+            "alternative",
+            "named_target",
             "animate",
             "as_dict",
             "asked",
@@ -232,7 +234,20 @@ METHODS = {
     },
     "Scene": {
         *("active", "bounds", "call", "called", "change", "document", "effects", "equations", "free", "full", "given"),
-        *("job", "jobs", "limits", "mechanism", "name", "operation", "origin", "own", "paths", "schema", "set", "show"),
+        *(
+            "effect_table",
+            "job",
+            "jobs",
+            "limits",
+            "mechanism",
+            "name",
+            "operation",
+            "origin",
+            "paths",
+            "schema",
+            "set",
+            "show",
+        ),
         *("shown_in", "source", "table", "tables", "targets", "title", "unit_for", "units", "update", "with_effect"),
         *("hash", "without_effect", "without_limit"),
     },

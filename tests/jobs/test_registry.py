@@ -37,7 +37,8 @@ def test_own_scenes_are_read_without_a_scan(name, scans):
     check.check_names([name])
     for name, effect in scene.schema.effects.items():
         if name in scene.document.get("available", {}):
-            scene.with_effect(*effect.companions, name)
+            clashing = [clash.effect for clash in effect.clashes if clash.effect in scene.effects]
+            scene.without_effect(*clashing).with_effect(*effect.companions, name)
     assert scans == []
 
 

@@ -24,8 +24,13 @@ NOT_FORMULAS = {"crank_rocker.py": {"curves", "fault", "_where_it_stops", "_angl
 """Parts of the crank-rocker that talk to people or fill arrays: they run on plain floats only."""
 IN_FLOATS = {"fixed", "remark", "samples"}
 """Functions of an effect that run on plain floats only: before the formulas, or beside them."""
+SHARED = ("coulomb.py", "shaft_torsion.py", "speed_fluctuation.py")
+"""Effects of several jobs."""
 EFFECT_FILES = sorted(
-    f"{path.parent.name}/{path.name}" for path in PACKAGE.glob("effects/*/*.py") if path.name != "__init__.py"
+    [
+        *(f"{path.parent.name}/{path.name}" for path in PACKAGE.glob("effects/*/*.py") if path.name != "__init__.py"),
+        *SHARED,
+    ]
 )
 
 
@@ -152,8 +157,8 @@ def test_formulas_of_an_oscillator_hold_no_branch(name):
     assert not offences(without_structure(functions(read("motion", "harmonic.py"))[name]))
 
 
-NO_FORMULAS = ("shedding/separation.py", "beatup/shaft_torsion.py")
-"""Flight is followed in floats alone; the torsion of the rocking shaft is that of every linkage's output."""
+NO_FORMULAS = {"shedding/separation.py", "beatup/shaft_torsion.py", *(f"linkage/{name}" for name in SHARED)}
+"""Flight is followed in floats alone; what several jobs have stands in a file of its own."""
 
 
 @pytest.mark.parametrize("file", EFFECT_FILES)

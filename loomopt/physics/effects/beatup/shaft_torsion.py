@@ -5,8 +5,8 @@ Carried: reed, counterweight and the resistance of the cloth. The rocker's own i
 
 from dataclasses import replace
 
+from loomopt.physics.effects import shaft_torsion
 from loomopt.physics.effects.kinds import EffectClash, StatePeak
-from loomopt.physics.effects.linkage import shaft_torsion
 from loomopt.physics.schema import Figure
 
 EFFECT = replace(

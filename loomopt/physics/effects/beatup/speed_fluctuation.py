@@ -3,8 +3,8 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from loomopt.physics.effects import speed_fluctuation
 from loomopt.physics.effects.kinds import Inputs
-from loomopt.physics.effects.linkage import speed_fluctuation
 from loomopt.physics.schema import Figure
 
 if TYPE_CHECKING:
