@@ -234,7 +234,8 @@ METHODS = {
     },
     "Scene": {
         *("active", "bounds", "call", "called", "change", "document", "effects", "equations", "free", "full", "given"),
-        *(
+        *("effect_table", "job", "jobs", "limits", "mechanism", "name", "operation", "origin", "paths", "schema"),
+        *("set", "show"),
             "effect_table",
             "job",
             "jobs",
