@@ -352,22 +352,20 @@ class Answer(Evaluation):
     @property
     def before(self) -> Evaluation | None:
         """Former name of `today`."""
-        return self._former("before", "today")
+        _warn_of("before", "today")
+        return self.today
 
     @property
     def asked(self) -> str | None:
         """Former name of `named_target`."""
-        return self._former("asked", "named_target")
+        _warn_of("asked", "named_target")
+        return self.result.named_target
 
     @property
     def beside(self) -> "solution.Alternative | None":
         """Former name of `alternative`."""
-        return self._former("beside", "alternative")
-
-    def _former(self, name: str, current: str) -> Any:
-        text = f"{name} is now {current}; the old name goes in the next version"
-        warnings.warn(text, DeprecationWarning, stacklevel=3)
-        return getattr(self, current)
+        _warn_of("beside", "alternative")
+        return self.result.alternative
 
     def __str__(self) -> str:
         from loomopt.interface.text import answers, layout
@@ -382,6 +380,12 @@ class Answer(Evaluation):
     def _summary(self) -> str:
         clash = self.result.clash
         return f"limits that clash: {', '.join(clash)}" if clash else super()._summary
+
+
+def _warn_of(name: str, current: str) -> None:
+    """Warn of a former name."""
+    text = f"{name} is now {current}; the old name goes in the next version"
+    warnings.warn(text, DeprecationWarning, stacklevel=3)
 
 
 def _fields_signature(record: type) -> inspect.Signature:
