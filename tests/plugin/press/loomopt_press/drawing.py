@@ -11,7 +11,7 @@ HALF = "half way"
 
 
 def linkage(known: Mapping[str, float], title: str, units: Units) -> Drawing:
-    """Return the press in both dead centres and half way."""
+    """Press in both dead centres and half way."""
     drawn, height = skeleton(known), 0.02 * (known["crank"] + known["rod"])
     strokes, at = drawn.strokes(height), drawn.at(HALF)
     labels = [
@@ -26,7 +26,7 @@ def linkage(known: Mapping[str, float], title: str, units: Units) -> Drawing:
 
 
 def skeleton(known: Mapping[str, float]) -> Skeleton:
-    """Return its joints in every position."""
+    """Its joints in every position."""
     shaft, crank, rod = Point(0.0, 0.0), known["crank"], known["rod"]
     positions = {TOP: 0.0, HALF: math.pi / 2, BOTTOM: math.pi}
     joints = {}

@@ -28,16 +28,16 @@ class Press(Job):
             )
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
-        """Return the slider-crank with the effects the scene calls for."""
+        """Slider-crank with the effects the scene calls for."""
         return model(scene)
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
-        """Return one sentence on what the optimum is worth."""
+        """One sentence on what the optimum is worth."""
         stroke, torque = figures["stroke"] or 0.0, figures["peak_torque"] or 0.0
         return f"With a stroke of {1000 * stroke:.6g} mm the least peak crank torque is {torque:.6g} N*m."
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
-        """Return the slide's travel with its derivatives, the terms, force and torque."""
+        """Slide's travel with its derivatives, the terms, force and torque."""
         return Columns(
             {
                 "q [m]": lambda at: at.pose.q,

@@ -77,17 +77,17 @@ class SliderCrank(Kinematics):
         }
 
     def pose(self, maths: Maths, given: Given, node: Node) -> SlidePose:
-        """Return the pose at a node."""
+        """Pose at a node."""
         values = given.values
         return SlidePose(maths, values["crank"], values["rod"], node.phi, values.get("speed"))
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
-        """Return both dead centres, rad."""
+        """Both dead centres, rad."""
         return {TOP: 0 * maths.pi, BOTTOM: maths.pi}
 
 
 def obliquity(at: Instant) -> Number:
-    """Return the rod's largest angle from the slide's line, rad."""
+    """Rod's largest angle from the slide's line, rad."""
     crank, rod = at.values["crank"], at.values["rod"]
     return at.maths.atan2(crank, at.maths.sqrt((rod - crank) * (rod + crank)))
 
@@ -105,5 +105,5 @@ ROWS = {
 
 
 def model(scene: Scene) -> JobModel:
-    """Return the slider-crank with the effects the scene calls for."""
+    """Slider-crank with the effects the scene calls for."""
     return JobModel(SliderCrank(), scene.active, words(scene), QUANTITIES, ROWS, known=frozenset(numbers(scene)))

@@ -1,4 +1,4 @@
-"""From a press scene to the program: crank, rod and every bounded number, the least peak torque."""
+"""Program of a press scene: variables are crank, rod and every bounded number; the peak torque is minimised."""
 
 from loomopt.base.records import lazy
 from loomopt.jobs.base import Task
@@ -16,5 +16,5 @@ class PressTask(Task):
         return model(self.scene)
 
     def objectives(self) -> tuple[Objective, ...]:
-        """Return the peak crank torque, and what checks would have least."""
+        """Peak crank torque, and the objectives of checks."""
         return Peak("peak_torque", "peak_torque", self.figure_size("peak_torque")), *self.least()

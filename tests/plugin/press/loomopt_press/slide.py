@@ -13,7 +13,7 @@ class Parameters(Table):
 
 
 def force(at: Inputs[Motion]) -> Number:
-    """Return m q¨, N."""
+    """Inertia force m q¨, N."""
     return at.table["mass"] * at.pose.acceleration
 
 

@@ -17,7 +17,7 @@ class Parameters(Table):
 
 
 def force(at: Inputs[ReedPose]) -> Number:
-    """Return k (q + rest), N·m."""
+    """Torque of the bar k (q + rest), N·m."""
     return at.table["k"] * (at.pose.q + at.table["rest"])
 
 

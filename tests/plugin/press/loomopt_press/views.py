@@ -18,7 +18,7 @@ from loomopt_press.model import BOTTOM, TOP, SlidePose
 
 
 def equations(model: JobModel) -> tuple[Equation, ...]:
-    """Return travel with its derivatives, each term, balance and crank torque."""
+    """Travel with its derivatives, each term, balance and crank torque."""
     names = "q", "q'", "q''"
     slide = SlidePose(systems.sympy(), symbol("crank"), symbol("rod"), symbol("phi"), symbol("omega"))
     travel = zip(names, (slide.q, slide.q1, slide.q2), strict=True)
@@ -32,23 +32,23 @@ class PressViews(JobViews):
     """A crank above, the slide below."""
 
     def linkage(self, scene: Scene, design: Mapping[str, float]) -> Drawing:
-        """Return the press in both dead centres and half way, at full scale."""
+        """Press in both dead centres and half way, at full scale."""
         return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name, drawn_units(scene))
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Return its joints as CSV."""
+        """Its joints as CSV."""
         return drawing.skeleton(registry.of(scene).numbers_of(scene, design)).csv(drawn_units(scene))
 
     def equations(self, scene: Scene) -> tuple[Equation, ...]:
-        """Return the equations the scene really uses."""
+        """Equations the scene really uses."""
         return equations(registry.of(scene).model(scene))
 
     def marks(self, scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
-        """Return both dead centres, rad."""
+        """Both dead centres, rad."""
         return {TOP: 0.0, BOTTOM: math.pi}
 
     def panels(self, scene: Scene, design: Mapping[str, float], columns: Sequence[str]) -> tuple[Panel, ...]:
-        """Return torque, force and travel."""
+        """Torque, force and travel."""
         shown = {"crank torque": "Md [N*m]", "force": "Q [N]", "travel": "q [m]"}
         return tuple(Panel((column,), name) for name, column in shown.items() if column in columns)
 

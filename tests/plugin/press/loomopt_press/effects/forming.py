@@ -15,7 +15,7 @@ class Parameters(Table):
 
 
 def corners(at: Inputs[object]) -> tuple[Number, ...]:
-    """Return the crank angles, rad, where the slide meets the sheet and where it turns."""
+    """Crank angles, rad, where the slide meets the sheet and where it turns."""
     crank, rod = at.values["crank"], at.values["rod"]
     reach = crank + rod - at.table["height"]
     meets = at.maths.atan2(heron(at.maths, crank, rod, reach), crank * crank + (reach - rod) * (reach + rod))
@@ -23,13 +23,13 @@ def corners(at: Inputs[object]) -> tuple[Number, ...]:
 
 
 def switch(angle: float, corners: tuple[float, ...]) -> float:
-    """Return 1 while the sheet is formed, 0 elsewhere."""
+    """1 while the sheet is formed, 0 elsewhere."""
     meets, turns = corners
     return 1.0 if meets <= angle % 6.283185307179586 < turns else 0.0
 
 
 def force(at: Inputs[Motion]) -> Number:
-    """Return F or nothing, N."""
+    """F or nothing, N."""
     return at.table["F"] * at.switch
 
 
