@@ -70,8 +70,8 @@ def from_curves(scene: Scene, curves: "pd.DataFrame", design: Mapping[str, float
     names = [name for name in known if f"{name}_x" in known and f"{name}_y" in known]
     if not names:
         giving = [e.name for e in scene.schema.effects.values() if _tells_forces(e) and e.name not in scene.effects]
-        remedy = f"Put one of these on: {', '.join(giving)}" if giving else "No effect of this job does"
-        raise refusal("no active effect gives forces by components", scene.origin, "effects", remedy=remedy)
+        remedy = f"Switch on one of these: {', '.join(giving)}" if giving else "No effect of this job gives them"
+        raise refusal("no effect that is on gives forces by components", scene.origin, "effects", remedy=remedy)
     phi = curves[ANGLE].to_numpy()
     sampler = registry.of(scene).sampler(scene, design)
     sides, turned = sampler.model.sides, dict[str, tuple[Floats, Floats]]()

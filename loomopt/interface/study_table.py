@@ -240,7 +240,7 @@ def units(study: SceneStudy, rows: Sequence[Row]) -> dict[str, str]:
 SAME = 1e-9
 """Relative spread of a column below which its number is the same in all rows."""
 
-KINDS = {"jump": "jump", "kink": "kink", "active set": "what binds changes"}
+KINDS = {"jump": "jump", "kink": "kink", "active set": "binding limits change"}
 """Name of a kind of change."""
 NARROWS = "*"
 """Mark of an added point that locates a change."""
@@ -281,7 +281,7 @@ def tables(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str
     narrowing = sum(row.narrows for row in findings.rows)
     number = len(findings.rows) - narrowing
     count = f"{number} point{'' if number == 1 else 's'}" if whole else counted(study, len(rows))
-    count += f" and {narrowing} that narrow{'s' * (narrowing == 1)} changes down ({NARROWS})" if narrowing else ""
+    count += f" and {narrowing} that locate{'s' * (narrowing == 1)} changes ({NARROWS})" if narrowing else ""
     first_columns = range(min(len(study.kinds) + 2, len(heads)))  # the point, its place, what is sought there
     right = tuple(range(len(heads)))
     grid = TextTable(
@@ -289,11 +289,12 @@ def tables(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str
     )
     reasons = [f"point {row.point}, {row.status}: {row.reason}" for row in findings.rows if row.reason]
     more = [f"and {len(reasons) - MOST_REASONS} more, in the table's last column"] if reasons[MOST_REASONS:] else []
-    count += f", {findings.bettered} bettered from a neighbour's design" if findings.bettered else ""
+    count += f", {findings.bettered} improved from a neighbour's design" if findings.bettered else ""
     message = [findings.message] if findings.message else []
     sentences = [change_sentence(study, change, si) for change in findings.changes]
     conditions = study.conditions
-    condition_text = "".join(f"; {name} {conditions[name]}" for name in ("held", "not held") if name in conditions)
+    words = {"held": "with", "not held": "without"}
+    condition_text = "".join(f"; {words[name]} {conditions[name]}" for name in words if name in conditions)
     return [
         f"{study.heading}: {count}, {outcome}{condition_text}",
         *message,
@@ -311,7 +312,7 @@ def change_sentence(study: SceneStudy, change: Change, si: bool) -> str:
     limits = [unbroken(side.text) for side in change.limits]
     low, high = (unbroken(show(value, unit)) for value in change.between)
     if change.at is None:
-        return f"{unbroken(key)} from {low} to {high}: what binds changes, {', '.join(limits)}"
+        return f"{unbroken(key)} from {low} to {high}: binding limits change, {', '.join(limits)}"
     where = f"{low} to {high}" if change.kind == "jump" else unbroken(show(change.at, unit))
     return f"{unbroken(key)} {where}: {', '.join([KINDS[change.kind], *limits])}"
 

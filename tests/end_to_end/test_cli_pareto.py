@@ -53,7 +53,7 @@ def test_changes_are_told_in_the_json_and_in_words(cli):
     assert (change["kind"], change["limits"]) == ("active set", ["N_min min"])
     assert change["between"][0] < 2.096358e-3 < change["between"][1]
     _, message, _ = cli(*arguments)
-    assert "\nX0 2.09636 mm: what binds changes, N_min min\n" in message
+    assert "\nX0 2.09636 mm: binding limits change, N_min min\n" in message
     assert "K1 per X0 is the slope of the front." in message
 
 
@@ -107,7 +107,7 @@ def test_ctrl_c_prints_what_is_finished_and_keeps_it(cli, monkeypatch):
 def test_axes_that_do_not_conflict_are_one_point(cli):
     status, out, _ = cli("beatup", *MASS, "--target", "none")
     assert status == 0
-    first = "beatup, no target, peak_torque against m4e: 1 point, 1 optimal; held the scene's limits; not held M3_fdc 0"
+    first = "beatup, no target, peak_torque against m4e: 1 point, 1 optimal; with the scene's limits; without M3_fdc 0"
     assert out.startswith(first)
     assert "peak_torque and m4e do not conflict: one design is best in both." in out
 
@@ -204,8 +204,8 @@ def test_a_front_holds_what_the_default_target_demands_and_its_first_line_says_s
     status, out, _ = cli("rapier", *DWELL)
     assert status == 0
     assert " ".join(out.split()).startswith(
-        "rapier, stroke-dwell, peak_acceleration against dwell: 3 points, 3 optimal; held the scene's limits, "
-        "stroke 850 mm; not held dwell_after at least"
+        "rapier, stroke-dwell, peak_acceleration against dwell: 3 points, 3 optimal; with the scene's limits, "
+        "stroke 850 mm; without dwell_after at least"
     )
     data = json.loads(cli("rapier", *DWELL, "--json")[1])
     assert data["target"] == "stroke-dwell"
@@ -218,7 +218,7 @@ def test_a_front_holds_what_the_default_target_demands_and_its_first_line_says_s
 def test_with_target_none_a_front_drops_demands_and_says_which(cli):
     status, out, _ = cli("rapier", *DWELL, "--target", "none")
     assert status == 0
-    assert "; held the scene's limits; not held stroke 850 mm, dwell_after at least 30 deg" in " ".join(out.split())
+    assert "; with the scene's limits; without stroke 850 mm, dwell_after at least 30 deg" in " ".join(out.split())
     data = json.loads(cli("rapier", *DWELL, "--target", "none", "--json")[1])
     assert data["target"] is None
     assert data["rows"][-1]["figures"]["peak_acceleration"] == pytest.approx(0.536717, rel=1e-5)

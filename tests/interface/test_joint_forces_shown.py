@@ -135,9 +135,9 @@ def test_the_command_tells_and_draws_them(scene, tmp_path, capsys):
 
 
 def test_without_an_effect_that_tells_forces_it_is_said_which_would(scene, capsys):
-    with pytest.raises(BadInput, match="no active effect gives forces by components"):
+    with pytest.raises(BadInput, match="no effect that is on gives forces by components"):
         lo.evaluate("beatup").plot_forces()
     assert app.run(["simulate", "beatup", "--forces"]) == 2
     output = capsys.readouterr()
     assert output.out == ""
-    assert "Put one of these on" in output.err
+    assert "Switch on one of these" in output.err

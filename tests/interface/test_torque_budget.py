@@ -50,7 +50,7 @@ def test_what_is_not_known_is_null_with_its_reason(capsys):
 def test_the_terminal_tells_them_in_the_scene_s_units(capsys):
     status, out, _ = told(capsys, "beatup", *MORE, "--set", "display.torque=lbf*in")
     assert status == 0
-    assert "the crank torque is largest, -832.466 lbf*in, at 33.3003 deg" in out
+    assert "peak crank torque -832.466 lbf*in at 33.3003 deg" in out
     (line,) = [line.split() for line in out.splitlines() if line.startswith("bearing_friction")]
     assert float(line[1]) == pytest.approx(0.411424 / 0.1129848, rel=1e-5)
     assert line[2] == "-0.4374"

@@ -1,4 +1,4 @@
-"""The `loomopt` command: words only, every one of them thin over the library."""
+"""The `loomopt` command line: it reads arguments and prints results; the library computes."""
 
 import atexit
 import contextlib
@@ -32,7 +32,7 @@ from loomopt.interface.cli.shell import (
 )
 
 HEADER = Path("include", "coin-or", "IpoptConfig.h")
-"""Where IPOPT says its version: beside CasADi's library in its wheel, below the prefix where both were built apart."""
+"""Header with the version of IPOPT: in CasADi's wheel beside its library, else below the prefix of a separate build."""
 UNTOLD = "of a version that it does not tell"
 _TOLD = re.compile(r'^#define IPOPT_VERSION "(.+)"', re.MULTILINE)
 
@@ -65,7 +65,7 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "
 UNPROVEN = 4
 EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": interrupts.INTERRUPTED}
 BAD_INPUT = 2
-SUMMARY = "Optimal design of weaving-loom mechanisms: dimensions that work, proof that they do, what each limit costs."
+SUMMARY = "Optimal design of weaving-loom mechanisms, with a certificate and the price of every limit."
 CommandLineError: type[Any] = typer.BadParameter.__mro__[2]
 """Click's base exception, which Typer carries inside itself or imports, by version."""
 
@@ -86,24 +86,29 @@ def solve(
     problem: Problem,
     target: Target = None,
     changes: SceneOptions = NO_CHANGES,
-    accuracy: Annotated[str, typer.Option(metavar="R", help="Relative accuracy, 1e-11 to 0.1.")] = "1e-8",
-    starts: Annotated[str | None, typer.Option(metavar="N", help="Number of starts; a wide search without it.")] = None,
+    accuracy: Annotated[str, typer.Option(metavar="R", help="Set the relative accuracy, 1e-11 to 0.1.")] = "1e-8",
+    starts: Annotated[str | None, typer.Option(metavar="N", help="Use N starts in place of a wide search.")] = None,
     proven: Annotated[bool, typer.Option("--prove", help="Also prove every limit at every crank angle.")] = False,
     everywhere: Annotated[bool, typer.Option("--global", help="Prove that no admissible design is better.")] = False,
-    gap: Annotated[str, typer.Option(metavar="R", help="Relative gap of --global.")] = "1e-3",
-    seconds: Annotated[str, typer.Option("--time", metavar="S", help="Time limit of --global, s.")] = "60",
+    gap: Annotated[str, typer.Option(metavar="R", help="Set the relative gap of --global.")] = "1e-3",
+    seconds: Annotated[str, typer.Option("--time", metavar="S", help="Set the time limit of --global, s.")] = "60",
     robust: Annotated[
-        str | None, typer.Option(metavar="SIGMAS", help="Margin of every limit in sigma of its figure.")
+        str | None, typer.Option(metavar="SIGMAS", help="Keep a margin to every limit, in sigma of its figure.")
     ] = None,
     least: Annotated[
-        str | None, typer.Option("--yield", metavar="Y", help="Margins for this share of admissible machines.")
+        str | None,
+        typer.Option("--yield", metavar="Y", help="Keep margins so that this share of machines holds all limits."),
     ] = None,
     steps: Annotated[
-        str | None, typer.Option("--round", metavar="NAME=STEP,…", help="Round numbers to steps; `scene`: its [steps].")
+        str | None,
+        typer.Option(
+            "--round", metavar="NAME=STEP,…", help="Round numbers to steps; `scene` for its [steps] and [stock]."
+        ),
     ] = None,
     as_json: Json = False,
     outs: Annotated[
-        list[Path] | None, typer.Option("--out", metavar="DIR|F.xlsx", help="Write answer, tables and drawing there.")
+        list[Path] | None,
+        typer.Option("--out", metavar="DIR|F.xlsx", help="Write answer, tables and drawing to a folder or a workbook."),
     ] = None,
     decimal: Decimal = "point",
 ) -> None:
@@ -148,11 +153,11 @@ def solve(
 def accuracy(
     problem: Problem,
     changes: SceneOptions = NO_CHANGES,
-    full: Annotated[bool, typer.Option("--full", help="More settings and repeats; takes minutes.")] = False,
+    full: Annotated[bool, typer.Option("--full", help="Run more settings and repeats; this takes minutes.")] = False,
     as_json: Json = False,
     out: Annotated[
         list[Path] | None,
-        typer.Option(metavar="F", help="Write figure (.png, .svg, .pdf) or table (.csv, .xlsx)."),
+        typer.Option(metavar="F", help="Write a figure (.png, .svg, .pdf) or the table (.csv, .xlsx)."),
     ] = None,
     decimal: Decimal = "point",
 ) -> None:
@@ -184,10 +189,14 @@ def accuracy(
 
 
 def check(
-    problems: Annotated[list[str] | None, typer.Argument(help="Packaged scenes; all of them without a name.")] = None,
-    write: Annotated[Path | None, typer.Option(metavar="DIR", help="Write new reference tables there instead.")] = None,
+    problems: Annotated[
+        list[str] | None, typer.Argument(help="Names of packaged scenes; all of them if omitted.")
+    ] = None,
+    write: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write new reference tables to DIR, and compare nothing.")
+    ] = None,
 ) -> None:
-    """Solve the packaged problems again; compare with results/."""
+    """Solve the packaged problems again, and compare with results/."""
     from loomopt.interface.text import layout
     from loomopt.studies import check as study
 
@@ -245,11 +254,11 @@ EXAMPLES = {
     "accuracy": "loomopt accuracy beatup --out accuracy.png",
     "check": "loomopt check beatup",
 }
-"""Name of each command → a call of it, as its help shows one."""
+"""Name of each command → the example in its help."""
 
 
 def application(words: list[str]) -> typer.Typer:
-    """Command line that reads words: with the one command they begin with, else with all of them."""
+    """Typer application for these arguments: with the one command that they begin with, else with all commands."""
     app = typer.Typer(
         add_completion=not words or words[0] not in COMMANDS,  # what one command never needs
         pretty_exceptions_enable=False,
@@ -306,7 +315,7 @@ def run(arguments: list[str] | None = None) -> int:
 
 
 def not_ours(error: BaseException) -> str:
-    """An error as one line where another distribution's code takes part; "" where loomopt itself has failed."""
+    """One line for an error in the code of another distribution; "" for an error of loomopt itself."""
     blame = blamed(error)
     if isinstance(blame, BadInput):
         return str(blame)
@@ -317,7 +326,7 @@ def not_ours(error: BaseException) -> str:
 
 
 def main() -> None:
-    """Run as a process; leave without taking the interpreter apart object by object, a tenth of the whole time."""
+    """Run as a process, and exit without the destruction of all objects, which takes a tenth of the time."""
     gc.disable()
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)

@@ -1,4 +1,4 @@
-"""The commands that show: scenes, figures of a design, curves, drawings, proofs. Nothing is optimised here."""
+"""Commands that optimise nothing: scenes, figures of a design, curves, drawings, proofs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -90,10 +90,13 @@ def list_problems(as_json: Json = False) -> None:
 
 
 def new(
-    job: Annotated[str, typer.Argument(help="A loom job; a wrong name lists them all. With --from, the file.")],
-    file: Annotated[Path | None, typer.Argument(help="The scene to write; it must not exist yet.")] = None,
+    job: Annotated[str, typer.Argument(help="Name of a job, such as beatup; with --from, the file.")],
+    file: Annotated[Path | None, typer.Argument(help="File to write; it must not exist yet.")] = None,
     start: Annotated[
-        str | None, typer.Option("--from", metavar="NAME", help="Copy this packaged problem; as .zip, all of its job.")
+        str | None,
+        typer.Option(
+            "--from", metavar="NAME", help="Copy this packaged scene; a .zip file gets all scenes of its job."
+        ),
     ] = None,
 ) -> None:
     """Write a commented scene to start from."""
@@ -110,7 +113,7 @@ def new(
     remark(f"Wrote {path}. Next: {then}loomopt show {scene}, then loomopt solve {scene}")
 
 
-def schema(job: Annotated[str, typer.Argument(help="A loom job; a wrong name lists them all.")]) -> None:
+def schema(job: Annotated[str, typer.Argument(help="Name of a job, such as beatup.")]) -> None:
     """Print the JSON Schema of a scene, for editors."""
     import json
 
@@ -122,17 +125,21 @@ def schema(job: Annotated[str, typer.Argument(help="A loom job; a wrong name lis
 
 def show(
     problem: Problem,
-    equations: Annotated[bool, typer.Option("--equations", help="Print the equations of the active effects.")] = False,
-    symbols: Annotated[bool, typer.Option("--symbols", help="Explain every symbol of its tables.")] = False,
+    equations: Annotated[
+        bool, typer.Option("--equations", help="Print the equations of the effects that are on.")
+    ] = False,
+    symbols: Annotated[bool, typer.Option("--symbols", help="Explain every symbol of the tables.")] = False,
     sources: Annotated[
-        bool, typer.Option("--sources", help="Print the figures of its source, and as computed.")
+        bool, typer.Option("--sources", help="Print the figures of the source beside the computed ones.")
     ] = False,
     figure: Figure = None,
-    animate: Annotated[list[Path] | None, typer.Option(metavar="F", help="Animate it: .html, .gif or .mp4.")] = None,
+    animate: Annotated[
+        list[Path] | None, typer.Option(metavar="F", help="Write an animation: .html, .gif or .mp4.")
+    ] = None,
     design: Design = None,
     changes: SceneOptions = NO_CHANGES,
 ) -> None:
-    """Show a scene as read, its equations, symbols, sources."""
+    """Show a scene as read, its equations, symbols and sources."""
     from loomopt.interface import api
     from loomopt.interface.files import outputs
     from loomopt.interface.text import glossary, layout, scenes
@@ -164,7 +171,7 @@ def evaluate(
     changes: SceneOptions = NO_CHANGES,
     as_json: Json = False,
 ) -> None:
-    """Show the figures of a design (today's without one)."""
+    """Compute the figures of a design, by default today's."""
     from loomopt.interface import api
 
     scene, given, name, _ = read_request(problem, design, target, changes.call)
@@ -183,7 +190,7 @@ def prove(
     problem: Problem,
     design: Design = None,
     target: Limits = None,
-    slack: Annotated[str, typer.Option(metavar="R", help="Permitted violation, relative.")] = "1e-8",
+    slack: Annotated[str, typer.Option(metavar="R", help="Permit this relative violation of a limit.")] = "1e-8",
     changes: SceneOptions = NO_CHANGES,
     as_json: Json = False,
 ) -> None:
@@ -205,20 +212,22 @@ def simulate(
     target: Limits = None,
     out: Annotated[
         list[Path] | None,
-        typer.Option(metavar="F", help="Write curves (.csv, .xlsx, .parquet) or a figure (.png, .svg, .pdf)."),
+        typer.Option(metavar="F", help="Write the curves (.csv, .xlsx, .parquet) or a figure (.png, .svg, .pdf)."),
     ] = None,
     accuracy: Annotated[
-        str | None, typer.Option(metavar="R", help="Fewest rows that show each peak to R; with --out.")
+        str | None, typer.Option(metavar="R", help="Write as few rows as give each peak to R; with --out.")
     ] = None,
     measured: Annotated[
         Path | None,
-        typer.Option("--beside", metavar="F.csv", help="Measured curves: phi [deg] and columns of the curves."),
+        typer.Option("--beside", metavar="F.csv", help="Compare with measured curves, by phi [deg]."),
     ] = None,
-    forces: Annotated[bool, typer.Option("--forces", help="Forces in joints; figures are polar diagrams.")] = False,
+    forces: Annotated[
+        bool, typer.Option("--forces", help="Show the forces in the joints; figures are polar diagrams.")
+    ] = False,
     decimal: Decimal = "point",
     changes: SceneOptions = NO_CHANGES,
 ) -> None:
-    """Compute curves over the cycle; print them without --out."""
+    """Compute curves over the cycle, and print or write them."""
     from loomopt.interface import api
     from loomopt.interface.files import outputs, sheets
     from loomopt.interface.text import layout, scenes
@@ -259,7 +268,7 @@ def budget(
     changes: SceneOptions = NO_CHANGES,
     as_json: Json = False,
 ) -> None:
-    """Show where the crank torque comes from; size the motor."""
+    """Show the shares of the crank torque; size the motor."""
     from loomopt.interface.files import outputs
     from loomopt.interface.study.budget import compute
 
@@ -276,16 +285,17 @@ def export(
     problem: Problem,
     out: Annotated[
         list[Path],
-        typer.Option(metavar="F", help="The file: .svg, .dxf; .csv, .xlsx for joints or profile; any number."),
+        typer.Option(metavar="F", help="Write a drawing (.svg, .dxf), or joints or profile (.csv, .xlsx)."),
     ],
     design: Design = None,
     target: Limits = None,
     decimal: Decimal = "point",
-    dxf: Annotated[str | None, typer.Option(metavar="V", help="Version of DXF: r2010 or r12.")] = None,
+    dxf: Annotated[str | None, typer.Option(metavar="V", help="Set the version of DXF: r2010 or r12.")] = None,
     arcs: Annotated[
-        str | None, typer.Option(metavar="T", help='Closed curves as arcs within a tolerance: "0.01 mm".')
+        str | None,
+        typer.Option(metavar="T", help='Approximate closed curves by arcs, within a tolerance such as "0.01 mm".'),
     ] = None,
-    only: Annotated[str | None, typer.Option(metavar="L", help="Draw one layer alone, such as profile.")] = None,
+    only: Annotated[str | None, typer.Option(metavar="L", help="Write only this layer, such as profile.")] = None,
     changes: SceneOptions = NO_CHANGES,
 ) -> None:
     """Export linkage or cam at true scale, for the workshop."""
@@ -309,4 +319,4 @@ OF_A_DESIGN: dict[str, Callable[..., None]] = {
     "budget": budget,
     "export": export,
 }
-"""Name → command, in the order that help lists them in: before and after `solve`."""
+"""Name → command in the order of the help: those before `solve`, and those after it."""

@@ -18,28 +18,29 @@ if TYPE_CHECKING:
     from loomopt.scenes.scene import Call, Scene
 
 Problem = Annotated[
-    str, typer.Argument(help="A packaged scene (see `loomopt list`), the path of a TOML scene, or an answer's JSON.")
+    str,
+    typer.Argument(help="Name of a packaged scene (see `loomopt list`), path of a TOML scene, or of an answer's JSON."),
 ]
 Set = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set a scene key by its dotted path.")
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set a key of the scene, such as operation.M0.")
 ]
 With = Annotated[list[str] | None, typer.Option("--with", metavar="EFFECT", help="Switch on an effect of [available].")]
 Without = Annotated[list[str] | None, typer.Option("--without", metavar="EFFECT", help="Switch off an effect.")]
-Free = Annotated[list[str] | None, typer.Option("--free", metavar="NAMES", help="Free variables with free = false.")]
+Free = Annotated[
+    list[str] | None, typer.Option("--free", metavar="NAMES", help="Let variables with free = false change.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Design = Annotated[
-    Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON; - for a pipe.")
+    Path | None, typer.Option("--design", metavar="FILE", help="Use the design of this JSON file; - for a pipe.")
 ]
-Decimal = Annotated[str, typer.Option(metavar="point|comma", help="The decimal sign of CSV files.")]
+Decimal = Annotated[str, typer.Option(metavar="point|comma", help="Set the decimal sign of CSV files.")]
 Limits = Annotated[
     str | None,
-    typer.Option(
-        "--target", help="Target whose limits count; that of the answer or the default of the job without it."
-    ),
+    typer.Option("--target", help="Use the limits of this target; by default that of the answer or of the job."),
 ]
-Target = Annotated[str | None, typer.Option(help="Target; the job's default without it.")]
+Target = Annotated[str | None, typer.Option(help="Use this target in place of the job's default.")]
 Out = Annotated[list[Path] | None, typer.Option(metavar="F", help="Write the table: .csv, .xlsx or .parquet.")]
-Figure = Annotated[list[Path] | None, typer.Option("--figure", metavar="F", help="Draw it: .png, .svg or .pdf.")]
+Figure = Annotated[list[Path] | None, typer.Option("--figure", metavar="F", help="Write a figure: .png, .svg or .pdf.")]
 
 
 @dataclass(frozen=True)
@@ -88,8 +89,10 @@ class SceneOptions(Options):
 class ComputerOptions(Options):
     """Workers of a study."""
 
-    workers: Annotated[str | None, typer.Option(metavar="N", help="Number of processes on this machine.")] = None
-    dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster.")] = None
+    workers: Annotated[str | None, typer.Option(metavar="N", help="Use N processes on this machine.")] = None
+    dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Use the Dask cluster with this scheduler.")] = (
+        None
+    )
 
     @property
     def count(self) -> int | None:
@@ -118,9 +121,10 @@ class StoreOptions(Options):
     """Store of finished rows."""
 
     store: Annotated[
-        Path | None, typer.Option("--store", metavar="FILE", help="Write each finished row there at once.")
+        Path | None,
+        typer.Option("--store", metavar="FILE", help="Write each row to this file as soon as it is finished."),
     ] = None
-    resume: Annotated[bool, typer.Option("--resume", help="Use the finished rows of the store.")] = False
+    resume: Annotated[bool, typer.Option("--resume", help="Continue with the finished rows of the store.")] = False
 
 
 @dataclass(frozen=True)

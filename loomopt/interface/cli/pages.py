@@ -1,4 +1,4 @@
-"""The commands that hand over: a page of answers and studies, designs side by side."""
+"""Commands for results: a report of answers and studies, and a comparison of designs."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -18,25 +18,28 @@ if TYPE_CHECKING:
 NOT_CERTIFIED, INFEASIBLE = 4, 3
 """Exit statuses."""
 Problems = Annotated[
-    list[str], typer.Argument(metavar="PROBLEM|ANSWER|STORE...", help="Scenes, which are solved; answers; stores.")
+    list[str], typer.Argument(metavar="PROBLEM|ANSWER|STORE...", help="Scenes (they are solved), answers and stores.")
 ]
-Page = Annotated[list[Path], typer.Option("--out", metavar="F.html", help="The page to write.")]
+Page = Annotated[list[Path], typer.Option("--out", metavar="F.html", help="Write this page.")]
 Beside = Annotated[
     list[str] | None,
-    typer.Option("--study", metavar="S", help="Add a study: budget, tolerance, sensitivity, effects, accuracy, proof."),
+    typer.Option("--study", metavar="S", help="Add budget, tolerance, sensitivity, effects, accuracy or proof."),
 ]
 Answers = Annotated[
-    list[str], typer.Argument(metavar="A.json B.json ... [today]", help="Answers; today for today's machine.")
+    list[str],
+    typer.Argument(metavar="A.json B.json ... [today]", help="JSON files of answers; `today` for today's machine."),
 ]
 
 
 def report(
     things: Problems,
     out: Page,
-    target: Annotated[str | None, typer.Option(help="Target of the scenes; their job's default without it.")] = None,
+    target: Annotated[
+        str | None, typer.Option(help="Use this target for the scenes in place of the job's default.")
+    ] = None,
     changes: SceneOptions = NO_CHANGES,
     proven: Annotated[
-        bool, typer.Option("--prove", help="Also prove every limit of scenes at every crank angle.")
+        bool, typer.Option("--prove", help="Also prove every limit of the scenes at every crank angle.")
     ] = False,
     studies: Beside = None,
 ) -> None:
@@ -90,7 +93,7 @@ def _checked_input(
     studies: Sequence[str],
     prove: bool = False,
 ) -> Input:
-    """An argument, a scene, an answer's file or a store, read and checked. Raises BadInput."""
+    """Input of an argument: a scene, an answer or a store, read and checked. Raises BadInput."""
     from loomopt.base.errors import refusal
     from loomopt.interface.files import answer_file, store_file
     from loomopt.interface.report import document
@@ -119,7 +122,7 @@ def _checked_input(
 
 
 def _check_studies(scene: "Scene", target: str | None, studies: Sequence[str]) -> None:
-    """Raise BadInput for a target, or a study beside a design of it, that a scene does not have."""
+    """Raise BadInput if a scene does not have the target, or cannot have a study."""
     from loomopt.base.errors import refusal
     from loomopt.jobs import registry
     from loomopt.scenes.tables import FAMILY
@@ -207,7 +210,7 @@ def compare(
         str | None, typer.Option("--in", metavar="PROBLEM", help="Evaluate all designs in this scene.")
     ] = None,
     figure: Annotated[
-        list[Path] | None, typer.Option(metavar="F", help="Draw their curves together: .png, .svg or .pdf.")
+        list[Path] | None, typer.Option(metavar="F", help="Draw their curves in one figure: .png, .svg or .pdf.")
     ] = None,
     files: TableOptions = NO_TABLE,
     as_json: Json = False,

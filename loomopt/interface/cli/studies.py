@@ -1,4 +1,4 @@
-"""The commands that solve many times: a row of a table each, by as many workers as there are, kept as they come."""
+"""Commands that solve many times, with one row per solve: sweep, front, effects, sensitivity, tolerance."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 OK, NOT_CERTIFIED, INFEASIBLE = 0, 4, 3
 """Exit statuses."""
 ANSWERED = "needed", "evaluated"
-"""Statuses of rows that are answered without a solve."""
+"""Statuses of rows without a solve."""
 
 
 @dataclass(frozen=True)
@@ -44,16 +44,16 @@ class RunOptions(Options):
     rows: StoreOptions = NO_STORE
     table: TableOptions = NO_TABLE
     figure: Annotated[
-        list[Path] | None, typer.Option(metavar="F", help="Draw it with some designs: .png, .svg or .pdf.")
+        list[Path] | None, typer.Option(metavar="F", help="Write a figure with some designs: .png, .svg or .pdf.")
     ] = None
     animate: Annotated[
-        list[Path] | None, typer.Option(metavar="F", help="Animate its designs: .html, .gif or .mp4.")
+        list[Path] | None, typer.Option(metavar="F", help="Write an animation of the designs: .html, .gif or .mp4.")
     ] = None
-    si: Annotated[bool, typer.Option("--si", help="Tables in SI, not in the units of the scene.")] = False
+    si: Annotated[bool, typer.Option("--si", help="Write tables in SI, not in the units of the scene.")] = False
     as_json: Json = False
 
     def check(self) -> None:
-        """Raise BadInput, before anything is computed, for files that cannot be written, or are the store's."""
+        """Raise BadInput for files that cannot be written or are the store; called before any computation."""
         from loomopt.base.errors import refusal
         from loomopt.interface.files import outputs
 
@@ -71,7 +71,7 @@ class RunOptions(Options):
                 raise refusal("it is the store's own file", str(path), "--store", remedy=remedy)
 
     def hand_over(self, table: "StudyTable", more: str = "") -> None:
-        """Print a study and write its files; more: what is said of them beside their name."""
+        """Print a study and write its files; more: text after the names of the files."""
         from loomopt.interface.files import outputs
 
         tell(self.as_json, table.as_dict, lambda: table.tables(si=self.si))
@@ -92,7 +92,10 @@ USUAL = RunOptions()
 def sweep(
     problem: Problem,
     over: Annotated[
-        list[str], typer.Option(metavar="KEY=LO:HI:STEP UNIT", help='Such as "operation.M0=600:900:25 N*m".')
+        list[str],
+        typer.Option(
+            metavar="KEY=LO:HI:STEP UNIT", help='Set the values of a number, such as "operation.M0=600:900:25 N*m".'
+        ),
     ],
     target: Target = None,
     changes: SceneOptions = NO_CHANGES,
@@ -108,19 +111,19 @@ def sweep(
 
 def pareto(
     problem: Problem,
-    against: Annotated[str, typer.Option(metavar="B", help="The other axis.")],
-    minimise: Annotated[list[str] | None, typer.Option(metavar="A", help="The axis that is minimised.")] = None,
-    maximise: Annotated[list[str] | None, typer.Option(metavar="A", help="An axis that is maximised.")] = None,
+    against: Annotated[str, typer.Option(metavar="B", help="Name the other axis.")],
+    minimise: Annotated[list[str] | None, typer.Option(metavar="A", help="Minimise this axis.")] = None,
+    maximise: Annotated[list[str] | None, typer.Option(metavar="A", help="Maximise this axis.")] = None,
     bounds: Annotated[
         list[str] | None,
-        typer.Option("--range", metavar="B=LO:HI UNIT", help='Range of an axis, such as "m4e=0:5 kg".'),
+        typer.Option("--range", metavar="B=LO:HI UNIT", help='Limit an axis to a range, such as "m4e=0:5 kg".'),
     ] = None,
     points: Annotated[
         str | None,
-        typer.Option(metavar="N", help="Number of points, 40 without it; points that locate changes are added."),
+        typer.Option(metavar="N", help="Compute N points (40 by default), and more that locate changes."),
     ] = None,
     target: Annotated[
-        str | None, typer.Option(help="Target whose other requirements hold; the job's default without it, or none.")
+        str | None, typer.Option(help="Keep the other demands of this target; `none` for no demands.")
     ] = None,
     changes: SceneOptions = NO_CHANGES,
     how: RunOptions = USUAL,
@@ -140,7 +143,7 @@ def pareto(
 
 
 def _axes(minimise: list[str], maximise: list[str], against: str) -> tuple[str, str]:
-    """Axis that is sought and the one that pays for it. Raises BadInput."""
+    """Optimised axis and the other axis. Raises BadInput."""
     from loomopt.base.errors import refusal
 
     named = [*minimise, *maximise]
@@ -170,7 +173,7 @@ def _split_items(items: list[str], option: str, example: str, form: str) -> dict
 
 
 def run(study: "SceneStudy", how: RunOptions) -> int:
-    """Run a study, print and write it; return the exit status. What is finished is printed after Ctrl-C too."""
+    """Run a study, print and write it; returns the exit status. After Ctrl-C the finished rows are printed."""
     from concurrent.futures import BrokenExecutor
 
     from loomopt.interface.study.points import StudyTable, run_study
@@ -198,7 +201,7 @@ def run(study: "SceneStudy", how: RunOptions) -> int:
 
 
 def status(rows: "tuple[Row, ...]") -> int:
-    """Exit status: rows that are certified or shown infeasible are as good as there can be."""
+    """Exit status: 3 if all rows are infeasible, 0 if the others are certified, else 4."""
     if all(row.status == "infeasible" for row in rows):
         return INFEASIBLE
     return OK if all(row.certified or row.status == "infeasible" for row in rows) else NOT_CERTIFIED
@@ -208,14 +211,14 @@ def effects(
     problem: Problem,
     target: Target = None,
     tolerance: Annotated[
-        str, typer.Option(metavar="R", help="Permitted change by an effect, relative to scales.")
+        str, typer.Option(metavar="R", help="Permit this relative change by effects that are left out.")
     ] = "0.01",
     changes: SceneOptions = NO_CHANGES,
     computer: ComputerOptions = ALONE,
     figure: Figure = None,
     as_json: Json = False,
 ) -> None:
-    """Show the influence of effects; find those to leave out."""
+    """Show the influence of effects, and which may be left out."""
     from loomopt.interface.files import outputs
     from loomopt.interface.study.effects import EffectsStudy, run_effects, summarise_effects
     from loomopt.studies.effects.study import plan_effects
@@ -286,8 +289,8 @@ def tolerance(
     problem: Problem,
     design: Design = None,
     target: Target = None,
-    samples: Annotated[str, typer.Option(metavar="N", help="Number of machines.")] = "100000",
-    seed: Annotated[str, typer.Option(metavar="S", help="Seed of the random machines.")] = "0",
+    samples: Annotated[str, typer.Option(metavar="N", help="Draw N machines.")] = "100000",
+    seed: Annotated[str, typer.Option(metavar="S", help="Set the seed of the random machines.")] = "0",
     worst: Annotated[bool, typer.Option(help="Prove the worst case of each figure within all tolerances.")] = True,
     changes: SceneOptions = NO_CHANGES,
     computer: ComputerOptions = ALONE,
@@ -296,7 +299,7 @@ def tolerance(
     table: TableOptions = NO_TABLE,
     as_json: Json = False,
 ) -> None:
-    """Show how machines spread as they are made, and how many hold."""
+    """Compute the scatter and the yield of manufactured machines."""
     from loomopt.interface.cli.shell import read_request
     from loomopt.interface.files import outputs
     from loomopt.interface.study.tolerance import run_tolerance
@@ -315,7 +318,7 @@ def tolerance(
 
 
 def outcome(statuses: Sequence[str]) -> int:
-    """Exit status of a study by those of its solves; what need not be solved counts as it is."""
+    """Exit status of a study of effects: 3 if all solves are infeasible, 0 if the others are optimal, else 4."""
     solved = [status for status in statuses if status not in ANSWERED]
     if all(status == "infeasible" for status in solved):
         return INFEASIBLE

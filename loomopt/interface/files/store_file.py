@@ -29,9 +29,9 @@ def is_store(path: Path) -> bool:
 
 
 def read_studies(path: Path) -> list[StudyTable]:
-    """Every study of a store with the rows that are there, in the order they were begun. Raises BadInput.
+    """Every study of a store with the rows that are there, in the order of their start. Raises BadInput.
 
-    Machines as they are made are no designs, and left out.
+    Scrambles of a tolerance study are not designs and are left out.
     """
     with Store(path) as store:
         studies = {key: (about, tuple(store.rows(key))) for key, about in store.studies().items()}

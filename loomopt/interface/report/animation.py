@@ -168,7 +168,7 @@ def _mp4(picture: MovingPicture, path: Path) -> None:
         if done.returncode:
             messages = done.stderr.decode(errors="replace").strip().splitlines()
             raise refusal(
-                f"ffmpeg fails: {messages[-1] if messages else 'no word'}",
+                f"ffmpeg fails: {messages[-1] if messages else 'no message'}",
                 str(path),
                 "--animate",
                 remedy="Write a .gif",

@@ -160,29 +160,28 @@ def _moving(subject: Subject) -> Iterator[Part]:
 def _clash(subject: Subject) -> Iterator[Part]:
     solution = subject.evaluated
     if isinstance(solution, Solution) and solution.relaxation:
-        clash = (
-            f"Limits that clash: {', '.join(solution.clash)}. The design below is the nearest one, and not admissible."
-        )
-        yield Part("What stands in the way", (clash, answers.relaxation(solution)))
+        conflict = f"No design satisfies {', '.join(solution.clash)} together."
+        clash = f"{conflict} The design below is the nearest one; it is not admissible."
+        yield Part("Conflicting limits", (clash, answers.relaxation(solution)))
 
 
 def _binding(subject: Subject) -> Iterator[Part]:
     if isinstance(subject.evaluated, Solution) and subject.evaluated.certificate:
-        caption = "By how much the best gets better for each unit that a limit is loosened; solving again confirms it."
+        caption = "A price is the change of the optimum for each unit by which a limit is loosened."
         bound = answers.binding(subject.evaluated)
         shown = (bound,) if isinstance(bound, str) else (caption, replace(bound, title=""))
-        yield Part("What binds, and what it is worth", shown)
+        yield Part("Binding limits and their prices", shown)
 
 
 def _certificate(subject: Subject) -> Iterator[Part]:
-    """The certificate in words: each requirement with its residual."""
+    """The certificate: each requirement with its residual."""
     certificate = subject.evaluated.certificate if isinstance(subject.evaluated, Solution) else None
     if certificate is None:
         return
     lines = [
-        ("every limit holds, by its own size", f"{certificate.feasibility:.1e}", f"{FEASIBLE:.0e}"),
+        ("excess of the limits, relative to their scales", f"{certificate.feasibility:.1e}", f"{FEASIBLE:.0e}"),
         (
-            f"whole-cycle values between the points, {certificate.whole_cycle}",
+            f"excess between the points of the cycle, {certificate.whole_cycle}",
             f"{certificate.violation:.1e}",
             "the accuracy",
         ),
@@ -190,28 +189,28 @@ def _certificate(subject: Subject) -> Iterator[Part]:
     for place, level in enumerate((*certificate.levels, *([certificate.change] if certificate.change else [])), 1):
         lines += [
             (
-                f"{place}. {level.objective}: slopes balance, nothing better nearby",
+                f"{place}. {level.objective}: stationarity",
                 f"{level.stationarity:.1e}",
                 f"{STATIONARY:.0e}",
             ),
             (
-                f"{place}. {level.objective}: only limits that are met carry a price",
+                f"{place}. {level.objective}: complementarity",
                 f"{level.complementarity:.1e}",
                 f"{COMPLEMENTARY:.0e}",
             ),
         ]
     head = "Passed" if certificate.passed else "NOT PASSED"
-    curved = "the curvature says a minimum" if certificate.minimum else "the curvature does NOT say a minimum"
-    unique = "the only one nearby" if certificate.unique else "not the only one: others are as good"
+    curved = "the curvature is that of a minimum" if certificate.minimum else "the curvature is NOT that of a minimum"
+    unique = "the only optimum nearby" if certificate.unique else "not the only optimum: others are as good"
     if not certificate.prices_unique:
-        unique += "; prices are not unique, for limits bind only together"
+        unique += "; prices are not unique, because some limits bind only together"
     blocks: list[Block] = [
-        f"{head}. It was checked apart from the solver, by {certificate.by}: {curved}, and it is {unique}.",
-        TextTable("", ("what was checked", "found", "at most"), tuple(lines), right=(1, 2)),
+        f"{head}. It is computed without the solver, by {certificate.by}: {curved}, and the design is {unique}.",
+        TextTable("", ("requirement", "residual", "at most"), tuple(lines), right=(1, 2)),
         *(f"Reason: {reason}." for reason in certificate.reasons),
     ]
     blocks += [f"Chosen among equals: {'; '.join(certificate.choices)}."] if certificate.choices else []
-    yield Part("The certificate in words", tuple(blocks))
+    yield Part("The certificate", tuple(blocks))
 
 
 def _proofs(subject: Subject) -> Iterator[Part]:
@@ -233,7 +232,7 @@ def _forces(subject: Subject) -> Iterator[Part]:
 
 def _members(subject: Subject) -> Iterator[Part]:
     if isinstance(subject.evaluated, Solution) and subject.evaluated.members:
-        yield Part("Each member by itself", (replace(answers.members(subject.evaluated, subject.scene), title=""),))
+        yield Part("Members", (replace(answers.members(subject.evaluated, subject.scene), title=""),))
 
 
 def _remarks(subject: Subject) -> Iterator[Part]:
@@ -267,10 +266,10 @@ def _search(subject: Subject) -> Iterator[Part]:
         time = solution.time
         sentences = [answers.starts(solution, subject.scene)] if solution.solver.get("starts", 1) > 1 else []
         sentences.append(
-            f"IPOPT said {solution.solver.get('status', 'nothing')}; {time.get('total_s', 0.0):.3f} s in all."
+            f"IPOPT said {solution.solver.get('status', 'nothing')}; {time.get('total_s', 0.0):.3f} s in total."
         )
         sentences.append(answers.design_text(solution, subject.scene))
-        yield Part("How it was solved", tuple(sentences))
+        yield Part("Solution method", tuple(sentences))
 
 
 PARTS: tuple[Callable[[Subject], Iterator[Part]], ...] = (

@@ -28,7 +28,7 @@ def page(chapters: Sequence[Chapter]) -> str:
     title = "; ".join(f"{chapter.status.verdict}: {chapter.heading}" for chapter in chapters)
     toc = _contents(chapters) if len(chapters) > 1 else ""
     body = "".join(_chapter(place, chapter) for place, chapter in enumerate(chapters, 1))
-    made = f"Made by loomopt {__version__}, {date.today().isoformat()}. The page holds all it shows."
+    made = f"Made by loomopt {__version__}, {date.today().isoformat()}. The page is self-contained."
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'

@@ -49,8 +49,8 @@ def parts(study: SceneStudy, solved: Sequence[Row]) -> list[Part]:
     above = {findings.message, *changes}
     tables = [block for block in study_table.tables(study, solved) if block not in above]
     shown = charts.block(study_table.charts(study, findings).charts)
-    text = "Each point is a certified design; where the line breaks there is none."
-    costs = [Part("What costs what", (text, *shown, *changes))] if shown else []
+    text = "Each point is a certified design; a line breaks where there is no design."
+    costs = [Part("Chart", (text, *shown, *changes))] if shown else []
     stages = _stages(study, findings.rows)
     return [*costs, *([stages] if stages else []), Part("All points", tuple(tables))]
 
@@ -63,7 +63,7 @@ def _stages(study: SceneStudy, rows: Sequence[Row]) -> Part | None:
         return None
     view, unit = registry.of(study.scene).views, study.scene.shown_in("angle")
     drawn = machine.widget(list(motions.values()), None, view.angle, unit, 0, list(motions) if len(motions) > 1 else ())
-    return Part("The designs along it", ("The second slider goes along the study.", Markup(drawn)))
+    return Part("Designs of the study", ("The second slider selects a design.", Markup(drawn)))
 
 
 def stages(study: SceneStudy, rows: Sequence[Row]) -> dict[str, MechanismMotion]:

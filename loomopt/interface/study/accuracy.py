@@ -26,7 +26,7 @@ LEAST = 1e-17
 class AccuracyStudy(StudyResult[AccuracyResult]):
     """Error and time of each numerical method; it shows itself in Jupyter."""
 
-    heading = "What accuracy costs"
+    heading = "Cost of accuracy"
 
     def table(self) -> "pd.DataFrame":
         """Table of one line per row; times in seconds."""
@@ -46,9 +46,9 @@ class AccuracyStudy(StudyResult[AccuracyResult]):
             Column("", (), "order", orders),
             Column("", (), "knee", knees),
         ]
-        title = "Measured orders, and the settings from which on errors stop falling"
+        title = "Measured orders, and the settings (knees) beyond which errors no longer decrease"
         return [
-            f"{result.problem}: relative errors against references at least 100 times tighter, and what they cost",
+            f"{result.problem}: relative errors against references at least 100 times more precise, and times",
             text_table(_columns(rows), (0, 1, 2, 3, 4, 6), "--json, --out F.csv"),
             text_table(measured, more="", title=title),
             *(text for text in (result.advice, in_time(result.rows)) if text),
@@ -63,7 +63,7 @@ class AccuracyStudy(StudyResult[AccuracyResult]):
                 ladders.setdefault(known[0].quantity, []).append(known)
         sized = {name: row_sets for name, row_sets in ladders.items() if any(_has_sizes(rows) for rows in row_sets)}
         shown = [_chart(self.result, name, row_sets) for name, row_sets in sized.items()]
-        return Charts(f"{self.result.problem}: what accuracy costs", shown, missing="no method has an error at sizes")
+        return Charts(f"{self.result.problem}: cost of accuracy", shown, missing="no method has an error at sizes")
 
     def __repr__(self) -> str:
         return f"<AccuracyStudy {self.result.problem}: {len(self.result.rows)} rows; {self.result.advice}>"

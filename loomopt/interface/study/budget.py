@@ -25,8 +25,8 @@ MOTOR = {
     "rms_torque": ("rms torque", "torque"),
     "mean_power": ("mean power", "power"),
     "peak_power": ("peak power, driving or braking", "power"),
-    "regenerated": ("given back to the motor, mean power", "power"),
-    "energy_swing": ("a flywheel takes in and gives back each turn", "energy"),
+    "regenerated": ("mean power returned to the motor", "power"),
+    "energy_swing": ("energy exchanged with a flywheel per turn", "energy"),
     "flywheel": ("flywheel at the crank", "inertia"),
 }
 """Number of the motor → its name for people and its kind of quantity."""
@@ -35,7 +35,7 @@ MOTOR = {
 class Budget(StudyResult[BudgetResult]):
     """Shares of the effects in the crank torque of a design, motor and flywheel; SI and rad."""
 
-    heading = "Where the crank torque comes from"
+    heading = "Shares of the crank torque"
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
         """Table of a line per effect and one for their sum; si: in SI, else in the scene's own units."""
@@ -49,7 +49,7 @@ class Budget(StudyResult[BudgetResult]):
         """A line per effect, their sum, the motor, and remarks."""
         result, scene = self.result, self.result.scene
         peak = scene.show(_round(result.total.at_peak, result.total.peak), "torque")
-        first = f"{scene.name}: the crank torque is largest, {peak}, at {scene.show(result.torque.angle, 'angle')}"
+        first = f"{scene.name}: peak crank torque {peak} at {scene.show(result.torque.angle, 'angle')}"
         motor = tuple((label, _motor(result, name)) for name, (label, _) in MOTOR.items())
         shares = text_table(_columns(result), first=(0, 1, 5))
         return [first, shares, TextTable("Motor", ("", ""), motor), *(f"Remark: {text}." for text in result.remarks)]
@@ -77,7 +77,7 @@ class Budget(StudyResult[BudgetResult]):
             ],
             cursor=True,
         )
-        return Charts(f"{scene.name}: where the crank torque comes from", [chart])
+        return Charts(f"{scene.name}: shares of the crank torque", [chart])
 
     def __repr__(self) -> str:
         scene = self.result.scene
@@ -102,10 +102,10 @@ def _columns(result: BudgetResult, si: bool = False) -> list[Column]:
         columns.append(Column(f"{name} [{torque}]", values, f"{head}\n{torque}", cells, called=head))
     cells = ["" if math.isnan(share) else f"{_round(share, 100.0):.4g}" for share in shares]
     columns.insert(2, Column("share [%]", shares, "of it\n%", cells, called="of it"))
-    head = f"energy a turn\n{energy}"
+    head = f"energy per turn\n{energy}"
     return [
         *columns,
-        Column(f"energy [{energy}]", energies, head, list(map(number_text, energies)), called="energy a turn"),
+        Column(f"energy [{energy}]", energies, head, list(map(number_text, energies)), called="energy per turn"),
     ]
 
 

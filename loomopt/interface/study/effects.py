@@ -30,7 +30,7 @@ ROOMY = 1.3
 class EffectsStudy(StudyResult[EffectsResult]):
     """Influence of each effect of a scene on a target; shares of scales inside, units in tables."""
 
-    heading = "What each effect is worth"
+    heading = "Influence of each effect"
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
         """Table of one line per effect, units in the column names; si: in SI, else in the scene's own units."""
@@ -69,7 +69,7 @@ class EffectsStudy(StudyResult[EffectsResult]):
             shown.append(
                 _bars_of(result, "limits without an effect", key, [(value,) for value in excesses], signed=False)
             )
-        title = f"{result.scene.name}, {result.target}: what each effect is worth"
+        title = f"{result.scene.name}, {result.target}: influence of each effect"
         return Charts(title, shown, missing="no effect was measured")
 
     def __repr__(self) -> str:
@@ -209,28 +209,26 @@ def verdict(result: EffectsResult) -> list[str]:
     """Sentences on the effects that may be left out, their verification, and remarks."""
     share, solve = f"{100 * result.tolerance:g} %", call(result.command or "")
     if not result.finished:
-        return ["Not finished: what may be left out is not known."]
+        return ["Not finished: the effects that may be left out are not known."]
     if not result.reference.scales:
-        return ["Without a design for the reference nothing can be measured."]
+        return ["The reference has no design, so that no influence can be measured."]
     sentence = f"{list_text(result.left_out)} may be left out" if result.left_out else "no effect may be left out"
     lines = [f"At {share}, {sentence}{': ' if solve else ''}{solve}"]
     if result.together and result.largest_omission:
         change = _change_text(result.together.largest_change)
-        lines.append(f"Left out together, and what is found so judged with all on: {change}.")
+        lines.append(f"Without these effects, evaluated with all effects: {change}.")
         if len(result.left_out) > 1 and abs(result.largest_omission.value) > SHOWN_AS_ZERO:
             by, of, value = result.largest_omission.by, result.largest_omission.of, result.largest_omission.value
-            lines[-1] += f" Most comes from {result.largest_omission.effect}: {_change(by, of, value)}."
+            lines[-1] += f" The largest part is that of {result.largest_omission.effect}: {_change(by, of, value)}."
     lines += omission_sentences(result)
     alone = [row.effect for row in result.rows if row.may_go and row.effect not in result.left_out]
     if alone:
-        lines.append(f"By itself {list_text(alone)} may go, but not together with what else is left out.")
+        lines.append(f"{list_text(alone)} may be left out alone, but not together with the others.")
     same = [row.effect for row in result.rows if _only_figures(row, result.tolerance)]
     if same:
-        lines.append(
-            f"Without {list_text(same)} as good a design is found, but its figures are wrong by more than that."
-        )
+        lines.append(f"Without {list_text(same)} the design is as good, but its figures change by more than that.")
     if result.judged:
-        lines.append(f"Evaluate the design with {list_text(result.judged)}, which solve does not take.")
+        lines.append(f"Evaluate the design with {list_text(result.judged)}, which solve does not accept.")
     return lines
 
 
@@ -241,10 +239,10 @@ def omission_sentences(result: EffectsResult) -> list[str]:
     for row in (*rows, *([result.together] if result.together and len(rows) > 1 else [])):
         single = row in rows
         missing, changed = row.missing_figures, row.changed_figures if single else ()
-        parts = [f"{list_text(missing)} {'is' if len(missing) == 1 else 'are'} gone"] if missing else []
+        parts = [f"{list_text(missing)} {'is' if len(missing) == 1 else 'are'} missing"] if missing else []
         parts += [f"{list_text(changed)} {'changes' if len(changed) == 1 else 'change'}"] if changed else []
         sentences += (
-            [f"{f'without {row.effect}' if single else 'without them all'} {' and '.join(parts)}"] if parts else []
+            [f"{f'without {row.effect}' if single else 'without all of them'} {' and '.join(parts)}"] if parts else []
         )
         names |= dict.fromkeys((*row.missing_figures, *row.changed_figures))
     if not sentences:

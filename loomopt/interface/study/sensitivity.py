@@ -40,7 +40,7 @@ class SensitivityStudy(StudyResult[SensitivityResult]):
         result = self.result
         head = f"{result.scene.name}, {result.target}: how the optimum moves with each number"
         if result.refused:
-            return [f"{head} cannot be told: {result.refused}"]
+            return [f"{head} cannot be computed: {result.refused}"]
         moves = [text_table(_columns(result, sort_rows(result, name), name), (0, 2, 3, 5)) for name in sought(result)]
         return [head, *moves, _prices(result), *_valid(result)]
 
@@ -54,7 +54,7 @@ class SensitivityStudy(StudyResult[SensitivityResult]):
             bars = [(f"{row.number} {ARROWS[row.side]}".strip(), (effect(result, row) / factor(unit),)) for row in rows]
             shown.append(Bars(f"{heading(name, unit)}, by one sigma of a number or by 1 %", bars))
         title = f"{result.scene.name}, {result.target}: what moves the optimum, a number up by one sigma or 1 %"
-        return Charts(title, shown, missing="no number moves what is sought")
+        return Charts(title, shown, missing="no number changes an objective")
 
     def __repr__(self) -> str:
         result = self.result
@@ -118,7 +118,7 @@ def _prices(result: SensitivityResult) -> TextTable:
         unit = formatter.unit(price.limit)
         ends = [(f"{x / factor(unit):+.6g}" if x else "0") if math.isfinite(x) else "" for x in price.range]
         lines.append((f"{price.limit} {price.side}", ends[0], price.ends[0], ends[1], price.ends[1], unit))
-    heads = ("price of", "holds\nfrom", "for then", "to", "for then", "unit")
+    heads = ("price of", "valid\nfrom", "what changes", "to", "what changes", "unit")
     return TextTable("", heads, tuple(lines), (1, 3), first=(0, 1, 3, 5), more="--json")
 
 

@@ -33,9 +33,9 @@ MOST_TOLD = 3
 
 
 class ToleranceStudy(StudyResult[ToleranceResult]):
-    """Machines as they are made: how figures spread, how often limits hold; SI inside."""
+    """Scatter of manufactured machines: how figures spread, how often limits hold; SI inside."""
 
-    heading = "Machines as they are made"
+    heading = "Scatter of manufactured machines"
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
         """Table of one line per figure with its spread and shares; si: in SI, else in the scene's own units."""
@@ -49,8 +49,8 @@ class ToleranceStudy(StudyResult[ToleranceResult]):
         """Spreads, yields, worst cases, and what to tighten first."""
         result, plan = self.result, self.result.plan
         numbers = ", ".join(tolerance.number for tolerance in plan.tolerances.values())
-        head = f"{plan.scene.name}, limits of {plan.target}: {result.samples} machines, {numbers} as they are made"
-        lost = f"{result.bad} of them do not assemble or lack a figure" if result.bad else "all of them assemble"
+        head = f"{plan.scene.name}, limits of {plan.target}: {result.samples} machines with tolerances of {numbers}"
+        lost = f"{result.bad} of them cannot be assembled or lack a figure" if result.bad else "all of them assemble"
         worst: list[str | TextTable] = [_worst(result)] if result.worst else []
         spreads = text_table(_spreads(result), first=(0, 1, 3, 4, 2))
         return [f"{head}; {lost}", spreads, _yields(result), *worst, *_advice(result)]
@@ -70,8 +70,8 @@ class ToleranceStudy(StudyResult[ToleranceResult]):
             for name, spread in spreads
             if spread and spread.sigma and spread.sigma_linear
         ]
-        title = f"{plan.scene.name}: {self.result.samples} machines as they are made"
-        return Charts(title, shown, missing="no figure that judges machines spreads")
+        title = f"{plan.scene.name}: {self.result.samples} manufactured machines"
+        return Charts(title, shown, missing="no figure that can reject machines varies")
 
     def __repr__(self) -> str:
         share, plan = self.result.yields[ALL].value, self.result.plan
@@ -153,8 +153,8 @@ def _yields(result: ToleranceResult) -> TextTable:
     shares = [f"{100 * share.value:.4g}" for share in result.yields.values()]
     errors = [f"{100 * share.se:.2g}" for share in result.yields.values()]
     columns = [
-        words("", names, "machines that hold"),
-        Column("", (), "%", shares),
+        words("", names, "limit satisfied"),
+        Column("", (), "machines\n%", shares),
         Column("", (), "standard error\n%", errors),
     ]
     return text_table(columns)
@@ -180,7 +180,7 @@ def _histogram(result: ToleranceResult, name: str, spread: Spread) -> Chart:
     outside += [(most, high)] if most is not None and most < high else []
     nominal = 0.0 if abs(spread.nominal) <= SHOWN_AS_ZERO * spread.sigma else spread.nominal
     key = [("k-place", f"nominal {units.shown(name, nominal)}")]
-    key += [("k-span", f"does not hold; {100 * result.yields[name].value:.4g} % hold")] if outside else []
+    key += [("k-span", f"rejected; {100 * result.yields[name].value:.4g} % accepted")] if outside else []
     axis = Axis(low, high, ticks(low, high, 4), heading(name, unit))
     curve = Series(np.repeat(edges, 2), steps, "c0", filled=True)
     return Chart("machines [%]", axis, [curve], spans=outside, places=[nominal / size], key=key)
@@ -195,7 +195,7 @@ def _worst(result: ToleranceResult) -> TextTable:
         sides = zip((bounds.min, bounds.max), bounds.farthest, (-1.0, 1.0), ("or less", "or more"), strict=True)
         shown = [_end(end, beyond, size, sign, more) for end, beyond, sign, more in sides]
         lines.append((name, *shown, "" if unit == "1" else unit, "proven" if bounds.proven else bounds.why))
-    heads = ("within all tolerances", "at least", "at most", "unit", "")
+    heads = ("range within all tolerances", "at least", "at most", "unit", "")
     return TextTable("", heads, tuple(lines), (1, 2), first=(0, 1, 2, 4, 3), more="--json")
 
 
@@ -221,11 +221,9 @@ def _outward(value: float, sign: float) -> str:
 def _advice(result: ToleranceResult) -> list[str]:
     first = [f"{name} ({100 * share:.3g} %)" for name, share in result.tighten[:MOST_TOLD] if share >= LEAST_SHARE]
     lost = any(result.yields[criterion.name].value < 1.0 for criterion in result.plan.criteria)
-    of = "what is lost" if lost else "what is sought spreads by; no machine that was drawn is lost"
+    of = "the rejected machines" if lost else "the scatter of the objective; no machine is rejected"
     sentences = [f"Tighten first: {', '.join(first)} of {of}."] if first else []
     names = result.plan.goals_without_band
     if names:
-        sentences.append(
-            f"No machine is judged by {', '.join(names)}, an equality or a goal: [accept] gives it a band."
-        )
+        sentences.append(f"{', '.join(names)} rejects no machine, as an equality or a goal without a band in [accept].")
     return sentences

@@ -30,7 +30,7 @@ def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
     explanation = answer.explanation
     if answer.relaxation:
         clash = ", ".join(unbroken(limit) for limit in answer.clash)
-        parts += [f"No admissible design exists near any start. Limits that clash: {clash}.", relaxation(answer)]
+        parts += [f"No admissible design exists near any start. Conflicting limits: {clash}.", relaxation(answer)]
     elif answer.status == "optimal" and not answer.terms:
         parts += [] if answer.members else [registry.of(scene).say(scene, answer.target, answer.figures)]
     else:
@@ -146,7 +146,7 @@ def members(solution: Solution, scene: Scene) -> TextTable:
         lines.append((str(place + 1), unbroken(changed(member)), *cells, f"{missed} not" if missed else ""))
     units = ["" if formatter.unit(name) == "1" else f" [{formatter.unit(name)}]" for name in names]
     head = ("member", "change", *(f"{name}{unit}" for name, unit in zip(names, units, strict=True)), "reached")
-    return TextTable("Each member by itself", head, tuple(lines), right=tuple(range(2, 2 + len(names))))
+    return TextTable("Members", head, tuple(lines), right=tuple(range(2, 2 + len(names))))
 
 
 def design_text(evaluated: Evaluated, scene: Scene) -> str:
@@ -184,7 +184,7 @@ def binding(answer: Solution) -> str | TextTable:
         return "No limit binds except the sizes." if answer.rounded else "No limit binds."
     lines = tuple((price.text, next(iter(price.worth)), price.reading) for price in answer.binding)
     lines += tuple((f"{named(price.limits)} together", price.figure, price.reading) for price in answer.bind_together)
-    return TextTable("What binds, and what loosening it is worth", ("limit", "moves", "by"), lines)
+    return TextTable("Binding limits and their prices", ("limit", "moves", "by"), lines)
 
 
 def certificate(answer: Solution) -> list[str]:
@@ -220,7 +220,7 @@ def global_summary(bound: GlobalBound, scene: Scene) -> str:
         side = 1 if level.sense == "most" else -1
         among = f"of those with {' and '.join(remarks)}, none" if remarks else "no admissible design in these bounds"
         if level.bound == 0.0 and level.proven:
-            sentences.append(f"{name} is 0, less than which there is none")
+            sentences.append(f"{name} is 0, and no magnitude is less")
         elif math.isfinite(level.bound):
             sentences.append(
                 f"{among} has {name} {BEYOND[side]} {formatter.outward(level.objective, level.bound, side)}"

@@ -48,7 +48,7 @@ def read(job: str) -> Source:
     """Source of a job's scenes. Raises BadInput where the job names none."""
     place = registry.find(job).resources / "sources.csv"
     if not place.is_file():
-        remedy = "Where a scene's numbers come from stands in its file: see `loomopt show`"
+        remedy = "`loomopt show` gives the sources of the numbers of a scene"
         raise BadInput(f"job {job} has no published figures", key="--sources", remedy=remedy)
     first, _, rest = place.read_text(encoding="utf-8").partition("\n")
     return Source(first.removeprefix("# "), tuple(Printed(**row) for row in csv.DictReader(rest.splitlines())))
@@ -213,8 +213,8 @@ def source_tables(scene: Scene) -> list[str | TextTable]:
     why = tuple((figure.key, figure.item, figure.inputs, figure.remark) for figure in source.figures)
     return [
         source.citation,
-        "The source's own machines, in its units, whatever this scene has otherwise. The suite computes every one of "
-        "these figures again.",
+        "Machines of the source in its units, also if this scene has other numbers. The suite computes all of "
+        "these figures.",
         TextTable("Printed and computed", ("figure", "printed", "computed", "unit", "verdict"), lines, right=(1, 2)),
-        TextTable("What each is, from what, and why", ("figure", "what it is", "from", "why"), why),
+        TextTable("Meaning and origin of each figure", ("figure", "what it is", "from", "why"), why),
     ]

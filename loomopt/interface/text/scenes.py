@@ -51,7 +51,7 @@ def parts(scene: Scene) -> list[str | TextTable]:
         TextTable("Effects that are on", ("effect", "what it is"), effects) if effects else "No effect is on",
         *(record.summary for record in registry.of(scene).tables(scene, scene.schema.default_target)),
         f"Effects that are off, and not in the equations: {', '.join(off) or 'none'}",
-        TextTable("Targets", ("target", "what it asks", "expected"), tuple(_targets(scene))),
+        TextTable("Targets", ("target", "objectives", "expected"), tuple(_targets(scene))),
         *_family(scene),
         TextTable("Figures", ("figure", "what it is"), figures),
     ]
@@ -82,7 +82,7 @@ def _family(scene: Scene) -> list[str | TextTable]:
     lines = tuple((str(place + 1), changes[place]) for place in range(len(members)))
     free_variables = f"; each has its own {', '.join(table.own)}" if table.own else ""
     sentence = f"A family of target {family.of_target(scene)}: the least {table.combine} of its members{free_variables}"
-    return [sentence, TextTable("Members of the family", ("member", "what it changes"), lines)]
+    return [sentence, TextTable("Members of the family", ("member", "changes"), lines)]
 
 
 def list_text(values: str | Sequence[float]) -> str:
@@ -168,7 +168,7 @@ def comparison(scene: Scene, frame: "pd.DataFrame") -> TextTable:
             lines.append((name, shown, str(len(there)), f"{rms:.4g}", f"{off[worst]:.4g}", angle, known))
     heads = ("curve", "unit", "samples", "rms", "largest", "at", "digits to \u00b1")
     file = "; ".join(str(frame.attrs[key]) for key in ("measured", "read") if key in frame.attrs)
-    return TextTable(f"Curves less what was measured ({file})", heads, tuple(lines), right=(2, 3, 4, 5, 6))
+    return TextTable(f"Computed minus measured curves ({file})", heads, tuple(lines), right=(2, 3, 4, 5, 6))
 
 
 def _angles(marks: Marks) -> dict[str, float]:
@@ -219,5 +219,5 @@ def forces(scene: Scene, frame: "pd.DataFrame", design: Mapping[str, float]) -> 
         )
     sizes = f"peak\n{force}", f"at\n{angle}", f"mean\n{force}", f"p = 3\n{force}", f"p = 10/3\n{force}"
     heads = "force", "turning\nparts", *sizes
-    title = f"{scene.name}: forces over the turn; p: mean of their powers, for the life of ball and of roller bearings"
+    title = f"{scene.name}: forces over the turn; p = 3 and 10/3: means for the life of ball and roller bearings"
     return [title, TextTable("", heads, tuple(lines), tuple(range(2, 7)))]

@@ -446,7 +446,7 @@ def without_optimum(
     """Answer where no design was reached: infeasible with the least relaxations, else failed."""
     if clash.relaxations:
         result = (
-            f"No admissible design exists near any start. Limits that clash: {', '.join(clash.limits)}. "
+            f"No admissible design exists near any start. Conflicting limits: {', '.join(clash.limits)}. "
             f"The least relaxation that helps: {_helps(clash.relaxations)}"
         )
     else:

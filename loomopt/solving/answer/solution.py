@@ -363,7 +363,7 @@ class Worse(NamedTuple):
 
 
 class Yield(NamedTuple):
-    """The share of machines that hold, with its standard error."""
+    """Share of machines that satisfy a limit or all limits, with its standard error."""
 
     value: float
     se: float
@@ -374,7 +374,7 @@ class Robust(NamedTuple):
 
     sigmas: standard deviations of its own figure by which each keeps clear; requested_yield: the requested yield, if
     any; linear: standard deviations for it by the joint normal distribution, with which sampling begins; yields: share
-    of machines that hold, by limit and of "all"; nominal, nominal_yields: the optimum without back-off, and its
+    of machines that satisfy each limit, and all; nominal, nominal_yields: the optimum without back-off, and its
     machines; exempt: equalities and goals, which nothing backs off; corners: figures that bend at the design, of whose
     two slopes in each number the steeper was taken; passes: solves until standard deviations were those of the design;
     shifted: whether bands are not even, so that back-off counts from the mean machine.

@@ -1,1 +1,1 @@
-"""What accuracy costs in time: work-precision studies."""
+"""Cost of accuracy in time: work-precision studies."""

@@ -128,7 +128,7 @@ class Trade:
         target_name = self.target or self.scene.schema.default_target
         first = {level.figure for level in base.objectives[: self.solver.level_count]}
         demanded = [
-            f"{_demand(words, goal)}{' or as near as it comes' * (goal.figure in first)}" for goal in base.goals
+            f"{_demand(words, goal)}{' or as near as possible' * (goal.figure in first)}" for goal in base.goals
         ]
         aimed = {goal.figure for goal in base.goals}
         demanded += [

@@ -100,7 +100,7 @@ def _left(plan: Plan, criterion: Criterion, slope: Slopes, side: str) -> dict[st
 def share(
     sides: Sequence[Margin], sigmas: float, applied: Mapping[tuple[str, int], float], caps: Mapping[str, float]
 ) -> float:
-    """Linear share of machines that hold all sides, were each back-off that is met one of `sigmas`.
+    """Linear share of machines that satisfy all sides, if every active side has a back-off of `sigmas`.
 
     applied: the back-off that the design was solved with, SI, by name and sign of a side; caps: the most standard
     deviations that a limit has room for.

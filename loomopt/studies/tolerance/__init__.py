@@ -1,1 +1,1 @@
-"""Machines as they are made: spread, yield, and what to tighten first."""
+"""Scatter of manufactured machines: spread, yield, and what to tighten first."""

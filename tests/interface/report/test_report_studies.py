@@ -123,7 +123,7 @@ def test_the_command_adds_studies_to_each_answer(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert run(["report", "shedding", "--study", "budget", "--study", "proof", "--out", "a.html"]) == 0
     titles = re.findall("<h3>(.*?)</h3>", (tmp_path / "a.html").read_text(encoding="utf-8"))
-    assert titles[-2:] == ["Where the crank torque comes from", "Proof at every crank angle"]
+    assert titles[-2:] == ["Shares of the crank torque", "Proof at every crank angle"]
     capsys.readouterr()
     assert run(["report", "shedding", "--study", "front", "--out", "b.html"]) == 2
     assert "budget, tolerance, sensitivity, effects, accuracy, proof" in capsys.readouterr().err
@@ -170,8 +170,8 @@ def test_one_page_holds_an_answer_with_stores_and_studies(files, tmp_path, monke
         "pareto of shedding-static",
     ]
     shown = [re.findall("<h3>(.*?)</h3>", chapter) for chapter in chapters]
-    assert sum(title == "Where the crank torque comes from" for title in shown[1]) == 1
-    assert not any("Where the crank torque comes from" in titles for titles in (shown[0], shown[2]))
+    assert sum(title == "Shares of the crank torque" for title in shown[1]) == 1
+    assert not any("Shares of the crank torque" in titles for titles in (shown[0], shown[2]))
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def test_an_answer_shows_sentence_table_prices_certificate_and_drawing(answer):
     cells = [[cell.text for cell in line] for line in tables[0].iter("tr")]
     lines = [[(cell or "").replace("\xa0", " ") for cell in line] for line in cells]
     assert ["l1", "31", "30", "mm", "30 ... 35", "min", ""] in lines
-    assert tables[1].find("caption").text == "What binds, and what loosening it is worth"
+    assert tables[1].find("caption").text == "Binding limits and their prices"
     assert all(price.reading in words for price in answer.binding)
     assert "Certificate passed" in words
     assert len(result.findall("{http://www.w3.org/2000/svg}svg")) == 1

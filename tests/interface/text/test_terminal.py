@@ -74,7 +74,7 @@ def test_a_table_fits_the_width_and_keeps_every_word(lines, columns):
 
 
 def test_a_title_that_is_wider_than_its_table_stands_on_one_line():
-    grid = TextTable("What binds, and what loosening it is worth", ("limit", "by"), (("X0 <= 80 mm", "740 N/m"),))
+    grid = TextTable("Binding limits and their prices", ("limit", "by"), (("X0 <= 80 mm", "740 N/m"),))
     assert text(grid, columns=60).splitlines()[0] == grid.title
 
 
@@ -232,7 +232,11 @@ def test_the_design_to_retype_is_the_design_to_the_last_digit(name):
     assert api.evaluate(second_answer.scene, back, second_answer.target).admissible
     assert all(isinstance(v, str) == (formatter.unit(k) != "1") for k, v in typed.items())
     assert max(map(len, shown.splitlines())) <= 80
-    assert shown.index(f"\n{second_answer.table().index[-1]} ") < shown.index("to retype: ") < shown.index("What binds")
+    assert (
+        shown.index(f"\n{second_answer.table().index[-1]} ")
+        < shown.index("to retype: ")
+        < shown.index("Binding limits")
+    )
 
 
 def test_what_was_proven_is_told_in_a_few_lines_and_only_where_it_was_asked_for(answer):
@@ -276,7 +280,7 @@ def test_points_that_narrow_a_change_down_are_marked_and_counted_apart():
     marked = [line[0] for line in grid.lines if line[0].endswith(study_table.NARROWS)]
     assert marked
     assert len(grid.lines) - len(marked) <= 5
-    assert f"{len(grid.lines) - len(marked)} points and {len(marked)} that narrow" in head
+    assert f"{len(grid.lines) - len(marked)} points and {len(marked)} that locate" in head
     assert front.table()["narrows"].sum() == len(marked)
     assert '"narrows": true' in json.dumps(front.as_dict())
 

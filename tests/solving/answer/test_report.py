@@ -149,7 +149,7 @@ def test_an_infeasible_target_says_what_clashes_and_what_helps(relaxations, mess
     clash = Clash({"p <= 1": "p", "x >= 9": "x"}, relaxations)
     answer = report.without_optimum("least", here, clash, {"status": "Restoration_Failed"}, here, "Physics.")
     assert answer.status == "infeasible"
-    head = "No admissible design exists near any start. Limits that clash: p <= 1, x >= 9."
+    head = "No admissible design exists near any start. Conflicting limits: p <= 1, x >= 9."
     assert answer.message == f"{head} {message} Physics."
     assert (answer.clash, answer.explanation) == (("p <= 1", "x >= 9"), "Physics.")
 

@@ -276,7 +276,7 @@ def test_an_effect_that_solve_does_not_accept_is_left_out_only_within_the_joint_
     assert result.judged == (() if "motor" in left_out else ("motor",))
     assert result.together.shift["M3_fdc"] == pytest.approx(-sum(torques[n] for n in left_out) / 734.985, rel=1e-5)
     stays = sorted(set(torques) - set(left_out))
-    assert (f"By itself {' '.join(stays)} may go, but not together" in result._repr_html_()) is bool(stays)
+    assert (f"{' '.join(stays)} may be left out alone, but not together" in result._repr_html_()) is bool(stays)
 
 
 @pytest.mark.slow
@@ -311,9 +311,9 @@ def test_its_repr_and_its_page_have_the_summary(beatup):
     assert repr(beatup).startswith("<EffectsStudy beatup, balance: at 1 % bearing_friction, centrifugal")
     page = beatup._repr_html_()
     assert "At 1 %, bearing_friction and centrifugal may be left out" in page
-    assert "By itself speed_fluctuation may go, but not together with what else is left out." in page
-    assert "Evaluate the design with speed_fluctuation, which solve does not take." in page
-    assert "resistance, rod_inertia and gravity as good a design is found, but its figures are wrong" in page
+    assert "speed_fluctuation may be left out alone, but not together with the others." in page
+    assert "Evaluate the design with speed_fluctuation, which solve does not accept." in page
+    assert "resistance, rod_inertia and gravity the design is as good, but its figures change" in page
     assert "solve" not in page.split("</thead>")[0], "times differ from run to run"
     with pytest.raises(TypeError, match="cannot be changed"):
         beatup.rows[0].shift["M3_fdc"] = 0.0
@@ -353,8 +353,8 @@ def test_figures_that_need_an_omitted_effect_are_named_even_if_the_target_reads_
     assert {"peak_acceleration", "stroke", "dwell_after"} <= set(reads)
     assert not set(kinematic.together.missing_figures) & set(reads)
     (sentence,) = [line for line in effects_text.verdict(kinematic.result) if line.startswith("Of the other figures: ")]
-    assert "without tape_stretch head_overrun is gone; " in sentence
-    assert "without them all tape_force, peak_torque, peak_power and head_overrun are gone" in sentence
+    assert "without tape_stretch head_overrun is missing; " in sentence
+    assert "without all of them tape_force, peak_torque, peak_power and head_overrun are missing" in sentence
     assert sentence.endswith("Target stroke-dwell reads none of these figures.")
     table = kinematic.table()
     assert table.loc["head_inertia", "takes away"] == "head_overrun"
@@ -377,6 +377,6 @@ def test_figures_of_an_effect_that_may_go_are_named_for_a_target_of_forces_too(b
     centrifugal = next(row for row in beatup.rows if row.effect == "centrifugal")
     assert set(centrifugal.missing_figures) == {"reed_centrifugal", "shaking_force"}
     assert any(
-        "without centrifugal reed_centrifugal and shaking_force are gone" in line
+        "without centrifugal reed_centrifugal and shaking_force are missing" in line
         for line in effects_text.verdict(beatup.result)
     )
