@@ -107,10 +107,10 @@ def beaten(study: Any, rows: int) -> tuple[int, list[dict[str, Any]]]:
     known = [row for row in study.rows if row.certified and trade.axes[1] in row.place]
     chosen = known[:: max(1, len(known) // rows)][:rows]
     for row in chosen:
-        asking = trade.asking(row.place)
+        request = trade.subproblem(row.place)
         others = [other.warm for other in study.rows if other.certified and other is not row]
         with working():
-            ends = [trade.solver.solve(asking, (), True), trade.solver.solve(asking, others, None)]
+            ends = [trade.solver.solve(request, (), True), trade.solver.solve(request, others, None)]
         mine = sought.value(plan.value(row, trade.axes[0]))
         for by, end in zip(("search", "rows"), ends, strict=True):
             remaining = all(

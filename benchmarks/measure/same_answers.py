@@ -29,7 +29,7 @@ SCENES = {
     "knuckle-press": ("torque",),
     "path-18": ("path",),
     "shaper": ("torque",),
-    "sixbar-sley": ("balance", "torque", "rms", "smooth", "dwell"),
+    "sixbar-sley": ("balance", "pulse", "retrofit", "torque", "rms", "smooth", "dwell"),
 }
 REED = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
 TAPE = ("head_inertia", "tape_friction")

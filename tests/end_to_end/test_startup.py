@@ -15,7 +15,7 @@ WORDS = {"annotated_types", "loomopt", "pydantic", "pydantic_core", "typer", "ty
 HELPERS = {"annotated_doc", "click", "shellingham", "typing_inspection"}
 """What Typer and pydantic bring themselves, by version."""
 SOLVER = {"casadi", "mpmath", "gmpy2"}
-MODULES = 525
+MODULES = 530
 """Most modules that any command imports."""
 LISTED = """import json, sys
 from loomopt.interface.cli.app import run
