@@ -116,7 +116,10 @@ def frame(attack):
 
 def verdicts(trial, **spoilt):
     trial.answer = trial.answers["default"] = SimpleNamespace(
-        **{name: getattr(trial.answer, name) for name in ("status", "design", "figures", "certificate", "message", "global_bound")}
+        **{
+            name: getattr(trial.answer, name)
+            for name in ("status", "design", "figures", "certificate", "message", "global_bound")
+        }
         | spoilt
     )
     trial.judged()
