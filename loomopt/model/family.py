@@ -1,7 +1,7 @@
-"""One machine for several sets of scene numbers: the members' programs as one, some variables shared, some their own.
+"""One machine for several sets of scene numbers: one program of all members, with shared and separate variables.
 
-Members are counted by index. What no number of a member's own can change stands in the program once, under its own
-name; all else once for each member. The worst over members, or their sum, is what each level seeks.
+Members are counted by index. A quantity that is the same for all members is in the program once, under its own name;
+any other quantity once for each member. Each level minimises the worst of the members, or their sum.
 """
 
 import functools
@@ -31,7 +31,7 @@ Combine = Literal["worst", "sum"]
 
 
 def of_member(name: str, member: int) -> Alias:
-    """Name in the whole of a number of one member; members are counted from 1."""
+    """Name of a member's number in the program of the family; members are counted from 1."""
     return Alias(member_name(name, member), name)
 
 
@@ -39,18 +39,18 @@ def of_member(name: str, member: int) -> Alias:
 
 
 class Scenario(NamedTuple):
-    """One member: its model, and what the whole calls its numbers and switches."""
+    """One member: its model, and the names of its numbers and switches in the family."""
 
     model: JobModel
     values: Mapping[str, str]
     switches: Mapping[str, str]
 
     def given(self, maths: Maths, values: Values) -> Given:
-        """Numbers of the member and those that follow from them, SI; values: of the whole."""
+        """Numbers of the member and those that follow from them, SI; values: numbers of the family."""
         return self.model.given(maths, {key: values[name] for key, name in self.values.items() if name in values})
 
     def node(self, node: Node) -> Node:
-        """Node of the whole as its own."""
+        """Node of the family as a node of the member."""
         switch = {key: node.switch[name] for key, name in self.switches.items() if name in node.switch}
         return Node(node.phi, switch | {name: node.switch[name] for name in (DATUM,) if name in node.switch})
 
@@ -64,7 +64,7 @@ def members_of(given: Given) -> tuple[Given, ...]:
 
 @dataclass(frozen=True, eq=False)
 class FamilyKinematics:
-    """The motions of all members; events: the member and the name of each event of the whole."""
+    """Motions of all members; events: member and name of each event of the family."""
 
     scenarios: tuple[Scenario, ...]
     structure: Hashable
@@ -82,7 +82,7 @@ class FamilyKinematics:
         return {}
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
-        """Angles of each member's events that no formula gives."""
+        """Approximate angles of the members' events without a closed form."""
         pairs = zip(self.scenarios, members_of(given), strict=True)
         return {part.values[name]: at for part, numbers in pairs for name, at in part.model.hints(numbers).items()}
 
@@ -137,11 +137,11 @@ def _parting(scenario: Scenario, member: int, place: int, maths: Maths, given: G
     return cornered(scenario.model, maths, members_of(given)[member])[place].placed
 
 
-# What no number of a member's own can change.
+# Numbers that are the same for all members.
 
 
 class Roots:
-    """Numbers of a model that its values follow from; known: their names. None where a formula cannot be recorded."""
+    """Numbers of a model on which its values depend; known: their names."""
 
     def __init__(self, model: JobModel, known: Collection[str]) -> None:
         self.model, self.tape = model, Tape()
@@ -151,16 +151,16 @@ class Roots:
 
     @lazy
     def given(self) -> Given:
-        """Inputs for the numbers. Raises what a formula raises that cannot be recorded."""
+        """Recorded inputs for the numbers. Raises the error of a formula that cannot be recorded."""
         return self.model.given(self.maths, self.inputs)
 
     @lazy
     def switches(self) -> dict[str, Number]:
-        """Inputs for the numbers of a node beside its angle."""
+        """Recorded inputs for the switches of a node."""
         return {name: self.tape.input() for name in (*self.model.switches, DATUM)}
 
     def of(self, name: str) -> frozenset[str]:
-        """Numbers that a row, a whole-cycle quantity or a mean follows from."""
+        """Numbers on which a row, a whole-cycle quantity or a mean depends."""
         if name in self.inputs:
             return frozenset({name})
         if name not in self._dependencies:
@@ -168,7 +168,7 @@ class Roots:
         return self._dependencies[name]
 
     def of_switch(self, place: int) -> frozenset[str]:
-        """Numbers that the corners of a switch follow from, by its place in the model's."""
+        """Numbers on which the corners of a switch depend, by its index in the model."""
         return self._of(lambda: cornered(self.model, self.maths, self.given)[place].angles)
 
     def _read(self, name: str) -> tuple[Number, ...]:
@@ -192,12 +192,12 @@ class Roots:
         return roots.union(*(self.of_switch(place) for place in turned))
 
 
-# What is sought of the members together.
+# Joint objectives.
 
 
 @dataclass(frozen=True)
 class WorstOf(Objective):
-    """The least of the worst value over members; of: the members' objectives."""
+    """Minimum of the worst value over the members; of: the members' objectives."""
 
     _: KW_ONLY
     of: tuple[Objective, ...]
@@ -219,7 +219,7 @@ class WorstOf(Objective):
 
     @property
     def sought(self) -> Sought:
-        """End of the figure that the members' objectives seek."""
+        """Sense of the members' objectives: "least" or "most"."""
         return self.of[0].sought
 
     def worsening(self, now: float, then: float, most: bool) -> float:
@@ -236,7 +236,7 @@ class WorstOf(Objective):
 
 
 class WorstMagnitude(WorstOf):
-    """The least of the worst magnitude."""
+    """Minimum of the worst magnitude over the members."""
 
     is_magnitude, least = True, 0.0
 
@@ -245,9 +245,9 @@ class WorstMagnitude(WorstOf):
 
 
 class MemberShare(NamedTuple):
-    """A member's share of the whole: its program, and what the whole calls its variables and limits.
+    """Part of a member in the family: its program, and the names of its variables and limits in the family.
 
-    names: of variables; limits: of those of its limits that are its own, by name.
+    names: name in the family by variable; limits: name in the family by name of a limit that is not shared.
     """
 
     program: Program
@@ -255,32 +255,32 @@ class MemberShare(NamedTuple):
     limits: Mapping[str, str]
 
     def member_values(self, x: Numbers) -> dict[str, float]:
-        """Variables of the member, SI, from those of the whole."""
+        """Variables of the member, SI, from those of the family."""
         return {name: x[whole] for name, whole in self.names.items()}
 
     def sampler(self, x: Numbers) -> Sampler:
-        """Design of the member, SI, from the variables of the whole."""
+        """Sampler of the member's design, from the variables of the family, SI."""
         return sampled(self.program.model, {**self.program.parameters, **self.member_values(x)})
 
 
 class Family(NamedTuple):
-    """The program of all members, and the share of each."""
+    """Program of all members, and the part of each member."""
 
     program: Program
     parts: tuple[MemberShare, ...]
 
 
 def standing_for(program: Program, name: str) -> frozenset[str]:
-    """Variables by which a program tells a number of the design: itself, or what its limits are read as."""
+    """Variables of a program that stand for a number of the design: itself, or the variables in its limits."""
     if any(variable.name == name for variable in program.variables):
         return frozenset({name})
     return frozenset(limit.row for limit in program.limits if limit.name == name and limit.is_of_variable)
 
 
 def together(programs: Sequence[Program], separate: Collection[str], combine: Combine) -> Family:
-    """Program of a family; separate: variables of which each member has its own.
+    """Program of a family; separate: variables that each member has for itself.
 
-    The members' programs are of one structure: they differ in numbers only.
+    The programs of the members have the same structure and differ in numbers only.
     """
     if len(programs) == 1:
         names = {variable.name: variable.name for variable in programs[0].variables}
@@ -293,7 +293,7 @@ UNLIKE = 1e-3
 
 
 class _Combining:
-    """The members' programs on the way to one."""
+    """Builder of the program of a family from the programs of its members."""
 
     def __init__(self, programs: Sequence[Program], separate: Collection[str], combine: Combine) -> None:
         self.programs, self.combine = tuple(programs), combine
@@ -311,9 +311,9 @@ class _Combining:
         self.measured: dict[str, tuple[int, Objective]] = {}
 
     def _hinted(self, separate: Collection[str]) -> dict[str, bool]:
-        """Events that no formula gives, by name of value, and whether any number of a member's own moves it.
+        """Events without a closed form, by name of value, and whether they differ between members.
 
-        They are found by iteration: that is seen at the first start, at which each member's own variables differ.
+        They are computed by iteration, at the first start with different separate variables for each member.
         """
         hints = list[Mapping[str, float]]()
         for k, program in enumerate(self.programs):
@@ -328,7 +328,7 @@ class _Combining:
         return {name: any(angles.get(name) != value for angles in hints) for name, value in hints[0].items()}
 
     def _apart(self, separate: Collection[str]) -> frozenset[str]:
-        """Numbers that are not the same for all members, and variables that hang on them by an equality."""
+        """Numbers that differ between members, and variables that an equality ties to them."""
         numbers = [program.parameters for program in self.programs]
         names = {*separate} | {name for name in numbers[0] if any(table[name] != numbers[0][name] for table in numbers)}
         names |= {name for name, moves in self.hinted.items() if moves}
@@ -351,14 +351,14 @@ class _Combining:
 
     @lazy
     def known(self) -> frozenset[str]:
-        """Variables that a designer chooses: those with a bound among the limits, or that stand for one."""
+        """Variables that a designer chooses: those with a bound among the limits, and fixed ones."""
         limited = {limit.row for limit in self.first.limits if limit.is_of_variable}
         return frozenset(limited | {v.name for v in self.first.variables if v.lower == v.upper})
 
     # Names.
 
     def name(self, member: int, name: str) -> str:
-        """Name in the whole of a member's number."""
+        """Name of a member's number in the family."""
         return of_member(name, member) if name in self.apart else name
 
     def is_shared(self, name: str) -> bool:
@@ -366,7 +366,7 @@ class _Combining:
         return self.roots.of(name).isdisjoint(self.apart)
 
     def read(self, member: int, name: str) -> str:
-        """Name in the whole of a member's row, quantity, mean or number; it is added where it is missing."""
+        """Name of a member's row, quantity, mean or number in the family; it is added if it is missing."""
         if name in self.first.parameters or name in self.variables:
             return self.name(member, name)
         shared, model = self.is_shared(name), self.model
@@ -402,7 +402,7 @@ class _Combining:
         return called
 
     def where(self, member: int, where: Where | None) -> Where | None:
-        """Pieces of a member's cycle as pieces of the cycle of the whole."""
+        """Pieces of a member's cycle as pieces of the cycle of the family."""
         return where and (self.scenarios[member].switches[where[0]], where[1])
 
     # The model.
@@ -424,7 +424,7 @@ class _Combining:
         )
 
     def arcs(self) -> list[tuple[bool, Arcs]]:
-        """Switches of the whole, and whether each changes a formula."""
+        """Switches of the family, and whether each of them changes a formula."""
         model, arcs = self.model, dict[str, tuple[bool, Arcs]]()
         loads = [load for load in model.loads if isinstance(load, Load) and load.corners]
         reads = [arc.switch for arc in (*model.kinematics.arcs, *model.arcs)] + [load.switch for load in loads]
@@ -436,7 +436,7 @@ class _Combining:
         return list(arcs.values())
 
     def closing(self) -> tuple[dict[str, Group], dict[str, tuple[str, float]]]:
-        """Rows by which members assemble: those of groups of links, and the others."""
+        """Rows that must be satisfied for assembly: those of groups of links, and the others."""
         closes, conditions = dict[str, str](), dict[str, tuple[str, float]]()
         groups = self.model.kinematics.groups
         for k in range(len(self.programs)):
@@ -452,7 +452,7 @@ class _Combining:
         return {"": Group({}, closes, closest=closest)}, conditions
 
     def whole(self) -> JobModel:
-        """Model of all members, with what was read of it."""
+        """Model of all members, with the rows and quantities that have been read."""
         groups, conditions = self.closing()
         arcs = self.arcs()
         scenarios = tuple(
@@ -477,7 +477,7 @@ class _Combining:
     # Variables, limits, objectives.
 
     def variable(self, member: int, place: int) -> Variable:
-        """Variable of a member as one of the whole."""
+        """Variable of a member as a variable of the family."""
         variables = [program.variables[place] for program in self.programs]
         variable = variables[member]
         if variable.name in self.apart:
@@ -486,7 +486,7 @@ class _Combining:
         return variable._replace(lower=lower, upper=max(lower, upper))
 
     def limit(self, member: int, limit: Limit) -> Limit:
-        """Limit of a member as one of the whole."""
+        """Limit of a member as a limit of the family."""
         whole: Limit = replace(limit, row=self.read(member, limit.row))
         if isinstance(whole, RatioLimit):
             whole = replace(whole, weight=self.read(member, whole.weight))
@@ -505,16 +505,16 @@ class _Combining:
         return list(limits.values())
 
     def objective(self, member: int, objective: Objective) -> Objective:
-        """Objective of a member as a part of that of the whole."""
+        """Objective of a member as a part of the family's objective."""
         whole = replace(objective, row=self.read(member, objective.row))
         if isinstance(whole, Worst):
             whole = replace(whole, others=tuple(self.read(member, row) for row in whole.others))
         return whole
 
     def objectives(self) -> tuple[Objective, ...]:
-        """Levels: of each of the members' the worst or the sum.
+        """Levels of the family: the worst or the sum of each level of the members.
 
-        Of a magnitude the sum too, after the worst: who does not decide the worst comes as near as can be.
+        For a magnitude the sum over the members is minimised next.
         """
         levels: list[Objective] = []
         for level in zip(*(program.objectives for program in self.programs), strict=True):
@@ -533,7 +533,7 @@ class _Combining:
         return tuple(levels)
 
     def summed(self, parts: Sequence[Objective]) -> Objective:
-        """Sum of what members seek: of what is not smooth, of variables that are no less."""
+        """Sum over the members; a variable that bounds an objective replaces it if it is not smooth."""
         first = parts[0]
         figure = Alias(sum_name(first.figure, first.is_magnitude, first.power), first.figure)
         direct = first.is_smooth and not any(part.row in self.integrals or self.stands(part.row) for part in parts)
@@ -543,11 +543,11 @@ class _Combining:
         return Value(figure, figure, first.scale, power=first.power)
 
     def stands(self, row: str) -> bool:
-        """Whether a row stands at an event; a sum has no events."""
+        """Whether a row is at an event; a sum is at none."""
         return row in self.rows and bool(self.rows[row].event)
 
     def least(self, member: int, part: Objective) -> str:
-        """Variable that is no less than what a member seeks, with the limits that say so."""
+        """Variable that bounds a member's objective from above, with the limits for this bound."""
         name = of_member(f"most {part.figure}", member)
         self.extra.append(Variable(name, -math.inf, math.inf, part.scale, (0.0, 2 * part.scale)))
         self.measured[name] = member, self.programs[member].objectives[self.place(part)]
@@ -570,18 +570,18 @@ class _Combining:
         return name
 
     def place(self, objective: Objective) -> int:
-        """Place of a level among the members' own."""
+        """Index of a level of the family among the levels of a member."""
         return next(k for k, level in enumerate(self.first.objectives) if level.figure == objective.figure)
 
     @property
     def signed(self) -> frozenset[str]:
-        """Quantities of the whole of which the largest value counts."""
+        """Quantities of the family whose largest value counts, not the largest magnitude."""
         return frozenset(name for name, quantity in self.quantities.items() if quantity.signed)
 
     # The program.
 
     def family(self) -> Family:
-        """Whole, and each member's share of it."""
+        """Program of the family, and the part of each member."""
         limits, objectives = self.limits(), self.objectives()
         places = range(len(self.variables))
         variables = {
@@ -614,7 +614,7 @@ class _Combining:
         return Family(replace(whole, starts=self.starts(whole)), parts)
 
     def part(self, member: int) -> MemberShare:
-        """Member's share."""
+        """Part of a member in the family."""
         limits = {limit.name: self.limit(member, limit).name for limit in self.programs[member].limits}
         return MemberShare(
             self.programs[member],
@@ -623,7 +623,7 @@ class _Combining:
         )
 
     def starts(self, whole: Program) -> tuple[dict[str, float], ...]:
-        """Members' own starts: those of one place together, what is shared from each member in turn."""
+        """Starts of the family: the members' k-th starts combined, with the shared variables of each member in turn."""
         starts: list[dict[str, float]] = []
         for place in range(max(len(program.starts) for program in self.programs)):
             group = [program.starts[min(place, len(program.starts) - 1)] for program in self.programs]
@@ -638,7 +638,7 @@ class _Combining:
         return tuple(starts)
 
     def moves(self) -> list[Move]:
-        """Members' moves, those along shared variables once, with what all members wish."""
+        """Moves of the members; a move along shared variables occurs once, with the preferences of all members."""
         moves: dict[Hashable, Move] = {}
         for k, program in enumerate(self.programs):
             for move in program.moves:
@@ -658,7 +658,7 @@ class _Combining:
 def _followed(
     parts: Sequence[MemberShare], measured: Mapping[str, tuple[int, Objective]], model: JobModel, values: Numbers
 ) -> dict[str, float]:
-    """Variables that follow from the others: the members' own, and what is no less than what they seek."""
+    """Variables that follow from the others: those of the members, and the bounds of their objectives."""
     variables: dict[str, float] = {}
     for part in parts:
         results = part.program.follow(part.program.model, {**part.program.parameters, **part.member_values(values)})

@@ -1,7 +1,6 @@
 """One model for every job: kinematics + effects + arcs + named quantities and rows, in every number system.
 
-Only this file groups effects by name and runs loads and checks, reads their switches, and eliminates states, where
-there are any.
+Only this file groups effects by name, runs loads and checks, reads their switches and eliminates states.
 """
 
 import functools
@@ -41,9 +40,9 @@ from loomopt.physics.schema import Values
 
 
 class Instant:
-    """The mechanism with its effects at one node, in one number system; what no formula reads is not computed.
+    """The mechanism with its effects at one node, in one number system; values are computed when they are read.
 
-    event: where it stands at an event of the motion, whose pose is exact.
+    event: name of the event of the motion at this node, if any; its pose is exact.
     """
 
     def __init__(self, model: "JobModel", maths: Maths, given: Given, node: Node, event: str = "") -> None:
@@ -111,11 +110,11 @@ Formula = Callable[[Instant], Number]
 
 
 class CycleQuantity(NamedTuple):
-    """A whole-cycle quantity; figure: whether its largest |value| is one.
+    """Whole-cycle quantity; figure: whether its largest |value| is a figure.
 
     signed: the largest value counts, not the largest |value|; bounded: its formula runs on series of balls, so that a
-    bound between points is proven with every answer; loaded: it reads the sum of the loads, so that it is known only
-    where all of them are. square: the quantity that is its square, where it has a corner itself, at 0.
+    bound between points is proven with every answer; loaded: it depends on the sum of the loads, so that it is known
+    only if all of them are. square: name of its square, if the quantity itself has a corner at 0.
     """
 
     formula: Formula
@@ -127,7 +126,7 @@ class CycleQuantity(NamedTuple):
 
 
 class DesignRow(NamedTuple):
-    """A value of the design alone, or of the position at an event; needs: scene numbers without which there is none."""
+    """Value of the design alone, or of the position at an event; needs: scene numbers that it requires."""
 
     formula: Formula
     needs: tuple[str, ...] = ()
@@ -139,10 +138,10 @@ class DesignRow(NamedTuple):
 
 
 class Integral(NamedTuple):
-    """A mean of `quantity` over the crank angle; root: its square root.
+    """Mean of `quantity` over the crank angle; root: name of its square root.
 
-    Over the pieces `where`; or, with `angles` (rad), over these alone, each with one number of `data` as the switch
-    "datum". parts: of each piece, where one rule does not resolve what rings on it.
+    The mean is over the pieces `where`, or with `angles` (rad) over these only, each with one number of `data` as the
+    switch "datum". parts: number of parts of each piece, more than 1 if oscillations need them.
     """
 
     name: str
@@ -228,7 +227,7 @@ FRAME = "frame"
 
 
 def joint_quantities(check: Check[Any], known: Collection[str]) -> dict[str, CycleQuantity]:
-    """Values that a check reads of the forces in the joints; known: names of scene numbers that are given."""
+    """Quantities of a check that reads the forces in the joints; known: names of given scene numbers."""
     quantities: dict[str, CycleQuantity] = {}
     lacked = lacking(check, known)
     for name in (name for name in check.vectors if name not in lacked):
@@ -267,7 +266,7 @@ def check_row(check: Check[Any], name: str, at: Instant) -> Number:
 
 
 class Cornered(NamedTuple):
-    """A switch: the angles, rad, of its corners, what reads it between them, and those that part the cycle."""
+    """Switch: the angles, rad, of its corners, its value between them, and the corners that divide the cycle."""
 
     angles: tuple[Number, ...]
     switch: Callable[[float, tuple[float, ...]], float]
@@ -291,7 +290,7 @@ def cornered(model: "JobModel", maths: Maths, given: Given) -> list[Cornered]:
 
 
 def with_states_eliminated(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], given: Given) -> Given:
-    """Scene's numbers with what follows from them for each state."""
+    """Numbers of a scene with the derived values of each state."""
     for state in (load for load in loads if isinstance(load, State)):
         moving = carried_by(maths, kinematics, loads, given, state)
         derived = state.derived(given.inputs(maths, state), moving)
@@ -333,7 +332,7 @@ def state_value(state: State, formula: Callable[[StateInstant], Number], sign: i
 
 
 def state_quantities(states: Sequence[State]) -> dict[str, CycleQuantity]:
-    """Whole-cycle quantities of states; a least value is stored as its opposite, which is no figure."""
+    """Whole-cycle quantities of states; a least value is stored with the opposite sign and is not a figure."""
     return {
         name: CycleQuantity(
             functools.partial(state_value, state, peak.read, -1 if peak.least else 1),
@@ -367,11 +366,11 @@ Stills = Mapping[str, Values]
 
 @dataclass(frozen=True, eq=False)
 class JobModel:
-    """A mechanism with the effects a scene calls for.
+    """A mechanism with the effects of a scene.
 
     effects: loads, states and checks, in the order of the job. words: (effect, key, word) for values that choose a
-    formula. quantities, rows: the job's own; those of checks come with them. assembly: what says that the mechanism
-    assembles at an angle beside its kinematics' groups: phrase → (quantity, the largest |value| it may have).
+    formula. quantities, rows: those of the job; those of checks are added. assembly: conditions of assembly
+    in addition to the groups of the kinematics: phrase → (quantity, largest permitted |value|).
     known: names of scene numbers that are given.
     """
 
@@ -401,12 +400,12 @@ class JobModel:
 
     @lazy
     def states(self) -> tuple[State, ...]:
-        """Loads that have a coordinate of their own."""
+        """Loads with a coordinate of their own."""
         return tuple(load for load in self.loads if isinstance(load, State))
 
     @lazy
     def checks(self) -> tuple[Check[Any], ...]:
-        """Effects that take no part in the balance."""
+        """Effects that do not act in the balance."""
         return tuple(effect for effect in self.effects if isinstance(effect, Check))
 
     @lazy
@@ -416,7 +415,7 @@ class JobModel:
 
     @lazy
     def labels(self) -> dict[str, str]:
-        """Full name of every number of the effects' tables → what a designer calls it."""
+        """Full name of every number of the effects' tables → name for the designer."""
         return {owned(effect, key): label(effect, key) for effect in self.effects for key in keys(effect.table)}
 
     @lazy
@@ -439,7 +438,7 @@ class JobModel:
         return self.known_in if self._quantities[name].loaded else ()
 
     def counted(self, cycle: Cycle, name: str, where: Where | None = None) -> NDArray[np.bool_]:
-        """Whether a quantity is known and counts, by piece of a cycle; where: the pieces to look at."""
+        """Whether a quantity is known and counts, by piece of a cycle; where: the pieces that count."""
         known, requested = [cycle.on(place) for place in self.known_of(name)], cycle.on(where)
         return requested & np.any(known, axis=0) if known else requested
 
@@ -478,7 +477,7 @@ class JobModel:
 
     @lazy
     def events_read(self) -> tuple[str, ...]:
-        """Events at which rows stand."""
+        """Events of the rows."""
         return tuple(dict.fromkeys(row.event for row in self._rows.values() if row.event))
 
     @property
@@ -493,16 +492,16 @@ class JobModel:
 
     @lazy
     def signed(self) -> frozenset[str]:
-        """Whole-cycle quantities of which the largest value counts, not the largest |value|."""
+        """Whole-cycle quantities whose largest value counts, not the largest |value|."""
         return frozenset(name for name, quantity in self._quantities.items() if quantity.signed)
 
     @lazy
     def bounded(self) -> frozenset[str]:
-        """Whole-cycle quantities whose formulas run on series of balls too: a bound between points is proven."""
+        """Whole-cycle quantities that run on series of balls, so that bounds between points are proven."""
         return frozenset(name for name, quantity in self._quantities.items() if quantity.bounded)
 
     def square(self, name: str) -> str:
-        """Quantity that is the square of one which has a corner at 0; "" where there is no need of it."""
+        """Name of the square of a quantity with a corner at 0; "" for any other quantity."""
         return self._quantities[name].square
 
     def has_quantity(self, name: str) -> bool:
@@ -525,7 +524,7 @@ class JobModel:
         return name in {*self._rows, *means, *turned}
 
     def event_of(self, name: str) -> str:
-        """Event that a row stands at; "" for one of the design alone."""
+        """Event of a row; "" for a row of the design alone."""
         return self._rows[name].event
 
     @lazy
@@ -557,7 +556,7 @@ class JobModel:
 
     @lazy
     def worked(self) -> dict[str, str]:
-        """Figures of checks that are mean powers, each with the quantity, J/rad, that it is of."""
+        """Figures of checks that are mean powers → the quantity, J/rad, whose mean they are."""
         checks = [(check, lacking(check, self.known)) for check in self.checks]
         return {name: work for check, lacked in checks for name, work in check.worked.items() if name not in lacked}
 
@@ -645,7 +644,7 @@ class JobModel:
 
     @lazy
     def formula_switches(self) -> frozenset[str]:
-        """Switches whose change changes a formula, not only what limits speak of."""
+        """Switches that select a formula; the others only select the limits that apply."""
         arcs = {arc.name for arc in self.arcs}
         return frozenset(name for name in self.switches if name not in arcs)
 
@@ -819,9 +818,9 @@ Word = tuple[str, str, str]
 
 
 def with_words_fixed(model: JobModel, values: Mapping[str, float]) -> JobModel:
-    """Model as its states need it at a design (SI); itself where it serves that already.
+    """Model that is valid for the states of a design (SI); the same object if it is valid already.
 
-    Raises UnsteadyError where there is no steady state to trust.
+    Raises UnsteadyError if there is no reliable steady state.
     """
     if not model.states:
         return model
@@ -864,6 +863,6 @@ def _made(model: JobModel, words: tuple[Word, ...], integrals: tuple[Integral, .
 
 
 def _with(model: JobModel, words: tuple[Word, ...], parts: tuple[int, ...]) -> JobModel:
-    """Model with these words, and means in these parts; itself where it has them."""
+    """Model with these words and parts of means; the same object if it has them already."""
     cut = tuple(mean._replace(parts=n) for mean, n in zip(model.integrals, parts, strict=False)) or model.integrals
     return model if (words, cut) == (model.words, model.integrals) else _made(model, words, cut)

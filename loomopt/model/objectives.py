@@ -1,7 +1,7 @@
-"""Objectives of a design task, one level of a target each: every kind is a class that says what a design is worth.
+"""Objectives of a design task: each is one level of a target, and each kind is a class.
 
-An objective is the largest of smooth functions of the design: rows with a sign, or the extremes of quantities over the
-cycle. What solves and proves asks for these alone: a new kind is a class of its own.
+An objective is the maximum of smooth functions of the design: rows with a sign, or the extremes of quantities over the
+cycle. Solver and proofs use only these functions, so that a new kind needs only a new class.
 """
 
 import abc
@@ -25,7 +25,7 @@ Sought = Literal["least", "least magnitude", "most"]
 
 
 class Piece(NamedTuple):
-    """A smooth function that an objective is made of: sign · row, or sign · quantity at a node; value: SI."""
+    """Smooth function of an objective: sign · row, or sign · quantity at a node; value: SI."""
 
     row: str
     value: float
@@ -37,8 +37,8 @@ class Piece(NamedTuple):
 class Objective(abc.ABC):
     """One level of a target, which is minimised.
 
-    figure: name for the designer; row: name of the row; scale: scale of the row, SI; power: the figure's
-    power that the row is.
+    figure: name for the designer; row: name of the row; scale: scale of the row, SI; power: power of the figure
+    that the row equals.
     """
 
     figure: str
@@ -71,12 +71,12 @@ class Objective(abc.ABC):
 
     @property
     def structure(self) -> Hashable:
-        """What the built NLP depends on: everything but the numbers."""
+        """Key of the built NLP: all but the numbers."""
         return type(self).__name__, self.rows
 
     @property
     def sought(self) -> Sought:
-        """End of the figure that is sought: the least or the most."""
+        """Sense of the optimisation: "least" or "most" of the figure."""
         return "least" if self.power > 0 else "most"
 
     def worth(self, rows: Rows) -> Number:
@@ -89,12 +89,12 @@ class Objective(abc.ABC):
         return float(self.worth(sampler.rows))
 
     def figure_of(self, sampler: Sampler) -> float:
-        """Figure of a design, SI: with its sign where it is a number of its own."""
+        """Figure of a design, SI, with its sign."""
         figure = sampler.figure(self.figure)
         return float(self.merit(sampler) ** (1 / self.power)) if figure is None else figure
 
     def worsening(self, now: float, then: float, most: bool) -> float:
-        """Amount by which the figure becomes worse from now to then, SI; most: whether the most of it is sought."""
+        """Amount by which the figure gets worse from `now` to `then`, SI; most: whether it is maximised."""
         return now - then if most else then - now
 
     def least_of(self, signed: Collection[str]) -> float:
@@ -102,7 +102,7 @@ class Objective(abc.ABC):
         return -math.inf if any(name in signed for name in self.quantities) else self.least
 
     def vanishes(self, sampler: Sampler) -> bool:
-        """Whether a design has the value 0, to the scale of the figure, and no design has less."""
+        """Whether the value of a design is 0, relative to the scale of the figure, and 0 is the least possible."""
         if self.least_of(sampler.model.signed) < 0.0 or self.power < 0:
             return False
         return abs(self.merit(sampler)) <= FEASIBLE**self.power * self.scale
@@ -116,7 +116,7 @@ class Objective(abc.ABC):
         return np.asarray(wide(self.worth(designs), designs.count))[None]
 
     def pieces(self, sampler: Sampler) -> list[Piece]:
-        """Smooth functions of which the objective is the largest at a design."""
+        """Smooth functions whose maximum is the objective, at a design."""
         smooth = [Piece(row, sign * sampler.single(row), sign) for row, sign in self.sides]
         return smooth + [Piece(row, e.height, e.sign, e) for row in self.quantities for e in sampler.extremes(row)]
 
@@ -126,7 +126,7 @@ class Objective(abc.ABC):
 
 
 class Value(Objective):
-    """The least of one row of the design."""
+    """Minimum of one row of the design."""
 
     is_smooth = True
 
@@ -146,7 +146,7 @@ class Value(Objective):
 
 @dataclass(frozen=True)
 class Worst(Objective):
-    """The least of the worst of several rows of the design; others: the rows beside the first."""
+    """Minimum of the largest of several rows of the design; others: the rows after the first."""
 
     others: tuple[str, ...]
 
@@ -166,7 +166,7 @@ class Worst(Objective):
 
 
 class Magnitude(Objective):
-    """The least magnitude of one row of the design."""
+    """Minimum of the magnitude of one row of the design."""
 
     is_magnitude, least = True, 0.0
 
@@ -177,7 +177,7 @@ class Magnitude(Objective):
 
     @property
     def sought(self) -> Sought:
-        """Its least magnitude."""
+        """Sense of the optimisation: "least magnitude"."""
         return "least magnitude"
 
     def worth(self, rows: Rows) -> Number:
@@ -185,7 +185,7 @@ class Magnitude(Objective):
         return abs(rows.single(self.row))
 
     def worsening(self, now: float, then: float, most: bool) -> float:
-        """Amount by which the magnitude grows from now to then, SI."""
+        """Amount by which the magnitude grows from `now` to `then`, SI."""
         return abs(then) - abs(now)
 
     def least_within(self, lower: Mapping[str, float]) -> float:
@@ -193,7 +193,7 @@ class Magnitude(Objective):
         return 0.0
 
     def pieces(self, sampler: Sampler) -> list[Piece]:
-        """Row with its own sign; with both where it vanishes."""
+        """Row with the sign of its value; with both signs if it is 0."""
         value = sampler.single(self.row)
         signs = (1.0, -1.0) if abs(value) <= FEASIBLE * self.scale else (float(np.sign(value)),)
         return [Piece(self.row, abs(value), sign) for sign in signs]
@@ -204,7 +204,7 @@ class Magnitude(Objective):
 
 
 class Peak(Objective):
-    """The least peak of |quantity| over the cycle (of a signed quantity, of the quantity)."""
+    """Minimum of the peak of |quantity| over the cycle, or of the quantity itself if it is signed."""
 
     least = 0.0
 
@@ -214,11 +214,11 @@ class Peak(Objective):
         return (self.row,)
 
     def figure_of(self, sampler: Sampler) -> float:
-        """Figure of a design, SI: of the peak itself."""
+        """Peak of a design, SI."""
         return float(self.merit(sampler) ** (1 / self.power))
 
     def watched(self, designs: BatchReading) -> Floats:
-        """Quantity at the nodes looked at, SI, (nodes, designs)."""
+        """Quantity at the sampled nodes, SI, (nodes, designs)."""
         return np.asarray(designs.looked(self.row))
 
     def limits(self, name: str, most: float) -> list[Limit]:
@@ -227,5 +227,5 @@ class Peak(Objective):
 
 
 def opposite(row: str) -> str:
-    """Name of a row's opposite: its minimum is the row's maximum."""
+    """Name of the negative of a row, whose minimum is the maximum of the row."""
     return f"-{row}"

@@ -1,6 +1,6 @@
-"""Cursor on the raw tables of a scene: a value, the key under which it stands, and the list of mistakes.
+"""Cursor on the raw tables of a scene: a value, its key, and the list of mistakes.
 
-Whoever reads a table gets a cursor. A mistake is built here, so that every message names file and key in one way.
+Every reader of a table gets a cursor. Mistakes are built here, so that all messages name file and key in the same way.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -42,9 +42,9 @@ _LIMITS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at mos
 
 
 class Cursor(NamedTuple):
-    """A value of a file, and where it stands.
+    """Value in a file, and its place.
 
-    raw: the value as TOML or JSON gives it, None where there is none; path: its dotted key, "" for the whole file;
+    raw: the value as TOML or JSON gives it, None if the key is missing; path: its dotted key, "" for the whole file;
     faults: the list of mistakes, which knows the name of the file.
     """
 
@@ -53,7 +53,7 @@ class Cursor(NamedTuple):
     faults: Faults
 
     def at(self, key: str | int) -> "Cursor":
-        """Cursor on an entry of the table, or of the list, whose places count from 1."""
+        """Cursor on an entry of the table, or of the list; list entries count from 1."""
         path = f"{self.path}.{key}" if self.path else str(key)
         raw = self.raw
         if isinstance(key, int):
@@ -67,7 +67,7 @@ class Cursor(NamedTuple):
         return {key: Cursor(value, f"{start}{key}", self.faults) for key, value in inner.items()}
 
     def apart(self) -> "Cursor":
-        """The same place with an empty list of mistakes, for a reader that raises its mistakes all at once."""
+        """Same place with an empty list of mistakes, for a reader that raises its mistakes together."""
         return self._replace(faults=Faults(self.faults.file))
 
     @property
@@ -91,11 +91,11 @@ class Cursor(NamedTuple):
         remedy: str = "Correct the name or take it out",
         given: Collection[str] = (),
     ) -> BadInput:
-        """Mistake of a name that nothing has; sort: what the name stands for; the rest as in `errors.unknown`."""
+        """Mistake: unknown name; sort: kind of thing that is named; other arguments as in `errors.unknown`."""
         return errors.unknown(sort, name, known, self.faults.file, self.path, remedy, given)
 
     def missing(self, model: type[BaseModel], key: str, reason: str = "") -> BadInput:
-        """Mistake of a table that lacks a key; reason: what needs the key."""
+        """Mistake: missing key of a table; reason: job or effect that needs the key."""
         quantity = quantity_of(model, key)
         allowed = described(quantity.kind) if quantity else "text"
         problem = f"{key} is missing{': ' if reason else ''}{reason}"
@@ -117,19 +117,19 @@ class Cursor(NamedTuple):
             raise errors.misread(error, self.faults.file, self.path, self.raw) from None
 
     def word(self, known: Collection[str], sort: str) -> str:
-        """The value as one of the known words; sort: what they are. Raises BadInput."""
+        """The value as one of the known words; sort: kind of thing that is named. Raises BadInput."""
         if not isinstance(self.raw, str) or self.raw not in known:
             raise self.unknown(sort, self.raw if isinstance(self.raw, str) else shown(self.raw), known)
         return self.raw
 
     def check_keys(self, keys: Collection[str], known: Collection[str], sort: str = "key") -> None:
-        """Add a mistake for every key that is not known; sort: what the keys stand for."""
+        """Add a mistake for every unknown key; sort: kind of thing that the keys name."""
         for key in keys:
             if key not in known:
                 self.faults.add(self.at(key).unknown(sort, key, known, given=keys))
 
     def subtables(self, known: Collection[str], sort: str) -> dict[str, "Cursor"]:
-        """Tables inside the table; an unknown name stands for the known one that is near and not there."""
+        """Tables inside the table; an unknown name is read as the similar known name that is missing."""
         with self.faults:
             given = self.table()
             self.check_keys(given, known, sort)
@@ -138,9 +138,9 @@ class Cursor(NamedTuple):
         return {}
 
     def record(self, model: type[_Model]) -> _Model:
-        """Table as its model, with NaN for what cannot be read.
+        """Table as its model, with NaN for values that cannot be read.
 
-        An unknown key stands for the missing one of a near name: that is one mistake, not two.
+        An unknown key is read as the missing key of a similar name: this is one mistake, not two.
         """
         fields = model.model_fields
         try:
@@ -182,7 +182,7 @@ class Cursor(NamedTuple):
 
 
 def _readable(values: Mapping[str, Any], model: type[_Model]) -> _Model:
-    """Record of values that can be read, whatever else the model requires."""
+    """Record of the values that can be read; the other requirements of the model are not checked."""
     try:
         return model.model_validate(values)
     except ValidationError:
@@ -190,7 +190,7 @@ def _readable(values: Mapping[str, Any], model: type[_Model]) -> _Model:
 
 
 def _limits(model: type[BaseModel], names: list[str]) -> str:
-    """Limits of a field in words; "" where it has none."""
+    """Limits of a field in words; "" without limits."""
     field = model.model_fields.get(names[0]) if len(names) == 1 else None
     if field is None:
         return ""

@@ -1,6 +1,6 @@
 """Schema of the scenes of a job, and the check of a scene's tables against it.
 
-A reader adds mistakes to the cursor's list and returns what can be read all the same.
+A reader adds mistakes to the list of its cursor and returns the values that can be read.
 """
 
 import re
@@ -96,10 +96,10 @@ _TAKEN = {"con", "prn", "aux", "nul", *(f"{port}{digit}" for port in ("com", "lp
 
 
 class JobNames(Protocol):
-    """The jobs that there are, by name."""
+    """Known jobs, by name."""
 
     def __contains__(self, name: object, /) -> bool:
-        """Whether there is a job of a name."""
+        """Whether a job of this name exists."""
 
     def names(self) -> Collection[str]:
         """Names of all jobs."""
@@ -115,7 +115,7 @@ class Problem(Table):
 
 
 class Bound(NamedTuple):
-    """Range of a number that may vary, SI; equal ends fix it; not free: held at today's; unit: as written."""
+    """Range of a number, SI; equal ends fix it; free: false fixes it at today's value; unit: as written."""
 
     min: float
     max: float
@@ -124,7 +124,7 @@ class Bound(NamedTuple):
 
 
 class LimitRange(NamedTuple):
-    """Range in which a figure is kept, SI; None: that side is open; unit: as written."""
+    """Limits of a figure, SI; None: no limit on this side; unit: as written."""
 
     min: float | None
     max: float | None
@@ -132,9 +132,9 @@ class LimitRange(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Place of a number: table and key; its designer's name; its quantity.
+    """Place of a number: table and key; name for the designer; quantity.
 
-    given: whether the scene has a value for it; waits: whether the values of its effect, which is off, are at hand.
+    given: whether the scene has a value; waits: whether the effect is off and has values in [available].
     """
 
     table: str
@@ -148,8 +148,8 @@ class Place(NamedTuple):
 def problem(cursor: Cursor, jobs: JobNames) -> Problem:
     """Table [problem], its name fit for a file name and its job one of `jobs`.
 
-    An unknown job stands for the one of a near name, so that the other tables are checked too. Raises BadInput where no
-    name is near.
+    An unknown job is read as the job of a similar name, so that the other tables are checked too. Raises BadInput if no
+    name is similar.
     """
     faults, read = cursor.faults, cursor.record(Problem)
     if not isinstance(read.job, str):
@@ -168,13 +168,13 @@ def problem(cursor: Cursor, jobs: JobNames) -> Problem:
 
 
 def records(cursor: Cursor, models: Mapping[str, type[Table]], sort: str) -> dict[str, Table]:
-    """Tables inside a table, in the order of `models`; sort: what their names stand for."""
+    """Tables inside a table, in the order of `models`; sort: kind of thing that they name."""
     inner = cursor.subtables(models, sort)
     return {name: inner[name].record(model) for name, model in models.items() if name in inner}
 
 
 def effects(cursor: Cursor, schema: SceneSchema) -> dict[Effect, Table]:
-    """Effects whose tables stand in [effects] or [available], in the order of the job, with their values."""
+    """Effects with a table in [effects] or [available], in the order of the job, with their values."""
     inner = cursor.subtables(schema.effects, "effect")
     read: dict[Effect, Table] = {}
     for name, effect in schema.effects.items():
@@ -200,7 +200,7 @@ def effects(cursor: Cursor, schema: SceneSchema) -> dict[Effect, Table]:
 
 
 def _effect(effect: Effect, cursor: Cursor) -> Table:
-    """Table of an effect; one that may be given as a curve has either the curve or the numbers in its place."""
+    """Table of an effect; an effect that may be a curve has either the curve or the numbers that it replaces."""
     read = cursor.record(effect.table)
     curve = effect.tabulated if isinstance(effect, Load) else None
     if curve is None:
@@ -256,7 +256,7 @@ def check_needs(
 
 
 def _check_model(cursor: Cursor, effect: Effect, table: Table) -> None:
-    """Add a mistake where an effect lacks a number of its model, or has one of another model."""
+    """Add a mistake if an effect lacks a number of its model, or has a number of another model."""
     model = model_of(effect, table)
     for key in model.keys:
         if getattr(table, key) is None:
@@ -297,7 +297,7 @@ def _places(path: str, model: type[Table], table: Table | None) -> Iterator[Plac
 
 
 def value_of(table: Table, key: str) -> object:
-    """A value of a table; of one inside it by "table.key"; None where it is not given."""
+    """Value of a table, or of a table inside it by "table.key"; None if it is not given."""
     value: object = table
     for name in key.split("."):
         value = getattr(value, name, None)
@@ -305,10 +305,10 @@ def value_of(table: Table, key: str) -> object:
 
 
 def flat(raw: Mapping[str, Any], known: Iterable[str]) -> dict[str, Any]:
-    """A table whose keys are labels, which TOML parts at their dots: [bounds.rod] m is "rod.m".
+    """Table whose keys are labels, which TOML splits at their dots: [bounds.rod] m has the label "rod.m".
 
-    Beside what is of a label itself may stand what is of longer ones: mass.max, and mass.rod.mass.max. A key beside
-    known ones that begin alike is one too: of rod.m a slip is rod.n, not rod.
+    Entries of a label and of longer labels may be in the same table: mass.max, and mass.rod.mass.max. An unknown key
+    next to known labels with the same beginning is a label too: rod.n next to rod.m is a mistake of rod.n, not of rod.
     """
     names, entries = set(known), dict[str, Any]()
     begun = {name[:place] for name in names if "." in name for place, sign in enumerate(name) if sign == "."}
@@ -319,16 +319,16 @@ def flat(raw: Mapping[str, Any], known: Iterable[str]) -> dict[str, Any]:
 
 
 def _merge(first: object, second: object) -> object:
-    """Union of two entries of one label where both are tables, else the later one."""
+    """Union of two entries of one label if both are tables, else the later one."""
     return {**first, **second} if isinstance(first, Mapping) and isinstance(second, Mapping) else second
 
 
 def _split_labels(
     name: str, value: object, known: Collection[str], begun: Collection[str]
 ) -> Iterator[tuple[str, Any]]:
-    """Yield what of a table's entry is of which label; the entry itself where no part of it is of a longer one.
+    """Yield each label in an entry of a table with its part of the entry.
 
-    begun: what stands before a dot of a known label.
+    begun: beginnings of the known labels, up to any of their dots.
     """
     if not isinstance(value, Mapping):
         yield name, value
@@ -343,12 +343,12 @@ def _split_labels(
 
 
 def label_entries(cursor: Cursor, known: Iterable[str]) -> dict[str, Cursor]:
-    """Entries of a table whose keys are labels: see `flat`; known: the labels. Raises BadInput."""
+    """Entries by label of a table as in `flat`; known: the known labels. Raises BadInput."""
     return cursor.entries(flat(cursor.table(), known))
 
 
 def bounds(cursor: Cursor, schema: SceneSchema, known: list[Place]) -> dict[str, Bound]:
-    """Table [bounds]; known: places of the scene's numbers, any of which may be bounded.
+    """Bounds by name from the table [bounds]; known: places of all numbers of the scene.
 
     The bound of a number of an effect that is off is checked and left out.
     """
@@ -374,7 +374,7 @@ def bounds(cursor: Cursor, schema: SceneSchema, known: list[Place]) -> dict[str,
 def number_or_waiting(
     cursor: Cursor, schema: SceneSchema, known: Sequence[Place], sort: str = "number to bound"
 ) -> tuple[Quantity, bool]:
-    """Quantity of the number of a label, and whether it counts: the number of an effect that is off does not.
+    """Quantity of the number of a label, and whether it counts: false for a number of an effect that is off.
 
     Raises BadInput.
     """
@@ -388,7 +388,7 @@ def number_or_waiting(
 def quantity_of_label(
     cursor: Cursor, schema: SceneSchema, known: Sequence[Place], sort: str = "number to bound"
 ) -> Quantity:
-    """Quantity of a design variable, or of the one number of that name; sort: what the label stands for.
+    """Quantity of a design variable or of the number of this label; sort: kind of thing for the message.
 
     Raises BadInput.
     """
@@ -434,7 +434,7 @@ def _bound(cursor: Cursor, quantity: Quantity) -> Bound:
 
 
 def limits(cursor: Cursor, schema: SceneSchema, active: Collection[Effect]) -> dict[str, LimitRange]:
-    """Table [limits]: figures of the job, and of the effects that are on."""
+    """Limits by figure from the table [limits]."""
     faults, inner = cursor.faults, dict[str, Cursor]()
     with faults:
         inner = label_entries(cursor, schema.figures)
@@ -461,7 +461,7 @@ def limits(cursor: Cursor, schema: SceneSchema, active: Collection[Effect]) -> d
 
 
 def _effect_figures(effect: Effect) -> Collection[str]:
-    """Figures that an effect gives by rows or over the cycle."""
+    """Figures of an effect."""
     if isinstance(effect, Check):
         return {*effect.over_cycle, *effect.rows}
     return effect.rows if isinstance(effect, Speed) else ()
@@ -487,7 +487,7 @@ def _limit(cursor: Cursor, figure: Figure) -> LimitRange:
 
 
 def _ends(cursor: Cursor, given: Iterable[str], quantity: Quantity) -> dict[str, float]:
-    """Ends of a range that are given, in order."""
+    """Given ends of a range, SI; adds a mistake if min is more than max."""
     ends = {}
     for end in given:
         with cursor.faults:

@@ -1,4 +1,4 @@
-"""From a beat-up scene and a target to the program: variables, limits, objectives and their scales."""
+"""Program of a beat-up scene and a target: variables, limits, objectives and their scales."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -34,19 +34,19 @@ AMPLE, LONG = 10.0, 3.0
 
 
 def counterweight_holding(reed: float, front: float, resistance: float) -> float:
-    """Inertia, kg·m², that holds the resistance at front dead centre, turning as the reed does today.
+    """Inertia, kg·m², that balances the resistance at front dead centre with today's acceleration of the reed.
 
-    reed: today's inertia, kg·m²; front: today's reed torque there with the resistance, N·m; resistance: N·m. From
-    M3 = M0 − J ψ'' ω² [Yuan24, eq 2], in proportion.
+    reed: today's inertia, kg·m²; front: today's reed torque at front dead centre, N·m; resistance: N·m. It follows
+    from M3 = M0 − J ψ'' ω² [Yuan24, eq 2].
     """
     return reed * abs(resistance / (front - resistance)) if front != resistance else 0.0
 
 
 def counterweight_room(known: Mapping[str, float], bounds: Mapping[str, Ends], inertia: float) -> dict[str, Ends]:
-    """Bounds of mass, kg, and radius, m, as far as they are of use: generous ones say nothing of a machine.
+    """Bounds of mass, kg, and radius, m, of the counterweight, reduced to a useful range for scales and starts.
 
-    known: today's m4e, r4e and l4; inertia: of the reed or of what holds the resistance, kg·m²; 0 where there is none
-    to compare with, and the bounds stay as they are.
+    known: today's m4e, r4e and l4; inertia: that of the reed, or the one that balances the resistance, kg·m²; 0 if
+    there is none to compare with: the bounds are then not reduced.
     """
     room, ample = {name: bounds[name] for name in COUNTERWEIGHT}, AMPLE * inertia
     if room["m4e"][1] * room["r4e"][1] ** 2 > ample > 0.0:
@@ -67,15 +67,15 @@ MASKED = 1e-3
 
 
 def resisted(scene: Scene) -> Where:
-    """Pieces of the cycle in which the cloth resists; of a curve those where it is not 0 all over."""
+    """Pieces of the cycle in which the cloth resists; for a curve those in which it is not 0 everywhere."""
     curve = next((pulse for (name, _), pulse in curves(scene).items() if name == RESISTED[0]), None)
     return RESISTED if curve is None else (RESISTED[0], curve.acting)
 
 
 def model(scene: Scene, known: Numbers, design: Numbers | None = None, changes: bool = False) -> JobModel:
-    """Mechanism with the effects the scene calls for, as its states need it. Raises BadInput.
+    """Mechanism with the effects of the scene, prepared for its states. Raises BadInput.
 
-    known: the scene's numbers; design: what is not today's; changes: whether the change from today is read.
+    known: numbers of the scene; design: numbers that differ from today's; changes: whether the change is read.
     """
     changing = tuple(VARIABLES) if changes else ()
     physics = beatup.model(scene.active, words(scene), frozenset(known), resisted(scene), changing)
@@ -84,18 +84,18 @@ def model(scene: Scene, known: Numbers, design: Numbers | None = None, changes: 
 
 @final
 class BeatupTask(Task):
-    """The crank-rocker with its counterweight: s = m4e r4e² is a variable where mass and radius do not matter apart."""
+    """Task of the crank-rocker; s = m4e r4e² is a variable if only this product of mass and radius counts."""
 
     read_from = Frozen(mu_min=("mu_near", "mu_far"))
 
     @lazy
     def known(self) -> dict[str, float]:
-        """Every number of the scene, today's lengths also as today.*."""
+        """Every number of the scene; today's lengths also with the names today.*."""
         return numbers(self.scene) | {today(name): self.scene.mechanism[name] for name in LENGTHS}
 
     @lazy
     def model(self) -> JobModel:
-        """The mechanism, with the change from today where that is sought."""
+        """The mechanism, with the change from today if the target or an axis needs it."""
         return model(self.scene, self.known, changes=self.changes)
 
     @property
@@ -105,12 +105,12 @@ class BeatupTask(Task):
 
     @property
     def trades_balance(self) -> bool:
-        """Whether the reed torque at front dead centre is an axis, and what the target asks of it falls away."""
+        """Whether the reed torque at front dead centre is an axis; the target's demand on it then does not apply."""
         return "M3_fdc" in self.traded
 
     @lazy
     def direct(self) -> bool:
-        """Whether m4e and r4e matter apart from s = m4e r4e², or leave no room for s."""
+        """Whether m4e and r4e are variables themselves, because more than s = m4e r4e² counts or s has no range."""
         names = {*self.scene.limits, *self.traded}
         read = self.changes or bool(names & {"r4", *COUNTERWEIGHT})
         for effect in self.scene.active:
@@ -134,17 +134,17 @@ class BeatupTask(Task):
         )
 
     def scale(self, name: str, ends: Ends) -> float:
-        """Size of a variable: its kind's, or its own largest value that is of use."""
+        """Scale of a variable: the frame for lengths, else its largest useful value."""
         if name in LENGTHS:
             return self.length
         return max(abs(self.known[name]), *map(abs, self.room(name, ends))) or self.length
 
     def room(self, name: str, ends: Ends) -> Ends:
-        """Range of the random starts: where a counterweight is of use."""
+        """Range of the random starts: the useful range of the counterweight."""
         return self.counterweight.get(name, ends)
 
     def parameters(self) -> dict[str, float]:
-        """Every known number that is no variable; m4e follows from s where that is one."""
+        """Every known number that is not a variable; m4e follows from s if s is a variable."""
         taken = {variable.name for variable in self.variables} | {"m4e"}
         values = {name: value for name, value in self.known.items() if name not in taken}
         if not self.changes:
@@ -155,7 +155,7 @@ class BeatupTask(Task):
     # Limits.
 
     def bounds(self) -> list[Limit]:
-        """Bounds of variables; the mass's as limits on s against r4e² where that is a variable."""
+        """Bounds of the variables; if s is a variable, bounds of the mass are limits on the ratio of s and r4e²."""
         limits = [limit for v in self.variables if v.called in self.scene.bounds for limit in bound_limits(v, False)]
         if self.direct:
             return limits
@@ -195,8 +195,8 @@ class BeatupTask(Task):
     def starts(self) -> tuple[dict[str, float], ...]:
         """Today's machine moved just inside its bounds, with a good part of the counterweight in use.
 
-        Never today's own m4e = r4e = 0 alone, where a gradient sees no way to use a counterweight. Where mass and
-        radius matter by themselves, little and much of it are optima of their own: then there is a second start.
+        Never only today's m4e = r4e = 0, where the gradient with respect to a counterweight is zero. If mass and radius
+        count themselves, a light and a heavy counterweight may be separate optima: then there is a second start.
         """
         first = self.inside({v.name: self.known.get(v.name, 0.0) for v in self.variables})
 
@@ -208,7 +208,7 @@ class BeatupTask(Task):
         return distinct([using(USED), *([first] if retrofit else [using(MUCH)] if self.direct else [])])
 
     def moves(self) -> list[Move]:
-        """Directions that may leave every figure unchanged: the counterweight's, then a common scale."""
+        """Directions in which all figures may be constant: the counterweight's mass and radius, a common scale."""
         names = {variable.name for variable in self.variables}
         used, above = ("s", NO_MASS * self.most) if "s" in names else ("m4e", 0.0)
         wishes = {
@@ -223,7 +223,7 @@ class BeatupTask(Task):
         return [*moves, self.scale_move("scale", LENGTHS), *self.axis_moves()]
 
     def added(self) -> Added | None:
-        """Counterweight: by its mass, or by s, which is least where that is at the largest radius."""
+        """Added mass, which must pay: the counterweight, by its mass or by s."""
         table = self.scene.targets[self.target] if self.target else None
         if not isinstance(table, BeatupTarget) or self.limited["m4e"][1] == 0.0:
             return None
@@ -242,12 +242,12 @@ class BeatupTask(Task):
 
     @property
     def length(self) -> float:
-        """The frame's, m."""
+        """Length of the frame, m: scale of lengths."""
         return self.known["l4"]
 
     @lazy
     def resistance(self) -> float:
-        """The cloth's, N·m."""
+        """Resistance of the cloth, N·m."""
         curve = next((pulse for (name, _), pulse in curves(self.scene).items() if name == RESISTED[0]), None)
         if curve is not None:
             return curve.largest
@@ -260,7 +260,7 @@ class BeatupTask(Task):
 
     @lazy
     def reed(self) -> float:
-        """Inertia of the reed without a counterweight, kg·m²: the largest that a load reads s for."""
+        """Inertia of the reed without a counterweight, kg·m²."""
         given = self.sampler.given
         bare = given._replace(values={**given.values, "s": 0.0})
         loads = [load for load in self.sampler.model.loads if isinstance(load, Load) and "s" in load.reads]
@@ -268,18 +268,18 @@ class BeatupTask(Task):
 
     @lazy
     def counterweight(self) -> dict[str, Ends]:
-        """Bounds of mass and radius, as far as they are of use."""
+        """Useful bounds of mass and radius of the counterweight."""
         holding = counterweight_holding(self.reed, self.front, self.resistance)
         return counterweight_room(self.known, self.limited, max(self.reed, holding))
 
     @lazy
     def most(self) -> float:
-        """The largest inertia of a counterweight that is of use, kg·m²."""
+        """Largest useful inertia of a counterweight, kg·m²."""
         return self.counterweight["m4e"][1] * self.counterweight["r4e"][1] ** 2
 
     @lazy
     def inertia(self) -> float:
-        """Of the reed, or of the counterweight, kg·m²."""
+        """Scale of inertias, kg·m²: that of the reed or of the counterweight, whichever is larger."""
         return max(self.reed, self.most) or 1.0
 
     @lazy
@@ -294,11 +294,11 @@ class BeatupTask(Task):
 
     @lazy
     def mean_square(self) -> float:
-        """Of the reed torque over the pulse, (N·m)²."""
+        """Scale of the mean square of the reed torque over the pulse, (N·m)²."""
         return self.torque * max(self.torque, self.resistance)
 
     def figure_size(self, name: str) -> float:
-        """Size of a figure."""
+        """Scale of a figure."""
         if name == TORQUE:
             return self.peak
         if self.sampler.model.has_quantity(name):
@@ -308,7 +308,7 @@ class BeatupTask(Task):
         return fixed.get(kind) or size_read(self.sampler, name, self.scene.schema.figures)
 
     def size(self, axis: str) -> float:
-        """Size of what of an axis is sought the least of."""
+        """Scale of an axis of a front."""
         if axis not in self.scene.schema.figures:
             return next(v.scale for v in self.variables if axis in (v.name, v.called))
         return {"change": 1.0, "pulse_rms": self.mean_square}.get(axis) or self.figure_size(axis)
@@ -318,7 +318,7 @@ class BeatupTask(Task):
 
 
 class Band(NamedTuple):
-    """Balance of a member: κ = M0/ω², kg·m², and its inertia with the least and the most counterweight, kg·m².
+    """Balance of a member: kappa = M0/ω², kg·m²; least, most: inertia without and with all counterweight, kg·m².
 
     bend: ψ'' at front dead centre.
     """
@@ -332,7 +332,7 @@ class Band(NamedTuple):
 def member_balance(
     scene: Scene, design: Mapping[str, float], figures: Mapping[str, float | None], member_numbers: Collection[str]
 ) -> Band | None:
-    """Balance that a member needs; None where more acts at front dead centre than the cloth and the reed's inertia."""
+    """Balance of a member; None if other torques than cloth and inertia act at front dead centre."""
     front, alpha, inertia = (figures.get(name) for name in ("M3_fdc", "alpha_fdc", "J4"))
     speed, resistance = scene.operation.get("speed"), scene.operation.get("M0")
     if front is None or alpha is None or inertia is None or not speed or not resistance:
@@ -350,7 +350,7 @@ def member_balance(
 
 
 def family_sentence(bands: Sequence[Band], scene: Scene) -> str:
-    """Sentence on the members that one ψ'' can balance, and on whether any balances all; scene: of the first member."""
+    """Sentence on the members that one ψ'' can balance, "" if it balances all; scene: that of the first member."""
     reached = [b.kappa / b.bend for b in bands]
     pairs = list(zip(bands, reached, strict=True))
     if all(b.least * (1 - SHOWN_AS_ZERO) <= j <= b.most * (1 + SHOWN_AS_ZERO) for b, j in pairs):
@@ -364,7 +364,7 @@ def family_sentence(bands: Sequence[Band], scene: Scene) -> str:
 
 
 def _ratio(bands: Sequence[Band], scene: Scene) -> str:
-    """Sentence on the members that one ψ'' balances where all have the same counterweights to choose from."""
+    """Sentence on the range of members that one ψ'' balances, if all have the same range of counterweights."""
     first, speed = bands[0], scene.operation["speed"]
     low, high = (scene.show(value, "inertia") for value in (first.least, first.most))
     ends = [scene.show(inertia * first.bend * speed**2, "torque") for inertia in (first.least, first.most)]

@@ -53,10 +53,10 @@ packaged means are right to 2e-15)."""
 class Output(NamedTuple):
     """Output of the linkage; measure: "angle", "slide", "x" or "y" of a link, part or joint.
 
-    against: another link, from which an angle is counted; sign: whether it counts so or the other way round.
-    scale: what it is multiplied by; of an angle a length makes a length of it, so that the output slides. zero: the
-    direction from which an angle is counted, x without one. carrier: the link, or joint, whose place moves with the
-    output alone and carries its mass: a link on a fixed axis, the pin of a slider on the frame, a joint; else "".
+    against: another link, from which an angle is counted; sign: 1, or −1 for the opposite sense. scale: factor of the
+    output; a length as the factor of an angle gives a length, so that the output slides. zero: the
+    direction from which an angle is counted, x without one. carrier: the link or joint that carries the mass of the
+    output and moves with the output alone: a link on a fixed axis, the pin of a slider on the frame, a joint; else "".
     """
 
     measure: str
@@ -70,12 +70,12 @@ class Output(NamedTuple):
 
 
 class EventRule(NamedTuple):
-    """An event: an extreme of q ("max", "min"), that nearest to a crank angle, rad, or the farthest of all without.
+    """Rule of an event: an extreme of q, a travel from another event, or a crank angle of the scene.
 
-    Or where q is `travel` away from its value at another event, `reference`, before (side −1) or after (+1): short of a
-    maximum (rise 1), or beyond a minimum (−1); or a crank angle of the scene's. of: another link, or a slider or slot,
-    of which it is an extreme. rest: of an output that rests at its extreme, whether the event is where the rest
-    "begins" or "ends"; the end nearer to `near` without it, and where it begins without both.
+    extreme: "max" or "min": the extreme nearest to the crank angle `near`, rad, else the greatest or least of all.
+    travel: distance of q from its value at the event `reference`, before (side −1) or after it (+1): below a maximum
+    (rise 1), or above a minimum (−1). of: another link, slider or slot whose extreme is meant. rest: "begins" or
+    "ends": the end of a rest at the extreme; without it the end nearer to `near`, without both the begin.
     """
 
     name: str
@@ -91,17 +91,17 @@ class EventRule(NamedTuple):
 
     @property
     def corner(self) -> str:
-        """The name of the value that says at which corner of a cam it stands, counted from 1; 0 at none."""
+        """Name of the index of the cam corner at this event, from 1; its value is 0 without a corner."""
         return f"corner of {self.name}"
 
     @property
     def turned(self) -> str:
-        """The name of the value that says how many turns its crank angle is beyond that corner's."""
+        """Name of the number of whole turns between the event and this corner."""
         return f"turns of {self.name}"
 
     @property
     def hint(self) -> str:
-        """The name of the value from which its crank angle is followed."""
+        """Name of its approximate crank angle."""
         return hint_of(self.name)
 
     @property
@@ -111,7 +111,7 @@ class EventRule(NamedTuple):
 
 
 def hint_of(name: str) -> str:
-    """Name of the value from which a crank angle is followed, rad."""
+    """Name of the approximate crank angle, rad, from which an exact one is computed."""
     return f"hint {name}"
 
 
@@ -125,19 +125,19 @@ OUTPUT_PLACES = "output at events"
 
 
 def turn_rule(k: int, extreme: str = "") -> EventRule:
-    """Event at a turn of the output, the k-th of those that effects request; at the end of a rest where it rests."""
+    """Event at the k-th turn of the output that effects need; at the end of the rest if the output rests there."""
     return EventRule(f"turn {k}", extreme, rest="ends")
 
 
 def output_value(event: str, axis: str) -> str:
-    """Name of the value that tells where the output is at an event: q, or its direction's x or y."""
+    """Name of the output at an event: axis "q", or the components "x" and "y" of its direction."""
     return f"output {axis} at {event}"
 
 
 class Window(NamedTuple):
-    """A stretch of crank angles after an event; what the output travels in it counts from its place at `level`.
+    """Interval of the crank angle after an event; the travel in it counts from the output at the event `level`.
 
-    It begins and ends so far after the event, or it begins there and ends at the event `until`.
+    It begins and ends at angles after the event, or it begins at the event and ends at the event `until`.
     """
 
     name: str
@@ -165,18 +165,18 @@ class Window(NamedTuple):
         return tuple(start + number(maths, given.values, end) for end in (self.begins, self.ends))
 
     def arcs(self) -> Arcs:
-        """Window as a stretch of the cycle that limits speak of."""
+        """Window as an interval of the cycle for limits."""
         return Arcs(self.switch, self.corners, inside, self)
 
 
 def inside(angle: float, corners: tuple[float, ...]) -> float:
-    """1 between two crank angles, rad, and 0 outside; a stretch that passes 0 is one too."""
+    """1 between two crank angles, rad, and 0 outside; the interval may contain the angle 0."""
     begin, end = corners
     return 1.0 if (angle - begin) % TURN < end - begin else 0.0
 
 
 class Path(NamedTuple):
-    """Path that a point should follow; phi: crank angles, rad, none where its timing is free; x, y, m."""
+    """Path that a point should follow; phi: crank angles, rad, empty if the timing is free; x, y: points, m."""
 
     point: str
     phi: tuple[float, ...]
@@ -205,9 +205,9 @@ def number(maths: Maths, values: Values, ref: Ref) -> Number:
 
 @dataclass(frozen=True)
 class LinkageMotion(Motion):
-    """The linkage at crank angles φ, rad, any shape; what nobody reads is not computed.
+    """Motion of the linkage at crank angles φ, rad, of any shape; quantities are computed when they are read.
 
-    joints: its parts; factor: what the output is multiplied by, None for 1; zero: the direction an angle counts from.
+    joints: its parts; factor: factor of the output, None for 1; zero: direction from which an angle is counted.
     """
 
     joints: chain.ChainPose
@@ -232,7 +232,7 @@ class LinkageMotion(Motion):
         return Vector(dot(seen, vector), cross(seen, vector))
 
     def travelled(self, given: Values, event: str) -> Number:
-        """q − q at an event, rad or m; given: with the output's places there."""
+        """Travel of q from its value at an event, rad or m; given: numbers that include the output at the event."""
         if self.output.measure != "angle":
             return self.q - given[output_value(event, "q")]
         return self._turned(Vector(given[output_value(event, "x")], given[output_value(event, "y")]))
@@ -271,7 +271,7 @@ class LinkageMotion(Motion):
         return self._turned(there.direction)
 
     def _turned(self, since: Vector) -> Number:
-        """Change of the output since it had another direction."""
+        """Change of the output from another direction."""
         seen = self.direction
         change = self.joints.maths.atan2(cross(since, seen), dot(since, seen))
         change = change if self.factor is None else self.factor * change
@@ -299,16 +299,16 @@ class LinkageMotion(Motion):
 
 
 class Corner(NamedTuple):
-    """A corner of the cams: its place among all of them, and its crank angle, rad, of the turn in question."""
+    """Corner of a cam: its index among the corners of all cams, and its crank angle, rad."""
 
     place: int
     angle: float
 
 
 class Turn(NamedTuple):
-    """Turning point of the output: the crank angle, rad, its kind, the output there, and q'' over its largest.
+    """Turning point of the output: crank angle, rad, kind, output there, and q'' relative to its largest value.
 
-    rest: the corners of cams at which it comes to rest and leaves it; one twice where it turns at once.
+    rest: the corners of cams between which the output rests; the same corner twice without a rest.
     """
 
     angle: float
@@ -319,7 +319,7 @@ class Turn(NamedTuple):
 
     @property
     def rests(self) -> bool:
-        """Whether the output stands still there for a while."""
+        """Whether the output rests there for an interval of the crank angle."""
         return bool(self.rest) and abs(angle_difference(self.rest[1].angle, self.rest[0].angle)) > SAME_ANGLE
 
     def away(self, near: float) -> float:
@@ -330,7 +330,7 @@ class Turn(NamedTuple):
 
 
 class UnfoundError(ValueError):
-    """An event is not there, or not one: which, and why in words."""
+    """Event that does not exist or is not unique, with the reason in words."""
 
     def __init__(self, event: str, problem: str) -> None:
         super().__init__(problem)
@@ -372,7 +372,7 @@ class Linkage(Kinematics):
 
     @lazy
     def arcs(self) -> tuple[Arcs, ...]:
-        """The stretches of each cam, with formulas of their own."""
+        """Intervals of each cam, each with its own formula."""
         return tuple(
             Arcs(cam_switch(cam), functools.partial(self._cam_corners, cam), stretch, cam) for cam in self.chain.cams
         )
@@ -385,7 +385,7 @@ class Linkage(Kinematics):
         return self.pose(maths, given, self._at(given, phi))
 
     def _at(self, given: Given, phi: Number) -> Node:
-        """Node at crank angles, rad, of a design in floats, with the cams' stretches there."""
+        """Node at crank angles, rad, of a design in floats, with the intervals of the cams at these angles."""
         if not self.chain.cams:
             return Node(phi, {})
         switch = self.chain.switch(given.values, np.atleast_1d(np.asarray(phi, dtype=np.float64)))
@@ -440,7 +440,7 @@ class Linkage(Kinematics):
         return {output_value(place.name, "x"): seen.x, output_value(place.name, "y"): seen.y}
 
     def _event_angle(self, maths: Maths, given: Given, place: EventRule) -> Number:
-        """Crank angle of an event from near which it is: a root, or a corner of a cam."""
+        """Crank angle of an event: a root near its approximate value, or a corner of a cam."""
         values, rates = given.values, functools.partial(self._rates, maths, given, place)
         if place.corner not in values:
             return turning_points.followed(rates, values[place.hint])
@@ -494,7 +494,7 @@ class Linkage(Kinematics):
         return hints | {f"{cam} at {name}": value for name, switch in switches.items() for cam, value in switch.items()}
 
     def _turn_hints(self, given: Given, place: EventRule, turn: Turn, hints: dict[str, float]) -> dict[str, float]:
-        """Crank angle of an event at a turn of the output, rad, by its name; `hints` gains what it is followed from."""
+        """Crank angle, rad, of an event at a turn of the output, by name; adds the approximate value to `hints`."""
         angle = hints[place.hint] = turn.angle
         if self.chain.cams:
             corner, turns_beyond = end_of_rest(turn, place), 0
@@ -507,7 +507,7 @@ class Linkage(Kinematics):
         return {place.name: angle}
 
     def _times(self, given: Given) -> dict[str, float]:
-        """Near which crank angles, rad, a point without timing is nearest to the places of its path."""
+        """Approximate crank angles, rad, at which a point without timing is nearest to the places of its path."""
         path = self.path
         if path is None or path.phi:
             return {}
@@ -523,9 +523,9 @@ class Linkage(Kinematics):
         return {hint_of(name): float(angle) for name, angle in zip(path.times, phi, strict=True)}
 
     def turns(self, given: Given) -> tuple[Turn, ...]:
-        """Points of the whole turn at which the output turns: between samples, then by Newton's method.
+        """Points at which the output turns: from samples of the whole turn, refined by Newton's method.
 
-        Raises UnfoundError where it has no real position somewhere.
+        Raises UnfoundError if the linkage cannot be assembled at some crank angle.
         """
         nodes, corners = self._scan(given)
         with np.errstate(all="ignore"):
@@ -555,19 +555,19 @@ class Linkage(Kinematics):
         return tuple(turns)
 
     def turn(self, given: Given, place: EventRule, turns: tuple[Turn, ...] | None = None) -> Turn:
-        """Turn that an extreme means; turns: those of the output, where they are known. Raises UnfoundError."""
+        """Turn at an extreme; turns: those of the output, if they are known. Raises UnfoundError."""
         known = None if place.of else turns
         return extreme_turn(self.of(place).turns(given) if known is None else known, place)
 
     def of(self, place: EventRule) -> "Linkage":
-        """Linkage whose output is what an event is an extreme of."""
+        """Linkage whose output is the link, slider or slot of an event."""
         if not place.of:
             return self
         measure = "angle" if place.of in chain_forces.origins(self.chain) else "slide"
         return dataclasses.replace(self, output=Output(measure, place.of), places=(), path=None)
 
     def corner_words(self, corner: Corner) -> str:
-        """Sentence on a corner of the cams, such as "the return of follower begins"."""
+        """Sentence on a corner of a cam, such as "the return of follower begins"."""
         place = corner.place
         for cam in self.chain.cams:
             pieces = len(LAWS[cam.word("law")].breaks) + 1
@@ -579,7 +579,7 @@ class Linkage(Kinematics):
         raise ValueError(f"the cams have no corner {corner.place}")
 
     def _scan(self, given: Given) -> tuple[Node, dict[int, Corner]]:
-        """Nodes over one turn, in order, and which of them are corners of cams: the ends of their stretches."""
+        """Nodes over one turn in order, and the corners of cams by the index of their node."""
         places = sorted(
             (BESIDE + (float(angle) - BESIDE) % TURN, place) for place, angle in enumerate(self._corners(FLOAT, given))
         )
@@ -602,7 +602,7 @@ class Linkage(Kinematics):
         return Node(np.concatenate(angles), switch), corners
 
     def _turning_angle(self, given: Given, ends: tuple[float, float], slopes: tuple[float, float]) -> float:
-        """Crank angle, rad, at which the output turns, between two at which its slopes have opposite signs."""
+        """Crank angle, rad, of a turn of the output between two angles with slopes of opposite signs."""
         (low, high), (at_low, at_high) = ends, slopes
         angle = low - at_low * (high - low) / (at_high - at_low)
         for _ in range(NEWTONS):
@@ -616,7 +616,7 @@ class Linkage(Kinematics):
         return angle
 
     def _crossing(self, given: Given, place: EventRule, reference: float) -> float:
-        """Crank angle at which q is `travel` short of its value at another event: the nearest before or after it."""
+        """Nearest crank angle before or after another event at which q differs by `travel` from its value there."""
         there = self.at(FLOAT, given, reference)
         assert place.travel is not None
         level = float(number(FLOAT, given.values, place.travel))
@@ -669,7 +669,7 @@ class Linkage(Kinematics):
     def _scan_conditions(
         self, turns: Sequence[Turn], swept: float, maths: Maths, given: Given, at: Sequence[Number]
     ) -> list[tuple[str, Number]]:
-        """Expressions that are positive where a scan finds the same events as for the design with those turns."""
+        """Expressions that are positive if a scan of another design locates the same events as these turns."""
         conditions: list[tuple[str, Number]] = []
         for place in (place for place in self.places if place.extreme):
             extreme = extreme_turn(tuple(turns), place)
@@ -708,11 +708,11 @@ class Linkage(Kinematics):
         return self.pose(maths, given, self._there(given, event, given.values[event_value(event)]))
 
     def at_place(self, maths: Maths, given: Given, name: str) -> LinkageMotion:
-        """Pose at a place of the path that has no timing; name: of its crank angle."""
+        """Pose at a place of a path without timing; name: that of its crank angle."""
         return self.pose(maths, given, self._there(given, name, given.values[name]))
 
     def _there(self, given: Given, event: str, phi: Number) -> Node:
-        """Node at or beside an event, or a place of a path, with the cams' stretches there."""
+        """Node at an event or a place of a path, with the intervals of the cams there."""
         cams = (cam_switch(cam) for cam in self.chain.cams)
         return Node(phi, {cam: given.values[f"{cam} at {event}"] for cam in cams})
 
@@ -726,7 +726,7 @@ SWEPT = "turn of sweep"
 
 
 def extreme_turn(turns: tuple[Turn, ...], place: EventRule) -> Turn:
-    """Turn of the output that an extreme means, its angle within half a turn of `near`. Raises."""
+    """Turn of the output at an extreme, with its angle within half a turn of `near`. Raises UnfoundError."""
     candidates = [turn for turn in turns if turn.extreme == place.extreme]
     if not candidates:
         raise UnfoundError(place.name, "the output never turns back")
@@ -746,13 +746,13 @@ def extreme_turn(turns: tuple[Turn, ...], place: EventRule) -> Turn:
 
 
 def turns_in_order(turns: Sequence[Turn]) -> list[Turn]:
-    """Turns of the output over one turn of the crank, from a minimum on: there the output sets out."""
+    """Turns of the output over one turn of the crank, beginning with a minimum."""
     first = next((k for k, turn in enumerate(turns) if turn.extreme == "min"), 0)
     return [*turns[first:], *turns[:first]]
 
 
 def end_of_rest(turn: Turn, place: EventRule) -> Corner | None:
-    """Corner of a cam at which an extreme stands, by the end of the rest that is meant; None at none."""
+    """Corner of a cam at an extreme: the end of the rest that the event selects; None without a cam corner."""
     if not turn.rest:
         return None
     begin, end = turn.rest
@@ -772,7 +772,7 @@ def _rates_of(linkage: Linkage, place: EventRule, maths: Maths, given: Given, ph
 
 
 def _distance(at: Number, angle: float, near: float) -> Number:
-    """Distance of a turning point near an angle from another angle, rad."""
+    """Distance, rad, of a turning point from the angle `near`; angle: its approximate value."""
     nearest = angle_difference(angle, near)
     off = at - angle + nearest
     return off if nearest >= 0 else -off
@@ -806,7 +806,7 @@ def _at(at: Instant, event: str) -> LinkageMotion:
 
 
 def linkage_of(model: JobModel) -> Linkage:
-    """Linkage of a model, at whatever speed its crank turns."""
+    """Linkage of a model, also if its crank speed varies."""
     kinematics = getattr(model.kinematics, "steady", model.kinematics)
     assert isinstance(kinematics, Linkage)
     return kinematics
@@ -837,7 +837,7 @@ class Reach(NamedTuple):
         return f"{self.axis}_{'max' if self.sign > 0 else 'min'}.{self.joint}"
 
     def value(self, at: Instant) -> Number:
-        """Coordinate, m, or its opposite where the least counts."""
+        """Coordinate, m, with opposite sign if the least one counts."""
         coordinate = getattr(at.pose.joints.joints[self.joint].place, self.axis)
         return coordinate if self.sign > 0 else -coordinate
 
@@ -856,9 +856,9 @@ RMS = {"jerk": "jerk_rms", "force": "force_rms", "moment": "moment_rms"}
 
 
 class Rms(NamedTuple):
-    """A figure that is the rms of the output's jerk, or of the force or moment there, over part of the cycle.
+    """Figure: rms of the output's jerk, or of the force or moment at the output, over part of the cycle.
 
-    quantity: "jerk", "force" or "moment"; over: the window, or the load with a pulse, that is meant; where: its pieces.
+    quantity: "jerk", "force" or "moment"; over: name of the window, or of the load with a pulse; where: its pieces.
     """
 
     quantity: str
@@ -877,7 +877,7 @@ class Rms(NamedTuple):
 
     @property
     def square(self) -> str:
-        """The name of the square of which the mean is taken."""
+        """Name of the square whose mean is computed."""
         return f"{self.quantity}_square"
 
     def integral(self) -> Integral:
@@ -904,7 +904,7 @@ class Match(NamedTuple):
     q: tuple[float, ...]
 
     def integral(self) -> Integral:
-        """Mean square of what the output misses it by."""
+        """Mean square of the difference between the output and the function."""
         return Integral(MATCH_SQUARE, MATCH, "miss_square", angles=self.phi, data=self.q)
 
 
@@ -913,7 +913,7 @@ def _square(a: Vector, x: Number, y: Number) -> Number:
 
 
 def _square_distance(path: Path, at: Instant) -> Number:
-    """Square of the distance of the point from where it should be at a place of the table, m²."""
+    """Square of the distance of the point from its position in the table, m²."""
     place = at.node.switch["datum"]
     x, y = (at.maths.choose(place, [at.maths.number(v) for v in values]) for values in (path.x, path.y))
     return _square(at.pose.joints.joints[path.point].place, x, y)

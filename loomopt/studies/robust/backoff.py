@@ -1,7 +1,7 @@
 """Back-off: an optimum whose limits are tightened by a multiple of the standard deviations of their own figures.
 
-The standard deviations are those of the optimum that they lead to: a fixed point. What it buys is sampled: machines as
-they are made, judged by the limits as they stand.
+The standard deviations are those of the optimum that results from them: a fixed point. Sampled machines, checked
+against the limits of the scene, give the yield.
 """
 
 import functools
@@ -61,7 +61,7 @@ Band = tuple[float, float]
 
 
 class Pass(NamedTuple):
-    """An answer, what its limits leave, and the back-off that it was solved with: standard deviations of a pass ago."""
+    """Answer of a pass, margins of its limits, and the back-off of its solve, from the pass before."""
 
     answer: Solution
     plan: Plan
@@ -80,9 +80,9 @@ class Pass(NamedTuple):
 
 @dataclass(frozen=True)
 class BackOff:
-    """Reduction of a task whose machines vary to tasks with tightened limits.
+    """Reduction of a task with tolerances to tasks with tightened limits.
 
-    sigmas: standard deviations, or share: yield, one of the two; samples, seed: of the machines that are drawn.
+    Either sigmas (standard deviations) or share (yield) is given; samples, seed: for the machines that are drawn.
     """
 
     sigmas: float | None = None
@@ -91,7 +91,7 @@ class BackOff:
     seed: int = 0
 
     def apply(self, task: Task) -> Task:
-        """Task of the nominal machine. Raises BadInput for a back-off that is none."""
+        """Task of the nominal machine. Raises BadInput for an invalid back-off."""
         if self.sigmas is not None and self.share is not None:
             remedy = "Give one of them"
             raise refusal("--robust and --yield cannot be combined", "", "robust", self.sigmas, remedy=remedy)
@@ -109,9 +109,9 @@ class BackOff:
         return replace(task, global_proof=None)
 
     def invert(self, task: Task, answer: Solution, solve: Solve) -> Solution:
-        """Optimum whose limits are backed off; answer: the optimum of the nominal machine.
+        """Optimum with backed-off limits; answer: the optimum of the nominal machine.
 
-        Where there is none, an answer that says why. Raises BadInput where a figure jumps within the back-off.
+        Without such an optimum, the answer gives the reason. Raises BadInput if a figure jumps within the back-off.
         """
         if answer.status != "optimal":
             return answer
@@ -153,7 +153,7 @@ class Request:
         self.task.settings.at(step)
 
     def plan(self, answer: Solution, frozen: "Mapping[str, Band]") -> Plan:
-        """Study of an answer's machines; frozen: bands, m, of numbers whose class would flip."""
+        """Plan for the machines of an answer; frozen: bands, m, of numbers whose tolerance class would alternate."""
         given = self.scene.document["tolerances"]
         entries = {name: {k: value for k, value in given[name].items() if k not in ("class", "fit")} for name in frozen}
         made = {
@@ -170,7 +170,7 @@ Sigmas = Callable[[Pass], float]
 
 
 def _search(request: Request, start: Pass, sigmas: Sigmas) -> Pass | Solution:
-    """Fixed point that a search from scratch leads to as well, or why there is none."""
+    """Fixed point that a search from scratch confirms, or the answer that says why there is none."""
     here = start
     for _ in range(SEARCHES):
         converged = _converge(request, here, sigmas)
@@ -249,9 +249,9 @@ def tightened(here: Pass) -> dict[tuple[str, int], float]:
 class Trials(NamedTuple):
     """Results of the back-offs so far.
 
-    low, high: standard deviations and sampled yield of the largest back-off that gives too little, and of the least
-    that gives enough; enough: its pass. best: the pass of the most machines, with their share. edge: the standard
-    deviations beyond which there is no design, and why: obstacle, and the limits that have no more room.
+    low, high: standard deviations and sampled yield of the largest back-off with too small a yield, and of the least
+    one that is sufficient; enough: the pass of the latter. best: the pass with the largest yield, and this yield. edge:
+    the standard deviations beyond which there is no design; obstacle: the reason, and the limits without room.
     """
 
     low: tuple[float, float]
@@ -271,10 +271,10 @@ class Obstacle(NamedTuple):
 
 
 def _search_yield(request: Request, start: Pass, before: Mapping[str, Yield]) -> Pass | Solution:
-    """Back-off whose sampled yield is no less than the requested one, and hardly more.
+    """Pass whose sampled yield is at least the requested one, and little more.
 
-    Limits that have no room for so much are backed off as far as they can be, and the others farther. Where all that is
-    too little, the answer says the most that was found, and what stands in the way of more.
+    Limits without enough room get the largest possible back-off, and the others more. If this is not sufficient, the
+    answer has the largest yield and the obstacle to a larger one.
     """
     if before[ALL].value >= (request.back_off.share or 0.0):
         return start
@@ -291,7 +291,7 @@ def _search_yield(request: Request, start: Pass, before: Mapping[str, Yield]) ->
 
 
 def _try(request: Request, trials: Trials) -> Trials:
-    """Trials of back-offs between those known, until one gives enough and hardly more, or none can."""
+    """Further trials of back-offs, until one has the requested yield and little more, or none can have it."""
     least, start = request.back_off.share or 0.0, trials.best[1]
     following = linear(start, least)
     if math.isnan(following):
@@ -331,7 +331,7 @@ def _try(request: Request, trials: Trials) -> Trials:
 
 
 def _reach(request: Request, start: Pass, sigmas: Sigmas) -> Pass | Obstacle:
-    """Pass at a back-off, or why there is no design with it."""
+    """Pass at a back-off, or the obstacle if no design has it."""
     try:
         result = _converge(request, start, sigmas)
     except BadInput as error:
@@ -340,7 +340,7 @@ def _reach(request: Request, start: Pass, sigmas: Sigmas) -> Pass | Obstacle:
 
 
 def _between(at: Pass, low: tuple[float, float], high: tuple[float, float], estimate: float, least: float) -> float:
-    """Next back-off to try: Newton's step on the yield with the slope of the linear one, within the known bracket."""
+    """Next back-off: Newton's step on the yield, with the slope of the linear yield, within the bracket."""
     step = 1e-4
     sides = [_quantile(share(at.margins, at.sigmas + shift, at.applied, at.caps)) for shift in (0.0, step)]
     # A little beyond it, for what is found must be no less.
@@ -351,14 +351,14 @@ def _between(at: Pass, low: tuple[float, float], high: tuple[float, float], esti
 
 
 def _quantile(value: float) -> float:
-    """Quantile of the standard normal distribution; shares of 0 and 1 are moved inside."""
+    """Quantile of the standard normal distribution; 0 and 1 are replaced by numbers nearby."""
     return float(normal.quantile(np.array([min(max(value, 1e-12), 1 - 1e-12)]))[0])
 
 
 def linear(at: Pass, least: float) -> float:
-    """Standard deviations at which the linear joint normal yield is `least`; NaN where there are none.
+    """Standard deviations at which the linear joint normal yield is `least`; NaN if there are none.
 
-    By secants of what a normal distribution has below it, nearly straight in them.
+    The secant method is applied to the quantile of the yield, which is almost linear.
     """
 
     def short(sigmas: float) -> float:
@@ -513,7 +513,7 @@ def _narrow(request: Request, here: Pass, name: str, width: float, needed: float
 
 
 def _fixed(here: Pass) -> str:
-    """Phrase of the sides that no back-off can move."""
+    """Phrase on the sides that have no back-off."""
     fixed = ", ".join(dict.fromkeys(margin.name for margin in here.margins if margin.fixed))
     return f"no margin for {fixed}" if fixed else f"no more than {MOST_SIGMAS:g} sigma are tried"
 
