@@ -39,12 +39,12 @@ class Box(NamedTuple):
     top: float
 
     def nearest(self, x: float, y: float) -> tuple[float, float]:
-        """Point of the box that lies nearest to another."""
+        """Point of the box nearest to another point."""
         return min(max(x, self.left), self.right), min(max(y, self.bottom), self.top)
 
 
 class LabelWish(NamedTuple):
-    """A box wanted beside a point, the first of `near` best, on the side an angle points to, rad."""
+    """Request for a label box near a point: the first of `near` is preferred; side: preferred direction, rad."""
 
     near: Sequence[tuple[float, float]]
     side: float
@@ -53,7 +53,7 @@ class LabelWish(NamedTuple):
 
 
 class LabelSpot(NamedTuple):
-    """A box found beside a point (x, y)."""
+    """Position of a label box near the point (x, y)."""
 
     box: Box
     x: float
@@ -61,10 +61,10 @@ class LabelSpot(NamedTuple):
 
 
 def place(wishes: Iterable[LabelWish], strokes: Floats, unit: float, leader: float = math.inf) -> list[LabelSpot]:
-    """A spot for each wish, in order; strokes: (n, 2) points of what is drawn; unit: a text height.
+    """Positions of labels in the order of the requests; strokes: (n, 2) points of the drawing; unit: text height.
 
-    No box meets a stroke or an earlier box. leader: distance of a box from its point, in text heights, from which on
-    a straight line will join the two: that meets no box either.
+    No box overlaps a stroke or another box. leader: distance of a box from its point, in text heights, above which a
+    straight line joins both; this line overlaps no box either.
     """
     taken: list[LabelSpot] = []
     for wish in wishes:
@@ -76,7 +76,7 @@ def place(wishes: Iterable[LabelWish], strokes: Floats, unit: float, leader: flo
 
 
 def _label_spot(wish: LabelWish, strokes: Floats, taken: Sequence[LabelSpot], unit: float, leader: float) -> LabelSpot:
-    """Free spot of a wish that costs least, in text heights: of distance, turn and what lies between."""
+    """Free position of a label with the least cost, in text heights, of distance, direction and crossed strokes."""
     best, least = None, math.inf
     for ring in itertools.chain(RINGS, (RINGS[-1] * FARTHER**k for k in itertools.count(1))):
         if best and ring >= least:
@@ -95,7 +95,7 @@ def _label_spot(wish: LabelWish, strokes: Floats, taken: Sequence[LabelSpot], un
 
 
 def _candidate(wish: LabelWish, near: tuple[float, float], gap: float, side: float) -> LabelSpot:
-    """Wish's box at a gap from a point in the direction of an angle, rad."""
+    """Label box at a gap from a point in the direction of an angle, rad."""
     across, up = math.cos(side), math.sin(side)
     half_width, half_height = wish.width / 2, wish.height / 2
     reach = gap + min(half_width / max(abs(across), 1e-9), half_height / max(abs(up), 1e-9))
@@ -121,12 +121,12 @@ def _within(points: Floats, left: float, bottom: float, right: float, top: float
 
 
 def _gap(spot: LabelSpot) -> float:
-    """Distance of a spot's box from its point."""
+    """Distance of a label box from its point."""
     return math.dist(spot.box.nearest(spot.x, spot.y), (spot.x, spot.y))
 
 
 def _between(spot: LabelSpot, unit: float) -> Floats:
-    """Points from a spot's point to its box, (n, 2)."""
+    """Points of the leader from a label's point to its box, (n, 2)."""
     end = spot.box.nearest(spot.x, spot.y)
     return np.linspace((spot.x, spot.y), end, 2 + int(_gap(spot) / (STEP * unit)))
 
@@ -157,7 +157,7 @@ Unit = Literal["mm", "in"]
 
 
 class Units(NamedTuple):
-    """Units of a drawing's lengths, whose numbers stand without it, and of its other quantities."""
+    """Units of a drawing: lengths are written without their unit, other quantities with it."""
 
     length: Unit = "mm"
     mass: str = "kg"
@@ -170,11 +170,11 @@ class Units(NamedTuple):
         return "lengths in inches" if self.length == "in" else "lengths in mm"
 
     def size(self, metres: float, digits: int = 6) -> str:
-        """A length as its number in the drawing's unit."""
+        """Number of a length in the unit of the drawing."""
         return f"{metres / units.factor(self.length) + 0.0:.{digits}g}"
 
     def within(self, metres: float) -> str:
-        """A tolerance, m, with its unit: one digit, rounded up, so that it is promised and kept."""
+        """Text of a tolerance, m, with its unit: one digit, rounded up."""
         value = metres / units.factor(self.length)
         if not value:
             return f"0 {self.length}"
@@ -187,7 +187,7 @@ METRIC = Units()
 
 
 def drawn_units(scene: "Scene") -> Units:
-    """Units a scene is drawn in: inches where its lengths are in whole inches, as feet are; else mm."""
+    """Units of a scene's drawings: inches if its lengths are in inches or feet, else mm."""
     inches = units.parse_unit(scene.shown_in("length")).factor / units.parse_unit("in").factor
     kinds = {kind: scene.shown_in(kind) for kind in ("mass", "force", "stiffness")}
     return Units("in" if inches.denominator == 1 else "mm", **kinds)
@@ -204,13 +204,13 @@ class Point(NamedTuple):
         return Point(self.x + distance * math.cos(angle), self.y + distance * math.sin(angle))
 
     def part(self, other: "Point", share: float = 0.5) -> "Point":
-        """Point that lies a share of the way to another."""
+        """Point at a share of the way to another point."""
         return Point(self.x + share * (other.x - self.x), self.y + share * (other.y - self.y))
 
 
 @dataclass(frozen=True)
 class Layer:
-    """Style of a layer: colour on white; aci: AutoCAD colour; width: of lines, mm where text is 3.5 mm high."""
+    """Style of a layer: colour on white; aci: AutoCAD colour; width: line width, mm, for text of 3.5 mm height."""
 
     colour: str
     aci: int
@@ -254,7 +254,7 @@ CHARACTER, CAPITAL_LETTER, WIDE = 0.88, 1.16, 1.45
 
 @dataclass(frozen=True)
 class Line:
-    """Strokes through points, m: straight, or arcs where bulges tell tan(angle/4) of each, positive to the left."""
+    """Strokes through points, m; bulges: tan(angle/4) of each arc, positive to the left, empty for straight lines."""
 
     layer: str
     points: tuple[Point, ...]
@@ -298,7 +298,7 @@ Primitive = Trace | Text
 
 
 class Measure(NamedTuple):
-    """A length between two points, m, and its name; band: its lower and upper deviation, m, both 0 where not said."""
+    """Dimension: a length between two points, m, and its name; band: lower and upper deviation, m, 0 by default."""
 
     name: str
     first: Point
@@ -308,10 +308,10 @@ class Measure(NamedTuple):
 
 @dataclass(frozen=True)
 class Drawing:
-    """A mechanism at full scale in m; height: of its capitals, m, which line widths and dashes follow.
+    """Drawing of a mechanism at full scale in m; height: text height, m, which also scales line widths and dashes.
 
-    legend: lines of (layer, text) below it. unit: in which its lengths are told, and which a workshop reads it in.
-    measures: lengths that a format with dimensions of its own has as such.
+    legend: lines of (layer, text) below the drawing. unit: unit of its lengths. measures: dimensions, for formats that
+    have them.
     """
 
     title: str
@@ -323,7 +323,7 @@ class Drawing:
 
     @property
     def layers(self) -> dict[str, Layer]:
-        """The layers that are drawn on, from back to front; positions of other names lie behind the joints."""
+        """Layers of the drawing from back to front; positions with other names are behind the joints."""
         drawn = dict.fromkeys(primitive.layer for primitive in self.primitives)
         others = dict(zip((name for name in drawn if name not in LAYERS), itertools.cycle(POSITIONS), strict=False))
         front = list(LAYERS).index("joints")
@@ -337,7 +337,7 @@ def plain(text: str) -> str:
 
 
 def scale_drawing(drawing: Drawing, size: float) -> Drawing:
-    """A drawing with every length times a size, such as 1000 for one whose unit is 1 mm."""
+    """Drawing with every length multiplied by a size, such as 1000 for the unit mm."""
 
     def of(point: Point) -> Point:
         return Point(size * point.x, size * point.y)
@@ -360,7 +360,7 @@ def scale_drawing(drawing: Drawing, size: float) -> Drawing:
 
 
 def text_box(text: Text, height: float) -> Box:
-    """Room a text takes, by a generous estimate of its width; height: text height, in the same unit."""
+    """Box of a text, by a generous estimate of its width; height: text height, in the same unit."""
     tall = height * text.size
     wide = tall * sum(map(_width, text.text))
     left = text.at.x - (wide / 2 if text.anchor == "centre" else 0.0)
@@ -383,7 +383,7 @@ def extent(drawing: Drawing, margin: float = 2.0) -> Box:
 
 
 def marks(primitive: Primitive, height: float) -> Floats:
-    """Points along a primitive, no farther apart than STEP text heights, or two corners of a text, (n, 2)."""
+    """Points along a primitive, at most STEP text heights apart, or two corners of a text, (n, 2)."""
     if isinstance(primitive, Text):
         box = text_box(primitive, height)
         return np.array([[box.left, box.bottom], [box.right, box.top]])

@@ -1,4 +1,4 @@
-"""Figures of curves over the crank angle: every text stands above its axes, so that none hides a curve."""
+"""Figures of curves over the crank angle; all texts are above the axes, so that they hide no curve."""
 
 import math
 from collections.abc import Sequence
@@ -38,9 +38,9 @@ BETWEEN, TITLE_AND_ANGLE = 0.2, 0.8
 
 
 class DrawnTurn(NamedTuple):
-    """One machine's curves over a closed turn: crank angles, deg, columns, SI, and marks.
+    """Curves of one machine over a closed turn: crank angles, deg, columns, SI, and marks.
 
-    unit: in which a person sees crank angles.
+    unit: unit in which crank angles are shown.
     """
 
     angles: Floats
@@ -50,7 +50,7 @@ class DrawnTurn(NamedTuple):
 
     @property
     def whole(self) -> float:
-        """The angle after which the curves repeat, deg: a turn, or as many as the table covers."""
+        """Period of the curves, deg: one turn, or all turns of the table."""
         return 360.0 * max(1, round(float(self.angles[-1] - self.angles[0]) / 360.0))
 
     def place_text(self, angle: float) -> str:
@@ -58,7 +58,7 @@ class DrawnTurn(NamedTuple):
         return f"{angle:.2f} deg" if self.unit == "deg" else show(math.radians(angle), self.unit, 5)
 
     def of(self, column: str) -> Floats:
-        """A column, SI, as long as the angles."""
+        """Column, SI, with the length of the angles."""
         values = self.columns[column].to_numpy(dtype=float)
         return np.append(values, values[:1]) if len(self.angles) > len(values) else values
 
@@ -73,11 +73,11 @@ def curves(
     angle: str = "crank angle",
     unit: str = "deg",
 ) -> Any:
-    """Small diagrams over `phi [rad]`; written as PNG, PDF or SVG where there is a path.
+    """Figure of small diagrams over `phi [rad]`; path: PNG, PDF or SVG file to write.
 
-    marks: such as both dead centres; a stretch such as the pulse is shaded. panels: what to show, one panel per
-    column with its unit without them. today: curves and marks of today's machine, drawn dashed beside a design's.
-    angle: what phi is; unit: in which it is shown.
+    marks: angles such as both dead centres; an interval such as the pulse is shaded. panels: columns to show, by
+    default one panel per column. today: curves and marks of today's machine, drawn dashed beside a design's.
+    angle: name of phi; unit: unit in which it is shown.
     Raises BadInput for another suffix, and ValueError where there is no column.
     """
     if path:
@@ -103,14 +103,14 @@ def curves(
 
 
 def drawn_turn(frame: "pd.DataFrame", marks: Marks, unit: str) -> DrawnTurn:
-    """A table's curves with angles that never fall, closed where the table covers a turn but for its end."""
+    """Curves of a table with ascending angles; closed if the table covers a turn without its end."""
     angles = np.degrees(np.unwrap(frame[ANGLE].to_numpy(dtype=float)))
     closes = 350.0 < angles[-1] - angles[0] < 360.0 - SAME
     return DrawnTurn(np.append(angles, angles[0] + 360.0) if closes else angles, frame, marks, unit)
 
 
 class Cell(NamedTuple):
-    """Axes with their panel: its row; first: whether they are the first of their column."""
+    """Axes of a panel and their row; first: whether they are the first of their column."""
 
     axes: Any
     panel: Panel
@@ -119,7 +119,7 @@ class Cell(NamedTuple):
 
 
 def _grid(panels: Sequence[Panel], title: str, below: str) -> tuple[Any, list[Cell]]:
-    """A figure and its axes: wide ones on top, the others below in columns of their own; below: what phi is."""
+    """Figure and its axes: wide ones on top, the others below in columns; below: label of the crank angle."""
     on_top, others = [p for p in panels if p.wide], [p for p in panels if not p.wide]
     wide = 1 if len(panels) <= 4 else 2
     rows, height = math.ceil(len(others) / wide), len(on_top)
@@ -141,7 +141,7 @@ def _grid(panels: Sequence[Panel], title: str, below: str) -> tuple[Any, list[Ce
 
 
 def _height(cells: Sequence[Cell], heads: Sequence[float]) -> float:
-    """Height of a page, inches, on which axes are as high as they are meant; heads: above each, inches."""
+    """Height of a page, inches, from the heights of its axes; heads: height of the texts above each, inches."""
     rows: dict[int, tuple[float, float]] = {}
     for cell, head_high in zip(cells, heads, strict=True):
         high, above = rows.get(cell.row, (0.0, 0.0))
@@ -150,7 +150,7 @@ def _height(cells: Sequence[Cell], heads: Sequence[float]) -> float:
 
 
 def _both() -> list[Entry]:
-    """Which curves are the design's and which today's."""
+    """Legend entries for the curves of the design and of today's machine."""
     from matplotlib.lines import Line2D
 
     design = Line2D([], [], color=COLOURS[0], linewidth=1.4)
@@ -158,18 +158,18 @@ def _both() -> list[Entry]:
 
 
 def _unit_text(panel: Panel) -> str:
-    """Unit a panel is shown in, in brackets; "" of a pure number."""
+    """Unit of a panel in brackets; "" for a pure number."""
     unit = shown_unit(panel)
     return "" if unit == "1" else f" [{unit}]"
 
 
 def shown_unit(panel: Panel) -> str:
-    """Unit a panel is shown in."""
+    """Unit in which a panel is shown."""
     return panel.unit or ("deg" if panel.si == "rad" else panel.si)
 
 
 def _panel(axes: Any, panel: Panel, design: DrawnTurn, before: DrawnTurn | None) -> list[Entry]:
-    """Draw a panel's columns with what is marked and limited; return what its legend says."""
+    """Draw the columns of a panel with marks and limits; returns the entries of its legend."""
     size = factor(shown_unit(panel))
     drawn = [design.of(column) / size for column in panel.columns]
     old = [before.of(column) / size for column in panel.columns] if before else []
@@ -200,13 +200,13 @@ def _panel(axes: Any, panel: Panel, design: DrawnTurn, before: DrawnTurn | None)
 
 
 def measured_column(column: str) -> str:
-    """Column of what was measured beside a column of the curves."""
+    """Name of the measured column for a column of the curves."""
     name, unit = split(column)
     return f"{name}_measured [{unit}]"
 
 
 def _frame(axes: Any, values: Floats, turn: DrawnTurn) -> None:
-    """Give axes their ticks, their grid and a zero where curves pass it."""
+    """Set ticks and grid of axes, and draw the zero line if curves cross it."""
     from matplotlib.ticker import FuncFormatter, MultipleLocator
 
     size = math.degrees(factor(turn.unit))
@@ -230,7 +230,7 @@ def _tick(value: float, _: int) -> str:
 
 
 def _in_g(axes: Any, size: float) -> None:
-    """Give axes of an acceleration a second scale, in g; size: of the first one's unit, m/s²."""
+    """Add a second scale in g to axes of an acceleration; size: unit of the first scale, m/s²."""
     from loomopt.interface.figures.shown_figure import TICK
 
     scale = axes.secondary_yaxis("right", functions=(lambda y: y * size / GRAVITY, lambda g: g * GRAVITY / size))
@@ -241,7 +241,7 @@ def _in_g(axes: Any, size: float) -> None:
 
 
 def _points(axes: Any, panel: Panel, turn: DrawnTurn, colour: str, prefix: str) -> list[Entry]:
-    """Mark what of a panel's first column is marked; return what is to say of it."""
+    """Draw the marks on the first column of a panel; returns their legend entries."""
     values, unit = turn.of(panel.columns[0]), shown_unit(panel)
     entries = []
     for how in panel.marked:
@@ -256,7 +256,7 @@ def _points(axes: Any, panel: Panel, turn: DrawnTurn, colour: str, prefix: str) 
 
 
 def marked_row(values: Floats, turn: DrawnTurn, how: str) -> int | None:
-    """Row of what is marked, the first of those alike; None where nothing is known."""
+    """Row of a mark, the first of several equal ones; None if its value is not known."""
     if how not in WORDS:
         mark = turn.marks.get(how, math.nan)
         place = math.nan if isinstance(mark, Span) else math.degrees(mark)
@@ -270,7 +270,7 @@ def marked_row(values: Floats, turn: DrawnTurn, how: str) -> int | None:
 
 
 def _levels(axes: Any, panel: Panel, size: float) -> list[Entry]:
-    """Draw a panel's levels that stand near its curves; return what they say."""
+    """Draw the levels of a panel that are near its curves; returns their legend entries."""
     from matplotlib.lines import Line2D
 
     low, high = axes.get_ylim()
@@ -289,7 +289,7 @@ def _levels(axes: Any, panel: Panel, size: float) -> list[Entry]:
 
 
 def _mark(axes: Any, of: DrawnTurn) -> list[tuple[float, str]]:
-    """Shade stretches and mark angles wherever they fall on the axis; return the names with their places."""
+    """Shade intervals and mark angles on the axis; returns their names with their positions."""
     (low, high), whole = axes.get_xlim(), of.whole
     names: list[tuple[float, str]] = []
     spans = {name: mark for name, mark in of.marks.items() if isinstance(mark, Span)}
@@ -313,6 +313,6 @@ def _mark(axes: Any, of: DrawnTurn) -> list[tuple[float, str]]:
 
 
 def _turns(angle: float, low: float, high: float, whole: float) -> list[float]:
-    """Multiples of the whole, deg, that may bring an angle between low and high."""
+    """Multiples of `whole`, deg, that may move an angle between low and high."""
     first, last = math.floor((low - angle) / whole), math.ceil((high - angle) / whole)
     return [whole * turn for turn in range(first, last + 1)]

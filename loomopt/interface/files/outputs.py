@@ -1,4 +1,4 @@
-"""Files for people and other programs: answers, curves and drawings, each written whole or not at all."""
+"""Files of answers, curves and drawings; each is written completely or not at all."""
 
 import contextlib
 import functools
@@ -54,7 +54,7 @@ class DrawnSubject(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Both, for a title."""
+        """Name and violated limits, for a title."""
         return f"{self.name}; limits not held: {', '.join(self.broken)}" if self.broken else self.name
 
 
@@ -66,17 +66,17 @@ class Serialisable(Protocol):
 
 
 def document(result: Serialisable) -> str:
-    """An evaluation or an answer as one JSON object; what is undefined is null."""
+    """Evaluation or answer as one JSON object; undefined numbers are null."""
     return json_text({"loomopt": __version__, **result.as_dict()})
 
 
 def json_text(data: Mapping[str, object]) -> str:
-    """Data as one JSON object; what is undefined is null."""
+    """Data as one JSON object; undefined numbers are null."""
     return json.dumps(_speakable(data), indent=1, allow_nan=False)
 
 
 def _speakable(data: object) -> object:
-    """Data without the numbers JSON cannot say."""
+    """Data with None in place of numbers that JSON does not have."""
     if isinstance(data, Mapping):
         return {name: _speakable(value) for name, value in data.items()}
     if isinstance(data, list | tuple):
@@ -85,7 +85,7 @@ def _speakable(data: object) -> object:
 
 
 def text(path: Path, content: str) -> None:
-    """Write text. Raises BadInput where it cannot be written."""
+    """Write text. Raises BadInput if it cannot be written."""
     atomically(path, lambda place: _put(content, place))
 
 
@@ -94,10 +94,10 @@ def _put(content: str, place: Path) -> None:
 
 
 def answer(folder: Path, solution: Solution, scene: Scene, comma: bool = False) -> list[Path]:
-    """Write an answer into a folder: answer.json, table.csv, curves.csv, and linkage.svg where there is one to draw.
+    """Write an answer into a folder: answer.json, table.csv, curves.csv, and linkage.svg if there is a drawing.
 
-    All of them or, where one cannot be written, none; a path that ends in .xlsx takes a workbook instead. comma:
-    whether CSV has decimal commas. Returns the files. Raises BadInput.
+    All files are written, or none if one of them cannot be. For a path that ends in .xlsx a workbook is written
+    instead. comma: whether CSV has decimal commas. Returns the files. Raises BadInput.
     """
     from loomopt.interface.files import svg
 
@@ -157,9 +157,9 @@ def answer_sheets(solution: Solution, scene: Scene) -> "dict[str, pd.DataFrame]"
 
 
 def check_answer(path: Path) -> None:
-    """Raise BadInput, before anything is computed, where an answer cannot be written there.
+    """Raise BadInput if an answer cannot be written to a path; called before any computation.
 
-    A name with an ending is a file's, never a new folder's.
+    A name with an ending is that of a file, not of a new folder.
     """
     if path.suffix and not path.is_dir():
         if path.suffix.lower() != WORKBOOK:
@@ -174,7 +174,7 @@ def check_answer(path: Path) -> None:
 
 
 def _make(folder: Path, missing: Sequence[Path]) -> None:
-    """Make the missing folders on the way to a folder, the innermost of which is named first."""
+    """Make the missing folders of a path; missing: innermost first."""
     try:
         for place in reversed(missing):
             place.mkdir(exist_ok=True)
@@ -183,7 +183,7 @@ def _make(folder: Path, missing: Sequence[Path]) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """Raise BadInput, before anything is computed, where an answer's folder or its files cannot be."""
+    """Raise BadInput if the folder of an answer or its files cannot be written; called before any computation."""
     try:
         taken = next((place for place in (folder, *folder.parents) if place.exists()), folder)
         if not taken.is_dir():
@@ -201,7 +201,7 @@ def _no_folder(folder: Path, reason: str) -> BadInput:
 
 
 def check_files(figures: Sequence[Path] = (), tables: Sequence[Path] = ()) -> None:
-    """Raise BadInput, before anything is computed, where figures or tables cannot be written as these files."""
+    """Raise BadInput if figures or tables cannot be written to these files; called before any computation."""
     for paths, endings in ((figures, PICTURES), (tables, sheets.ENDINGS)):
         for path in paths:
             suffix(path, endings)
@@ -209,9 +209,9 @@ def check_files(figures: Sequence[Path] = (), tables: Sequence[Path] = ()) -> No
 
 
 def write_table(path: Path, frame: "pd.DataFrame", name: str = "points", comma: bool = False) -> None:
-    """Write a table as its file's ending says, its provenance in it. Raises BadInput.
+    """Write a table with its provenance, in the format of the file's ending. Raises BadInput.
 
-    name: of its sheet in a workbook; comma: whether CSV has decimal commas.
+    name: name of the sheet in a workbook; comma: whether CSV has decimal commas.
     """
     shown = frame if suffix(path, sheets.ENDINGS) == ".parquet" else tables.meaningful(frame)
     sheets.write(path, {name: shown}, comma)
@@ -227,10 +227,10 @@ def curves(
     measured: Path | None = None,
     comma: bool = False,
 ) -> None:
-    """Write a design's curves as a table or a figure, by the file's ending; accuracy: of peaks, for few rows.
+    """Write the curves of a design as a table or a figure, by the file's ending.
 
-    target: the one the design was found for, named in the table; subject: the design in words, for the title.
-    measured: a file of measured curves; comma: whether CSV has decimal commas.
+    accuracy: of peaks, for as few rows as it needs. target: target of the design, for the provenance; subject:
+    description of the design, for the title. measured: file of measured curves; comma: decimal commas in CSV.
     """
     ending = suffix(path, CURVES)
     frame = tables.curves(scene, design, accuracy, target, measured)
@@ -250,7 +250,7 @@ def plot(
     path: Path | None,
     measured: str | os.PathLike[str] | None = None,
 ) -> "Figure":
-    """Curves of an evaluated design as a figure; path: a file to write it to as well. Raises BadInput."""
+    """Figure of the curves of an evaluated design; path: file to write. Raises BadInput."""
     from loomopt.interface.figures import figure
 
     if path:
@@ -266,9 +266,9 @@ def plot(
 def plot_curves(
     frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], design_subject: DrawnSubject | None = None
 ) -> "Figure":
-    """Curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
+    """Figure of curves, SI, in the units of the scene, with the marks of the job and the curves of today's machine.
 
-    design: SI; today's without one. design_subject: the design in words, for the title.
+    design: SI; empty for today's. design_subject: description of the design, for the title.
     """
     from loomopt.interface.figures import curves
     from loomopt.picture.panels import in_units
@@ -290,7 +290,7 @@ def plot_curves(
 def describe_design(evaluated: Evaluated, target: str | None = None, status: str | None = None) -> DrawnSubject:
     """Description of the design of an evaluation or of an answer.
 
-    target, status: of the answer whose design was evaluated, where it was one's.
+    target, status: those of the answer, if the evaluated design is that of an answer.
     """
     broken = tuple(limit.name for limit in evaluated.limits if not limit.ok and not limit.rounding)
     if isinstance(evaluated, Solution):
@@ -305,7 +305,7 @@ def describe_design(evaluated: Evaluated, target: str | None = None, status: str
 
 @working()
 def drawing(scene: Scene, design: Design, subject: DrawnSubject | None = None) -> "Drawing":
-    """A design's mechanism in the positions that matter; subject: the design in words, for the title."""
+    """Drawing of a design's mechanism in its main positions; subject: description of the design, for the title."""
     drawn = registry.of(scene).views.linkage(scene, flat(design))
     return replace(drawn, title=f"{scene.name}: {subject.text if subject else GIVEN if design else TODAY}")
 
@@ -313,8 +313,8 @@ def drawing(scene: Scene, design: Design, subject: DrawnSubject | None = None) -
 class Workshop(NamedTuple):
     """Options of a drawing for the workshop.
 
-    version: of DXF, a key of `dxf.VERSIONS`; arcs: tolerance, m, within which closed curves are written as arcs of
-    circles, None for straight strokes; only: the one layer that is drawn, "" for all of them.
+    version: version of DXF, a key of `dxf.VERSIONS`; arcs: tolerance, m, of the arcs that replace closed curves, None
+    for straight lines; only: name of the only layer to write, "" for all layers.
     """
 
     version: str = "r2010"
@@ -329,7 +329,7 @@ straight strokes between these points leave (`jobs/shedding/drawing.py`, CURVE_C
 
 
 def workshop(version: str | None = None, arcs: str | None = None, only: str | None = None) -> Workshop:
-    """Read how a drawing is written: `export`'s options --dxf, --arcs and --only. Raises BadInput."""
+    """Options of a drawing from --dxf, --arcs and --only of `export`. Raises BadInput."""
     from loomopt.interface.files.dxf import R2010, VERSIONS
 
     chosen = (version or R2010).lower()
@@ -348,7 +348,7 @@ def workshop(version: str | None = None, arcs: str | None = None, only: str | No
 
 
 def check_workshop(paths: Sequence[Path], how: Workshop) -> None:
-    """Raise BadInput where no file of a call takes its options, before any is written; how: those options."""
+    """Raise BadInput if the options do not apply to the files; called before any is written; how: the options."""
     endings = {path: path.suffix.lower() for path in paths}
     if how._replace(only="") != USUAL and ".dxf" not in endings.values():
         remedy = "Name a file that ends in .dxf"
@@ -368,9 +368,9 @@ def linkage(
     comma: bool = False,
     how: Workshop = USUAL,
 ) -> None:
-    """Write a design's linkage in the positions that matter, as its file's ending says (`DRAWINGS`).
+    """Write the linkage of a design in its main positions, in the format of the file's ending (`DRAWINGS`).
 
-    comma: whether CSV has decimal commas; how: it is drawn and written. Raises BadInput.
+    comma: whether CSV has decimal commas; how: options of the drawing. Raises BadInput.
     """
     ending = suffix(path, tuple(DRAWINGS))
     if ending == ".dxf":
@@ -400,7 +400,7 @@ def _svg(path: Path, scene: Scene, design: Design, subject: DrawnSubject | None)
 
 
 def only(drawn: "Drawing", layer: str) -> "Drawing":
-    """One layer of a drawing alone, without dimensions and legend. Raises BadInput where it has no such layer."""
+    """One layer of a drawing, without dimensions and legend. Raises BadInput for an unknown layer."""
     from loomopt.picture.shapes import Text
 
     if layer not in drawn.layers:
@@ -414,7 +414,7 @@ def only(drawn: "Drawing", layer: str) -> "Drawing":
 
 
 def with_arcs(drawn: "Drawing", tolerance: float) -> "Drawing":
-    """A drawing whose closed curves are arcs of circles that touch each other, within a tolerance, m."""
+    """Drawing whose closed curves are replaced by tangent circular arcs, within a tolerance, m."""
     from loomopt.maths.arcs import closed_biarcs
     from loomopt.picture.shapes import Line, Point
 
@@ -433,7 +433,7 @@ CORNERED = 12
 
 
 def _dxf(path: Path, scene: Scene, design: Design, subject: DrawnSubject | None, how: Workshop = USUAL) -> None:
-    """Write a linkage as DXF at true scale, its lengths with their tolerances."""
+    """Write a linkage as DXF at true scale, with the tolerances of its lengths."""
     from loomopt.interface.files import dxf
     from loomopt.studies.tolerance.plan import read_tolerances
 
@@ -453,7 +453,7 @@ DRAWINGS: dict[str, Writer] = {".svg": _svg, ".dxf": _dxf, ".csv": _joints, ".xl
 
 
 def picture(path: Path, scene: Scene, design: Design, subject: DrawnSubject | None = None) -> None:
-    """Draw a design's linkage in the positions that matter as a picture."""
+    """Write a picture of a design's linkage in its main positions."""
     from loomopt.interface.figures import figure
 
     suffix(path, PICTURES)

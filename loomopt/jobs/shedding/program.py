@@ -1,4 +1,4 @@
-"""From a shedding scene and a target to the program: variables, limits, objectives and starts."""
+"""Program of a shedding scene and a target: variables, limits, objectives and starts."""
 
 import functools
 import math
@@ -49,11 +49,11 @@ steps at most, and the share of the speed after which there is none left to take
 
 
 def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most: float, slack: float = 0.0) -> float:
-    """Speed, rad/s, up to which a signed quantity stays at most `most`, SI; infinite where it always does.
+    """Speed, rad/s, up to which a signed quantity is at most `most`, SI; infinite without such a speed.
 
     It is quadratic in the speed at every crank angle: the first root is sampled, then followed by Newton's method
-    with the refined largest value. 0 where the bound is broken at rest. slack, SI: an excess that counts as none, at
-    rest and up to the mechanism's own speed: what a solve leaves of a bound that is met exactly.
+    with the refined largest value. 0 if the bound is violated at rest. slack, SI: permitted excess at rest and
+    up to the speed of the mechanism, because a solve meets an active bound only to rounding.
     """
     nominal = float(values["speed"])
     at_rest = sampled(model, {**values, "speed": 0.0})
@@ -147,7 +147,7 @@ def scene_numbers(scene: Scene) -> dict[str, float]:
 
 
 def model(scene: Scene, law: CamLaw | None = None, speed_rows: tuple[str, ...] = ()) -> JobModel:
-    """Frame with the effects the scene calls for; law: another than the scene's; speed_rows: of model.SPEED_ROWS."""
+    """Frame with the effects of the scene; law: replaces that of the scene; speed_rows: of model.SPEED_ROWS."""
     free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
     several = moves(scene)
     dwells = (True, True) if free or several else has_dwells(scene.mechanism)
@@ -157,19 +157,19 @@ def model(scene: Scene, law: CamLaw | None = None, speed_rows: tuple[str, ...] =
 
 
 def largest_contact_speed(sampler: Sampler, least: float) -> float:
-    """Speed, rad/s, up to which the cam force stays at least `least`, N, as closely as a solve keeps it."""
+    """Speed, rad/s, up to which the cam force is at least `least`, N, to the accuracy of a solve."""
     slack = ACCURACY * abs(sampler.static["spring_force_max"])
     return speed_reached(sampler.model, sampler.values, "lift", -least, slack)
 
 
 def has_contact_speed(physics: JobModel) -> bool:
-    """Whether a load grows with the speed, so that the roller leaves the cam at a speed that is known."""
+    """Whether the speed at which the roller leaves the cam is known, because a load grows with the speed."""
     unknown = drive.motor(physics.effects) or physics.known_in
     return not unknown and any(load.moved for load in physics.loads if isinstance(load, Load))
 
 
 def contact_speed(scene: Scene, sampler: Sampler) -> float | None:
-    """Speed, rad/s, up to which the roller stays on the cam; None where none ends that, or it is unknown."""
+    """Speed, rad/s, up to which the roller stays on the cam; None if there is no such speed, or it is unknown."""
     if not has_contact_speed(sampler.model):
         return None
     speed = largest_contact_speed(sampler, scene.operation["N_min"])
@@ -177,9 +177,9 @@ def contact_speed(scene: Scene, sampler: Sampler) -> float | None:
 
 
 def contact_speeds(machines: "Machines") -> Floats | None:
-    """Speed, rad/s, up to which each roller stays on its cam, (machines,); infinite where none ends that.
+    """Speed, rad/s, up to which each roller stays on its cam, (machines,); infinite without such a speed.
 
-    As `speed_reached`, but that at each cam angle the inverse of the first root is a curve, and refined as one.
+    As in `speed_reached`, but the inverse of the first root over the cam angle is refined like a curve.
     """
     if not has_contact_speed(machines.model):
         return None
@@ -222,7 +222,7 @@ def _inverse_shares(machines: "Machines", runs: "Sequence[Machines]", least: Flo
 
 
 def demand_moving(scene: Scene, instead: str) -> None:
-    """Raise BadInput where contact holds, or is lost, whatever the speed; instead: what else could be done."""
+    """Raise BadInput if contact does not depend on the speed; instead: remedy in the message."""
     if contact_speed(scene, sampled(model(scene), scene_numbers(scene))) is None:
         problem = "nothing limits the speed: the roller stays on the cam at any speed"
         keys = "effects.inertia.M, mechanism.travel, effects.warp_tension.shape"
@@ -232,7 +232,7 @@ def demand_moving(scene: Scene, instead: str) -> None:
 
 @final
 class SpringScale:
-    """force, N: the largest sum of the loads' magnitudes, the spring apart; stiffness, N/m: what keeps contact.
+    """Scales of spring and forces. force, N: largest sum of the loads without the spring; stiffness, N/m: for contact.
 
     sampler: the frame today; stretch: the largest elongation its spring may have, m; most: its largest stiffness.
     """
@@ -260,35 +260,35 @@ class SpringScale:
 
 @final
 class SheddingTask(Task):
-    """The frame between its cam and its return spring; of target law the cam's knots are variables too."""
+    """Task of the frame between cam and return spring; for the target law the knots of the cam are variables."""
 
     read_from = Frozen({name: (row,) for name, row in CYCLE.items()} | {CONTACT_SPEED: ()})
     remedy = f"Give the follower ({', '.join(FOLLOWER)}), or take the limit out."
 
     @lazy
     def law(self) -> Spline | None:
-        """The free cam law of target law."""
+        """Free cam law of the target law; None for other targets."""
         table = self.scene.table(LawTarget)
         return Spline(table.intervals, table.symmetric) if self.target == "law" else None
 
     @lazy
     def known(self) -> dict[str, float]:
-        """Every number of the scene, with the knots of its law or those that a free one starts from."""
+        """Every number of the scene, with the knots of its law, or the starting knots of a free law."""
         return scene_numbers(self.scene) | named_knots(cam_spline.cycloid_like(self.law.intervals) if self.law else ())
 
     @property
     def varies_speed(self) -> bool:
-        """Whether the cam shaft's speed is sought."""
+        """Whether the speed of the cam shaft is optimised."""
         return self.target == "speed" or "speed" in self.traded
 
     @property
     def varies_contact_speed(self) -> bool:
-        """Whether the speed up to which contact holds is sought."""
+        """Whether the speed up to which contact holds is optimised."""
         return CONTACT_SPEED in self.traded
 
     @lazy
     def minima(self) -> Minima:
-        """Minimum of the speed up to which contact holds; of the shaft's speed where that is optimised."""
+        """Minimum of the speed up to which contact holds, or of the shaft speed if that is optimised."""
         limit = self.scene.limits.get(CONTACT_SPEED)
         if limit is None or not limit.min:
             return {}
@@ -300,7 +300,7 @@ class SheddingTask(Task):
 
     @lazy
     def speed_rows(self) -> tuple[str, ...]:
-        """Contact at rest, and at the speed up to which it must hold. Raises BadInput where none ends it."""
+        """Rows of contact at rest and at the speed up to which it must hold. Raises BadInput without such a speed."""
         if self.minima:
             demand_moving(self.scene, f"take limits.{CONTACT_SPEED} out")
         if self.varies_contact_speed:
@@ -315,12 +315,12 @@ class SheddingTask(Task):
 
     @lazy
     def model(self) -> JobModel:
-        """The frame with its law, and with contact at other speeds where that is limited."""
+        """The frame with its law, and with the rows of contact at other speeds."""
         return model(self.scene, self.law, self.speed_rows)
 
     @lazy
     def fastest(self) -> float:
-        """The speed that today's spring survives, rad/s; 0 where no speed is sought."""
+        """Speed up to which today's spring keeps contact, rad/s; 0 if no speed is optimised."""
         if not (self.varies_speed or self.varies_contact_speed):
             return 0.0
         speed = largest_contact_speed(
@@ -330,7 +330,7 @@ class SheddingTask(Task):
 
     @lazy
     def fixed_names(self) -> list[str]:
-        """Numbers that the target does not change: the travel, and the speed where an effect needs it."""
+        """Numbers that the target does not change: the travel, and the speed if an effect needs it."""
         needed = {key for effect in self.scene.active for key in effect.needs}
         travel = ["travel"] if "travel" in self.scene.mechanism else []
         return [*travel, *(["speed"] if SPEED in needed else [])]
@@ -341,7 +341,7 @@ class SheddingTask(Task):
         return [effect for effect in self.scene.active if isinstance(effect, Check)]
 
     def decides(self, check: Check[Any]) -> bool:
-        """Whether a check affects the program: it demands something, or is minimised, limited or sought."""
+        """Whether a check affects the program by a demand, an objective, a limit or an axis."""
         names = {*self.scene.limits, *self.traded}
         return bool(check.demands or check.least or check.axes or names & {*check.over_cycle, *check.rows})
 
@@ -349,7 +349,7 @@ class SheddingTask(Task):
 
     @lazy
     def bounded(self) -> tuple[Variable, ...]:
-        """Variables of the target, and numbers that it fixes: variables without room, so that they have a price."""
+        """Variables of the target, and fixed numbers as variables with equal bounds, so that they have a price."""
         scene, known = self.scene, self.known
         free = {scene.full(name) for name, bound in scene.bounds.items() if bound.free} - {"near_dwell"}
         ends = {name: pair for name, pair in self.limited.items() if name in free}
@@ -401,7 +401,7 @@ class SheddingTask(Task):
         return [*limits, *self.figures(), *self.demands(), *self.law_limits()]
 
     def bounds(self) -> list[Limit]:
-        """Bounds of variables as limits; a requirement gives way on one side only."""
+        """Bounds of variables as limits; a requirement can be relaxed on one side only."""
         limits: list[Limit] = []
         knots = set(self.law.names) if self.law else set()
         for v in (v for v in self.bounded if v.name not in knots):
@@ -418,7 +418,7 @@ class SheddingTask(Task):
         return limits
 
     def contact(self) -> list[Limit]:
-        """Limit that is the job: contact where the warp's pull is known, up to a speed that is traded."""
+        """Limit of contact where the pull of the warp is known; also at the speed that is an axis."""
         least, size = self.known["N_min"], self.sizes.force
         row = FASTEST if self.varies_contact_speed and not self.varies_speed else LIFT
         limit = self.row_limit("N_min", -1, row, least, size, relaxable=least > 0.0)
@@ -429,7 +429,7 @@ class SheddingTask(Task):
         return [limit, *speed_limits]
 
     def angles(self) -> list[Limit]:
-        """Limit on the near dwell, which takes the rest of the turn, where another angle is free."""
+        """Limits on the near dwell, the remainder of the turn, if another angle is free."""
         if not any(self.scene.bounds[name].free for name in SEGMENTS if name in self.scene.bounds):
             return []
         low, high = self.limited.get("near_dwell", (0.0, math.inf))
@@ -440,7 +440,7 @@ class SheddingTask(Task):
         ]
 
     def figure(self, name: str, low: float | None, high: float | None) -> list[Limit]:
-        """Scene's limits on a figure; the least of a quantity is the largest of its opposite."""
+        """Limits of the scene on a figure; the least of a quantity is the largest of its negative."""
         if name == CONTACT_SPEED or (name == "law_acceleration" and self.law):
             return []
         row, sides = (
@@ -457,19 +457,19 @@ class SheddingTask(Task):
         return abs(value) or (abs(self.sampler.peak(row)) if self.model.has_quantity(row) else 0.0) or 1.0
 
     def margin_size(self, row: str) -> float:
-        """Scale of a check's margins; 0 where the frame gives none."""
+        """Scale of a check's margins; 0 if the frame gives none."""
         known = {"stiffness": self.sizes.stiffness, "pressure": 100 * MEGA, "force": self.sizes.force}
         return known.get(self.scene.schema.margins.get(row, ""), 0.0)
 
     @property
     def most_acceleration(self) -> float:
-        """The largest |s''| a free law may have."""
+        """Largest |s''| of a free law."""
         limit = self.scene.limits.get("law_acceleration")
         bound = limit.max if limit else None
         return float(self.scene.table(LawTarget).acceleration if bound is None else bound)
 
     def law_limits(self) -> list[Limit]:
-        """Limits that make a free law a cam law: it reaches 1 at rest, never falls, and keeps its peak s''."""
+        """Limits of a free cam law: it ends at 1 at rest, never decreases, and limits its peak s''."""
         law = self.law
         if law is None:
             return []
@@ -487,13 +487,13 @@ class SheddingTask(Task):
         ]
 
     def goals(self) -> tuple[Goal, ...]:
-        """Goal of contact, which may be out of reach."""
+        """Goal of contact, which may be impossible."""
         return goals(replace(n, name="contact_min") for n in self.contact() if n.name == "N_min" and n.row == LIFT)
 
     # Levels, starts and moves.
 
     def objectives(self) -> tuple[Objective, ...]:
-        """Target's levels in order; what checks would have least comes after the spring."""
+        """Levels of the target in order; the objectives of checks follow the spring."""
         if self.target == "force":
             return (Peak("contact_max", "cam_force", self.sizes.force),)
         if self.target == "speed":
@@ -517,13 +517,13 @@ class SheddingTask(Task):
         return tuple(starts)
 
     def moves(self) -> list[Move]:
-        """Variables that may not change anything: a preload that is not needed, and those that checks name."""
+        """Moves of variables that may have no influence: the preload, and those that checks name."""
         rooms = {v.name for v in self.variables if v.lower < v.upper}
         preload = [self.move("preload", "X0")] if "X0" in rooms else []
         return [*preload, *(move for move in self.axis_moves() if set(move.along) <= rooms)]
 
     def follow(self) -> Callable[[JobModel, Numbers], Numbers]:
-        """Solved variable for the speed up to which contact holds, where that is sought."""
+        """Function for the speed up to which contact holds, if that is optimised."""
         reached = functools.partial(largest_contact_speed, least=self.known["N_min"])
         return functools.partial(solved_speed, CONTACT_SPEED, reached) if self.varies_contact_speed else nothing_follows
 
@@ -550,7 +550,7 @@ class SheddingTask(Task):
 
     @lazy
     def sizes(self) -> SpringScale:
-        """Of the spring and of forces, from the frame today."""
+        """Scales of the spring and of forces, from today's frame."""
         most = self.limited["K1"][1] if "K1" in self.scene.bounds else math.inf
         return SpringScale(self.sampler, self.limited["X0"][1] + self.known["travel"], most)
 

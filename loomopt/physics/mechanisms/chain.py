@@ -1,18 +1,18 @@
 """A planar linkage of one degree of freedom: a chain of parts, each placed by one formula on those before it.
 
-What a caller uses:
-    linked = Chain(parts)                              parts in an order in which each hangs on those before it
+Interface:
+    linked = Chain(parts)                              parts in order: each depends only on those before it
     pose = linked.pose(maths, values, phi, switch)     the linkage at crank angles φ, rad, in any number system
     pose.joints[name].at(k), .place                    k-th derivative of a joint, m (None: zero); its place
     pose.links[name].unit(), .rates(k), .point(a, b)   direction; derivatives of its angle; a point of it as a joint
     pose.slides[name].at(k)                            place of a slider, or in a slot, m, and its derivatives
     pose.vector(link), pose.obliquity(part)            direction of any length; π/2 less the transmission angle, rad
-    pose.margins[part].spans[name]()                   1 where a group is singular; `closes(part)` says them in words
-    fault(linked, values, shown)                       the part that does not close, and at which crank angle, in words
+    pose.margins[part].spans[name]()                   1 where a group is singular; `closes(part)` has their phrases
+    fault(linked, values, shown)                       sentence on the part that does not close, with the crank angle
     linked.joints, .links, .slides, .pivots            names; .bars, .bodies: what is drawn
-    provides(part), wants(part)                        names that a part places, and hangs on
-    linked.cams, .corners(cam, …), .switch(…)          cams: the node's switch says in which stretch each of them is
-A part's number is a name in `values`, its opposite, or a literal (Ref); the literal 0 is in no formula.
+    provides(part), wants(part)                        names that a part places, and names that it depends on
+    linked.cams, .corners(cam, …), .switch(…)          cams: a switch of the node selects the interval of each
+A number of a part is a name in `values`, its negative, or a literal (Ref); the literal 0 is in no formula.
 """
 
 import functools
@@ -50,7 +50,7 @@ NO_SWITCH: Values = Frozen()
 
 
 class Ref(NamedTuple):
-    """A number of the scene by its name, or its opposite (sign −1); without a name the literal `value`, SI."""
+    """Number of the scene by name, or its negative (sign −1); without a name the literal `value`, SI."""
 
     name: str
     sign: int = 1
@@ -63,10 +63,10 @@ NOTHING = Ref("")
 
 @dataclass(frozen=True)
 class Part:
-    """One part.
+    """One part of a linkage.
 
-    kind: a key of KINDS; words: by key, what it hangs on and what it places; refs: by key, its numbers (a link's length
-    under the link's name).
+    kind: a key of KINDS; words: by key, the names that it depends on and that it places; refs: by key, its numbers (the
+    length of a link under the name of the link).
     """
 
     kind: str
@@ -102,7 +102,7 @@ class Part:
 
 @dataclass
 class ChainPose:
-    """The linkage at crank angles φ, rad, any shape; values: numbers by name, SI; switch: the cams' pieces there."""
+    """Linkage at crank angles φ, rad, of any shape; values: numbers by name, SI; switch: intervals of the cams."""
 
     maths: Maths
     values: Values
@@ -114,7 +114,7 @@ class ChainPose:
     margins: dict[str, Closure] = field(default_factory=dict)
 
     def number(self, part: Part, key: str) -> Number | None:
-        """Part's number; None for one that is not given, and for a literal 0."""
+        """Number of a part; None if it is not given, or a literal 0."""
         ref = part.numbers.get(key)
         if ref is None:
             return None
@@ -127,12 +127,12 @@ class ChainPose:
         return self.links[link].heading()
 
     def obliquity(self, part: str) -> Number:
-        """Amount by which a group's transmission angle falls short of a right angle, rad; negative beyond it."""
+        """Right angle minus the transmission angle of a group, rad."""
         margin = self.margins[part]
         return self.maths.atan2(margin.inward(), margin.across())
 
     def place(self, part: Part) -> None:
-        """Put a part on those that are there."""
+        """Place a part on those that are placed already."""
         KINDS[part.kind](self, part)
 
 
@@ -144,7 +144,7 @@ def _pivot(pose: ChainPose, part: Part) -> None:
 
 
 def _crank(pose: ChainPose, part: Part) -> None:
-    """Place what turns with φ: angle = start + ratio φ. Another ratio is a gear on the main shaft."""
+    """Place a crank: angle = start + ratio φ. A ratio other than 1 is a gear on the main shaft."""
     ratio, start, phi = part.ratio, pose.number(part, "start"), pose.phi
 
     def angle() -> Number:
@@ -156,7 +156,7 @@ def _crank(pose: ChainPose, part: Part) -> None:
 def _by_angle(
     pose: ChainPose, part: Part, angle: Callable[[], Number | None], rates: Callable[[int], Number | None]
 ) -> None:
-    """Place a link whose angle from x is known, rad, with its derivatives."""
+    """Place a link by its angle from x, rad, and the derivatives of this angle."""
     maths = pose.maths
     _turning(pose, part, Link(pose.joints[part.word("at")], lambda: polar(maths, angle()), rates, angle=angle))
 
@@ -171,8 +171,8 @@ def _turning(pose: ChainPose, part: Part, link: Link) -> None:
 def _gear(pose: ChainPose, part: Part) -> None:
     """Place a gear: its angle from the carrier is start + ratio (angle of its mate from the carrier − zero).
 
-    ratio < 0: they mesh from outside. A whole ratio needs no angle: unit vectors are multiplied as complex numbers.
-    Another one takes the mate's angle from the carrier between zero − π and zero + π.
+    ratio < 0: external mesh. A whole ratio needs no angle: unit vectors are multiplied as complex numbers. Any other
+    ratio uses the angle of the mate from the carrier between zero − π and zero + π.
     """
     mate, carrier = pose.links[part.word("with")], pose.links[part.word("carrier") or FRAME_NAME]
     ratio, start, zero, maths = part.ratio, pose.number(part, "start"), pose.number(part, "zero"), pose.maths
@@ -198,13 +198,13 @@ def _gear(pose: ChainPose, part: Part) -> None:
 
 
 def _counted(maths: Maths, mate: Link, carrier: Link, zero: Number | None) -> Vector:
-    """Direction of a gear's mate as seen from its carrier, counted from zero."""
+    """Direction of a gear's mate relative to its carrier, from the angle zero."""
     seen = seen_from(carrier.unit(), mate.unit())
     return seen if zero is None else seen_from(polar(maths, zero), seen)
 
 
 def _power(unit: Vector, exponent: int) -> Vector:
-    """Unit vector whose angle is a whole multiple of another's."""
+    """Unit vector whose angle is `exponent` times that of another."""
     if exponent < 0:
         unit, exponent = Vector(unit.x, -unit.y), -exponent
     power = X
@@ -216,14 +216,14 @@ def _power(unit: Vector, exponent: int) -> Vector:
 
 
 def _cam(pose: ChainPose, part: Part) -> None:
-    """Place a link that a cam turns; which stretch of its turn it is in is data of the node: `Chain.corners`."""
+    """Place a link that a cam turns; the interval of the cam is data of the node (`Chain.corners`)."""
     start, lift = pose.number(part, "start"), pose.number(part, "lift")
     at = DwellCam(pose.maths, _lasts(pose, part), lift, pose.phi, pose.switch[cam_switch(part)])
     _by_angle(pose, part, lambda: total(at.angle(0), start), at.angle)
 
 
 def cam_switch(part: Part) -> str:
-    """Name under which a node says in which stretch of its turn a cam is."""
+    """Name of the switch for the interval of a cam."""
     return f"cam {part.name}"
 
 
@@ -316,24 +316,24 @@ def provides(part: Part) -> tuple[str, ...]:
 
 
 def wanted_joints(part: Part) -> tuple[str, ...]:
-    """Joints that a part hangs on."""
+    """Joints that a part depends on."""
     names = (*part.names("joins"), *(part.word(key) for key in ("at", "from", "through")))
     return tuple(name for name in names if name)
 
 
 def wanted_links(part: Part) -> tuple[str, ...]:
-    """Links that a part hangs on; the frame is always there."""
+    """Links that a part depends on, without the frame."""
     names = (part.word(key) for key in ("on", "guide", "with", "carrier"))
     return tuple(name for name in names if name not in ("", FRAME_NAME))
 
 
 def wants(part: Part) -> tuple[str, ...]:
-    """Joints and links that a part hangs on."""
+    """Joints and links that a part depends on."""
     return wanted_joints(part) + wanted_links(part)
 
 
 def closes(part: Part) -> Mapping[str, str]:
-    """Spans of a part's margin by what they say: "drive: B to D < rod + rocker"."""
+    """Spans of a part's margin by phrase, such as "drive: B to D < rod + rocker"."""
     if part.kind == "dyad":
         (a, b), (one, other) = part.names("joins"), part.names("links")
         far, near = f"{part.name}: {a} to {b} < {one} + {other}", f"{part.name}: {a} to {b} > |{one} - {other}|"
@@ -360,7 +360,7 @@ def has_transmission_angle(part: Part) -> bool:
 
 @dataclass(frozen=True)
 class Chain:
-    """Parts in an order in which each hangs on those before it, apart from their numbers."""
+    """Parts in order, without their numbers: each depends only on those before it."""
 
     parts: tuple[Part, ...]
 
@@ -373,15 +373,15 @@ class Chain:
 
     @lazy
     def cams(self) -> tuple[Part, ...]:
-        """The parts whose turn falls into stretches of formulas of their own."""
+        """Cams of the linkage: parts with one formula for each interval of the turn."""
         return tuple(part for part in self.parts if part.kind == "cam")
 
     def corners(self, cam: Part, maths: Maths, values: Values) -> tuple[Number, ...]:
-        """Crank angles, rad, between the stretches of a cam, for `dwell_cam.stretch`."""
+        """Crank angles, rad, between the intervals of a cam, for `dwell_cam.stretch`."""
         return _lasts(ChainPose(maths, values, None), cam).corners(maths)
 
     def switch(self, values: Values, phi: "Floats") -> dict[str, Number]:
-        """Stretches in which all cams are at crank angles φ, rad, as a node has them."""
+        """Intervals of all cams at crank angles φ, rad, as the switches of a node."""
         return {cam_switch(cam): stretches(phi, self.corners(cam, FLOAT, values)) for cam in self.cams}
 
     @lazy
@@ -396,7 +396,7 @@ class Chain:
 
     @lazy
     def slides(self) -> tuple[str, ...]:
-        """The names of the parts in which something slides."""
+        """The names of the sliders and slots."""
         return tuple(part.name for part in self.parts if part.kind in ("slider", "slot"))
 
     @lazy
@@ -423,7 +423,7 @@ class Chain:
 
     @lazy
     def bodies(self) -> Mapping[str, tuple[str, ...]]:
-        """All joints of each link, those of a plate in the order in which they came; the frame's are its pivots."""
+        """All joints of each link in the order of their parts; those of the frame are its pivots."""
         joints: dict[str, tuple[str, ...]] = {FRAME_NAME: self.pivots}
         for link, a, b in self.bars:
             joints[link] = tuple(dict.fromkeys((*joints.get(link, ()), a, b)))
@@ -437,9 +437,9 @@ close, a hundred times the rounding of a place."""
 
 
 def fault(chain: Chain, values: Values, shown: ShowValue = usual) -> str:
-    """Reason with the part that does not close and the crank angle, also where it only touches; "" where all close.
+    """Sentence on a part that does not close at a crank angle, or only just closes; "" if all parts close.
 
-    values: numbers by name, SI; shown(value, kind): a value as text in the reader's unit.
+    values: numbers by name, SI; shown(value, kind): text of a value in the unit of the scene.
     """
     import numpy as np
 
@@ -470,7 +470,7 @@ def _heights(chain: Chain, part: Part, span: str, values: Values, phi: "Floats")
 
 
 def _top(heights: "Callable[[Floats], Floats]") -> tuple[float, float]:
-    """Highest of heights(angles) over one turn, between samples too where it nears 1, and its angle, rad."""
+    """Maximum of heights(angles) over one turn and its angle, rad; refined between samples if it is near 1."""
     import numpy as np
 
     from loomopt.maths.turning_points import golden_section
@@ -498,7 +498,7 @@ def _cam_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> st
 
 
 def _gear_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> str:
-    """Reason where the angle that a gear of no whole ratio counts passes its end or does not come back."""
+    """Sentence on a gear without a whole ratio whose angle leaves its range or does not return; "" if it is valid."""
     import numpy as np
 
     if isinstance(part.ratio, int):

@@ -23,9 +23,9 @@ from loomopt.solving.certificate.records import Binding, Certificate, GlobalBoun
 class Proof(NamedTuple):
     """Evidence on one limit, SI.
 
-    name: of the limit, or of the figure whose claimed peak it is. margin: by how much the refined value stays clear of
-    the limit, negative where it exceeds it; slack: what is left open; boxes: how many it took; angle: the crank angle,
-    rad, of that value where the limit fails; unit: SI, of margin and slack; open: the crank angle, rad, from which on
+    name: of the limit, or of the figure whose claimed peak it is. margin: distance of the refined value from
+    the limit, negative if it exceeds it; slack: permitted violation; boxes: number of boxes; angle: the crank angle,
+    rad, of that value if the limit fails; unit: SI, of margin and slack; open: the crank angle, rad, from which on
     an undecided one is left open.
     """
 
@@ -59,7 +59,7 @@ class Proof(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Proofs(Shown):
-    """All proofs of one design; in Jupyter they show themselves as a table."""
+    """All proofs of one design, a table in Jupyter."""
 
     problem: str
     target: str
@@ -105,10 +105,10 @@ ADVICE = {
 
 
 class Finding(NamedTuple):
-    """One limit beside its figure, SI; min or max is None where the limit has no such side.
+    """One limit with the value of its figure, SI; min or max is None if the limit does not have this side.
 
-    rounding: of one that is exceeded, whether by less than the rounding of the digits in which the design was given.
-    backed_off: required distance of a nominal design from it, SI.
+    rounding: whether the excess is less than the rounding of the digits in which the design was given.
+    backed_off: required margin of a nominal design, SI.
     """
 
     name: str
@@ -120,16 +120,16 @@ class Finding(NamedTuple):
     backed_off: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """The record as JSON data, without rounding and back-off where they say nothing."""
+        """The record as JSON data; rounding and back-off only if they are not zero."""
         return {
             name: value for name, value in self._asdict().items() if value or name not in ("rounding", "backed_off")
         }
 
 
 class Price(NamedTuple):
-    """A limit that binds; worth: objective figure → its fall per unit the limit is loosened, SI.
+    """Binding limit; worth: objective figure → its decrease per unit by which the limit is loosened, SI.
 
-    backed_off: how far from its value it binds already, SI.
+    backed_off: margin at which it binds, SI.
     """
 
     limit: str
@@ -149,10 +149,10 @@ class Price(NamedTuple):
 
 
 class JointPrice(NamedTuple):
-    """Limits that are worth more together than the sum of what each is worth alone.
+    """Limits whose joint price is more than the sum of their single prices.
 
-    worth: objective figure → its fall, SI, where each limit is loosened by one SI unit; alone: what each is worth by
-    itself; reading: both in the designer's own units, as a phrase.
+    worth: objective figure → its decrease, SI, if each limit is loosened by one SI unit; alone: price of each single
+    limit; reading: both in the units of the scene, as a phrase.
     """
 
     limits: tuple[str, ...]
@@ -164,7 +164,7 @@ class JointPrice(NamedTuple):
 
     @property
     def figure(self) -> str:
-        """The figure that it is a price of."""
+        """Figure of the price."""
         return next(iter(self.worth))
 
     @property
@@ -188,7 +188,7 @@ def named(names: Sequence[str]) -> str:
 class Relaxation(NamedTuple):
     """Amount by which a limit must be loosened to make a design possible, SI.
 
-    alone: this one limit suffices; in_proportion: it gives way by no more than a designer may think of.
+    alone: whether this one relaxation is sufficient; in_proportion: whether it is not much larger than the limit.
     """
 
     limit: str
@@ -201,7 +201,7 @@ class Relaxation(NamedTuple):
 
 
 def remedies(relaxations: Sequence[Relaxation]) -> list[tuple[Relaxation, ...]]:
-    """Remedies: limits that give way together, or one alone; those out of proportion come last."""
+    """Remedies: relaxations that are needed together, or a single one; those out of proportion come last."""
     together = tuple(relaxation for relaxation in relaxations if not relaxation.alone)
     groups = [together] if together else []
     groups += [(relaxation,) for relaxation in relaxations if relaxation.alone]
@@ -210,9 +210,9 @@ def remedies(relaxations: Sequence[Relaxation]) -> list[tuple[Relaxation, ...]]:
 
 @dataclass(frozen=True)
 class Clash:
-    """Why nothing is admissible: the relaxations that help, and where they lead (SI).
+    """Conflict of limits: the relaxations that help, and the design that they give (SI).
 
-    limits: those that clash, as phrases, with their names.
+    limits: conflicting limits by phrase, with their names.
     """
 
     limits: Mapping[str, str] = field(default_factory=dict)
@@ -221,7 +221,7 @@ class Clash:
 
 
 class Terms(Protocol):
-    """Judgement of a design beyond a target alone, such as by the limits on the axes of a front."""
+    """Limits and objectives of a design that differ from those of a target, such as those of a front."""
 
     @property
     def summary(self) -> str:
@@ -262,7 +262,7 @@ class Evaluated:
     """Changes of the scene by a member of a family: dotted key → value."""
 
     def __post_init__(self) -> None:
-        """Freeze what a frozen dataclass would leave open."""
+        """Freeze the mappings of the record."""
         freeze(self, "design", "figures", "units", "reached", "undefined")
 
     @property
@@ -271,7 +271,7 @@ class Evaluated:
         return all(limit.ok for limit in self.limits)
 
     def as_dict(self, target: str = "") -> dict[str, Any]:
-        """Object that `evaluate --json` prints; target: whose tables it tells."""
+        """Object that `evaluate --json` prints; target: target whose tables are listed."""
         data = {
             "problem": self.problem,
             "effects": list(self.effects),
@@ -290,7 +290,7 @@ class Evaluated:
 
 
 def _tables(scene: Scene, target: str) -> list[dict[str, object]]:
-    """Precision and misfit of each table that was read, as JSON data, without tables that are gone since."""
+    """Precision and misfit of each table that was read, as JSON data; missing tables are left out."""
     from loomopt.jobs import registry
 
     with contextlib.suppress(BadInput):
@@ -304,7 +304,7 @@ def changed(member: Evaluated) -> str:
 
 
 def demand_single(evaluation: Evaluated, data: str) -> None:
-    """Raise BadInput for a family, whose members each have their own; data: the requested data."""
+    """Raise BadInput for a family, whose members have separate results; data: the requested data."""
     if evaluation.members:
         origin = evaluation.scene.origin if evaluation.scene else ""
         remedy = "Take one member: answer.members[0], or its numbers set and its own target"
@@ -312,7 +312,7 @@ def demand_single(evaluation: Evaluated, data: str) -> None:
 
 
 def _member_dict(member: Evaluated, whole: Scene | None) -> dict[str, Any]:
-    """A member of a family as JSON data, with what it changes of the scene; whole: the scene of the family."""
+    """Member of a family as JSON data, with its changes of the scene; whole: scene of the family."""
     from loomopt.scenes import family
 
     target = family.of_target(whole) if whole else ""
@@ -321,9 +321,9 @@ def _member_dict(member: Evaluated, whole: Scene | None) -> dict[str, Any]:
 
 
 class Alternative(NamedTuple):
-    """Another design, with more or less added mass, beside which an answer makes little difference.
+    """Other design with more or less added mass, whose figures differ little from those of the answer.
 
-    added: name of the mass; share: of each figure that counts as little; chosen: whether the answer has less of it.
+    added: name of the mass; share: largest difference that counts as little; chosen: whether the answer has less mass.
     """
 
     added: str
@@ -346,7 +346,7 @@ class Alternative(NamedTuple):
 
 
 class Worse(NamedTuple):
-    """A figure that an answer does not seek and makes worse than today's machine has it, SI."""
+    """Figure that is not optimised and is worse than that of today's machine, SI."""
 
     figure: str
     today: float
@@ -370,7 +370,7 @@ class Yield(NamedTuple):
 
 
 class Robust(NamedTuple):
-    """Back-off of limits, so that machines hold them as they are made.
+    """Back-off of limits, so that manufactured machines satisfy them.
 
     sigmas: standard deviations of its own figure by which each keeps clear; requested_yield: the requested yield, if
     any; linear: standard deviations for it by the joint normal distribution, with which sampling begins; yields: share
@@ -451,7 +451,7 @@ class Rounded(NamedTuple):
 
 
 def risen(answer: "Solution", nominal: Evaluated) -> dict[str, float]:
-    """Rise of each objective of an answer above that of another design, SI."""
+    """Increase of each objective of an answer over that of another design, SI."""
     levels = answer.certificate.levels if answer.certificate else ()
     pairs = {
         level.objective: (answer.figures.get(level.objective), nominal.figures.get(level.objective)) for level in levels
@@ -473,10 +473,10 @@ DESIGN_IS = {
 
 
 class Sentences(NamedTuple):
-    """Sentences of an answer, "" where it has nothing to say.
+    """Sentences of an answer, "" if there is nothing to report.
 
-    result: what was reached, or why nothing was; limits: those that stop it; open: variables that may be others as
-    well; search: how far the best was looked for; explanations: what else there is to know, one after the other.
+    result: the result, or the reason of a failure; limits: limits that prevent more; open: variables that are not
+    unique; search: extent of the search; explanations: further sentences in order.
     """
 
     result: str = ""
@@ -490,13 +490,13 @@ NO_SENTENCES = Sentences()
 
 
 def joined(*sentences: str) -> str:
-    """Sentences as one text, without those that say nothing."""
+    """Sentences as one text, without empty ones."""
     return " ".join(sentence for sentence in sentences if sentence)
 
 
 @dataclass(frozen=True)
 class Solution(Evaluated):
-    """A solved target. `status` is ours, `solver["status"]` is IPOPT's own word."""
+    """Solved target. `status` is that of the certificate, `solver["status"]` that of IPOPT."""
 
     target: str = ""
     status: str = "failed"
@@ -531,7 +531,7 @@ class Solution(Evaluated):
     """Point of the solver, from which a neighbour's solve can start."""
 
     def __post_init__(self) -> None:
-        """Freeze what a frozen dataclass would leave open."""
+        """Freeze the mappings of the record."""
         freeze(self, "design", "figures", "units", "reached", "undefined", "solver", "time")
 
     @property
@@ -542,7 +542,7 @@ class Solution(Evaluated):
 
     @property
     def explanation(self) -> str:
-        """Explanation beyond figures and limits; for a family also who decides."""
+        """Further sentences of the answer; for a family also on the members that decide."""
         result = self.sentences.result if self.members and self.status == "optimal" else ""
         return joined(result, *self.sentences.explanations)
 
@@ -566,7 +566,7 @@ class Solution(Evaluated):
 
     @lazy
     def worse(self) -> tuple[Worse, ...]:
-        """Figures with a good end that it makes worse than today's by more than `WORSE`, beside what it seeks."""
+        """Figures that are not optimised and are worse than today's by more than `WORSE`."""
         if self.scene is None or self.status not in ("optimal", "uncertified") or self.today is None:
             return ()
         goals = {level.objective for level in self.certificate.levels} if self.certificate else set[str]()
@@ -662,7 +662,7 @@ def certificate_dict(certificate: Certificate) -> dict[str, Any]:
 
 
 def _scene_dict(scene: "Scene", target: str | None) -> dict[str, Any]:
-    """Scene and tables as JSON data from which it can be made again; target: as the call named it."""
+    """Scene and tables as JSON data, from which the scene can be rebuilt; target: as in the call."""
     from loomopt.scenes.numbers import tables
 
     call, files = scene.call.as_dict() | {"target": target}, tables(scene)
@@ -671,7 +671,7 @@ def _scene_dict(scene: "Scene", target: str | None) -> dict[str, Any]:
 
 
 def _finite(value: float | None) -> float | None:
-    """The number, or None for one that JSON cannot hold."""
+    """The number; None for NaN and infinity, which JSON does not have."""
     return value if value is not None and math.isfinite(value) else None
 
 
@@ -684,7 +684,7 @@ UNKNOWN = "number"
 
 
 def outward(value: float, side: int) -> float:
-    """Value rounded to six significant digits so that it gives no less room: up for a maximum."""
+    """Value rounded to six significant digits so that the admissible range does not shrink: up for a maximum."""
     if value == 0.0:
         return value
     step = 10.0 ** (math.floor(math.log10(abs(value))) - 5)
@@ -692,12 +692,12 @@ def outward(value: float, side: int) -> float:
 
 
 def grouped(unit: str) -> str:
-    """Unit that may stand after a stroke."""
+    """Unit in parentheses if it contains a stroke, for use after another stroke."""
     return f"({unit})" if "/" in unit else unit
 
 
 class UnitFormatter:
-    """The vocabulary of one scene: kinds and units of its variables and figures."""
+    """Kinds and units of the variables and figures of one scene, and texts with them."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -741,7 +741,7 @@ class UnitFormatter:
         return show(value, self.unit(name), digits)
 
     def outward(self, name: str, value: float, side: int) -> str:
-        """SI value that something never passes on a side, rounded outward, with its unit."""
+        """Bound, SI, rounded outward on a side, as text with its unit."""
         unit = self.unit(name)
         return show(outward(value / factor(unit), side) * factor(unit), unit)
 
