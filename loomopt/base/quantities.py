@@ -106,10 +106,10 @@ _SMALLEST, _LARGEST = Fraction(1, 10**60), Fraction(10**60)
 _PLAIN = re.compile(NUMBER_PATTERN)
 _QUANTITY = re.compile(rf"({NUMBER_PATTERN}) *(.*)", re.DOTALL)
 _RATIO = re.compile(rf"({NUMBER_PATTERN})(?: */ *({NUMBER_PATTERN}))?")
-_FRACTION = re.compile(r"(?:([0-9]{1,9}) +)?([0-9]{1,9}) */ *([0-9]{1,9}) *([a-z]*|[\"'″′])")
-_FEET = re.compile(r"([0-9]{1,9}(?:\.[0-9]+)?) *(?:ft|['′’])[ -]*([0-9]{1,9}(?:\.[0-9]+)?) *(?:in|inch|[\"″”])?")
-_GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[ _'’\u00a0\u202f][0-9]{3})+(?![0-9])")
-_ARITHMETIC = re.compile(r"[0-9.] *(?:\*\*|[-+*/^]) *\(?[0-9.]|(?<![eE])\+ *[0-9]|[-*/^] +[0-9]")
+_FRACTION = r"(?:([0-9]{1,9}) +)?([0-9]{1,9}) */ *([0-9]{1,9}) *([a-z]*|[\"'″′])"
+_FEET = r"([0-9]{1,9}(?:\.[0-9]+)?) *(?:ft|['′’])[ -]*([0-9]{1,9}(?:\.[0-9]+)?) *(?:in|inch|[\"″”])?"
+_GROUPED = r"[+-]?[0-9]{1,3}(?:[ _'’\u00a0\u202f][0-9]{3})+(?![0-9])"
+_ARITHMETIC = r"[0-9.] *(?:\*\*|[-+*/^]) *\(?[0-9.]|(?<![eE])\+ *[0-9]|[-*/^] +[0-9]"
 
 
 @functools.lru_cache(maxsize=_MOST_REMEMBERED)
@@ -267,20 +267,20 @@ def _misreading(text: str, kind: str, problem: str = "", remedy: str = "") -> Qu
         return _refusal(kind, "it is not a finite number")
     if re.match(r"[+-]?[0-9. ]*,", text):
         return _refusal(kind, "a comma stands in the number", "Write a decimal point and no thousands separators")
-    if _GROUPED.match(text):
+    if re.match(_GROUPED, text):
         return _refusal(kind, "the digits are grouped", "Write the digits without separators")
     if kind == "angular speed" and re.fullmatch(rf"{NUMBER_PATTERN} */ *(min|s|sec)", text):
         return _refusal(kind, "it does not say whether turns or radians are counted", "Write rpm or rad/s")
-    fraction = _FRACTION.fullmatch(text)
+    fraction = re.fullmatch(_FRACTION, text)
     if fraction:
         whole, over, under = (int(digits or 0) for digits in fraction.groups()[:3])
         decimal = f': "{whole + over / under:.10g} {ascii_unit(fraction[4])}"' if under else ""
         return _refusal(kind, "a fraction stands for the number", f"Write a decimal number{decimal}")
-    feet = _FEET.fullmatch(text) if kind == "length" else None
+    feet = re.fullmatch(_FEET, text) if kind == "length" else None
     if feet:
         inches = 12 * float(feet[1]) + float(feet[2])
         return _refusal(kind, "feet and inches are two numbers", f'Write one number: "{inches:.10g} in"')
-    if _ARITHMETIC.search(text):
+    if re.search(_ARITHMETIC, text):
         return _refusal(kind, "arithmetic is not evaluated", "Write the result as one number")
     if not re.match(r"[+\- .]*[0-9]", text):
         return _refusal(

@@ -16,13 +16,15 @@ from loomopt.model.session import working
 from loomopt.physics.cycle import TURN, Floats
 from loomopt.physics.effects.kinds import Event
 from loomopt.physics.tolerances import ACCURACY, SHOWN_AS_ZERO
-from loomopt.scenes import csv_tables, designs
+from loomopt.scenes import designs
 from loomopt.scenes.provenance import provenance
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Evaluated, Solution, UnitFormatter
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from loomopt.scenes import csv_tables
 
 REACHED = {None: "", True: "yes", False: "no"}
 
@@ -204,6 +206,8 @@ def curves(
         raise refusal(problem, scene.origin, "accuracy", remedy="Leave the accuracy out, or take the effect off")
     given: dict[str, tuple[float, ...]] = {}
     if measured is not None:
+        from loomopt.scenes import csv_tables
+
         place = Path(arguments.path(measured, "measured", "a table: .csv, .xlsx or .parquet", "Name one"))
         table = csv_tables.read_measured(place, _kinds(rows()))
         given = dict(table.columns)
@@ -257,7 +261,7 @@ def _add_measured(
     return measured_values
 
 
-def _measurement_notes(table: csv_tables.Table) -> dict[str, object]:
+def _measurement_notes(table: "csv_tables.Table") -> dict[str, object]:
     """Precision of measured columns, SI, and how what can be read in two ways was read."""
     precision = {f"precision_{name}": size for name, size in table.precision.items() if size}
     return precision | ({"read": "; ".join(table.remarks)} if table.remarks else {})

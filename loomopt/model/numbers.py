@@ -1,15 +1,17 @@
 """Numbers of a scene by full name, from all its tables."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from loomopt.base.errors import refusal
 from loomopt.maths import periodic_cubic
 from loomopt.maths.periodic_cubic import PeriodicCubic, PeriodicCubics
 from loomopt.physics.effects.kinds import Load, keys, label, owned, value_at
 from loomopt.physics.schema import Table
-from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene, cached
+
+if TYPE_CHECKING:
+    from loomopt.scenes import csv_tables
 
 CORNER = "corner"
 """The column that marks corners of a curve."""
@@ -50,7 +52,7 @@ def curves(scene: Scene) -> dict[tuple[str, str], Curve]:
     return {place: curve for place, (curve, _) in _curves(scene).items()}
 
 
-def _curves(scene: Scene) -> dict[tuple[str, str], tuple[Curve, csv_tables.Table]]:
+def _curves(scene: Scene) -> "dict[tuple[str, str], tuple[Curve, csv_tables.Table]]":
     """Curves that the scene's loads are, each with its table. Raises BadInput."""
     on = zip(scene.active, scene.effects.values(), strict=True)
     loads = [(effect, table) for effect, table in on if isinstance(effect, Load) and effect.tabulated]
@@ -60,12 +62,15 @@ def _curves(scene: Scene) -> dict[tuple[str, str], tuple[Curve, csv_tables.Table
     return {place: curve for place, curve in curve_tables.items() if curve is not None}
 
 
-def _curve(scene: Scene, load: Load[Any], parameters: Table) -> tuple[Curve, csv_tables.Table] | None:
+def _curve(scene: Scene, load: Load[Any], parameters: Table) -> "tuple[Curve, csv_tables.Table] | None":
     """Curve that a load's table names, with the table; None where it names none. Raises BadInput."""
     table = load.tabulated
     given = getattr(parameters, table.key) if table else None
     if table is None or given is None:
         return None
+    # Most scenes name no table.
+    from loomopt.scenes import csv_tables
+
     key = ".".join(("effects", *load.path, table.key))
     read = csv_tables.read(
         scene,
@@ -109,7 +114,7 @@ def table_remarks(scene: Scene) -> tuple[str, ...]:
     return tuple(record.summary for record in records(scene))
 
 
-def records(scene: Scene) -> tuple[csv_tables.Record, ...]:
+def records(scene: Scene) -> "tuple[csv_tables.Record, ...]":
     """Remarks on the tables of the loads. Raises BadInput."""
     remarks = []
     loads = {load.name: load for load in scene.active if isinstance(load, Load)}

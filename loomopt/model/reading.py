@@ -72,11 +72,14 @@ class _History:
 class Quantities:
     """Whole-cycle quantities of one design at nodes, SI.
 
-    systems: of the design's numbers, as `given` has them, and of the nodes'.
+    systems: of the design's numbers, as `given` has them, and of the nodes'; record_at_once: whether a formula
+    is recorded before its first evaluation, not after many.
     """
 
-    def __init__(self, model: JobModel, systems: tuple[Maths, Maths], given: Given) -> None:
-        self.model, self.systems, self.given = model, systems, given
+    def __init__(
+        self, model: JobModel, systems: tuple[Maths, Maths], given: Given, record_at_once: bool = False
+    ) -> None:
+        self.model, self.systems, self.given, self.record_at_once = model, systems, given, record_at_once
         self._bound: dict[tuple[tuple[str, ...], tuple[str, ...]], AtNode] = {}
 
     def __call__(self, names: tuple[str, ...], node: Node) -> tuple[Number, ...]:
@@ -94,7 +97,8 @@ class Quantities:
     def _run(self, names: tuple[str, ...], switches: tuple[str, ...], history: _History) -> AtNode | None:
         """Recorded quantities of this design, None where there is no recording, or not yet."""
         history.evaluations += 1
-        if history.recording is None and history.evaluations > WORTH_IT and not history.refused:
+        worth_it = self.record_at_once or history.evaluations > WORTH_IT
+        if history.recording is None and worth_it and not history.refused:
             try:
                 history.recording = recorded_quantities(self.model, names, switches, self.given.known)
             except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):

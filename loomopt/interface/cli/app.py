@@ -34,7 +34,7 @@ from loomopt.interface.cli.shell import (
 HEADER = Path("include", "coin-or", "IpoptConfig.h")
 """Header with the version of IPOPT: in CasADi's wheel beside its library, else below the prefix of a separate build."""
 UNTOLD = "of a version that it does not tell"
-_TOLD = re.compile(r'^#define IPOPT_VERSION "(.+)"', re.MULTILINE)
+_VERSION = r'^#define IPOPT_VERSION "(.+)"'
 
 
 def line() -> str:
@@ -47,7 +47,9 @@ def ipopt() -> str:
     spec = importlib.util.find_spec("casadi")
     folders = [*(spec.submodule_search_locations or () if spec else ()), sys.prefix]
     for header in (Path(folder) / HEADER for folder in folders):
-        if header.is_file() and (version := _TOLD.search(header.read_text(encoding="utf-8", errors="replace"))):
+        if header.is_file() and (
+            version := re.search(_VERSION, header.read_text(encoding="utf-8", errors="replace"), re.MULTILINE)
+        ):
             return version[1]
     return UNTOLD
 

@@ -76,7 +76,8 @@ class Boxes(Reading):
         exact = {name: system.number(value) for name, value in {**sampler.values, **sampler.hints}.items()}
         super().__init__(model, system, model.given(system, exact), sampler.cycle, sampler.stills)
         self.sampler = sampler
-        self._centred = Quantities(model, (system, systems.centred_balls()), self.given)
+        # A centred series is narrowed where it is read first, so a bound depends on the order of operations.
+        self._centred = Quantities(model, (system, systems.centred_balls()), self.given, record_at_once=True)
         self._read: dict[tuple[int, float, float], Number] = {}
         self._read_of = ""
         self._together: tuple[str, ...] = ()

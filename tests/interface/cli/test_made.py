@@ -60,7 +60,7 @@ def test_sensitivity_of_what_cannot_be_solved(capsys):
     words = ("sensitivity", "beatup", "--set", "bounds.l1.min=34 mm", "--set", "limits.swing.max=22.9 deg")
     status, out, _ = called(capsys, *words, "--json")
     assert status == 3
-    assert "clash" in json.loads(out)["refused"]
+    assert "Conflicting limits" in json.loads(out)["refused"]
 
 
 def test_two_steps_of_one_number_are_refused(capsys):

@@ -12,6 +12,7 @@ from support import slow
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
+from loomopt.model.session import Session, working
 from loomopt.scenes.packaged import problems
 from loomopt.solving.certificate import taylor_bounds
 from loomopt.studies.check import available_targets
@@ -175,3 +176,11 @@ def test_margin_and_angle_are_of_the_same_place(speed):
     there = np.interp(proof.angle, curves["phi [rad]"], curves["N [N]"])
     assert proof.margin == pytest.approx(lo.evaluate(scene).figures["contact_min"], rel=1e-9)
     assert proof.margin == pytest.approx(there, rel=1e-4), "between rows"
+
+
+def test_the_boxes_of_a_proof_do_not_depend_on_earlier_proofs():
+    """Series are narrowed in the order of operations, which a recorded formula keeps."""
+    scene = lo.load("beatup").with_effect("gravity").with_effect("rod_inertia")
+    with working(Session()):
+        first, *others = [lo.prove(scene, target="balance").as_dict() for _ in range(4)]
+    assert all(other == first for other in others)
