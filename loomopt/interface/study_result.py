@@ -81,7 +81,7 @@ class Presentation(ABC):
         from loomopt.interface.report import charts
         from loomopt.interface.report.markup import Part
 
-        return [Part(self.heading, (*charts.block(self.charts().charts), *self.tables()))]
+        return [Part(self.heading, (*charts.blocks(self.charts()), *self.tables()))]
 
     def __str__(self) -> str:
         from loomopt.interface.text import layout

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +80,8 @@ class Chart:
     levels: horizontal lines; spans: shaded stretches of x; places: vertical lines, numbered from 1 in their order where
     a list that stands with the chart is; dots: (x, y, kind); key: kind and words, of kind "" the heading of all;
     names: x and what stands above the chart there; cursor: whether a script may move one over it; upright: the vertical
-    axis, fitted to curves and levels without one.
+    axis, fitted to curves and levels without one; wide: across all columns of a figure; second: a scale on the right,
+    its name and its unit on that of the left.
     """
 
     title: str
@@ -94,6 +96,8 @@ class Chart:
     cursor: bool = False
     numbered: bool = False
     upright: Axis | None = None
+    wide: bool = False
+    second: tuple[str, float] | None = None
 
     @lazy
     def y(self) -> Axis:
@@ -140,12 +144,30 @@ class Bars:
         return Axis(low - room * (low < 0.0), high + room * (high > 0.0), ticks(low, high, 4))
 
 
+class Mark(NamedTuple):
+    """A place on an axis, or a stretch of it, that all charts mark.
+
+    x: where its name stands; where: the place as text; span: both ends of a stretch.
+    """
+
+    x: float
+    name: str
+    where: str
+    span: tuple[float, float] | None = None
+
+    @property
+    def kind(self) -> str:
+        """Its kind of style."""
+        return "k-span" if self.span else "k-place"
+
+
 @dataclass(frozen=True)
 class Charts:
     """The charts of a study.
 
     shared: whether all stand over the same axis, with the same key; first: how many of them a figure of one page shows;
-    notes: what its numbered places are; missing: why there is nothing to draw.
+    notes: what its numbered places are; missing: why there is nothing to draw; marks: of the shared axis; key: that of
+    all together, beside the key of each; without it that of the charts is shared.
     """
 
     title: str
@@ -154,6 +176,8 @@ class Charts:
     first: int | None = None
     notes: Sequence[str] = ()
     missing: str = ""
+    marks: Sequence[Mark] = ()
+    key: Sequence[tuple[str, str]] | None = None
 
 
 def fit_axis(values: Sequence[Floats], levels: Iterable[float] = (), name: str = "") -> Axis:

@@ -75,6 +75,11 @@ class Panel(NamedTuple):
         """The panel's name; that of its only column where it has none."""
         return self.name or self.labels[0]
 
+    @property
+    def shown_unit(self) -> str:
+        """Unit in which the panel is shown."""
+        return self.unit or ("deg" if self.si == "rad" else self.si)
+
 
 def in_units(scene: Scene, panel: Panel) -> Panel:
     """A panel shown in the unit in which the scene's reader sees its kind of quantity."""

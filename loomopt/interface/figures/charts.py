@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from loomopt.base.errors import BadInput
-from loomopt.interface.figures.figure import COLOURS, STYLES, Entry, below, frame, head, own_style, page, put
+from loomopt.interface.figures.figure import COLOURS, HEAD_SIZE, STYLES, Entry, below, frame, head, own_style, page, put
 from loomopt.picture.chart import Axis, Bars, Chart, Charts
 from loomopt.picture.shapes import Drawing, extent, plain
 from loomopt.picture.table import restore_spaces
@@ -17,8 +17,9 @@ ONE_COLUMN = 5
 """Panels that stand one below the other; more stand in two columns."""
 WIDTH, MORE, SKETCH = 7.0, 3.6, 3.2
 """Inches: of the panels, more of two columns, of the column of designs."""
-ALONE, HIGH, SHARED, BAR, AROUND = 3.6, 1.7, 1.15, 0.17, 0.9
-"""Heights in inches: of a single panel, of others, of those over one axis; of a bar, and of a panel of bars beyond."""
+ALONE, HIGH, SHARED, WIDE, BAR, AROUND = 3.6, 1.7, 1.15, 1.9, 0.17, 0.9
+"""Heights in inches: of a single panel, of others, of those over one axis, of a wide one; of a bar, and of a panel of
+bars beyond."""
 ABOVE, FOOT = 0.4, 0.9
 """Inches: above each panel, for its name; of the title with what stands below all panels."""
 ROOM = 0.16
@@ -44,6 +45,7 @@ DOTS: dict[str, dict[str, Any]] = {
     "kink": {"marker": "D", "color": INK, "markersize": 3.5, "fillstyle": "none"},
     "chosen": {"marker": "o", "color": BLACK, "markersize": 8.0, "fillstyle": "none"},
     "ghost": {"marker": "o", "color": QUIET, "markersize": 5.0},
+    "measured": {"marker": "o", "color": BLACK, "markersize": 3.0, "fillstyle": "none"},
 }
 """Kind of a dot → how it is drawn; others are full circles in the colour of their kind."""
 
@@ -53,47 +55,70 @@ def draw(charts: Charts, drawings: Sequence[tuple[str, Drawing]] = ()) -> Any:
     shown = list(charts.charts[: charts.first])
     if not shown:
         raise BadInput(f"there is nothing to draw: {charts.missing}", remedy="Look at the reasons in the table")
-    alone, columns = charts.shared and len(shown) == 1, 1 if len(shown) <= ONE_COLUMN else 2
-    rows = math.ceil(len(shown) / columns)
+    together = charts.shared and charts.key is None
+    alone, columns = together and len(shown) == 1, 1 if len(shown) <= ONE_COLUMN else 2
+    cells = _cells(shown, columns)
+    rows = 1 + max(row for row, _ in cells)
     notes = _number_notes(charts.notes)
-    heights = [max(_height(chart, charts, len(shown)) for chart in shown[row::rows]) for row in range(rows)]
+    heights = [
+        max(_height(chart, charts, len(shown)) for chart, cell in zip(shown, cells, strict=True) if cell[0] == row)
+        for row in range(rows)
+    ]
     heights += [LINE * len(notes)] if notes else []
     width, high = WIDTH + (columns - 1) * MORE, sum(heights) + rows * ABOVE + FOOT
-    with own_style(charts.title, *notes, *(word for chart in shown for word in _words(chart))):
+    names = [(mark.x, mark.name) for mark in charts.marks if mark.name]
+    texts = [charts.title, *notes, *(name for _, name in names), *(word for chart in shown for word in _words(chart))]
+    with own_style(*texts):
         figure = page(width + SKETCH * bool(drawings), high, charts.title)
         ratios = (width, SKETCH) if drawings else (1.0,)
         left, *right = figure.subfigures(1, len(ratios), width_ratios=ratios, squeeze=False)[0]
         grid = left.add_gridspec(len(heights), columns, height_ratios=heights)
         panels, keys, over = [], [], None
-        for place, chart in enumerate(shown):
-            column, row = divmod(place, rows)
+        for place, (chart, (row, column)) in enumerate(zip(shown, cells, strict=True)):
             axes = left.add_subplot(grid[row, column], sharex=over)
             over = axes if charts.shared else None
             keys.append(_bars(axes, chart) if isinstance(chart, Bars) else _curves(axes, chart))
             last = not charts.shared or row == rows - 1 or place == len(shown) - 1
-            axes.tick_params(labelbottom=last)
+            axes.tick_params(labelbottom=last or _is_wide(chart))
             axes.set_xlabel(plain(chart.x.name) if last else "", parse_math=False, fontsize=9)
             if alone:  # what is drawn stands beside its axis
                 axes.set_ylabel("\n".join(textwrap.wrap(plain(chart.title), NAMED)), parse_math=False, fontsize=9)
             panels.append(axes)
         if notes:
             _list(left.add_subplot(grid[rows, :]), notes)
-        foot = below(left, *_common_key(keys)) if charts.shared and any(keys) else 0.0
+        common = _common_key(keys) if together else ([(_handle(kind), words) for kind, words in charts.key or ()], "")
+        foot = below(left, *common) if common[0] else 0.0
         _place_drawings(right[0], drawings) if drawings else None
         figure.get_layout_engine().execute(figure)
         above = [0.0] * rows
-        for place, (axes, chart, key) in enumerate(zip(panels, shown, keys, strict=True)):
-            names = chart.names if isinstance(chart, Chart) and (place % rows == 0 or not charts.shared) else ()
-            height = head(axes, "" if alone else chart.title, () if charts.shared else key, names) / 72.0
-            above[place % rows] = max(above[place % rows], height - ABOVE)
+        for axes, chart, key, (row, _) in zip(panels, shown, keys, cells, strict=True):
+            on_top = row == 0 or not charts.shared
+            over_axes = [*(chart.names if isinstance(chart, Chart) else ()), *names] if on_top else ()
+            height = head(axes, "" if alone else chart.title, () if together else key, over_axes) / 72.0
+            above[row] = max(above[row], height - ABOVE)
         figure.finish(max(figure.get_figheight() + foot + sum(above), 1.6 * len(drawings) + FOOT))
     return figure
+
+
+def _is_wide(chart: Chart | Bars) -> bool:
+    """Whether a chart stands across all columns."""
+    return isinstance(chart, Chart) and chart.wide
+
+
+def _cells(shown: Sequence[Chart | Bars], columns: int) -> list[tuple[int, Any]]:
+    """Row and column of each chart: wide ones, which come first, across all columns, others one below the other."""
+    wide = sum(map(_is_wide, shown))
+    rows = math.ceil((len(shown) - wide) / columns)
+    others = [(wide + place % rows, place // rows) for place in range(len(shown) - wide)]
+    return [*((row, slice(None)) for row in range(wide)), *others]
 
 
 def _height(chart: Chart | Bars, charts: Charts, count: int) -> float:
     """Height of a panel, inches."""
     if isinstance(chart, Bars):
         return BAR * len(chart.rows) * max(len(chart.kinds), 1.5) + AROUND
+    if chart.wide:
+        return WIDE
     return ALONE if count == 1 else SHARED if charts.shared else HIGH
 
 
@@ -116,10 +141,13 @@ def _curves(axes: Any, chart: Chart) -> list[Entry]:
         axes.axvspan(low, high, color=SPAN, zorder=0)
     for series in chart.series:
         colour = _colour(series.kind)
-        if series.points:
+        label = {"label": plain(series.label)} if series.label else {}
+        if series.kind in DOTS:
+            axes.plot(series.x, series.y, linestyle="none", **_dot(series.kind), **label)
+        elif series.points:
             axes.plot(series.x, series.y, ".", color=colour, markersize=5)
         else:
-            axes.plot(series.x, series.y, color=colour, linestyle=_dash(series.kind), linewidth=1.2)
+            axes.plot(series.x, series.y, color=colour, linestyle=_dash(series.kind), linewidth=1.2, **label)
         if series.filled:
             axes.fill_between(series.x, max(0.0, chart.y.low), series.y, color=colour, alpha=0.4, linewidth=0)
     for level in (level for level in chart.levels if chart.y.low <= level <= chart.y.high):
@@ -141,8 +169,21 @@ def _curves(axes: Any, chart: Chart) -> list[Entry]:
     if math.isinf(chart.y.linear) and chart.y.low < 0.0 < chart.y.high:
         axes.axhline(0.0, color=QUIET, linewidth=0.6, zorder=1)
     axes.set_ylabel(plain(chart.y.name))
+    if chart.second:
+        _second_scale(axes, *chart.second)
     frame(axes)
     return [(_handle(kind), words) for kind, words in chart.key]
+
+
+def _second_scale(axes: Any, name: str, size: float) -> None:
+    """Add a scale on the right of axes; size: its unit on the scale of the left."""
+    from loomopt.interface.figures.shown_figure import TICK
+
+    scale = axes.secondary_yaxis("right", functions=(lambda y: y / size, lambda value: value * size))
+    scale.set_ylabel(name, fontsize=HEAD_SIZE)
+    scale.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    scale.tick_params(**TICK)
+    scale.spines["right"].set_visible(False)
 
 
 def _scale(axes: Any, side: str, axis: Axis) -> None:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from loomopt.picture.chart import Charts
     from loomopt.picture.shapes import Drawing, Primitive
 
 PICTURES = (".png", ".svg", ".pdf")
@@ -262,7 +263,6 @@ def plot(
     return drawn
 
 
-@working()
 def plot_curves(
     frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], design_subject: DrawnSubject | None = None
 ) -> "Figure":
@@ -270,21 +270,35 @@ def plot_curves(
 
     design: SI; empty for today's. design_subject: description of the design, for the title.
     """
-    from loomopt.interface.figures import curves
+    from loomopt.interface.figures import charts
+
+    drawn: Figure = charts.draw(curve_charts(frame, scene, design, design_subject))
+    return drawn
+
+
+@working()
+def curve_charts(
+    frame: "pd.DataFrame",
+    scene: Scene,
+    design: Mapping[str, float],
+    design_subject: DrawnSubject | None = None,
+    sparse: bool = False,
+) -> "Charts":
+    """Charts of curves, as `plot_curves` draws them; sparse: through fewer rows, for a page."""
+    from loomopt.picture import turn
     from loomopt.picture.panels import in_units
 
     job, view = registry.of(scene), registry.of(scene).views
     now = job.today(scene)
     full_design = {**now, **design}
     columns = tuple(column for column in frame.columns if f"{tables.MEASURED} [" not in column)
-    panels = [in_units(scene, panel) for panel in view.panels(scene, design, columns)]
-    today = None if full_design == now else (tables.curves(scene, {}), view.marks(scene, now))
+    panels, unit = [in_units(scene, panel) for panel in view.panels(scene, design, columns)], scene.shown_in("angle")
+    shown = turn.from_table(frame, view.marks(scene, full_design), unit)
+    today = None if full_design == now else turn.from_table(tables.curves(scene, {}), view.marks(scene, now), unit)
     subject = design_subject or DrawnSubject(GIVEN if design else TODAY)
     short = ", limits not held" if subject.broken else f", {subject.shortfall}" if subject.shortfall else ""
     title = f"{scene.name}: {subject.name}{short}, curves over the cycle"
-    unit = scene.shown_in("angle")
-    drawn: Figure = curves.curves(frame, None, title, view.marks(scene, full_design), panels, today, view.angle, unit)
-    return drawn
+    return turn.charts(title, panels, shown, today, view.angle, sparse)
 
 
 def describe_design(evaluated: Evaluated, target: str | None = None, status: str | None = None) -> DrawnSubject:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from loomopt.base.records import lazy
 from loomopt.interface import forces, tables
 from loomopt.interface.files import outputs, svg
-from loomopt.interface.report import machine, mathml, turn
+from loomopt.interface.report import charts, machine, mathml
 from loomopt.interface.report.markup import Block, Markup, Part
 from loomopt.interface.text import answers, scenes
 from loomopt.jobs import registry
@@ -220,7 +220,9 @@ def _proofs(subject: Subject) -> Iterator[Part]:
 
 
 def _curves(subject: Subject) -> Iterator[Part]:
-    yield turn.part(subject.scene, subject.evaluated.design)
+    scene, design = subject.scene, flat(subject.evaluated.design)
+    shown = outputs.curve_charts(tables.curves(scene, design), scene, design, sparse=True)
+    yield Part("Curves over the turn", tuple(charts.blocks(shown)))
 
 
 def _forces(subject: Subject) -> Iterator[Part]:

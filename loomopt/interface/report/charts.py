@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from loomopt.interface.report.markup import Markup, text
-from loomopt.picture.chart import Axis, Bars, Chart, Series
+from loomopt.picture.chart import Axis, Bars, Chart, Charts, Series
 from loomopt.picture.shapes import Floats
 
 WIDTH, HEIGHT = 360, 168
@@ -18,9 +18,17 @@ BAR, ROW, LETTER = 9, 14, 5.8
 """Heights of one bar and of a row beyond them, and the room of a letter, in a chart's own units."""
 
 
-def block(charts: Sequence[Chart | Bars]) -> list[Markup]:
-    """Charts side by side; nothing of none."""
-    return [Markup(f'<div class="charts">{"".join(map(figure, charts))}</div>')] if charts else []
+def blocks(charts: Charts) -> list[Markup]:
+    """Charts side by side, above them what they have in common; nothing of none."""
+    drawn = "".join(map(figure, charts.charts))
+    marks = [(mark.kind, f"{mark.name} {mark.where}") for mark in charts.marks if mark.name]
+    key = _key([*dict.fromkeys(marks), *(charts.key or ())])
+    return [Markup(part) for part in (key, f'<div class="charts">{drawn}</div>' if drawn else "") if part]
+
+
+def _key(entries: Sequence[tuple[str, str]]) -> str:
+    lines = "".join(f'<li class="{kind}"><i></i>{text(words)}</li>' for kind, words in entries)
+    return f'<ul class="key">{lines}</ul>' if lines else ""
 
 
 def figure(chart: Chart | Bars) -> str:
@@ -31,9 +39,7 @@ def figure(chart: Chart | Bars) -> str:
     else:
         caption, svg, key = chart.caption, _curves(chart), list(chart.key)
         output = '<output class="told"></output>' if chart.cursor else ""
-    lines = "".join(f'<li class="{kind}"><i></i>{text(words)}</li>' for kind, words in key)
-    keys = f'<ul class="key">{lines}</ul>' if lines else ""
-    return f'<figure class="chart"><figcaption>{text(caption)}{output}</figcaption>{svg}{keys}</figure>'
+    return f'<figure class="chart"><figcaption>{text(caption)}{output}</figcaption>{svg}{_key(key)}</figure>'
 
 
 def _curves(chart: Chart) -> str:

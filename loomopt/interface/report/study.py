@@ -48,7 +48,7 @@ def parts(study: SceneStudy, solved: Sequence[Row]) -> list[Part]:
     changes = [study_table.change_sentence(study, change, False) for change in findings.changes]
     above = {findings.message, *changes}
     tables = [block for block in study_table.tables(study, solved) if block not in above]
-    shown = charts.block(study_table.charts(study, findings).charts)
+    shown = charts.blocks(study_table.charts(study, findings))
     text = "Each point is a certified design; a line breaks where there is no design."
     costs = [Part("Chart", (text, *shown, *changes))] if shown else []
     stages = _stages(study, findings.rows)

@@ -1,7 +1,6 @@
 """Comparison of designs: dimensions, figures, limits and curves in common units, with marked differences."""
 
 import functools
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,13 +10,13 @@ from loomopt.base import arguments
 from loomopt.base.errors import refusal
 from loomopt.base.units import factor
 from loomopt.interface import results, tables
-from loomopt.interface.figures.curves import drawn_turn, shown_unit
 from loomopt.interface.results import Evaluation
 from loomopt.interface.study_result import Presentation
 from loomopt.jobs import registry
 from loomopt.model.session import working
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
-from loomopt.picture.chart import COLOURS, TICKS, Axis, Chart, Charts, Series, heading
+from loomopt.picture import turn
+from loomopt.picture.chart import COLOURS, Chart, Charts, Series, heading
 from loomopt.picture.job_views import Marks
 from loomopt.picture.panels import in_units
 from loomopt.picture.panels import single_panels as each_alone
@@ -235,26 +234,22 @@ def _overlaid(designs: Sequence[tuple[str, Scene, Design]]) -> Charts:
     """Curves of designs, named, in their scenes and in the units of the first one's scene."""
     scene, first = designs[0][1:]
     view, unit = registry.of(scene).views, scene.shown_in("angle")
-    angle = math.degrees(factor(unit))
-    turns = [drawn_turn(tables.curves(home, design), _marks(home, design), unit) for _, home, design in designs]
-    columns = tuple(dict.fromkeys(column for turn in turns for column in turn.columns.columns))
+    turns = [turn.from_table(tables.curves(home, design), _marks(home, design), unit) for _, home, design in designs]
+    columns = tuple(dict.fromkeys(column for one in turns for column in one.columns.columns))
     known = view.panels(scene, flat(first), tuple(turns[0].columns.columns))
     panels = [*known, *(panel for panel in each_alone(columns) if panel.columns[0] not in turns[0].columns)]
-    ends = min(float(turn.angles.min()) for turn in turns), max(float(turn.angles.max()) for turn in turns)
-    step = TICKS * turns[0].whole / 360.0
-    numbered = [step * k / angle for k in range(math.ceil(ends[0] / step), math.floor(ends[1] / step + 1e-9) + 1)]
-    axis = Axis(ends[0] / angle, ends[1] / angle, numbered, f"{view.angle} phi [{unit}]")
+    axis = turn.axis(turns, view.angle)
     key = [(f"c{place % COLOURS}", name) for place, (name, *_) in enumerate(designs)]
     shown = []
     for panel in (in_units(scene, panel) for panel in panels):
         for column, label in zip(panel.columns, panel.labels, strict=True):
-            size = factor(shown_unit(panel))
+            size = factor(panel.shown_unit)
             drawn = [
-                Series(turn.angles / angle, turn.of(column) / size, kind, name)
-                for turn, (kind, name) in zip(turns, key, strict=True)
-                if column in turn.columns
+                Series(one.shown(one.angles), one.of(column) / size, kind, name)
+                for one, (kind, name) in zip(turns, key, strict=True)
+                if column in one.columns
             ]
-            shown.append(Chart(heading(label, shown_unit(panel)), axis, drawn, key=key, cursor=True))
+            shown.append(Chart(heading(label, panel.shown_unit), axis, drawn, key=key, cursor=True))
     return Charts(f"{scene.name}: designs compared, curves over the cycle", shown, shared=True)
 
 
