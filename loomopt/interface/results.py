@@ -122,11 +122,8 @@ class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
         BadInput : an argument is wrong, or no active effect gives forces by components.
         """
         from loomopt.interface import forces
-        from loomopt.interface.figures import forces as figures
 
-        place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
-        drawn: Figure = figures.plot(self.scene, forces.from_curves(self.scene, self.simulate(), self.design), place)
-        return drawn
+        return forces.from_curves(self.scene, self.simulate(), self.design).plot(path)
 
     def draw(self) -> "Sketch":
         """Draw the mechanism at full scale.

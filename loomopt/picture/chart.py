@@ -81,7 +81,7 @@ class Chart:
     a list that stands with the chart is; dots: (x, y, kind); key: kind and words, of kind "" the heading of all;
     names: x and what stands above the chart there; cursor: whether a script may move one over it; upright: the vertical
     axis, fitted to curves and levels without one; wide: across all columns of a figure; second: a scale on the right,
-    its name and its unit on that of the left.
+    its name and its unit on that of the left; equal: whether both axes have the same scale.
     """
 
     title: str
@@ -98,6 +98,7 @@ class Chart:
     upright: Axis | None = None
     wide: bool = False
     second: tuple[str, float] | None = None
+    equal: bool = False
 
     @lazy
     def y(self) -> Axis:

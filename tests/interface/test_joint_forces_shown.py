@@ -44,7 +44,7 @@ def scene(monkeypatch):
 
 
 def test_peaks_and_means_are_those_of_the_closed_form(scene):
-    forces = from_curves(scene, lo.simulate(scene))
+    forces = from_curves(scene, lo.simulate(scene)).by_name
     assert list(forces) == ["turns", "along"]
     for power in (1.0, 3.0, 10 / 3):
         assert forces["turns"].mean(power) == pytest.approx(100.0, rel=1e-12)
@@ -92,7 +92,7 @@ def test_each_force_is_shown_on_the_parts_that_it_is_between(name):
     values = lo.load(name).with_effect("joint_forces", *(["head_inertia"] if name == "rapier" else []))
     values = values.update(LEVER) if name == "shedding" else values
     evaluated = lo.evaluate(values)
-    forces = from_curves(values, evaluated.simulate(), evaluated.design)
+    forces = from_curves(values, evaluated.simulate(), evaluated.design).by_name
     for force, parts in OWN[name].items():
         assert list(forces[force].headings) == parts
         for part in parts:
@@ -115,7 +115,7 @@ def test_each_force_is_shown_on_the_parts_that_it_is_between(name):
 
 def test_a_two_force_member_carries_its_force_along_its_line():
     own_scene = lo.load("beatup").with_effect("joint_forces")
-    x, y = from_curves(own_scene, lo.simulate(own_scene))["force_C"].on("rod")
+    x, y = from_curves(own_scene, lo.simulate(own_scene)).by_name["force_C"].on("rod")
     assert np.max(np.abs(y)) < 1e-9 * np.max(np.abs(x))
 
 

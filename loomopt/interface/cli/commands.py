@@ -238,7 +238,11 @@ def simulate(
     relative = None if accuracy is None else read_number("--accuracy", accuracy, float)
     if relative is not None:
         check_numbers(relative, 1)
-    force_parts = scenes.forces(scene, api.simulate(scene, given, name), given) if forces else ()
+    force_parts: Sequence[str | TextTable] = ()
+    if forces:
+        from loomopt.interface.forces import from_curves
+
+        force_parts = from_curves(scene, api.simulate(scene, given, name), given).tables()
     compared = [scenes.comparison(scene, api.simulate(scene, given, name, measured=measured))] if measured else []
     subject = outputs.describe_design(api.evaluate(scene, given, name).result, name, status) if given and out else None
     for path in out or ():

@@ -15,8 +15,9 @@ from loomopt.picture.table import restore_spaces
 
 ONE_COLUMN = 5
 """Panels that stand one below the other; more stand in two columns."""
-WIDTH, MORE, SKETCH = 7.0, 3.6, 3.2
-"""Inches: of the panels, more of two columns, of the column of designs."""
+WIDTH, MORE, SKETCH, DIAGRAM, ACROSS = 7.0, 3.6, 3.2, 3.0, 3
+"""Inches: of the panels, more of two columns, of the column of designs; of a diagram with equal scales, and how many of
+these stand side by side."""
 ALONE, HIGH, SHARED, WIDE, BAR, AROUND = 3.6, 1.7, 1.15, 1.9, 0.17, 0.9
 """Heights in inches: of a single panel, of others, of those over one axis, of a wide one; of a bar, and of a panel of
 bars beyond."""
@@ -56,7 +57,9 @@ def draw(charts: Charts, drawings: Sequence[tuple[str, Drawing]] = ()) -> Any:
     if not shown:
         raise BadInput(f"there is nothing to draw: {charts.missing}", remedy="Look at the reasons in the table")
     together = charts.shared and charts.key is None
-    alone, columns = together and len(shown) == 1, 1 if len(shown) <= ONE_COLUMN else 2
+    diagrams = any(isinstance(chart, Chart) and chart.equal for chart in shown)
+    columns = ACROSS if diagrams else 1 if len(shown) <= ONE_COLUMN else 2
+    alone = together and len(shown) == 1
     cells = _cells(shown, columns)
     rows = 1 + max(row for row, _ in cells)
     notes = _number_notes(charts.notes)
@@ -65,7 +68,8 @@ def draw(charts: Charts, drawings: Sequence[tuple[str, Drawing]] = ()) -> Any:
         for row in range(rows)
     ]
     heights += [LINE * len(notes)] if notes else []
-    width, high = WIDTH + (columns - 1) * MORE, sum(heights) + rows * ABOVE + FOOT
+    width = ACROSS * DIAGRAM if diagrams else WIDTH + (columns - 1) * MORE
+    high = sum(heights) + rows * ABOVE + FOOT
     names = [(mark.x, mark.name) for mark in charts.marks if mark.name]
     texts = [charts.title, *notes, *(name for _, name in names), *(word for chart in shown for word in _words(chart))]
     with own_style(*texts):
@@ -94,7 +98,8 @@ def draw(charts: Charts, drawings: Sequence[tuple[str, Drawing]] = ()) -> Any:
         for axes, chart, key, (row, _) in zip(panels, shown, keys, cells, strict=True):
             on_top = row == 0 or not charts.shared
             over_axes = [*(chart.names if isinstance(chart, Chart) else ()), *names] if on_top else ()
-            height = head(axes, "" if alone else chart.title, () if together else key, over_axes) / 72.0
+            own_key = [] if together else [(mark or _blank(), words) for mark, words in key]
+            height = head(axes, "" if alone else chart.title, own_key, over_axes) / 72.0
             above[row] = max(above[row], height - ABOVE)
         figure.finish(max(figure.get_figheight() + foot + sum(above), 1.6 * len(drawings) + FOOT))
     return figure
@@ -106,19 +111,23 @@ def _is_wide(chart: Chart | Bars) -> bool:
 
 
 def _cells(shown: Sequence[Chart | Bars], columns: int) -> list[tuple[int, Any]]:
-    """Row and column of each chart: wide ones, which come first, across all columns, others one below the other."""
+    """Row and column of each chart: wide ones, which come first, across all columns, others one below the other.
+
+    Those of three columns are read from the left.
+    """
     wide = sum(map(_is_wide, shown))
     rows = math.ceil((len(shown) - wide) / columns)
-    others = [(wide + place % rows, place // rows) for place in range(len(shown) - wide)]
-    return [*((row, slice(None)) for row in range(wide)), *others]
+    places = range(len(shown) - wide)
+    others = [divmod(p, columns) if columns == ACROSS else (p % rows, p // rows) for p in places]
+    return [*((row, slice(None)) for row in range(wide)), *((wide + row, column) for row, column in others)]
 
 
 def _height(chart: Chart | Bars, charts: Charts, count: int) -> float:
     """Height of a panel, inches."""
     if isinstance(chart, Bars):
         return BAR * len(chart.rows) * max(len(chart.kinds), 1.5) + AROUND
-    if chart.wide:
-        return WIDE
+    if chart.wide or chart.equal:
+        return WIDE if chart.wide else DIAGRAM
     return ALONE if count == 1 else SHARED if charts.shared else HIGH
 
 
@@ -169,6 +178,7 @@ def _curves(axes: Any, chart: Chart) -> list[Entry]:
     if math.isinf(chart.y.linear) and chart.y.low < 0.0 < chart.y.high:
         axes.axhline(0.0, color=QUIET, linewidth=0.6, zorder=1)
     axes.set_ylabel(plain(chart.y.name))
+    axes.set_aspect("equal") if chart.equal else None
     if chart.second:
         _second_scale(axes, *chart.second)
     frame(axes)
@@ -229,6 +239,13 @@ def _handle(kind: str) -> Any:
     if kind in ("k-level", "k-place"):
         return Line2D([], [], color=MISSED if kind == "k-level" else BLACK, **DASHED)
     return Line2D([], [], color=_colour(kind), linestyle=_dash(kind), linewidth=1.4)
+
+
+def _blank() -> Any:
+    """Sample of what has no style."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], linestyle="none")
 
 
 def _bars(axes: Any, chart: Bars) -> list[Entry]:

@@ -229,7 +229,7 @@ def _forces(subject: Subject) -> Iterator[Part]:
     """Forces in joints, if an active effect computes them."""
     scene, design = subject.scene, flat(subject.evaluated.design)
     if forces.tells(scene):
-        yield Part("Forces in the joints", tuple(scenes.forces(scene, tables.curves(scene, design), design)))
+        yield from forces.from_curves(scene, tables.curves(scene, design), design).report_parts()
 
 
 def _members(subject: Subject) -> Iterator[Part]:

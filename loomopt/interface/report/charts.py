@@ -43,14 +43,14 @@ def figure(chart: Chart | Bars) -> str:
 
 
 def _curves(chart: Chart) -> str:
-    frame = _Frame(chart.x, chart.y)
+    frame = _Frame(chart.x, chart.y, WIDTH - LEFT - RIGHT + TOP + BOTTOM if chart.equal else HEIGHT)
     low, high = chart.y.low, chart.y.high
     parts = [
         f'<rect class="span" x="{frame.x(a)}" y="{TOP}" width="{_n(frame.places(b) - frame.places(a))}"'
-        f' height="{HEIGHT - TOP - BOTTOM}"/>'
+        f' height="{frame.tall - TOP - BOTTOM}"/>'
         for a, b in chart.spans
     ]
-    right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
+    right, bottom = WIDTH - RIGHT, frame.tall - BOTTOM
     parts += [f'<path class="grid" d="{"".join(f"M{LEFT} {frame.y(at)}H{right}" for at in chart.y.ticks)}"/>']
     if low < 0.0 < high:
         parts.append(f'<path class="zero" d="M{LEFT} {frame.y(0.0)}H{right}"/>')
@@ -59,7 +59,9 @@ def _curves(chart: Chart) -> str:
     parts += [
         f'<text class="y" x="{LEFT - 4}" y="{frame.y(at, 3.5)}">{chart.y.text(at)}</text>' for at in chart.y.ticks
     ]
-    parts += [f'<text class="x" x="{frame.x(at)}" y="{HEIGHT - 5}">{chart.x.text(at)}</text>' for at in chart.x.ticks]
+    parts += [
+        f'<text class="x" x="{frame.x(at)}" y="{frame.tall - 5}">{chart.x.text(at)}</text>' for at in chart.x.ticks
+    ]
     parts += [_curve(series, frame) for series in chart.series]
     parts += [f'<circle class="dot {kind}" cx="{frame.x(x)}" cy="{frame.y(y)}" r="3"/>' for x, y, kind in chart.dots]
     parts += [f'<text class="x" x="{frame.x(at)}" y="{TOP + 8}">{escape(name)}</text>' for at, name in chart.names]
@@ -70,7 +72,7 @@ def _curves(chart: Chart) -> str:
         data = f' data-ends="{" ".join(f"{end:.9g}" for end in ends)}"'
         parts.append(f'<path class="cursor" d="M{LEFT} {TOP}V{bottom}"/>')
     label = escape(chart.caption)
-    return f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label}"{data}>{"".join(parts)}</svg>'
+    return f'<svg viewBox="0 0 {WIDTH} {frame.tall}" role="img" aria-label="{label}"{data}>{"".join(parts)}</svg>'
 
 
 @dataclass(frozen=True)
@@ -79,12 +81,13 @@ class _Frame:
 
     across: Axis
     upright: Axis
+    tall: int
 
     def places(self, values: Floats | float) -> Floats:
         return LEFT + (WIDTH - LEFT - RIGHT) * self.across.share(values)
 
     def heights(self, values: Floats | float) -> Floats:
-        return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * self.upright.share(values)
+        return self.tall - BOTTOM - (self.tall - TOP - BOTTOM) * self.upright.share(values)
 
     def x(self, value: float) -> str:
         return _n(self.places(value))

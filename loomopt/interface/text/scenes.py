@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -198,26 +198,3 @@ def _curve(scene: Scene, name: str, values: Floats) -> tuple[str, list[str]]:
     places = min(9, max(0, 3 - math.floor(math.log10(largest)))) if largest > 0 else 0
     texts = ["" if math.isnan(number) else f"{round(float(number), places) + 0.0:.{places}f}" for number in numbers]
     return f"{symbol}\n[{unit}]", texts
-
-
-def forces(scene: Scene, frame: "pd.DataFrame", design: Mapping[str, float]) -> list[str | TextTable]:
-    """A line for each force of curves (SI): its peak, where that is, and the means that bearings go by."""
-    from loomopt.interface.forces import CUBIC, ROLLER, from_curves
-
-    lines, force, angle = [], scene.shown_in("force"), scene.shown_in("angle")
-    for name, turned_force in from_curves(scene, frame, design).items():
-        means = (f"{turned_force.mean(power) / factor(force):.6g}" for power in (1.0, CUBIC, ROLLER))
-        turning = " and ".join(turned_force.headings)
-        lines.append(
-            (
-                name,
-                turning,
-                f"{turned_force.peak / factor(force):.6g}",
-                f"{turned_force.at / factor(angle):.6g}",
-                *means,
-            )
-        )
-    sizes = f"peak\n{force}", f"at\n{angle}", f"mean\n{force}", f"p = 3\n{force}", f"p = 10/3\n{force}"
-    heads = "force", "turning\nparts", *sizes
-    title = f"{scene.name}: forces over the turn; p = 3 and 10/3: means for the life of ball and roller bearings"
-    return [title, TextTable("", heads, tuple(lines), tuple(range(2, 7)))]

@@ -10,9 +10,9 @@ import pytest
 
 import loomopt as lo
 from loomopt.interface.cli.app import run
+from loomopt.interface.forces import from_curves
 from loomopt.interface.report import charts, document, markup
 from loomopt.interface.study import sensitivity
-from loomopt.interface.text import scenes
 from loomopt.picture.chart import Bars
 from loomopt.picture.table import TextTable
 
@@ -95,8 +95,10 @@ def test_forces_in_the_joints_are_told_where_an_effect_tells_them():
     scene = lo.load("beatup").with_effect("joint_forces")
     evaluation = lo.evaluate(scene)
     (part,) = [item for item in document.of_design(evaluation).parts if item.title == "Forces in the joints"]
-    assert part.blocks == tuple(scenes.forces(scene, evaluation.simulate(), evaluation.design))
+    forces = from_curves(scene, evaluation.simulate(), evaluation.design)
+    assert part.blocks[-2:] == tuple(forces.tables())
     shown = markup.part(part)
+    assert len(drawn(shown)) == 1 + len(forces.by_name)
     assert all(f"force_<wbr>{joint}</td>" in shown for joint in "ABCD")
     titles = [item.title for item in document.of_design(lo.evaluate("beatup")).parts]
     assert "Forces in the joints" not in titles
