@@ -483,12 +483,23 @@ class Job(abc.ABC):
     """Class that builds the program of a scene and target, or of axes."""
     members: "tuple[Scene, ...]" = ()
     """The scenes of a family, where it is one."""
-    open_boxes: str = ""
-    """Why branch and bound does not close on its designs, "" where it does."""
     monotone_slack: Mapping[str, str] = MappingProxyType({})
     """Variables that only limits read, and only looser as they grow, wherever the program has another variable too."""
 
     # What every job says.
+
+    def open_boxes(self, model: JobModel) -> str:
+        """Reason why branch and bound does not close on designs of a model; "" where it does.
+
+        Parameters
+        ----------
+        model : model of the program whose best is to be proven.
+
+        Returns
+        -------
+        Text.
+        """
+        return ""
 
     @abc.abstractmethod
     def check(self, scene: Scene) -> None:

@@ -23,12 +23,15 @@ class FamilyJob(Job):
     """The members of a scene's family; job: whose mechanism they all have."""
 
     name = FAMILY
-    open_boxes = "it is several machines in one problem"
 
     def __init__(self, job: Job, scene: Scene) -> None:
         self.job, self.scene = job, scene
         self.own_schema, self.target = scene.schema, family.of_target(scene)
         self.members = family.members(scene)
+
+    def open_boxes(self, model: JobModel) -> str:
+        """Boxes of several machines are not bounded."""
+        return "it is several machines in one problem"
 
     @functools.cached_property
     def family(self) -> Family:

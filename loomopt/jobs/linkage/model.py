@@ -27,6 +27,7 @@ from loomopt.physics.effects.kinds import Effect, Load, Motion, State
 from loomopt.physics.mechanisms import chain, chain_forces
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.chain import Chain, Part, Ref, cam_switch
+from loomopt.physics.mechanisms.dead_centres import CrankRockerGroup, crank_rockers
 from loomopt.physics.mechanisms.dwell_cam import stretch
 from loomopt.physics.mechanisms.dyad import Vector, cross, dot
 from loomopt.physics.mechanisms.moving import Joint
@@ -377,6 +378,51 @@ class Linkage(Kinematics):
             Arcs(cam_switch(cam), functools.partial(self._cam_corners, cam), stretch, cam) for cam in self.chain.cams
         )
 
+    @lazy
+    def rocker(self) -> CrankRockerGroup | None:
+        """Crank-rocker group whose rocker's angle is the output: its turns have a closed form. None without one."""
+        out = self.output
+        if self.chain.cams or out.measure != "angle" or out.against or out.scale is not None:
+            return None
+        return crank_rockers(self.chain).get(out.name)
+
+    @property
+    def four_bar(self) -> bool:
+        """Whether one crank-rocker group is all that must close."""
+        rockers = crank_rockers(self.chain).values()
+        return not self.chain.cams and len(rockers) == 1 == len(self.groups)
+
+    @lazy
+    def closed(self) -> Mapping[str, CrankRockerGroup]:
+        """Crank-rocker groups by the events that are their dead centres.
+
+        An event without `near` counts within one turn: it has a closed form where it cannot pass the angle 0.
+        """
+        groups = {place.name: self.of(place).rocker for place in self.places if place.extreme}
+        return {
+            place.name: group
+            for place in self.places
+            if (group := groups.get(place.name)) and (place.near is not None or group.level)
+        }
+
+    @lazy
+    def swings(self) -> CrankRockerGroup | None:
+        """Crank-rocker group whose dead centres are the first maximum and the first minimum of the output."""
+        return self.rocker if all(name in self.closed for name in extremes(self.places)) else None
+
+    def side(self, extreme: str) -> str:
+        """Extreme of the link's own angle at an extreme of the output."""
+        return extreme if self.output.sign > 0 else {"max": "min", "min": "max"}[extreme]
+
+    def _dead_centre(self, maths: Maths, given: Given, place: EventRule) -> Number:
+        """Crank angle, rad, of an event with a closed form."""
+        return self.closed[place.name].angle(maths, given.values, self.of(place).side(place.extreme), place.near)
+
+    @property
+    def _turns_closed(self) -> bool:
+        """Whether the turns of the output have a closed form without a place at which they jump by a turn."""
+        return self.rocker is not None and self.rocker.level
+
     def _cam_corners(self, cam: Part, maths: Maths, given: Given) -> tuple[Number, ...]:
         return self.chain.corners(cam, maths, given.values)
 
@@ -402,10 +448,16 @@ class Linkage(Kinematics):
         for place in self.places:
             if place.angle is not None:
                 values[place.value] = number(maths, given.values, place.angle)
+            elif place.name in self.closed:
+                if place.value not in given.values:
+                    values[place.value] = self._dead_centre(maths, given, place)
             elif place.hint in given.values:
                 here = given._replace(values={**given.values, **values})
                 values[place.value] = self._event_angle(maths, here, place)
-        if TURNS in called:
+        if TURNS in called and self.rocker and self._turns_closed:
+            sides = map(self.side, ("min", "max"))
+            values[TURNS] = tuple(self.rocker.angle(maths, given.values, side) for side in sides)
+        elif TURNS in called:
             rules = itertools.takewhile(lambda turn: turn.hint in given.values, map(turn_rule, itertools.count()))
             values[TURNS] = tuple(self._event_angle(maths, given, turn) for turn in rules)
         values |= self._mean_square_distance(maths, given)
@@ -471,11 +523,12 @@ class Linkage(Kinematics):
         """Crank angles of the events, rad, from a scan of the whole turn. Raises UnfoundError."""
         hints = self._times(given)
         angles = {name: hints[hint_of(name)] for name in self.path.times} if self.path else {}
+        listed = TURNS in called and not self._turns_closed
         read = TURNS in called or any(place.angle is None for place in self.places)
         if not read and not self.chain.cams:
             return hints
         turns = self.turns(given) if read else ()
-        for k, turn in enumerate(turns_in_order(turns) if TURNS in called else ()):
+        for k, turn in enumerate(turns_in_order(turns) if listed else ()):
             angles |= self._turn_hints(given, turn_rule(k, turn.extreme), turn, hints)
         for place in self.places:
             if place.angle is not None:
@@ -484,9 +537,13 @@ class Linkage(Kinematics):
             if not place.extreme:
                 angles[place.name] = hints[place.hint] = self._crossing(given, place, angles[place.reference])
                 continue
-            angles |= self._turn_hints(given, place, self.turn(given, place, turns), hints)
+            turn = self.turn(given, place, turns)
+            if place.name in self.closed:
+                angles[place.name] = turn.angle
+                continue
+            angles |= self._turn_hints(given, place, turn, hints)
         high, low = extremes(self.places)
-        if high and low:
+        if high and low and not self.swings:
             hints[SWEPT] = 0.0 if angles[low] > angles[high] else TURN
         if not self.chain.cams:
             return hints
@@ -525,8 +582,11 @@ class Linkage(Kinematics):
     def turns(self, given: Given) -> tuple[Turn, ...]:
         """Points at which the output turns: from samples of the whole turn, refined by Newton's method.
 
-        Raises UnfoundError if the linkage cannot be assembled at some crank angle.
+        Those of a crank-rocker are its dead centres. Raises UnfoundError if the linkage cannot be assembled at some
+        crank angle.
         """
+        if self.rocker and self.rocker.rocks(given.values):
+            return self._dead_centres(given, self.rocker)
         nodes, corners = self._scan(given)
         with np.errstate(all="ignore"):
             pose = self.pose(systems.numpy(), given, nodes)
@@ -553,6 +613,14 @@ class Linkage(Kinematics):
             here = self.at(FLOAT, given, angle)
             turns.append(Turn(angle, extreme, float(here.q), abs(float(here.q2)) / largest))
         return tuple(turns)
+
+    def _dead_centres(self, given: Given, group: CrankRockerGroup) -> tuple[Turn, ...]:
+        """Turns of the output at the dead centres of its crank-rocker group; q'' is at no other angle out of scale."""
+        turns = []
+        for extreme in ("min", "max"):
+            angle = float(group.angle(FLOAT, given.values, self.side(extreme)))
+            turns.append(Turn(angle, extreme, float(self.at(FLOAT, given, angle).q), 1.0))
+        return tuple(sorted(turns))
 
     def turn(self, given: Given, place: EventRule, turns: tuple[Turn, ...] | None = None) -> Turn:
         """Turn at an extreme; turns: those of the output, if they are known. Raises UnfoundError."""
@@ -689,7 +757,7 @@ class Linkage(Kinematics):
             conditions += [(text, alternative - away[0]) for alternative in away[1:]]
             conditions.append((f"{place.name} passes half a turn from near", math.pi - away[0]))
         high, low = extremes(self.places)
-        if high and low:
+        if high and low and not self.swings:
             later = given.values[event_value(low)] - given.values[event_value(high)]
             sign = 1 if swept == 0.0 else -1
             conditions.append((f"{low} and {high} follow in the other order", sign * later))
@@ -813,10 +881,15 @@ def linkage_of(model: JobModel) -> Linkage:
 
 
 def _swing(high: str, low: str, at: Instant) -> Number:
+    if group := linkage_of(at.model).swings:
+        return group.centres(at.maths, at.values).swing
     return _at(at, high).since(_at(at, low))
 
 
 def _sweep(high: str, low: str, at: Instant) -> Number:
+    linkage = linkage_of(at.model)
+    if linkage.swings:
+        return linkage.swings.sweep(at.maths, at.values, linkage.side("max"))
     return at.values[event_value(low)] - at.values[event_value(high)] + at.values[SWEPT]
 
 

@@ -35,7 +35,10 @@ class Rapier(Job):
     at_once = ("match_rms",)
     own_schema = SCHEMA
     task = RapierTask
-    open_boxes = "no global claim: boxes of 1 % round a drive's optimum do not close in any time worth waiting for"
+
+    def open_boxes(self, model: JobModel) -> str:
+        """Boxes of drives do not close."""
+        return "no global claim: boxes of 1 % round a drive's optimum do not close in any time worth waiting for"
 
     def check(self, scene: Scene) -> None:
         """Raise BadInput when today's drive does not turn, or the dwells leave no time to travel."""

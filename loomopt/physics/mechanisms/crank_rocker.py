@@ -184,6 +184,12 @@ class DeadCentres:
         return self.lengths.side * self.maths.atan2(self._areas[1], self._at_crank[1])
 
     @lazy
+    def cranks(self) -> tuple[Vector, Vector]:
+        """Directions of the crank from A→D at the front and at the rear, of any length."""
+        (front, rear), (at_front, at_rear), side = self._areas, self._at_crank, self.lengths.side
+        return Vector(at_front, side * front), Vector(-at_rear, -side * rear)
+
+    @lazy
     def theta(self) -> Number:
         """θ = β − β_r, as one angle."""
         (front, rear), (at_front, at_rear) = self._areas, self._at_crank

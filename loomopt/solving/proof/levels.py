@@ -59,7 +59,7 @@ class Levels:
         self.program, self.gap = program, gap
         sampler = Sampler(program.model, {**program.parameters, **x})
         self.merits = [objective.merit(sampler) / objective.scale for objective in program.objectives]
-        self.why = job.open_boxes or _unserved(program, sampler)
+        self.why = job.open_boxes(program.model) or _unserved(program, sampler)
         self._levels: list[_Level] = []
         if self.why:
             return

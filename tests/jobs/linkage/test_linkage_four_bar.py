@@ -9,6 +9,10 @@ from support.linkage_scenes import four_bar
 
 import loomopt as lo
 from loomopt.jobs import registry
+from loomopt.solving.nlp.point import Settings
+from loomopt.solving.proof.levels import Levels
+from loomopt.solving.search.multistart import run_search
+from loomopt.solving.search.search import Search
 
 BEATUP = lo.load("beatup").update(
     {
@@ -120,3 +124,47 @@ def test_the_optimum_with_an_effect_is_that_of_the_beat_up(effect):
     assert (beatup.status, chain.status) == ("optimal", "optimal")
     for name in ("M3_fdc", "peak_torque"):
         assert chain.figures[SAME[name]] == pytest.approx(beatup.figures[name], rel=1e-8, abs=1e-8 * 745.0), name
+
+
+def proven(scene, x=None):
+    """Outcome of the proof that no design has a lower torque than an optimum, or than a design x."""
+    job = registry.find("linkage")
+    program = job.program(scene, "torque")
+    search = run_search(Search(job, program, Settings()))
+    assert search.best is not None
+    return Levels(program, job, x or search.best.x, 1e-3).run(math.inf, lambda text: None)
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("torque", ["745 N*m", "800 N*m"])
+def test_the_least_torque_of_all_designs_is_proven(torque):
+    outcome = proven(four_bar(effects={"resistance": {"torque": torque}}))
+    assert outcome.proven, outcome.why
+    (level,) = outcome.levels
+    assert level.bound == pytest.approx(level.best * (1 - 1e-3), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_proof_that_begins_at_a_worse_design_turns_up_a_better_one():
+    scene = four_bar()
+    job = registry.find("linkage")
+    today = job.today(scene)
+    program = job.program(scene, "torque")
+    outcome = proven(scene, {v.name: today.get(v.name, 0.0) for v in program.variables})
+    assert not outcome.proven
+    assert outcome.better is not None
+
+
+def test_a_chain_with_more_than_a_crank_rocker_or_with_other_events_is_not_proven():
+    job = registry.find("linkage")
+    travel = {"shed": {"travel": "10 deg", "before": "front"}}
+    assert not job.open_boxes(job.model(four_bar()))
+    assert "no global claim" in job.open_boxes(job.model(registry.load("sixbar-sley")))
+    outcome = proven(four_bar(events=travel, targets={"torque": {"most": ["angle.shed"], "least": None}}))
+    assert "found by iteration" in outcome.why
+
+
+@pytest.mark.parametrize("effects", [{}, {"bearing_friction": {"coulomb": "2 N*m", "viscous": "0.05 N*m*s/rad"}}])
+def test_the_dead_centres_need_no_search(effects):
+    sampler = registry.find("linkage").sampler(four_bar(effects=effects), {})
+    assert not sampler.hints
