@@ -117,9 +117,10 @@ def _prices(result: SensitivityResult) -> TextTable:
     for price in result.prices:
         unit = formatter.unit(price.limit)
         ends = [(f"{x / factor(unit):+.6g}" if x else "0") if math.isfinite(x) else "" for x in price.range]
-        lines.append((f"{price.limit} {price.side}", ends[0], price.ends[0], ends[1], price.ends[1], unit))
-    heads = ("price of", "valid\nfrom", "what changes", "to", "what changes", "unit")
-    return TextTable("", heads, tuple(lines), (1, 3), first=(0, 1, 3, 5), more="--json")
+        worth = formatter.price_reading(price.figure, price.limit, price.worth)
+        lines.append((f"{price.limit} {price.side}", worth, ends[0], price.ends[0], ends[1], price.ends[1], unit))
+    heads = ("price of", "price", "valid\nfrom", "what changes", "to", "what changes", "unit")
+    return TextTable("", heads, tuple(lines), (2, 4), first=(0, 1, 2, 4, 6), more="--json")
 
 
 def _valid(result: SensitivityResult) -> list[str]:

@@ -22,6 +22,7 @@ from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ACTIVE, FEASIBLE, POSITIVE, SAME_NODE
 from loomopt.scenes import designs, numbers
 from loomopt.scenes.scene import Scene
+from loomopt.solving import engine
 from loomopt.solving.answer.solution import SIDES, Price, Solution, UnitFormatter, demand_single
 from loomopt.solving.certificate import kkt
 from loomopt.solving.certificate.kkt import ActiveRow
@@ -78,7 +79,10 @@ class Row(NamedTuple):
 class PriceRange(NamedTuple):
     """Price of a limit, SI, and the range in which it stays within 10 %; ends: why the range ends.
 
-    range: shift of the limit's value to each side, SI; infinite where the range has no end.
+    A limit with another price if it is tightened than if it is loosened has two ranges, which meet at 0.
+
+    range: shift of the limit's value to each side, SI; infinite where the range has no end. figure: the one that the
+    price changes.
     """
 
     limit: str
@@ -88,6 +92,7 @@ class PriceRange(NamedTuple):
     range: tuple[float, float]
     ends: tuple[str, str]
     unit: str
+    figure: str
 
 
 class ActiveSetRange(NamedTuple):
@@ -265,8 +270,7 @@ def run(study: Study, on_step: Callable[[str], None] | None = None) -> Sensitivi
         return SensitivityResult(study.scene, study.target, study.answer, (), (), why, {}, {})
     for price in study.answer.binding if working_sets else ():
         report(f"range of the price of {price.limit}")
-        price_range = _price_range(study, working_sets, chosen.get(number_key(study, price) or "", {}), price)
-        prices += [price_range] if price_range else []
+        prices += _price_ranges(study, working_sets, chosen.get(number_key(study, price) or "", {}), price)
     kinds = {key: number.quantity.kind for key, number in study.numbers.items()}
     sizes = {key: study.usual_change(key) for key in study.numbers}
     worth = {name: abs(value) for name, value in study.answer.figures.items() if value}
@@ -441,24 +445,71 @@ ZERO_DERIVATIVE = 1e-8
 # Prices.
 
 
-def _price_range(
+class PriceEnd(NamedTuple):
+    """Price of a limit, SI, on one side of its number, the shift at which its range ends, SI, and why it ends."""
+
+    worth: float
+    shift: float
+    why: str
+
+
+def _price_ranges(
     study: Study, working_sets: Sequence[WorkingSet], chosen: Mapping[Side, WorkingSet], price: Price
-) -> PriceRange | None:
-    """A price with its range; None for a limit whose value is not a number of the scene.
+) -> Iterator[PriceRange]:
+    """Yield a price with its range, or of each side if they differ; none where the value is no number of the scene.
 
     chosen: working set of each side of the number; a side without one follows the first of `working_sets` with the
     limit.
     """
     key = number_key(study, price)
-    places = _limit_rows(study, price)
-    if key is None or not places:
-        return None
+    if key is None or not _limit_rows(study, price):
+        return
     figure, worth = next(iter(price.worth.items()))
-    usual = next((working_set for working_set in working_sets if {*places} & {*working_set.constraints}), None)
-    ends = {side: _price_end(study, chosen.get(side, usual), key, price, side) for side in SIDES_OF_A_NUMBER}
-    reach = (0.0 - ends["down"][0], ends["up"][0])
-    why = (ends["down"][1], ends["up"][1])
-    return PriceRange(price.limit, price.side, worth, price.value, reach, why, price.unit[figure])
+    down, up = (
+        _resolved_end(study, _price_end(study, working_sets, chosen.get(side), key, price, side), key, price, side)
+        for side in ("down", "up")
+    )
+
+    def price_range(worth: float, low: PriceEnd, high: PriceEnd) -> PriceRange:
+        reach, why = (0.0 - low.shift, high.shift), (low.why, high.why)
+        return PriceRange(price.limit, price.side, worth, price.value, reach, why, price.unit[figure], figure)
+
+    if abs(up.worth - down.worth) <= PRICE_CHANGE * max(abs(up.worth), abs(down.worth)):
+        yield price_range(worth, down, up)
+        return
+    formatter = UnitFormatter(study.scene)
+    at_zero = [
+        PriceEnd(end.worth, 0.0, f"the price is {formatter.price_reading(figure, price.limit, end.worth)} there")
+        for end in (down, up)
+    ]
+    yield price_range(down.worth, down, at_zero[1])
+    yield price_range(up.worth, at_zero[0], up)
+
+
+def _resolved_end(study: Study, end: PriceEnd, key: str, price: Price, side: Side) -> PriceEnd:
+    """The end of a side's range; of a short one it is confirmed by a solve within the range.
+
+    Among equally good designs, that which stays optimal on a side may be another than the answer's, with another price.
+    """
+    point = study.answer.point
+    if study.answer.certificate is None or study.answer.certificate.unique or not 0.0 < end.shift < study.step(key):
+        return end
+    assert point is not None
+    shift = end.shift / 2
+    try:
+        scene, _ = study.change(key, study.value(key) + (shift if side == "up" else -shift))
+        answer = engine.solve(scene, study.target, near=(point,))
+    except BadInput:
+        return end
+    figure = next(iter(price.worth))
+    there = next((p for p in answer.binding if (p.limit, p.side) == (price.limit, price.side)), None)
+    if answer.status != "optimal" or there is None or figure not in there.worth:
+        return end
+    if abs(there.worth[figure] - end.worth) <= PRICE_CHANGE * abs(end.worth):
+        return end
+    moved = Study(scene, study.target, answer)
+    beyond = _price_end(moved, list(moved.optimum.working_sets()), None, key, there, side)
+    return beyond._replace(shift=shift + beyond.shift)
 
 
 def _possible_keys(price: Price) -> tuple[str, ...]:
@@ -478,34 +529,45 @@ def _limit_rows(study: Study, price: Price) -> list[int]:
     return [k for k, row in rows if row.limit and row.limit.name == price.limit and row.limit.sign in signs]
 
 
-def _price_end(study: Study, working_set: WorkingSet | None, key: str, price: Price, side: Side) -> tuple[float, str]:
-    """Shift of a limit's number to one side, SI, at which its price range ends, and why it ends."""
+def _price_end(
+    study: Study, working_sets: Sequence[WorkingSet], working_set: WorkingSet | None, key: str, price: Price, side: Side
+) -> PriceEnd:
+    """Price of a limit on one side of its number, and the end of its range.
+
+    working_set: the one of this side; None for the first of `working_sets` with the limit.
+    """
     optimum, places = study.optimum, _limit_rows(study, price)
     figure, worth = next(iter(price.worth.items()))
     level = [objective.figure for objective in optimum.program.objectives].index(figure)
     if level > optimum.level:
-        return 0.0, "the optimum cannot be followed"
+        return PriceEnd(worth, 0.0, "the optimum cannot be followed")
     # The least price counts where the limit is loosened, the largest where it is tightened.
     loosened = (side == "up") == (price.side == "max")
-    limit = optimum.rows[places[0]].limit
+    row = optimum.rows[places[0]]
+    assert row.limit is not None
     # The multiplier of an equality has the sign of the side on which it gains.
-    sign = -1.0 if price.side == "min" and limit and not limit.sign else 1.0
-    cost = np.where(np.isin(np.arange(len(optimum.rows)), places), sign, 0.0)
+    sign = -1.0 if price.side == "min" and not row.limit.sign else 1.0
+    unit = optimum.program.objectives[level].scale / row.limit.scale
+    factor = float(row.limit.factor(optimum.build_sampler(optimum.program, optimum.x).rows))
+    cost = np.where(np.isin(np.arange(len(optimum.rows)), places), sign * factor, 0.0)
     every = optimum.multiplier_sets[level]
     here = {way: every.minimiser(way * cost) for way in (1.0, -1.0)}
     multipliers = here[1.0 if loosened else -1.0]
     if multipliers is None:
-        return 0.0, "no design is admissible beyond"
+        return PriceEnd(worth, 0.0, "no design is admissible beyond")
     support = optimum.find_support(level, multipliers)
-    largest = max(
-        sign * _price(optimum, optimum.x, level, w, optimum.rows, places) for w in here.values() if w is not None
-    )
-    size = worth or largest
-    now = sign * _price(optimum, optimum.x, level, multipliers, optimum.rows, places)
-    if abs(now - worth) > PRICE_CHANGE * size:
-        return 0.0, f"the price is {UnitFormatter(study.scene).price_reading(figure, price.limit, now)} there"
+    prices = [
+        sign * _price(optimum, optimum.x, level, w, optimum.rows, places)
+        for w in (multipliers, *here.values())
+        if w is not None
+    ]
+    now, *others = (0.0 if abs(value) <= POSITIVE * unit else value for value in prices)
+    now = worth if abs(now - worth) <= PRICE_CHANGE * worth else now
+    # A price that is 0 is compared with that of the other side, or with one of ordinary size.
+    size = abs(now) or max(map(abs, others)) or unit
+    working_set = working_set or next((known for known in working_sets if {*places} & {*known.constraints}), None)
     if working_set is None:
-        return 0.0, "the optimum cannot be followed"
+        return PriceEnd(now, 0.0, "the optimum cannot be followed")
 
     def price_excess(there: PathPoint) -> tuple[float, str]:
         """Change of the price beyond `PRICE_CHANGE`, negative within it, and what it means."""
@@ -522,11 +584,13 @@ def _price_end(study: Study, working_set: WorkingSet | None, key: str, price: Pr
         for k, row in zip(row_places, evaluation.rows, strict=True):
             rows[k] = row
         value = sign * _price(optimum, there.x, level, full, rows, places, there.evaluation.sampler)
-        reason = f"the price moves by {'+' if value > worth else '-'}10 %" if worth else "its price is no longer 0"
-        return abs(value - worth) / size - PRICE_CHANGE, reason
+        reason = f"the price moves by {'+' if value > now else '-'}10 %" if now else "its price is no longer 0"
+        return abs(value - now) / size - PRICE_CHANGE, reason
 
-    row = optimum.rows[places[0]]
-    return _follow(study, working_set, key, row.scale, 1.0 if side == "up" else -1.0, price_excess)
+    bound = study.scene.bounds.get(price.limit)
+    width = bound.max - bound.min if bound and math.isfinite(bound.max - bound.min) else 0.0
+    shift, why = _follow(study, working_set, key, max(row.scale, width), 1.0 if side == "up" else -1.0, price_excess)
+    return PriceEnd(now, shift, why)
 
 
 def _price(
@@ -615,7 +679,8 @@ def _follow(
             there = _newton(optimum, working_set, study.change(key, here + sign * shift)[1], start)
             change = criterion(there) if criterion else (-math.inf, "")
         except BadInput as error:
-            return start, math.inf, error.problem
+            # The numbers in brackets are those of a trial.
+            return start, math.inf, error.problem.partition(" (")[0]
         except (ContinuationError, np.linalg.LinAlgError):
             return start, math.inf, "the optimum cannot be followed farther"
         return PathPlace(there.x, there.evaluation.rows), *max((there.excess, there.reason), change)

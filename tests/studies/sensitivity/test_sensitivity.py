@@ -189,10 +189,14 @@ def test_bounds_that_bind_only_together_have_different_derivatives_on_both_sides
     for name in ("left", "right"):
         assert rows[f"bounds.{name}.max", "up"] == 0.0
         assert rows[f"bounds.{name}.max", "down"] == pytest.approx(-0.19781344543, rel=1e-8)
-    for price in rams("torque").prices:
-        assert price.worth == 0.0
-        assert price.range == (0.0, math.inf)
-        assert price.ends[0] == "the price is 0.000198 N*m per mm there"
+    for name in ("left", "right"):
+        tighter, looser = (price for price in rams("torque").prices if price.limit == name)
+        assert looser.worth == 0.0
+        assert looser.range == (0.0, math.inf)
+        assert looser.ends[0] == "the price is 0.000198 N*m per mm there"
+        assert tighter.worth == pytest.approx(0.19781344543, rel=1e-8)
+        assert tighter.range[0] < 0.0 == tighter.range[1]
+        assert tighter.ends[1] == "the price is 0 N*m per mm there"
 
 
 @pytest.mark.slow
