@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import loomopt as lo
+from loomopt.base.errors import BadInput
 from loomopt.base.units import SI_UNIT
 from loomopt.jobs import registry
 from loomopt.scenes.packaged import problems
@@ -20,6 +21,8 @@ INSIDE, BEYOND, STEP = 0.97, 1.03, 0.01
 """Shares of a range at which the price is computed, and step of its difference."""
 MARGIN = 2e-3
 """Error of a difference of figures, as a share of the price."""
+WAY = (0.25, 0.5, 0.75)
+"""Shares of a range at which the optimum is found on the way to its end."""
 LEAST_RMS = Path(__file__).parent / "least_rms_torque.toml"
 
 
@@ -45,13 +48,23 @@ def _check_end(plan, price, priced, end, why):
     unit = SI_UNIT[plan.numbers[key].quantity.kind]
     figure, worth = priced.figure, priced.worth
 
+    points = [plan.answer.point]
+
     def solve(value):
         scene = plan.scene.set(key, value if unit == "1" else f"{value!r} {unit}")
-        return engine.solve(scene, plan.target, near=(plan.answer.point,), accuracy=1e-10)
+        return engine.solve(scene, plan.target, near=tuple(points), accuracy=1e-10)
+
+    # One step over the whole range may end in another basin.
+    for share in WAY:
+        answer = solve(plan.value(key) + share * end)
+        points += [answer.point] if answer.status == "optimal" else []
 
     def slope(share):
         at, step = plan.value(key) + share * end, STEP * abs(end)
-        high, low = solve(at + step), solve(at - step)
+        try:
+            high, low = solve(at + step), solve(at - step)
+        except BadInput:
+            return None, None
         if "optimal" not in (high.status, low.status):
             return None, None
         sign = 1.0 if price.side == "max" else -1.0
