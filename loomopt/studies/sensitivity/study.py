@@ -79,10 +79,10 @@ class Row(NamedTuple):
 class PriceRange(NamedTuple):
     """Price of a limit, SI, and the range in which it stays within 10 %; ends: why the range ends.
 
-    A limit with another price if it is tightened than if it is loosened has two ranges, which meet at 0.
+    A limit whose price differs between tightening and loosening has two ranges, which meet at 0.
 
-    range: shift of the limit's value to each side, SI; infinite where the range has no end. figure: the one that the
-    price changes.
+    range: shift of the limit's value to each side, SI; infinite where the range has no end. figure: the objective whose
+    fall per unit is the price.
     """
 
     limit: str
@@ -487,7 +487,7 @@ def _price_ranges(
 
 
 def _resolved_end(study: Study, end: PriceEnd, key: str, price: Price, side: Side) -> PriceEnd:
-    """The end of a side's range; of a short one it is confirmed by a solve within the range.
+    """The end of a side's range; a short range of an answer that is not unique is confirmed by a solve within it.
 
     Among equally good designs, that which stays optimal on a side may be another than the answer's, with another price.
     """
@@ -508,6 +508,8 @@ def _resolved_end(study: Study, end: PriceEnd, key: str, price: Price, side: Sid
     if abs(there.worth[figure] - end.worth) <= PRICE_CHANGE * abs(end.worth):
         return end
     moved = Study(scene, study.target, answer)
+    if key not in moved.numbers or not _limit_rows(moved, there):
+        return end
     beyond = _price_end(moved, list(moved.optimum.working_sets()), None, key, there, side)
     return beyond._replace(shift=shift + beyond.shift)
 

@@ -21,7 +21,7 @@ INSIDE, BEYOND, STEP = 0.97, 1.03, 0.01
 """Shares of a range at which the price is computed, and step of its difference."""
 MARGIN = 2e-3
 """Error of a difference of figures, as a share of the price."""
-WAY = (0.25, 0.5, 0.75)
+WAY = (0.5, 0.9)
 """Shares of a range at which the optimum is found on the way to its end."""
 LEAST_RMS = Path(__file__).parent / "least_rms_torque.toml"
 
@@ -50,14 +50,17 @@ def _check_end(plan, price, priced, end, why):
 
     points = [plan.answer.point]
 
-    def solve(value):
-        scene = plan.scene.set(key, value if unit == "1" else f"{value!r} {unit}")
-        return engine.solve(scene, plan.target, near=tuple(points), accuracy=1e-10)
+    def changed(value):
+        return plan.scene.set(key, value if unit == "1" else f"{value!r} {unit}")
 
-    # One step over the whole range may end in another basin.
+    def solve(value):
+        return engine.solve(changed(value), plan.target, near=tuple(points), accuracy=1e-10)
+
+    # One start near today's optimum may end in another basin.
     for share in WAY:
-        answer = solve(plan.value(key) + share * end)
-        points += [answer.point] if answer.status == "optimal" else []
+        value = plan.value(key) + share * end
+        answers = solve(value), engine.solve(changed(value), plan.target)
+        points += [answer.point for answer in answers if answer.status == "optimal"]
 
     def slope(share):
         at, step = plan.value(key) + share * end, STEP * abs(end)
