@@ -39,7 +39,7 @@ JUMP, SURE, MOST_JUMPS = 0.5, 6.0, 6
 """Share of a part's roughness that a jump explains, its standard deviations at least, and jumps of a part at most."""
 SMALLEST = 0.05
 """Share of the largest s'' below which a jump is none."""
-SAFETY = 1.5
+SAFETY = 2.0
 """Ratio of the reported uncertainty to the estimated one."""
 LESS = 30.0
 """Ratio by which λ is made smaller to see what smoothing does to s''."""
