@@ -73,11 +73,16 @@ def _plain(text: str) -> str:
 # Scenes
 
 
-OWN_NAMES = "Names are the scene's own: [parts and their keys](linkages.md). Tables beside these: {}."
-EFFECTS = (
-    "## [effects.NAME], [available.NAME]\n\nIn `[effects]` it is on; in `[available]` it waits for `--with NAME`.\n"
+OWN_NAMES = (
+    "The scene chooses the names of dimensions and parts: [parts and their keys](linkages.md). Further tables: {}."
 )
-ACCEPT = "## [accept]\n\nA figure → half the band around an equality or a goal by which made machines are judged.\n"
+EFFECTS = (
+    "## [effects.NAME], [available.NAME]\n\n"
+    "An effect in `[effects]` is on. An effect in `[available]` is off; `--with NAME` switches it on.\n"
+)
+ACCEPT = (
+    "## [accept]\n\nFigure → half the band around an equality or a goal in which manufactured machines are accepted.\n"
+)
 
 
 NEEDED = "needed"
@@ -97,9 +102,11 @@ def scene(job: str) -> str:
         "" if free else _table("mechanism", tables["mechanism"], known),
         EFFECTS,
         *(_table(f"effects.{name}", table, known, 3) for name, table in tables["effects"]["properties"].items()),
-        _ranges("bounds", "What may change, and how far: a range, or one value.", tables["bounds"], known, not free),
+        _ranges(
+            "bounds", "Numbers that may change, with a range, or a fixed value.", tables["bounds"], known, not free
+        ),
         _figures(schema.figures, free),
-        _ranges("tolerances", "How a number is made.", tables["tolerances"], known, not free),
+        _ranges("tolerances", "Scatter of a number.", tables["tolerances"], known, not free),
         ACCEPT,
         _table("display", tables["display"], known),
         *([] if free else [_targets(schema, tables["targets"], known)]),
@@ -134,7 +141,7 @@ def _table(name: str, table: Mapping[str, Any], known: Mapping[str, Any], level:
     if not rows:
         return f"{head}\nNo values of its own.\n" if level > 2 else head
     lines = "\n".join(f"| `{key}` | {_cell(_plain(what))} | {_cell(_plain(form))} |" for key, what, form in rows)
-    return f"{head}\n| key | what it is | what stands there |\n| --- | --- | --- |\n{lines}\n"
+    return f"{head}\n| key | what it is | allowed values |\n| --- | --- | --- |\n{lines}\n"
 
 
 def _sentence(text: str) -> str:
@@ -197,8 +204,8 @@ def _ranges(name: str, text: str, table: Mapping[str, Any], known: Mapping[str, 
         for key, what, form in _keys(first.get("then", {}), known)
     ]
     names = f"Numbers: {_listed(table['properties'])}.\n" if listed else ""
-    head = f"## [{name}]\n\n{text} Of each number, as of `{next(iter(table['properties']))}`:\n\n"
-    return head + "| key | what it is | what stands there |\n| --- | --- | --- |\n" + "\n".join(rows) + f"\n\n{names}"
+    head = f"## [{name}]\n\n{text} Keys of each number, such as `{next(iter(table['properties']))}`:\n\n"
+    return head + "| key | what it is | allowed values |\n| --- | --- | --- |\n" + "\n".join(rows) + f"\n\n{names}"
 
 
 def _figures(figures: Mapping[str, Any], free: bool) -> str:
@@ -208,13 +215,13 @@ def _figures(figures: Mapping[str, Any], free: bool) -> str:
         for figure in figures.values()
         if figure.sides
     ]
-    more = " Here those of the packaged `sixbar-sley`." if free else ""
-    head = f'## [limits]\n\nFigures to keep, each with its unit: `swing = {{ min = "22.9 deg" }}`.{more}\n\n'
+    more = " The table has the figures of the packaged `sixbar-sley`." if free else ""
+    head = f'## [limits]\n\nLimits of figures, with units: `swing = {{ min = "22.9 deg" }}`.{more}\n\n'
     return head + "| figure | what it is | ends |\n| --- | --- | --- |\n" + "\n".join(lines) + "\n"
 
 
 def _targets(schema: Any, tables: Mapping[str, Any], known: Mapping[str, Any]) -> str:
-    parts = [f"## [targets.NAME]\n\nWithout `--target` it is `{schema.default_target}`.\n"]
+    parts = [f"## [targets.NAME]\n\nThe default target is `{schema.default_target}`.\n"]
     return "\n".join(
         [*parts, *(_table(f"targets.{name}", table, known, 3) for name, table in tables["properties"].items())]
     )

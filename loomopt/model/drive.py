@@ -13,7 +13,7 @@ FIGURES = (
     Figure(
         POWER,
         "power",
-        "peak |motor power| over the cycle, driving or braking: crank torque, and what a flywheel takes, times speed",
+        "peak |motor power| over the cycle: torque of crank and flywheel, times speed",
         sides=("max",),
     ),
 )

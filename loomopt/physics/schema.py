@@ -21,10 +21,10 @@ Name = Annotated[str, Field(pattern=r"\S")]
 class TargetTable(Table):
     """Keys that every target's table may have."""
 
-    expected: dict[str, Any] | None = Field(None, description="what the target is known to reach: shown, never used")
+    expected: dict[str, Any] | None = Field(None, description="known optimum, shown only")
 
 
-DIGITS = "decimals to which the table's values are known, those printed without it"
+DIGITS = "decimals of the table's values; by default those printed"
 """What the key `digits` beside a table is: for cut zeros, or where more are printed than are known."""
 
 Values = Mapping[str, Number]

@@ -170,7 +170,7 @@ def test_today_is_judged_by_what_its_figures_are(rapier, cam):
 @pytest.mark.parametrize(
     ("key", "value", "target", "message"),
     [
-        ("limits.dwell_after.min", "35 deg", "dwell", "the lesser of both dwells is maximised.*Limit dwell"),
+        ("limits.dwell_after.min", "35 deg", "dwell", "the smaller of both dwells is maximised.*Limit dwell"),
         ("limits.dwell.min", "-5 deg", None, "the dwell is out of range.*more than 0 deg and less than 180 deg"),
         ("limits.dwell.min", "180 deg", None, "the dwell is out of range"),
         ("limits.dwell_before.max", "40 deg", None, "dwell_before has no limit max"),

@@ -60,7 +60,7 @@ GREEK = {"alpha": "α", "beta": "β", "theta": "θ", "phi": "φ", "psi": "ψ", "
 SHARED = {
     "phi": "angle of the shaft",
     "omega": "speed of the shaft",
-    "motor_torque": "torque of the motor: the shaft's, and what turns the flywheel",
+    "motor_torque": "torque of the motor: on the shaft and on the flywheel",
     "motor_power": "torque of the motor times the speed of the shaft",
 }
 """Columns that every job's curves may have."""

@@ -118,7 +118,10 @@ def _by_number(schema: SceneSchema, made: Callable[[Quantity], Json]) -> Json:
 
 
 def _bound(value: Json) -> Json:
-    free = {"enum": [True, False, "true", "false"], "description": "false: held at today's value until it is freed"}
+    free = {
+        "enum": [True, False, "true", "false"],
+        "description": "false: fixed at today's value, unless --free names it",
+    }
     ends = _closed_table({"min": value, "max": value, "free": free}, ["min", "max"])
     return {"if": {"type": "object"}, "then": ends, "else": value}
 
@@ -130,19 +133,23 @@ def _tolerances(schema: SceneSchema) -> Json:
 
 def _tolerance(quantity: Quantity) -> Json:
     percent = {"type": "string", "pattern": rf"^[ \t]*{NUMBER_PATTERN} *%[ \t]*$"}
-    half: Json = {"anyOf": [percent, _quantity(Quantity(quantity.kind, least=0))], "description": "to each side"}
+    half: Json = {"anyOf": [percent, _quantity(Quantity(quantity.kind, least=0))], "description": "half the band"}
     off: Json = {"anyOf": [percent, {"enum": ["0", 0]}, _quantity(Quantity(quantity.kind))]}
     positive, share = _quantity(Quantity("number", above=0)), _quantity(Quantity("number", least=0))
     keys = {
         "plus_minus": half,
-        "plus": off | {"description": "upper end of a band that is not even"},
-        "minus": off | {"description": "how far its lower end lies below the nominal"},
-        "class": {"enum": list(CLASSES), "description": "of a length, by its nominal"},
-        "fit": {"type": "string", "pattern": FIT_PATTERN, "description": "ISO 286 class such as H7, by the nominal"},
-        "sigmas": positive | {"description": "standard deviations that plus_minus is worth, 3 without it"},
+        "plus": off | {"description": "upper deviation of an uneven band"},
+        "minus": off | {"description": "lower deviation of an uneven band, as a positive number"},
+        "class": {"enum": list(CLASSES), "description": "tolerance class of a length"},
+        "fit": {
+            "type": "string",
+            "pattern": FIT_PATTERN,
+            "description": "ISO 286 class of a hole or a shaft, such as H7",
+        },
+        "sigmas": positive | {"description": "standard deviations in plus_minus; 3 by default"},
         "spread": {"enum": list(SPREADS)},
-        "group": {"type": "string", "description": "what numbers are made together by"},
-        "correlation": share | {"description": "with the others of the group"},
+        "group": {"type": "string", "description": "name of a group of correlated numbers"},
+        "correlation": share | {"description": "correlation with the others of the group"},
     }
     exactly_one_form: Json = {"oneOf": [{"required": [form]} for form in FORMS]}
     pairs = (("group", "correlation"), ("plus", "minus"))

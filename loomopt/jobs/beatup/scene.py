@@ -47,23 +47,21 @@ class BeatupTarget(TargetTable):
 
     indifference: PureNumber | None = Field(
         None,
-        description="share of each figure that less counterweight may cost; without it, 0.001 for none at all, and 0 "
-        "for the least torque at any price",
+        description="share by which a figure may get worse for less counterweight; by default 0.001, only to "
+        "omit it; 0: least torque at any mass",
     )
 
 
 class TorqueTarget(BeatupTarget):
     """Values of the target torque."""
 
-    M3_tolerance: Torque | None = Field(
-        None, description="largest |M3| at front dead centre; 1 % of the cloth's largest torque, M0, without it"
-    )
+    M3_tolerance: Torque | None = Field(None, description="largest |M3| at front dead centre; 1 % of M0 by default")
 
 
 class RetrofitTarget(TargetTable):
     """Values of the target retrofit."""
 
-    weights: dict[str, PureNumber] = Field({}, description="design variable → weight of its change, 1 without it")
+    weights: dict[str, PureNumber] = Field({}, description="design variable → weight of its change; 1 by default")
 
 
 RESISTED = ("resistance", 1.0)
@@ -84,7 +82,7 @@ FIGURES = {
         Figure("J4", "inertia", "inertia of reed and counterweight"),
         Figure("r4", "length", "reed system's eccentricity"),
         Figure("pulse_rms", "torque", "rms reed torque over the pulse", sides=("max",)),
-        Figure("change", "number", "change from today, in bound widths squared", sides=()),
+        Figure("change", "number", "change from today: sum of squares, relative to the widths of the bounds", sides=()),
     )
 }
 

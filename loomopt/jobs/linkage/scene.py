@@ -61,8 +61,8 @@ class Operation(Table):
 class LinkageTarget(TargetTable):
     """A target of the scene: figures that are optimised in order, or a path."""
 
-    least: tuple[Name, ...] = Field((), description="figures or numbers of which the least is sought, in order")
-    most: tuple[Name, ...] = Field((), description="figures or numbers of which the most is sought, after those")
+    least: tuple[Name, ...] = Field((), description="figures or numbers that are minimised, in order")
+    most: tuple[Name, ...] = Field((), description="figures or numbers that are maximised, after those")
     point: Name | None = Field(None, description="joint that should follow a path")
     table: Name | None = Field(
         None, description="CSV file of the path: x [mm], y [mm], and phi [deg] where its timing is given"
@@ -71,7 +71,7 @@ class LinkageTarget(TargetTable):
         None, description="CSV file of a function that the output should be: phi [deg], q in deg or mm"
     )
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
-    weights: dict[str, PureNumber] = Field({}, description="number → weight of its change from today, 1 without it")
+    weights: dict[str, PureNumber] = Field({}, description="number → weight of its change from today; 1 by default")
 
     @property
     def sought(self) -> tuple[tuple[str, str], ...]:
@@ -370,7 +370,11 @@ def figures(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Figur
     if _has(document, "match"):
         figure_list.append(Figure(MATCH, travel, "rms distance of the output from its function", sides=("max",)))
     if _reads_change(document):
-        figure_list.append(Figure(CHANGE, "number", "change from today, in bound widths squared", sides=()))
+        figure_list.append(
+            Figure(
+                CHANGE, "number", "change from today: sum of squares, relative to the widths of the bounds", sides=()
+            )
+        )
     return {figure.name: figure for figure in figure_list}
 
 

@@ -108,7 +108,7 @@ class RapierTask(Task):
         if DWELL in self.goal_names:
             for name in (name for name in least if name in SIDES):
                 problem, remedy = (
-                    "the lesser of both dwells is maximised, so one dwell alone cannot be limited",
+                    "the smaller of both dwells is maximised, so one dwell alone cannot be limited",
                     f"Limit {DWELL}.",
                 )
                 raise refusal(problem, self.scene.origin, f"limits.{name}", remedy=remedy)

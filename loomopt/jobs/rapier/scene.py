@@ -23,8 +23,8 @@ class Operation(Table):
     """Operation of the drive."""
 
     speed: Speed | None = Field(None, description="speed of the main shaft")
-    stroke: PositiveLength | None = Field(None, description="travel S of the head, the largest")
-    s_dwell: PositiveLength | None = Field(None, description="head travel that counts as standing still")
+    stroke: PositiveLength | None = Field(None, description="largest travel S of the head")
+    s_dwell: PositiveLength | None = Field(None, description="head travel up to which the head rests")
     dwell_after: DwellAngle | None = Field(None, description="angle after front dead centre within s_dwell")
     dwell_before: DwellAngle | None = Field(None, description="angle before front dead centre within s_dwell")
 
@@ -85,7 +85,7 @@ FIGURES = {
         Figure("stroke", "length", "largest head travel from front dead centre"),
         Figure("dwell_after", "angle", "crank angle after front dead centre within s_dwell", sides=("min",)),
         Figure("dwell_before", "angle", "crank angle before front dead centre within s_dwell", sides=("min",)),
-        Figure("dwell", "angle", "the lesser of both dwells", sides=("min",)),
+        Figure("dwell", "angle", "the smaller of both dwells", sides=("min",)),
         Figure("peak_acceleration", "travel acceleration", "peak |S''| over the cycle", sides=("max",)),
         Figure("peak_jerk", "travel jerk", "peak |S'''| over the cycle", sides=("max",)),
         Figure("rms_jerk", "travel jerk", "rms S''' over the cycle", sides=("max",)),

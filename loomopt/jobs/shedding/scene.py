@@ -82,18 +82,16 @@ class Lever(Table):
 class HealdFrame(Table):
     """The heald frame and its cam today; the follower's arm turns about C, its roller's centre is B."""
 
-    travel: Length | None = Field(None, description="travel of the heald frame; of segments the largest height")
+    travel: Length | None = Field(None, description="travel of the heald frame; with segments their largest height")
     law: LAW = Field("cycloidal", description="cam law of the rise, and mirrored of the return")
     law_coefficients: Numbers | None = Field(None, description="s'' of a spline law at evenly spaced knots")
     law_table: Name | None = Field(None, description="CSV file of a tabulated law")
-    digits: int | None = Field(
-        None, ge=0, le=15, description="decimals to which s of law_table is known, those printed without it"
-    )
+    digits: int | None = Field(None, ge=0, le=15, description="decimals of s in law_table; by default those printed")
     rise: SegmentAngle | None = Field(None, description="cam angle of the rise")
     far_dwell: SegmentAngle | None = Field(None, description="cam angle with the shed open downward")
     near_dwell: SegmentAngle | None = Field(None, description="cam angle with the shed open upward")
     segments: tuple[SegmentTable, ...] | None = Field(
-        None, description="the motion in several segments instead: dwells, and moves to a height, one turn together"
+        None, description="segments of the motion in place of the four angles: dwells, and moves to a height"
     )
     base_radius: PositiveLength | None = Field(None, description="base circle of the roller's centre C, about A")
     arm: PositiveLength | None = Field(None, description="arm BC of the follower")
@@ -114,7 +112,7 @@ class LawTarget(TargetTable):
     """Values of the target law."""
 
     intervals: int = Field(16, description="intervals of the spline")
-    symmetric: bool = Field(False, description="whether s(u) + s(1 − u) = 1 is asked")
+    symmetric: bool = Field(False, description="whether s(u) + s(1 − u) = 1 is required")
     acceleration: PositiveNumber = Field(CYCLOID, description="largest |s''|")
 
 
@@ -142,7 +140,12 @@ FIGURES = {
         Figure("law_acceleration", "number", "peak |s''| of the cam law", sides=("max",)),
         Figure("pressure_angle_max", "angle", "largest pressure angle", sides=("max",)),
         Figure("curvature_min", "curvature", "least signed curvature of the roller centre's curve", sides=("min",)),
-        Figure("curvature_max", "curvature", "largest one; undercut where it exceeds 1/roller_radius", sides=("max",)),
+        Figure(
+            "curvature_max",
+            "curvature",
+            "largest signed curvature of the roller centre's curve; more than 1/roller_radius is undercut",
+            sides=("max",),
+        ),
     )
 }
 

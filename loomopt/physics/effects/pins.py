@@ -14,13 +14,13 @@ from loomopt.physics.effects.kinds import Inputs
 from loomopt.physics.schema import Figure, Table
 
 LOSS = "friction_loss"
-FIGURE = Figure(LOSS, "power", "mean power that friction in the pins takes, by their loads", sides=())
+FIGURE = Figure(LOSS, "power", "mean friction loss in the pins under their loads", sides=())
 
 
 class Pin(Table):
     """Friction of one pin."""
 
-    mu: PureNumber | None = Field(None, description="coefficient of friction, for what it loses under its load")
+    mu: PureNumber | None = Field(None, description="coefficient of friction, for the friction loss")
     radius: PositiveLength | None = Field(None, description="radius of the pin or journal")
 
 

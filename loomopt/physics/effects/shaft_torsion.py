@@ -38,10 +38,10 @@ class Parameters(Table):
     """Values of the shaft between the output's link and what it carries."""
 
     stiffness: PositiveRotaryStiffness = Field(
-        description="torque that twists what the shaft carries against the output's link by a radian"
+        description="torque per radian of twist between the output's link and the parts on the shaft"
     )
     damping: PositiveRotaryDamping = Field(
-        description="torque against the speed of the twist; without any the ringing would never end"
+        description="damping torque per speed of the twist; without damping there is no steady state"
     )
 
 
@@ -184,7 +184,7 @@ EFFECT = State(
     figures=(
         Figure("shaft_peak", "torque", "peak |torque of the shaft| over the cycle", sides=("max",)),
         Figure("twist_peak", "angle", "peak |twist| of the shaft over the cycle", sides=("max",)),
-        Figure("carried_max", "angle", "largest angle of what the shaft carries", sides=("max",)),
+        Figure("carried_max", "angle", "largest angle of the parts on the shaft", sides=("max",)),
     ),
     peaks={
         "shaft_peak": StatePeak(lambda at: at.force()),

@@ -23,7 +23,7 @@ class Parameters(Table):
     """Values of motor and flywheel, all as they act at the crank."""
 
     motor_torque: PositiveTorque = Field(description="rated torque of the motor")
-    slip: Share = Field(description="share of the mean speed by which the rated torque slows the motor")
+    slip: Share = Field(description="decrease of the speed at rated torque, as a share of the mean speed")
     flywheel: PositiveInertia = Field(description="inertia of all that turns with the crank, J_f")
 
 
@@ -69,7 +69,7 @@ EFFECT = Speed(
     most="motor_torque_max",
     needs=("operation.speed",),
     figures=(
-        Figure("fluctuation", "number", "greatest less least speed of the crank, over the mean", sides=("max",)),
+        Figure("fluctuation", "number", "range of the crank speed, divided by its mean", sides=("max",)),
         Figure("no_load_speed", "angular speed", "speed at which the motor gives no torque", sides=()),
         Figure("motor_torque_max", "torque", "largest torque of the motor", sides=("max",)),
     ),

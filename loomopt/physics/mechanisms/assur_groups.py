@@ -1,8 +1,8 @@
 """Assur groups of class II, closed by one formula each: RRR (two links), RRP (a slider), RPR (a slotted link).
 
-Each hangs between joints and links whose motion is known. Its links add no degree of freedom. Lengths
-in m, angles in rad, derivatives with respect to the crank angle φ, in closed form up to the third: each order is
-linear in what is new, with the same determinant, which vanishes with the sine of the transmission angle.
+A group is attached to joints and links whose motion is known. Its links add no degree of freedom. Lengths are in m,
+angles in rad. Derivatives with respect to the crank angle φ are in closed form up to the third: each order is a linear
+system for the new derivatives, with the same determinant, which vanishes with the sine of the transmission angle.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,9 +1,10 @@
-"""The least return spring over all cam laws: what a free law of ever more intervals tends to, in closed form.
+"""The softest return spring over all cam laws, in closed form: the limit of a free law with more and more intervals.
 
-With |s''| bounded, the law that needs the least spring is bang and arc: s'' stands at its bound until the cam force has
-fallen to its least; then the frame flies with that force, slowed by spring and steady loads, until it is at rest at
-s = 1. On the arc s'' = −(α + β s), a straight line on each side of the middle of the shed, so that its speed follows
-from energy and its duration from arc cosines; what is left is one unknown, the stiffness for which both fill the rise.
+With |s''| bounded, the law with the softest spring has two parts. First s'' is at its bound until the cam force has
+fallen to its least value. Then the cam force remains at this value, and spring and steady loads decelerate the frame
+until it rests at s = 1. In this part s'' = −(α + β s), linear on each side of the middle of the shed, so that the speed
+follows from energy and the duration from arc cosines. One unknown remains: the stiffness for which both parts fill the
+rise.
 """
 
 from dataclasses import dataclass

@@ -1,11 +1,11 @@
 """Forces in the joints of any chain of links: one formula for each group, from the output back to the crank.
 
-What acts on a link is known as one force and one moment about its outer joint, the mass that it moves included
-(d'Alembert). Solving a group gives the force in its inner joint, then in its outer ones; the opposite of an outer one
-is a load of the link that the group hangs on [Norton, Design of Machinery, ch. 11]. A force R is that of a group's
-first link on its second one. Nothing is inverted: the one divisor is the determinant of the group's velocities, which
-vanishes exactly where its triangle does: there is no force there, which floats say by ZeroDivisionError and arrays by
-what is not finite. Any one set of units; a × b = a_x b_y − a_y b_x.
+The load of a link is one force and one moment about its outer joint, including its inertia (d'Alembert). The equations
+of a group give the force in its inner joint, then those in its outer joints. The negative of an outer force is a load
+of the link to which the group is attached [Norton, Design of Machinery, ch. 11]. A force R is the force of the first
+link of a group on its second link. The only divisor is the determinant of the velocities of the group. It vanishes with
+the area of its triangle, where no force exists: floats then raise ZeroDivisionError, and arrays are not finite. Units
+are consistent; a × b = a_x b_y − a_y b_x.
 """
 
 from collections.abc import Iterable

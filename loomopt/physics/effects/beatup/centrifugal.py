@@ -34,7 +34,7 @@ EFFECT = Check(
     needs=("operation.speed", *PLACED),
     figures=(
         Figure(
-            "reed_centrifugal", "force", "peak centrifugal force of the reed alone, no bearing's load", sides=("max",)
+            "reed_centrifugal", "force", "peak centrifugal force of the reed alone, not a bearing load", sides=("max",)
         ),
         SHAKING_FORCE,
     ),

@@ -28,13 +28,14 @@ class Parameters(Table):
         None, description="crank angle δ through which the cloth resists, about front dead centre"
     )
     table: Name | None = Field(
-        None, description="CSV file of M_R instead: angle [deg] from front dead centre, M [N*m], corner"
+        None,
+        description="CSV file of M_R in place of pulse and M0: angle [deg] from front dead centre, M [N*m], corner",
     )
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
     reach: PositiveLength | None = Field(
-        None, description="distance from the rocking shaft D at which the cloth pushes, for the force there"
+        None, description="distance of the fell from the rocking shaft D, for the force of the cloth"
     )
-    reach_angle: Angle | None = Field(None, description="angle of that place from the rocker's line D to C, 0 without")
+    reach_angle: Angle | None = Field(None, description="angle of the fell from the rocker's line D to C; 0 by default")
 
 
 def corners(at: Inputs[object]) -> tuple[Number, ...]:

@@ -19,7 +19,7 @@ class Parameters(Table):
 
     J3: PositiveInertia = Field(description="inertia of the rocker about the rocking shaft D")
     s3: Length | None = Field(None, description="centre of mass of the rocker from the rocking shaft D, towards C")
-    m3: Mass | None = Field(None, description="mass of the rocker, for the forces in the joints; none without it")
+    m3: Mass | None = Field(None, description="mass of the rocker, for weight and joint forces; 0 by default")
 
     @field_validator("m3")
     @classmethod

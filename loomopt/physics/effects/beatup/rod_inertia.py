@@ -22,7 +22,9 @@ class Parameters(Table):
 
     m2: PositiveMass = Field(description="mass of the connecting rod BC")
     s2: Length = Field(description="centre of mass of the rod from the crank pin B")
-    JS2: PositiveInertia | None = Field(None, description="inertia of the rod about its centre of mass; exact only")
+    JS2: PositiveInertia | None = Field(
+        None, description="inertia of the rod about its centre of mass, for the exact model"
+    )
     model: Literal["lumped", "exact"] = Field("lumped", description="two point masses, or the rigid rod itself")
 
     @field_validator("model")

@@ -39,7 +39,7 @@ EFFECT: Check[Motion] = Check(
         Figure(
             "output_centrifugal",
             "force",
-            "peak centrifugal force of what turns with the output, no bearing's load",
+            "peak centrifugal force of the parts that turn with the output, not a bearing load",
             sides=("max",),
         ),
     ),

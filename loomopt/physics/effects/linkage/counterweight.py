@@ -16,8 +16,8 @@ class Parameters(Table):
 
     mass: Mass = Field(description="mass of the counterweight")
     radius: Length = Field(description="its distance from the output's axis")
-    angle: Angle | None = Field(None, description="its angle from the link's line; 180 deg, opposite, without it")
-    J: Inertia | None = Field(None, description="its inertia about its own centre of mass; 0 without it")
+    angle: Angle | None = Field(None, description="its angle from the link's line; 180 deg (opposite) by default")
+    J: Inertia | None = Field(None, description="its inertia about its own centre of mass; 0 by default")
 
 
 def moved(at: Inputs[object]) -> Number:

@@ -10,7 +10,7 @@ from loomopt.physics.effects.kinds import Inputs, Load
 from loomopt.physics.effects.linkage import LinkagePose, between, event_angle
 from loomopt.physics.schema import Name, Table
 
-BEGINS, ENDS = "event where it sets in", "event where it ceases"
+BEGINS, ENDS = "event at which it begins", "event at which it ends"
 
 
 class Parameters(Table):

@@ -21,8 +21,8 @@ class Parameters(Table):
 
     J: PositiveInertia = Field(description="inertia about the output link's axis")
     centre: Length | None = Field(None, description="distance of its centre of mass from the axis")
-    offset: Angle | None = Field(None, description="angle of its centre of mass from the link's line; 0 without it")
-    m: PositiveMass | None = Field(None, description="its mass, for forces and weight; they leave it out without m")
+    offset: Angle | None = Field(None, description="angle of its centre of mass from the link's line; 0 by default")
+    m: PositiveMass | None = Field(None, description="mass, for joint forces, shaking force and weight")
 
     @field_validator("m")
     @classmethod

@@ -20,11 +20,11 @@ class Parameters(Table):
 
     x: SignedForce | None = Field(None, description="its component along x")
     y: SignedForce | None = Field(None, description="its component along y")
-    begins: Name | None = Field(None, description="event where it sets in; it acts all over the turn without one")
-    ends: Name | None = Field(None, description="event where it ceases")
-    at: Name | None = Field(None, description="event from which the table's angles count, crank angle 0 without one")
+    begins: Name | None = Field(None, description="event at which it begins; by default it acts over the whole turn")
+    ends: Name | None = Field(None, description="event at which it ends")
+    at: Name | None = Field(None, description="event from which the table's angles count; crank angle 0 by default")
     table: Name | None = Field(
-        None, description="CSV file of its components instead: angle [deg], x [N], y [N], corner"
+        None, description="CSV file of the components, in place of x and y: angle [deg], x [N], y [N], corner"
     )
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from loomopt.physics.effects.kinds import SteadyOscillator
 
 PULSE, AT = "crank angle δ through which it acts, about the event", "event about which it acts"
-SAID = "CSV file of it instead: angle [deg] from the event, {}, corner"
+SAID = "CSV file of the resistance, in place of pulse: angle [deg] from the event, {}, corner"
 
 
 class Parameters(Table):

@@ -51,7 +51,7 @@ EFFECT: Check[Motion] = Check(
     needs=("operation.speed",),
     companions=("head_inertia",),
     rows={"head_overrun": head_overrun},
-    figures=(Figure("head_overrun", "length", "how far the head runs beyond its stroke", sides=("max",)),),
+    figures=(Figure("head_overrun", "length", "travel of the head beyond its stroke", sides=("max",)),),
     remark=remark,
     examples=({"stiffness": "100 kN/m"},),
 )

@@ -193,35 +193,47 @@ OPENED = "coils are drawn open at the top"
 class Parameters(Table):
     """The coils of one return spring, their steel, and what they must keep."""
 
-    springs: PositiveNumber = Field(2.0, description="how many springs share K1")
+    springs: PositiveNumber = Field(2.0, description="number of springs that share K1")
     wire: PositiveLength = Field(description="diameter of the wire")
     diameter: PositiveLength = Field(description="mean diameter of the coil")
     turns: PositiveNumber = Field(description="active turns")
-    initial_tension: Force = Field(description="force at which the turns begin to part")
+    initial_tension: Force = Field(description="force at which the turns begin to separate")
     shear_modulus: PositivePressure = Field(description="shear modulus of the steel")
     elasticity: PositivePressure = Field(description="modulus of elasticity of the steel")
     density: PositiveDensity = Field(description="density of the steel")
     strength: PositivePressure = Field(description="tensile strength of wire of 1 mm")
-    strength_exponent: PureNumber = Field(description="exponent with which the strength falls as the wire grows")
-    shear_share: PositiveNumber = Field(description="share of the strength that shear in the body may take")
-    bending_share: PositiveNumber = Field(description="share of the strength that bending of the hooks may take")
+    strength_exponent: PureNumber = Field(
+        description="exponent of the decrease of the strength with the diameter of the wire"
+    )
+    shear_share: PositiveNumber = Field(description="permitted shear stress in the body, as a share of the strength")
+    bending_share: PositiveNumber = Field(
+        description="permitted bending stress in the hooks, as a share of the strength"
+    )
     spring_length: PositiveLength = Field(description="space inside the hooks with the shed fully open")
     surge_ratio: PositiveNumber = Field(13.0, description="least surge frequency over that of the cam")
     hook_factor: PositiveNumber = Field(1.0, description="bend radius of the hooks over half the coil's diameter")
     winding: Literal["shigley", "bench", "machine"] = Field(
         "shigley",
-        description="what band the initial tension keeps: Shigley's, or as wound on a bench or a machine (EN 13906-2)",
+        description="band of the initial tension: Shigley's, or of winding on a bench or a machine (EN 13906-2)",
     )
-    initial_tension_min: Force | None = Field(None, description="least initial tension, instead of the winding's")
-    initial_tension_max: Force | None = Field(None, description="largest initial tension, instead of the winding's")
+    initial_tension_min: Force | None = Field(
+        None, description="least initial tension, in place of that of the winding"
+    )
+    initial_tension_max: Force | None = Field(
+        None, description="largest initial tension, in place of that of the winding"
+    )
     factor: Literal["Wahl", "EN 13906"] = Field("Wahl", description="correction of the shear stress")
     hooks: Literal["loops", "free"] = Field(
-        "loops", description="full loops of the last coil, whose bend is judged, or free hooks, which are not"
+        "loops",
+        description="full loops of the last coil, whose bending is checked, or free hooks, which are not checked",
     )
     hook_length: Length | None = Field(
-        None, description="of a free hook, from the body to its inside; the coil's inner diameter without it"
+        None,
+        description="length of a free hook, from the body to its inside; by default the inner diameter of the coil",
     )
-    sizes: Literal["preferred", "any"] = Field("preferred", description="a free wire's: those that are sold, or any")
+    sizes: Literal["preferred", "any"] = Field(
+        "preferred", description="sizes of a free wire: those that are sold, or any"
+    )
 
     @model_validator(mode="before")
     @classmethod

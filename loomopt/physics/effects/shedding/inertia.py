@@ -11,7 +11,7 @@ from loomopt.physics.schema import Table
 class Parameters(Table):
     """Values of the frame."""
 
-    M: Mass = Field(description="mass of the frame and of what moves with it")
+    M: Mass = Field(description="mass of the frame and of all parts that move with it")
 
 
 def moved(at: Inputs[object]) -> Number:

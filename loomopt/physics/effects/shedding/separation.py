@@ -29,9 +29,9 @@ class Parameters(Table):
     """Values of the landing, and how long to go on."""
 
     restitution: Annotated[float, Quantity("number", least=0, below=1)] = Field(
-        description="speed after a landing over that before, both relative to the cam"
+        description="ratio of the speeds after and before a landing, relative to the cam"
     )
-    turns: int = Field(50, ge=1, le=10_000, description="turns of the cam after which no more is simulated")
+    turns: int = Field(50, ge=1, le=10_000, description="largest number of simulated turns of the cam")
 
 
 @dataclass(frozen=True)

@@ -30,9 +30,10 @@ class Parameters(Table):
 
     T1: Force | None = Field(None, description="pull of the warp with the shed open upward")
     T2: Force | None = Field(None, description="pull of the warp with the shed open downward")
-    shape: Literal["levels", "linear", "step"] = Field("linear", description="how the one pull becomes the other")
+    shape: Literal["levels", "linear", "step"] = Field("linear", description="course of the pull between T1 and T2")
     table: Name | None = Field(
-        None, description="CSV file of T instead: angle [deg] of the cam, T [N] positive downward, corner"
+        None,
+        description="CSV file of T in place of T1, T2, shape: cam angle [deg], T [N] positive downward, corner",
     )
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
