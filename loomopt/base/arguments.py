@@ -53,7 +53,7 @@ def number(given: object, key: str, allowed: str, remedy: str) -> float:
 
 
 def flag(given: object, key: str, remedy: str = "Write True or False") -> bool:
-    """Truth value, of Python or of NumPy. Raises BadInput for anything else, however true it looks."""
+    """Truth value, of Python or of NumPy. Raises BadInput for anything else, such as 1 or "yes"."""
     if isinstance(given, bool) or (type(given).__module__ == "numpy" and type(given).__name__ in ("bool", "bool_")):
         return bool(given)
     raise refusal("it is neither true nor false", "", key, given, "true, false", remedy)

@@ -79,19 +79,19 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
         return (self._in(self.file) if self.others else self, *self.others)
 
     def placed(self, file: str, tables: Collection[str]) -> "BadInput":
-        """Same mistakes, those in one of these tables as mistakes of a file, where they name none."""
+        """Same mistakes; those in one of these tables name this file if they name none."""
         first, *others = (
             fault._in(file) if not fault.file and fault.key.split(".")[0] in tables else fault for fault in self.faults
         )
         return first.together(others) if others else first
 
     def _in(self, file: str) -> "BadInput":
-        """This mistake alone, as one of a file."""
+        """First mistake, with the name of a file."""
         more = {name: getattr(self, name) for name in ("key", "value", "allowed", "remedy", "grade")}
         return type(self)(self.problem, file=file, **more)
 
     def together(self, others: "Sequence[BadInput]") -> "BadInput":
-        """One error of this mistake and of others, a line each."""
+        """Error with several mistakes, one line for each."""
         error = copy.copy(self)
         error.others = tuple(others)
         named, more = others[: _MOST_TOLD - 1], len(others) - _MOST_TOLD + 1
@@ -146,7 +146,7 @@ BROUGHT: dict[str, str] = {}
 
 
 def blamed(error: BaseException) -> BaseException:
-    """Error that ran through the code of another distribution as one message that names it.
+    """Message for an error raised in the code of another distribution, with its name.
 
     Any other is returned as it is, with a note of what other distributions bring.
     """
@@ -174,7 +174,7 @@ def _is_of(module: str, package_name: str) -> bool:
 
 @contextlib.contextmanager
 def naming() -> Iterator[None]:
-    """Name the distribution whose code fails in what is done inside. Raises Broken."""
+    """Context in which an error of another distribution's code is raised as Broken, with its name."""
     try:
         yield
     except BaseException as error:
@@ -215,7 +215,7 @@ def refusal(
     remedy: str = "",
     grade: int = VALUE,
 ) -> BadInput:
-    """Error for one problem; value: as given, where one is given; grade: how bad it is."""
+    """Error for one problem; value: as the user wrote it, if any; grade: severity."""
     return BadInput(
         clean(problem, _LONGEST_PART),
         file=clean(origin, _LONGEST_PART),
@@ -249,7 +249,7 @@ def unknown(
 
 
 def nearest(name: str, known: Iterable[str], given: Collection[str] = (), least: float = NEAR) -> str:
-    """Known name that is meant, whatever its case and its hyphens; "" where none is near.
+    """Nearest known name, ignoring case and hyphens; "" where none is near.
 
     given: names that come last among equally near ones; least: how alike names must be, 1 for the same letters.
     """
@@ -266,7 +266,7 @@ def _plain(name: str) -> str:
 
 
 def near_file(path: Path) -> str:
-    """Path of the file beside one that is not there which is meant; "" where none is near."""
+    """Path of an existing file with a name near that of a missing file in its folder; "" where none is near."""
     with contextlib.suppress(OSError, ValueError):
         entries = itertools.islice(path.parent.iterdir(), _MOST_FILES)
         names = [entry.name for entry in entries if entry.suffix == path.suffix and entry.is_file()]

@@ -45,12 +45,12 @@ def together(writes: Mapping[Path, Callable[[Path], None]]) -> None:
 
 
 def check(path: Path) -> None:
-    """Raise BadInput where a file may not be written, its disk's room apart."""
+    """Raise BadInput if a file may not be written; free disk space is not checked."""
     _place(path)
 
 
 def check_room(folder: Path) -> None:
-    """Raise OSError where a folder takes no new file of `PROBE` bytes, by trying; nothing is left behind."""
+    """Raise OSError if a new file of `PROBE` bytes cannot be written to a folder; the file is removed."""
     new = folder / f".{secrets.token_hex(8)}"
     try:
         new.write_bytes(bytes(PROBE))

@@ -29,12 +29,12 @@ def leave() -> NoReturn:
 
 
 def leave_at_once() -> None:
-    """Have Ctrl-C end the process: while modules are imported, and once all is said, there is nothing to clean up."""
+    """Let Ctrl-C end the process at once, as during imports and after all output: there is nothing to clean up."""
     _handle(lambda number, frame: leave())
 
 
 def stoppable(run: Callable[[], int]) -> int:
-    """Exit status of `run`; after Ctrl-C 130, whatever an import or a library has made of it."""
+    """Exit status of `run`; 130 after Ctrl-C, even if an import or a library caught it."""
 
     def stop(number: int, frame: "FrameType | None") -> None:
         _came.append(number)
@@ -58,7 +58,7 @@ def stoppable(run: Callable[[], int]) -> int:
 
 
 def check() -> None:
-    """Raise KeyboardInterrupt where Ctrl-C has come and a library that calls Python has swallowed it."""
+    """Raise KeyboardInterrupt if Ctrl-C was pressed and a library that calls Python suppressed it."""
     if _came:
         raise KeyboardInterrupt
 

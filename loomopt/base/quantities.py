@@ -46,7 +46,7 @@ _RATIO_PATTERN = rf"^[ \t]*{NUMBER_PATTERN}(?: */ *{NUMBER_PATTERN})?[ \t]*$"
 
 
 def pattern_schema(kind: str, least: float, above: float, below: float, allowed: str) -> dict[str, Any]:
-    """JSON Schema of a quantity's raw value; least, above, below: its range, SI; allowed: it in words.
+    """JSON Schema of a quantity's raw value; least, above, below: range, SI; allowed: range in words.
 
     Under the key `QUANTITY` stands a name that equal ones share. `message_schema` adds the message.
     """
@@ -67,7 +67,7 @@ def pattern_schema(kind: str, least: float, above: float, below: float, allowed:
 
 
 def message_schema(check: dict[str, Any], allowed: str) -> dict[str, Any]:
-    """JSON Schema that takes what `check` takes, and of anything else says what is allowed.
+    """JSON Schema that accepts the same values as `check`, with the allowed values as its message.
 
     Editors repeat the part that fails: a pattern says nothing to a person, the one value that would be taken does.
     """

@@ -1,4 +1,4 @@
-"""Mappings that never change: what answers and scenes are made of."""
+"""Immutable mappings, of which answers and scenes consist."""
 
 import functools
 from collections.abc import Callable, ItemsView, Iterable, Iterator, Mapping, Sequence
@@ -15,12 +15,12 @@ class Frozen(dict[str, Any]):
     __setitem__ = __delitem__ = __ior__ = clear = pop = popitem = setdefault = update = _refuse
 
     def __reduce__(self) -> tuple[type["Frozen"], tuple[dict[str, Any]]]:
-        """Constructor and items with which pickle makes it again: it would otherwise set items one by one."""
+        """Constructor and items for pickle, which would otherwise set items one by one."""
         return Frozen, (dict(self),)
 
 
 class Awaited(Mapping[str, float | None]):
-    """An immutable mapping with values that are computed when they are read: first one alone, then the rest.
+    """Immutable mapping whose values are computed when read: the first one alone, then all others.
 
     names: of all, in order; known: those that are there; later(names): others, which cost less together. It pickles as
     a `Frozen`.
@@ -56,14 +56,14 @@ class Awaited(Mapping[str, float | None]):
         return name in self._names
 
     def __or__(self, other: Mapping[str, float | None]) -> dict[str, float | None]:
-        """Union as a dict; the other's value counts where both have one."""
+        """Union as a dict; the right operand's value is used where both have one."""
         return {**self, **other}
 
     def __repr__(self) -> str:
         return repr(dict(self))
 
     def __reduce__(self) -> tuple[type[Frozen], tuple[dict[str, float | None]]]:
-        """Constructor and values with which pickle makes it again; missing values are computed first."""
+        """Constructor and values for pickle; missing values are computed first."""
         return Frozen, (dict(self),)
 
 

@@ -1,4 +1,4 @@
-"""Units: what each is in SI, exactly, and how an expression of units is read.
+"""Units: exact size of each unit in SI, and parser of expressions of units.
 
 Factors are exact fractions. Angle is a dimension of its own, so that rpm and Hz cannot be mistaken for each other.
 """
@@ -141,7 +141,7 @@ def show(value: float, unit_text: str, digits: int = 6) -> str:
 
 
 def usual(value: float, kind: str, digits: int = 6) -> str:
-    """SI value as text in the unit of its kind where no scene says another."""
+    """SI value as text in the usual unit of its kind of quantity."""
     return show(value, DISPLAY_UNIT[kind], digits)
 
 
@@ -241,7 +241,7 @@ def _from_pint(name: str) -> Unit:
 
 
 def meant_unit(text: str, kind: str, shortest: int = 2) -> str:
-    """Unit of a kind of quantity that stands a slip away from text that is none of it; "" where none does.
+    """Unit of a kind of quantity that differs from a wrong text by one typing error; "" if there is none.
 
     Case, and what joins units, count for nothing; a slip is a letter more, less, another one, or two exchanged.
     shortest: letters of text in which there may be one.
@@ -261,7 +261,7 @@ def _letters(unit: str) -> str:
 
 
 def _slips(first: str, second: str) -> int:
-    """Number of letters to insert, delete, change or exchange to make one word of another."""
+    """Edit distance of two words: letters to insert, delete, change or exchange."""
     before: list[int] = []
     row = list(range(len(second) + 1))
     for i, a in enumerate(first):

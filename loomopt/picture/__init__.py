@@ -1,1 +1,1 @@
-"""Shapes, panels and equation records: what jobs return and views render."""
+"""Shapes, panels and equations as records that jobs return and renderers draw."""

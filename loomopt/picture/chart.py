@@ -1,4 +1,4 @@
-"""Charts as plain data: curves, bars and marks over axes; studies say them, renderers draw them."""
+"""Charts as plain data: curves, bars and marks over axes. Studies create them, renderers draw them."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -21,7 +21,7 @@ TICKS = 90.0
 
 @dataclass(frozen=True)
 class Axis:
-    """One side of a chart: its two ends, where it is numbered, its name with the unit.
+    """Axis of a chart: two ends, positions of its numbers, name with the unit.
 
     linear: size of a value up to which the axis is linear; beyond it is logarithmic.
     """
@@ -40,7 +40,7 @@ class Axis:
         return np.asarray((at - low) / (high - low))
 
     def text(self, value: float) -> str:
-        """Number that stands beside the axis."""
+        """Text of a number at the axis."""
         return (
             number(value, self.ticks)
             if math.isinf(self.linear)
@@ -75,7 +75,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Chart:
-    """Curves over an axis, with what is marked on them.
+    """Curves over an axis, with marks.
 
     levels: horizontal lines; spans: shaded stretches of x; places: vertical lines, numbered from 1 in their order where
     a list that stands with the chart is; dots: (x, y, kind); key: kind and words, of kind "" the heading of all;
@@ -113,7 +113,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class Bars:
-    """Bars from 0 to either side, a row of them for each name.
+    """Horizontal bars from 0 to both sides, one row for each name.
 
     key: kind and words of the first, second, ... of a row; axis: fitted without one; places: vertical lines; place:
     what they are; numbers: what stands beside each bar.
@@ -146,7 +146,7 @@ class Bars:
 
 
 class Mark(NamedTuple):
-    """A place on an axis, or a stretch of it, that all charts mark.
+    """Position or interval on an axis that all charts mark.
 
     x: where its name stands; where: the place as text; span: both ends of a stretch.
     """
@@ -158,7 +158,7 @@ class Mark(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Its kind of style."""
+        """Kind of style."""
         return "k-span" if self.span else "k-place"
 
 
@@ -182,7 +182,7 @@ class Charts:
 
 
 def fit_axis(values: Sequence[Floats], levels: Iterable[float] = (), name: str = "") -> Axis:
-    """Axis that shows all values, and levels no farther off than they reach."""
+    """Axis that shows all values, and the levels near them."""
     some = np.concatenate([*values, [math.nan]])
     some = some[np.isfinite(some)]
     low, high = (float(some.min()), float(some.max())) if some.size else (0.0, 1.0)
@@ -196,7 +196,7 @@ def fit_axis(values: Sequence[Floats], levels: Iterable[float] = (), name: str =
 
 
 def ticks(low: float, high: float, count: int) -> list[float]:
-    """Round numbers between two ends; count: of the steps between them, roughly."""
+    """Round numbers between two ends; count: approximate number of steps."""
     raw = (high - low) / count
     size = 10.0 ** math.floor(math.log10(raw))
     step = next(factor * size for factor in (1, 2, 2.5, 5, 10) if factor * size >= raw * 0.999)
@@ -226,7 +226,7 @@ TELLING = 0.02
 
 
 def number(value: float, others: Sequence[float]) -> str:
-    """Number of an axis in as few digits as tell it from the others; a huge or tiny one by its power of ten."""
+    """Number of an axis with the fewest digits that distinguish it from the others; a power of ten if huge or tiny."""
     largest, step = max(map(abs, others), default=0.0), abs(others[-1] - others[0]) / max(1, len(others) - 1)
     if abs(value) <= 1e-9 * largest:
         return "0"
@@ -239,7 +239,7 @@ def number(value: float, others: Sequence[float]) -> str:
 
 
 def thin_rows(angles: Floats) -> NDArray[np.bool_]:
-    """Whether a curve is drawn through each of its rows at angles, deg: every 2 degrees, at corners, at both ends."""
+    """Mask of the rows, at angles in deg, through which a curve is drawn: every 2 degrees, at corners, at both ends."""
     near = np.abs(angles / EVERY - np.round(angles / EVERY)) < 1e-9
     half = np.abs(2 * angles - np.round(2 * angles)) < 1e-7
     again = np.concatenate([[False], np.diff(angles) < 1e-6])
@@ -249,5 +249,5 @@ def thin_rows(angles: Floats) -> NDArray[np.bool_]:
 
 
 def heading(title: str, unit: str) -> str:
-    """Title with its unit, where it has one."""
+    """Title, with the unit if any."""
     return title if unit == "1" else f"{title} [{unit}]"

@@ -30,7 +30,7 @@ LEADER = 2.0
 
 
 class Label(NamedTuple):
-    """A text to be placed near a point, preferably on the side an angle points to, rad; also: other points that do."""
+    """Text to be placed near a point, preferably in the direction of an angle, rad; also: further possible points."""
 
     layer: str
     near: Point
@@ -40,7 +40,7 @@ class Label(NamedTuple):
 
 
 def along(layer: str, first: Point, second: Point, side: float, text: str) -> Label:
-    """Label of a link between two joints: beside its middle, else nearer to an end."""
+    """Label of a link between two joints: at its middle, or else nearer to an end."""
     return Label(
         layer, first.part(second), side, text, tuple(first.part(second, share) for share in (0.62, 0.38, 0.75, 0.25))
     )
@@ -65,7 +65,7 @@ def place(labels: Sequence[Label], strokes: Sequence[Primitive], height: float) 
 
 
 def _written(label: Label, spot: shapes.LabelSpot, h: float) -> list[Text | Line]:
-    """A label in its spot, and the leader from its point where it stands far off; h: text height, m."""
+    """Placed label, with a leader from its point if it is far away; h: text height, m."""
     box, near = spot.box, Point(spot.x, spot.y)
     text = Text(label.layer, Point((box.left + box.right) / 2, (box.bottom + box.top) / 2), label.text)
     end = Point(*box.nearest(*near))
@@ -75,7 +75,7 @@ def _written(label: Label, spot: shapes.LabelSpot, h: float) -> list[Text | Line
 
 
 def sheet(body: Drawing) -> Drawing:
-    """A drawing with its title above and its legend below as texts: what a renderer draws."""
+    """Drawing for a renderer, with the title above and the legend below as texts."""
     box, h = shapes.extent(body), body.height
     columns = max(20, int((box.right - box.left) / (1.4 * CHARACTER * h)))
     title = " ".join(plain(body.title).split())
@@ -204,7 +204,7 @@ class Skeleton:
 
     @property
     def primes(self) -> dict[str, str]:
-        """The marks of moving joints' names at each event."""
+        """Primes of the names of moving joints, by event."""
         return {event: "'" * k for k, event in enumerate(self.joints)}
 
     def at(self, event: str) -> dict[str, Point]:
@@ -235,7 +235,7 @@ class Skeleton:
         return primitives
 
     def csv(self, units: Units = METRIC) -> str:
-        """Joints as CSV; of centres of mass, where there are any, mass and radius too. Digits round-trip."""
+        """Joints and centres of mass as CSV, the latter with mass and radius. Digits round-trip."""
         length, mass = units.length, units.mass
         heading = f"joint,position,x [{length}],y [{length}]"
         lines = [f"{heading},mass [{mass}],radius [{length}]" if self.masses else heading]

@@ -1,4 +1,4 @@
-"""Equations of effects by their own formulas on symbols: each load's term, the balance, what checks read and demand."""
+"""Equations of effects, from their formulas on symbols: terms of loads, balance, figures and demands of checks."""
 
 import math
 from collections import ChainMap
@@ -74,7 +74,7 @@ def forces(
     letter: str,
     torque: tuple[str, str] = ("crank torque", "Md"),
 ) -> list[Equation]:
-    """Write each term, their balance and the crank torque, the crank's motion, then what checks read and demand."""
+    """Write the terms, the balance, the crank torque and motion, then the figures and demands of checks."""
     at = turning(pose, model)
     equations = [item for load in model.loads for item in _load_equations(model, load, at, inputs, letter)]
     within = dict[str, Expression]()
@@ -90,14 +90,14 @@ def forces(
 
 
 def turning(pose: AnyMotion, model: JobModel) -> AnyMotion:
-    """A pose of symbols with the change of its speed where an effect gives the crank a speed of its own."""
+    """Pose of symbols, with the crank's speed as a variable if an effect determines it."""
     if motor(model.effects) is None:
         return pose
     return replace(pose, omega_dot=symbol("omega_dot"))  # type: ignore[type-var]  # poses are dataclasses
 
 
 def crank_motion(model: JobModel, pose: Motion, inputs: Given, torque: str) -> list[Equation]:
-    """Write the motor's line, the crank's own equation of motion, and what its mean speed demands; none without."""
+    """Write the motor's characteristic, the crank's equation of motion and its mean speed, if an effect has them."""
     drive = motor(model.effects)
     if drive is None:
         return []
@@ -138,7 +138,7 @@ def _in_symbols(pose: Motion, inertia: Expression, carried: Expression) -> "Writ
 
 
 def term(load: Acting, pose: Motion, inputs: Given, letter: str) -> Equation:
-    """Write a load's term, with where each of its formulas holds."""
+    """Write a load's term, with the range of each formula."""
     name = symbol(f"{letter}_{load.name}")
     if isinstance(load, Load) and load.tabulated and load.tabulated.key in inputs.tables[load.name]:
         return _table_equation(load, name, inputs)
@@ -159,7 +159,7 @@ def term(load: Acting, pose: Motion, inputs: Given, letter: str) -> Equation:
 
 
 def _table_equation(load: Load[Any], name: Expression, inputs: Given) -> Equation:
-    """Equation of a load that is tabulated: one cubic form, whose coefficients differ between intervals."""
+    """Equation of a tabulated load: a cubic, with other coefficients in each interval."""
     assert load.tabulated is not None
     curve = inputs.tables[load.name][load.tabulated.key]
     bent = f"{curve.corners} corners" if curve.corners != 1 else "one corner"
@@ -170,7 +170,7 @@ def _table_equation(load: Load[Any], name: Expression, inputs: Given) -> Equatio
 
 
 def force(load: Acting, pose: Motion, inputs: Given, switch: float) -> Expression:
-    """A load's formula at a switch, on the turn on which its corners lie: no whole turns are taken off."""
+    """Formula of a load at a switch, on the turn of its corners: whole turns are not subtracted."""
     if isinstance(load, State):
         return load.term(_in_symbols(pose, 0, 0), inputs.tables[load.name])
     sp = sympy()
@@ -196,7 +196,7 @@ def pieces(load: Acting, pose: Motion, inputs: Given) -> list[Piece]:
 
 
 def check_equations(check: Check[Any], pose: Motion, inputs: Given) -> list[Equation]:
-    """Write each figure and row of an effect that takes no part in the balance, and what it must keep."""
+    """Write the figures, rows and demands of an effect that is not part of the balance."""
     at = inputs.inputs(systems.sympy(), check, pose)
     values = {name: read(at) for name, read in (*check.quantities.items(), *check.rows.items())}
     return [item for name, value in values.items() for item in _demand_equations(check, name, value)]
@@ -218,7 +218,7 @@ class WrittenLoading(NamedTuple):
 
 
 def joint_equations(model: JobModel, pose: Motion, inputs: Given, total: Expression, letter: str) -> list[Equation]:
-    """Write the components of each force in a joint, and the moments, that checks read, once for all of them."""
+    """Write the joint forces' components and the moments that checks read, once for all checks."""
     checks = [check for check in model.checks if check.joints]
     if not checks:
         return []
@@ -255,7 +255,7 @@ def joint_equations(model: JobModel, pose: Motion, inputs: Given, total: Express
 
 
 def _between(joints: Number, name: str) -> Iterator[tuple[str, Expression]]:
-    """Yield what acts on a link by its own mass, and let symbols stand for it from there on; nothing without any."""
+    """Yield the inertia force and moment of a link, and replace them by symbols; nothing for a link without mass."""
     joint = getattr(joints, name)
     if joint is not None:
         parts = [f"F_{name}_x", f"F_{name}_y", f"N_{name}"]
@@ -265,7 +265,7 @@ def _between(joints: Number, name: str) -> Iterator[tuple[str, Expression]]:
 
 
 def _demand_equations(check: Check[Any], name: str, value: Expression) -> list[Equation]:
-    """Write one figure of a check and what it must keep; a margin, whose name is a phrase, by its demand alone."""
+    """Write a figure of a check and its demand; of a margin, whose name is a phrase, only the demand."""
     sp = sympy()
     value = sp.sympify(value).replace(sp.Abs, lambda positive: positive)
     whole = " " in name
@@ -279,7 +279,7 @@ def _demand_equations(check: Check[Any], name: str, value: Expression) -> list[E
 
 
 def event_equations(model: JobModel, poses: tuple[Motion, Motion], inputs: Given, letter: str) -> list[Equation]:
-    """Write how the output parts from its mechanism, moves on its own and meets it again, as an event says it.
+    """Write an event's equations: separation of the output, free motion and landing.
 
     poses: of symbols, on the output's way forward and back; none without an event.
     """

@@ -1,4 +1,4 @@
-"""Printing of equations: names of symbols, text and LaTeX, loops differentiated, effects' own formulas on symbols."""
+"""Printed equations: names of symbols, text and LaTeX, derivatives of loops, formulas of effects on symbols."""
 
 import dataclasses
 import functools
@@ -22,7 +22,7 @@ _GREEK = {"alpha", "beta", "gamma", "delta", "theta", "phi", "psi", "chi", "omeg
 
 @dataclass(frozen=True)
 class Equation:
-    """One equation: what it is of, as plain text, and in LaTeX.
+    """Equation: its name, its plain text, and its LaTeX.
 
     written: its LaTeX, or what writes that when it is first asked for. form: its rows of expressions, signs and words,
     for other ways to write it; of several the first is the left side.
@@ -43,7 +43,7 @@ class Equation:
 
 
 class Symbols(dict[str, Expression]):
-    """A scene's numbers as symbols, each made when a formula first reads it."""
+    """Numbers of a scene as symbols, created when a formula first reads them."""
 
     def __missing__(self, name: str) -> Expression:
         return symbol(name)
@@ -102,7 +102,7 @@ def sums(
     torque: tuple[str, str] = ("crank torque", "Md"),
     within: Sequence[Expression] = (),
 ) -> list[Equation]:
-    """Output's balance and the crank torque by the balance's own sums; a load's term: LETTER_name.
+    """Balance of the output and crank torque, as sums of terms; a load's term: LETTER_name.
 
     torque: what the crank's torque is called, and its symbol; within: what output loads take inside the drive besides.
     """
@@ -123,7 +123,7 @@ def sums(
 
 
 def _with_symbol(load: Acting, value: Expression) -> Acting:
-    """A load whose force is one symbol, and which no state needs to answer."""
+    """Load whose force is a symbol, without states."""
     if isinstance(load, Load):
         return dataclasses.replace(load, force=lambda *_: value, response=None, upon=None, inside=None)
     return dataclasses.replace(load, force=lambda *_: value)
@@ -165,7 +165,7 @@ Case = tuple[Expression | str, str | tuple[Expression, Expression, Expression]]
 
 
 def cases(name: str, left: Expression, rows: Sequence[Case]) -> Equation:
-    """An equation whose right side is one formula after another; a single one needs no condition."""
+    """Equation with a piecewise right side; a single piece has no condition."""
     if len(rows) == 1:
         return equation(name, left, rows[0][0])
     written = ", ".join(f"{_case_value(value, text)} {_where(when, text)}" for value, when in rows)
@@ -206,7 +206,7 @@ def latex(expression: Expression) -> str:
 
 
 def _latex_name(name: str) -> str:
-    """A symbol's name in LaTeX: its letter with primes or dot, what follows as index; words stay words."""
+    """LaTeX of a symbol: letter with primes or dot, the rest as index; words are not changed."""
     head, _, rest = name.partition("_")
     if rest == "dot":
         return rf"\dot{{{_latex_name(head)}}}"
@@ -228,7 +228,7 @@ GREEK_LETTERS = dict(zip(sorted(_GREEK), ("α", "β", "χ", "δ", "γ", "ω", "�
 
 
 def name_parts(name: str) -> tuple[str, str, str]:
-    """A symbol's letter, its index and its primes, as `latex` writes them; words stay words."""
+    """Letter, index and primes of a symbol, as `latex` writes them; words are not changed."""
     head, _, rest = name.partition("_")
     if rest == "dot":
         letter, index, primes = name_parts(head)
@@ -247,7 +247,7 @@ def name_parts(name: str) -> tuple[str, str, str]:
 
 @functools.cache
 def symbol(name: str) -> Expression:
-    """Real symbol of a name; one with dots stands with underscores, so that SymPy reads it back."""
+    """Real symbol of a name, with underscores in place of dots, so that SymPy can parse it."""
     return sympy().Symbol(name.replace(".", "_"), real=True)
 
 

@@ -1,4 +1,4 @@
-"""Forces in the joints as arrows on a drawing: at events of the motion, and where each one peaks."""
+"""Joint forces as arrows on a drawing: at events of the motion, and at their peaks."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -28,7 +28,7 @@ NOWHERE: Mapping[str, str] = Frozen()
 
 
 class ForceArrow(NamedTuple):
-    """The force in one joint at one crank angle, rad; x, y: N; event: of the motion, "" for where it peaks.
+    """Force in a joint at a crank angle, rad; x, y: N; event: event of the motion, "" for the peak.
 
     at: the joint that it acts in, where that is called otherwise.
     """
@@ -47,7 +47,7 @@ class ForceArrow(NamedTuple):
 
     @property
     def size(self) -> float:
-        """Its size, N."""
+        """Magnitude, N."""
         return math.hypot(self.x, self.y)
 
 
@@ -82,7 +82,7 @@ def _read(sampler: Sampler, name: str, piece: int, u: float, event: str, places:
 
 
 class Sheet(NamedTuple):
-    """A mechanism's drawing before its texts are placed: strokes, labels and lines of its legend, each with its layer.
+    """Drawing of a mechanism without placed texts: strokes, labels and lines of the legend, with their layers.
 
     height: of texts, m; event: that before which forces are drawn, "" for none; measures: lengths that stand in it.
     """
@@ -117,7 +117,7 @@ class Sheet(NamedTuple):
 def draw(
     forces: Sequence[ForceArrow], motion: "MechanismMotion", sizes: Mapping[ForceArrow, str], height: float
 ) -> tuple[list[Primitive], list[Label]]:
-    """Arrows, as long as forces are large, and their labels; a joint at a peak stands as an open circle.
+    """Arrows of lengths proportional to the forces, with labels; a joint at a peak is an open circle.
 
     motion: joints at the forces' angles, one after another; sizes: each one with its unit; height: of texts, m.
     """

@@ -34,12 +34,12 @@ def tells_forces(scene: "Scene") -> bool:
 
 
 def force_sizes(scene: "Scene", forces: "Iterable[ForceArrow]") -> "dict[ForceArrow, str]":
-    """Forces, each with its size in the scene's unit."""
+    """Forces with their magnitudes in the scene's unit."""
     return {force: scene.show(force.size, "force", 4) for force in forces}
 
 
 class JobViews(abc.ABC):
-    """A job's own views; a design, SI, may name only some numbers, the others are today's.
+    """Views of a job. A design, SI, may name only some numbers; the others are today's.
 
     angle: what phi is; lists: part of a design that is a list → what its numbers are, "{count}" for how many.
     """

@@ -1,4 +1,4 @@
-"""A mechanism through its turn as plain data: where its joints are at crank angles, and what turns as one piece."""
+"""Motion of a mechanism as plain data: positions of joints at crank angles, and rigid curves that turn."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ def crank_angles() -> Floats:
 
 
 class Turning(NamedTuple):
-    """A closed curve that turns as one piece about a fixed joint, such as a cam.
+    """Closed rigid curve that turns about a fixed joint, such as a cam.
 
     points: where it stands at turn 0, m, from the joint; turns: by how much it has turned at each crank angle, rad.
     """

@@ -72,7 +72,7 @@ class Panel(NamedTuple):
 
     @property
     def title(self) -> str:
-        """The panel's name; that of its only column where it has none."""
+        """Name of the panel, or else of its only column."""
         return self.name or self.labels[0]
 
     @property
@@ -82,7 +82,7 @@ class Panel(NamedTuple):
 
 
 def in_units(scene: Scene, panel: Panel) -> Panel:
-    """A panel shown in the unit in which the scene's reader sees its kind of quantity."""
+    """Panel in the scene's unit for its kind of quantity."""
     kind = _KIND.get(panel.si)
     return panel._replace(unit=scene.shown_in(kind) if kind else panel.si)
 
@@ -111,7 +111,7 @@ def arrange(
 
 
 def _column_title(column: str, curve: Curve) -> str:
-    """A column's name in words with its symbol: "crank torque Md"; in its own words without any."""
+    """Title of a column: description and symbol, "crank torque Md"; only the name without a description."""
     symbol = split(column)[0]
     return f"{curve.name} {symbol}" if curve.name else symbol.replace("_", " ")
 
@@ -141,7 +141,7 @@ def _of_effects(scene: Scene) -> dict[str, Curve]:
 
 
 def _time_columns(known: Collection[str], speed: float) -> dict[str, tuple[str, float]]:
-    """Name → (name of what is shown for it, its size over the first's): where there is one, the one by time."""
+    """Column → (column to show, its ratio to the first): a derivative by time where there is one."""
     orders = {f"{name}_{k}": (f"{name}_{'t' * k}", speed**k) for name in known for k in range(1, ORDERS + 1)}
     instead = {name: later for name, later in orders.items() if later[0] in known}
     shown = {later for later, _ in instead.values()}

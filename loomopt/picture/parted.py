@@ -14,7 +14,7 @@ WIDE_FLIGHT = 0.1
 
 
 def remarks(scene: Scene, parted: Parted) -> Iterator[str]:
-    """Yield where contact is lost and how hard it is found again, and whether that repeats."""
+    """Yield remarks on the loss of contact: its angle, the speed of the landing, and whether it repeats."""
     name, course = parted.event.name, parted.course
     if not course.parted:
         yield f"{name}: contact is never lost"
@@ -63,7 +63,7 @@ def marks(parted: Parted, every: Marks) -> Marks:
 
 
 def _of_turn(mark: float | Span, turn: int, turns: int) -> float | Span:
-    """A mark in one of several turns, counted from 0."""
+    """Mark in one of several turns, counted from 0."""
     if not isinstance(mark, Span):
         return turn * TURN + mark
     ahead = TURN if turns > 1 and mark.end < mark.begin else 0.0

@@ -12,7 +12,7 @@ OPTION = "\ue001"
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table; right: places of right-aligned columns, the others may be wrapped; a heading may have lines.
+    """Table of texts; right: indices of right-aligned columns, the others may be wrapped; headings may have lines.
 
     Where a terminal is too narrow columns go, the last of what is asked for first. first: places in the order in which
     they are asked for, those that it does not name after them, from the left; units: places of columns that are the
@@ -47,7 +47,7 @@ def restore_spaces(text: str) -> str:
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a study's table, for files and for people.
+    """Column of a study's table, for files and for people.
 
     name: its heading in files, with the unit; "" for people alone. values: one a row, as pandas takes them. head: above
     it where people read it; None for files alone. cells: what people read; right: whether numbers stand there; called:

@@ -1,4 +1,4 @@
-"""Curves of a machine over the turn as charts: one for each panel, today's machine beside a design's."""
+"""Curves of a machine over the turn as charts: one for each panel, with those of today's machine."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -131,7 +131,7 @@ def _chart(panel: Panel, design: Turn, today: Turn | None, across: Axis, marks: 
 def _series(
     columns: Sequence[str], turn: Turn, rows: NDArray[np.intp], size: float, kinds: Sequence[str], names: Sequence[str]
 ) -> list[Series]:
-    """Curves of a turn through some of its rows, of those columns that it has."""
+    """Curves of a turn through some of its rows, for the columns that exist."""
     return [
         Series(turn.shown(turn.angles[rows]), turn.of(column)[rows] / size, kind, name)
         for column, kind, name in zip(columns, kinds, names, strict=True)
@@ -188,7 +188,7 @@ def marked_row(values: Floats, turn: Turn, how: str) -> int | None:
 
 
 def _marks(turn: Turn) -> Iterator[Mark]:
-    """Yield the marks of a turn at every place where they stand on its axis."""
+    """Yield the marks of a turn at all their positions on the axis."""
     low, high, whole = float(turn.angles.min()), float(turn.angles.max()), turn.whole
     for name, mark in turn.marks.items():
         begin, end = map(math.degrees, mark if isinstance(mark, Span) else (mark, mark))

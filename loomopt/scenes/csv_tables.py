@@ -54,7 +54,7 @@ SIGNIFICANT = 0.5
 
 
 class _Column(NamedTuple):
-    """A column that is read: its name, as the file calls it, kind of quantity, place, and unit in SI."""
+    """Column to be read: name in the file, kind of quantity, index, and unit in SI."""
 
     name: str
     called: str
@@ -155,7 +155,7 @@ def columns(scene: Scene, given: str, key: str, kinds: Mapping[str, str]) -> tup
 
 
 def read_measured(path: Path, kinds: Mapping[str, str]) -> Table:
-    """Columns of a caller's table whose names are in `kinds`, the first of which must be there. Raises BadInput.
+    """Columns of a table with names in `kinds`; the first name is required. Raises BadInput.
 
     kinds: column name → kind of quantity, angles first. An empty cell, but for an angle, is NaN.
     """
@@ -185,7 +185,7 @@ def _file_of_scene(scene: Scene, given: str, key: str) -> bytes:
 
 
 def _bytes(path: Path, given: str, origin: str, key: str) -> bytes:
-    """Bytes of a file, at most one more than is allowed. Raises BadInput."""
+    """Bytes of a file, at most one above the limit. Raises BadInput."""
     try:
         if not path.is_file():
             problem = "the table cannot be read: the file does not exist"
@@ -259,7 +259,7 @@ def _table(
 
 
 def _heading(cell: str) -> tuple[str, str | None]:
-    """Name in a heading, and the unit where one stands behind it."""
+    """Name in a heading, and the unit after it, if any."""
     plain = " ".join(cell.split())
     for pattern in _HEADINGS:
         match = pattern.fullmatch(plain)
@@ -269,7 +269,7 @@ def _heading(cell: str) -> tuple[str, str | None]:
 
 
 def _places(row: Row, name: str) -> list[int]:
-    """Places of a column in a heading: under its name, else whatever its case, else under another name."""
+    """Indices of a column in a heading: by its name, else ignoring case, else by another name for it."""
     headings = [_heading(cell)[0] for cell in row.cells]
     for called in (name, *ALIASES.get(name, ())):
         places = [place for place, heading in enumerate(headings) if heading == called]
@@ -334,7 +334,7 @@ def _quote(row: Row) -> str:
 
 
 def _size(unit: str, kind: str, where: str, usual: str, origin: str) -> tuple[float, str]:
-    """A unit of a column in SI, and in ASCII. Raises BadInput for one that is none of its kind."""
+    """Unit of a column in SI, and in ASCII. Raises BadInput for a unit of another kind of quantity."""
     plain, meant = ascii_unit(unit), ""
     try:
         if plain == DISPLAY_UNIT[kind] or fits(plain, kind):
@@ -346,7 +346,7 @@ def _size(unit: str, kind: str, where: str, usual: str, origin: str) -> tuple[fl
 
 
 def _check_length(row: Row, head: Row, separator: str, origin: str) -> None:
-    """Raise BadInput for a row that has cells beside its header: a decimal comma parts one number into two."""
+    """Raise BadInput for a row with more cells than the header: a decimal comma splits a number."""
     strange = [cell for place, cell in enumerate(row.cells) if cell and not head.cell(place)]
     if strange:
         cells, named = sum(map(bool, row.cells)), sum(map(bool, head.cells))
@@ -420,7 +420,7 @@ def _bare(text: str) -> str:
 
 
 def _plain(text: str, decimal: str) -> str:
-    """A number's text with a decimal point, and without what groups thousands."""
+    """Text of a number with a decimal point, without separators of thousands."""
     group_sign = COMMA if decimal == POINT else POINT
     whole, sign, rest = _bare(text).partition(decimal)
     whole = whole.replace(group_sign, "") if _GROUPS[group_sign].fullmatch(whole) else whole
@@ -449,7 +449,7 @@ def _number(text: str, row: Row, column: _Column, origin: str, gap: bool) -> flo
 
 
 def _precision(column: _Column, texts: Sequence[str], digits: int | None) -> list[float]:
-    """Half a unit of the last digit of each number of a column, in its own unit; 0 of whole degrees."""
+    """Half a unit of the last digit of each number of a column, in the column's unit; 0 for whole degrees."""
     if column.kind != "angle":
         return _halves(texts, digits)
     halves = _halves(texts, None)
@@ -457,7 +457,7 @@ def _precision(column: _Column, texts: Sequence[str], digits: int | None) -> lis
 
 
 def _halves(texts: Sequence[str], digits: int | None) -> list[float]:
-    """Half a unit of the last digit of each number, in its own unit; digits: decimals, None for those printed.
+    """Half a unit of the last digit of each number, in the number's unit; digits: decimals, None for those printed.
 
     All numbers have as many decimals as the one that has most: offices strip zeros. Where most would have lost some so,
     numbers are written with a count of digits from the first one on; those with an exponent are so always.
@@ -512,7 +512,7 @@ def _falls(angles: Sequence[float]) -> bool:
 
 
 def _check_angles(column: _Column, angles: Sequence[float], rows: Sequence[Row], twice: bool, origin: str) -> None:
-    """Raise BadInput for an angle that comes too often, and for angles that are not of one turn."""
+    """Raise BadInput for an angle that is repeated too often, and for angles beyond one turn."""
     name = column.called
     if max(map(abs, angles)) > TURN or max(angles) - min(angles) > TURN:
         worst = max(range(len(angles)), key=lambda k: abs(angles[k]))

@@ -80,7 +80,7 @@ class Cursor(NamedTuple):
     def fault(
         self, problem: str, value: object = NOTHING, allowed: str = "", remedy: str = "", grade: int = VALUE
     ) -> BadInput:
-        """Mistake at this place; value: what the message repeats, if anything; grade: how bad it is."""
+        """Mistake at this place; value: value that the message repeats, if any; grade: severity."""
         return refusal(problem, self.faults.file, self.path, value, allowed, remedy, grade)
 
     def unknown(
@@ -182,7 +182,7 @@ class Cursor(NamedTuple):
 
 
 def _readable(values: Mapping[str, Any], model: type[_Model]) -> _Model:
-    """Record of the values that can be read; the other requirements of the model are not checked."""
+    """Record of the readable values; other requirements of the model are not checked."""
     try:
         return model.model_validate(values)
     except ValidationError:

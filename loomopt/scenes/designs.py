@@ -1,4 +1,4 @@
-"""Designs read back: the JSON of a `design`, in SI or with units, or of a whole answer, which brings its scene."""
+"""Reader of designs: JSON of a `design`, in SI or with units, or of a whole answer with its scene."""
 
 import math
 import re
@@ -69,7 +69,7 @@ def loaded(path: Path) -> object:
 
 
 def _file_bytes(path: Path) -> bytes:
-    """Bytes of a file, one more than allowed at most. Raises BadInput for what is no file."""
+    """Bytes of a file, at most one above the limit. Raises BadInput if it is not a file."""
     if not path.is_file():
         problem = "it is not an ordinary file" if path.exists() else "the file does not exist"
         near = near_file(path)
@@ -80,7 +80,7 @@ def _file_bytes(path: Path) -> bytes:
 
 
 def _pipe_bytes() -> bytes:
-    """Bytes of a pipe, one more than allowed at most. Raises BadInput where nothing comes through it."""
+    """Bytes of a pipe, at most one above the limit. Raises BadInput for an empty pipe."""
     raw = b"" if sys.stdin is None else sys.stdin.buffer.read(LARGEST_FILE + 1)
     if not raw.strip():
         remedy = "Pipe an answer in: loomopt solve PROBLEM --json | loomopt evaluate PROBLEM --design -"
@@ -110,7 +110,7 @@ def packed(design: Mapping[str, float], names: Iterable[str]) -> dict[str, float
 
 
 def flat(design: Design) -> dict[str, float]:
-    """A design with each list's numbers under names of their own, NAME_0, NAME_1 ..."""
+    """Design with the numbers of lists under separate names, NAME_0, NAME_1 ..."""
     numbers: dict[str, float] = {}
     for name, value in design.items():
         numbers |= {name: value} if isinstance(value, float | int) else {f"{name}_{k}": v for k, v in enumerate(value)}
@@ -200,7 +200,7 @@ def _other_unit(cursor: Cursor, scene: Scene, kind: str, value: float) -> BadInp
 
 
 def _list_numbers(design: Cursor, lists: Mapping[str, Quantity]) -> dict[str, object]:
-    """Numbers of a design's lists, each under a name of its own. Raises BadInput."""
+    """Numbers of a design's lists under separate names. Raises BadInput."""
     numbers: dict[str, object] = {}
     given = design.table()
     for name in lists:
@@ -309,7 +309,7 @@ def read_answer(path: Path, jobs: Jobs) -> tuple[Scene, DesignGiven]:
 
 
 def resumed(given: DesignGiven, scene: Scene, later: Call, origin: str) -> Scene:
-    """A scene with what an answer's call changed in its own, then a later call. Raises BadInput.
+    """Scene with the changes of an answer's call, then those of a later call. Raises BadInput.
 
     All else is as `scene` has it; a path that the answer's call has set is bound as one that a scene file names.
     """
@@ -367,14 +367,14 @@ def _shorten(sentences: Sequence[str]) -> list[str]:
 
 
 def _is_of(call: Call, key: str) -> bool:
-    """Whether a call has set a key, or a table in which it stands, or has freed its bound."""
+    """Whether a call sets a key or a table that contains it, or frees its bound."""
     return any(
         f"{key}.".startswith(f"{prefix}.") for prefix in (*call.set, *(f"bounds.{name}.free" for name in call.free))
     )
 
 
 def _on(document: Mapping[str, Any], scene: Scene) -> list[str]:
-    """Effects that raw tables have on; every instance by its name."""
+    """Effects that are on in raw tables, including instances, by name."""
     names: list[str] = []
     table = document.get("effects")
     for name, entry in table.items() if isinstance(table, Mapping) else ():
@@ -403,7 +403,7 @@ def _text(value: object) -> str:
 
 
 def document_values(document: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
-    """Yield what decides an answer, and how it is shown, by dotted key; values of effects that are on or off alike."""
+    """Yield the values that decide an answer and its display, by dotted key, for effects that are on or off."""
     if (name := looked_up(document, ("problem", "name"))) is not None:
         yield "problem.name", name
     tables = ("operation", "mechanism", "available", "effects", "bounds", "limits", "display", "targets")

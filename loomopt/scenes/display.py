@@ -69,7 +69,7 @@ def units(
 
 
 def unit_for(si: str, known: Mapping[str, str]) -> str:
-    """Unit in which a person sees what has an SI unit; known: unit of every kind of quantity.
+    """Display unit for an SI unit; known: unit of every kind of quantity.
 
     What swings stays in rad/s, whatever unit the shaft's speed has.
     """

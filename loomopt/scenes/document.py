@@ -103,7 +103,7 @@ def copied(table: object, origin: str, path: tuple[str, ...] = ()) -> dict[str, 
 
 
 def _copied_value(value: object, origin: str, path: tuple[str, ...]) -> object:
-    """A copy of one value; path: where it stands, of a list counted from 1."""
+    """Copy of a value; path: its place, with indices of lists from 1."""
     if len(path) > _DEEPEST and isinstance(value, Mapping | list | tuple):
         key, remedy = ".".join(path[:3]) + "...", "Write a scene as `loomopt new` does"
         raise refusal("its tables or lists are nested too deep", origin, key, remedy=remedy)
@@ -131,7 +131,7 @@ def looked_up(document: Mapping[str, Any], parts: Sequence[str]) -> object:
 
 
 def replaced(document: Mapping[str, Any], parts: Sequence[str], value: object, origin: str, key: str) -> dict[str, Any]:
-    """Tables in which one path has another value; tables on the way are made where they are missing.
+    """Tables with the value at a path replaced; missing tables on the path are created.
 
     key: the whole path, for the BadInput raised where it leads through a value, or too deep.
     """
@@ -155,7 +155,7 @@ def _is_place(part: str, values: Sequence[object]) -> bool:
 
 
 def _replaced_in(values: list[Any], parts: Sequence[str], value: object, origin: str, key: str) -> list[Any]:
-    """A list of tables in which one path has another value; its first part counts from 1."""
+    """List of tables with the value at a path replaced; the first part of the path counts from 1."""
     if not _is_place(parts[0], values):
         problem = f"the list has no place {shown(parts[0])}"
         raise refusal(problem, origin, key, allowed=f"1 to {len(values)}", remedy="Count from 1")
@@ -197,7 +197,7 @@ class Paths:
         return None if self._is_own(_on(key)) else self.texts.get(_on(key))
 
     def located(self, given: str, key: str, origin: str) -> Path:
-        """Path of a file that stands under a dotted key. Raises BadInput for one that a scene may not name.
+        """Path of the file that a dotted key names. Raises BadInput for a file that a scene may not name.
 
         What a scene file says is looked for beside it, and with all links resolved must lie in its folder or below.
         A caller's path is looked for from the working folder, then beside the scene.

@@ -1,4 +1,4 @@
-"""[targets.family]: one machine for several sets of scene numbers, each of which is a scene of its own."""
+"""[targets.family]: one machine for several sets of scene numbers; each set is a scene."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -41,7 +41,7 @@ def table(scene: Scene) -> FamilyTarget:
 
 
 def of_target(scene: Scene) -> str:
-    """Target that each member has. Raises BadInput for one that the job does not have."""
+    """Target of all members. Raises BadInput for a target that the job does not have."""
     name = table(scene).of or scene.schema.default_target
     known = [target for target in scene.schema.targets if target != FAMILY]
     if name not in known:

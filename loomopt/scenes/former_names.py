@@ -1,4 +1,4 @@
-"""Former names of figures, each of which stands for today's name for one version, with a warning."""
+"""Former names of figures, accepted with a warning for one version."""
 
 import warnings
 from collections.abc import Mapping

@@ -77,7 +77,7 @@ def files(scene: Scene) -> dict[str, str]:
 
 
 def tables(scene: Scene) -> dict[str, str]:
-    """Every table in a file that a scene names as CSV text, by the dotted key of its name; no huge one's."""
+    """Tables of the files that a scene names as CSV text, by the dotted key of the name; huge files are left out."""
     texts: dict[str, str] = {}
     for key, raw in _contents(scene, table_cells.ENDINGS):
         with contextlib.suppress(BadInput):
@@ -87,7 +87,7 @@ def tables(scene: Scene) -> dict[str, str]:
 
 
 def _contents(scene: Scene, endings: tuple[str, ...] = ("",)) -> Iterator[tuple[str, bytes]]:
-    """Yield what stands in every file that a scene names, or that came with it, by the dotted key of its name."""
+    """Yield the contents of files that a scene names or contains, by the dotted key of the name."""
     for key, text in _texts({name: value for name, value in scene.document.items() if name not in WITHOUT_FILES}):
         if not text.lower().endswith(endings):
             continue

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @functools.cache
 def entry_points(group: str) -> "tuple[EntryPoint, ...]":
-    """Entry points of a group, by name; one that stands twice on the path counts once."""
+    """Entry points of a group, by name, without repetitions on the path."""
     from importlib.metadata import entry_points
 
     return tuple(sorted(set(entry_points(group=group)), key=lambda point: (point.name, point.value)))

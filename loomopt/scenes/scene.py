@@ -35,7 +35,7 @@ _DIGITS = f"1 to {_MOST_DIGITS}", "Give 6, or leave it out"
 
 
 class Equation(Protocol):
-    """One equation of a scene: what it is of, and itself as plain text and in LaTeX."""
+    """Equation of a scene: its name, its plain text, and its LaTeX."""
 
     @property
     def name(self) -> str:
@@ -60,7 +60,7 @@ class Jobs(JobNames, Protocol):
         """Schema of a scene of a job, with the effects it names where a distribution brings them."""
 
     def check(self, scene: "Scene", /) -> None:
-        """Raise BadInput where today's machine is not one that its job can work on."""
+        """Raise BadInput if the job cannot compute today's machine."""
 
     def equations(self, scene: "Scene", /) -> tuple[Equation, ...]:
         """Equations that a scene really uses."""
@@ -112,7 +112,7 @@ def _unique(*names: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, repr=False)
 class Scene(Shown):
-    """One job with all its numbers, SI; whatever changes it returns a new scene or raises BadInput.
+    """Job with all its numbers, SI. Every change returns a new scene or raises BadInput.
 
     document: the raw tables, never to be changed; origin: the file they came from; schema: what its job declares.
     operation, mechanism: numbers given or defaulted; tables: both as their models, words and lists too.
@@ -140,11 +140,11 @@ class Scene(Shown):
     call: Call = field(default_factory=Call, compare=False)
 
     def __post_init__(self) -> None:
-        """Freeze what a frozen dataclass would leave open."""
+        """Freeze the mappings of the dataclass."""
         freeze(self, "operation", "mechanism", "tables", "effects", "bounds", "limits", "targets")
 
     def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Mapping[str, Any], Jobs, str, Paths, Call]]:
-        """How pickle restores it: from its tables, for formulas do not pickle."""
+        """Constructor and tables for pickle: formulas cannot be pickled."""
         return build, (self.document, self.jobs, self.origin, self.paths, self.call)
 
     def __repr__(self) -> str:
@@ -263,14 +263,14 @@ class Scene(Shown):
         return self.units[self._kind_of_quantity(kind)]
 
     def _kind_of_quantity(self, kind: str) -> str:
-        """A kind of quantity that there is. Raises BadInput for any other."""
+        """Known kind of quantity. Raises BadInput for an unknown one."""
         if not isinstance(kind, str) or kind not in self.units:
             allowed = ", ".join(self.units)
             raise refusal("unknown kind of quantity", "", "kind", kind, allowed, "Choose one of them")
         return kind
 
     def unit_for(self, si: str) -> str:
-        """Unit in which a person reads what has an SI unit.
+        """Display unit for an SI unit.
 
         Parameters
         ----------
@@ -601,7 +601,7 @@ class Scene(Shown):
         raise refusal(problem, self.origin, key, allowed=", ".join(known), remedy=remedy)
 
     def _keys_of(self, name: str) -> list[str]:
-        """Dotted keys under which what a designer calls so may stand."""
+        """Dotted keys that a designer's name may mean."""
         schema = self.schema
         known: dict[str, Iterable[str]] = {
             "operation": schema.operation.model_fields,
@@ -615,7 +615,7 @@ class Scene(Shown):
         return keys or [f"limits.{near}.{side}" for side in sides.get(near, ())]
 
     def _effect(self, name: str) -> Effect:
-        """A declared effect; of an instance, its kind."""
+        """Declared effect; for an instance, its kind."""
         return self.jobs.schema(self.job, self.document, (self._kind(name),)).effects[self._kind(name)]
 
     def _kind(self, name: str) -> str:
@@ -631,7 +631,7 @@ class Scene(Shown):
 
 
 def _replaced_keys(effect: Effect | None, key: list[str]) -> tuple[str, ...]:
-    """Keys of an effect's table that say otherwise what the one that is set says."""
+    """Keys of an effect's table that a set key replaces."""
     curve = effect.tabulated if isinstance(effect, Load) else None
     if curve is None or len(key) != 1:
         return ()
@@ -762,7 +762,7 @@ def _build_scene(
 
 
 def _raw_tables(original: Mapping[str, Any], known: Collection[str]) -> dict[str, Any]:
-    """Raw tables, empty ones too; one whose name nobody knows stands for the near one that is not there."""
+    """Raw tables, including empty ones; a table with an unknown name is read as a missing one with a similar name."""
     raw: dict[str, Any] = {name: {} for name in known} | dict(original)
     for name in original:
         if name not in known:
@@ -772,7 +772,7 @@ def _raw_tables(original: Mapping[str, Any], known: Collection[str]) -> dict[str
 
 
 def _is_checkable(scene: Scene, faults: Faults) -> bool:
-    """Whether today's machine can be checked: its only wrong numbers are those that it does not need."""
+    """Whether today's machine can be checked: no number that it needs is wrong."""
     mechanism = scene.tables["mechanism"]
     wrong = [name for name, value in mechanism if value != value]
     optional = [
@@ -828,7 +828,7 @@ def reads(scene: Scene, file: str) -> None:
 
 
 def cursor(scene: Scene) -> Cursor:
-    """Cursor on the tables of a scene, empty ones too, to read again what the scene does not keep."""
+    """Cursor on the tables of a scene, including empty ones, to read values that the scene does not store."""
     return Cursor({name: {} for name in TABLES} | dict(scene.document), "", Faults(scene.origin))
 
 

@@ -16,7 +16,7 @@ STEP = "number with a step"
 
 
 class Sizes(NamedTuple):
-    """[steps] and [stock], SI, by what a designer calls a number; sizes ascending."""
+    """[steps] and [stock], SI, by the designer's name of a number; sizes ascending."""
 
     steps: Mapping[str, float]
     stock: Mapping[str, tuple[float, ...]]

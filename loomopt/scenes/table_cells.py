@@ -31,7 +31,7 @@ _TO_EXCEL = "Save it as .xlsx or as CSV"
 
 
 class Row(NamedTuple):
-    """One row: the line of the file in which it ends, and its cells, without empty ones at the end."""
+    """Row of a file: number of its last line, and its cells without empty ones at the end."""
 
     line: int
     cells: tuple[str, ...]
@@ -42,7 +42,7 @@ class Row(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """A file's rows that are not empty; separator: between its cells, "" in a workbook; remarks: lines after a #."""
+    """Non-empty rows of a file; separator: between cells, "" in a workbook; remarks: lines that begin with #."""
 
     rows: tuple[Row, ...]
     separator: str
@@ -50,7 +50,7 @@ class Cells(NamedTuple):
 
 
 def read(raw: bytes, origin: str) -> Iterator[Cells]:
-    """Yield the cells of a file, once for each separator that may be meant; at least one. Raises BadInput.
+    """Yield the cells of a file for each possible separator; at least once. Raises BadInput.
 
     raw: what stands in the file; origin: what messages call it.
     """
@@ -71,7 +71,7 @@ def read(raw: bytes, origin: str) -> Iterator[Cells]:
 
 
 def text(raw: bytes, origin: str) -> str:
-    """A table as text, a workbook's first sheet as CSV with commas. Raises BadInput for what is no table."""
+    """Table as text, a workbook's first sheet as CSV with commas. Raises BadInput if the file is not a table."""
     if raw.startswith(WORKBOOK):
         return _csv_text(_sheet(raw, origin))
     if raw.startswith(PARQUET):

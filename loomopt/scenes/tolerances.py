@@ -41,7 +41,7 @@ class Tolerance(NamedTuple):
     correlation: float = 0.0
 
     def band(self, nominal: float) -> tuple[float, float]:
-        """Lower and upper deviation of the number from its nominal, SI. Raises BadInput where a class tells none."""
+        """Lower and upper deviation from the nominal, SI. Raises BadInput for a size outside its class."""
         if not self.standard:
             size = abs(nominal) if self.share else 1.0
             return -self.below * size, self.above * size
@@ -56,7 +56,7 @@ class Tolerance(NamedTuple):
         return deviations
 
     def plus_minus(self, nominal: float) -> float:
-        """Half width of the band, SI. Raises BadInput where a class tells none."""
+        """Half width of the band, SI. Raises BadInput for a size outside its class."""
         low, high = self.band(nominal)
         return high if low == -high else (high - low) / 2
 
