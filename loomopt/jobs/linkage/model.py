@@ -893,6 +893,16 @@ def _sweep(high: str, low: str, at: Instant) -> Number:
     return at.values[event_value(low)] - at.values[event_value(high)] + at.values[SWEPT]
 
 
+def bend_row(event: str) -> str:
+    """Name of q'' at an event."""
+    return f"bend at {event}"
+
+
+def _bend(event: str, at: Instant) -> Number:
+    """q'' at an event."""
+    return _at(at, event).q2
+
+
 def _angle(event: str, at: Instant) -> Number:
     return at.values[event_value(event)]
 
@@ -1050,6 +1060,9 @@ def model(
     for name, event in linkage.loads.items():
         rows[f"angle.{event}"] = DesignRow(functools.partial(_angle, event))
         rows[name] = DesignRow(operator.attrgetter("force"), event=event)
+    for place in linkage.places:
+        if place.extreme and not place.of:
+            rows[bend_row(place.name)] = DesignRow(functools.partial(_bend, place.name))
     high, low = extremes(linkage.places)
     if high and low:
         rows["swing"] = DesignRow(functools.partial(_swing, high, low))

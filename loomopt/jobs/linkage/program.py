@@ -33,6 +33,10 @@ from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Node
 from loomopt.scenes.scene import Scene
 
+TURNING_SHARE = 0.01
+"""Share of today's largest |q''| that |q''| keeps at an extreme whose load or angle is sought: of a six-bar a tenth of
+it is reached by 2 of 12 starts, this by 7 of 7."""
+
 
 def model(scene: Scene, target: str = "", design: Numbers | None = None) -> JobModel:
     """Linkage with the effects the scene calls for, as its states need it. Raises BadInput.
@@ -175,11 +179,35 @@ class LinkageTask(Task):
     def margins(self) -> list[Limit]:
         """Rows by which every part closes over the whole turn; a limit on its transmission angle does so too."""
         return [
-            CycleLimit(text, 1, prefix + row, 1.0, 1.0, relaxable=False)
-            for prefix, group in self.model.kinematics.groups.items()
-            if f"mu.{prefix[:-1]}" not in self.scene.limits
-            for text, row in group.closes.items()
+            *(
+                CycleLimit(text, 1, prefix + row, 1.0, 1.0, relaxable=False)
+                for prefix, group in self.model.kinematics.groups.items()
+                if f"mu.{prefix[:-1]}" not in self.scene.limits
+                for text, row in group.closes.items()
+            ),
+            *self._turning_margins(),
         ]
+
+    def _turning_margins(self) -> list[Limit]:
+        """Rows by which the output still turns back at an extreme whose load or crank angle is sought.
+
+        The load of a mass falls to 0 with q'', and the angle moves without bound: at 0 the event is no extreme, and
+        without a margin there is no best design. Cams are left out: their output may rest at an extreme.
+        """
+        linkage, sought = linkage_of(self.plain_model), {*self.traded, *(name for name, _ in self.levels)}
+        read = {**self._loads, **{f"angle.{event}": event for event in self._loads.values()}}
+        events = {read[name] for name in sought if name in read}
+        events |= set(linkages.extremes(linkage.places)) if "sweep" in sought else set()
+        places = [place for place in linkage.places if place.name in events and place.extreme and not place.of]
+        if not places or linkage.chain.cams:
+            return []
+        size, limits = size_read(self.sampler, "peak_acceleration", self.scene.schema.figures), list[Limit]()
+        for place in places:
+            row, sign = linkages.bend_row(place.name), 1 if place.extreme == "max" else -1
+            least = min(TURNING_SHARE * size, abs(self.sampler.single(row)) / 2)
+            text = f"the output turns back at {place.name}"
+            limits.append(DesignLimit(text, sign, row, -sign * least, size, relaxable=False))
+        return limits
 
     # Levels, starts and moves.
 
