@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from loomopt.maths.fourier import FourierWeights
+
 if TYPE_CHECKING:
     pass
 
@@ -81,6 +83,8 @@ def _spread_objects(numbers: Sequence[Number], pattern: Iterable[Number]) -> Num
 
 
 def _weighted_objects(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:
+    if isinstance(weights, FourierWeights):
+        return weights.sums(list(values))
     return [sum((w * v for w, v in zip(row[1:], values[1:], strict=True)), row[0] * values[0]) for row in weights]
 
 
@@ -184,6 +188,8 @@ def casadi() -> Maths:
         return ca.SX(ca.DM(numbers))
 
     def weighted(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:
+        if isinstance(weights, FourierWeights):
+            return weights.sums(ca.vertsplit(values))
         return list(ca.vertsplit(ca.mtimes(ca.DM(weights), values)))
 
     functions = ca.sin, ca.cos, ca.sqrt, ca.atan2

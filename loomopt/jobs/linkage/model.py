@@ -418,6 +418,16 @@ class Linkage(Kinematics):
         """Crank angle, rad, of an event with a closed form."""
         return self.closed[place.name].angle(maths, given.values, self.of(place).side(place.extreme), place.near)
 
+    def _all_closed(self, given: Given) -> bool:
+        """Whether every event of a design in floats is a dead centre that it has, or a crank angle of the scene."""
+        if not all(place.name in self.closed or place.angle is not None for place in self.places):
+            return False
+        high, low = extremes(self.places)
+        if high and low and not self.swings:
+            return False
+        groups = [*self.closed.values(), *([self.rocker] if self.rocker else [])]
+        return not self.chain.cams and all(group.rocks(given.values) for group in groups)
+
     @property
     def _turns_closed(self) -> bool:
         """Whether the turns of the output have a closed form without a place at which they jump by a turn."""
@@ -525,7 +535,7 @@ class Linkage(Kinematics):
         angles = {name: hints[hint_of(name)] for name in self.path.times} if self.path else {}
         listed = TURNS in called and not self._turns_closed
         read = TURNS in called or any(place.angle is None for place in self.places)
-        if not read and not self.chain.cams:
+        if (not read and not self.chain.cams) or (not listed and self._all_closed(given)):
             return hints
         turns = self.turns(given) if read else ()
         for k, turn in enumerate(turns_in_order(turns) if listed else ()):

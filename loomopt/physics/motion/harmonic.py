@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
+from loomopt.maths.fourier import FourierWeights
 from loomopt.maths.systems import Maths, Number
 
 FEWEST, MOST = 32, 512
@@ -159,7 +160,7 @@ def harmonics(maths: Maths, count: int, weigh: Weigh) -> FourierSeries:
     return FourierSeries(sums[:count], [0 * sums[0], *sums[count:]])
 
 
-def _made(maths: Maths, count: int) -> tuple[Sequence[Number], Sequence[Sequence[Number]]]:
+def _made(maths: Maths, count: int) -> tuple[Sequence[Number], FourierWeights]:
     """Angles, rad, and the weights of the cosines from 0 on and of the sines from 1 on."""
     points = 2 * count
     angles = [2 * maths.pi * k / points for k in range(points)]
@@ -169,7 +170,8 @@ def _made(maths: Maths, count: int) -> tuple[Sequence[Number], Sequence[Sequence
         size = points if n == 0 else count
         return [waves[(n * k - back) % points] / size for k in range(points)]
 
-    return angles, [row(n, 0) for n in range(count)] + [row(n, points // 4) for n in range(1, count)]
+    rows = [row(n, 0) for n in range(count)] + [row(n, points // 4) for n in range(1, count)]
+    return angles, FourierWeights(rows, waves)
 
 
 _cached = functools.lru_cache(maxsize=16)(_made)

@@ -237,3 +237,15 @@ def test_numbers_by_name_are_found_again():
     again = harmonic.read_series("b", known, 64)
     assert (list(again.cosines), list(again.sines)) == (list(force.cosines), list(force.sines))
     assert harmonic.read_series("b", known, 3).cosines == force.cosines[:3]
+
+
+@pytest.mark.parametrize("count", [32, 64, 6, 10])
+def test_harmonics_by_halving_are_the_sums_of_all_products(count):
+    angles, weights = harmonic._made(EXACT, count)
+    rng = np.random.default_rng(count)
+    values = [EXACT.number(value) for value in rng.normal(size=2 * count).tolist()]
+    assert len(angles) == len(values)
+    sums = weights.sums(values)
+    assert len(sums) == len(weights) == 2 * count - 1
+    for row, value in zip(weights, sums, strict=True):
+        assert abs(value - MP.fdot(row, values)) < MP.mpf(10) ** -45
