@@ -471,6 +471,18 @@ class Every:
 EVERY = Every()
 
 
+def balance_sentence(load: str, at: str, value: str, rest: str) -> str:
+    """Sentence on a target that makes a load of the output zero first.
+
+    load, at: its name, and where it acts, such as "at front dead centre"; value: the least that is possible, in words,
+    "" for zero; rest: what is sought then, and its value, "" for nothing.
+    """
+    then = f", and then {rest}." if rest else "."
+    if not value:
+        return f"Balanced: {load} {at} is zero{then}"
+    return f"Balance is out of reach: {load} nearest to zero {at} is {value}{then}"
+
+
 class Job(abc.ABC):
     """A loom mechanism and its computations; all numbers SI."""
 

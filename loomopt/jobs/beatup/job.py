@@ -159,11 +159,9 @@ class Beatup(Job):
         if target == "pulse":
             return f"The least reed torque over the pulse is {text('pulse_rms')} rms ({front} {where})."
         peak_text = f"the least peak crank torque over the whole cycle is {text('peak_torque')}"
-        if target == "balance" and BALANCE.reached(figures):
-            return f"Balanced: the reed torque {where} is zero, and then {peak_text}."
         if target == "balance":
-            nearest = f"the reed torque nearest to zero {where} is {front}"
-            return f"Balance is out of reach: {nearest}, and then {peak_text}."
+            value = "" if BALANCE.reached(figures) else front
+            return base.balance_sentence("the reed torque", where, value, peak_text)
         if target == "torque":
             return f"With the reed torque at {front} {where}, {peak_text}."
         return f"Balanced with the least change from today's machine; {peak_text.replace('least ', '')}."

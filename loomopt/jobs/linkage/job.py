@@ -90,16 +90,25 @@ class LinkageJob(Job):
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Sentence on an optimum; figures in SI."""
         kinds, clauses, task = scene.schema.figures, [], LinkageTask(scene, target)
-        for name, sense in task.levels:
+        linkage, load, nearest = linkage_of(task.plain_model), "", ""
+        for place, (name, sense) in enumerate(task.levels):
             value = figures.get(name)
             if name in kinds and value is not None:
                 made_zero = abs(value) <= FEASIBLE * task.figure_size(name)
                 text = scene.show(0.0 if made_zero else value, kinds[name].kind, 9)
-                clauses.append(f"the {sense} {name} is {text}")
+                if place == 0 and name in linkage.loads:
+                    load, nearest = name, "" if made_zero else text
+                else:
+                    clauses.append(f"the {sense} {name} is {text}")
             elif name not in kinds:
                 clauses.append(f"the {sense} {name} is sought")
-        sentence = ", then ".join(clauses)
-        return f"{sentence[:1].upper()}{sentence[1:]}."
+        rest = ", then ".join(clauses)
+        if load:
+            word = load.partition(".")[0]
+            return base.balance_sentence(
+                f"the {word} of {linkage.output.name}", f"at {linkage.loads[load]}", nearest, rest
+            )
+        return f"{rest[:1].upper()}{rest[1:]}."
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Output with three derivatives, the transmission angles, the terms, force and torque."""

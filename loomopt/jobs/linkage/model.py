@@ -199,9 +199,7 @@ def nearest_rates(joint: Joint, place: tuple[Number, Number]) -> tuple[Number, N
 
 def number(maths: Maths, values: Values, ref: Ref) -> Number:
     """Number of the scene by its name, or a literal."""
-    if not ref.name:
-        return maths.number(ref.value)
-    return values[ref.name] if ref.sign > 0 else -values[ref.name]
+    return ref.of(values) if ref.name else maths.number(ref.value)
 
 
 @dataclass(frozen=True)

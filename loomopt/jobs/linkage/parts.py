@@ -1,7 +1,7 @@
 """The table [parts] of a linkage scene: read into parts, so that a part depends only on those before it.
 
-A number of a part is the name of one in [mechanism], its opposite ("-d"), or a literal with its unit; what kind of
-quantity a name stands for follows from its uses.
+A number of a part is the name of one in [mechanism], its opposite ("-d"), a multiple ("2 * d", "d / 3"), or a literal
+with its unit; what kind of quantity a name stands for follows from its uses.
 """
 
 import math
@@ -28,6 +28,9 @@ Used = dict[str, tuple[Kind, str]]
 MOST_PARTS, LONGEST_NAME = 100, 40
 """Parts of a linkage that is still one, and letters of a name that fits a table."""
 _NAME = re.compile(r"[^\W\d_]\w*")
+_FACTOR = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
+_MULTIPLE = re.compile(rf"(-?)\s*(?:({_FACTOR})\s*\*\s*)?([^\W\d_]\w*)(?:\s*/\s*({_FACTOR}))?")
+"""A name, or a multiple of it: sign, factor, name, divisor."""
 
 
 class NumberKey(NamedTuple):
@@ -146,7 +149,7 @@ class Numbers:
         """Number that a part or event names, or a literal with its unit; text: what it is in words. Raises BadInput."""
         number = self._reference(cursor, kind)
         if number.name:
-            self._use(cursor, number.name, kind, text)
+            self._use(cursor, number.name, _divided(kind, number.factor), text)
         return number
 
     def _reference(self, cursor: Cursor, kind: Kind) -> Ref:
@@ -159,12 +162,14 @@ class Numbers:
             problem = "it is neither the name of a number nor a quantity"
             raise cursor.fault(problem, raw, allowed, "Write either, in quotes")
         text = raw.strip()
-        name = text.removeprefix("-").strip()
+        name, factor = multiple(text)
+        if factor == 0:
+            raise cursor.fault("the factor of a number must not be 0", raw, remedy=f'Write "{name}"')
         if name in self.names:
             positive = quantity.least >= 0 or quantity.above >= 0
-            if positive and name != text:
-                raise cursor.fault("it cannot be negative", raw, remedy=f'Write "{name}"')
-            return Ref(name, 1 if name == text else -1)
+            if positive and factor < 0:
+                raise cursor.fault("it cannot be negative", raw, remedy=f'Write "{text.removeprefix("-").strip()}"')
+            return Ref(name, factor)
         if name[:1] in (*"+.0123456789", ""):
             return Ref("", 1, cursor._replace(raw=text).number(quantity))
         remedy = "Add it to [mechanism], or correct the name"
@@ -184,6 +189,28 @@ class Numbers:
             kind if (second.least, second.above, -second.below) > (first.least, first.above, -first.below) else known
         )
         self.uses[name] = narrower, f"{words}; {text}"
+
+
+def multiple(text: str) -> tuple[str, float]:
+    """Name in a text such as "-d", "2 * d" or "d / 3", and its factor; the factor 0 where none is possible."""
+    found = _MULTIPLE.fullmatch(text)
+    if found is None or not (found[2] or found[4]):
+        name = text.removeprefix("-").strip()
+        return name, 1 if name == text else -1
+    top, bottom = (float(found[place] or 1) for place in (2, 4))
+    size = top / bottom if bottom > 0.0 else 0.0
+    if not 0.0 < size < math.inf:
+        return found[3], 0
+    size = int(size) if size == int(size) else size
+    return found[3], -size if found[1] else size
+
+
+def _divided(kind: Kind, factor: float) -> Kind:
+    """What a number may be of which a multiple is used."""
+    quantity: Quantity = kind.__metadata__[0]
+    if factor in (1, -1) or math.isinf(quantity.below):
+        return kind
+    return Annotated[float, quantity._replace(below=quantity.below / abs(factor))]
 
 
 # What one key holds: how it is read, and how an editor checks it.
@@ -267,9 +294,10 @@ def _whole_ratio(cursor: Cursor) -> int:
 def number_schema(number: NumberKey) -> Json:
     """JSON Schema of a number of the linkage: a quantity, or the name of a number of [mechanism]."""
     quantity = number.kind.__metadata__[0].schema()
-    name: Json = {"type": "string", "pattern": r"^[ \t]*-?[ \t]*[^\s\d+.-]"}
+    name: Json = {"type": "string", "pattern": r"^[ \t]*-?[ \t]*([0-9.]+[ \t]*\*[ \t]*)?[^\s\d+.*-]"}
     words = re.sub(r" (?:of|from|between|and) (?:\{\w*\})+| \{\w*\}", "", number.text)
-    return {"if": name, "else": quantity, "description": f"{words}: a number of [mechanism], or a quantity"}
+    said = f"{words}: a number of [mechanism], a multiple of one such as \"2 * d\", or a quantity"
+    return {"if": name, "else": quantity, "description": said}
 
 
 def _name_schema() -> Json:

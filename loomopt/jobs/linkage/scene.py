@@ -207,7 +207,7 @@ def _one_of(cursor: Cursor, known: Iterable[str], sort: str) -> str:
 
 def _scale(raw: object, form: str, names: Mapping[str, object]) -> tuple[Any, bool]:
     """Kind of an output's scale, and whether the output then slides: an angle times a length is one."""
-    text = names.get(raw, raw) if isinstance(raw, str) else raw
+    text = names.get(parts.multiple(raw.strip())[0], raw) if isinstance(raw, str) else raw
     if form != "angle":
         return PositiveNumber, True
     try:

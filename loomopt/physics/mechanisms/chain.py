@@ -50,11 +50,18 @@ NO_SWITCH: Values = Frozen()
 
 
 class Ref(NamedTuple):
-    """Number of the scene by name, or its negative (sign −1); without a name the literal `value`, SI."""
+    """Number of the scene by name, times a factor; without a name the literal `value`, SI."""
 
     name: str
-    sign: int = 1
+    factor: float = 1
     value: float = 0.0
+
+    def of(self, values: Values) -> Number:
+        """Number that a name stands for, SI."""
+        value = values[self.name]
+        if self.factor in (1, -1):
+            return value if self.factor > 0 else -value
+        return self.factor * value
 
 
 NOTHING = Ref("")
@@ -120,7 +127,7 @@ class ChainPose:
             return None
         if not ref.name:
             return self.maths.number(ref.value) if ref.value else None
-        return self.values[ref.name] if ref.sign > 0 else -self.values[ref.name]
+        return ref.of(self.values)
 
     def vector(self, link: str) -> Vector:
         """Link's direction, of any length."""

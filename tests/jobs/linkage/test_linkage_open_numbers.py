@@ -1,5 +1,7 @@
 """Numbers of one's own linkage that an optimum leaves open: settled by least change, and named."""
 
+import copy
+
 import numpy as np
 import pytest
 
@@ -64,3 +66,32 @@ def test_without_its_timing_a_path_is_met_closer_and_where_the_crank_starts_says
     assert np.sqrt(np.mean(missed**2)) == pytest.approx(answer.figures["path_rms"], rel=1e-4)
     assert answer.figures["path_rms"] < 0.0223965, "than with the timing"
     assert any("start" in message for message in answer.certificate.tie_breaks + tuple(answer.certificate.open))
+
+
+@pytest.mark.slow
+def test_a_length_in_a_fixed_ratio_of_another_is_one_variable():
+    """Half of a number with twice the bounds: the same optimum, and the number is twice as long."""
+    scene, plain = lo.load("knuckle-press"), solved("knuckle-press")
+    bound = scene.bounds["lower"]
+    doubled = scene.update(
+        {
+            "mechanism.lower": f"{2 * scene.mechanism['lower']} m",
+            "parts.ram.links.strut": "lower / 2",
+            "bounds.lower": {"min": f"{2 * bound.min} m", "max": f"{2 * bound.max} m"},
+        }
+    )
+    answer = solved(doubled)
+    assert answer.figures["peak_torque"] == pytest.approx(plain.figures["peak_torque"], rel=1e-9)
+    assert answer.design["lower"] == pytest.approx(2 * plain.design["lower"], rel=1e-6)
+
+
+@pytest.mark.slow
+def test_one_number_serves_two_lengths_in_a_ratio():
+    document = copy.deepcopy(dict(lo.load("knuckle-press").document))
+    document["parts"]["ram"]["links"]["strut"] = "1.25 * upper"
+    del document["mechanism"]["lower"], document["bounds"]["lower"]
+    answer = solved(lo.scene(document))
+    assert "lower" not in answer.design
+    document["parts"]["ram"]["links"]["strut"] = f"{1.25 * answer.design['upper']} m"
+    peak = lo.evaluate(lo.scene(document), dict(answer.design)).figures["peak_torque"]
+    assert peak == pytest.approx(answer.figures["peak_torque"], rel=1e-12)

@@ -1,6 +1,7 @@
 """The table [parts]: what is read from it, and one message for each mistake in it."""
 
 import copy
+import re
 
 import pytest
 
@@ -308,3 +309,40 @@ def test_a_name_that_is_taken_is_told():
 def test_wants_of_a_gear_leave_out_the_frame():
     chain, _ = linked(with_part("g", GEAR, **{"with": "frame"}), NAMES)
     assert wants(chain.parts[-1]) == ("C", "rocker")
+
+
+@pytest.mark.parametrize(
+    ("text", "factor"), [("2 * l1", 2), ("0.5*l1", 0.5), ("l1 / 4", 0.25), ("-3 * l1 / 2", -1.5), ("- l1", -1)]
+)
+def test_a_multiple_of_a_number_is_read(text, factor):
+    assert parts.Numbers(dict.fromkeys(NAMES)).read(at("parts.D.x", text), Coordinate, "x") == Ref("l1", factor)
+    assert Ref("l1", factor).of({"l1": 0.03}) == pytest.approx(factor * 0.03, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("0 * l1", "must not be 0"),
+        ("l1 / 0", "must not be 0"),
+        ("-2 * l1", "cannot be negative"),
+        ("2 * l9", "unknown number"),
+    ],
+)
+def test_a_multiple_that_cannot_be_is_refused(text, problem):
+    with pytest.raises(BadInput, match=problem):
+        parts.Numbers(dict.fromkeys(NAMES)).read(at("parts.crank.length", text), PositiveLength, "length")
+
+
+def test_a_number_whose_multiple_has_a_greatest_value_has_a_smaller_one():
+    numbers = parts.Numbers(dict.fromkeys(NAMES))
+    numbers.read(at("parts.cam.rise", "2 * epsilon"), parts.PositiveAngle, "rise")
+    kind, _ = numbers.uses["epsilon"]
+    assert kind.__metadata__[0].below == parts.PositiveAngle.__metadata__[0].below / 2
+
+
+@pytest.mark.parametrize("text", ["l1", "-l1", "2 * l1", "0.5*l1", "l1 / 4", "- .5 * l1"])
+def test_an_editor_takes_a_multiple_for_the_name_of_a_number(text):
+    schema = parts.number_schema(parts.NumberKey(Coordinate, "x of pivot {}"))
+    assert re.search(schema["if"]["pattern"], text)
+    assert not re.search(schema["if"]["pattern"], "25 mm")
+    assert not re.search(schema["if"]["pattern"], "-.25 mm")
