@@ -296,7 +296,7 @@ def number_schema(number: NumberKey) -> Json:
     quantity = number.kind.__metadata__[0].schema()
     name: Json = {"type": "string", "pattern": r"^[ \t]*-?[ \t]*([0-9.]+[ \t]*\*[ \t]*)?[^\s\d+.*-]"}
     words = re.sub(r" (?:of|from|between|and) (?:\{\w*\})+| \{\w*\}", "", number.text)
-    said = f"{words}: a number of [mechanism], a multiple of one such as \"2 * d\", or a quantity"
+    said = f'{words}: a number of [mechanism], a multiple of one such as "2 * d", or a quantity'
     return {"if": name, "else": quantity, "description": said}
 
 
