@@ -1,1 +1,1 @@
-"""What a design task is, as data; one model of a mechanism with its effects; readings, samples and curves of it."""
+"""Design tasks as data; the model of a mechanism with its effects; its readings, samples and curves."""

@@ -132,7 +132,7 @@ def _opposed(model: JobModel, name: str) -> DesignRow:
 
 
 def _read(name: str, at: Instant) -> Number:
-    """Row that stands at no event, or a number."""
+    """Row that is not at an event, or a number."""
     known = at.model.static(at.maths, at.given, {}, (name,))
     return known[name] if name in known else at.values[name]
 

@@ -66,7 +66,7 @@ class MotorSize(NamedTuple):
 
 @dataclass(frozen=True)
 class TorqueBudget:
-    """The crank torque of a design as the sum of what acts on it.
+    """Crank torque of a design as the sum of its effects.
 
     angle: where it peaks, rad; fluctuation: (largest − least speed)/mean that the flywheel is for; curves: each share
     over the turn at the angles phi, rad, N·m.

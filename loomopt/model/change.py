@@ -51,6 +51,6 @@ def figure(
     limited: Mapping[str, Ends],
     weights: Mapping[str, float],
 ) -> Number:
-    """Change of a design; values: its numbers. The rest as in `parameters`."""
+    """Change of a design; values: its numbers. Other arguments as in `parameters`."""
     widths = {name: limited[name][1] - limited[name][0] for name in names}
     return sum(weights.get(x, 1.0) * ((values[x] - known[x]) / widths[x]) ** 2 for x in names if widths[x] > 0.0)

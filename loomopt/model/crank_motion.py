@@ -134,7 +134,7 @@ class TurnedCrank(Kinematics):
         return self.steady.events(maths, given)
 
     def _speeds(self, maths: Maths, node: Node) -> tuple[Number, Number]:
-        """ω, rad/s, and ω̇, rad/s², of the side of a corner that the node's switch tells."""
+        """ω, rad/s, and ω̇, rad/s², on the side of a corner that the node's switch selects."""
         if maths.name not in FLOATS:
             raise TypeError(f"the crank's own speed is known in float64 only, not in {maths.name}")
         phi = np.asarray(node.phi, dtype=np.float64)

@@ -68,7 +68,7 @@ class Columns(NamedTuple):
 
 
 def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequence[float] = ()) -> dict[str, Floats]:
-    """Curves of a design over one turn, SI; columns of what the scene does not call for are absent.
+    """Curves of a design over one turn, SI; only columns of effects in the scene.
 
     Rows are `steps` equal ones, the angles `also`, rad, and both sides of every corner where a formula changes (the
     same angle twice). Where a load's term is not known, neither it nor the force is: NaN.
@@ -123,7 +123,7 @@ def tops(sampler: Sampler, quantities: Iterable[str]) -> list[float]:
 
 
 def _in_time(columns: Mapping[str, Floats], at: Instant) -> dict[str, Floats]:
-    """Derivatives with respect to time of what has columns of those with respect to φ, SI.
+    """Derivatives with respect to time, SI, of quantities with columns of derivatives with respect to φ.
 
     x˙ = x' ω, x¨ = x'' ω² + x' ω̇; the third, x''' ω³, at constant speed only. None where the speed is not known.
     """
@@ -141,7 +141,7 @@ def _in_time(columns: Mapping[str, Floats], at: Instant) -> dict[str, Floats]:
 
 
 def drive_name(load: Acting) -> str:
-    """Name of the column of what a load of the output takes inside the drive besides."""
+    """Name of the column of the additional term of an output load inside the drive."""
     return f"{load_name(load)}_drive"
 
 

@@ -1,4 +1,4 @@
-"""What the motor must give at the crank, the same for every job: the peaks of its torque and of its power."""
+"""Peaks of the motor's torque and power at the crank, for all jobs."""
 
 from collections.abc import Collection, Iterable
 

@@ -1,4 +1,4 @@
-"""One machine for several sets of scene numbers: one program of all members, with shared and separate variables.
+"""Family: one machine for several sets of scene numbers, as one program with shared and separate variables.
 
 Members are counted by index. A quantity that is the same for all members is in the program once, under its own name;
 any other quantity once for each member. Each level minimises the worst of the members, or their sum.
@@ -39,7 +39,7 @@ def of_member(name: str, member: int) -> Alias:
 
 
 class Scenario(NamedTuple):
-    """One member: its model, and the names of its numbers and switches in the family."""
+    """Member: its model, and the names of its numbers and switches in the family."""
 
     model: JobModel
     values: Mapping[str, str]
@@ -78,7 +78,7 @@ class FamilyKinematics:
         return tuple(scenario.given(maths, values) for scenario in self.scenarios)
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
-        """Empty: each member has its own."""
+        """Empty: the members have them."""
         return {}
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:

@@ -31,7 +31,7 @@ Squares = Callable[[tuple[str, ...], Floats], Sequence[Floats]]
 
 
 class Group(NamedTuple):
-    """Links that close a triangle at every crank angle, and what follows from that.
+    """Links that close a triangle at every crank angle, with margins and extremes that follow.
 
     quantities: over the cycle: the squares of the base over what the links span (1 where they are stretched or folded:
     `closes` names them by phrase) and the obliquity of the transmission angle. rows: of the design alone, angles and
@@ -46,7 +46,7 @@ class Group(NamedTuple):
     closest: tuple[float, ...] = ()
 
     def singular(self, prefix: str, squares: Squares) -> tuple[float, ...]:
-        """Crank angles, rad, where the links nearly fold or stretch; prefix: what their quantities have."""
+        """Crank angles, rad, where the links nearly fold or stretch; prefix: of the names of their quantities."""
         squares_at = functools.partial(squares, tuple(prefix + name for name in self.closes.values()))
         if self.closest:
             tops = [
@@ -101,7 +101,7 @@ class Arcs(NamedTuple):
 
 
 class Followed(NamedTuple):
-    """A crank angle that no formula gives: its event, the name of its value, and where it lies on one design, rad.
+    """Crank angle without a formula: its event, the name of its value, and its value in one design, rad.
 
     rates(maths, given, phi): what vanishes there, and its slope.
     """
@@ -130,14 +130,14 @@ class Following(NamedTuple):
 
 @runtime_checkable
 class Follows(Protocol):
-    """A mechanism that says of its events what boxes of designs need to enclose them."""
+    """Mechanism with the data of its events that boxes of designs need to enclose them."""
 
     def following(self, given: Given) -> Following | None:
         """Events of a design in floats that hints lead to; None where they are not followed so."""
 
 
 class Kinematics(Protocol):
-    """A mechanism in every number system; angles rad, lengths m. One that inherits has what few mechanisms need."""
+    """Mechanism in every number system; angles rad, lengths m. The defaults suit most mechanisms."""
 
     @property
     def structure(self) -> Hashable:

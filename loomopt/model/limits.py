@@ -1,4 +1,4 @@
-"""Limits of a design task: each kind is a class that says how far a design exceeds it, and where it touches it.
+"""Limits of a design task: a class for each kind, with the excess of a design and the nodes where it is active.
 
 A limit is one row of the design, read in any number system, or it holds over the whole cycle, at the extremes of a
 quantity. What solves, proves or reports asks for no more than that: a new kind of either is a class of its own.
@@ -64,7 +64,7 @@ class Limit(abc.ABC):
 
     @property
     def structure(self) -> Hashable:
-        """What the built NLP depends on: everything but the numbers."""
+        """Data on which the built NLP depends: all but the numbers."""
         return type(self).__name__, self.name, self.sign, self.reads, self.relaxable
 
     @property
@@ -190,7 +190,7 @@ class CycleLimit(Limit):
 
     @property
     def structure(self) -> Hashable:
-        """What the built NLP depends on: where it holds, too."""
+        """Data on which the built NLP depends, including where the limit holds."""
         return super().structure, self.where
 
     def residual(self, rows: Rows) -> Number:

@@ -253,7 +253,7 @@ class Machines:
 
 
 class _Refined:
-    """Local tops of a curve on the grid, in order of the cycle: node, machine and what lies beside it, each (tops,)."""
+    """Local maxima of a curve on the grid, in order of the cycle: node, machine and neighbour values, each (tops,)."""
 
     def __init__(self, of: Machines, nodes: Places, machines: Places, values: Floats, signed: bool) -> None:
         self.of, self.machines, self.piece, self.u = of, machines, of.pieces[nodes], of.u[nodes]

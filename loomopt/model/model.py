@@ -1,4 +1,4 @@
-"""One model for every job: kinematics + effects + arcs + named quantities and rows, in every number system.
+"""Model of all jobs: kinematics, effects, arcs, named quantities and rows, in every number system.
 
 Only this file groups effects by name, runs loads and checks, reads their switches and eliminates states.
 """
@@ -52,7 +52,7 @@ class Instant:
 
     @property
     def values(self) -> Values:
-        """The scene's numbers and what follows from them, by name."""
+        """Numbers of the scene and derived numbers, by name."""
         return self.given.values
 
     @property
@@ -69,7 +69,7 @@ class Instant:
 
     @property
     def force(self) -> Number:
-        """Q, N or N·m: what the mechanism must supply at its output."""
+        """Q, N or N·m: force or moment that the mechanism supplies at its output."""
         return balance.output_force(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
 
     @property
@@ -614,7 +614,7 @@ class JobModel:
         return max((math.ceil(state.samples(given.inputs(FLOAT, state))) for state in self.states), default=0)
 
     def plain(self, maths: Maths, values: Values) -> Given:
-        """Scene's numbers with what follows from the mechanism alone.
+        """Numbers of the scene and those derived from the mechanism alone.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Objectives of a design task: each is one level of a target, and each kind is a class.
+"""Objectives of a design task: the levels of a target, a class for each kind.
 
 An objective is the maximum of smooth functions of the design: rows with a sign, or the extremes of quantities over the
 cycle. Solver and proofs use only these functions, so that a new kind needs only a new class.
@@ -35,7 +35,7 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class Objective(abc.ABC):
-    """One level of a target, which is minimised.
+    """Level of a target, which is minimised.
 
     figure: name for the designer; row: name of the row; scale: scale of the row, SI; power: power of the figure
     that the row equals.

@@ -93,7 +93,7 @@ class Move(abc.ABC):
 
 
 class AxisMove(Move):
-    """Each variable changes by itself."""
+    """Moves of the variables one at a time."""
 
     is_apart = True
 
@@ -168,7 +168,7 @@ class Variable(NamedTuple):
 
 
 class Added(NamedTuple):
-    """What a design adds as mass, and what that must be worth.
+    """Added mass of a design, and the benefit that justifies it.
 
     least: the level that seeks the least of it; without: the variables of a design that has none, SI, nothing where
     some must be; share: of each figure, what less of it may cost; wholly: whether only none of it may cost that.
@@ -181,7 +181,7 @@ class Added(NamedTuple):
 
 
 class Goal(NamedTuple):
-    """What a target asks of a figure: from `low` to `high`, SI, met to `slack` times |another figure|, or SI."""
+    """Demand of a target on a figure: from `low` to `high`, SI, within `slack`, in SI or times |another figure|."""
 
     figure: str
     low: float

@@ -175,7 +175,7 @@ def quadrature(cycle: Cycle, integral: Integral) -> tuple[Pieces, Floats, Floats
 
 
 class Rows(abc.ABC):
-    """Rows of one design in one number system; a subclass says how a mean over the cycle is taken.
+    """Rows of one design in one number system; subclasses define means over the cycle.
 
     given: the scene's numbers in that system; stills: the switches just before each event that a row stands at.
     """

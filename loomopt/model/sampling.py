@@ -91,7 +91,7 @@ class Sampler:
 
     @lazy
     def stills(self) -> Stills:
-        """The switches just before each event that a row stands at, by event and name."""
+        """Switches just before the events at which rows are evaluated, by event and name."""
         switches = {}
         for event in self.model.events_read:
             piece = self.cycle.piece_before(float(self.model.event(systems.FLOAT, self.given, event)))
@@ -360,7 +360,7 @@ class Sampler:
         return max((extreme.height for extreme in self.extremes(name, where)), default=0.0)
 
     def pushed(self, name: str) -> float:
-        """Largest |quantity| where Q is not negative, SI; of what only pushes that is its peak."""
+        """Largest |quantity| where Q is not negative, SI; the peak of a contact that only pushes."""
         extremes = [extreme for extreme in self.extremes(name) if extreme.height > 0.0]
         if not extremes:
             return 0.0

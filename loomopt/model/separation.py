@@ -38,7 +38,7 @@ PROBES = ((0.7, 0.0, 0.0, 0.0), (-0.4, 0.9, 0.0, 0.5), (0.3, -0.8, 0.6, -1.0), (
 
 
 class UnfollowedError(ValueError):
-    """What keeps a design from being followed: in words, "{force}" for one in N; effect: to name; what helps."""
+    """Reason why a design cannot be simulated: text, "{force}" for a force in N; effect; remedy."""
 
     def __init__(self, effect: str, problem: str, remedy: str, force: float = 0.0) -> None:
         super().__init__(problem)
@@ -192,7 +192,7 @@ class Parted:
         return dict(self.event.read(self.course))
 
     def curves(self, columns: Columns, steps: int, also: Sequence[float]) -> dict[str, Floats]:
-        """Curves of one period, SI; of the last turn that was simulated where there is none.
+        """Curves of one period, SI, or of the last simulated turn if the motion is not periodic.
 
         Of the output in flight they are its own; what it rests on, and the gap between them, are columns too.
         """

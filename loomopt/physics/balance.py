@@ -24,7 +24,7 @@ NO_SWITCH: Values = Frozen()
 
 @dataclass(frozen=True)
 class Pose(Motion):
-    """One instant of the cycle, any shape.
+    """Instant of the cycle, any shape.
 
     phi: crank angle, rad; omega: crank speed, rad/s (None where no load needs it); q, q1, q2: output and its
     derivatives with respect to φ; joints: the mechanism's own pose; omega_dot: rad/s², None at constant speed.
@@ -101,12 +101,12 @@ def total(numbers: Sequence[Number]) -> Number:
 
 
 def carried(loads: Sequence[Acting]) -> frozenset[str]:
-    """Names of the loads that move with a coordinate of their own: its force stands for them."""
+    """Names of the loads that move with a separate coordinate, whose force replaces theirs."""
     return frozenset(name for load in loads if isinstance(load, State) for name in load.carries)
 
 
 def output_force(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values) -> Number:
-    """Q, N or N·m: what the mechanism must supply at its output."""
+    """Q, N or N·m: force or moment that the mechanism supplies at its output."""
     gone = carried(loads) | {load.name for load in loads if load.acts != "output"}
     return total([term for _, term in terms(maths, loads, pose, given, switch, gone)])
 
@@ -128,7 +128,7 @@ def inside(maths: Maths, load: Acting, pose: Motion, given: Given) -> Number | N
 
 @dataclass(frozen=True)
 class Loaded:
-    """What acts on a mechanism at one instant, for whoever reads the forces in its joints; each when first read."""
+    """Loads on a mechanism at one instant, for its joint forces; computed when first read."""
 
     maths: Maths
     loads: Sequence[Acting]
@@ -138,7 +138,7 @@ class Loaded:
 
     @lazy
     def terms(self) -> Sequence[tuple[Acting, Number]]:
-        """Each load with its term, as if all moved with the output."""
+        """Loads with their terms, as if all moved with the output."""
         return list(terms(self.maths, self.loads, self.pose, self.given, self.switch))
 
     @lazy
@@ -149,7 +149,7 @@ class Loaded:
 
     @lazy
     def carried(self) -> Motion:
-        """The motion of what moves with the output; where a state carries that, its own."""
+        """Motion of the parts that move with the output, or that of the state that carries them."""
         state = next((load for load in self.loads if isinstance(load, State) and load.moved), None)
         if state is None or state.moved is None:
             return self.pose
@@ -206,7 +206,7 @@ def masses(
 def pushes(
     maths: Maths, terms: Sequence[tuple[Acting, Number]], given: Given, motions: tuple[Motion, Motion]
 ) -> "list[Vector]":
-    """Forces that loads tell of their terms, N; motions: the output's, and of what is carried."""
+    """Forces of the terms of loads, N; motions: those of the output and of the carried parts."""
     vectors = []
     gone = carried([load for load, _ in terms])
     for load, term in terms:

@@ -1,4 +1,4 @@
-"""The cycle as pieces between corners: one smooth formula on each, corners that move with the design.
+"""Cycle as pieces between corners: a smooth formula on each piece, corners that move with the design.
 
 A node is (piece, u) with u ∈ [0, 1]; its crank angle is start + u (end − start). Both sides of a corner are u = 1 of
 one piece and u = 0 of the next. As a function of the design, a node's angle is offset + Σ coefficient · corner.
@@ -56,7 +56,7 @@ class Cycle:
 
     @lazy
     def _columns(self) -> Floats:
-        """The switches by name: what is taken from a column stands together in memory."""
+        """Switches by name, as arrays contiguous in memory."""
         return np.ascontiguousarray(self.switches.T)
 
     def on(self, where: Where | None) -> NDArray[np.bool_]:

@@ -9,7 +9,7 @@ from loomopt.maths.systems import Number
 
 
 class Table(BaseModel):
-    """One table of a scene: unknown keys are errors, values never change."""
+    """Table of a scene: unknown keys are errors, values never change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
@@ -32,7 +32,7 @@ Values = Mapping[str, Number]
 
 
 class Figure(NamedTuple):
-    """One number a designer reads: its kind of quantity, and the sides on which a scene may limit it."""
+    """Number that a designer reads: kind of quantity, and the sides on which a scene may limit it."""
 
     name: str
     kind: str
@@ -70,7 +70,7 @@ class Conflict(NamedTuple):
 
 
 class Axis(NamedTuple):
-    """What can be traded against something else: a figure or a number of the design, and how a program reads it.
+    """Axis of a front: a figure or a number of the design, and how a program reads it.
 
     rows: rows, or one whole-cycle quantity, that it is read from, itself without any; form: one smooth "value" (of
     several rows the worst), a "magnitude", or the "peak" of a quantity; "" for a peak where the model has a quantity of

@@ -1,4 +1,4 @@
-"""Numbers that decide a verdict, a stop or a step in several files: where each comes from, what depends on it.
+"""Numerical tolerances that several files share, with their origin and use.
 
 Those of one file alone stand in it, a job's own in the job's.
 """

@@ -1,4 +1,4 @@
-"""A scene's target between answers of its neighbours: its task, its answer, and the optimum for the next one."""
+"""Answer of a target that starts from answers of neighbouring scenes: task, answer, optimum for the next neighbour."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -67,7 +67,7 @@ def answer_of_search(scene: Scene, target: str, search: Search) -> Solution:
 
 
 def optimum(scene: Scene, program: Program, answer: Solution) -> Optimum | None:
-    """Optimum of an answer; None where none can begin from it, as where what it adds was weighed."""
+    """Optimum of an answer; None if it cannot be a start, as after a trade-off of added mass."""
     if answer.status != "optimal" or answer.certificate is None or answer.alternative is not None or answer.members:
         return None
     full = {scene.full(name): value for name, value in designs.flat(answer.design).items()}

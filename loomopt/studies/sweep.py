@@ -115,7 +115,7 @@ Over = Mapping[str, str | Sequence[str | float]]
 
 @dataclass(frozen=True)
 class SweptNumber:
-    """A number of a sweep: its key, its values as texts of a scene and in SI; kind: kind of quantity."""
+    """Number of a sweep: key, values as texts of a scene and in SI; kind: kind of quantity."""
 
     key: str
     texts: tuple[str | float, ...]

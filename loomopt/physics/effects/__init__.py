@@ -1,1 +1,1 @@
-"""The effects a scene may call for: one file each, in a folder per job; kinds.py says what each may declare."""
+"""Effects of scenes: a file for each effect, a folder for each job; kinds.py defines their declarations."""

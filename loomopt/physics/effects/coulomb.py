@@ -1,4 +1,4 @@
-"""Coulomb friction of an output: its sign changes wherever the output turns."""
+"""Coulomb friction of an output: its sign changes where the output reverses."""
 
 import math
 

@@ -51,7 +51,7 @@ Place = tuple[str, float]
 
 
 class Inputs(NamedTuple, Generic[AnyPose]):
-    """What a formula of an effect reads, in one number system.
+    """Arguments of the formulas of an effect, in one number system.
 
     values: the scene's numbers, SI, with what follows from them; table: the values of the effect's own table.
     pose: the mechanism at the instant, None in a formula of the design alone.
@@ -93,15 +93,15 @@ class Applied(NamedTuple):
 
 
 class Loading(Protocol):
-    """What acts on a mechanism at one instant, for a check that reads the forces in its joints."""
+    """Loads on a mechanism at one instant, for a check that reads its joint forces."""
 
     @property
     def force(self) -> Number:
-        """Q, N or N·m: what the mechanism must supply at its output."""
+        """Q, N or N·m: force or moment that the mechanism supplies at its output."""
 
     @property
     def carried(self) -> Number:
-        """Motion of what moves with the output; where a state carries that, its own."""
+        """Motion of the parts that move with the output, or that of the state that carries them."""
 
     @property
     def masses(self) -> "Sequence[tuple[LinkMass, Any]]":
@@ -121,17 +121,17 @@ class Loading(Protocol):
 
 
 def constant_switch(angle: float, corners: tuple[float, ...]) -> float:
-    """Switch of what has no corners: it is never read."""
+    """Switch of a formula without corners: it is never read."""
     return 0.0
 
 
 def nothing_unknown(words: Mapping[str, str]) -> tuple[Place, ...]:
-    """No places: what the effect adds is known all over the cycle."""
+    """No unknown intervals: the load is known over the whole cycle."""
     return ()
 
 
 class EffectClash(NamedTuple):
-    """Another effect that one cannot stand beside, and why; key, words: only while that key of its table says so."""
+    """Incompatible effect, and the reason; key, words: only for these values of a key of its table."""
 
     effect: str
     why: str
@@ -155,7 +155,7 @@ class FlatNumber(NamedTuple):
 
 
 class ModelNeeds(NamedTuple):
-    """What an effect needs with one word of its key `model`: keys of its table, scene keys, design variables.
+    """Requirements of one value of an effect's key `model`: keys of its table, scene keys, design variables.
 
     may: keys of its table that it may have too.
     """
@@ -221,7 +221,7 @@ class Effect:
 
     @property
     def path(self) -> tuple[str, ...]:
-        """Where its table stands inside [effects]: under its name; of an instance under that of its kind first."""
+        """Path of its table inside [effects]: its name; for an instance the name of its kind first."""
         return (self.kind, self.instance) if self.instance else (self.name,)
 
 
@@ -270,7 +270,7 @@ def required(effect: "Effect") -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Load(Effect, Generic[Pose]):
-    """An algebraic effect: one term of the force that the output needs, or of the crank torque inside the drive.
+    """Algebraic effect: a term of the force that the output needs, or of the crank torque inside the drive.
 
     Attributes
     ----------
@@ -310,7 +310,7 @@ class Load(Effect, Generic[Pose]):
     applied: Callable[[Inputs[Pose]], Sequence[Applied]] | None = None
 
     def __post_init__(self) -> None:
-        """Raise ValueError for what no job could make least."""
+        """Raise ValueError for a quantity that no job can minimise."""
         if self.least and self.least not in self.table.model_fields:
             raise ValueError(f"effect {self.name}: {self.least} is no key of the table")
 
@@ -328,7 +328,7 @@ def inertia_load(
     moved: Callable[[Inputs[object]], Number],
     example: Mapping[str, str],
 ) -> Load[Any]:
-    """Load of what moves with the output: output term moved · q¨, N·m or N.
+    """Inertia of parts that move with the output: output term moved · q¨, N·m or N.
 
     moved(at): its inertia, kg·m² or kg; example: a table that it may have. The rest as in `Load`.
     """
@@ -422,7 +422,7 @@ class Check(Effect, Generic[Pose]):
         return (*self.quantities, *self.vectors, *self.scalars)
 
     def __post_init__(self) -> None:
-        """Raise ValueError for what no job could keep."""
+        """Raise ValueError for a demand that no job can satisfy."""
         sides = {figure.name: figure.sides for figure in self.figures}
         faults = [f"quantity {name} is no figure" for name in self.over_cycle if name not in sides]
         faults += [f"mean power {name} is no figure" for name in self.worked if name not in sides]
@@ -441,7 +441,7 @@ class Check(Effect, Generic[Pose]):
 
 
 class StatePeak(NamedTuple):
-    """A figure of a state: the largest |value| over the cycle of what is read, or its least or its largest value.
+    """Figure of a state: the largest |value| of a reading over the cycle, or its least or largest value.
 
     least: whether the least value counts; signed: whether the largest one does, not the largest |value|.
     """
@@ -498,7 +498,7 @@ class State(Effect):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Speed(Effect):
-    """Motion of the crank: its speed changes over the turn as motor and load do.
+    """Motion of the crank, with a speed that depends on motor and load.
 
     Attributes
     ----------
@@ -516,7 +516,7 @@ class Speed(Effect):
 
 
 class Rule(NamedTuple):
-    """One line of an effect's own equations: what it is of; left sign right, "=", "<=" or ">="; words that follow."""
+    """Equation of an effect: its name; left side, sign "=", "<=" or ">=", right side; words that follow."""
 
     name: str
     left: Number
@@ -526,7 +526,7 @@ class Rule(NamedTuple):
 
 
 class EventTerms(NamedTuple):
-    """Symbols of an event's equations: symbol(name); the output's terms in all, what of them is friction, the mass."""
+    """Symbols of an event's equations: symbol(name); sum of the output's terms, friction among them, mass."""
 
     symbol: Callable[[str], Number]
     total: Number
@@ -579,7 +579,7 @@ def ranked(effects: Iterable[Effect]) -> dict[str, Effect]:
 
 
 class SteadyOscillator(Protocol):
-    """What a state is made of, as `motion/harmonic.py` has it: what a load with corners makes of it is read here."""
+    """Linear state as in `motion/harmonic.py`, with its response to loads with corners."""
 
     @property
     def turn(self) -> Number:
@@ -589,7 +589,7 @@ class SteadyOscillator(Protocol):
         """A and B of its answer A cos Ωt + B sin Ωt to the force cos Ωt; frequency: Ω, rad/s."""
 
     def steady_cubic(self, force: Sequence[Number], /) -> tuple[Number, Number, Number, Number]:
-        """Powers of the cubic in time that answers a force that is one; force: its powers, N or N·m."""
+        """Coefficients of the cubic in time that responds to a cubic force; force: its coefficients, N or N·m."""
 
     def repeated(self, position: Number, rate: Number, /) -> tuple[Number, Number]:
         """z and z˙ just after a kick of both, once a turn for ever."""
@@ -610,7 +610,7 @@ class Carried(NamedTuple):
 
 
 class UnsteadyError(ArithmeticError):
-    """There is no steady state to trust: the problem, and the remedy, in words."""
+    """Error for a state without a reliable steady state: problem and remedy in words."""
 
     def __init__(self, problem: str, remedy: str) -> None:
         super().__init__(problem)
@@ -618,7 +618,7 @@ class UnsteadyError(ArithmeticError):
 
 
 class StateInstant(NamedTuple):
-    """What is read of a state at one instant; force(): Q, N or N·m; coordinate(): z, the reply of corners included."""
+    """Readings of a state at one instant; force(): Q, N or N·m; coordinate(): z, with the response to corners."""
 
     pose: Number
     coordinate: Callable[[], Number]
@@ -626,7 +626,7 @@ class StateInstant(NamedTuple):
 
 
 class Written(NamedTuple):
-    """Symbols in which a state writes its equation of motion: z, z', z'' with respect to φ, and what it answers."""
+    """Symbols of a state's equation of motion: z, z', z'' with respect to φ, and the excitation."""
 
     coordinate: tuple[Number, Number, Number]
     omega: Number
@@ -646,7 +646,7 @@ def keys(table: type[Table]) -> tuple[str, ...]:
 
 
 def value_at(table: Table, key: str) -> object:
-    """Table's value by a dotted key; None where it, or the table that it would stand in, is not given."""
+    """Value of a table by a dotted key; None if the key or its table is not given."""
     value: object = table
     for part in key.split("."):
         value = None if value is None else getattr(value, part)
@@ -706,7 +706,7 @@ class Fault(NamedTuple):
 
 
 def faults(active: Mapping[Effect, Table]) -> Iterator[Fault]:
-    """Yield what keeps effects from being on together; active: effects with their tables, in the order of the job."""
+    """Yield the conflicts of effects; active: effects with their tables, in the order of the job."""
     tables = {effect.name: table for effect, table in active.items()}
     for effect in active:
         for name in effect.companions:

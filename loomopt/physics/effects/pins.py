@@ -1,4 +1,4 @@
-"""What friction in pins takes, by their loads: μ r |F| times how a pin turns, F without friction [one explicit step].
+"""Friction loss in pins: μ r |F| times the speed of the pin, with F computed without friction [one explicit step].
 
 On slender pins that is close to what pins that brake each other take: at μ = 0.1 within a percent on a beat-up.
 """

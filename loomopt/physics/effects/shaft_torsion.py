@@ -1,4 +1,4 @@
-"""Torsion of the output's shaft: what the output drives swings on a spring and a damper, z = q − q_r behind the link.
+"""Torsion of the output's shaft: the driven parts are on a spring and a damper, z = q − q_r behind the link.
 
     J z¨ + c z˙ + k z = J q¨ + M_R        in the periodic steady state, at constant speed; linear
     output term k z + c z˙ instead of the terms of what the shaft carries, whose inertia is J
@@ -35,7 +35,7 @@ pulse has faded within 0.1 degrees there."""
 
 
 class Parameters(Table):
-    """Values of the shaft between the output's link and what it carries."""
+    """Values of the shaft between the output's link and the parts on it."""
 
     stiffness: PositiveRotaryStiffness = Field(
         description="torque per radian of twist between the output's link and the parts on the shaft"
@@ -82,7 +82,7 @@ def derived(at: Inputs[object], carried: "Carried") -> dict[str, Number]:
 
 
 def oscillator(at: Inputs[object]) -> "SteadyOscillator":
-    """Shaft with what moves on it."""
+    """Shaft with the parts on it."""
     from loomopt.physics.motion import harmonic
 
     return harmonic.Oscillator(at.maths, at.table["regime"], harmonic.read_constants(NAME, at.values))
@@ -109,7 +109,7 @@ def coordinate(at: "Inputs[Motion]", reply: tuple[Number, Number]) -> Number:
 
 
 class CarriedMotion(NamedTuple):
-    """Motion of what the shaft carries: q_r, rad, with its speed and acceleration."""
+    """Motion of the parts on the shaft: q_r, rad, with speed and acceleration."""
 
     phi: Number
     q: Number
@@ -118,7 +118,7 @@ class CarriedMotion(NamedTuple):
 
 
 def moved(at: "Inputs[Motion]", coordinate: Number, force: Number, acceleration: Number) -> CarriedMotion:
-    """Motion of what the shaft carries: z˙ follows from k z + c z˙."""
+    """Motion of the parts on the shaft: z˙ follows from k z + c z˙."""
     rate = (force - at.table["stiffness"] * coordinate) / at.table["damping"]
     return CarriedMotion(at.pose.phi, at.pose.q - coordinate, at.pose.velocity - rate, acceleration)
 

@@ -50,7 +50,7 @@ class Slide(NamedTuple):
 
 
 def passing(base: Vector, base_1: Vector | None) -> Number:
-    """|base'|²/(|base'|² + |base|²), 1 where two joints meet, whatever the unit of length.
+    """|base'|²/(|base'|² + |base|²), 1 where two joints meet, independent of the unit of length.
 
     base: from one to the other, m; base_1: its derivative with respect to φ. Kept below 1/ASSEMBLY_MARGIN², a link
     between them turns at most 22 times as fast as the crank, as in a dyad that keeps that margin.
@@ -186,7 +186,7 @@ class OnGuide:
 
     @lazy
     def n(self) -> Vector:
-        """Its left normal."""
+        """Left normal."""
         return left_of(self.d)
 
     @lazy
@@ -322,7 +322,7 @@ class Slotted:
 
     @lazy
     def n(self) -> Vector:
-        """Its left normal."""
+        """Left normal."""
         return left_of(self.d)
 
     def _on(self, order: int) -> tuple[Number | None, Number | None]:

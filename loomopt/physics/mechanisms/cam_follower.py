@@ -144,7 +144,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class Stations:
-    """What the workshop needs at n cam angles: theta, rad, as the sampler counts them; X, m, and the contact there."""
+    """Table for manufacturing at n cam angles: theta, rad, as the sampler counts them; X, m, and the contact."""
 
     theta: "Floats"
     X: "Floats"

@@ -27,7 +27,7 @@ class LawDerivatives(NamedTuple):
 
 @dataclass(frozen=True)
 class Law:
-    """One cam law.
+    """Cam law.
 
     breaks: where the formula changes, inside (0, 1); piece k lies between break k − 1 and break k.
     smooth: the highest derivative that is continuous over the whole cam, the dwells included.

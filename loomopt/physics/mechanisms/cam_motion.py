@@ -19,7 +19,7 @@ HALF = 0.5
 
 
 class CamLaw(Hashable, Protocol):
-    """s(u) with its derivatives; u is the share of the rise, piece the data that says which formula holds."""
+    """s(u) with its derivatives; u: share of the rise; piece: data that selects the formula."""
 
     @property
     def key(self) -> Hashable:
@@ -48,7 +48,7 @@ class NamedLaw:
 
     @property
     def key(self) -> Hashable:
-        """Its name."""
+        """Name."""
         return self.name
 
     @property
@@ -79,7 +79,7 @@ class Spline:
 
     @property
     def key(self) -> Hashable:
-        """Its structure."""
+        """Structure."""
         return "spline", self.intervals, self.mirrored
 
     @functools.cached_property
@@ -94,7 +94,7 @@ class Spline:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The values it is made of that a design may choose: its ends, where the dwells join, are at rest."""
+        """Values that a design may choose; both ends, where the dwells join, are at rest."""
         last = self.intervals // 2 if self.mirrored else self.intervals
         return tuple(f"{PREFIX}{k}" for k in range(1, last))
 
@@ -176,7 +176,7 @@ class Tabulated:
 
     @property
     def key(self) -> Hashable:
-        """Its points."""
+        """Points."""
         return self.table
 
     @property

@@ -70,7 +70,7 @@ NOTHING = Ref("")
 
 @dataclass(frozen=True)
 class Part:
-    """One part of a linkage.
+    """Part of a linkage.
 
     kind: a key of KINDS; words: by key, the names that it depends on and that it places; refs: by key, its numbers (the
     length of a link under the name of the link).

@@ -164,7 +164,7 @@ class Walk:
         return None if wrench is None else Wrench(wrench.force, wrench.moment - cross(self.at(joint), wrench.force))
 
     def given(self, joint: str, part: Part, force: Vector) -> None:
-        """Keep the force of a joint on a part's link, and its opposite on what the joint belongs to."""
+        """Store the force of a joint on a part's link, and the opposite force on the link of the joint."""
         self.forces[joint, part.name] = force
         self.push(self.owners[joint], minus(force), self.at(joint))
 
@@ -238,7 +238,7 @@ class Walk:
 
 
 def solve_forces(linked: Chain, pose: ChainPose, applied: Sequence[Applied]) -> Walk:
-    """Chain with the forces in all its joints, N, and what the main shaft must give."""
+    """Chain with the forces in all its joints, N, and the torque of the main shaft."""
     walk = Walk(linked, pose)
     for load in applied:
         if load.on in pose.joints:

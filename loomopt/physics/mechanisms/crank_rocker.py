@@ -271,7 +271,7 @@ def transmission_angle_far(maths: Maths, lengths: Lengths) -> Number:
 
 
 class Inequality(NamedTuple):
-    """What a crank-rocker keeps: the links of one side, added up, are shorter than those of the other."""
+    """Condition of a crank-rocker: the links of one side are in sum shorter than those of the other."""
 
     shorter: tuple[str, ...]
     longer: tuple[str, ...]

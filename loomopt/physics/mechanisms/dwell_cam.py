@@ -1,4 +1,4 @@
-"""A cam that turns a follower link up, lets it rest, turns it back and lets it rest for what is left of the turn.
+"""Cam with rise, dwell, return and dwell of a rotating follower link.
 
 Angles in rad. The turn falls into stretches, numbered from where the rise begins: one for each piece of the law going
 up, the upper dwell, one for each piece going down, the lower dwell. On each one smooth formula holds; which one is

@@ -1,4 +1,4 @@
-"""Forces in the joints of any chain of links: one formula for each group, from the output back to the crank.
+"""Forces in the joints of any chain of links: a formula for each group, from the output back to the crank.
 
 The load of a link is one force and one moment about its outer joint, including its inertia (d'Alembert). The equations
 of a group give the force in its inner joint, then those in its outer joints. The negative of an outer force is a load
@@ -58,7 +58,7 @@ def turned(direction: Vector, along: Number, across: Number) -> Vector:
 
 
 def together(wrenches: Iterable[Wrench]) -> Wrench | None:
-    """Sum of what acts on one link about one joint; None for nothing."""
+    """Sum of the loads on a link about a joint; None without loads."""
     parts = list(wrenches)
     if not parts:
         return None

@@ -101,7 +101,7 @@ def times(first: Number | None, *factors: Number | None) -> Number | None:
 
 
 def known(a: Number | None) -> Number:
-    """Number as it is, and 0 for what is zero by construction."""
+    """Number, with 0 in place of None, which stands for zero by construction."""
     return 0 if a is None else a
 
 
@@ -181,7 +181,7 @@ class Link:
         return Joint(self.carried(once(arm)))
 
     def carried(self, arm: Callable[[], Vector]) -> Callable[[int], Vector | None]:
-        """Motion of what an arm of the link, m, reaches from the origin."""
+        """Motion of the end of an arm of the link, m, from the origin."""
         return by_order(lambda order: plus(self.origin.at(order), turned(self.rates, arm(), order)))
 
 

@@ -77,7 +77,7 @@ class Stand:
 
 @dataclass(frozen=True)
 class Sley:
-    """The sley four-bar: what does not depend on the crank angle; mirror, sense: as in `Stand`."""
+    """Sley four-bar: numbers that do not depend on the crank angle; mirror, sense: as in `Stand`."""
 
     maths: Maths
     dimensions: Dimensions
@@ -91,7 +91,7 @@ class Sley:
 
     @lazy
     def centres(self) -> crank_rocker.DeadCentres:
-        """Its dead centres, angles from A0→B0."""
+        """Dead centres of the sley, angles from A0→B0."""
         return crank_rocker.dead_centres(self.maths, self.lengths)
 
     @lazy
@@ -160,7 +160,7 @@ class RapierPose:
 
     @lazy
     def base(self) -> Vector:
-        """Vector C→B2, m: what links l5 and l6 have to span."""
+        """Vector C→B2, m, which links l5 and l6 must span."""
         d, carrier, crank = self.dimensions, self.carrier, self.second_crank
         return Vector(carrier.x - d.C0x - crank.x, carrier.y - d.C0y - crank.y)
 
@@ -285,7 +285,7 @@ class RapierPose:
 
 @dataclass(frozen=True)
 class DriveLayout:
-    """What the paper's construction returns: pivot C0, m, l4 + l5, m, and φ40, rad."""
+    """Result of the paper's construction: pivot C0, m, l4 + l5, m, and φ40, rad."""
 
     C0x: Number
     C0y: Number

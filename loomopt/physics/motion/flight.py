@@ -29,7 +29,7 @@ GAP_SAMPLES = 720
 
 @dataclass(frozen=True)
 class Cam:
-    """What pushes. omega, rad/s; motion(angle) of its face, angle in [0, 2π].
+    """Cam that pushes a body. omega, rad/s; motion(angle) of its surface, angle in [0, 2π].
 
     fastest, hardest: its largest |speed|, m/s, and |acceleration|, m/s²; stroke, m; pulls: stretches (begin, end) of
     the turn, rad, over which a body held on it would have to be pulled.
@@ -68,7 +68,7 @@ class Landing(NamedTuple):
 
 @dataclass(frozen=True)
 class FlightTurn:
-    """One turn: its stretches in order, where contact is lost, the landings, and the state at its end."""
+    """Turn of the cam: intervals of contact and flight in order, separations, landings, and the state at its end."""
 
     stretches: tuple[Stretch, ...]
     lifts: tuple[float, ...]
@@ -87,7 +87,7 @@ class Course:
 
     @property
     def periodic(self) -> tuple[FlightTurn, ...]:
-        """The turns of one period, the last one where there is none."""
+        """Turns of one period, or the last turn if the motion is not periodic."""
         return self.turns[-(self.period or 1) :]
 
     @property
@@ -167,7 +167,7 @@ def _same(first: FlightState | None, second: FlightState | None, cam: Cam) -> bo
 
 @dataclass
 class _Rule:
-    """One turn after another: state at its beginning → turn."""
+    """Map of a turn: state at its beginning → turn."""
 
     body: Body
     cam: Cam

@@ -1,4 +1,4 @@
-"""Free motion of a body in closed form: what holds it back is linear in its position and speed, zone by zone.
+"""Free motion of a body in closed form: the force on it is linear in position and speed in each zone.
 
 M ẍ + C ẋ + k x + f + F sgn ẋ = 0        k, f: one pair between corners of x; at rest it stays while |k x + f| <= F
 """
@@ -22,7 +22,7 @@ class Zone(NamedTuple):
 
 @dataclass(frozen=True)
 class Body:
-    """What flies. mass, kg; damping, N·s/m; friction, N; zones between the corners of x, m, ascending."""
+    """Body in free motion. mass, kg; damping, N·s/m; friction, N; zones between the corners of x, m, ascending."""
 
     mass: float
     damping: float

@@ -73,7 +73,7 @@ class Oscillator:
         return (f0 - c * p1 - 2 * J * p2) / k, p1, p2, p3
 
     def repeated(self, position: Number, rate: Number) -> Pair:
-        """z and z˙ just after a kick that adds position and rate once a turn, those of all turns before kept."""
+        """z and z˙ just after a jump of both that repeats once a turn, with the effect of all earlier turns."""
         of = self.of
         moved = rate + of.decay * position, -(of.decay * rate + (of.square + of.decay**2) * position)
         left = 1 - of.cosine

@@ -1,4 +1,4 @@
-"""A crank whose speed changes over the turn: the periodic motion in which a motor gives what the crank takes.
+"""Crank with a speed that changes over the turn: periodic motion in which motor torque and crank torque balance.
 
 On each piece between corners ω̇ is the polynomial through its values at Chebyshev points. As ω̇ = d(ω²/2)/dφ, its exact
 integral is ω²/2, and loads that are linear in ω² and ω̇ stay so: Newton's method may start from constant speed. Each
@@ -32,7 +32,7 @@ square of it."""
 
 
 class NoTurn(ArithmeticError):  # noqa: N818 (it names what was found)
-    """There is no periodic motion in which the crank never stops."""
+    """Error: no periodic motion exists in which the crank never stops."""
 
 
 @dataclass(frozen=True)

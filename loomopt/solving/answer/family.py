@@ -59,7 +59,7 @@ def _labelled(name: str, labels: Mapping[str, str]) -> str:
 
 
 def family_sentences(scene: Scene, job: Job, here: Evaluated, priced: Collection[str]) -> str:
-    """Sentences: who decides each level, which members reach their goals, and what physics says of the others.
+    """Sentences on a family: deciding members of the levels, members that reach their goals, reasons for the others.
 
     priced: names of the limits that bind; of what all members share those decide it whose own limits do.
     """

@@ -57,7 +57,7 @@ def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: st
 
 @working()
 def evaluated(scene: Scene, job: Job, target: str, design: Mapping[str, float]) -> Evaluated:
-    """Figures and limits of a design (full names, SI; what it does not name stays today's)."""
+    """Figures and limits of a design (full names, SI; numbers that it does not name are today's)."""
     return evaluation(scene, job, job.program(scene, target), {**job.today(scene), **design})
 
 
@@ -324,7 +324,7 @@ def _sought(search: Search) -> str:
 
 
 def _substituted(search: Search, best: Candidate) -> str:
-    """Sentence that names the known design which stands in place of the ends of all solves."""
+    """Sentence on a known design that replaces the results of all solves."""
     apart = max(abs(best.x[v.name] - search.today.get(v.name, math.inf)) / v.scale for v in search.program.variables)
     name = "today's machine" if apart <= FEASIBLE else "where one of the solves ended"
     return f"No solve ended in a better design that is certified; this is the best admissible design known, {name}."

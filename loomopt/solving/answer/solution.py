@@ -105,7 +105,7 @@ ADVICE = {
 
 
 class Finding(NamedTuple):
-    """One limit with the value of its figure, SI; min or max is None if the limit does not have this side.
+    """Limit with the value of its figure, SI; min or max is None if the limit does not have this side.
 
     rounding: whether the excess is less than the rounding of the digits in which the design was given.
     backed_off: required margin of a nominal design, SI.
@@ -240,7 +240,7 @@ class Terms(Protocol):
 
 @dataclass(frozen=True)
 class Evaluated:
-    """A given design: its figures and limits, SI and rad."""
+    """Evaluated design: its figures and limits, SI and rad."""
 
     problem: str
     effects: tuple[str, ...]
@@ -588,7 +588,7 @@ class Solution(Evaluated):
 
     @property
     def sought(self) -> str:
-        """Its target, or the objectives of its terms."""
+        """Target, or the objectives of its terms."""
         return self.terms.summary if self.terms else self.target
 
     def as_dict(self, target: str = "") -> dict[str, Any]:

@@ -43,7 +43,7 @@ SECOND_ORDER_OPEN = "second order open"
 
 
 class CertifiedLevel(NamedTuple):
-    """One level: its residuals, their multipliers, and its curvature (None if it was not computed)."""
+    """Certificate of a level: residuals, multipliers, and curvature (None if it was not computed)."""
 
     level: Level
     multipliers: LevelMultipliers

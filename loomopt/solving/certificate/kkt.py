@@ -27,7 +27,7 @@ FARTHEST_MOVE = 100 * SAME_NODE
 
 
 class ActiveRow(NamedTuple):
-    """One smooth function of the design, in its scale.
+    """Smooth function of the design, divided by its scale.
 
     A limit's residual or an objective's piece, possibly at an extreme of the cycle (`node`). reads: name of its value;
     place: of its limit, or of its objective (`limit` is None), in the program; excess: its distance to the bound, or to
@@ -211,13 +211,13 @@ def system(
 
 
 def _higher_level_rows(active: ActiveSet, level: int, bound: set[int]) -> list[Floats]:
-    """Equalities of an earlier objective: each piece that binds; both pieces where it is zero."""
+    """Equalities of an earlier objective: its active pieces; both pieces where it is zero."""
     unit = np.eye(len(active.rows))
     return [unit[k] for k in active.levels[level] if active.zero[level] or k in bound]
 
 
 def vanishing_multipliers(system: System, rows: int) -> LevelMultipliers:
-    """Multipliers of a magnitude that vanishes: its two pieces balance each other; rows: their number."""
+    """Multipliers of a magnitude that is zero: its two pieces balance; rows: their number."""
     values = np.zeros(rows)
     values[list(system.pieces)] = 1.0 / len(system.pieces)
     return LevelMultipliers(values, 0.0)

@@ -188,7 +188,7 @@ class Lagrangian:
         return self.fall(design) > FALL_MARGIN * slope * step + max(LEAST_FALL, self._rounding) + error
 
     def fall(self, design: Mapping[str, float]) -> float:
-        """Its fall from x to a design (SI); −∞ where either value is unknown."""
+        """Decrease from x to a design (SI); −∞ where either value is unknown."""
         base, value = self._base, self.value(design)
         return -math.inf if base is None or value is None else base - value
 
@@ -203,7 +203,7 @@ class Lagrangian:
         return ROUNDINGS * sys.float_info.epsilon * (abs(self._base or 0.0) + weights)
 
     def value(self, design: Mapping[str, float]) -> float | None:
-        """Its value at a design (SI); None where the linkage has no real position."""
+        """Value at a design (SI); None where the linkage has no real position."""
         sampler = sampler_at(self.program, design)
         if sampler is None:
             return None
@@ -630,7 +630,7 @@ def _curve(
     bends: Floats,
     valley: tuple[ClosedDirections, Floats] | None = None,
 ) -> FeasibleCurve:
-    """Designs that keep the binding rows, and an earlier level's valley if there is one.
+    """Designs on which the binding rows, and the earlier levels if any, do not change.
 
     curved, bends: curved directions in the cone's basis, and their curvatures.
     """

@@ -385,7 +385,7 @@ def _pivot_round(calls: Calls, sampler: Sampler, point: Point, extremes: Nodes) 
 
 
 def _select_nodes(extremes: Sequence[Extreme], binding: Sequence[Extreme], slots: int) -> list[Extreme]:
-    """Extremes at the binding nodes, then other extremes, as many as there is room for."""
+    """Extremes at the binding nodes, then other extremes, up to the number of nodes."""
     first = [_nearest(extremes, node) for node in binding]
     other_extremes = [e for e in extremes if not any(e.piece == f.piece and abs(e.u - f.u) <= SAME_NODE for f in first)]
     return first + other_extremes[: max(0, slots - len(first))]

@@ -328,7 +328,7 @@ def _begin(calls: Calls, x: dict[str, float], sampler: Sampler, warm: Point | No
 
 
 def _round(calls: Calls, place: _Place, iterations: int) -> _Round | Point:
-    """One round: solve at the nodes, then add the extremes that exceed their bounds.
+    """Round of the exchange: solve at the nodes, then add the extremes that exceed their bounds.
 
     A failed point where the solver's end has no real cycle, or is no better than the best known; iterations: of the
     rounds before.

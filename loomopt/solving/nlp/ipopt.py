@@ -236,7 +236,7 @@ class Calls:
         return tuple(tuple(family_extremes[: self.leading]) for family_extremes in loose)
 
     def with_known(self, nodes: Sequence[Sequence[Extreme]]) -> tuple[tuple[Extreme, ...], ...]:
-        """Nodes, and after them the nodes known to bind, as many as there is room for."""
+        """Nodes, then the nodes known to bind, up to the number of nodes."""
         if not self.known.nodes:
             return tuple(map(tuple, nodes))
         room = [max(self.slots, len(family_nodes)) for family_nodes in nodes]

@@ -1,4 +1,4 @@
-"""Records of a solve: its settings, its end point, and what other solves have shown."""
+"""Records of a solve: settings, end point, and results of other solves."""
 
 import functools
 import math

@@ -422,7 +422,7 @@ class Multipliers:
         return lam_g
 
     def binding(self, rows: RowMap, counts: Sequence[int]) -> BindingRows:
-        """What binds when the first nodes of each family, `counts` of them, are the binding ones."""
+        """Binding rows if the first `counts` nodes of the families bind."""
         masks = binding(self.lam_x, self.for_slots(rows).lam_g)
         rows.node_rows(masks.rows)[:] = rows.used_slots(counts)
         return masks

@@ -1,4 +1,4 @@
-"""One parametric NLP for each structure of a program: built once, solved for any numbers."""
+"""Parametric NLP of a program: built once for each structure, solved for any numbers."""
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
@@ -293,7 +293,7 @@ class Buffered:
 
 
 class Transcription:
-    """One built NLP; its solvers and derivatives are created at their first use.
+    """Built NLP; its solvers and derivatives are created at their first use.
 
     Lifted variables appear in `nlp` only; every other member is in the original variables and rows.
     """

@@ -73,7 +73,7 @@ class Levels:
             self._levels, self.why = [], "a formula of this scene does not run in intervals"
 
     def run(self, until: float, say: Callable[[str], None]) -> LevelOutcome:
-        """Go on until all is shown, a better design turns up, or the clock says `until`."""
+        """Continue until everything is proven, a better design is known, or the time is `until`."""
         for place, level in enumerate(self._levels):
             now = time.perf_counter()
             better = level.search(now + (until - now) / (len(self._levels) - place), say)
@@ -135,7 +135,7 @@ def _no_larger(program: Program, merits: list[float]) -> dict[str, float]:
 
 
 class _Level:
-    """One level's question, and the tree of its boxes."""
+    """Proof of one level: its claim and the tree of boxes."""
 
     def __init__(self, task: BoxTask, x: Mapping[str, float], merits: list[float], place: int, gap: float) -> None:
         self.task, self.place, self.gap = task, place, gap

@@ -73,7 +73,7 @@ class Spots:
 
 
 class NodeLayout:
-    """One order of the corners in the cycle, read at a design that has it."""
+    """Order of the corners in the cycle, read at a design that has it."""
 
     def __init__(self, sampler: Sampler) -> None:
         self.sampler, self.cycle, self.stills = sampler, sampler.cycle, sampler.stills
@@ -352,13 +352,13 @@ class Reader:
         return values, sure
 
     def _ratios(self, numbers: dict[str, Number]) -> list[Number]:
-        """Rows that keep the ratios of lengths: they hold whatever the order of corners."""
+        """Rows that limit ratios of lengths, for any order of corners."""
         scale = self.task.scale
         return [(numbers[a] - numbers[b] * share) / scale.bounds[a][1] for a, b, share in scale.pairs] if scale else []
 
 
 class _EventError(Exception):
-    """A row stands at an event."""
+    """Error: a row is evaluated at an event."""
 
 
 class _Nowhere(dict[str, Values]):

@@ -31,7 +31,7 @@ def strips(widths: Floats) -> int:
 
 
 class OpenError(Exception):
-    """Nothing can be proven of a program; the text says why."""
+    """Error: nothing can be proven of a program; the text is the reason."""
 
 
 class BoxRows(Rows):
@@ -75,7 +75,7 @@ class BoxRows(Rows):
         return total([width * mean for width, mean in zip(widths, means, strict=True)]) / total(widths)
 
     def _mean(self, name: str, cycle: Cycle, starts: Sequence[Number], piece: int) -> Number:
-        """Mean of a quantity over one piece: its value at the middle of each strip, and its bend over it."""
+        """Mean of a quantity over a piece: its values at the middles of strips, and bounds of its second derivative."""
         count = self._strips
         half = 0.5 / count
         middles: Floats = ((2 * np.arange(count, dtype=np.float64) + 1) * half)[:, None]
@@ -110,7 +110,7 @@ def _added(values: Interval, count: int) -> Interval:
 
 @dataclass(frozen=True)
 class Scale:
-    """Lengths of which one stands still, at its upper bound, for all sizes of the others.
+    """Scale of similar designs: one length is fixed at its upper bound, the others are relative to it.
 
     bounds: of all lengths, SI; still: the one that stands.
     """
@@ -120,7 +120,7 @@ class Scale:
 
     @property
     def fixed_length(self) -> dict[str, float]:
-        """The length that stands, SI."""
+        """Fixed length, SI."""
         return {self.still: self.bounds[self.still][1]}
 
     @property
@@ -147,7 +147,7 @@ class Scale:
         ]
 
     def taken_out(self, x: Mapping[str, float]) -> dict[str, float]:
-        """A design, SI, of the size at which the one stands."""
+        """Similar design, SI, with the fixed length at its bound."""
         factor = self.bounds[self.still][1] / x[self.still]
         return {name: value * factor if name in self.bounds else value for name, value in x.items()}
 

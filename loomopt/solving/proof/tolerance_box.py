@@ -83,7 +83,7 @@ class NumberBox:
                 raise OpenError("corners of the cycle may change places within the tolerances")
 
     def given(self, low: Floats, high: Floats) -> Given:
-        """Numbers of parts, ends (numbers, parts), SI, with what follows from them, and slopes."""
+        """Numbers of parts, ends (numbers, parts), SI, with derived numbers and slopes."""
         count = len(self.names)
         variables = {name: intervals.variable(k, count, low[k], high[k]) for k, name in enumerate(self.names)}
         values = {**self.fixed, **variables}
@@ -177,7 +177,7 @@ class AtAngle(Single):
 
 
 class OverPiece(Function):
-    """A whole-cycle quantity times a sign over a stretch: its share of the stretch is the first variable.
+    """Whole-cycle quantity times a sign over an interval; the position in the interval is the first variable.
 
     ends(given): where the stretch begins, and how wide it is, rad; switch: the switches on it.
     """
@@ -261,7 +261,7 @@ def over_angles(box: NumberBox, quantity: str, sign: float, angle: float) -> Ove
 
 
 class Peak(Function):
-    """The opposite of the largest of a quantity's values, times signs, at nodes: what its peak is at least, negated.
+    """Negative of the largest signed value of a quantity at nodes, a lower bound of its peak.
 
     nodes: piece, share of it and sign. Of weights that add up to 1 the largest value is at least the weighted mean,
     whose slopes cancel where two peaks tie [as the cut of `tree.with_cut`].

@@ -257,7 +257,7 @@ def _smear(read: Read, half: Floats) -> Floats:
 
 
 def _branch(tree: Tree, boxes: tuple[Floats, ...], least: Floats, sizes: Floats) -> None:
-    """Put boxes back: as they are where they were narrowed much, halved along what moves the rows most elsewhere."""
+    """Put boxes back: unchanged if they were narrowed much, else halved along the most influential variable."""
     low, high, narrow_low, narrow_high, smear = boxes
     if not low.shape[1]:
         return

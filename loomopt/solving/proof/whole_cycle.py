@@ -71,7 +71,7 @@ growth of that number from round to round, and s of its thread from which on no 
 
 
 def _decided(program: Program, job: Job, formatter: UnitFormatter, reads: "tuple[_Read, _Read]") -> list[Proof]:
-    """Proofs: each claim gets a few boxes, then in every round open claims get more, while time is left."""
+    """Proofs of claims: a few boxes for each claim, then more in every round for open claims, while time is left."""
     start_time = time.thread_time()
     most = min(FIRST_BOXES, taylor_bounds.MOST_BOXES)
 
@@ -109,7 +109,7 @@ def _merged(proofs: list[Proof]) -> Iterator[Proof]:
 
 @dataclass(frozen=True)
 class _Read:
-    """A design read in floats and in balls; slack: relative, what proofs leave open."""
+    """Design read in floats and in balls; slack: relative margin of the proofs."""
 
     sampler: Sampler
     boxes: Boxes
@@ -118,7 +118,7 @@ class _Read:
 
 @dataclass(frozen=True)
 class _Claim:
-    """That |quantity| (of a signed one, the quantity) stays below a bound; peak: its refined largest; all SI."""
+    """Claim that a quantity (or its magnitude if unsigned) is below a bound; peak: its refined maximum; all SI."""
 
     name: str
     text: str
@@ -148,7 +148,7 @@ def _readings(
 def _claims(
     program: Program, job: Job, formatter: UnitFormatter, target_read: _Read, whole: _Read
 ) -> "Iterator[Proof | tuple[_Read, _Claim]]":
-    """Yield what is to be proven: limits of the cycle, assembly, claimed peaks; of single values their proofs."""
+    """Yield claims to be proven: limits over the cycle, assembly, peaks; for single values, finished proofs."""
     for limit in program.row_limits:
         hidden = limit.row if limit.name in program.named_limits else limit.name
         text = hidden if limit.hidden else formatter.limit(limit)

@@ -1,4 +1,4 @@
-"""Reductions of a task to simpler ones, as in cvxpy: each is applied before the solve and inverted after it."""
+"""Reductions of a task to simpler tasks, as in cvxpy: applied before the solve, inverted after it."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol
@@ -10,7 +10,7 @@ Solve = Callable[[Task], Solution]
 
 
 class Reduction(Protocol):
-    """One step from a task to a simpler one, and back."""
+    """Step from a task to a simpler one, and back."""
 
     def apply(self, task: Task) -> Task:
         """Simpler task, which is solved first. Raises BadInput for a task that it cannot serve."""

@@ -90,7 +90,7 @@ class SizeRounding:
 
 @dataclass(frozen=True)
 class Lattice:
-    """Task and its sizes: of each number by what a designer calls it, SI, ascending, within its bounds."""
+    """Task and sizes of its numbers, by designer's name: SI, ascending, within the bounds."""
 
     task: Task
     sizes: Mapping[str, tuple[float, ...]]
@@ -167,7 +167,7 @@ def read_sizes(scene: Scene, given: Mapping[str, object] | None) -> dict[str, tu
 
 
 class Best(NamedTuple):
-    """The best point, SI by number, and how it was found; levels: what it is worth there, in units of the scale."""
+    """Best point, SI by number, and how it was found; levels: values of the objectives, in units of the scale."""
 
     point: Mapping[str, float] | None
     admissible: int | None

@@ -102,7 +102,7 @@ class Batch:
         return {self.names[place] for value in slopes for place in np.flatnonzero(value.max(axis=0))}
 
     def tops(self, x: Floats) -> Floats:
-        """Designs with the variables that stand at a quantity's maximum put there, approximately."""
+        """Designs with variables that are defined by the maximum of a quantity set to it, approximately."""
         if not self.program.tops:
             return x
         moved = x.copy()

@@ -199,7 +199,7 @@ def _drop(candidate: Candidate) -> Candidate:
 
 
 def _certify_ranked(search: Search) -> Search:
-    """The search with its best candidate tie-broken and certified, whatever the solver's status.
+    """Search with its best candidate tie-broken and certified, for any status of the solver.
 
     If an earlier objective got worse in favour of a later one, the search solves again with a larger weight.
     """

@@ -175,7 +175,7 @@ class _ActiveRows:
         return rows
 
     def level(self, place: int, unknown: Sequence[Number], exact: Reading | None = None) -> Number:
-        """Objective in its scale: its peak, or its row."""
+        """Scaled objective: its peak, or its row."""
         tops = dict(zip(self.levels, unknown[len(self.free) :], strict=True))
         if place in tops:
             return tops[place]

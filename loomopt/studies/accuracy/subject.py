@@ -79,7 +79,7 @@ class Rung:
 
 @dataclass(frozen=True)
 class Ladder:
-    """One method at several settings.
+    """Method at several settings.
 
     settings: coarse to fine. run(setting): is timed. read(setting, result): values of the run, not timed.
     reference(quantity): reference value, None without an accurate one. step(setting): step of which the error may be a
@@ -98,7 +98,7 @@ class Ladder:
 
 @dataclass(frozen=True)
 class LadderRow:
-    """One quantity by one method at one setting.
+    """Quantity by a method at one setting.
 
     error: relative, None where it is unknown. seconds: least of the repeats after a warm-up. evaluations: number of
     positions of the mechanism evaluated in a run.

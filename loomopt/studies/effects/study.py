@@ -48,7 +48,7 @@ def known_effects(scene: Scene) -> dict[Effect, Table]:
 
 
 def effects_without_values(scene: Scene, given: Iterable[Effect]) -> dict[str, str]:
-    """Effects of the job that the scene has no values for, each with what to set."""
+    """Effects of the job without values in the scene, with the keys to set."""
     present = {effect.path[0] for effect in given}
     return {name: _missing_values(effect) for name, effect in scene.schema.effects.items() if name not in present}
 
@@ -264,7 +264,7 @@ def plan_effects(
 
 
 class EffectsCourse:
-    """State of a study after some of its rows: the next solves, and what is known.
+    """State of a study after some of its rows: next solves and known results.
 
     base: effects that are off in the reference, None without one. reference: its row. unsolved: effects of the
     combination that solve does not accept. inadmissible: effects with which no design is admissible. obstacles: why the

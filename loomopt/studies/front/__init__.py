@@ -1,1 +1,1 @@
-"""What two figures of a machine cost each other: certified fronts."""
+"""Certified Pareto fronts of two figures of a machine."""

@@ -1,4 +1,4 @@
-"""What two figures of a machine cost each other: the whole front, by adaptive ε-constraints, every point certified.
+"""Pareto front of two figures of a machine, by adaptive ε-constraints, every point certified.
 
 The least of one axis with the other at most ε, then the least of the other, so that no point is only weakly efficient;
 non-convex parts are reached too [Haimes, Lasdon, Wismer, IEEE Trans. SMC 1 (1971); Mavrotas, AMC 213 (2009)].
@@ -113,7 +113,7 @@ def trade(
 
 
 def _lifted(scene: Scene, senses: Mapping[str, Sense]) -> tuple[Scene, tuple[str, ...]]:
-    """Scene without the limits that stand in the way of an end that is sought, and those limits in words.
+    """Scene without the limits that exclude a requested end of the front, and those limits in words.
 
     Of an axis of which the least is sought that is a minimum, of one of which the most is sought a maximum; a limit to
     one value stands in the way of both ends.
@@ -162,7 +162,7 @@ def _ends(scene: Scene, name: str, given: str | Sequence[float]) -> tuple[float,
 
 
 def _read(text: str, kind: str, name: str) -> float:
-    """One end of a range, SI. Raises BadInput."""
+    """End of a range, SI. Raises BadInput."""
     try:
         return read_quantity(text, kind)
     except QuantityError as error:

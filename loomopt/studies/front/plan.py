@@ -57,7 +57,7 @@ def touched(row: Row) -> tuple[Touched, ...]:
 
 
 class Spot(NamedTuple):
-    """A point of the front. point: of its row; b, a: its position; empty: largest b up to which no design is better.
+    """Point of the front. point: its row; b, a: its position; empty: largest b up to which no design is better.
 
     slope: da/db; active: touched sides; x: variables of its design, SI.
     """

@@ -1,4 +1,4 @@
-"""One point of a front: the least of one axis with the other limited, then the least of the other; its answer."""
+"""Point of a front: minimum of one axis with the other limited, then minimum of the other; its answer."""
 
 import functools
 import math
@@ -49,7 +49,7 @@ def capped(axis: Traded) -> str:
 
 
 class Subproblem(NamedTuple):
-    """One program of a front.
+    """Program of a front.
 
     first: the axis that is optimised first, 0 or 1; caps: largest value of each axis, None for no limit; levels: 1 for
     the first axis alone, 2 for the other after it.

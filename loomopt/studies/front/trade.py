@@ -86,7 +86,7 @@ class Trade:
 
     @property
     def labels(self) -> tuple[str, str]:
-        """Label of each axis; that of a magnitude says so."""
+        """Labels of the axes; for a magnitude with this word."""
         first, second = self.solver.axes
         return first.called, second.called
 

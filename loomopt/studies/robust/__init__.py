@@ -1,1 +1,1 @@
-"""Optima that stay admissible as they are made: limits backed off by what machines vary."""
+"""Robust optima: limits are backed off by the scatter of manufactured machines."""

@@ -1,4 +1,4 @@
-"""Margins of a design's limits: each side's room in standard deviations of its own figure, linear."""
+"""Margins of a design's limits, in standard deviations of their figures, by linearisation."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,7 +21,7 @@ MET = 1e-5
 
 
 class Margin(NamedTuple):
-    """One side of what machines are judged by.
+    """Side of a limit or band by which machines are accepted.
 
     sign: +1 where the figure may be no more; room: how far the mean machine keeps clear, SI; way: what each
     independent standard normal number does to what is left of it, (numbers,), SI; fixed: whether nothing backs it off;

@@ -23,7 +23,7 @@ ENDS = frozenset({"min", "max", "fixed", PEAK})
 
 
 class Side(NamedTuple):
-    """One side of a limit or figure; end: one of `ENDS`, "" for the limit alone."""
+    """Side of a limit or figure; end: one of `ENDS`, "" for the limit alone."""
 
     limit: str
     end: str = ""
@@ -152,7 +152,7 @@ def _alike(first: float | None, second: float | None) -> bool:
 
 @dataclass(frozen=True)
 class StudyTask:
-    """One point to be solved.
+    """Point to be solved.
 
     place: as of its row; parent: the point, of an earlier batch, of its warm start, None for a cold start; ask: further
     requests as JSON data; length: approximate time relative to others of its batch; neighbours: optima of two
@@ -337,7 +337,7 @@ def _nodes(families: list[list[list[Any]]]) -> Nodes:
 
 
 def _task(program: Program) -> str:
-    """Hash of what programs of one structure share in every process: names, no formulas."""
+    """Hash of a program's structure that is equal in every process: names, no formulas."""
     objectives = [objective.structure for objective in program.objectives]
     limits = [limit.structure for limit in program.limits]
     names = [variable.name for variable in program.variables], list(program.parameters)

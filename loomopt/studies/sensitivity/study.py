@@ -572,7 +572,7 @@ def _price_end(
         return PriceEnd(now, 0.0, "the optimum cannot be followed")
 
     def price_excess(there: PathPoint) -> tuple[float, str]:
-        """Change of the price beyond `PRICE_CHANGE`, negative within it, and what it means."""
+        """Change of the price beyond `PRICE_CHANGE`, negative within it, and its meaning."""
         evaluation, weights, row_places = there.evaluation, there.multipliers, working_set.rows
         if level != optimum.level:
             row_places = support.rows
@@ -800,7 +800,7 @@ def _piece_excesses(optimum: Optimum, working_set: WorkingSet, evaluation: Evalu
 
 
 def _highest_new_extreme(extremes: Sequence[Extreme], rows: Sequence[ActiveRow]) -> Extreme | None:
-    """Highest extreme at which none of the rows stands; None without one."""
+    """Highest extreme without a row at it; None without one."""
     nodes = [row.node for row in rows if row.node]
     new = (e for e in extremes if not any(e.piece == n.piece and abs(e.u - n.u) <= SAME_NODE for n in nodes))
     return next(new, None)

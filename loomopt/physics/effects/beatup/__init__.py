@@ -6,7 +6,7 @@ from loomopt.maths.systems import Number
 
 
 class Rod(Protocol):
-    """What effects read of the linkage itself: the rod's angle, its derivatives, and the angle from rod to crank."""
+    """Motion of the linkage that effects read: angle of the rod, its derivatives, and the angle from rod to crank."""
 
     @property
     def rod_1(self) -> Number:
@@ -46,7 +46,7 @@ class ReedPose(Protocol):
 
     @property
     def omega_dot(self) -> Number:
-        """Its change, rad/s²; None at constant speed."""
+        """Angular acceleration of the crank, rad/s²; None at constant speed."""
 
     @property
     def velocity(self) -> Number:

@@ -1,4 +1,4 @@
-"""Weight of the reed system with its counterweight, and of rocker, rod and crank as far as the scene tells their mass.
+"""Weight of the reed system with its counterweight, and of rocker, rod and crank if the scene has their masses.
 
 Output term ∂U/∂q, U = g (m4 r4 − m4e r4e) sin(ψ + χ + tilt) + g m3 s3 sin(ψ + tilt): the reed's centre lies at
 (r4, ψ + χ) from the rocking shaft, the counterweight opposite; tilt is the angle of A→D from the horizontal. Rod and
@@ -42,7 +42,7 @@ def rocker_moment(given: Values) -> Number | None:
 
 
 def inside(at: Inputs[ReedPose]) -> Number | None:
-    """Crank torque that lifts rod and crank, N·m: the rod as its shares at B and C; None where neither tells a mass."""
+    """Crank torque that lifts rod and crank, N·m: the rod as its shares at B and C; None without their masses."""
     turned = at.maths.cos(at.pose.phi + at.table["tilt"])
     crank = at.values["crank.mass"] * at.values["crank.centre"] if "crank.mass" in at.values else None
     if "rod_inertia.m2" not in at.values:

@@ -1,4 +1,4 @@
-"""Forces in the joints of the beat-up, A to D, and what all moving masses do to the frame: figures only.
+"""Forces in the joints of the beat-up, A to D, and the shaking force and moment on the frame: figures only.
 
 F_J is the force of the part nearer the drive on the next one: frame → crank (A) → rod (B) → rocker (C), frame → rocker
 (D); x along A→D, y towards C. Output terms are couples on the rocker, and load D by themselves only where they tell
@@ -45,7 +45,7 @@ SIDES = {
 
 
 class Swinging(Protocol):
-    """What of a motion the masses on the rocking shaft read."""
+    """Part of a motion that the masses on the rocking shaft read."""
 
     @property
     def q(self) -> Number:
@@ -75,7 +75,7 @@ class CrankRockerForces:
 
     @lazy
     def rod(self) -> Wrench | None:
-        """What acts on the rod by its own mass, about B; None for a rod without mass."""
+        """Inertia and weight of the rod, about B; None for a rod without mass."""
         linkage, rods = self.linkage, [pair for pair, _ in self.loading.masses if pair.link == "rod"]
         if not rods:
             return None
@@ -203,7 +203,7 @@ class CrankRockerForces:
 
     @lazy
     def friction_work(self) -> Mapping[str, Number]:
-        """What a newton in each joint takes by friction, m per rad of the crank: μ r |δ'|, δ' how the pin turns."""
+        """Friction torque per newton in the joints, m per rad of the crank: μ r |δ'|; δ: rotation of the pin."""
         rod, rocker = self.linkage.rod_1, -self.at.pose.q1
         turned = {"A": 1, "B": rod - 1, "C": rocker - rod, "D": rocker}
         return pins.works(self.at, {joint: (f"force_{joint}", turn) for joint, turn in turned.items()})

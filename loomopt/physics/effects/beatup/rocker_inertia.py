@@ -36,7 +36,7 @@ def moved(at: Inputs[object]) -> Number:
 
 
 def mass(at: Inputs[object]) -> LinkMass:
-    """Rocker; one that tells no mass is balanced about D."""
+    """Rocker; without a mass in the scene it is balanced about D."""
     if "m3" not in at.table or "s3" not in at.table:
         return LinkMass("rocker", 0, 0, 0, at.table["J3"])
     return LinkMass("rocker", at.table["m3"], at.table["m3"] * at.table["s3"], 0, at.table["J3"])

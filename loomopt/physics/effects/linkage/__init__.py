@@ -27,11 +27,11 @@ class Parts(Protocol):
 
 
 class OutputPart(Protocol):
-    """What of a linkage its output is."""
+    """Output of a linkage."""
 
     @property
     def measure(self) -> str:
-        """What is measured: "angle", "slide", "x" or "y"."""
+        """Measured coordinate: "angle", "slide", "x" or "y"."""
 
     @property
     def name(self) -> str:
@@ -39,7 +39,7 @@ class OutputPart(Protocol):
 
     @property
     def carrier(self) -> str:
-        """Link or joint that carries the mass of the output; "" where the output alone does not tell its motion."""
+        """Link or joint that carries the mass of the output; "" if the output does not determine its motion."""
 
 
 class LinkagePose(Protocol):
@@ -59,7 +59,7 @@ class LinkagePose(Protocol):
 
     @property
     def omega_dot(self) -> Number:
-        """Its change, rad/s²; None at constant speed."""
+        """Angular acceleration of the crank, rad/s²; None at constant speed."""
 
     @property
     def acceleration(self) -> Number:

@@ -1,4 +1,4 @@
-"""Friction of what moves with the output: Coulomb and viscous, in the bearings of its shaft or in its guides.
+"""Coulomb and viscous friction of the output, in the bearings of its shaft or in its guides.
 
 Output term T_c sgn q˙ + c q˙. It jumps where the output turns; there, and while the output rests, the friction may be
 anything between −T_c and T_c, and the value of the motion just before is shown.

@@ -1,4 +1,4 @@
-"""Centrifugal force of what turns with the output, |Σ m r| q˙²: the output's mass and its counterweight.
+"""Centrifugal force of the parts that turn with the output, |Σ m r| q˙²: the output's mass and its counterweight.
 
 It is that part of the shaft's load alone; `joint_forces` gives what the bearings carry.
 """

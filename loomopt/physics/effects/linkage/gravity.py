@@ -1,4 +1,4 @@
-"""Weight of all links and joints that have a mass, and of what moves with the output: drive term −Σ m g·p'."""
+"""Weight of links and joints with a mass, and of parts that move with the output: drive term −Σ m g·p'."""
 
 from collections.abc import Iterator
 
@@ -32,7 +32,7 @@ def weighed(at: Inputs[LinkagePose]) -> Iterator[OutputMass]:
 
 
 def force(at: Inputs[LinkagePose]) -> Number:
-    """Crank torque that lifts what has a mass, N·m."""
+    """Crank torque that lifts the masses, N·m."""
     x, y, torque = at.maths.cos(at.table["down"]), at.maths.sin(at.table["down"]), 0
     for weight in weighed(at):
         rate = weight.at.at(1)

@@ -1,4 +1,4 @@
-"""Inertia of what moves with the output: output term J q¨, or m q¨ of one that slides.
+"""Inertia of the parts that move with the output: output term J q¨, or m q¨ for a sliding output.
 
 Of an output that turns J alone is a couple. With its mass m, `centre` from the axis, it also loads the joints, shakes
 the frame and is weighed; J stays the whole inertia about the axis.
@@ -17,7 +17,7 @@ from loomopt.physics.schema import Table
 
 
 class Parameters(Table):
-    """Values of what turns with the output."""
+    """Values of the parts that turn with the output."""
 
     J: PositiveInertia = Field(description="inertia about the output link's axis")
     centre: Length | None = Field(None, description="distance of its centre of mass from the axis")
@@ -39,7 +39,7 @@ class Parameters(Table):
 
 
 class Sliding(Table):
-    """Values of what slides with the output."""
+    """Values of the parts that slide with the output."""
 
     mass: Mass = Field(description="mass of what slides with the output")
 

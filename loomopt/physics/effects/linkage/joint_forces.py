@@ -67,7 +67,7 @@ class LinkageForces:
 
     @lazy
     def inertial(self) -> list[Applied]:
-        """What moves with the output resists with this, as loads."""
+        """Loads by the parts that move with the output."""
         if not self.loading.masses:
             return []
         return self.output(-self.loading.inertia * self.pose.acceleration, True)
@@ -103,7 +103,7 @@ class LinkageForces:
 
     @lazy
     def friction_work(self) -> Mapping[str, Number]:
-        """What a newton in each pin takes by friction, m per rad of the crank."""
+        """Friction torque per newton in the pins, m per rad of the crank."""
         from loomopt.physics.mechanisms import chain_forces
 
         turned = {

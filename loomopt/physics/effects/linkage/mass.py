@@ -1,4 +1,4 @@
-"""The mass of a link, or of what sits on a joint, after which its table is named: drive term of its inertia.
+"""Mass of a link or at a joint, which gives the table its name: drive term of its inertia.
 
 (m p'·p'' + J θ' θ'') ω² + (m p'·p' + J θ'²) ω̇, the change of its kinetic energy by crank angle; p: its centre of mass,
 θ: its angle.
@@ -16,7 +16,7 @@ from loomopt.physics.schema import Table
 
 
 class Parameters(Table):
-    """Values of the link, or of what sits on the joint."""
+    """Values of the link, or of the mass at the joint."""
 
     mass: PositiveMass = Field(description="mass")
     along: Coordinate | None = Field(None, description="centre of mass from the link's first joint, along its line")

@@ -1,4 +1,4 @@
-"""Torsion of the shaft between the output's link and what it drives."""
+"""Torsion of the shaft between the output's link and the driven parts."""
 
 from loomopt.physics.effects.shaft_torsion import EFFECT
 

@@ -81,7 +81,7 @@ class RapierForces:
 
     @lazy
     def sley(self) -> Wrench:
-        """What acts on the sley, about B0."""
+        """Loads on the sley, about B0."""
         push = minus(self.force_B2)
         return Wrench(push, self.couple + cross(self._drive.carrier, push))
 
@@ -157,7 +157,7 @@ class RapierForces:
 
     @lazy
     def friction_work(self) -> Mapping[str, Number]:
-        """What a newton in each joint takes by friction, m per rad of the main crank."""
+        """Friction torque per newton in the joints, m per rad of the main crank."""
         drive = self._drive
         sense, sley, (link, driving) = drive.stand.sense, drive.phi3_1, drive.rates
         rod, second = sense * drive.four_bar.rod_1, -2 * sense

@@ -41,7 +41,7 @@ WIRES: tuple[float, ...] = tuple(float(f"{size}e-3") for size in _MILLIMETRES.sp
 
 @dataclass(frozen=True)
 class Coil:
-    """One tension spring, its numbers of one number system.
+    """Tension spring, with numbers of one number system.
 
     wire: wire diameter d, m; diameter: mean coil diameter D, m; turns: active turns n, hooks' share included;
     shear_modulus G and elasticity E, Pa; density, kg/m³; initial_tension: force that parts the turns, N.
@@ -191,7 +191,7 @@ OPENED = "coils are drawn open at the top"
 
 
 class Parameters(Table):
-    """The coils of one return spring, their steel, and what they must keep."""
+    """Coils of a return spring, their steel, and their limits."""
 
     springs: PositiveNumber = Field(2.0, description="number of springs that share K1")
     wire: PositiveLength = Field(description="diameter of the wire")
@@ -238,7 +238,7 @@ class Parameters(Table):
     @model_validator(mode="before")
     @classmethod
     def _band_of_initial_tension(cls, raw: object) -> object:
-        """Take initial_tension = { min, max } for the band that it keeps; it stands in its middle then."""
+        """Read initial_tension = { min, max } as its band, with the middle as its value."""
         if not isinstance(raw, Mapping):
             return raw
         band = raw.get("initial_tension")
@@ -289,7 +289,7 @@ def _length(at: Inputs[object]) -> Number:
 
 
 def _bending_share(at: Inputs[object]) -> Number:
-    """Bending stress of the hooks over the strength; 0 of free hooks, whose bend nothing tells."""
+    """Bending stress of the hooks over the strength; 0 for free hooks, whose bend is unknown."""
     share = coil(at.table).hook_bending(at.maths, load(at)) / tensile(at.maths, at.table)
     return 0 * share if at.table.get("hooks") == "free" else share
 

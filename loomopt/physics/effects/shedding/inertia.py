@@ -1,4 +1,4 @@
-"""Inertia of the heald frame and what moves with it: output term M X¨ [Qiu21, eq 4]."""
+"""Inertia of the heald frame and the parts that move with it: output term M X¨ [Qiu21, eq 4]."""
 
 from pydantic import Field
 

@@ -81,7 +81,7 @@ class CamForces:
 
     @lazy
     def lever_pivot_force(self) -> Vector:
-        """Of the frame on the lever: what roller and rod leave."""
+        """Force of the frame on the lever: the balance of roller and rod."""
         normal, angle = self._contact.normal(0), self.at.values["lever.direction"]
         rod = self.lever_couple / self.at.values["lever.arm"]
         return Vector(

@@ -80,7 +80,7 @@ def follow(body: "Body", cam: "Cam", table: Values) -> "Course":
 
 
 def read(course: "Course") -> dict[str, float | None]:
-    """Figures of the first flight, and of the period where there is one; SI, rad."""
+    """Figures of the first flight, and of the period if the motion is periodic; SI, rad."""
     (lift_off, landing), first, period = course.first, course.first_landing, course.period
     speed = first.speed if first else None
     return {

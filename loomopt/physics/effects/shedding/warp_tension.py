@@ -56,7 +56,7 @@ def past_middle(angle: float, corners: tuple[float, ...]) -> float:
 
 
 def known_in(words: Mapping[str, str]) -> tuple[Place, ...]:
-    """Dwells where nothing is said of the moves."""
+    """Dwells, for a tension that is not given in the moves."""
     return (("segment", 1.0), ("segment", 3.0)) if words["shape"] == "levels" and "table" not in words else ()
 
 
@@ -71,7 +71,7 @@ def step(at: Inputs[FramePose]) -> Number:
 
 
 def levels(at: Inputs[FramePose]) -> Number:
-    """−T, N, in the dwells; 0 stands for what is not known between them."""
+    """−T, N, in the dwells; 0 between them, where it is unknown."""
     return at.maths.choose(at.pose.segment, (0, at.table["T2"], 0, -at.table["T1"]))
 
 
