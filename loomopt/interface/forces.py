@@ -34,7 +34,7 @@ TODAY: Mapping[str, float] = Frozen()
 
 
 class TurnedForce(NamedTuple):
-    """One force over the turn: crank angles, rad, ascending; components in the frame, N.
+    """Force over the turn: crank angles, rad, ascending; components in the frame, N.
 
     peak, at: the largest size, N, and its crank angle, rad; mean, ball, roller: the mean size over the turn, and the
     means of its powers 3 and 10/3 that bearings' lives go by, N. headings: unit directions over the turn of the parts
@@ -86,7 +86,7 @@ class Forces(Presentation):
     heading = "Forces in the joints"
 
     def tables(self) -> list[str | TextTable]:
-        """A line for each force: its peak, where that is, and the means that bearings go by."""
+        """Table of forces: peak, its crank angle, and the means for bearing life."""
         lines, force, angle = [], self.scene.shown_in("force"), self.scene.shown_in("angle")
         for name, turned in self.by_name.items():
             numbers = turned.peak / factor(force), turned.at / factor(angle), *self._means(turned, factor(force))

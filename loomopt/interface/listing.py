@@ -17,7 +17,7 @@ STAMP = (2000, 1, 1, 0, 0, 0)
 
 
 def problems() -> tuple[tuple[Head, ...], list[BadInput]]:
-    """Heads of all problems in alphabetical order, and what kept others from being read."""
+    """Heads of all problems in alphabetical order, and the errors of those that cannot be read."""
     heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
     silent = [head.name for head in heads if not head.targets]
     if silent or packaged.entry_points("loomopt.jobs"):  # whose targets only their jobs know: those are read whole
@@ -76,7 +76,7 @@ def copy_scene(name: str, path: Path) -> Path:
 
 
 def _named_files(scene: Path) -> dict[str, str]:
-    """Files that a packaged scene names, by name, with what stands in them. Raises BadInput."""
+    """Contents of the files that a packaged scene names, by name. Raises BadInput."""
     from loomopt.jobs import registry
     from loomopt.scenes.numbers import tables
 

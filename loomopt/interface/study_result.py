@@ -37,7 +37,7 @@ class Presentation(ABC):
     @property
     @abstractmethod
     def heading(self) -> str:
-        """Its heading on a page."""
+        """Heading on a page."""
 
     @abstractmethod
     def tables(self) -> Sequence[str | TextTable]:
@@ -45,10 +45,10 @@ class Presentation(ABC):
 
     @abstractmethod
     def charts(self) -> Charts:
-        """Its charts."""
+        """Charts of the study."""
 
     def figure(self) -> tuple[Charts, Sequence[tuple[str, Drawing]]]:
-        """Charts of its figure, and designs that stand beside them with their headings."""
+        """Charts of its figure, and the designs drawn with them, with headings."""
         return self.charts(), ()
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":

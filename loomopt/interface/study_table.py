@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class NumberColumn(NamedTuple):
-    """A column of numbers: its name, its unit, and its values, SI, None where a row has none; size: of the unit, SI."""
+    """Column of numbers: name, unit, and values, SI, None where a row has no value; size: of the unit, SI."""
 
     name: str
     unit: str
@@ -249,7 +249,7 @@ MOST_REASONS = 5
 
 
 def shown_columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[NumberColumn]:
-    """Columns that a study is about: what it seeks and shows, and what differs of the design."""
+    """Main columns of a study: objectives, shown figures, and the numbers of the design that differ."""
     made = columns(study, rows, si)
     known = [*made["design"], *made["figures"], *made["multipliers"]]
     shown = [column for name in study.shown for column in known if column.name == name]

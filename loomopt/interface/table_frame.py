@@ -1,4 +1,4 @@
-"""Table with six digits in each cell, whatever the other cells hold."""
+"""Table with six digits in each cell, independent of the other cells."""
 
 from collections.abc import Mapping, Sequence
 

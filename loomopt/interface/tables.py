@@ -53,7 +53,7 @@ def answer(solution: Evaluated, scene: Scene) -> "pd.DataFrame":
 
 
 def rows(solution: Evaluated, scene: Scene, before: Evaluated | None = None) -> list[dict[str, Any]]:
-    """Rows of `answer` as plain data, what is only rounding as 0; before: today's.
+    """Rows of `answer` as plain data, with rounding errors as 0; before: today's.
 
     A figure the scene cannot have is left out.
     """
@@ -166,7 +166,7 @@ def to_file(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
 
 
 def meaningful(frame: "pd.DataFrame", digits: int | None = None) -> "pd.DataFrame":
-    """A table whose numbers have the digits that mean something, and no -0 or what is only rounding beside a 0.
+    """Table with the significant digits of its numbers, and 0 in place of -0 and of rounding errors.
 
     digits: significant ones; without, two more than the accuracy that the table says it was found with.
     """
@@ -190,7 +190,7 @@ def curves(
     target: str | None = None,
     measured: str | os.PathLike[str] | None = None,
 ) -> "pd.DataFrame":
-    """Curves of a design (SI; what it does not name stays today's) over one turn, SI.
+    """Curves of a design (SI; numbers that it does not name are today's) over one turn, SI.
 
     Every half degree; or, with an accuracy, as few rows as show each column's largest magnitude to it, relative.
     target: what the design was found for, where that is known. measured: a CSV file of measured curves, `phi [deg]` and
@@ -243,7 +243,7 @@ def _kinds(columns: "Mapping[str, Floats]") -> dict[str, str]:
 def _add_measured(
     columns: "dict[str, Floats]", angles: Sequence[float], measured: Mapping[str, Sequence[float]]
 ) -> dict[str, float]:
-    """Add what was measured to curves, in the rows at its angles, rad; return the rms difference of each, SI."""
+    """Add measured columns to curves, in the rows at their angles, rad; return their rms differences, SI."""
     import numpy as np
 
     from loomopt.model.curves import ANGLE, split
@@ -262,7 +262,7 @@ def _add_measured(
 
 
 def _measurement_notes(table: "csv_tables.Table") -> dict[str, object]:
-    """Precision of measured columns, SI, and how what can be read in two ways was read."""
+    """Precision of measured columns, SI, and the chosen reading of ambiguous values."""
     precision = {f"precision_{name}": size for name, size in table.precision.items() if size}
     return precision | ({"read": "; ".join(table.remarks)} if table.remarks else {})
 

@@ -1,4 +1,4 @@
-"""All that other packages know of a job: one object. What few jobs need has a default here."""
+"""Interface of a job for other packages, with defaults for methods that few jobs need."""
 
 import abc
 import functools
@@ -49,7 +49,7 @@ Minima = Mapping[str, Sequence[tuple[str, float]]]
 
 
 class Task(abc.ABC):
-    """One scene and target on the way to a program: a step each, which a job overrides where it differs.
+    """Steps from a scene and a target to a program; a job overrides the steps in which it differs.
 
     target: "" for none; traded: axes, which are sought in place of the target's objectives. What a target asks of an
     axis falls away.
@@ -198,7 +198,7 @@ class Task(abc.ABC):
         return [limit for v in self.bounded if v.called in self.scene.bounds for limit in bound_limits(v)]
 
     def floors(self) -> Iterator[Limit]:
-        """Yield what limits ask of variables, the most first; a row that stood twice would have no price."""
+        """Yield lower bounds of variables from limits, largest first, not repeated: a repeated row has no price."""
         for name, pairs in self.minima.items():
             variable = self._minimum_variable(name)
             binding = [(by, value) for by, value in pairs if variable.lower == variable.upper or value > variable.lower]
@@ -269,7 +269,7 @@ class Task(abc.ABC):
         return tuple(level for level in levels[:-1] if level.figure not in self.traded)
 
     def least(self) -> tuple[Objective, ...]:
-        """Levels after a target's own: what effects want least, rows of checks and free numbers of any."""
+        """Levels after those of a target: quantities that effects minimise, rows of checks and free numbers of any."""
         levels = []
         for effect in self.sampler.model.effects:
             if isinstance(effect, Check) and effect.least in effect.rows:
@@ -341,7 +341,7 @@ class Task(abc.ABC):
         return size_read(self.sampler, read, self.scene.schema.figures)
 
     def size(self, axis: str) -> float:
-        """Scale of what of an axis is sought the least of."""
+        """Scale of the minimised quantity of an axis."""
         return next((v.scale for v in self.variables if axis in (v.name, v.called)), 0.0) or self.figure_size(axis)
 
 
@@ -351,7 +351,7 @@ Below the second it is: no force, torque or length of a loom is that small."""
 
 
 def size_read(today: Sampler, name: str, figures: Mapping[str, Figure]) -> float:
-    """Size of a figure as today's machine has it; 1 for one that only its own speed tells.
+    """Size of a figure by today's machine; 1 for a figure that needs its speed.
 
     Where today's is only rounding, as of a machine that is balanced already: the largest peak of its kind.
     """
@@ -635,7 +635,7 @@ class Job(abc.ABC):
         return files(self.package)
 
     def demand(self, scene: Scene, target: str) -> None:
-        """Check that a scene has what a target needs.
+        """Check that a scene has the numbers that a target needs.
 
         Parameters
         ----------
@@ -911,7 +911,7 @@ class Job(abc.ABC):
         return {**self.values(program, {**self.today(scene), **program.today}), **program.today}
 
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
-        """NLP's variables without what is only rounding.
+        """Variables of the NLP without rounding errors.
 
         Parameters
         ----------

@@ -132,7 +132,7 @@ class FamilyJob(Job):
         return program.completed(self._joined(members, design))
 
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Variables without what is only rounding."""
+        """Variables without rounding errors."""
         tidied = self._joined([self.job.tidy(part.program, part.member_values(x)) for part in self.parts], x)
         return {**x, **tidied}
 
@@ -168,7 +168,7 @@ class FamilyJob(Job):
         return ""
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
-        """Raise BadInput: each member has curves of its own."""
+        """Raise BadInput: the members have separate curves."""
         raise refusal("a family has no curves of its own", scene.origin, "target", FAMILY, remedy="Draw one member")
 
 

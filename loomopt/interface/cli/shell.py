@@ -60,7 +60,7 @@ def read_request(
     target: str | None,
     read_call: "Callable[[Scene], Call]",
 ) -> DesignRequest:
-    """Scene of the file, as an answer's own call has changed it, with what the command line changes.
+    """Scene of the file, with the changes of an answer's call and of the command line.
 
     An answer in place of the file is judged in its own scene. A remark names what is otherwise than in the file, and
     what the answer was found in that does not count. read_call: reads the changes.

@@ -106,7 +106,7 @@ def draw(charts: Charts, drawings: Sequence[tuple[str, Drawing]] = ()) -> Any:
 
 
 def _is_wide(chart: Chart | Bars) -> bool:
-    """Whether a chart stands across all columns."""
+    """Whether a chart spans all columns."""
     return isinstance(chart, Chart) and chart.wide
 
 
@@ -145,7 +145,7 @@ def _common_key(keys: Sequence[Sequence[Entry]]) -> tuple[list[Entry], str]:
 
 
 def _curves(axes: Any, chart: Chart) -> list[Entry]:
-    """Draw curves and what is marked on them; return the key."""
+    """Draw curves with their marks; return the key."""
     for low, high in chart.spans:
         axes.axvspan(low, high, color=SPAN, zorder=0)
     for series in chart.series:
@@ -242,7 +242,7 @@ def _handle(kind: str) -> Any:
 
 
 def _blank() -> Any:
-    """Sample of what has no style."""
+    """Empty sample of a legend."""
     from matplotlib.lines import Line2D
 
     return Line2D([], [], linestyle="none")

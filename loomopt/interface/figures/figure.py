@@ -1,4 +1,4 @@
-"""Figures by matplotlib: a drawing, and what every figure and its head have in common. No window, no global state."""
+"""Figures by matplotlib: drawings, and common parts of all figures. No window, no global state."""
 
 import functools
 import math
@@ -70,7 +70,7 @@ def draw(drawing: Drawing, path: Path) -> None:
 
 
 def save(figure: Any, path: Path) -> None:
-    """Write a figure as PNG, PDF or SVG, by the path's ending, whatever the user's settings."""
+    """Write a figure as PNG, PDF or SVG, by the path's ending, independent of the user's settings."""
     with own_style():
         _save(figure, path)
 
@@ -107,7 +107,7 @@ def put(axes: Any, primitive: Primitive, layer: Layer, text_height: float, point
 
 @contextmanager
 def own_style(*texts: str) -> Iterator[None]:
-    """Draw texts in matplotlib's own defaults, whatever the user's settings; a character no font has is a box."""
+    """Draw texts with matplotlib's defaults, independent of the user's settings; an unknown character is a box."""
     from matplotlib import style
 
     settings = {**_STYLE, "font.family": families("".join(texts))}
@@ -139,7 +139,7 @@ OWN, BOXES = "DejaVu Sans", "Last Resort High-Efficiency"
 
 
 def families(text: str) -> list[str]:
-    """Fonts to write a text in, the first that has a character first; what none has stays an empty box."""
+    """Fonts for the characters of a text, in order of use; a character without a font is an empty box."""
     from matplotlib import font_manager
 
     lacking = {character for character in text if character.isprintable()} - _characters(font_manager.findfont(OWN))
@@ -212,7 +212,7 @@ def head(axes: Any, title: str, entries: Sequence[Entry] = (), names: Sequence[t
 
 
 def _head(axes: Any, title: str, entries: Sequence[Entry], columns: int, above: float, scale: float) -> float:
-    """Write legend and title above axes; above: of what stands there already, pt at full scale; return the height."""
+    """Write legend and title above axes; above: height already used, pt at full scale; return the height."""
     from matplotlib.transforms import ScaledTranslation
 
     high = scale * above
@@ -263,7 +263,7 @@ def _high(legend: Any) -> float:
 
 
 def _page(artist: Any) -> Any:
-    """Whole figure that something stands in."""
+    """Figure that contains axes or a subfigure."""
     return artist.get_figure(root=True)
 
 

@@ -58,7 +58,7 @@ class ShownFigure(Figure):
         return picture.getvalue()
 
     def _shrink(self, scale: float) -> None:
-        """Have all texts, and what stands between them, at a scale of the size that they were made in."""
+        """Scale all texts and the distances between them."""
         ratio, self.scale = scale / self.scale, scale
         engine = self.get_layout_engine()
         if isinstance(engine, ConstrainedLayoutEngine):

@@ -22,7 +22,7 @@ NAMED = 42
 def letter_designs(
     study: SceneStudy, findings: Findings, charts: Charts
 ) -> tuple[Charts, Sequence[tuple[str, Drawing]]]:
-    """Charts of a study with letters where three designs stand, and these designs with their headings."""
+    """Charts of a study with letters at three designs, and these designs with headings."""
     certified = [row for row in findings.rows if row.certified]
     if not charts.charts:
         return charts, ()
@@ -67,7 +67,7 @@ def _mark_designs(chart: Chart, first: NumberColumn, panel: NumberColumn, spots:
 
 
 def _heading(letter: str, columns: Sequence[NumberColumn], row: Row, at: int) -> str:
-    """Heading of a design: its letter, its place, what is sought there and what it misses, a line each."""
+    """Heading of a design, in lines: letter, place, objective, missed goals."""
     first, *others = (value_text(column, at) for column in columns)
     lines = (line for text in (f"{letter}: {first}", *others, row.shortfall) for line in textwrap.wrap(text, NAMED))
     return "\n".join(map(plain, lines))

@@ -1,4 +1,4 @@
-"""An answer read back from its JSON file: its figures and limits computed anew, the rest as the file tells it.
+"""Reader of an answer's JSON file: figures and limits are recomputed, the rest is taken from the file.
 
 What the file says of its status is believed only as far as its design bears it out.
 """
@@ -175,7 +175,7 @@ def _proofs(records: Sequence[Mapping[str, Any]], evaluation: Evaluation) -> Pro
 
 
 def _doubts(document: Mapping[str, Any], answer: Answer) -> Iterator[str]:
-    """Yield what speaks against the status that a file tells: figures, limits, thresholds."""
+    """Yield contradictions to the status in a file: figures, limits, thresholds."""
     sizes: dict[str, float] = {}
     for name, value in answer.figures.items():
         unit = answer.units.get(name, "1")

@@ -63,7 +63,7 @@ class Serialisable(Protocol):
     """Object with JSON data."""
 
     def as_dict(self) -> Mapping[str, object]:
-        """Its JSON data."""
+        """JSON data."""
 
 
 def document(result: Serialisable) -> str:

@@ -31,14 +31,14 @@ MADE = datetime.datetime(2000, 1, 1)
 
 
 def decimal_comma(given: str) -> bool:
-    """Whether `--decimal` asks for a comma. Raises BadInput for what is neither."""
+    """Whether `--decimal` is a comma. Raises BadInput if it is neither comma nor point."""
     if given not in DECIMALS:
         raise refusal("it is not a decimal sign", "", "--decimal", given, ", ".join(DECIMALS), "Choose one of them")
     return DECIMALS[given]
 
 
 def write(path: Path, sheets: Mapping[str, "pd.DataFrame"], comma: bool = False) -> None:
-    """Write tables as the file's ending says: CSV and Parquet take the first one, a workbook all. Raises BadInput."""
+    """Write tables by the file's ending: the first one as CSV or Parquet, all as a workbook. Raises BadInput."""
     ending, first = suffix(path, ENDINGS), next(iter(sheets.values()))
     if ending == ".csv":
         atomically(path, functools.partial(_put, to_decimal_comma(provenance.csv(first), comma)))
@@ -61,7 +61,7 @@ def write_text(path: Path, text: str, name: str, comma: bool = False) -> None:
 
 
 def to_decimal_comma(text: str, comma: bool) -> str:
-    """CSV text with decimal commas and semicolons, where that is asked for; comment lines stay."""
+    """CSV text with decimal commas and semicolons if requested; comment lines are not changed."""
     if not comma:
         return text
     lines = text.splitlines(keepends=True)

@@ -1,4 +1,4 @@
-"""The studies of a store, made again from what it says of them: their rows as they were written."""
+"""Reader of the studies in a store, with their rows as they were written."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -47,7 +47,7 @@ def read_studies(path: Path) -> list[StudyTable]:
 
 
 def _study(record: Mapping[str, Any], path: Path) -> SceneStudy:
-    """Plan that a store tells of. Raises BadInput."""
+    """Plan of a study in a store. Raises BadInput."""
     try:
         paths = Paths(path.absolute().parent, texts=dict(record["files"]))
         scene = build(record["document"], REGISTERED, str(path), paths)

@@ -1,4 +1,4 @@
-"""One self-contained page of answers and studies: markup, own SVG, and a script that only looks positions up."""
+"""Self-contained page of answers and studies: markup, SVG, and a script that only looks up positions."""
 
 from importlib.resources import files
 from importlib.resources.abc import Traversable

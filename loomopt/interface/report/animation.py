@@ -70,7 +70,7 @@ class MovingPicture:
         return f'<iframe srcdoc="{frame}" style="width:100%;height:720px;border:0" title="{title}"></iframe>'
 
     def save(self, path: Path) -> None:
-        """Write it as its file's ending says. Raises BadInput, also where there is no ffmpeg for an MP4."""
+        """Write the animation by the file's ending. Raises BadInput, also for an MP4 without ffmpeg."""
         WRITERS[suffix(path, ENDINGS)](self, path)
 
 

@@ -1,4 +1,4 @@
-"""The parts of a page on one design: its true status first, then the machine, what binds, the certificate, curves."""
+"""Parts of a page on a design: status first, then machine, binding limits, certificate, curves."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ class Status(NamedTuple):
 
 @dataclass(frozen=True)
 class Subject:
-    """A design to report on, in its scene; doubts: why what its file says is not believed, none for one just computed.
+    """Design to report on, in its scene; doubts: contradictions in its file, empty for a design just computed.
 
     target: whose limits it was judged by; sought: what it answers.
     """
@@ -48,7 +48,7 @@ class Subject:
 
     @property
     def heading(self) -> str:
-        """Problem and what is sought."""
+        """Problem and objectives."""
         return ", ".join(word for word in (self.evaluated.problem, self.sought) if word)
 
     @lazy
@@ -125,13 +125,13 @@ def _certified_status(solution: Solution, scene: Scene) -> Status:
 
 
 def parts(subject: Subject) -> list[Part]:
-    """Parts of a design's page, in order; none that has nothing to say, of a family none of one machine."""
+    """Parts of a design's page, in order, without empty ones; a family has no parts of one machine."""
     made = [make for make in PARTS if make not in ONE_MACHINE] if subject.evaluated.members else PARTS
     return [part for make in made for part in make(subject)]
 
 
 def members(family: Subject) -> list[tuple[str, Status, list[Part]]]:
-    """Heading, the status and the parts of each member of a family: what the whole cannot show."""
+    """Heading, status and parts of the members of a family, which the whole family does not have."""
     whole, chapters = status(family), list[tuple[str, Status, list[Part]]]()
     for place, member in enumerate(family.evaluated.members, 1):
         assert member.scene is not None

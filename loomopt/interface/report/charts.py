@@ -19,7 +19,7 @@ BAR, ROW, LETTER = 9, 14, 5.8
 
 
 def blocks(charts: Charts) -> list[Markup]:
-    """Charts side by side, above them what they have in common; nothing of none."""
+    """Charts side by side, with their common legend above; empty without charts."""
     drawn = "".join(map(figure, charts.charts))
     marks = [(mark.kind, f"{mark.name} {mark.where}") for mark in charts.marks if mark.name]
     key = _key([*dict.fromkeys(marks), *(charts.key or ())])

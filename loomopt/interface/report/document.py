@@ -28,7 +28,7 @@ class Reported(Protocol):
 
 
 class Judged(Protocol):
-    """A design in its scene; target: whose limits it was judged by; sought: what it answers."""
+    """Design in its scene; target: target of the limits; sought: objectives."""
 
     @property
     def result(self) -> Evaluated:

@@ -1,4 +1,4 @@
-"""The mechanism as it moves: one SVG, today's machine ghosted behind, its positions as data for the script."""
+"""Moving mechanism: an SVG with today's machine faint behind it, and its positions as data for the script."""
 
 import json
 import math

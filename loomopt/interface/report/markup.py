@@ -26,14 +26,14 @@ Block = str | TextTable | Markup
 
 @dataclass(frozen=True)
 class Part:
-    """One part of a page: its title, and what stands below it."""
+    """Part of a page: title and contents."""
 
     title: str
     blocks: tuple[Block, ...]
 
 
 def text(string: str) -> str:
-    """Text escaped, with places in long names where a line may break, and none in what is joined."""
+    """Escaped text with possible line breaks in long names, and none in joined words."""
     return escape(restore_spaces(string.replace(JOINED, "\u00a0"))).replace("_", "_<wbr>")
 
 

@@ -1,4 +1,4 @@
-"""The page itself: one file that asks for nothing beside it; its style and its script stand in it."""
+"""Page as a single file that contains its style and its script."""
 
 import functools
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from loomopt.interface.report.markup import Part, part, text
 
 @dataclass(frozen=True)
 class Chapter:
-    """One answer or study of a page: its heading, what it truly is, its parts; source: where it comes from."""
+    """Answer or study of a page: heading, status, parts; source: its origin."""
 
     heading: str
     title: str
@@ -24,7 +24,7 @@ class Chapter:
 
 
 def page(chapters: Sequence[Chapter]) -> str:
-    """A page of chapters; the status of each stands before all else."""
+    """Page of chapters, which begin with their status."""
     title = "; ".join(f"{chapter.status.verdict}: {chapter.heading}" for chapter in chapters)
     toc = _contents(chapters) if len(chapters) > 1 else ""
     body = "".join(_chapter(place, chapter) for place, chapter in enumerate(chapters, 1))

@@ -1,4 +1,4 @@
-"""The parts of a page on a study: what came of its points first, then charts, the designs along it, the table."""
+"""Parts of a page on a study: results of its points first, then charts, designs along it, table."""
 
 from collections import Counter
 from collections.abc import Sequence

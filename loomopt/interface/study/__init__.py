@@ -1,1 +1,1 @@
-"""Each study to work with: its result, its tables and its charts."""
+"""Results of studies, with their tables and charts."""

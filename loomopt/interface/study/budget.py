@@ -1,4 +1,4 @@
-"""The torque budget of a design to work with: its tables, its chart, and the motor that it takes."""
+"""Torque budget of a design: tables, chart, and the required motor."""
 
 import math
 from typing import TYPE_CHECKING
@@ -55,7 +55,7 @@ class Budget(StudyResult[BudgetResult]):
         return [first, shares, TextTable("Motor", ("", ""), motor), *(f"Remark: {text}." for text in result.remarks)]
 
     def charts(self) -> Charts:
-        """Each effect's share over the turn, and their sum."""
+        """Shares of the effects over the turn, and their sum."""
         scene, record = self.result.scene, self.result.torque
         unit, shown = scene.shown_in("torque"), scene.shown_in("angle")
         size, angle = factor(unit), factor(shown)
@@ -86,7 +86,7 @@ class Budget(StudyResult[BudgetResult]):
 
 
 def compute(scene: Scene, design: Design, fluctuation: float | None = None) -> Budget:
-    """Torque budget of a design, checked (SI; what it does not name is today's). Raises BadInput."""
+    """Torque budget of a checked design (SI; numbers that it does not name are today's). Raises BadInput."""
     return Budget(budget.compute(scene, design, fluctuation))
 
 

@@ -42,7 +42,7 @@ class Named(NamedTuple):
 
 
 class ComparedRow(NamedTuple):
-    """One number of all designs, in one unit; None where a design has none; differs: whether they are not all one.
+    """Number of all designs, in one unit; None where a design does not have it; differs: whether the values differ.
 
     limits: as of each design: whether it holds; None where there is none.
     """
@@ -68,7 +68,7 @@ class Comparison(Presentation):
 
     @functools.cached_property
     def rows(self) -> tuple[ComparedRow, ...]:
-        """Dimensions, then figures, then limits on what is neither."""
+        """Dimensions, then figures, then limits of other quantities."""
         formatter = UnitFormatter(self.scene)
         parts = (
             [design.evaluation.design for design in self.designs],

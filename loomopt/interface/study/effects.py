@@ -42,7 +42,7 @@ class EffectsStudy(StudyResult[EffectsResult]):
         return frame(_columns(result, result.rows, si=arguments.flag(si, "si")), attrs, "without")
 
     def tables(self, *, timed: bool = True) -> list[str | TextTable]:
-        """A line per effect, what may be left out, and what was not measured; timed: with the time of each solve."""
+        """Table of effects, those that may be left out, and those not measured; timed: with the times of the solves."""
         result, reference = self.result, self.result.reference
         values = ", ".join(f"{name} {_reference_value(result, name)}" for name in reference.scales)
         first = f"{result.scene.name}, {result.target}, with {list_text(reference.effects) or 'no effect'} on: "

@@ -1,4 +1,4 @@
-"""A front or a sweep to work with: its rows as a table, its charts, and the whole answer of any row."""
+"""Front or sweep: its rows as a table, its charts, and the whole answer of any row."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -90,7 +90,7 @@ class StudyTable(Presentation):
         return study.letter_designs(self.study, self.findings, self.charts())
 
     def report(self, path: str | os.PathLike[str], *results: object) -> Path:
-        """Write one self-contained page, which says first how many points are certified; return the file.
+        """Write a self-contained page that begins with the number of certified points; return the file.
 
         path: one that ends in .html. results: as in an answer's `report`. Raises BadInput.
         """

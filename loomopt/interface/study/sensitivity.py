@@ -81,7 +81,7 @@ def effect(result: SensitivityResult, row: Row) -> float:
 
 
 def _under(unit: str) -> str:
-    """A unit that stands after a stroke."""
+    """Unit after a slash."""
     return f"({unit})" if "*" in unit or "/" in unit else unit
 
 

@@ -46,7 +46,7 @@ class ToleranceStudy(StudyResult[ToleranceResult]):
         return frame(_spreads(self.result, arguments.flag(si, "si")), attrs)
 
     def tables(self) -> list[str | TextTable]:
-        """Spreads, yields, worst cases, and what to tighten first."""
+        """Spreads, yields, worst cases, and the tolerances to tighten first."""
         result, plan = self.result, self.result.plan
         numbers = ", ".join(tolerance.number for tolerance in plan.tolerances.values())
         head = f"{plan.scene.name}, limits of {plan.target}: {result.samples} machines with tolerances of {numbers}"
@@ -211,7 +211,7 @@ DIGITS = 7
 
 
 def _outward(value: float, sign: float) -> str:
-    """The nearest number of so many digits that is no less, or no more, than a value."""
+    """Value rounded up, or down, to a number of digits."""
     if value == 0.0:
         return "0"
     step = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - DIGITS)

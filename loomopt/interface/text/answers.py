@@ -24,7 +24,7 @@ HEADINGS = {"infeasible": "relaxed", "failed": "stopped"}
 
 
 def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
-    """Parts of a solved target: sentence, table, what binds, certificate, time."""
+    """Parts of a solved target: sentence, table, binding limits, certificate, time."""
     heading = HEADINGS.get(answer.status, "design")
     parts: list[str | TextTable] = [f"{answer.problem}, {answer.sought}: {answer.outcome}"]
     explanation = answer.explanation
@@ -68,7 +68,7 @@ def evaluation(evaluated: Evaluated, scene: Scene, before: Evaluated | None) -> 
 
 
 def comparison(evaluated: Evaluated, scene: Scene, before: Evaluated | None, heading: str) -> TextTable:
-    """Design and figures beside today's machine and the limits; what binds and what is reached is marked."""
+    """Table of design, figures, today's machine and limits; binding limits and reached goals are marked."""
     table = [
         row for row in rows(evaluated, scene, before) if not (evaluated.members and _of_member(row["name"], evaluated))
     ]
@@ -188,7 +188,7 @@ def binding(answer: Solution) -> str | TextTable:
 
 
 def certificate(answer: Solution) -> list[str]:
-    """Certificate in one line, and in a second one what chose among equally good designs."""
+    """Certificate in one line; a second line for the choice among equally good designs."""
     record = answer.certificate
     assert record is not None
     if not record.passed:
@@ -261,7 +261,7 @@ def proof_summary(proofs: "Proofs") -> list[str]:
 
 
 def proofs(proofs: "Proofs") -> list[str | TextTable]:
-    """Parts of a proof: a sentence, and what was shown of each limit."""
+    """Parts of a proof: a sentence, and the results by limit."""
     formatter, angle, lines = UnitFormatter(proofs.scene), proofs.scene.shown_in("angle"), []
     for proof in proofs.proofs:
         unit = formatter.unit(proof.name)

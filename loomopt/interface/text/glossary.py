@@ -25,7 +25,7 @@ from loomopt.solving.answer.solution import UnitFormatter
 
 
 class Printed(NamedTuple):
-    """One printed figure: what is computed from which inputs, in which unit; "reproduces" or else why it does not."""
+    """Printed figure of a source: computed value, inputs, unit; "reproduces", or the reason why it does not."""
 
     key: str
     item: str
@@ -73,7 +73,7 @@ DRAWN = "x"
 
 
 class Symbol(NamedTuple):
-    """A symbol, its unit ("1" without one) and what it is."""
+    """Symbol, unit ("1" without one) and description."""
 
     name: str
     unit: str
@@ -93,7 +93,7 @@ def symbols(scene: Scene) -> list[Symbol]:
 
 
 def _tables(scene: Scene) -> dict[str, list[Symbol]]:
-    """Symbols by what they are."""
+    """Symbols by their group."""
     schema, words = scene.schema, UnitFormatter(scene)
     return {
         "Operation": _numbers(scene, schema.operation),
@@ -109,7 +109,7 @@ def _tables(scene: Scene) -> dict[str, list[Symbol]]:
 
 
 def _figure(figure: Figure, scene: Scene, formatter: UnitFormatter) -> Iterator[Symbol]:
-    """Yield a figure and, with the speed known, what tables show of it in time."""
+    """Yield a figure and, with a known speed, its derivatives with respect to time in tables."""
     yield Symbol(figure.name, formatter.unit(figure.name), figure.text)
     if figure.kind in PER_SECOND and "speed" in scene.operation:
         yield Symbol(f"{figure.name}_t", scene.shown_in(PER_SECOND[figure.kind][0]), f"{figure.text}, in time")
@@ -176,7 +176,7 @@ def _derivative(name: str) -> str:
 
 
 def sketch_design(scene: Scene) -> dict[str, float]:
-    """Design, SI, that a sketch shows: today's, and what is 0 today in the middle of its bounds."""
+    """Design, SI, of a sketch: today's, with numbers that are 0 today in the middle of their bounds."""
     bounds = {name: bound for name, bound in scene.bounds.items() if scene.mechanism.get(name) == 0.0}
     return {name: (bound.min + bound.max) / 2 for name, bound in bounds.items() if bound.max < math.inf}
 
@@ -192,7 +192,7 @@ def labels(scene: Scene) -> frozenset[str]:
 
 
 def source_tables(scene: Scene) -> list[str | TextTable]:
-    """Tables of `loomopt show --sources`: what is printed, what is computed, the verdict and why.
+    """Tables of `loomopt show --sources`: printed value, computed value, verdict and reason.
 
     Of a scene that is not packaged, whose machine no source prints, it is what the scene itself says.
     """

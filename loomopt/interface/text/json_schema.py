@@ -235,7 +235,7 @@ def _quantity(quantity: Quantity) -> Json:
 
 
 def _model(model: type[Table], summary: str = "") -> Json:
-    """A table by its model; summary: what it is, in the words of its job."""
+    """Schema of a table by its model; summary: description from its job."""
     table = _without_null(model.model_json_schema())
     return table | ({"description": summary} if summary else {})
 
@@ -252,7 +252,7 @@ def _map_values(part: Json, change: Callable[[Json], Json]) -> Json:
 
 
 def _without_null(part: Json) -> Json:
-    """A part of a schema without null, which no scene can say: a key is there or it is not."""
+    """Part of a schema without null, which TOML does not have."""
     reduced = _map_values(
         {key: value for key, value in part.items() if key != "default" or value is not None}, _without_null
     )
@@ -263,7 +263,7 @@ def _without_null(part: Json) -> Json:
 
 
 def _hoist_quantities(whole: Json) -> Json:
-    """A schema in which each kind of quantity stands once, under $defs; a place keeps its own description.
+    """Schema with a single definition of each kind of quantity, in $defs; the keys have their descriptions.
 
     Defaults are SI numbers inside, where a scene has text with a unit: they are not told.
     """

@@ -1,4 +1,4 @@
-"""Text for terminals and pipes: paragraphs and tables. Nothing is wrapped in a pipe, by Rich what a terminal needs."""
+"""Text for terminals and pipes: paragraphs and tables. Rich wraps lines for a terminal; in a pipe none is wrapped."""
 
 import itertools
 import os
@@ -108,7 +108,7 @@ def _with_units(grid: TextTable, shown: Collection[int]) -> list[int]:
 
 
 def _least(grid: TextTable, columns: int) -> list[int]:
-    """How wide each column is at least: of what may be wrapped its longest word, else its longest line.
+    """Least width of the columns: the longest word if it may be wrapped, else the longest line.
 
     The first column is wrapped only where not all columns fit otherwise.
     """
@@ -121,7 +121,7 @@ def _least(grid: TextTable, columns: int) -> list[int]:
 
 
 def _unbroken(word: str) -> int:
-    """How many characters of a word stay on one line: all but of an address, or of what is as long as one."""
+    """Number of characters of a word on one line: all, except for addresses and words as long as one."""
     return len(word) if JOINED in word else min(len(word), LONGEST_WORD)
 
 

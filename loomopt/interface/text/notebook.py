@@ -54,7 +54,7 @@ def sketch(scene: Scene, design: Design, subject: outputs.DrawnSubject | None = 
 
 
 def html(thing: object) -> str:
-    """A scene, a design's evaluation, an answer or proofs as HTML: what the terminal shows, and the mechanism.
+    """HTML of a scene, an evaluation, an answer or proofs: the text of the terminal, and the mechanism.
 
     The mechanism is drawn where the scene gives what a drawing needs. Raises TypeError for anything else.
     """
@@ -73,7 +73,7 @@ def html(thing: object) -> str:
 
 
 def _draw(scene: Scene, design: Design, subject: outputs.DrawnSubject | None = None) -> str:
-    """Mechanism as SVG where the scene gives what a drawing needs, else ""."""
+    """Mechanism as SVG, or "" if the scene lacks numbers for a drawing."""
     return "" if registry.of(scene).views.missing(scene) else sketch(scene, design, subject)._repr_svg_()
 
 

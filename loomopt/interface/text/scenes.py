@@ -91,7 +91,7 @@ def list_text(values: str | Sequence[float]) -> str:
 
 
 def _values(scene: Scene) -> Iterator[tuple[str, str, float | str | Sequence[float]]]:
-    """Yield the dotted key of each number, word and list, what a designer calls it, and its SI value."""
+    """Yield dotted key, designer's name and SI value of each number, word and list."""
     for table in ("operation", "mechanism"):
         for name, value in given(scene.tables[table]).items():
             if isinstance(value, tuple) and value and isinstance(value[0], Table):

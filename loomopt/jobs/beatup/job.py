@@ -54,7 +54,7 @@ class Beatup(Job):
         return model(scene, self.numbers(scene), design)
 
     def demand(self, scene: Scene, target: str) -> None:
-        """Raise BadInput where a target speaks of what the scene does not have."""
+        """Raise BadInput if a target needs a number that the scene does not have."""
         if not any(isinstance(effect, Load) and effect.acts == "output" for effect in scene.active):
             raise BadInput(
                 f"target {target} needs a reed torque, and no effect in the scene makes one",

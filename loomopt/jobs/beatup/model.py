@@ -28,7 +28,7 @@ LENGTHS = ("l1", "l2", "l3", "l4")
 
 @dataclass(frozen=True)
 class ReedMotion(Motion):
-    """The pose at crank angles φ, rad, any shape: q = −ψ; what no load reads is not computed."""
+    """Pose at crank angles φ, rad, any shape: q = −ψ; only quantities that loads read are computed."""
 
     phi: Number
     omega: Number

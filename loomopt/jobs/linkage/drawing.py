@@ -117,7 +117,7 @@ def motion(sampler: Sampler, angles: Floats) -> MechanismMotion:
 
 
 def forces(sampler: Sampler) -> list[ForceArrow]:
-    """Forces that a design tells in its joints: just before its first event, and at their peaks."""
+    """Joint forces of a design: just before its first event, and at their peaks."""
     linked = linkage_of(sampler.model).chain
     pins = {part.name: part.word("pin") for part in linked.parts}
     places = {

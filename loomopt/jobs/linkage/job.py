@@ -127,7 +127,7 @@ class LinkageJob(Job):
         )
 
     def demand(self, scene: Scene, target: str) -> None:
-        """Raise BadInput where a target speaks of what the scene does not have."""
+        """Raise BadInput if a target needs a number that the scene does not have."""
         base.demand(scene, target)
         self.task(scene, target).demand_figures()
 

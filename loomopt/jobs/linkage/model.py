@@ -972,7 +972,7 @@ class Rms(NamedTuple):
         return f"{self.quantity}_square"
 
     def integral(self) -> Integral:
-        """Its mean square over the cycle."""
+        """Mean square over the cycle."""
         return Integral(self.mean, self.name, self.square, self.where, parts=SMOOTH)
 
 

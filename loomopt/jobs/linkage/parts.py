@@ -34,7 +34,7 @@ _MULTIPLE = re.compile(rf"(-?)\s*(?:({_FACTOR})\s*\*\s*)?([^\W\d_]\w*)(?:\s*/\s*
 
 
 class NumberKey(NamedTuple):
-    """A number of a table; kind: what it may be; needed: always.
+    """Number of a table; kind: kind of quantity; needed: whether it is required.
 
     text: what it is in words, {} for the table's name, {key} for another word of the table.
     """
@@ -131,7 +131,7 @@ NAME_ALLOWED = f"up to {LONGEST_NAME} letters, digits and _, a letter first"
 
 
 def check_name(cursor: Cursor, name: str, taken: Mapping[str, str] | None = None) -> None:
-    """Raise BadInput for what can be no name; taken: names that mean something else, with what they mean."""
+    """Raise BadInput for an invalid name; taken: reserved names, with their meanings."""
     if not _NAME.fullmatch(name) or len(name) > LONGEST_NAME:
         raise cursor.fault("it is not a name", name, NAME_ALLOWED, "Give it another name")
     if taken and name in taken:
@@ -139,7 +139,7 @@ def check_name(cursor: Cursor, name: str, taken: Mapping[str, str] | None = None
 
 
 class Numbers:
-    """Numbers of [mechanism] by name, and what they are used as, in the order of their first use."""
+    """Numbers of [mechanism] by name, with their uses, in the order of their first use."""
 
     def __init__(self, names: Mapping[str, object]) -> None:
         self.names = names
@@ -399,7 +399,7 @@ def entries(cursor: Cursor, known: Keys, numbers: Numbers, of: str = "", name: s
 
 
 def _part(name: str, cursor: Cursor, numbers: Numbers) -> Part | None:
-    """One part; None where its mistakes leave none."""
+    """Part; None if mistakes prevent it."""
     faults = cursor.faults
     before = len(faults.mistakes)
     with faults:

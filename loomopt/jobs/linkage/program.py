@@ -105,7 +105,7 @@ class LinkageTask(Task):
         return {self.scene.full(name): weight for name, weight in given.items()}
 
     def parameters(self) -> dict[str, float]:
-        """Every known number that is no variable, and what the change from today reads."""
+        """Known numbers that are not variables, and those of the change from today."""
         values = super().parameters()
         if self.changes:
             values |= change.parameters(self.changing, self.known, self.limited, self.weights)
@@ -216,7 +216,7 @@ class LinkageTask(Task):
         return *(self.level(name, sense) for name, sense in self.levels), *self.least()
 
     def higher_levels(self) -> tuple[Objective, ...]:
-        """Levels before the first that is traded: what the target demands before it weighs anything."""
+        """Levels of the target before the first one on the front."""
         before = itertools.takewhile(lambda level: level[0] not in self.traded, self.levels[:-1])
         return tuple(self.level(name, sense) for name, sense in before)
 

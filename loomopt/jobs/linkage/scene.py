@@ -555,7 +555,7 @@ def read_path(scene: Scene, name: str) -> csv_tables.Table:
 
 
 def _check_path(scene: Scene, known: LinkageScene, name: str, table: LinkageTarget) -> None:
-    """Raise BadInput for a path without its point or its table; the table is read by what needs it."""
+    """Raise BadInput for a path without its point or its table; the table is read later."""
     key = f"targets.{name}"
     if table.point is None:
         if table.table is not None:
@@ -687,7 +687,7 @@ def _check_sense(effect: kinds.Effect, values: Mapping[str, Any], path: str, ori
 
 
 def _check_targets(scene: Scene, known: LinkageScene) -> None:
-    """Raise BadInput for what a target seeks and the scene does not have, or has no such end of."""
+    """Raise BadInput for objectives that the scene does not have, or that cannot be minimised or maximised."""
     faults, axes_ = Faults(), scene.schema.axes
     bounded = [name for name, bound in scene.bounds.items() if bound.min < bound.max]
     for name, table in scene.targets.items():

@@ -41,7 +41,7 @@ LITERAL, FINEST = 1e-14, 720
 
 @dataclass
 class _SymbolicParts:
-    """Parts as symbols: what they close by, in order.
+    """Loop equations of the parts as symbols, in order.
 
     pose: joints and links whose angles are symbols; taken: names of numbers; angles: those that move, by name.
     """
@@ -80,7 +80,7 @@ class _SymbolicParts:
 
 
 def symbolic(linked: Chain, taken: Collection[str] = ()) -> _SymbolicParts:
-    """Parts as symbols, and what they close by; taken: names of numbers, which no angle has."""
+    """Parts as symbols, and their loop equations; taken: names of numbers, which angles must not have."""
     exact = replace(systems.sympy(), number=_exact)
     written = _SymbolicParts(chain.ChainPose(exact, Symbols(), symbol("phi")), taken)
     for part in linked.parts:
@@ -314,7 +314,7 @@ class LinkageViews(JobViews):
             yield f"{place.name} is where {linkage.corner_words(standing)}: the output rests from {begin} to {end}"
 
     def _moved(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Remark on a design that turns more or less often than today's: its events may be others."""
+        """Remark on a design with more or fewer reversals than today's: its events may differ."""
         job = registry.of(scene)
         here, today = job.sampler(scene, design), job.sampler(scene, {})
         linkage = linkage_of(here.model)

@@ -67,7 +67,7 @@ class Rapier(Job):
         return model(scene)
 
     def demand(self, scene: Scene, target: str) -> None:
-        """Raise BadInput where a target speaks of what the scene does not have."""
+        """Raise BadInput if a target needs a number that the scene does not have."""
         base.demand(scene, target)
         if target == "match":
             match_table(scene)

@@ -55,7 +55,7 @@ PRIMES = ("s", "s'", "s''")
 
 @dataclass(frozen=True)
 class Unwritten:
-    """A cam law of which nothing is known but its name: s(u) and its derivatives are symbols."""
+    """Cam law with only a name: s(u) and its derivatives are symbols."""
 
     law: CamLaw
 
@@ -84,7 +84,7 @@ class Unwritten:
 
 
 def law(cam_law: CamLaw) -> list[Equation]:
-    """S(u) and its first two derivatives as the law has them: by pieces of u, or what it is made of."""
+    """S(u) and its first two derivatives: by pieces of u, or by the data of the law."""
     if isinstance(cam_law, Spline):
         return _spline(cam_law)
     if isinstance(cam_law, Tabulated):
