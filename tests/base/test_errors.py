@@ -68,7 +68,7 @@ def test_a_scene_of_any_names_is_answered_shortly():
         assert len(str(refused.value)) <= LONGEST_MESSAGE
 
 
-def brought(monkeypatch, body):
+def entry_point_function(monkeypatch, body):
     """Return a function of a module that an entry point names."""
     monkeypatch.setitem(BROUGHT, "windy.drag", "effect beatup.wind of loomopt-wind")
     module = {"__name__": "windy.formulas"}
@@ -78,7 +78,7 @@ def brought(monkeypatch, body):
 
 @pytest.mark.parametrize("body", ["raise SystemExit(0)", "return 1 / 0", "return given['k']", "return force(given)"])
 def test_code_of_another_distribution_that_fails_is_named(monkeypatch, body):
-    force = brought(monkeypatch, body)
+    force = entry_point_function(monkeypatch, body)
     message = r"effect beatup\.wind of loomopt-wind fails in force, line 2 of windy"
     with pytest.raises(Broken, match=message) as caught, naming():
         force({})
@@ -88,7 +88,7 @@ def test_code_of_another_distribution_that_fails_is_named(monkeypatch, body):
 
 def test_what_is_told_or_stopped_already_stays_as_it_is(monkeypatch):
     for name in ("BadInput", "KeyboardInterrupt"):
-        force = brought(monkeypatch, f"raise given['{name}']")
+        force = entry_point_function(monkeypatch, f"raise given['{name}']")
         error = {"BadInput": BadInput("ask"), "KeyboardInterrupt": KeyboardInterrupt()}[name]
         with pytest.raises(type(error)) as caught, naming():
             force({name: error})
@@ -96,7 +96,7 @@ def test_what_is_told_or_stopped_already_stays_as_it_is(monkeypatch):
 
 
 def test_an_error_elsewhere_keeps_its_kind_and_says_once_who_takes_part(monkeypatch):
-    force = brought(monkeypatch, "return None")
+    force = entry_point_function(monkeypatch, "return None")
     for _ in range(2):
         with pytest.raises(TypeError) as caught, naming(), naming():
             len(force({}))

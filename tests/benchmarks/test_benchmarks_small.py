@@ -17,7 +17,7 @@ TOP = Path(__file__).parents[2]
 
 
 @functools.cache
-def said(script):
+def run_benchmark(script):
     """Return what a benchmark says in its small size, run once."""
     command = [sys.executable, "-m", f"benchmarks.{script}", "--quick", "--json"]
     done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, timeout=300)
@@ -26,12 +26,12 @@ def said(script):
 
 
 def rows(script):
-    return {row["method"]: row for row in said(script)["rows"]}
+    return {row["method"]: row for row in run_benchmark(script)["rows"]}
 
 
 def median(script, ratio):
     """Return the median of a ratio over the turns of one run; they tell their spread too."""
-    result = said(script)[ratio]
+    result = run_benchmark(script)[ratio]
     assert result["lowest"] <= result["median"] <= result["highest"]
     return result["median"]
 

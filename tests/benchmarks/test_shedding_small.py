@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mpmath import mp
 from scipy.integrate import solve_ivp
-from test_benchmarks_small import median, rows, said
+from test_benchmarks_small import median, rows, run_benchmark
 
 import loomopt as lo
 
@@ -255,7 +255,7 @@ def test_a_solve_takes_no_longer_than_slsqp_where_that_is_right():
 
 
 def test_loomopts_laws_need_the_springs_of_the_linear_programmes():
-    result = said(LAW)["rows"]
+    result = run_benchmark(LAW)["rows"]
     assert len(result) == 8
     for row in result:
         assert abs(row["off"]) < 1e-10, row
@@ -265,16 +265,15 @@ def test_loomopts_laws_need_the_springs_of_the_linear_programmes():
 
 def test_a_certified_law_takes_at_most_ten_times_ipopt_alone_on_an_nlp_written_for_it():
     """And is the same optimum, from 16 to 256 intervals."""
-    result = said(LAW)["beside_ipopt_alone"]
+    result = run_benchmark(LAW)["beside_ipopt_alone"]
     assert [row["intervals"] for row in result] == [16, 64, 256]
     assert max(abs(row["off IPOPT's"]) for row in result) < 1e-9
     assert max(row["ratio"]["median"] for row in result) <= 10.0
 
 
 def test_a_free_law_of_16_intervals_needs_a_quarter_less_spring_than_the_softest_fixed_one():
-    softer = {
-        row["scene"]: row["softer"] for row in said(LAW)["rows"] if (row["law"], row["intervals"]) == ("free", 16)
-    }
+    free = [row for row in run_benchmark(LAW)["rows"] if (row["law"], row["intervals"]) == ("free", 16)]
+    softer = {row["scene"]: row["softer"] for row in free}
     assert softer == {
         "shedding": pytest.approx(0.3138, abs=1e-4),
         "shedding-printed-travel": pytest.approx(0.2617, abs=1e-4),

@@ -19,7 +19,7 @@ FLOOR, OF_THE_LIBRARIES = "the same, with Typer and pydantic at work", 1.7
 
 
 @functools.cache
-def said():
+def run_benchmark():
     done = subprocess.run(
         [sys.executable, "-m", SCRIPT, "--quick", "--json"], cwd=TOP, capture_output=True, text=True, timeout=300
     )
@@ -28,11 +28,11 @@ def said():
 
 
 def ratio(command):
-    return next(row["beside the import"]["median"] for row in said()["rows"] if row["command"] == command)
+    return next(row["beside the import"]["median"] for row in run_benchmark()["rows"] if row["command"] == command)
 
 
 def test_a_whole_solve_makes_at_most_1_7_times_the_calls_that_its_libraries_make_at_work():
-    made = {row["command"]: row["calls"] for row in said()["calls"]}
+    made = {row["command"]: row["calls"] for row in run_benchmark()["calls"]}
     assert made[FLOOR] < made["loomopt evaluate beatup"] < made[SOLVE] <= OF_THE_LIBRARIES * made[FLOOR]
 
 

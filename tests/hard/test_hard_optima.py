@@ -24,7 +24,7 @@ def optimal(scene, target=None):
     return answer
 
 
-def judged(scene, design, target):
+def certificate_of(scene, design, target):
     job = registry.of(scene)
     program = job.program(scene, target)
     return certify(program, job.values(program, design), 1e-8)
@@ -119,7 +119,7 @@ def test_todays_machine_without_counterweight_is_no_stationary_point():
     scene = lo.load("beatup-heavy")
     best = optimal(scene)
     assert best.figures["peak_torque"] == pytest.approx(96.8757999181, rel=1e-10)
-    without = judged(scene, {**best.design, "m4e": 0.0, "r4e": 0.0}, "balance")
+    without = certificate_of(scene, {**best.design, "m4e": 0.0, "r4e": 0.0}, "balance")
     assert not without.passed
     assert any("can still fall" in reason for reason in without.reasons)
 

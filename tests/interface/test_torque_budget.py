@@ -14,7 +14,7 @@ from loomopt.interface.cli import app
 MORE = ["--with", "gravity", "--with", "bearing_friction", "--fluctuation", "0.02"]
 
 
-def told(capsys, *words):
+def run_budget(capsys, *words):
     """Return the exit status, stdout and stderr of the command."""
     status = app.run(["budget", *words])
     output = capsys.readouterr()
@@ -22,7 +22,7 @@ def told(capsys, *words):
 
 
 def test_json_has_the_shares_their_sum_and_the_motor(capsys):
-    status, out, err = told(capsys, "beatup", *MORE, "--json")
+    status, out, err = run_budget(capsys, "beatup", *MORE, "--json")
     data = json.loads(out)
     assert (status, err) == (0, "")
     assert data["problem"] == "beatup"
@@ -36,7 +36,7 @@ def test_json_has_the_shares_their_sum_and_the_motor(capsys):
 
 
 def test_what_is_not_known_is_null_with_its_reason(capsys):
-    data = json.loads(told(capsys, "beatup", "--json")[1])
+    data = json.loads(run_budget(capsys, "beatup", "--json")[1])
     assert data["motor"]["flywheel"] is None
     assert data["undefined"]["flywheel"] == "no fluctuation is given, such as 0.02"
     document = {**lo.load("shedding-static").without_effect("warp_tension").document}
@@ -48,7 +48,7 @@ def test_what_is_not_known_is_null_with_its_reason(capsys):
 
 
 def test_the_terminal_tells_them_in_the_scene_s_units(capsys):
-    status, out, _ = told(capsys, "beatup", *MORE, "--set", "display.torque=lbf*in")
+    status, out, _ = run_budget(capsys, "beatup", *MORE, "--set", "display.torque=lbf*in")
     assert status == 0
     assert "peak crank torque -832.466 lbf*in at 33.3003 deg" in out
     (line,) = [line.split() for line in out.splitlines() if line.startswith("bearing_friction")]
@@ -90,7 +90,7 @@ def test_the_figure_has_a_curve_for_each_share_and_no_text_runs_into_anything(tm
 
 def test_figures_are_written_from_the_command_line(tmp_path, capsys):
     path = tmp_path / "shares.png"
-    status, _, err = told(capsys, "shedding", "--figure", str(path))
+    status, _, err = run_budget(capsys, "shedding", "--figure", str(path))
     assert (status, err) == (0, f"Wrote {path}\n")
     assert path.read_bytes()[:4] == b"\x89PNG"
 
@@ -105,7 +105,7 @@ def test_figures_are_written_from_the_command_line(tmp_path, capsys):
     ],
 )
 def test_bad_input_is_one_line_and_nothing_is_printed(words, message, capsys):
-    status, out, err = told(capsys, *words)
+    status, out, err = run_budget(capsys, *words)
     assert (status, out) == (2, "")
     assert message in err
     assert len(err.splitlines()) == 1

@@ -23,7 +23,7 @@ BENT = {
 }
 
 
-def asked(function, accuracy, singular=()):
+def sparse_curve(function, accuracy, singular=()):
     """Return the rows and the claimed error of a curve without corners of its own."""
     seen = []
 
@@ -48,7 +48,7 @@ def top(function, exact):
 @pytest.mark.parametrize("name", SMOOTH)
 def test_the_top_is_as_close_as_asked_and_no_farther_than_claimed(name, accuracy):
     function, exact = SMOOTH[name]
-    angles, result, error = asked(function, accuracy)
+    angles, result, error = sparse_curve(function, accuracy)
     missed = 1 - result / top(function, exact)
     assert missed <= accuracy
     assert missed <= error + 1e-12
@@ -58,14 +58,14 @@ def test_the_top_is_as_close_as_asked_and_no_farther_than_claimed(name, accuracy
 @pytest.mark.parametrize("name", BENT)
 def test_corners_levels_and_nothing_end_too(name):
     function, exact = BENT[name]
-    angles, result, _ = asked(function, 1e-6)
+    angles, result, _ = sparse_curve(function, 1e-6)
     assert result == pytest.approx(top(function, exact), abs=1e-6)
     assert len(angles) < SPARSE_MOST_ROWS
 
 
 def test_more_accuracy_takes_more_rows_and_leaves_less():
     function, _ = SMOOTH["one wave"]
-    results = [asked(function, 10.0**-k) for k in (3, 6, 9)]
+    results = [sparse_curve(function, 10.0**-k) for k in (3, 6, 9)]
     rows, errors = [len(angles) for angles, _, _ in results], [error for *_, error in results]
     assert rows == sorted(rows)
     assert errors == sorted(errors, reverse=True)
@@ -73,5 +73,5 @@ def test_more_accuracy_takes_more_rows_and_leaves_less():
 
 def test_a_spike_beside_a_singular_position_is_found():
     place = 4.0
-    _, result, _ = asked(lambda phi: 1 / np.hypot(1, (phi - place) / 1e-6), 1e-6, (place,))
+    _, result, _ = sparse_curve(lambda phi: 1 / np.hypot(1, (phi - place) / 1e-6), 1e-6, (place,))
     assert result == pytest.approx(1.0, abs=1e-6)

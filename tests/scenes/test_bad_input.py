@@ -212,7 +212,7 @@ FILES = [
 ]
 
 
-def told(error, file, key, problem, remedy, given=None):
+def assert_message(error, file, key, problem, remedy, given=None):
     """Check one message, the worst of them: one printable line with all its parts."""
     message = str(error).split("\n")[0]
     assert message.isprintable(), message
@@ -250,7 +250,7 @@ def named(rows):
 @pytest.mark.parametrize(("change", "key", "problem", "remedy"), named(VALUES))
 def test_a_bad_value(change, key, problem, remedy):
     whole = "not a crank" in problem or "more than max" in problem
-    told(
+    assert_message(
         caught(scene, changed(*change)),
         "<dict>: ",
         key,
@@ -262,43 +262,45 @@ def test_a_bad_value(change, key, problem, remedy):
 
 @pytest.mark.parametrize(("change", "key", "problem", "remedy"), named(NAMES))
 def test_a_bad_name_or_gap(change, key, problem, remedy):
-    told(caught(scene, changed(*change)), "<dict>: ", key, problem, remedy)
+    assert_message(caught(scene, changed(*change)), "<dict>: ", key, problem, remedy)
 
 
 @pytest.mark.parametrize(("method", "arguments", "key", "problem", "remedy"), CHANGES)
 def test_a_bad_change(method, arguments, key, problem, remedy):
-    told(caught(getattr(BEATUP, method), *arguments), "beatup.toml: ", key, problem, remedy)
+    assert_message(caught(getattr(BEATUP, method), *arguments), "beatup.toml: ", key, problem, remedy)
 
 
 @pytest.mark.parametrize(("content", "problem", "remedy"), FILES, ids=[row[1] + str(n) for n, row in enumerate(FILES)])
 def test_a_bad_file(tmp_path, content, problem, remedy):
     path = tmp_path / "scene.toml"
     path.write_bytes(content)
-    told(caught(load, path), f"{path}: ", "", problem, remedy)
+    assert_message(caught(load, path), f"{path}: ", "", problem, remedy)
 
 
 def test_files_that_are_none(tmp_path):
-    told(caught(load, tmp_path), str(tmp_path), "", "folder", "file in it")
-    told(caught(load, tmp_path / "none.toml"), str(tmp_path), "", "does not exist", "loomopt list")
-    told(caught(load, "a\x00b.toml"), "a\\x00b.toml", "", "", "path")
-    told(caught(load, "x" * 5000 + ".toml"), "xxx", "", "cannot be read", "path")
-    told(caught(load, "/dev/zero"), "/dev/zero", "", "not an ordinary file", "Name a file")
+    assert_message(caught(load, tmp_path), str(tmp_path), "", "folder", "file in it")
+    assert_message(caught(load, tmp_path / "none.toml"), str(tmp_path), "", "does not exist", "loomopt list")
+    assert_message(caught(load, "a\x00b.toml"), "a\\x00b.toml", "", "", "path")
+    assert_message(caught(load, "x" * 5000 + ".toml"), "xxx", "", "cannot be read", "path")
+    assert_message(caught(load, "/dev/zero"), "/dev/zero", "", "not an ordinary file", "Name a file")
     os.mkfifo(tmp_path / "pipe.toml")
-    told(caught(load, tmp_path / "pipe.toml"), str(tmp_path), "", "not an ordinary file", "Name a file")
+    assert_message(caught(load, tmp_path / "pipe.toml"), str(tmp_path), "", "not an ordinary file", "Name a file")
     big = tmp_path / "big.toml"
     with big.open("wb") as file:
         file.truncate(100_000_000)
-    told(caught(load, big), str(big), "", "too large", "the file you mean")
+    assert_message(caught(load, big), str(big), "", "too large", "the file you mean")
 
 
 def test_an_unknown_packaged_name_tells_the_nearest():
-    told(caught(load, "beatup-lite"), "beatup-lite", "", "no packaged scene", '"beatup-light"', '"beatup-lite"')
-    told(caught(load, ""), "", "", "no packaged scene", "beatup, beatup-heavy")
-    told(caught(load, "x\x1b[2J"), "x\\x1b[2J", "", "no packaged scene", ".toml")
-    told(caught(scene, nested(50)), "<dict>", "a.a.a...", "nested too deep", "loomopt new")
+    assert_message(
+        caught(load, "beatup-lite"), "beatup-lite", "", "no packaged scene", '"beatup-light"', '"beatup-lite"'
+    )
+    assert_message(caught(load, ""), "", "", "no packaged scene", "beatup, beatup-heavy")
+    assert_message(caught(load, "x\x1b[2J"), "x\\x1b[2J", "", "no packaged scene", ".toml")
+    assert_message(caught(scene, nested(50)), "<dict>", "a.a.a...", "nested too deep", "loomopt new")
     itself: dict[str, object] = {}
     itself["again"] = itself
-    told(caught(scene, itself), "<dict>", "again", "nested too deep", "loomopt new")
+    assert_message(caught(scene, itself), "<dict>", "again", "nested too deep", "loomopt new")
 
 
 DOTTED = '# see a, 1.2.3.4.5.6.7.8.9.10.11.12.13.14.15\nsource = "1.2.3.4.5.6.7.8.9.10.11.12.13.14.15.16.17.18.19"'
@@ -312,7 +314,9 @@ def test_dots_that_part_no_key_are_read(tmp_path):
 
 @pytest.mark.parametrize("key", ["a." * 50_000 + "a", "effects." + "a." * 50_000 + "a", "bounds.l1." + "a." * 9 + "a"])
 def test_a_key_of_many_parts_is_told(key):
-    told(caught(BEATUP.set, key, "1 mm"), "beatup.toml", "", f"the key has {key.count('.') + 1} parts", "operation.M0")
+    assert_message(
+        caught(BEATUP.set, key, "1 mm"), "beatup.toml", "", f"the key has {key.count('.') + 1} parts", "operation.M0"
+    )
     for change in (BEATUP.with_effect, BEATUP.without_effect):
         assert "unknown effect" in caught(change, key).problem
 
@@ -446,8 +450,8 @@ def test_a_file_that_is_not_there_is_told_the_near_one(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my-bu.toml").write_text(TEXT)
     (tmp_path / "first-answer.json").write_text("{}")
-    told(caught(load, "my_bu.toml"), "my_bu.toml", "", "does not exist", '"my-bu.toml"')
-    told(caught(load, "My-bu"), "My-bu", "", "no packaged scene", '"my-bu.toml"')
+    assert_message(caught(load, "my_bu.toml"), "my_bu.toml", "", "does not exist", '"my-bu.toml"')
+    assert_message(caught(load, "My-bu"), "My-bu", "", "no packaged scene", '"my-bu.toml"')
     assert "first-answer.json" in caught(designs.loaded, tmp_path / "first_answer.json").remedy
     assert "my-bu" not in caught(load, "press.toml").remedy
     wish = (packaged.problems()["rapier"].parent / "rapier-wish.csv").read_text()

@@ -101,7 +101,7 @@ def changed(table, path, value):
     return result
 
 
-def told(text):
+def assert_lines(text):
     """Check that each mistake is one plain line that names a key, and that no line comes twice."""
     lines = text.split("\n")
     assert all(line.isprintable() and len(line) < 2100 for line in lines)
@@ -114,7 +114,7 @@ def read_or_refused(raw):
     try:
         lo.scene(raw)
     except BadInput as error:
-        told(str(error))
+        assert_lines(str(error))
         return False
     return True
 

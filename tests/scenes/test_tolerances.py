@@ -11,13 +11,13 @@ from loomopt.scenes.tolerance_classes import plus_minus
 BEATUP = registry.load("beatup")
 
 
-def made(**given):
+def read_tolerances(**given):
     scene = BEATUP.update({"tolerances": given})
     return {e.number: e for e in tolerances.read(cursor(scene).at("tolerances"), scene.schema, places(scene))}
 
 
 def test_half_widths_and_standard_deviations():
-    result = made(
+    result = read_tolerances(
         l1={"plus_minus": "0.06 mm", "sigmas": 2},
         l2="0.06 mm",
         l3={"plus_minus": "0.06 mm", "spread": "uniform"},
@@ -45,13 +45,13 @@ def test_half_widths_and_standard_deviations():
 )
 def test_classes_go_by_the_nominal(name, nominal, half):
     assert plus_minus(name, nominal) == pytest.approx(half, rel=1e-12)
-    assert made(l1={"class": name})["l1"].plus_minus(nominal) == pytest.approx(half, rel=1e-12)
+    assert read_tolerances(l1={"class": name})["l1"].plus_minus(nominal) == pytest.approx(half, rel=1e-12)
 
 
 @pytest.mark.parametrize(("name", "nominal"), [("IT7", 4.0), ("ISO 2768-f", 2.5), ("ISO 2768-v", 0.002)])
 def test_a_class_that_says_nothing_of_a_size_is_refused(name, nominal):
     with pytest.raises(BadInput, match="does not cover"):
-        made(l1={"class": name})["l1"].plus_minus(nominal)
+        read_tolerances(l1={"class": name})["l1"].plus_minus(nominal)
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_that_of_an_effect_that_is_off_waits_for_it():
 
 
 def test_a_band_that_is_not_even_has_its_middle_and_half_width():
-    result = made(
+    result = read_tolerances(
         l1={"plus": "0", "minus": "0.05 mm"},
         l2={"plus": "-0.02 mm", "minus": "0.06 mm", "spread": "uniform"},
         l3={"plus": "1 %", "minus": 0},
@@ -125,10 +125,10 @@ N8 25 -36 -3 | M6 300 -41 -9 | N6 300 -57 -25 | h9 100 -87 0 | H7 500 0 63 | JS7
 @pytest.mark.parametrize("row", FITS.replace("\n", "|").strip("|").split("|"))
 def test_fits_have_the_printed_limits(row):
     name, size, low, high = row.split()
-    result = made(l1={"fit": name})["l1"].band(float(size) / 1000)
+    result = read_tolerances(l1={"fit": name})["l1"].band(float(size) / 1000)
     assert result == pytest.approx((float(low) * 1e-6, float(high) * 1e-6), abs=1e-15)
 
 
 def test_a_fit_says_nothing_beyond_500_mm():
     with pytest.raises(BadInput, match="does not cover 600 mm"):
-        made(l1={"fit": "H7"})["l1"].band(0.6)
+        read_tolerances(l1={"fit": "H7"})["l1"].band(0.6)

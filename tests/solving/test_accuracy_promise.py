@@ -97,7 +97,7 @@ def errors(answer, truth):
     return {name: abs(figures[name] - value) / size(truth, name) for name, value in truth.items() if value is not None}
 
 
-def kept(answer, accuracy, truth):
+def assert_accurate(answer, accuracy, truth):
     """Assert that the answer is certified, tells its accuracy, and keeps it against the true figures."""
     assert answer.status == "optimal", answer.message
     assert answer.solver["accuracy"] == accuracy
@@ -114,7 +114,7 @@ def kept(answer, accuracy, truth):
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 @pytest.mark.parametrize("name", JOBS)
 def test_every_figure_of_an_optimum_is_as_accurate_as_asked(name, accuracy):
-    kept(solved(name, accuracy), accuracy, solved(name, BEST).figures)
+    assert_accurate(solved(name, accuracy), accuracy, solved(name, BEST).figures)
 
 
 FLAT = {("match", 1e-10)}
@@ -126,7 +126,7 @@ FLAT = {("match", 1e-10)}
 )
 @pytest.mark.few(4)
 def test_the_promise_holds_for_other_machines_and_targets(name, accuracy):
-    kept(solved(name, accuracy), accuracy, solved(name, BEST).figures)
+    assert_accurate(solved(name, accuracy), accuracy, solved(name, BEST).figures)
 
 
 @pytest.mark.few(8)

@@ -42,7 +42,7 @@ def price(answer, name):
     return worth
 
 
-def told(result, name):
+def limit_of(result, name):
     (limit,) = (item for item in result.limits if item.name == name)
     return limit
 
@@ -54,7 +54,7 @@ def test_a_limit_on_both_dwells_gives_the_known_drives(short, degrees, peak):
     assert answer.status == "optimal"
     assert answer.figures["peak_acceleration"] == pytest.approx(peak, rel=2e-9)
     assert answer.figures["dwell"] == pytest.approx(degrees * DEGREE, rel=1e-9)
-    limit = told(answer, "dwell")
+    limit = limit_of(answer, "dwell")
     assert (limit.min, limit.max, limit.ok) == (pytest.approx(degrees * DEGREE), None, True)
 
 
@@ -159,11 +159,11 @@ def test_today_is_judged_by_what_its_figures_are(rapier, cam):
     evaluation = lo.evaluate(
         rapier.update({"limits.dwell_before.min": "36.8 deg", "limits.stroke.min": "849 mm"}), target="match"
     )
-    before = told(evaluation, "dwell_before")
+    before = limit_of(evaluation, "dwell_before")
     assert (before.value, before.ok) == (evaluation.figures["dwell_before"], False)
     assert before.value / DEGREE == pytest.approx(36.64, abs=5e-3), "as the paper's drive dwells"
-    assert told(evaluation, "stroke").ok
-    slow = told(lo.evaluate(cam.set("limits.contact_speed.min", "150 rpm")), "contact_speed")
+    assert limit_of(evaluation, "stroke").ok
+    slow = limit_of(lo.evaluate(cam.set("limits.contact_speed.min", "150 rpm")), "contact_speed")
     assert (slow.value / RPM, slow.ok) == (pytest.approx(144.508702549), False)
 
 
@@ -216,7 +216,7 @@ def test_contact_up_to_its_own_speed_or_less_costs_nothing(cam, speed):
     assert answer.status == "optimal"
     assert answer.figures["K1"] == pytest.approx(STIFFNESS[600], rel=1e-11)
     assert "contact_speed" not in {item.limit for item in answer.binding}
-    assert told(answer, "contact_speed").ok
+    assert limit_of(answer, "contact_speed").ok
 
 
 def test_contact_up_to_a_speed_holds_with_friction_and_a_free_law(cam):

@@ -34,21 +34,21 @@ def found(figure):
     values = {text: legend for legend in legends for text in legend.get_texts()}
     lines = [(name, path) for axis in axes for name, path in _lines(axis)]
     message = [
-        f"{_said(item)} meets {_said(two)}" for item, two in combinations(texts, 2) if texts[item].overlaps(texts[two])
+        f"{_name(item)} meets {_name(two)}" for item, two in combinations(texts, 2) if texts[item].overlaps(texts[two])
     ]
     message += [
-        f"{_said(text)} meets the legend of {_said(legend)}"
+        f"{_name(text)} meets the legend of {_name(legend)}"
         for text, box in texts.items()
         for legend, area in boxes.items()
         if values.get(text) is not legend and box.overlaps(area)
     ]
     message += [
-        f"two legends meet: {_said(a)}, {_said(b)}" for a, b in combinations(boxes, 2) if boxes[a].overlaps(boxes[b])
+        f"two legends meet: {_name(a)}, {_name(b)}" for a, b in combinations(boxes, 2) if boxes[a].overlaps(boxes[b])
     ]
     for thing, box in {**texts, **boxes}.items():
-        message += [f"{_said(thing)} meets {name}" for name, path in lines if path.intersects_bbox(box, filled=False)]
+        message += [f"{_name(thing)} meets {name}" for name, path in lines if path.intersects_bbox(box, filled=False)]
         if not _inside(box, figure.bbox):
-            message.append(f"{_said(thing)} leaves the figure")
+            message.append(f"{_name(thing)} leaves the figure")
     return message
 
 
@@ -99,7 +99,7 @@ def _inside(box, border):
     return border.x0 <= box.x0 and border.y0 <= box.y0 and box.x1 <= border.x1 and box.y1 <= border.y1
 
 
-def _said(thing):
+def _name(thing):
     return (
         repr(thing.get_text()) if hasattr(thing, "get_text") else f"legend {[t.get_text() for t in thing.get_texts()]}"
     )

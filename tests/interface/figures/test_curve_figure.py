@@ -65,7 +65,7 @@ def titled(figure):
     return {axes.get_title("left"): axes for axes in figure.axes}
 
 
-def said(axes):
+def legend_texts(axes):
     legend = axes.get_legend()
     return [text.get_text() for text in legend.get_texts()] if legend else []
 
@@ -131,16 +131,16 @@ def test_peaks_stand_where_the_figures_say_and_limits_are_levels():
     limits = {"peak_torque": "90 N*m", "peak_power": "5500 W", "M3_fdc": "20 N*m"}
     scene = lo.load("beatup").update({f"limits.{name}.max": value for name, value in limits.items()})
     figures, panels = lo.evaluate(scene).figures, titled(outputs.plot_curves(tables.curves(scene, {}), scene, {}))
-    assert said(panels["crank torque Md [N*m]"])[0].startswith(f"peak -{figures['peak_torque']:.6g} N*m at ")
-    assert said(panels["motor power [W]"])[0].startswith(f"peak -{figures['peak_power']:.6g} W at ")
-    assert said(panels["reed torque M3 [N*m]"])[0] == f"at front dead centre {figures['M3_fdc']:.6g} N*m"
+    assert legend_texts(panels["crank torque Md [N*m]"])[0].startswith(f"peak -{figures['peak_torque']:.6g} N*m at ")
+    assert legend_texts(panels["motor power [W]"])[0].startswith(f"peak -{figures['peak_power']:.6g} W at ")
+    assert legend_texts(panels["reed torque M3 [N*m]"])[0] == f"at front dead centre {figures['M3_fdc']:.6g} N*m"
     for title, text, levels in (
         ("crank torque Md [N*m]", "peak_torque <= 90 N*m", {-90, 90}),
         ("motor power [W]", "peak_power <= 5500 W", {-5500, 5500}),
         ("reed torque M3 [N*m]", "M3_fdc <= 20 N*m", {20}),
         ("transmission angle mu [deg]", "mu_min >= 56.5 deg", {56.5}),
     ):
-        assert text in said(panels[title])
+        assert text in legend_texts(panels[title])
         flat = {round(line.get_ydata()[0], 9) for line in panels[title].lines if line.get_color() == charts.MISSED}
         assert flat == levels
 
@@ -150,7 +150,7 @@ def test_a_limit_on_the_heads_acceleration_per_radian_stands_at_that_in_metres_p
     scene = lo.load("rapier").set("limits.peak_acceleration.max", "0.8 m/rad^2")
     axes = titled(outputs.plot_curves(tables.curves(scene, {}), scene, {}))["head acceleration S_tt [m/s^2]"]
     level = 0.8 * scene.operation["speed"] ** 2
-    assert f"peak_acceleration <= {level:.6g} m/s^2" in said(axes)
+    assert f"peak_acceleration <= {level:.6g} m/s^2" in legend_texts(axes)
     (scale,) = axes.child_axes
     assert scale.get_ylabel() == "[g]"
     axes.get_figure(root=True).draw_without_rendering()
@@ -183,8 +183,8 @@ def test_the_transmission_angle_is_folded_as_it_is_limited():
         assert curve.max() <= math.pi / 2
         assert curve.min() == pytest.approx(lo.evaluate(scene).figures["mu_min"], rel=1e-12)
     axes = titled(drawn("rapier", "solved"))["transmission angle mu [deg]"]
-    assert "mu_min >= 30 deg" in said(axes)
-    assert any(text.startswith("least 30 deg at ") for text in said(axes))
+    assert "mu_min >= 30 deg" in legend_texts(axes)
+    assert any(text.startswith("least 30 deg at ") for text in legend_texts(axes))
 
 
 def test_without_a_speed_curves_are_per_radian():
@@ -246,15 +246,15 @@ def test_a_stretch_through_zero_is_shaded_on_both_sides_and_undefined_marks_are_
 def test_a_level_far_from_the_curves_is_said_not_drawn(frame):
     levels = {"near": (800.0,), "far": (1e5,)}
     axes = figure_of(frame, panels=(Panel(("M3 [N*m]",), levels=levels),)).axes[0]
-    assert said(axes) == ["near 800 N*m", "far 100000 N*m, beyond the scale"]
+    assert legend_texts(axes) == ["near 800 N*m", "far 100000 N*m, beyond the scale"]
     assert axes.get_ylim()[1] < 2000
 
 
 def test_what_is_nowhere_known_or_marked_nowhere_has_no_point(frame):
     unknown = frame.assign(**{"M3 [N*m]": math.nan})
     panel = Panel(("M3 [N*m]",), marked=("peak", "front dead centre"))
-    assert said(figure_of(unknown, MARKS, (panel,)).axes[0]) == []
-    assert said(figure_of(frame, {}, (panel,)).axes[0]) == ["peak 700 N*m at 0.00 deg"]
+    assert legend_texts(figure_of(unknown, MARKS, (panel,)).axes[0]) == []
+    assert legend_texts(figure_of(frame, {}, (panel,)).axes[0]) == ["peak 700 N*m at 0.00 deg"]
 
 
 @pytest.mark.slow

@@ -24,7 +24,7 @@ def answer():
     return lo.solve(family(), "family", starts=2)
 
 
-def own(answer, name):
+def member_values(answer, name):
     return [member.design.get(name, member.figures.get(name)) for member in answer.members]
 
 
@@ -37,8 +37,8 @@ def test_five_cloths_on_one_linkage(answer):
     assert answer.figures["peak_torque"] == pytest.approx(92.876292, abs=1e-6)
     lengths = [1000 * answer.design[name] for name in ("l1", "l2", "l3", "l4")]
     assert lengths == pytest.approx([30.0, 84.060251, 151.314494, 167.0], abs=1e-6)
-    assert own(answer, "m4e") == pytest.approx([0.0, 0.0, 3.2939704, 9.7334042, 12.4], abs=1e-7)
-    assert [answer.design[f"m4e[{k}]"] for k in range(1, 6)] == own(answer, "m4e")
+    assert member_values(answer, "m4e") == pytest.approx([0.0, 0.0, 3.2939704, 9.7334042, 12.4], abs=1e-7)
+    assert [answer.design[f"m4e[{k}]"] for k in range(1, 6)] == member_values(answer, "m4e")
 
 
 def test_every_member_keeps_its_own_limits_over_its_whole_cycle(answer):
@@ -58,7 +58,7 @@ def test_prices_are_what_the_worst_and_the_sum_gain_where_a_limit_gives_way(answ
     gained = abs(answer.figures["M3_fdc"]) - abs(looser.figures["M3_fdc"])
     assert gained / 1e-6 == pytest.approx(worth["l1", "min"]["M3_fdc"], rel=1e-3)
     heavier = lo.solve(family(**{"bounds.m4e.max": "12.41 kg"}), "family", starts=1)
-    gained = sum(map(abs, own(answer, "M3_fdc"))) - sum(map(abs, own(heavier, "M3_fdc")))
+    gained = sum(map(abs, member_values(answer, "M3_fdc"))) - sum(map(abs, member_values(heavier, "M3_fdc")))
     (per_kg,) = worth["m4e[5]", "max"].values()
     assert gained / 0.01 == pytest.approx(per_kg, rel=1e-6)
 
@@ -86,7 +86,7 @@ def test_the_band_of_one_linkage_balances_every_cloth_in_it():
     second_answer = lo.solve(family((680, 700, 760)), "family", starts=2)
     assert second_answer.reached == {"M3_fdc": True}
     assert "All members reach M3_fdc" in second_answer.message
-    assert own(second_answer, "M3_fdc") == pytest.approx([0.0] * 3, abs=1e-6)
+    assert member_values(second_answer, "M3_fdc") == pytest.approx([0.0] * 3, abs=1e-6)
 
 
 def test_json_tells_each_member(answer):
@@ -120,7 +120,7 @@ def test_the_order_of_members_changes_nothing(answer):
     turned = lo.solve(family(TORQUES[::-1]), "family", starts=2)
     for name in ("l1", "l2", "l3", "l4"):
         assert turned.design[name] == pytest.approx(answer.design[name], rel=1e-9)
-    assert own(turned, "m4e")[::-1] == pytest.approx(own(answer, "m4e"), rel=1e-9, abs=1e-9)
+    assert member_values(turned, "m4e")[::-1] == pytest.approx(member_values(answer, "m4e"), rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.few(1)
@@ -139,13 +139,13 @@ def test_without_anything_of_their_own_members_share_all():
     assert second_answer.status == "optimal"
     assert "m4e" in second_answer.design
     # One inertia for both: the best balances half way between them.
-    assert own(second_answer, "M3_fdc") == pytest.approx([-22.5, 22.5], abs=1e-6)
+    assert member_values(second_answer, "M3_fdc") == pytest.approx([-22.5, 22.5], abs=1e-6)
 
 
 def test_the_sum_lets_one_member_go():
     summed = lo.solve(family((700, 730, 800), (), **{f"{KEY}.combine": "sum"}), "family", starts=2)
     worst = lo.solve(family((700, 730, 800), ()), "family", starts=2)
-    totals = [math.fsum(map(abs, own(item, "M3_fdc"))) for item in (summed, worst)]
+    totals = [math.fsum(map(abs, member_values(item, "M3_fdc"))) for item in (summed, worst)]
     assert totals == pytest.approx([100.0, 120.0], abs=1e-6)  # the median is balanced; or the middle of the ends
     assert summed.status == worst.status == "optimal"
     grids = [answers.members(item.result, item.scene) for item in (summed, worst)]
@@ -159,7 +159,7 @@ def test_peaks_of_other_targets_combine_too(combine):
     scene = family((700, 745), **{f"{KEY}.of": "torque", f"{KEY}.combine": combine})
     second_answer = lo.solve(scene, "family", starts=1)
     assert second_answer.status == "optimal"
-    peaks = own(second_answer, "peak_torque")
+    peaks = member_values(second_answer, "peak_torque")
     assert second_answer.figures["peak_torque"] == max(peaks)
     alone = [lo.solve(member.scene, "torque", starts=1).figures["peak_torque"] for member in second_answer.members]
     assert all(peak >= least - 1e-6 for peak, least in zip(peaks, alone, strict=True))
@@ -225,10 +225,10 @@ def test_squares_are_summed_where_the_target_is_a_root_of_squares():
     more = {f"{KEY}.of": "pulse", f"{KEY}.combine": "sum"}
     second_answer = lo.solve(family((600, 745), **more), "family", starts=1)
     assert second_answer.status == "optimal"
-    least = math.hypot(*own(second_answer, "pulse_rms"))
+    least = math.hypot(*member_values(second_answer, "pulse_rms"))
     assert f"The least root sum of squares of pulse_rms is {least:.6g} N*m" in second_answer.message
     other = lo.solve(family((600, 745), **{f"{KEY}.of": "pulse"}), "family", starts=1)
-    assert least <= math.hypot(*own(other, "pulse_rms")) + 1e-6
+    assert least <= math.hypot(*member_values(other, "pulse_rms")) + 1e-6
 
 
 def test_show_tells_the_members_and_finds_bad_ones():

@@ -115,7 +115,7 @@ def test_torques_scale_with_the_square_of_the_speed(k, M0):
         assert other.figures[name] == pytest.approx(k**2 * first.figures[name], rel=1e-9, abs=1e-7 * k**2), name
 
 
-def told(answer):
+def printed_text(answer):
     """Return what an answer prints, without times."""
     return json.dumps(answer.as_dict() | {"time": None}, sort_keys=True)
 
@@ -123,16 +123,16 @@ def told(answer):
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("problem", "target"), slow.grid(["beatup", "beatup-light"], TARGETS))
 def test_the_same_scene_gives_the_same_digits_twice(problem, target):
-    first = told(lo.solve(lo.load(problem), target))
+    first = printed_text(lo.solve(lo.load(problem), target))
     lo.solve(lo.load("beatup-heavy").with_effect("gravity"), starts=2)
-    assert told(lo.solve(lo.load(problem), target)) == first
+    assert printed_text(lo.solve(lo.load(problem), target)) == first
 
 
 @pytest.mark.slow
 def test_another_process_gives_the_same_digits():
     """Whatever this one has solved before, and whatever its hash seed."""
     command = [sys.executable, "-c", "from loomopt.interface.cli.app import main; main()", "solve", "beatup", "--json"]
-    ours = json.loads(told(lo.solve(lo.load("beatup"))))
+    ours = json.loads(printed_text(lo.solve(lo.load("beatup"))))
     for seed in ("0", "12345"):
         environment = os.environ | {"PYTHONHASHSEED": seed}
         done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)

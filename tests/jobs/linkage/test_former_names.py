@@ -78,12 +78,12 @@ def test_both_names_at_once_are_refused(now):
 def test_what_a_call_sets_under_the_former_name_is_set_under_the_name():
     scene = four_bar(limits={"moment.front": {"min": "-1 N*m"}})
     with pytest.warns(FormerNameWarning):
-        second_scene = scene.update({"limits.force.front.max": "1 kN*m", "limits.force.rear.max": "2 kN*m"})
-    assert second_scene == scene.update({"limits.moment.front.max": "1 kN*m", "limits.moment.rear.max": "2 kN*m"})
-    assert (second_scene.limits["moment.front"].min, second_scene.limits["moment.front"].max) == (-1.0, 1000.0)
-    assert set(second_scene.call.set) == {"limits.moment.front.max", "limits.moment.rear.max"}
+        renamed_scene = scene.update({"limits.force.front.max": "1 kN*m", "limits.force.rear.max": "2 kN*m"})
+    assert renamed_scene == scene.update({"limits.moment.front.max": "1 kN*m", "limits.moment.rear.max": "2 kN*m"})
+    assert (renamed_scene.limits["moment.front"].min, renamed_scene.limits["moment.front"].max) == (-1.0, 1000.0)
+    assert set(renamed_scene.call.set) == {"limits.moment.front.max", "limits.moment.rear.max"}
     with pytest.warns(FormerNameWarning):
-        assert "moment.rear" not in second_scene.without_limit("force.rear", ["max"]).limits
+        assert "moment.rear" not in renamed_scene.without_limit("force.rear", ["max"]).limits
 
 
 def test_axes_and_ranges_of_a_front_and_keys_of_a_sweep_take_the_former_name():

@@ -131,7 +131,7 @@ def travels(scene, every):
     return "phi1 [deg],S [mm]\n" + "".join(f"{math.degrees(phi)!r},{1e3 * travel!r}\n" for phi, travel in pairs)
 
 
-def other():
+def second_drive():
     """Return another drive than the packaged one, from whose start it has to be found."""
     return lo.load("rapier").update({"mechanism.l4": "11 mm", "mechanism.l6": "190 mm"})
 
@@ -141,7 +141,7 @@ def other():
 )
 def test_a_drives_own_travel_is_recovered(tmp_path, every):
     """To 1e-7 m of 0.85 m: the mean square is then at rounding, its root is not."""
-    scene = lo.load("rapier") if every == 18 else other()
+    scene = lo.load("rapier") if every == 18 else second_drive()
     answer = lo.solve(wished(tmp_path, travels(scene, every)), "match", starts=1)
     assert answer.status == "optimal", answer.message
     assert answer.figures["match_rms"] < 1e-7

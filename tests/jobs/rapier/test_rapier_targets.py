@@ -92,10 +92,10 @@ def test_gain_at_the_papers_own_stroke_dwells_and_transmission_angle_is_four_per
     today = lo.evaluate(scene).figures
     keys = {"operation.stroke": "stroke", "limits.mu_min.min": "mu_min"}
     keys |= {f"operation.{name}": name for name in ("dwell_after", "dwell_before")}
-    second_scene = scene.update({key: f"{today[n]!r} {'m' if n == 'stroke' else 'rad'}" for key, n in keys.items()})
-    answer = lo.solve(second_scene, starts=1)
+    changed_scene = scene.update({key: f"{today[n]!r} {'m' if n == 'stroke' else 'rad'}" for key, n in keys.items()})
+    answer = lo.solve(changed_scene, starts=1)
     assert answer.status == "optimal"
-    assert_held(second_scene, answer)
+    assert_held(changed_scene, answer)
     assert Drive(scene, answer.design).peak(2) / PAPER_PEAK == pytest.approx(0.96, abs=0.005)
 
 
@@ -170,8 +170,8 @@ def test_a_limit_on_the_torque_of_the_head_alone_is_held_and_priced(scene, best)
 
 def test_the_neighbours_answer_is_no_trap(scene, best):
     """Warm from a neighbour is what cold gives."""
-    second_scene = scene.update({"operation.stroke": "820 mm", "operation.dwell_after": "34 deg"})
-    warm, cold = lo.solve(second_scene, warm_start=best), lo.solve(second_scene, starts=1)
+    changed_scene = scene.update({"operation.stroke": "820 mm", "operation.dwell_after": "34 deg"})
+    warm, cold = lo.solve(changed_scene, warm_start=best), lo.solve(changed_scene, starts=1)
     assert warm.status == cold.status == "optimal"
     assert warm.figures["peak_acceleration"] == pytest.approx(cold.figures["peak_acceleration"], rel=1e-9)
 
@@ -207,13 +207,13 @@ def test_a_machine_of_another_size_has_the_scaled_optimum(scene, best, factor):
 @pytest.mark.parametrize(("stroke", "dwell"), [(700, 20), (700, 40), (780, 35), (850, 22), (900, 20), (900, 40)])
 @pytest.mark.few(1)
 def test_other_strokes_and_dwells_are_optimal_and_certified(scene, stroke, dwell):
-    second_scene = scene.update(
+    changed_scene = scene.update(
         {
             "operation.stroke": f"{stroke} mm",
             **{f"operation.dwell_{side}": f"{dwell} deg" for side in ("after", "before")},
         }
     )
-    answer = lo.solve(second_scene, starts=1)
+    answer = lo.solve(changed_scene, starts=1)
     assert answer.status == "optimal", answer.message
     assert answer.certificate.passed
-    assert_held(second_scene, answer)
+    assert_held(changed_scene, answer)

@@ -32,7 +32,7 @@ def named(axes):
     return {line.get_label(): line for line in axes.lines if not line.get_label().startswith("_")}
 
 
-def said(axes):
+def legend_texts(axes):
     legend = axes.get_legend()
     return [text.get_text() for text in legend.get_texts()] if legend else []
 
@@ -53,7 +53,7 @@ def test_what_a_designer_of_a_shed_looks_for_has_panels(name):
         "pitch curvature [1/m]",
     ]
     assert set(named(panels["forces by effect [N]"])) == FORCES[name]
-    assert set(said(panels["forces by effect [N]"])) == FORCES[name]
+    assert set(legend_texts(panels["forces by effect [N]"])) == FORCES[name]
     width = panels["cam force N [N]"].get_position().width
     assert width > 1.9 * panels["frame travel X [mm]"].get_position().width
 
@@ -70,7 +70,7 @@ def test_the_least_cam_force_is_marked_where_it_is(name):
     assert (lowest.get_xdata()[0], lowest.get_ydata()[0]) == (pytest.approx(angle), pytest.approx(force))
     drawn = named(axes)["cam force N"]
     assert np.nanmin(drawn.get_ydata()) == pytest.approx(force, rel=1e-9)
-    assert f"least {force:.6g} N at {angle:.2f} deg" in said(axes)
+    assert f"least {force:.6g} N at {angle:.2f} deg" in legend_texts(axes)
     assert max(point.get_ydata()[0] for point in points) == pytest.approx(figures["contact_max"], rel=1e-9)
 
 
@@ -82,7 +82,7 @@ def test_n_min_is_a_level_and_so_are_the_rollers_own_curvature_and_the_laws_limi
         ("pitch curvature [1/m]", "undercut", 50),
         ("acceleration s'' of the cam law s_2", "law_acceleration <= 7", 7),
     ):
-        assert any(text in item for item in said(panels[title]))
+        assert any(text in item for item in legend_texts(panels[title]))
         levels = [line.get_ydata() for line in panels[title].lines if len(line.get_ydata()) == 2]
         assert any(np.allclose(ends, level) for ends in levels)
 
@@ -95,7 +95,7 @@ def test_a_designs_least_force_stands_beside_todays():
     assert set(lines) == {"cam force N", "cam force N, today"}
     assert lines["cam force N"].get_ydata().min() == pytest.approx(0, abs=1e-6)
     assert lines["cam force N, today"].get_ydata().min() == pytest.approx(lo.evaluate(scene).figures["contact_min"])
-    assert {"least 0 N at 88.37 deg", "today: least -13159.9 N at 89.85 deg"} <= set(said(axes))
+    assert {"least 0 N at 88.37 deg", "today: least -13159.9 N at 89.85 deg"} <= set(legend_texts(axes))
 
 
 def test_the_force_has_gaps_where_the_warps_pull_is_not_known():

@@ -17,7 +17,7 @@ BOUNDS = {"X0": (0.0, 0.08)}
 CLASH = ("surge_ratio", "shear_share")
 
 
-def own(**values):
+def coil_values(**values):
     return SCENE.effect_table(coil.Parameters).model_copy(update=values)
 
 
@@ -39,13 +39,13 @@ def test_every_demand_is_of_one_of_its_rows_and_every_margin_is_demanded():
 
 
 def test_wire_comes_in_preferred_sizes_unless_any_will_do():
-    assert coil.sold(own()) == {"wire": WIRES}
-    assert coil.sold(own(sizes="any")) == {}
+    assert coil.sold(coil_values()) == {"wire": WIRES}
+    assert coil.sold(coil_values(sizes="any")) == {}
 
 
 def test_the_bound_it_explains_by_is_below_the_shear_of_every_coil_that_surges_late_enough():
     """tau >= 2 K_W (X0 + travel) f sqrt(2 G rho), with equality where rate, surge and force are all just met."""
-    first, f = own(), 13 * KNOWN["speed"] / (2 * math.pi)
+    first, f = coil_values(), 13 * KNOWN["speed"] / (2 * math.pi)
     for wire, index in ((0.004, 6.0), (0.006, 9.0), (0.009, 12.0)):
         D = index * wire
         turns = wire * math.sqrt(first.shear_modulus / (2 * first.density)) / (2 * math.pi * D**2 * f)
@@ -57,13 +57,13 @@ def test_the_bound_it_explains_by_is_below_the_shear_of_every_coil_that_surges_l
 
 
 def test_it_explains_surge_against_stress_with_both_numbers_and_else_says_nothing():
-    message = coil.explain(KNOWN, BOUNDS, own(), CLASH)
+    message = coil.explain(KNOWN, BOUNDS, coil_values(), CLASH)
     slimmest = (4 * 12 - 1) / (4 * 12 - 4) + 0.615 / 12
     least = 2 * slimmest * 0.1456 * 130 * math.sqrt(2 * 77.2e9 * 7850) / 1e6
     assert f"carry at least {least:.4g} MPa" in message
     assert f"the wire allows {0.5 * 1974 / 6**0.108:.4g} MPa" in message
-    assert coil.explain(KNOWN, BOUNDS, own(), CLASH[:1]) == ""
-    assert coil.explain(KNOWN, BOUNDS, own(), ("N_min", CLASH[1])) == ""
-    assert coil.explain(KNOWN, BOUNDS, own(surge_ratio=1.0), CLASH) == ""
+    assert coil.explain(KNOWN, BOUNDS, coil_values(), CLASH[:1]) == ""
+    assert coil.explain(KNOWN, BOUNDS, coil_values(), ("N_min", CLASH[1])) == ""
+    assert coil.explain(KNOWN, BOUNDS, coil_values(surge_ratio=1.0), CLASH) == ""
     thin = {**BOUNDS, "coil.wire": (0.001, 0.01)}
-    assert f"allows {0.5 * 1974:.4g} MPa" in coil.explain(KNOWN, thin, own(), CLASH)
+    assert f"allows {0.5 * 1974:.4g} MPa" in coil.explain(KNOWN, thin, coil_values(), CLASH)

@@ -87,7 +87,7 @@ def test_a_bound_is_held_to_its_own_size_and_hidden_limits_are_not_told():
 PASSED = Certificate(True, (), (), 0.0, 0.0, True, True)
 
 
-def told(certificate, here=None, limits=(("p", 1, 5.0),)):
+def report_of(certificate, here=None, limits=(("p", 1, 5.0),)):
     program = toy.program("xy", ROWS, WAVES, limits=limits)
     job = toy.ToyJob(program)
     here = here or evaluated(limits, {"x": 1.0, "y": 1.0})
@@ -104,7 +104,7 @@ def test_an_optimum_names_the_limits_that_stop_its_first_objective():
     program = toy.program("xy", ROWS, limits=(("p", 1, 5.0), ("x", -1, 1.0)))
     p, x = program.limits[:2]
     certificate = replace(PASSED, binding=(binding(p, 2.0), binding(p, 0.5), binding(x, 3.0, "p")))
-    answer = told(certificate)
+    answer = report_of(certificate)
     assert (answer.status, answer.target) == ("optimal", "least")
     assert answer.message == "Least. Limits that stop f: p <= 5 (worth 2.5 per unit)."
     assert [price.limit for price in answer.binding] == ["p", "x"]
@@ -112,15 +112,15 @@ def test_an_optimum_names_the_limits_that_stop_its_first_objective():
 
 
 def test_without_a_limit_that_binds_that_is_said():
-    assert told(PASSED).message == "Least. No limit binds."
+    assert report_of(PASSED).message == "Least. No limit binds."
 
 
 def test_what_did_not_pass_says_why():
     refused = replace(PASSED, passed=False, reasons=("one", "two"))
-    answer = told(refused)
+    answer = report_of(refused)
     assert answer.status == "uncertified"
     assert answer.message == "A design was reached but not certified: one; two. Try more starts, such as 20."
-    beyond = told(PASSED, evaluated((("p", 1, 1.0),), {"x": 1.0, "y": 1.0}))
+    beyond = report_of(PASSED, evaluated((("p", 1, 1.0),), {"x": 1.0, "y": 1.0}))
     assert beyond.status == "uncertified"
     assert "a limit does not hold on independent evaluation" in beyond.message
 

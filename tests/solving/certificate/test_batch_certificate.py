@@ -33,7 +33,7 @@ def optimum(job, target):
     return program, registry.find(job).values(program, full)
 
 
-def beside(program, x, share, count):
+def scattered_designs(program, x, share, count):
     """Return an optimum and designs around it, all off by a share of scales."""
     drawn = np.random.default_rng(1).standard_normal((count, len(program.variables)))
     moved = [
@@ -50,7 +50,7 @@ def beside(program, x, share, count):
 @pytest.mark.parametrize(("job", "target"), TASKS)
 def test_derivatives_are_those_of_each_design_alone(job, target):
     program, x = optimum(job, target)
-    places = [(item, prepare(program, item, ACCURACY)) for item in beside(program, x, 1e-9, 4)]
+    places = [(item, prepare(program, item, ACCURACY)) for item in scattered_designs(program, x, 1e-9, 4)]
     requests = [DesignAt(program, item, sampler, active.rows) for item, (sampler, active) in places]
     for of, result in zip(requests, jet_derivatives(requests), strict=True):
         alone = JetDerivatives(program, of.x, of.sampler, of.rows)
@@ -66,7 +66,7 @@ def test_derivatives_are_those_of_each_design_alone(job, target):
 @pytest.mark.parametrize(("job", "target"), TASKS)
 def test_derivatives_are_the_same_bits_in_batches_of_any_size(job, target):
     program, x = optimum(job, target)
-    places = [(entry, prepare(program, entry, ACCURACY)) for entry in beside(program, x, 1e-9, 10)]
+    places = [(entry, prepare(program, entry, ACCURACY)) for entry in scattered_designs(program, x, 1e-9, 10)]
     requests = [DesignAt(program, entry, sampler, active.rows) for entry, (sampler, active) in places]
     whole = jet_derivatives(list(itertools.islice(itertools.cycle(requests), 200)))
     for size in (1, 8):
@@ -88,7 +88,7 @@ def test_derivatives_are_the_same_bits_in_batches_of_any_size(job, target):
 def test_adversaries_are_refused_in_batches_as_they_are_alone(job, target, count):
     """The optimum, and designs a millionth and a ten-thousandth off it: the same digits in batches of 1 and more."""
     program, x = optimum(job, target)
-    requests = [(program, item) for share in (1e-6, 1e-4) for item in beside(program, x, share, 2)]
+    requests = [(program, item) for share in (1e-6, 1e-4) for item in scattered_designs(program, x, share, 2)]
     several = list(itertools.islice(itertools.cycle(requests), count))
     whole = batch_certificate.certify_batch(several, ACCURACY)
     for k, (_, item) in enumerate(requests):

@@ -23,7 +23,7 @@ def scene_of(M0):
     return lo.load("beatup").set("operation.M0", f"{M0} N*m")
 
 
-def judged(scene, target, design):
+def certificate_of(scene, target, design):
     """Return the certificate of a design (SI) as the optimum of a scene's target."""
     program = JOB.program(scene, target)
     return certify(program, JOB.values(program, design), ACCURACY)
@@ -46,7 +46,7 @@ def best():
 @pytest.mark.few(2)
 @pytest.mark.parametrize("M0", [600, 745, 800, 900])
 def test_the_optimum_itself_passes(best, M0):
-    certificate = judged(scene_of(M0), "balance", best[M0])
+    certificate = certificate_of(scene_of(M0), "balance", best[M0])
     assert certificate.passed, certificate.reasons
     assert certificate.feasibility <= 1e-9
     assert max(level.stationarity for level in certificate.levels) <= 1e-6
@@ -56,14 +56,14 @@ def test_the_optimum_itself_passes(best, M0):
 @pytest.mark.parametrize(("name", "step"), [("l1", -1.67e-7), ("l4", 1.67e-7), ("m4e", -1e-6 * 12.4)])
 def test_a_limit_exceeded_by_a_millionth_is_seen(best, name, step):
     design = best[600] | {name: best[600][name] + step, "r4e": 0.08}
-    certificate = judged(scene_of(600), "balance", design)
+    certificate = certificate_of(scene_of(600), "balance", design)
     refused(certificate, " is exceeded by ")
     assert certificate.feasibility >= 1e-7, "a hundred times what is allowed, whatever a row's scale"
 
 
 def test_a_figure_exceeded_by_a_millionth_is_seen(best):
     scene = scene_of(745).set("limits.swing.max", f"{math.radians(23.4) - 1e-6!r} rad")
-    refused(judged(scene, "balance", best[745]), "limit swing is exceeded by 1e-06")
+    refused(certificate_of(scene, "balance", best[745]), "limit swing is exceeded by 1e-06")
 
 
 @pytest.mark.parametrize("M0", [600, 745, 800, 900])
@@ -75,7 +75,7 @@ def test_a_perturbed_optimum_never_passes(best, M0, size, seed):
     steps = np.random.default_rng(seed).uniform(0.3, 1.0, 5) * [1, -1, 1, -1, 1] * (-1) ** seed
     design = {name: best[M0][name] + size * 0.167 * step for name, step in zip(DESIGN, steps, strict=False)}
     design |= {"m4e": max(0.0, best[M0]["m4e"] + size * 12.4 * steps[4]), "r4e": best[M0]["r4e"]}
-    certificate = judged(scene_of(M0), "balance", design)
+    certificate = certificate_of(scene_of(M0), "balance", design)
     assert not certificate.passed
     assert certificate.reasons
 
@@ -84,7 +84,7 @@ def test_a_perturbed_optimum_never_passes(best, M0, size, seed):
 def test_a_common_factor_of_the_lengths_within_its_bounds_is_no_perturbation(best, M0):
     """No angle changes and no limit is crossed: as good a design, though not the one the silent levels choose."""
     scaled = {name: best[M0][name] * (1 - 1e-3) for name in ("l1", "l2", "l3", "l4")}
-    certificate = judged(scene_of(M0), "balance", best[M0] | scaled)
+    certificate = certificate_of(scene_of(M0), "balance", best[M0] | scaled)
     assert certificate.passed, certificate.reasons
     assert not certificate.unique
 
@@ -109,12 +109,12 @@ def test_the_best_of_a_tighter_limit_is_not_the_best(M0, key, value):
     tighter = lo.solve(scene_of(M0).set(key, fixed))
     assert tighter.status == "optimal"
     figure = "M3_fdc" if M0 in (600, 900) else "peak_torque"
-    refused(judged(scene_of(M0), "balance", tighter.design), f"{figure} can still fall")
+    refused(certificate_of(scene_of(M0), "balance", tighter.design), f"{figure} can still fall")
 
 
 def test_the_optimum_of_another_resistance_is_refused(best):
     for M0, other in ((745, 800), (800, 745), (900, 600), (600, 900)):
-        refused(judged(scene_of(M0), "balance", best[other]), "can still fall")
+        refused(certificate_of(scene_of(M0), "balance", best[other]), "can still fall")
 
 
 def test_an_optimum_of_36_points_is_refused():
@@ -126,7 +126,7 @@ def test_an_optimum_of_36_points_is_refused():
     room = [lambda d: 0.0745 - machine.static(d)["M3_fdc"] / 100, lambda d: 0.0745 + machine.static(d)["M3_fdc"] / 100]
     results = [least(machine, "peak_torque", start, room, offsets=coarse) for start in random_designs(machine, 3, 0)]
     design = next(design for design in results if design)
-    refused(judged(scene, "torque", design), "peak_torque can still fall")
+    refused(certificate_of(scene, "torque", design), "peak_torque can still fall")
 
 
 def test_a_peak_held_at_36_points_only_is_seen(best):
@@ -137,7 +137,7 @@ def test_a_peak_held_at_36_points_only_is_seen(best):
     sampled = float(sampled.max())
     assert sampled < machine.peaks(best[745])["peak_torque"] * (1 - 1e-5)
     scene = scene_of(745).set("limits.peak_torque.max", f"{sampled!r} N*m")
-    refused(judged(scene, "balance", best[745]), "limit peak_torque is exceeded")
+    refused(certificate_of(scene, "balance", best[745]), "limit peak_torque is exceeded")
     assert not next(k for k in lo.evaluate(scene, best[745]).limits if k.name == "peak_torque").ok
 
 
@@ -146,13 +146,13 @@ def test_admissible_designs_drawn_at_random_are_refused(target):
     scene = lo.load("beatup-light").update({"limits.theta.max": "8 deg", "limits.mu_min.min": "45 deg"})
     machine = Machine(scene)
     for design in random_designs(machine, 5, 4):
-        assert not judged(scene, target, design).passed
+        assert not certificate_of(scene, target, design).passed
 
 
 @pytest.mark.parametrize("design", [{"l1": 31, "l2": 65, "l3": 155}, {"l1": 30, "l2": 84, "l3": 151}])
 def test_designs_of_the_source_are_not_optimal(design):
     lengths = {name: 1e-3 * value for name, value in design.items()} | {"l4": 0.167, "m4e": 0.0, "r4e": 0.0}
-    refused(judged(scene_of(600), "balance", lengths), "M3_fdc can still fall")
+    refused(certificate_of(scene_of(600), "balance", lengths), "M3_fdc can still fall")
 
 
 # Toys: minimum, maximum, saddle ----------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ ACCURACY = 1e-8
 FALLS, CURVES, EXCEEDED, PRICED = "can still fall", "second order fails", " is exceeded by ", "carries a price"
 
 
-def judged(program, x):
+def certificate_of(program, x):
     """Return the certificate; what jets are clear about, 40 digits say too."""
     x = {name: float(value) for name, value in x.items()}
     quick, slow = (certify_by(kind, program, x, ACCURACY) for kind in (JetDerivatives, MpmathDerivatives))
@@ -131,13 +131,13 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_a_wrong_answer_is_refused_with_its_reason(name):
     program, _, wrong, reason = CASES[name]
-    assert_refused(judged(program, wrong), reason)
+    assert_refused(certificate_of(program, wrong), reason)
 
 
 @pytest.mark.parametrize("name", [name for name, case in CASES.items() if case[1]])
 def test_the_true_optimum_beside_it_passes(name):
     program, true, _, _ = CASES[name]
-    certificate = judged(program, true)
+    certificate = certificate_of(program, true)
     assert certificate.passed, certificate.reasons
     assert certificate.minimum
 
@@ -159,10 +159,10 @@ def test_a_limit_held_on_a_grid_only_is_seen(points):
     program, corner = toward(half), 1 / math.cos(half)
     fixed = np.cos(2 * half * np.arange(points) - half) * corner
     assert np.all(np.abs(fixed) <= 1 + 1e-12), "held at every point of the grid"
-    certificate = judged(program, xy(corner * math.cos(half), corner * math.sin(half)))
+    certificate = certificate_of(program, xy(corner * math.cos(half), corner * math.sin(half)))
     assert_refused(certificate, "limit w" + EXCEEDED)
     assert certificate.feasibility == pytest.approx(corner - 1, rel=1e-6)
-    assert judged(program, xy(math.cos(half), math.sin(half))).passed
+    assert certificate_of(program, xy(math.cos(half), math.sin(half))).passed
 
 
 @pytest.mark.parametrize("points", [28, 44, 74])
@@ -174,8 +174,8 @@ def test_a_peak_least_on_a_grid_only_is_seen(points):
     x, y, peak = linprog([0, 0, 1], rows, np.concatenate([-(c**3), c**3]), bounds=[(None, None)] * 3).x
     assert peak < 0.25 - 1e-4
     program = plane({}, (), ("peak w",), CHEBYSHEV)
-    assert_refused(judged(program, xy(x, y)), "w can still fall")
-    assert judged(program, xy(0.75, 0)).passed
+    assert_refused(certificate_of(program, xy(x, y)), "w can still fall")
+    assert certificate_of(program, xy(0.75, 0)).passed
 
 
 # Degenerate and flat ----------------------------------------------------------------------------------------------
@@ -183,10 +183,10 @@ def test_a_peak_least_on_a_grid_only_is_seen(points):
 
 def test_a_flat_valley_passes_and_is_not_called_unique():
     program = plane(f(lambda x, y: (x - y) ** 2))
-    certificate = judged(program, xy(1, 1))
+    certificate = certificate_of(program, xy(1, 1))
     assert certificate.passed
     assert not certificate.unique
-    assert_refused(judged(program, xy(1, 1 + 1e-5)), FALLS)
+    assert_refused(certificate_of(program, xy(1, 1 + 1e-5)), FALLS)
 
 
 def pyramid(sides):
@@ -210,7 +210,7 @@ def apex(sides, lowered):
 @pytest.mark.few(1)
 @pytest.mark.parametrize("sides", [3, 4, 7, 24])
 def test_an_apex_where_more_limits_meet_than_there_are_directions_passes(sides):
-    certificate = judged(pyramid(sides), xyz(0, 0, 0))
+    certificate = certificate_of(pyramid(sides), xyz(0, 0, 0))
     assert certificate.passed, certificate.reasons
     assert certificate.unique
     assert certificate.prices_unique == (sides == 3)
@@ -226,22 +226,22 @@ def test_an_apex_where_more_limits_meet_than_there_are_directions_passes(sides):
         assert joint.worth([1.0] * len(names)) == pytest.approx(lower, rel=1e-9)
         assert lower > 1e-3
     for x, y, z in ((1e-6, 0, 1e-6), (0, 1e-4, 1e-4), (-1e-6, 1e-6, 2e-6)):
-        assert_refused(judged(pyramid(sides), xyz(x, y, z)), FALLS)
-    assert_refused(judged(pyramid(sides), xyz(0, 0, -1e-6)), EXCEEDED)
+        assert_refused(certificate_of(pyramid(sides), xyz(x, y, z)), FALLS)
+    assert_refused(certificate_of(pyramid(sides), xyz(0, 0, -1e-6)), EXCEEDED)
 
 
 def test_limits_that_touch_without_need_are_not_said_to_bind():
     touching = (("x", -1, 0.0), ("y", -1, 0.0), ("x", 1, 0.0))
-    certificate = judged(plane(f(lambda x, y: x**2 + y**2), touching), xy(0, 0))
+    certificate = certificate_of(plane(f(lambda x, y: x**2 + y**2), touching), xy(0, 0))
     assert certificate.passed
     assert certificate.unique
     assert certificate.binding == ()
-    assert_refused(judged(plane(f(lambda x, y: x**2 + y**2), touching[:2]), xy(1e-6, 0)), FALLS)
+    assert_refused(certificate_of(plane(f(lambda x, y: x**2 + y**2), touching[:2]), xy(1e-6, 0)), FALLS)
 
 
 def test_a_price_is_said_once_for_a_limit_that_stands_twice():
     twice = f(lambda x, y: 3 * x + y**2, h=lambda x, y: 2 * x)
-    certificate = judged(plane(twice, (("x", -1, 0.0), ("h", -1, 0.0))), xy(0, 0))
+    certificate = certificate_of(plane(twice, (("x", -1, 0.0), ("h", -1, 0.0))), xy(0, 0))
     assert certificate.passed
     assert [binding.worth for binding in certificate.binding] == [0.0, 0.0]
     (joint,) = certificate.bind_together
@@ -252,7 +252,7 @@ def test_a_price_is_said_once_for_a_limit_that_stands_twice():
 def test_touching_limits_that_close_every_way_down_keep_a_minimum():
     """−x² + 5 y² above y = |x|: nothing has a price, and along both limits the objective rises by 4."""
     both = f(lambda x, y: 5 * y**2 - x**2, a=lambda x, y: x - y, b=lambda x, y: -x - y)
-    assert judged(plane(both, (("a", 1, 0.0), ("b", 1, 0.0))), xy(0, 0)).passed
+    assert certificate_of(plane(both, (("a", 1, 0.0), ("b", 1, 0.0))), xy(0, 0)).passed
 
 
 # What second order and singular systems hide -------------------------------------------------------
@@ -285,21 +285,21 @@ FALSELY_REFUSED = {
 }  # fmt: skip
 
 
-def told_apart(cases):
+def as_parameters(cases):
     return [
         pytest.param(program, x, marks=pytest.mark.xfail(strict=True, reason=reason) if reason else (), id=name)
         for name, (program, x, reason) in cases.items()
     ]
 
 
-@pytest.mark.parametrize(("program", "x"), told_apart(FALSELY_PASSED))
+@pytest.mark.parametrize(("program", "x"), as_parameters(FALSELY_PASSED))
 def test_what_only_looks_optimal_to_second_order_is_refused(program, x):
-    assert not judged(program, x).passed
+    assert not certificate_of(program, x).passed
 
 
-@pytest.mark.parametrize(("program", "x"), told_apart(FALSELY_REFUSED))
+@pytest.mark.parametrize(("program", "x"), as_parameters(FALSELY_REFUSED))
 def test_a_true_optimum_with_a_singular_system_passes(program, x):
-    certificate = judged(program, x)
+    certificate = certificate_of(program, x)
     assert certificate.passed, certificate.reasons
 
 
@@ -319,7 +319,7 @@ NONE = {
 def test_what_has_no_value_or_no_slope_is_refused(name):
     program, x = NONE[name]
     with np.errstate(all="ignore"):
-        certificate = judged(program, x)
+        certificate = certificate_of(program, x)
     assert not certificate.passed
     assert certificate.reasons
 
@@ -332,17 +332,17 @@ def test_a_solve_that_ends_where_an_objective_does_is_answered():
 def test_an_objective_with_a_pole_nearby_is_judged_beside_it(x):
     """a/u + u/a is least at u = a, however near the pole; an endless slope is no optimum."""
     steep = f(lambda u, y: x / u + u / x + y**2)
-    assert judged(plane(steep), xy(x, 0)).passed
-    assert_refused(judged(plane(steep), xy(x * (1 + 1e-6), 0)), FALLS)
-    assert_refused(judged(toy.program("xy", formulas={"f": lambda m, v: m.sqrt(v["x"])}), xy(0, 0)), FALLS)
+    assert certificate_of(plane(steep), xy(x, 0)).passed
+    assert_refused(certificate_of(plane(steep), xy(x * (1 + 1e-6), 0)), FALLS)
+    assert_refused(certificate_of(toy.program("xy", formulas={"f": lambda m, v: m.sqrt(v["x"])}), xy(0, 0)), FALLS)
 
 
 FAR = toy.program("xy", formulas={"f": lambda m, v: m.sqrt(v["x"] ** 2 + v["y"] ** 2)})
 
 
 def test_the_tip_of_a_cone_has_no_slope_and_is_refused():
-    assert_refused(judged(FAR, xy(0, 0)), FALLS)
+    assert_refused(certificate_of(FAR, xy(0, 0)), FALLS)
 
 
 def test_a_slope_is_seen_however_far_out():
-    assert_refused(judged(FAR, xy(1.0, 1e22)), FALLS)
+    assert_refused(certificate_of(FAR, xy(1.0, 1e22)), FALLS)

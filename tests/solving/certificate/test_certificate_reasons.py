@@ -27,7 +27,7 @@ from loomopt.solving.certificate.second_order import Curvature, Local
 NONE = LevelMultipliers(np.zeros(0), 0.0)
 
 
-def judged(curvature=None, **residuals):
+def level_of(curvature=None, **residuals):
     level = {"objective": "f", "stationarity": 0.0, "complementarity": 0.0, "higher_levels": 0.0, **residuals}
     return CertifiedLevel(Level(**level), NONE, curvature)
 
@@ -59,22 +59,24 @@ def test_the_whole_cycle_is_covered_to_the_accuracy(violation, bound, reasons):
 
 def test_residuals_may_be_as_large_as_is_allowed():
     ends = {"stationarity": STATIONARY, "complementarity": COMPLEMENTARY, "price": LARGEST_PRICE}
-    assert not_least(judged(**ends)) == []
-    beyond = [judged(**{name: end * 1.001}, dearest="x") for name, end in ends.items()]
+    assert not_least(level_of(**ends)) == []
+    beyond = [level_of(**{name: end * 1.001}, dearest="x") for name, end in ends.items()]
     assert not_least(*beyond) == [
         "f can still fall",
         "a limit that is not met exactly carries a price",
         "the price of limit x is too large",
     ]
-    assert len(not_least(judged(stationarity=float("nan"), complementarity=float("nan")))) == 2
+    assert len(not_least(level_of(stationarity=float("nan"), complementarity=float("nan")))) == 2
 
 
 def test_the_last_level_that_falls_is_named():
     falls, fails = Curvature(higher="falls"), Curvature(minimum=False)
-    assert not_least(judged(falls)) == ["second order does not decide"]
-    message = list(certificate._optimality_reasons([judged(falls), judged(falls, objective="g"), judged(Curvature())]))
+    assert not_least(level_of(falls)) == ["second order does not decide"]
+    message = list(
+        certificate._optimality_reasons([level_of(falls), level_of(falls, objective="g"), level_of(Curvature())])
+    )
     assert message == ["second order does not decide: g falls along a direction without curvature"]
-    assert not_least(judged(fails), judged()) == ["second order fails"]
+    assert not_least(level_of(fails), level_of()) == ["second order fails"]
 
 
 # The toy x² + y² with three limits that touch at 0 ------------------------------------------------------------------
@@ -150,8 +152,8 @@ def test_a_later_level_tells_what_the_earlier_ones_are_held_by():
 def test_a_limit_is_worth_what_the_first_objective_it_moves_would_fall():
     here = local(("f", "slope"), TOUCHING[:2])
     levels = [
-        CertifiedLevel(judged().level, LevelMultipliers(np.array([0.0, POSITIVE, 1.0, 0.0]), 0.0)),
-        CertifiedLevel(judged().level, LevelMultipliers(np.array([3.0, 2.0, 0.0, 1.0]), 0.0)),
+        CertifiedLevel(level_of().level, LevelMultipliers(np.array([0.0, POSITIVE, 1.0, 0.0]), 0.0)),
+        CertifiedLevel(level_of().level, LevelMultipliers(np.array([3.0, 2.0, 0.0, 1.0]), 0.0)),
     ]
     results = [
         (price.limit.row, price.objective.figure, price.worth)

@@ -158,7 +158,7 @@ def program(wave, bounded=True, signed=False):
     return toy.program("x", square, {"wave": wave}, limits=limits, bounded=bounded, signed=signed)
 
 
-def said(wave, **kinds):
+def bounds_and_certificate(wave, **kinds):
     """Return what the boxes say of the peak that was sampled, and the certificate of x = 0."""
     made = program(wave, **kinds)
     sampled = Sampler(made.model, {"x": 0.0})
@@ -168,7 +168,7 @@ def said(wave, **kinds):
 
 @pytest.mark.parametrize("wave", [spiked, sunk])
 def test_a_spike_between_the_samples_is_refuted_and_the_certificate_says_so(wave):
-    status, certificate = said(wave)
+    status, certificate = bounds_and_certificate(wave)
     assert status == "violated"
     assert certificate.violation <= ACCURACY, "the dense scan misses it too"
     assert not certificate.passed
@@ -184,17 +184,17 @@ def test_the_angle_of_the_spike_is_found():
 
 
 def test_without_the_spike_the_same_design_passes():
-    status, certificate = said(smooth)
+    status, certificate = bounds_and_certificate(smooth)
     assert (status, certificate.passed, certificate.whole_cycle) == ("proven", True, "bounded")
 
 
 def test_a_spike_downward_does_not_count_where_only_the_highest_value_does():
-    assert said(sunk, signed=True)[0] == "proven"
-    assert said(spiked, signed=True)[0] == "violated"
+    assert bounds_and_certificate(sunk, signed=True)[0] == "proven"
+    assert bounds_and_certificate(spiked, signed=True)[0] == "violated"
 
 
 def test_a_wave_that_is_not_declared_to_run_on_balls_is_left_undecided():
-    status, certificate = said(spiked, bounded=False)
+    status, certificate = bounds_and_certificate(spiked, bounded=False)
     assert (status, certificate.passed, certificate.whole_cycle) == ("undecided", True, "refined")
 
 

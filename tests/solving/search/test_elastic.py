@@ -17,39 +17,39 @@ from loomopt.solving.search.search import Search
 ROWS = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "p": lambda v: v["x"] + v["y"], "q": lambda v: v["x"] - v["y"]}
 
 
-def found(limits, sizes=None, waves=None):
+def clash_of(limits, sizes=None, waves=None):
     program = toy.program("xy", ROWS, waves, limits=limits, sizes=sizes)
     formatter = UnitFormatter(toy.scene_of(toy.ToyJob(program)))
     return clash(Search(None, program, Settings(), nearest=least(program, [program.starts[0]], Settings())), formatter)
 
 
-def told(answer):
+def relaxations_of(answer):
     return {
         (relaxation.limit, relaxation.side, relaxation.alone): relaxation.needed for relaxation in answer.relaxations
     }
 
 
 def test_either_of_two_limits_that_clash_would_do_alone():
-    answer = found((("x", -1, 2.0), ("x", 1, 1.0), ("y", 1, 5.0)))
+    answer = clash_of((("x", -1, 2.0), ("x", 1, 1.0), ("y", 1, 5.0)))
     assert tuple(answer.limits) == ("x >= 2", "x <= 1")
-    assert told(answer)["x", "min", True] == pytest.approx(1.0, rel=1e-7)
-    assert told(answer)["x", "max", True] == pytest.approx(2.0, rel=1e-7)
-    assert ("y", "max", True) not in told(answer)
+    assert relaxations_of(answer)["x", "min", True] == pytest.approx(1.0, rel=1e-7)
+    assert relaxations_of(answer)["x", "max", True] == pytest.approx(2.0, rel=1e-7)
+    assert ("y", "max", True) not in relaxations_of(answer)
 
 
 def test_the_least_sum_is_in_natural_sizes():
     """p ≥ 4 against x ≤ 1 and y ≤ 1: what is large by nature gives way first."""
-    answer = found((("p", -1, 4.0), ("x", 1, 1.0), ("y", 1, 1.0)), sizes={"p": 10.0})
-    assert told(answer)["p", "min", True] == pytest.approx(2.0, rel=1e-7)
+    answer = clash_of((("p", -1, 4.0), ("x", 1, 1.0), ("y", 1, 1.0)), sizes={"p": 10.0})
+    assert relaxations_of(answer)["p", "min", True] == pytest.approx(2.0, rel=1e-7)
     assert answer.relaxations[0].limit == "p"
-    small = found((("p", -1, 4.0), ("x", 1, 1.0), ("y", 1, 1.0)), sizes={"x": 10.0})
+    small = clash_of((("p", -1, 4.0), ("x", 1, 1.0), ("y", 1, 1.0)), sizes={"x": 10.0})
     assert small.relaxations[0].limit == "x"
     assert small.relaxations[0].needed == pytest.approx(3.0, rel=1e-7)
 
 
 def test_limits_that_must_give_way_together_are_not_alone():
     clashing = (("x", -1, 2.0), ("x", 1, 1.0), ("y", -1, 2.0), ("y", 1, 1.0))
-    answer = found(clashing)
+    answer = clash_of(clashing)
     assert {relaxation.alone for relaxation in answer.relaxations} == {False}
     assert sum(abs(relaxation.needed - relaxation.value) for relaxation in answer.relaxations) == pytest.approx(
         2.0, rel=1e-7
@@ -58,7 +58,7 @@ def test_limits_that_must_give_way_together_are_not_alone():
 
 
 def test_an_equality_gives_way_to_the_side_that_helps():
-    answer = found((("x", 0, 3.0), ("x", 1, 1.0)))
+    answer = clash_of((("x", 0, 3.0), ("x", 1, 1.0)))
     sides = {(relaxation.side, relaxation.value): relaxation.needed for relaxation in answer.relaxations}
     assert sides["min", 3.0] == pytest.approx(1.0, rel=1e-7)
     assert sides["max", 1.0] == pytest.approx(3.0, rel=1e-7)
@@ -66,9 +66,9 @@ def test_an_equality_gives_way_to_the_side_that_helps():
 
 def test_what_a_whole_cycle_limit_needs():
     waves = {"w": lambda m, v, phi: v["x"] + m.cos(phi)}
-    answer = found((("w", 1, 0.25),), waves=waves)
+    answer = clash_of((("w", 1, 0.25),), waves=waves)
     assert tuple(answer.limits) == ("w <= 0.25",)
-    assert told(answer) == {("w", "max", True): pytest.approx(1.0, rel=1e-7)}
+    assert relaxations_of(answer) == {("w", "max", True): pytest.approx(1.0, rel=1e-7)}
 
 
 def test_where_a_design_needs_nothing_the_search_for_the_least_relaxation_ends(monkeypatch):
@@ -130,16 +130,16 @@ def test_another_basin_of_the_least_relaxation_is_found_from_another_start():
 def test_a_limit_alone_is_found_though_all_at_once_another_gives_way():
     """Least together: p gives way by 1. Alone: x to 3, or y to 3."""
     limits = (("p", -1, 4.0), ("x", 1, 1.5), ("y", 1, 1.5))
-    answer = found(limits)
-    assert told(answer)["p", "min", True] == pytest.approx(3.0, rel=1e-7)
-    assert told(answer)["x", "max", True] == pytest.approx(2.5, rel=1e-7)
-    assert told(answer)["y", "max", True] == pytest.approx(2.5, rel=1e-7)
+    answer = clash_of(limits)
+    assert relaxations_of(answer)["p", "min", True] == pytest.approx(3.0, rel=1e-7)
+    assert relaxations_of(answer)["x", "max", True] == pytest.approx(2.5, rel=1e-7)
+    assert relaxations_of(answer)["y", "max", True] == pytest.approx(2.5, rel=1e-7)
 
 
 def test_a_limit_that_does_not_suffice_is_not_told():
     """The circle keeps x at 1 or below, whatever y may be."""
-    answer = found((("f", 1, 1.0), ("x", -1, 2.0), ("y", 1, 5.0)))
-    assert {key[0] for key in told(answer)} == {"f", "x"}
+    answer = clash_of((("f", 1, 1.0), ("x", -1, 2.0), ("y", 1, 5.0)))
+    assert {key[0] for key in relaxations_of(answer)} == {"f", "x"}
 
 
 def test_both_rows_of_a_limit_need_what_the_worse_one_does():

@@ -88,7 +88,7 @@ def damaged(path, *statements):
     file.close()
 
 
-def made(path):
+def write_store(path):
     """Make a store of one row."""
     with Store(path) as store:
         store.begin("one", {})
@@ -106,7 +106,7 @@ CELLS = [
 
 @pytest.mark.parametrize("cell", CELLS)
 def test_a_damaged_row_is_told_by_its_point(tmp_path, cell):
-    damaged(made(tmp_path / "s.db"), f"UPDATE row SET {cell}")
+    damaged(write_store(tmp_path / "s.db"), f"UPDATE row SET {cell}")
     with Store(tmp_path / "s.db") as store, pytest.raises(BadInput, match="the row of point 2 is damaged") as caught:
         store.rows("one")
     assert len(str(caught.value).splitlines()) == 1
@@ -114,10 +114,12 @@ def test_a_damaged_row_is_told_by_its_point(tmp_path, cell):
 
 
 def test_a_row_of_another_study_or_point_is_damaged(tmp_path):
-    damaged(made(tmp_path / "s.db"), "INSERT INTO study VALUES ('other', '{}')", "UPDATE row SET study = 'other'")
+    damaged(
+        write_store(tmp_path / "s.db"), "INSERT INTO study VALUES ('other', '{}')", "UPDATE row SET study = 'other'"
+    )
     with Store(tmp_path / "s.db") as store, pytest.raises(BadInput, match="damaged"):
         store.rows("other")
-    damaged(made(tmp_path / "t.db"), "UPDATE row SET point = char(27) || 'x'")
+    damaged(write_store(tmp_path / "t.db"), "UPDATE row SET point = char(27) || 'x'")
     with Store(tmp_path / "t.db") as store, pytest.raises(BadInput, match="damaged") as caught:
         store.rows("one")
     assert "\x1b" not in str(caught.value)
@@ -144,7 +146,7 @@ WRONG = [
 
 @pytest.mark.parametrize("wrong", WRONG)
 def test_what_no_row_holds_is_damage_whatever_its_checksum_says(tmp_path, wrong):
-    path = made(tmp_path / "s.db")
+    path = write_store(tmp_path / "s.db")
     cells = [v if k == "point" else json.dumps(v) for k, v in {**ROW.as_dict(), **wrong}.items()]
     file = sqlite3.connect(path)
     file.execute("DELETE FROM row")
@@ -170,7 +172,7 @@ OTHERS = {
 
 @pytest.mark.parametrize("subject", OTHERS)
 def test_what_no_store_holds_is_refused_at_once(tmp_path, subject):
-    path = made(tmp_path / "s.db")
+    path = write_store(tmp_path / "s.db")
     damaged(path, *(OTHERS[subject]))
     before = path.read_bytes()
     name = {"view": "row", "trigger": "slow", "column": "row", "missing": "row"}.get(subject, "mine")
@@ -181,7 +183,7 @@ def test_what_no_store_holds_is_refused_at_once(tmp_path, subject):
 
 @pytest.mark.parametrize("subject", ["tables", "mine"])
 def test_a_refused_store_is_let_go(tmp_path, subject):
-    path = made(tmp_path / "s.db")
+    path = write_store(tmp_path / "s.db")
     damaged(path, "CREATE TABLE mine (a)" if subject == "mine" else "PRAGMA user_version = 9")
     gc.disable()
     try:
@@ -196,7 +198,7 @@ def test_a_refused_store_is_let_go(tmp_path, subject):
 @pytest.mark.parametrize("name", [":memory:", "file:s.db?mode=memory", "file:s.db", "s?mode=ro.db", "%41.db"])
 def test_a_name_that_sqlite_would_read_otherwise_is_that_of_a_file(tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
-    made(Path(name))
+    write_store(Path(name))
     assert [path.name for path in tmp_path.iterdir()] == [name]
     with Store(Path(name)) as store:
         assert store.rows("one") == [ROW]
