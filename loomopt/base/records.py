@@ -2,7 +2,6 @@
 
 import functools
 from collections.abc import Callable, ItemsView, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Generic, NoReturn, TypeVar, overload
 
 
@@ -109,20 +108,18 @@ def show_by(html: Callable[[Shown], str]) -> None:
     _SHOWN_BY[:] = [html]
 
 
-Record = TypeVar("Record", covariant=True)
+class attribute(Generic[Computed]):  # noqa: N801 (it is written like a property)
+    """Attribute of a result that is the one of its record, `result`, with the same name."""
 
+    def __set_name__(self, owner: type[Any], name: str) -> None:
+        self._name = name
 
-@dataclass(frozen=True, repr=False)
-class RecordHolder(Generic[Record]):
-    """Holder of a record that a computation returned."""
+    @overload
+    def __get__(self, instance: None, owner: type[Any]) -> "attribute[Computed]": ...
 
-    result: Record
+    @overload
+    def __get__(self, instance: Any, owner: type[Any]) -> Computed: ...
 
-    def __getattr__(self, name: str) -> Any:
-        """Attribute of the record."""
-        if name == "result" or name.startswith("__"):  # while it is being unpickled there is no record yet
-            raise AttributeError(name)
-        return getattr(self.result, name)
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *(name for name in dir(self.result) if not name.startswith("_"))})
+    def __get__(self, instance: Any, owner: type[Any]) -> "attribute[Computed] | Computed":
+        """Value in the record."""
+        return self if instance is None else getattr(instance.result, self._name)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt.base import arguments, records
 from loomopt.base.arguments import renamed
-from loomopt.base.records import lazy
+from loomopt.base.records import attribute, lazy
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
@@ -31,13 +31,25 @@ PICTURE = arguments.PICTURE
 
 
 @dataclass(frozen=True, repr=False)
-class Evaluation(records.RecordHolder[solution.Evaluated], records.Shown):
+class Evaluation(records.Shown):
     """Figures and limits of a given design in its scene, SI and rad, without optimisation.
 
     target: whose limits it was judged by.
     """
 
+    result: solution.Evaluated
     target: str = ""
+    problem = attribute[str]()
+    effects = attribute[tuple[str, ...]]()
+    design = attribute[Mapping[str, Any]]()
+    figures = attribute[Mapping[str, Any]]()
+    units = attribute[Mapping[str, str]]()
+    limits = attribute[tuple[solution.Finding, ...]]()
+    reached = attribute[Mapping[str, bool]]()
+    undefined = attribute[Mapping[str, str]]()
+    terms = attribute[Any]()
+    change = attribute[Mapping[str, Any]]()
+    admissible = attribute[bool]()
 
     @property
     def scene(self) -> Scene:
@@ -340,6 +352,29 @@ class Answer(Evaluation):
     """Result of a solve: the optimum, its binding limits, its certificate, and today's machine."""
 
     result: solution.Solution
+    status = attribute[str]()
+    sentences = attribute[solution.Sentences]()
+    message = attribute[str]()
+    explanation = attribute[str]()
+    outcome = attribute[str]()
+    design_is = attribute[str]()
+    binding = attribute[tuple[solution.Price, ...]]()
+    bind_together = attribute[tuple[solution.JointPrice, ...]]()
+    certificate = attribute[Any]()
+    relaxation = attribute[tuple[solution.Relaxation, ...]]()
+    clash = attribute[tuple[str, ...]]()
+    solver = attribute[Mapping[str, Any]]()
+    time = attribute[Mapping[str, float]]()
+    optima = attribute[Any]()
+    proofs = attribute[Any]()
+    global_bound = attribute[Any]()
+    named_target = attribute[str | None]()
+    alternative = attribute[Any]()
+    robust = attribute[Any]()
+    rounded = attribute[Any]()
+    worse = attribute[tuple[solution.Worse, ...]]()
+    evaluate_today = attribute[Any]()
+    point = attribute[Any]()
 
     @lazy
     def today(self) -> Evaluation | None:

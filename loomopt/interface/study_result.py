@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from loomopt.base import arguments
 from loomopt.base.errors import refusal
 from loomopt.base.files import atomically, suffix
-from loomopt.base.records import Record, RecordHolder
 from loomopt.interface.files import outputs
 from loomopt.interface.progress import cell_progress
 from loomopt.picture.chart import Charts
@@ -92,10 +91,6 @@ class Presentation(ABC):
         from loomopt.interface.text import notebook
 
         return notebook.page(self.tables())
-
-
-class StudyResult(RecordHolder[Record], Presentation):
-    """Result of a study; it has the attributes of its record."""
 
 
 @contextlib.contextmanager

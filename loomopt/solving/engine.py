@@ -14,7 +14,6 @@ from loomopt.solving.nlp.ipopt import IterationCallback
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.optimum import Task
 from loomopt.solving.reductions.reduction import Reduction, WholeCycleProof, solve_reduced
-from loomopt.solving.reductions.stock_sizes import StockSizes
 from loomopt.solving.search.search import Clock
 
 
@@ -65,11 +64,11 @@ def solve(
         callback = IterationCallback(on_iteration) if on_iteration else None
         settings = Settings(accuracy, callback=callback, on_step=on_step)
         task = Task(scene, name, settings, starts, seed, near, mass_tradeoff, global_proof, on_start)
-        pipeline: list[Reduction] = [
-            *([WholeCycleProof()] if prove else []),
-            *reductions,
-            *([StockSizes()] if job.sizes(scene) else []),
-        ]
+        pipeline: list[Reduction] = [*([WholeCycleProof()] if prove else []), *reductions]
+        if job.sizes(scene):
+            from loomopt.solving.reductions.stock_sizes import StockSizes
+
+            pipeline.append(StockSizes())
 
         def solve_continuous(simplest: Task) -> Solution:
             search_result = optimum.search(simplest)

@@ -1,13 +1,15 @@
 """Work–precision study: a table of runs, error over time, the advice."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from loomopt.base import arguments
+from loomopt.base.records import attribute
 from loomopt.interface.progress import cell_progress
-from loomopt.interface.study_result import StudyResult
+from loomopt.interface.study_result import Presentation
 from loomopt.picture.chart import COLOURS, Chart, Charts, Series, decades
 from loomopt.picture.table import Column, TextTable, text_table, unbroken, words
 from loomopt.scenes.scene import Scene
@@ -23,9 +25,18 @@ LEAST = 1e-17
 """Errors below this, zero among them, are drawn here."""
 
 
-class AccuracyStudy(StudyResult[AccuracyResult]):
+@dataclass(frozen=True, repr=False)
+class AccuracyStudy(Presentation):
     """Error and time of each numerical method; it shows itself in Jupyter."""
 
+    result: AccuracyResult
+    problem = attribute[str]()
+    rows = attribute[Any]()
+    orders = attribute[Any]()
+    knees = attribute[Any]()
+    advice = attribute[str]()
+    provenance = attribute[Any]()
+    as_dict = attribute[Callable[[], dict[str, Any]]]()
     heading = "Cost of accuracy"
 
     def table(self) -> "pd.DataFrame":

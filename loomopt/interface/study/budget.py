@@ -1,13 +1,16 @@
 """Torque budget of a design: tables, chart, and the required motor."""
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from loomopt.base import arguments
+from loomopt.base.records import attribute
 from loomopt.base.units import factor
-from loomopt.interface.study_result import StudyResult
+from loomopt.interface.study_result import Presentation
 from loomopt.physics.cycle import TURN
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.chart import COLOURS, TICKS, Axis, Chart, Charts, Series, heading, thin_rows
@@ -32,9 +35,19 @@ MOTOR = {
 """Number of the motor → its name for people and its kind of quantity."""
 
 
-class Budget(StudyResult[BudgetResult]):
+@dataclass(frozen=True, repr=False)
+class Budget(Presentation):
     """Shares of the effects in the crank torque of a design, motor and flywheel; SI and rad."""
 
+    result: BudgetResult
+    scene = attribute[Any]()
+    torque = attribute[Any]()
+    remarks = attribute[tuple[str, ...]]()
+    undefined = attribute[Any]()
+    rows = attribute[Any]()
+    total = attribute[Any]()
+    motor = attribute[Any]()
+    as_dict = attribute[Callable[[], dict[str, Any]]]()
     heading = "Shares of the crank torque"
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":

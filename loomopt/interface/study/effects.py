@@ -1,13 +1,15 @@
 """Influence of effects: tables, bars of shift and regret, a sentence on the effects that may be left out."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from loomopt.base import arguments
+from loomopt.base.records import attribute
 from loomopt.base.units import factor
-from loomopt.interface.study_result import StudyResult, row_hook, workers
+from loomopt.interface.study_result import Presentation, row_hook, workers
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.chart import Bars, Charts, both_sides
 from loomopt.picture.table import Column, TextTable, call, number_text, text_table, words
@@ -27,9 +29,28 @@ ROOMY = 1.3
 """Share of the longest bars that the axis is long."""
 
 
-class EffectsStudy(StudyResult[EffectsResult]):
+@dataclass(frozen=True, repr=False)
+class EffectsStudy(Presentation):
     """Influence of each effect of a scene on a target; shares of scales inside, units in tables."""
 
+    result: EffectsResult
+    scene = attribute[Any]()
+    target = attribute[str]()
+    tolerance = attribute[float]()
+    reference = attribute[Any]()
+    rows = attribute[Any]()
+    together = attribute[Any]()
+    kept = attribute[tuple[str, ...]]()
+    left_out = attribute[tuple[str, ...]]()
+    judged = attribute[tuple[str, ...]]()
+    out = attribute[Any]()
+    unknown = attribute[Any]()
+    largest_omission = attribute[Any]()
+    command = attribute[str | None]()
+    finished = attribute[bool]()
+    units = attribute[dict[str, str]]()
+    statuses = attribute[list[str]]()
+    as_dict = attribute[Callable[[], dict[str, Any]]]()
     heading = "Influence of each effect"
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":

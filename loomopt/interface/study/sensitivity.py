@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from loomopt.base import arguments
+from loomopt.base.records import attribute
 from loomopt.base.units import factor
 from loomopt.interface.progress import cell_progress
-from loomopt.interface.study_result import StudyResult
+from loomopt.interface.study_result import Presentation
 from loomopt.picture.chart import Bars, Charts, heading
 from loomopt.picture.table import Column, TextTable, text_table, words
 from loomopt.scenes.provenance import provenance
@@ -23,9 +25,21 @@ MOST = 20
 """Bars of a chart at most."""
 
 
-class SensitivityStudy(StudyResult[SensitivityResult]):
+@dataclass(frozen=True, repr=False)
+class SensitivityStudy(Presentation):
     """Derivatives of an optimum by every number of its scene, and ranges of its prices; SI inside."""
 
+    result: SensitivityResult
+    scene = attribute[Any]()
+    target = attribute[str]()
+    answer = attribute[Any]()
+    rows = attribute[Any]()
+    prices = attribute[Any]()
+    refused = attribute[str | None]()
+    sizes = attribute[Any]()
+    kinds = attribute[Any]()
+    holds = attribute[Any]()
+    as_dict = attribute[Callable[[], dict[str, Any]]]()
     heading = "How the optimum moves with each number"
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":

@@ -5,14 +5,16 @@ import math
 import os
 from collections.abc import Callable
 from concurrent.futures import Executor
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from loomopt.base import arguments
+from loomopt.base.records import attribute
 from loomopt.base.units import factor
 from loomopt.interface.progress import cell_progress
-from loomopt.interface.study_result import StudyResult, check_resume, opened_store, workers
+from loomopt.interface.study_result import Presentation, check_resume, opened_store, workers
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.chart import Axis, Chart, Charts, Series, heading, ticks
 from loomopt.picture.table import Column, TextTable, number_text, text_table, words
@@ -32,9 +34,19 @@ MOST_TOLD = 3
 """Number of shares that a terminal shows."""
 
 
-class ToleranceStudy(StudyResult[ToleranceResult]):
+@dataclass(frozen=True, repr=False)
+class ToleranceStudy(Presentation):
     """Scatter of manufactured machines: how figures spread, how often limits hold; SI inside."""
 
+    result: ToleranceResult
+    plan = attribute[Any]()
+    figures = attribute[Any]()
+    yields = attribute[Any]()
+    tighten = attribute[tuple[tuple[str, float], ...]]()
+    samples = attribute[int]()
+    bad = attribute[int]()
+    worst = attribute[Any]()
+    as_dict = attribute[Callable[[], dict[str, Any]]]()
     heading = "Scatter of manufactured machines"
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":

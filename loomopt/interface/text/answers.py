@@ -80,6 +80,15 @@ def comparison(evaluated: Evaluated, scene: Scene, before: Evaluated | None, hea
     }
     marked = [name for name in ("binds", "reached") if any(row[name] for row in table)]
     missed = {limit.name: "exceeded by rounding" if limit.rounding else "not held" for limit in evaluated.limits}
+    shown, sizes = {row["name"] for row in table}, largest(table)
+    for entry in evaluated.limits:
+        # Of the margins that every design keeps, and that no scene can set, only those that are not held are told.
+        if entry.name not in shown and (not entry.ok or entry.name not in scene.schema.margins):
+            unit = formatter.unit(entry.name)
+            value, low, high = (None if n is None else n / factor(unit) for n in (entry.value, entry.min, entry.max))
+            value = 0.0 if abs(value or 0.0) <= SHOWN_AS_ZERO * sizes.get(unit, 0.0) else value
+            numbers = {"today": None, "design": value, "min": low, "max": high}
+            table.append({"name": entry.name, "unit": unit, **numbers, "ok": entry.ok, "binds": "", "reached": ""})
     lines = []
     for row in table:
         today = [] if before is None else ["" if row["today"] is None else f"{row['today']:.6g}"]
@@ -87,20 +96,6 @@ def comparison(evaluated: Evaluated, scene: Scene, before: Evaluated | None, hea
         limit += apart.get(row["name"], "")
         unit = "" if row["unit"] == "1" else row["unit"]
         lines.append((row["name"], *today, f"{row['design']:.6g}", unit, limit, *(row[name] for name in marked)))
-    shown = {row["name"] for row in table}
-    pads, sizes = [""] * len(marked), largest(table)
-    for entry in evaluated.limits:
-        # Of the margins that every design keeps, and that no scene can set, only those that are not held are told.
-        if entry.name not in shown and (not entry.ok or entry.name not in scene.schema.margins):
-            unit = formatter.unit(entry.name)
-            size = factor(unit)
-            low, high = (None if end is None else end / size for end in (entry.min, entry.max))
-            range_text = unbroken(_limit(low, high) + ("" if entry.ok else f"  <- {missed[entry.name]}"))
-            range_text += apart.get(entry.name, "")
-            value = entry.value / size
-            value = 0.0 if abs(value) <= SHOWN_AS_ZERO * sizes.get(unit, 0.0) else value
-            cells = (f"{value:.6g}", "" if unit == "1" else unit, range_text, *pads)
-            lines.append((entry.name, *([""] if before else []), *cells))
     first = ("", "today") if before else ("",)
     count = len(first)
     right = tuple(range(1, count + 1))
