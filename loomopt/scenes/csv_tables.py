@@ -12,12 +12,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from loomopt.base.errors import BadInput, near_file, refusal, shown
+from loomopt.base.errors import Faults, refusal, shown
 from loomopt.base.quantities import is_beyond, plain_number
 from loomopt.base.units import DISPLAY_UNIT, QuantityError, ascii_unit, factor, fits, meant_unit
 from loomopt.scenes import table_cells
+from loomopt.scenes.cursor import Cursor
 from loomopt.scenes.scene import Scene, reads
-from loomopt.scenes.table_cells import LARGEST_FILE, Cells, Row
+from loomopt.scenes.table_cells import Cells, Row
 
 FEWEST_ROWS, MOST_ROWS = 8, 2000
 UNITS = {
@@ -160,7 +161,7 @@ def read_measured(path: Path, kinds: Mapping[str, str]) -> Table:
     kinds: column name → kind of quantity, angles first. An empty cell, but for an angle, is NaN.
     """
     given, (angle, *names) = str(path), kinds
-    tables = list(table_cells.read(_bytes(path, given, "", "beside"), given))
+    tables = list(table_cells.read(Cursor(given, "measured", Faults()).content(path, "table"), given))
     there = max((_present_columns(cells, {name: kinds[name] for name in names}) for cells in tables), key=len)
     if any(cells.rows for cells in tables) and not there:
         allowed = ", ".join(f"{name} [{DISPLAY_UNIT[kinds[name]]}]" for name in names)
@@ -181,24 +182,7 @@ def _file_of_scene(scene: Scene, given: str, key: str) -> bytes:
     reads(scene, given)
     if text is not None:
         return text.encode()
-    return _bytes(scene.paths.located(given, key, scene.origin), given, scene.origin, key)
-
-
-def _bytes(path: Path, given: str, origin: str, key: str) -> bytes:
-    """Bytes of a file, at most one above the limit. Raises BadInput."""
-    try:
-        if not path.is_file():
-            problem = "the table cannot be read: the file does not exist"
-            near = near_file(path)
-            remedy = f'Perhaps "{Path(given).with_name(Path(near).name)}" is meant' if near else "Correct it"
-            raise refusal(problem, origin, key, given, remedy=remedy)
-        with path.open("rb") as file:
-            return file.read(LARGEST_FILE + 1)
-    except BadInput:
-        raise
-    except (OSError, ValueError) as error:
-        problem = f"the table cannot be read: {getattr(error, 'strerror', None) or 'it is no file'}"
-        raise refusal(problem, given, remedy="Check the path and its permissions") from None
+    return Cursor(given, key, Faults(scene.origin)).content(scene.paths.located(given, key, scene.origin), "table")
 
 
 def _table(

@@ -4,18 +4,20 @@ Every reader of a table gets a cursor. Mistakes are built here, so that all mess
 """
 
 from collections.abc import Collection, Iterable, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from loomopt.base import errors
-from loomopt.base.errors import GAP, NOTHING, SAME, VALUE, WHOLE, BadInput, Faults, nearest, refusal, shown
+from loomopt.base.errors import GAP, NOTHING, SAME, VALUE, WHOLE, BadInput, Faults, near_file, nearest, refusal, shown
 from loomopt.base.quantities import Quantity, described, quantity_of
 from loomopt.base.units import QuantityError
 
 _Model = TypeVar("_Model", bound=BaseModel)
 _NAN = float("nan")
+_LARGEST_FILE = 1_000_000
 _PROBLEMS = {
     "dict_type": ("it is not a table", "a table"),
     "model_type": ("it is not a table", "a table"),
@@ -115,6 +117,36 @@ class Cursor(NamedTuple):
             return quantity.validate(self.raw)
         except QuantityError as error:
             raise errors.misread(error, self.faults.file, self.path, self.raw) from None
+
+    def content(self, path: Path, kind: str, hint: str = "") -> bytes:
+        """Bytes of a file that the value names; kind: what it should be; hint: on a file that is not there.
+
+        Raises BadInput for what is no ordinary file, cannot be read or is larger than 1 MB.
+        """
+        problem, allowed, remedy = "", "", "Name a file"
+        try:
+            if path.is_dir():
+                problem, remedy = "it is a folder, not an ordinary file", "Name the file in it"
+            elif not path.exists():
+                near = near_file(path)
+                near = str(Path(self.raw).with_name(Path(near).name)) if near and isinstance(self.raw, str) else near
+                problem, remedy = (
+                    "the file does not exist",
+                    f'Perhaps "{near}" is meant' if near else "Correct the path",
+                )
+                remedy += hint
+            elif not path.is_file():
+                problem = "it is not an ordinary file"
+            else:
+                with path.open("rb") as file:
+                    raw = file.read(_LARGEST_FILE + 1)
+                if len(raw) <= _LARGEST_FILE:
+                    return raw
+                problem, allowed, remedy = "the file is too large", "up to 1 MB", "Check that this is the file you mean"
+        except (OSError, ValueError) as error:
+            problem, remedy = getattr(error, "strerror", None) or str(error), "Check the path and its permissions"
+        value = NOTHING if self.raw is None else self.raw
+        raise self.fault(f"the {kind} cannot be read: {problem}", value, allowed, remedy)
 
     def word(self, known: Collection[str], sort: str) -> str:
         """The value as one of the known words; sort: kind of thing that is named. Raises BadInput."""

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from loomopt.base.errors import BadInput, Faults, clean, near_file, refusal, shown
+from loomopt.base.errors import BadInput, Faults, clean, refusal, shown
 from loomopt.base.quantities import Quantity, described, quantities_of, quantity_of
 from loomopt.base.records import Frozen
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, show
@@ -52,31 +52,17 @@ def loaded(path: Path) -> object:
 
     origin = named(path)
     try:
-        raw = _pipe_bytes() if str(path) == PIPE else _file_bytes(path)
+        raw = _pipe_bytes() if str(path) == PIPE else Cursor(None, "", Faults(origin)).content(path, "design")
         if len(raw) > LARGEST_FILE:
             raise refusal("the file is too large for a design", origin, allowed="up to 1 MB", remedy=_GIVE_FILE)
         contents: object = json.loads(
             raw.decode("utf-8-sig"), object_pairs_hook=lambda pairs: _unique_entries(pairs, origin)
         )
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise refusal(f"the design cannot be read: {reason}", origin, remedy="Check the path") from None
     except BadInput:
         raise
     except (ValueError, RecursionError):
         raise refusal("the file is not JSON", origin, remedy=_GIVE_FILE) from None
     return contents
-
-
-def _file_bytes(path: Path) -> bytes:
-    """Bytes of a file, at most one above the limit. Raises BadInput if it is not a file."""
-    if not path.is_file():
-        problem = "it is not an ordinary file" if path.exists() else "the file does not exist"
-        near = near_file(path)
-        remedy = f'Perhaps "{near}" is meant' if near else "Correct the path"
-        raise refusal(f"the design cannot be read: {problem}", str(path), remedy=remedy)
-    with path.open("rb") as file:
-        return file.read(LARGEST_FILE + 1)
 
 
 def _pipe_bytes() -> bytes:

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from loomopt.base.errors import BadInput, near_file, refusal, shown
+from loomopt.base.errors import BadInput, Faults, refusal, shown
 from loomopt.base.records import Frozen
+from loomopt.scenes.cursor import Cursor
 
-_LARGEST_FILE = 1_000_000
 _DEEPEST = 8
 _DOTS = 2 * _DEEPEST
 """Dots in a key that is not read: each further one costs the parser the square of those before it."""
@@ -57,31 +57,12 @@ def read_list_or_table(text: str) -> list[Any] | dict[str, Any] | None:
 
 def _read_text(path: Path, origin: str) -> str:
     """Text of a file that is regular, small and UTF-8."""
-    allowed = "a TOML file of a scene, in UTF-8, up to 1 MB"
+    hint = "; a packaged scene is called by its name alone: see `loomopt list`"
     try:
-        if path.is_dir():
-            raise refusal("it is a folder", origin, allowed=allowed, remedy="Name the file in it")
-        if not path.exists():
-            near = near_file(path)
-            remedy = f'Perhaps "{near}" is meant' if near else "Correct the path"
-            remedy += "; a packaged scene is called by its name alone: see `loomopt list`"
-            raise refusal("the file does not exist", origin, allowed=allowed, remedy=remedy)
-        if not path.is_file():
-            raise refusal("it is not an ordinary file", origin, allowed=allowed, remedy="Name a file")
-        with path.open("rb") as file:
-            raw = file.read(_LARGEST_FILE + 1)
-        if len(raw) > _LARGEST_FILE:
-            remedy = "Check that this is the file you mean"
-            raise refusal("the file is too large", origin, allowed=allowed, remedy=remedy)
-        return raw.decode("utf-8-sig")
+        return Cursor(None, "", Faults(origin)).content(path, "scene", hint).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        problem, remedy = f"it is not UTF-8 text (byte {error.start})", "Save the file as UTF-8"
-    except BadInput:
-        raise
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        problem, remedy = f"it cannot be read: {reason}", "Check the path and its permissions"
-    raise refusal(problem, origin, allowed=allowed, remedy=remedy)
+        problem, allowed = f"it is not UTF-8 text (byte {error.start})", "a TOML file of a scene, in UTF-8"
+        raise refusal(problem, origin, allowed=allowed, remedy="Save the file as UTF-8") from None
 
 
 def copied(table: object, origin: str, path: tuple[str, ...] = ()) -> dict[str, Any]:
