@@ -3,6 +3,7 @@
 import functools
 import json
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -774,27 +775,54 @@ def _check_events(scene: Scene, linkage: Linkage) -> None:
         raise refusal(error.problem, scene.origin, key, remedy=remedy) from None
 
 
+def ambiguity(scene: Scene, turns: Sequence[Turn], place: EventRule) -> str:
+    """Sentence on an extreme that other turns equal within `LEVEL` of the swing; "" for one that stands alone."""
+    choice = extreme_turn(tuple(turns), place)
+    swing = max(turn.q for turn in turns) - min(turn.q for turn in turns)
+    equal = [turn for turn in turns if turn.extreme == place.extreme and abs(turn.q - choice.q) <= LEVEL * swing]
+    if place.near is not None or len(equal) < 2:
+        return ""
+    word = "highest" if place.extreme == "max" else "lowest"
+    where = _angles(scene, equal)
+    return f"the output is {word}, within {LEVEL:.1%} of its swing, at {where}: {place.name} is ambiguous"
+
+
+def is_named(scene: Scene, event: str) -> bool:
+    """Whether anything of a scene reads an event: an effect, by default too, a limit, a target, or another event."""
+    document = scene.document
+    others = {name: rule for name, rule in document.get("events", {}).items() if name != event}
+    effects = [list(vars(table).values()) for table in scene.effects.values()]
+
+    def has(part: object) -> bool:
+        if isinstance(part, Mapping):
+            return any(has(key) or has(value) for key, value in part.items())
+        if isinstance(part, list):
+            return any(map(has, part))
+        return isinstance(part, str) and event in re.split(r"\W+", part)
+
+    read = {name: table for name, table in document.items() if name not in ("events", "available", "problem")}
+    return has([*read.values(), *others.values(), *effects])
+
+
+def _angles(scene: Scene, turns: Iterable[Turn]) -> str:
+    """Crank angles of turns, in words."""
+    return ", ".join(scene.show(turn.angle % (2 * math.pi), "angle", 4) for turn in turns)
+
+
 def _check_extreme(scene: Scene, turns: Sequence[Turn], place: EventRule) -> None:
     """Raise BadInput for an extreme that is another, or that a small change of the design would exchange."""
-    key, choice = f"events.{place.name}", extreme_turn(tuple(turns), place)
+    key = f"events.{place.name}"
     subject = place.of or "the output"
     candidates = [turn for turn in turns if turn.extreme == place.extreme]
     word = "highest" if place.extreme == "max" else "lowest"
 
-    def at(few: Sequence[Turn]) -> str:
-        return ", ".join(scene.show(turn.angle % (2 * math.pi), "angle", 4) for turn in few)
-
     if place.near is None:
-        swing = max(turn.q for turn in turns) - min(turn.q for turn in turns)
-        alike = [turn for turn in candidates if abs(turn.q - choice.q) <= LEVEL * swing]
-        if len(alike) > 1:
-            problem = (
-                f"the output is {word}, within {LEVEL:.1%} of its swing, at {at(alike)}: {place.name} is ambiguous"
-            )
+        problem = ambiguity(scene, turns, place)
+        if problem and is_named(scene, place.name):
             raise refusal(problem, scene.origin, key, remedy='Add near = "60 deg"')
         return
     distances = [turn.away(place.near) for turn in turns if turn.extreme != place.extreme]
     if min(distances) < min(turn.away(place.near) for turn in candidates):
         where = scene.show(place.near, "angle")
-        problem = f"near {where} {subject} has no {place.extreme}: it is {word} at {at(candidates)}"
+        problem = f"near {where} {subject} has no {place.extreme}: it is {word} at {_angles(scene, candidates)}"
         raise refusal(problem, scene.origin, f"{key}.near", remedy="Correct near, or name the other extreme")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
 from loomopt.jobs.linkage.model import LinkageMotion, Output, end_of_rest, event_value, linkage_of
-from loomopt.jobs.linkage.scene import read_tables
+from loomopt.jobs.linkage.scene import ambiguity, read_tables
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT, Number
 from loomopt.model.model import JobModel
@@ -298,7 +298,18 @@ class LinkageViews(JobViews):
         """Remarks: on the curves, and on events that lie elsewhere than today's."""
         remarks = (*table_remarks(scene), *_without_place(scene))
         moved = self._moved(scene, design)
-        return (*remarks, *self._rests(scene, design), *((moved,) if moved else ()))
+        return (*remarks, *self._rests(scene, design), *self._ambiguous(scene), *((moved,) if moved else ()))
+
+    def _ambiguous(self, scene: Scene) -> Iterator[str]:
+        """Yield the sentence on each event that is one of several equal extremes of today's linkage."""
+        given = registry.of(scene).sampler(scene, {}).given
+        linkage = linkage_of(registry.of(scene).model(scene))
+        for place in linkage.places:
+            if place.extreme:
+                turns = linkage.of(place).turns(given) if place.of else linkage.turns(given)
+                text = ambiguity(scene, turns, place)
+                if text:
+                    yield f'{text}; add near = "60 deg" to events.{place.name}'
 
     def _rests(self, scene: Scene, design: Mapping[str, float]) -> Iterator[str]:
         """Yield for each event at which the output rests which end of the rest it is."""

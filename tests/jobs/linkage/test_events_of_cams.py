@@ -114,8 +114,18 @@ def test_equal_extremes_are_told_by_those_of_the_kind_asked_for():
     twice = {"crank": {"kind": "crank", "at": "D", "ratio": 2, "pin": "P", "length": "arm"}, "sley": None}
     changes = {"parts": twice, "output": {"y": "P", "angle": None}, "bounds": None, "effects": None}
     scene = changed({**SLEY, "mechanism": {"arm": "700 mm"}}, changes)
-    with pytest.raises(BadInput, match=r"highest, within 0.1% of its swing, at 45 deg, 225 deg: front is ambiguous"):
-        registry.scene(scene)
+    equal = "highest, within 0.1% of its swing, at 45 deg, 225 deg: front is ambiguous"
+    # Nothing reads the event: the scene is read, and a remark says so.
+    read = registry.scene(scene)
+    assert any(equal in remark for remark in registry.of(read).views.remarks(read, {}))
+    for reader in (
+        {"effects": {"resistance": {"force": "300 N", "pulse": "20 deg"}}},
+        {"effects": {"inertia": {"mass": "1 kg"}}, "targets": {"t": {"least": ["force.front"]}}},
+        {"limits": {"angle": {"front": {"min": "10 deg"}}}},
+        {"events": {"late": {"angle": "10 deg"}, "near": {"travel": "1 mm", "after": "front"}}},
+    ):
+        with pytest.raises(BadInput, match=equal):
+            registry.scene(changed(scene, reader))
 
 
 def test_an_unknown_end_of_a_rest_is_refused():
