@@ -36,6 +36,9 @@ from loomopt.scenes.scene import Scene
 TURNING_SHARE = 0.01
 """Share of today's largest |q''| that |q''| keeps at an extreme whose load or angle is sought: of a six-bar a tenth of
 it is reached by 2 of 12 starts, this by 7 of 7."""
+RESTING_SHARE = 0.001
+"""The same at events of a window whose travel or length is sought: a rest needs a small |q''|. 11 of 11 starts reach
+a six-bar's least travel, of 27 starts without it none ends at a certified one."""
 
 
 def model(scene: Scene, target: str = "", design: Numbers | None = None) -> JobModel:
@@ -189,7 +192,7 @@ class LinkageTask(Task):
         ]
 
     def _turning_margins(self) -> list[Limit]:
-        """Rows by which the output still turns back at an extreme whose load or crank angle is sought.
+        """Rows by which the output still turns back at an extreme whose load, crank angle or window is sought.
 
         The load of a mass falls to 0 with q'', and the angle moves without bound: at 0 the event is no extreme, and
         without a margin there is no best design. Cams are left out: their output may rest at an extreme.
@@ -198,13 +201,17 @@ class LinkageTask(Task):
         read = {**self._loads, **{f"angle.{event}": event for event in self._loads.values()}}
         events = {read[name] for name in sought if name in read}
         events |= set(linkages.extremes(linkage.places)) if "sweep" in sought else set()
-        places = [place for place in linkage.places if place.name in events and place.extreme and not place.of]
+        known = read_tables(self.scene.document).windows
+        windows = [window for window in known if sought & {f"travel.{window.name}", window.length}]
+        bounding = {name for window in windows for name in (window.after, window.until, window.level)} - events
+        shares = {**dict.fromkeys(events, TURNING_SHARE), **dict.fromkeys(bounding, RESTING_SHARE)}
+        places = [place for place in linkage.places if place.name in shares and place.extreme and not place.of]
         if not places or linkage.chain.cams:
             return []
         size, limits = size_read(self.sampler, "peak_acceleration", self.scene.schema.figures), list[Limit]()
         for place in places:
             row, sign = linkages.bend_row(place.name), 1 if place.extreme == "max" else -1
-            least = min(TURNING_SHARE * size, abs(self.sampler.single(row)) / 2)
+            least = min(shares[place.name] * size, abs(self.sampler.single(row)) / 2)
             text = f"the output turns back at {place.name}"
             limits.append(DesignLimit(text, sign, row, -sign * least, size, relaxable=False))
         return limits
