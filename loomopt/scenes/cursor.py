@@ -146,7 +146,8 @@ class Cursor(NamedTuple):
         except (OSError, ValueError) as error:
             problem, remedy = getattr(error, "strerror", None) or str(error), "Check the path and its permissions"
         value = NOTHING if self.raw is None else self.raw
-        raise self.fault(f"the {kind} cannot be read: {problem}", value, allowed, remedy)
+        name = "" if self.raw is None else f" {path.name}"
+        raise self.fault(f"the {kind}{name} cannot be read: {problem}", value, allowed, remedy)
 
     def word(self, known: Collection[str], sort: str) -> str:
         """The value as one of the known words; sort: kind of thing that is named. Raises BadInput."""

@@ -58,7 +58,7 @@ COMMANDS = [
     (page, line)
     for page, text in PAGES.items()
     for block in re.findall(r"^```(?:sh|text|console)?\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-    for line in re.findall(r"^(?:\$ )?(loomopt [a-z].*)$", block, re.MULTILINE)
+    for line in re.findall(r"^(?:\$ )?(loomopt [a-z].*)$", block.replace("\\\n", " "), re.MULTILINE)
 ]
 
 

@@ -104,7 +104,7 @@ class LinkageJob(Job):
                 clauses.append(f"the {sense} {name} is sought")
         rest = ", then ".join(clauses)
         if load:
-            word = load.partition(".")[0]
+            word = "force" if linkage.output.slides else "moment"
             return base.balance_sentence(
                 f"the {word} of {linkage.output.name}", f"at {linkage.loads[load]}", nearest, rest
             )

@@ -38,7 +38,7 @@ TURNING_SHARE = 0.01
 it is reached by 2 of 12 starts, this by 7 of 7."""
 RESTING_SHARE = 0.001
 """The same at events of a window whose travel or length is sought: a rest needs a small |q''|. 11 of 11 starts reach
-a six-bar's least travel, of 27 starts without it none ends at a certified one."""
+a six-bar's least travel; without it the best of 27 starts has no certificate."""
 
 
 def model(scene: Scene, target: str = "", design: Numbers | None = None) -> JobModel:

@@ -67,7 +67,7 @@ def test_slopes_of_events_enclose_differences():
 
 def test_a_box_in_which_an_event_is_not_unique_is_undecided():
     with pytest.raises(OpenError, match="a turn of the output is not enclosed"):
-        box(four_bar(), 8e-3)
+        box(four_bar(events={"touch": {"travel": "5 deg", "before": "front"}}), 8e-3)
 
 
 @pytest.mark.slow
