@@ -106,7 +106,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name when it is first used: the command line starts without what it does not use."""
+    """Import a public name when it is first used, which keeps the start of the command line short."""
     from importlib import import_module
 
     if name in _FORMER_NAMES:

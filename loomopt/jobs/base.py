@@ -402,7 +402,7 @@ if TYPE_CHECKING:
 
 
 class Crossing(NamedTuple):
-    """The first crank angle at which |quantity| passes a level: the figure that tells it, and the level's full name.
+    """First crank angle at which |quantity| passes a level: its figure, and the level's full name.
 
     side: which way the crank turns from angle 0.
     """

@@ -107,7 +107,7 @@ def of_target(scene: Scene, target: str) -> Job:
 
 
 class _Registered:
-    """All jobs, as scenes look them up; it pickles as what it is."""
+    """Registry of all jobs, by which scenes find theirs; its pickle refers to this object."""
 
     def __reduce__(self) -> str:
         return "REGISTERED"
@@ -167,7 +167,7 @@ REGISTERED = _Registered()
 
 
 def external_scenes() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
-    """Files of other distributions' scenes by name, and what is wrong with their jobs."""
+    """Files of other distributions' scenes by name, and the errors of their jobs."""
     paths: dict[str, Path] = {}
     faults: list[BadInput] = []
     for point in {point.name: point for point in entry_points(JOBS)}.values():
@@ -214,7 +214,7 @@ def results(scene: Scene) -> Path:
 
 
 def _folder(job: str, name: str) -> Path:
-    """Folder of what a job brings. Raises BadInput where the job cannot be imported."""
+    """Folder with the files of a job. Raises BadInput if the job cannot be imported."""
     return Path(str(find(job).resources / name))
 
 

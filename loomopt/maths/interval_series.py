@@ -138,7 +138,7 @@ def atan2(y: Number, x: Number) -> Number:
 
 
 def floor(x: Number) -> Number:
-    """Largest whole numbers up to what x may be; where these are several, slopes are without bound."""
+    """Largest whole numbers not above x; if an interval has several, its slopes are unbounded."""
     if not isinstance(x, IntervalSeries):
         return intervals.floor(x)
     whole = intervals.floor(x.terms.value)

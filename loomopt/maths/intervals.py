@@ -1,4 +1,4 @@
-"""Intervals as numbers, rounded outward, and their slopes: what a formula can be worth anywhere in a box of designs.
+"""Intervals as numbers, rounded outward, with slopes: the values of a formula over a box of designs.
 
 Every result encloses the true one [Moore, Kearfott and Cloud, Introduction to Interval Analysis, chapters 2 and 6].
 Sums, products, quotients and roots of floats are right to the nearest float, so the next one outward bounds them.
@@ -120,7 +120,7 @@ class Interval:
         return Interval(np.where(self.holds_zero, -np.inf, ends[0]), np.where(self.holds_zero, np.inf, ends[1]))
 
     def root(self) -> "Interval":
-        """Square root of what of it is not negative: anything from 0 where nothing is."""
+        """Square root of the part that is not negative; [0, inf] if there is none."""
         low, high = (np.sqrt(np.maximum(end, 0.0)) for end in (self.low, self.high))
         return Interval(np.maximum(_down(low), 0.0), np.where(self.high < 0, np.inf, _up(high)))
 
@@ -344,7 +344,7 @@ def atan2(y: Number, x: Number) -> Number:
 
 
 def floor(x: Number) -> Number:
-    """Largest whole numbers up to what x may be; where these are several, slopes are without bound."""
+    """Largest whole numbers not above x; if an interval has several, its slopes are unbounded."""
     value = x.v if isinstance(x, Enclosure) else interval(x)
     whole = Interval(np.floor(value.low), np.floor(value.high))
     several = whole.low != whole.high

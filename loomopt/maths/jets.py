@@ -156,7 +156,7 @@ def _shaped(v: Number, like: Jet) -> Jet:
 
 
 def variables(values: Sequence[Number], directions: Floats, curved: bool) -> list[Jet]:
-    """Jets of variables, each a number or an array of shape S; directions: (variables, n), what each moves by.
+    """Jets of variables, numbers or arrays of shape S; directions: (variables, n), their derivatives.
 
     curved: whether second derivatives are carried along.
     """
@@ -265,7 +265,7 @@ def _picked(places: NDArray[np.intp], values: Sequence[Number]) -> Number:
 
 
 def _masked(value: Number, share: Floats) -> Number:
-    """Value where share is 1, exactly 0 elsewhere whatever it is there."""
+    """Value where share is 1, exactly 0 elsewhere, also where the value is not a number."""
     on = share > 0
 
     def masked(numbers: Number, axes: int) -> Number:

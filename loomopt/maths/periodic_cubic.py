@@ -84,7 +84,7 @@ class PeriodicCubic(NamedTuple):
 
 
 class PeriodicCubics(NamedTuple):
-    """The components of a vector, through samples at the same angles: `PeriodicCubic` says what each word means."""
+    """Components of a vector through samples at the same angles; for the attributes see `PeriodicCubic`."""
 
     curves: tuple[PeriodicCubic, ...]
 

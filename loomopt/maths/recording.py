@@ -1,4 +1,4 @@
-"""Formulas written down once: numbers that record what is done with them, and the plain function that does it again.
+"""Recorded formulas: numbers that record their operations, and the plain function that repeats them.
 
 Equal expressions are computed once; what does not depend on the function's arguments, once for all its calls; what does
 not even depend on a design, once for a number system. The operations are the formula's own, in that system: the same to
@@ -29,7 +29,7 @@ HARMLESS = re.compile(r"input|literal|pi_\d+|\(.*\)|[-+]\{0\}|\{0\} [-+*] \{1\}"
 
 
 class RecordedOperation(NamedTuple):
-    """What is done: Python with its operands as {0}, {1} ..., the places of these, and the value of a literal."""
+    """Operation: Python code with operands {0}, {1} ..., the places of these, and the value of a literal."""
 
     template: str
     of: tuple[int, ...] = ()
@@ -96,7 +96,7 @@ class Recorded:
         return self.tape.record("+{0}", self)
 
     def __bool__(self) -> bool:
-        """Raise TypeError: what is not known yet decides nothing."""
+        """Raise TypeError: a condition cannot be decided by a number that is not known yet."""
         raise TypeError("a recorded number has no value yet")
 
     def _undecided(self, other: object) -> NoReturn:
@@ -301,7 +301,7 @@ class _Written:
 
 
 def recorded(tape: Tape, system: int = 0) -> Maths:
-    """Numbers that record on a tape what is done with them; system: what they stand for, by its place in `Program`."""
+    """Numbers that record their operations on a tape; system: their number system, by its place in `Program`."""
 
     def function(name: str) -> Callable[..., Number]:
         return functools.partial(tape.call, system, name)

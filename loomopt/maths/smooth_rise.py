@@ -229,7 +229,7 @@ class _Fit(NamedTuple):
 
 
 def _smooth(u: "Floats", s: "Floats", half: "Floats") -> _Part:
-    """Smoothest curve of one rise; half: what rounding may have done to each value, 0 for none."""
+    """Smoothest curve of one rise; half: largest rounding error of each value, 0 for none."""
     import numpy as np
 
     spline = _spline(u)

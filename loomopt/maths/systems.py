@@ -176,7 +176,7 @@ def jets() -> Maths:
 
 @functools.cache
 def casadi() -> Maths:
-    """CasADi SX or MX expressions: what the NLPs are made of."""
+    """CasADi SX or MX expressions, of which the NLPs consist."""
     import casadi as ca
 
     def choose(place: Number, values: Sequence[Number]) -> Number:

@@ -119,7 +119,7 @@ class Cursor(NamedTuple):
             raise errors.misread(error, self.faults.file, self.path, self.raw) from None
 
     def content(self, path: Path, kind: str, hint: str = "") -> bytes:
-        """Bytes of a file that the value names; kind: what it should be; hint: on a file that is not there.
+        """Bytes of a file that the value names; kind: of file, in words; hint: advice if the file does not exist.
 
         Raises BadInput for what is no ordinary file, cannot be read or is larger than 1 MB.
         """

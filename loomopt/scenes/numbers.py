@@ -33,7 +33,7 @@ def quantity(scene: Scene, key: str) -> Quantity:
 
 
 def _quantities(scene: Scene) -> Iterator[tuple[str, Quantity]]:
-    """Yield the dotted key of every number that a scene may hold, with what it may be."""
+    """Yield the dotted key of every number that a scene may have, with its quantity."""
     schema, labels = scene.schema, {name: Quantity(kind) for name, kind in scene.schema.variables.items()}
     for table, model in (("operation", schema.operation), ("mechanism", schema.mechanism)):
         for key, quantity in _fields(model):

@@ -146,7 +146,7 @@ class Numbers:
         self.uses: Used = {}
 
     def read(self, cursor: Cursor, kind: Kind, text: str) -> Ref:
-        """Number that a part or event names, or a literal with its unit; text: what it is in words. Raises BadInput."""
+        """Number that a part or event names, or a literal with its unit; text: its description. Raises BadInput."""
         number = self._reference(cursor, kind)
         if number.name:
             self._use(cursor, number.name, _divided(kind, number.factor), text)
@@ -206,7 +206,7 @@ def multiple(text: str) -> tuple[str, float]:
 
 
 def _divided(kind: Kind, factor: float) -> Kind:
-    """What a number may be of which a multiple is used."""
+    """Quantity of a number of which a multiple is used."""
     quantity: Quantity = kind.__metadata__[0]
     if factor in (1, -1) or math.isinf(quantity.below):
         return kind

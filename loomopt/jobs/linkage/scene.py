@@ -759,7 +759,7 @@ def _check_output(scene: Scene, linkage: Linkage) -> None:
 
 
 def _check_events(scene: Scene, linkage: Linkage) -> None:
-    """Raise BadInput for an event that today's linkage does not have, or not where it is said to be."""
+    """Raise BadInput for an event that today's linkage does not have, or has at another crank angle."""
     given = Given(dict(scene.mechanism), {})
     if all(place.angle is not None for place in linkage.places):
         return

@@ -47,7 +47,7 @@ JERK_NODES = 64
 
 @dataclass(frozen=True)
 class HeadPose(Motion):
-    """The head at crank angles φ1, rad, any shape; what no load reads is not computed."""
+    """Motion of the head at crank angles φ1, rad, of any shape; terms that no load reads are not computed."""
 
     joints: rapier_drive.RapierPose
     front: Vector
@@ -81,7 +81,7 @@ class HeadPose(Motion):
 
 
 def _five_bar() -> Group:
-    """Dyad C D B2: what links l5 and l6 have to span, 1 at the margin, and the transmission angle at D."""
+    """Dyad C D B2: the distance that links l5 and l6 span, 1 at the margin, and the transmission angle at D."""
 
     def base(given: Given, pose: Callable[[], Any]) -> Number:
         vector = pose().joints.base

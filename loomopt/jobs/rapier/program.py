@@ -48,7 +48,7 @@ TURN = (0.0, 2 * math.pi)
 def model(
     scene: Scene, goal_names: Collection[str] = (), read: bool = True, dwell_numbers: Collection[str] | None = None
 ) -> JobModel:
-    """Drive with the effects the scene calls for and what is sought; read: whether effects are.
+    """Drive with the effects of the scene and the sought figures; read: whether effects are read.
 
     goal_names: the target, or the axes; dwell_numbers: names of the dwells that are demanded, else the operation's.
     """
@@ -84,7 +84,7 @@ class RapierTask(Task):
 
     @property
     def goal_names(self) -> tuple[str, ...]:
-        """The target, or what is traded."""
+        """Target, or the axes of the front."""
         return self.traded or (self.target,)
 
     @lazy
@@ -126,7 +126,7 @@ class RapierTask(Task):
 
     @lazy
     def model(self) -> JobModel:
-        """The drive with what is sought; with the effects where anything that they give is read."""
+        """Drive with the sought figures, and with the effects if one of their figures is read."""
         checks = [effect for effect in self.scene.active if isinstance(effect, Check)]
         given = {name for check in checks for name in (*check.over_cycle, *check.rows)}
         read = bool((given | set(LOADED)) & {*self.scene.limits, *self.goal_names})
@@ -216,7 +216,7 @@ class RapierTask(Task):
         ]
 
     def bounds(self) -> list[Limit]:
-        """Bounds of what the scene frees."""
+        """Bounds of the numbers that the scene frees."""
         return [limit for v in self.bounded if v.name in self.free for limit in bound_limits(v)]
 
     def required(self) -> list[Limit]:

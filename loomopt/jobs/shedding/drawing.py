@@ -243,7 +243,7 @@ def missing(scene: Scene) -> tuple[str, ...]:
 
 
 def cam(scene: Scene, design: Mapping[str, float]) -> CamDrawing:
-    """Cam of a design, SI (today's number for what it does not name). Raises BadInput where there is none.
+    """Cam of a design, SI, with today's value of every other number. Raises BadInput if there is no cam.
 
     A cam that is undercut is one.
     """

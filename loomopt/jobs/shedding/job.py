@@ -120,7 +120,7 @@ class Shedding(Job):
         return model(scene, Spline(len(knot_values) - 1) if knot_values else None)
 
     def demand(self, scene: Scene, target: str) -> None:
-        """Raise BadInput where a target speaks of what the scene does not have, or today's frame cannot be followed."""
+        """Raise BadInput if a target needs a number that the scene lacks, or today's frame cannot be followed."""
         base.demand(scene, target)
         if target == "law" and scene.table(HealdFrame).segments:
             problem, remedy = "target law chooses one law for rise and return", "Choose another target"
@@ -158,7 +158,7 @@ class Shedding(Job):
         return (read_law(scene).record(scene), *super().tables(scene, target))
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Design, SI, of NLP variables: the spring, what else is freed, and a free law's knots."""
+        """Design, SI, of NLP variables: the spring, the other free numbers, and the knots of a free law."""
         values, law = {**program.parameters, **x}, frame(program.model).law
         knots = set(law.names) if isinstance(law, Spline) else set()
         fixed = {limit.row for limit in program.bound_limits.values() if limit.sign == 0}

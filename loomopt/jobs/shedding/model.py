@@ -361,7 +361,7 @@ class CamProgram(CamFrame):
         return tuple(angles)
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
-        """Angles where segments begin, rad, and what their laws are made of."""
+        """Angles where segments begin, rad, and the numbers of their laws."""
         values, angle = given.values, 0
         numbers: dict[str, Number] = {}
         for k, move in enumerate(self.moves):

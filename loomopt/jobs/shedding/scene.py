@@ -410,7 +410,7 @@ def _steps(heights: Sequence[float], angles: Sequence[float]) -> Iterator[tuple[
 
 
 def _even(angles: Sequence[float], halves: Sequence[float]) -> tuple[list[float], list[float]]:
-    """Angles as shares of the last one, and what rounding leaves open of them.
+    """Angles as shares of the last one, and their rounding error.
 
     Angles that are evenly spaced but for their rounding are taken as evenly spaced.
     """

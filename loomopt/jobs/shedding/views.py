@@ -1,4 +1,4 @@
-"""Shedding's own views: the cam, its profile, the cam force, and what a designer should know beside the numbers."""
+"""Views of shedding: the cam, its profile, the cam force, and remarks for the designer."""
 
 import dataclasses
 import functools

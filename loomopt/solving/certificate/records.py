@@ -84,7 +84,7 @@ class FrameRow(NamedTuple):
 
 @dataclass(frozen=True)
 class Certificate:
-    """Results of the checks of a design; `reasons` says why it did not pass."""
+    """Results of the checks of a design; `reasons`: of a failure."""
 
     passed: bool
     reasons: tuple[str, ...]

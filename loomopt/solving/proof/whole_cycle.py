@@ -211,7 +211,7 @@ def _largest(sampler: Sampler, quantity: str) -> float:
 
 
 def proven(scene: Scene, target: str, answer: Solution) -> Solution:
-    """Answer whose certificate says that everything is proven, or why it is not."""
+    """Answer whose certificate has the result of the proof."""
     proofs = prove(scene, designs.flat(answer.design), target)
     answer = replace(answer, proofs=proofs)
     assert answer.certificate is not None

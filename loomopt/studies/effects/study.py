@@ -54,7 +54,7 @@ def effects_without_values(scene: Scene, given: Iterable[Effect]) -> dict[str, s
 
 
 def _missing_values(effect: Effect) -> str:
-    """Sentence that says how to study an effect without values."""
+    """Advice on how to study an effect that has no values."""
     table = f"effects.{effect.name}.NAME" if effect.many else f"effects.{effect.name}"
     keys = [f"{table}.{key}" for key in required(effect)]
     if keys or effect.many:

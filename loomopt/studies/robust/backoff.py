@@ -170,7 +170,7 @@ Sigmas = Callable[[Pass], float]
 
 
 def _search(request: Request, start: Pass, sigmas: Sigmas) -> Pass | Solution:
-    """Fixed point that a search from scratch confirms, or the answer that says why there is none."""
+    """Fixed point that a search from scratch confirms, or an answer with the reason why there is none."""
     here = start
     for _ in range(SEARCHES):
         converged = _converge(request, here, sigmas)

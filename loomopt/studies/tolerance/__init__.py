@@ -1,1 +1,1 @@
-"""Scatter of manufactured machines: spread, yield, and what to tighten first."""
+"""Scatter of manufactured machines: spread, yield, and the tolerance to tighten first."""
