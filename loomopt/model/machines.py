@@ -96,6 +96,20 @@ class Machines:
         values = self.tops(name, where).value
         return values if name in self.model.signed else np.abs(values)
 
+    def pushed(self, name: str) -> Floats:
+        """Largest |quantity| where Q is not negative, (machines,), SI; the peak of a contact that only pushes."""
+        values, on = self.sampled(name), self.model.counted(self.like.cycle, name, None)
+        signed = name in self.model.signed
+        top = self.highest(values, signed, on, self._at(name), self._pushing).value
+        missing = np.isnan(top) & np.isfinite(values).all(axis=0)
+        return np.where(missing, 0.0, np.maximum(top if signed else np.abs(top), 0.0))
+
+    @lazy
+    def _pushing(self) -> NDArray[np.bool_]:
+        """Mask of the grid where Q is not negative, (nodes, machines)."""
+        force = self.model.instant(self.rows.maths, self.rows.given, self.rows.node(self.pieces, self.u)).force
+        return np.broadcast_to(np.asarray(force) >= 0.0, (len(self.u), self.count))
+
     def search(self, names: Sequence[str]) -> None:
         """Sample quantities on the grid in one pass, the poses computed once for all."""
         new = [name for name in dict.fromkeys(names) if name not in self._sampled]
@@ -161,19 +175,30 @@ class Machines:
         key = f"{name}, {where}, {signed}"
         if key not in self._tops:
             on = self.model.counted(self.like.cycle, name, where)
-
-            def at(pieces: Pieces, u: Floats, machines: Places) -> Floats:
-                return self.at(name, pieces, u, machines)
-
-            self._tops[key] = self.highest(self.sampled(name), signed, on, at)
+            self._tops[key] = self.highest(self.sampled(name), signed, on, self._at(name))
         return self._tops[key]
 
-    def highest(self, values: Floats, signed: bool, on: NDArray[np.bool_], at: At) -> Tops:
-        """Position where a curve is highest; values: on the grid, (nodes, machines); on: the pieces that count."""
+    def _at(self, name: str) -> At:
+        def at(pieces: Pieces, u: Floats, machines: Places) -> Floats:
+            return self.at(name, pieces, u, machines)
+
+        return at
+
+    def highest(
+        self, values: Floats, signed: bool, on: NDArray[np.bool_], at: At, counted: NDArray[np.bool_] | None = None
+    ) -> Tops:
+        """Position where a curve is highest; values: on the grid, (nodes, machines); on: the pieces that count.
+
+        counted: mask of the local maxima that count, (nodes, machines); all by default.
+        """
         known = on[self.pieces]
         lost = ~np.isfinite(values[known]).all(axis=0)
         heights = np.where(known[:, None] & ~lost, values if signed else np.abs(values), -np.inf)
-        nodes, machines = np.nonzero(self._local(heights))
+        local = self._local(heights)
+        if counted is not None:
+            local &= counted
+            heights = np.where(local, heights, -np.inf)
+        nodes, machines = np.nonzero(local)
         highest = _Refined(self, nodes, machines, values, signed)
         # A parabola rises above its highest sample by an eighth of its bend at most.
         near = highest.sampled + highest.bend / 4 >= heights.max(axis=0)[machines]

@@ -206,7 +206,10 @@ def _numbers(scene: Scene) -> dict[str, Quantity]:
     for model in (scene.schema.mechanism, scene.schema.operation):
         quantities |= quantities_of(model)
     for effect in scene.active:
-        quantities |= {label(effect, key): quantity_of(effect.table, key) for key in effect.table.model_fields}
+        for key in effect.table.model_fields:
+            # Of several numbers with one name the first is meant, as in `Scene.full`.
+            if quantity := quantity_of(effect.table, key):
+                quantities.setdefault(label(effect, key), quantity)
     first = {name: quantities[name] for name in scene.schema.variables}
     return {name: quantity for name, quantity in {**first, **quantities}.items() if quantity}
 

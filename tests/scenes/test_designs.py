@@ -172,3 +172,10 @@ def test_files_that_are_none_are_named(tmp_path):
     with big.open("wb") as file:
         file.truncate(100_000_000)
     assert "too large" in refused(designs.read, big, SCENE).problem
+
+
+def test_of_two_numbers_with_one_name_the_first_is_meant():
+    """A coil and a simulated flight both have `turns`."""
+    scene = lo.load("shedding").with_effect("coil", "separation")
+    now = lo.evaluate(scene)
+    assert lo.evaluate(scene, {**now.design, "turns": 9.0}).design["turns"] == 9.0

@@ -199,8 +199,8 @@ class Shedding(Job):
         sampled.search(("lift", *peaks.values()))
         for name, quantity in peaks.items():
             figures[name] = sampled.peak(quantity) * (-1 if quantity in ("concavity", "lift") else 1)
+        figures |= {name: sampled.pushed(name) for name in peaks if name in sampled.model.pushes}
         if isinstance(sampled, Sampler):
-            figures |= {name: sampled.pushed(name) for name in peaks if name in sampled.model.pushes}
             figures["contact_min"], figures["contact_angle"] = _least(sampled.extremes("lift"), sampled)
             return figures | ({CONTACT_SPEED: contact_speed(scene, sampled)} if CONTACT_SPEED in names else {})
         lowest = sampled.tops("lift")
