@@ -47,7 +47,7 @@ def is_near(value, reference, share):
     return value == reference or abs(value - reference) <= share * max(1.0, abs(reference))
 
 
-@pytest.mark.few(0, slow=6)
+@pytest.mark.few(0, slow=3)
 @pytest.mark.parametrize(("job", "name"), SOLVABLE)
 def test_rows_of_a_front_are_single_solves(job, name):
     scene, (figure, against, limit, unit) = scene_with(job, name), FRONTS[job]
@@ -65,7 +65,7 @@ def test_rows_of_a_front_are_single_solves(job, name):
         assert is_near(values[figure], {**answer.design, **answer.figures}[figure], SOLVED)
 
 
-@pytest.mark.few(2, slow=8)
+@pytest.mark.few(2, slow=4)
 @pytest.mark.parametrize(("job", "name"), CASES)
 def test_slopes_of_a_tolerance_are_differences_of_evaluations(job, name):
     scene, number = scene_with(job, name), LENGTHS[job]
