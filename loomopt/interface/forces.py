@@ -98,7 +98,7 @@ class Forces(Presentation):
 
     def charts(self) -> Charts:
         """Sizes over the turn, and of each force its components, in the frame and on the parts that turn with it."""
-        title = f"{self.scene.name}: forces over the turn, in the frame and on what turns"
+        title = f"{self.scene.name}: forces over the turn, in the frame and on turning parts"
         names = list(self.by_name)
         sizes = [self._sizes(names[place : place + COLOURS]) for place in range(0, len(names), COLOURS)]
         drawn = {label for force in self.by_name.values() for label in force.labels}
@@ -116,7 +116,8 @@ class Forces(Presentation):
             phi, size = (np.append(values, values[:1]) for values in (self.by_name[name].phi, self.by_name[name].size))
             phi[-1] += TURN
             series.append(Series(phi / factor(angle), size / factor(unit), kind, name))
-        across = Axis(0.0, TURN / factor(angle), [k * TURN / 4 / factor(angle) for k in range(5)])
+        name = f"{registry.of(self.scene).views.angle} phi [{angle}]"
+        across = Axis(0.0, TURN / factor(angle), [k * TURN / 4 / factor(angle) for k in range(5)], name)
         upright = fit_axis([np.zeros(1), *(curve.y for curve in series)])
         key = [(kind, name) for name, kind in kinds.items()]
         return Chart(heading("size of forces", unit), across, series, key=key, cursor=True, upright=upright, wide=True)
@@ -134,7 +135,7 @@ class Forces(Presentation):
         axis = Axis(-most, most, ticks(-most, most, 4))
         shown = [self.scene.show(value * size, "force", 4) for value in (force.peak / size, *self._means(force, size))]
         key = [("dot c0", f"peak {shown[0]}, mean {shown[1]}"), ("", f"p = 3, 10/3: {shown[2]}, {shown[3]}")]
-        title = " on ".join(filter(None, (name, " and ".join(force.headings))))
+        title = heading(" on ".join(filter(None, (name, " and ".join(force.headings)))), unit)
         dots = [(force.x[row] / size, force.y[row] / size, "c0")]
         return Chart(title, axis, series, dots=dots, key=key, upright=axis, equal=True)
 

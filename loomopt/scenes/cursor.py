@@ -17,7 +17,8 @@ from loomopt.base.units import QuantityError
 
 _Model = TypeVar("_Model", bound=BaseModel)
 _NAN = float("nan")
-_LARGEST_FILE = 1_000_000
+LARGEST_FILE = 1_000_000
+"""Bytes of a scene, design or table; an answer has a few thousand."""
 _PROBLEMS = {
     "dict_type": ("it is not a table", "a table"),
     "model_type": ("it is not a table", "a table"),
@@ -139,8 +140,8 @@ class Cursor(NamedTuple):
                 problem = "it is not an ordinary file"
             else:
                 with path.open("rb") as file:
-                    raw = file.read(_LARGEST_FILE + 1)
-                if len(raw) <= _LARGEST_FILE:
+                    raw = file.read(LARGEST_FILE + 1)
+                if len(raw) <= LARGEST_FILE:
                     return raw
                 problem, allowed, remedy = "the file is too large", "up to 1 MB", "Check that this is the file you mean"
         except (OSError, ValueError) as error:

@@ -12,12 +12,10 @@ from loomopt.base.quantities import Quantity, described, quantities_of, quantity
 from loomopt.base.records import Frozen
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, show
 from loomopt.physics.effects.kinds import label
-from loomopt.scenes.cursor import Cursor
+from loomopt.scenes.cursor import LARGEST_FILE, Cursor
 from loomopt.scenes.document import Paths, copied, looked_up
 from loomopt.scenes.scene import Call, Jobs, Scene, build
 
-LARGEST_FILE = 1_000_000
-"""Bytes; an answer has a few thousand."""
 LONGEST = 1000
 """Numbers in a list."""
 LARGEST = 1e60

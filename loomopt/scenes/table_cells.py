@@ -9,11 +9,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from loomopt.base.errors import BadInput, refusal, shown
+from loomopt.scenes.cursor import LARGEST_FILE
 
 ENDINGS = (".csv", ".tsv", ".tab", ".txt", ".xlsx", ".parquet")
 """Endings of files that are tables; what a file is, its first bytes tell."""
-LARGEST_FILE = 1_000_000
-"""Bytes of a file."""
 MOST_ROWS, MOST_COLUMNS = 2500, 256
 """Rows and columns of a sheet that are looked at."""
 SEPARATORS = "\t;,|"
