@@ -70,9 +70,9 @@ class Evaluation(records.Shown):
 
     def table(self) -> "pd.DataFrame":
         """Design and figures, a row each, with today's machine and the limits, in the units of the scene."""
-        from loomopt.interface import tables
+        from loomopt.interface import answer_table
 
-        return tables.answer(self.result, self.scene)
+        return answer_table.frame(self.result, self.scene)
 
     def to_frame(self, *, si: bool = False) -> "pd.DataFrame":
         """Design and figures as one row, for `pd.concat` with rows of other designs.

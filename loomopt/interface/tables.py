@@ -1,129 +1,30 @@
-"""Answers and curves as pandas tables; column names carry their unit in ASCII, every table its provenance."""
+"""Rows of answers and curves as pandas tables; column names carry their unit in ASCII, every table its provenance."""
 
 import functools
 import math
 import os
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from loomopt.base import arguments
 from loomopt.base.errors import refusal
 from loomopt.base.units import SI_UNIT, factor
+from loomopt.interface import answer_table
 from loomopt.jobs import registry
 from loomopt.model.session import working
 from loomopt.physics.cycle import TURN, Floats
 from loomopt.physics.effects.kinds import Event
-from loomopt.physics.tolerances import ACCURACY, SHOWN_AS_ZERO
+from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import designs
 from loomopt.scenes.provenance import provenance
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluated, Solution, UnitFormatter
+from loomopt.solving.answer.solution import Evaluated, UnitFormatter
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from loomopt.scenes import csv_tables
-
-REACHED = {None: "", True: "yes", False: "no"}
-
-
-def answer(solution: Evaluated, scene: Scene) -> "pd.DataFrame":
-    """Table of a row per design variable and figure: today, design, limits and unit, in the scene's display units.
-
-    Where no design is admissible, the nearest one's column is "relaxed". binds: the side, min or max, on which a solved
-    design's limit binds; reached: yes or no where the target asks what may be out of reach. Of an evaluated design,
-    today's machine is not among them.
-    """
-
-    from loomopt.interface.table_frame import TableFrame
-
-    table = rows(solution, scene)
-    left_out = {"reached"} if not solution.reached else set[str]()
-    if not isinstance(solution, Solution):
-        left_out |= {"binds", "today"}
-    relaxed = isinstance(solution, Solution) and solution.relaxation
-    frame = TableFrame([{name: cell for name, cell in row.items() if name not in left_out} for row in table])
-    more = {}
-    if isinstance(solution, Solution):
-        more = {"target": solution.sought, "accuracy": solution.solver["accuracy"]}
-    frame.attrs.update(provenance(scene, **more))
-    return frame.rename(columns={"design": "relaxed"} if relaxed else {}).set_index("name")
-
-
-def rows(solution: Evaluated, scene: Scene, before: Evaluated | None = None) -> list[dict[str, Any]]:
-    """Rows of `answer` as plain data, with rounding errors as 0; before: today's.
-
-    A figure the scene cannot have is left out.
-    """
-    formatter = UnitFormatter(scene)
-    before = before or (solution.today if isinstance(solution, Solution) else None)
-    limits = {limit.name: limit for limit in solution.limits}
-    prices = solution.binding if isinstance(solution, Solution) else ()
-    binding = {price.limit: price.side for price in prices}
-    table = []
-    for name, value in {**solution.design, **solution.figures}.items():
-        if value is None or getattr(name, "of", name) == "change" or name in scene.schema.lists:
-            continue
-        unit = formatter.unit(name)
-        size, limit = factor(unit), limits.get(name)
-        old = {**before.design, **before.figures}.get(name) if before else None
-        low, high = (limit.min, limit.max) if limit else (None, None)
-        numbers = {"today": old, "design": value, "min": low, "max": high}
-        shown = {column: None if number is None else _as_written(number, size) for column, number in numbers.items()}
-        marks = {"binds": binding.get(name, ""), "reached": REACHED[solution.reached.get(name)]}
-        table.append({"name": name, "unit": unit, **shown, "ok": limit.ok if limit else True, **marks})
-        table += _per_second(table[-1], formatter.kind(name), scene, solution.design.get("speed"))
-    return _without_rounding(table)
-
-
-def _as_written(value: float, size: float) -> float:
-    """An SI value in units of a size: with 15 digits where these are the same value, as 23.4 is for 23.4 deg."""
-    exact = value / size
-    short = float(f"{exact:.15g}")
-    return short if math.isclose(short * size, value, rel_tol=sys.float_info.epsilon) else exact
-
-
-PER_SECOND = {
-    "travel velocity": ("velocity", 1),
-    "travel acceleration": ("acceleration", 2),
-    "travel jerk": ("jerk", 3),
-}
-"""Kind of a motion per radian of the crank → its kind in time, and the power of the speed between them."""
-
-
-def _per_second(row: dict[str, Any], kind: str, scene: Scene, speed: float | None) -> list[dict[str, Any]]:
-    """Row of a motion in time beside one per crank angle, where the speed is known; speed: the design's."""
-    known = scene.operation.get("speed")
-    if kind not in PER_SECOND or known is None:
-        return []
-    real, power = PER_SECOND[kind]
-    unit = scene.shown_in(real)
-    size = factor(row["unit"]) / factor(unit)
-    speeds = {"today": known, "design": known if speed is None else speed}
-    shown = {column: None if row[column] is None else row[column] * size * at**power for column, at in speeds.items()}
-    return [
-        row | {"name": f"{row['name']}_t", "unit": unit, **shown, "min": None, "max": None, "binds": "", "ok": True}
-    ]
-
-
-def _without_rounding(table: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Rows whose numbers are 0 where they are only rounding beside the largest one of their unit."""
-    sizes = largest(table)
-    for row in table:
-        for column in ("today", "design"):
-            if row[column] is not None and abs(row[column]) <= SHOWN_AS_ZERO * sizes[row["unit"]]:
-                row[column] = 0.0
-    return table
-
-
-def largest(table: list[dict[str, Any]]) -> dict[str, float]:
-    """Largest magnitude in rows of each unit."""
-    sizes: dict[str, float] = {}
-    for row in table:
-        sizes[row["unit"]] = max(sizes.get(row["unit"], 0.0), abs(row["design"]), abs(row["today"] or 0.0))
-    return sizes
 
 
 def row(solution: Evaluated, scene: Scene, target: str, outcome: str, *, si: bool = False) -> "pd.DataFrame":
@@ -134,7 +35,8 @@ def row(solution: Evaluated, scene: Scene, target: str, outcome: str, *, si: boo
 
     from loomopt.interface.table_frame import TableFrame
 
-    formatter, shown = UnitFormatter(scene), {} if si else {row["name"]: row["design"] for row in rows(solution, scene)}
+    formatter = UnitFormatter(scene)
+    shown = {} if si else {row.name: row.value for row in answer_table.rows(solution, scene)}
     cells: dict[str, object] = {"problem": solution.problem, "target": target, "outcome": outcome}
     for name, value in {**solution.design, **solution.figures}.items():
         listed = name in scene.schema.lists

@@ -9,7 +9,7 @@ from support import inch, slow
 
 import loomopt as lo
 from loomopt.base.units import SI_UNIT, UNITS, factor, parse_unit
-from loomopt.interface import tables
+from loomopt.interface import answer_table
 from loomopt.interface.cli.app import run
 from loomopt.interface.text import answers, layout, scenes
 from loomopt.interface.text.scenes import curves, parts
@@ -171,7 +171,7 @@ def test_what_physics_says_of_a_clash_is_in_the_scenes_units():
 def seen(scene):
     """Return the tables of a scene that a person sees, each as its units."""
     evaluation = lo.evaluate(scene)
-    yield [row["unit"] for row in tables.rows(evaluation.result, scene)]
+    yield [row.unit for row in answer_table.rows(evaluation.result, scene)]
     grids = [part for part in scenes.curves(scene, {}, None) if isinstance(part, TextTable)]
     heads = [head for grid in grids for head in grid.columns]
     yield [head.partition("[")[2].rstrip("]") for head in heads]

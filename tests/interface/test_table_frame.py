@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 import loomopt as lo
-from loomopt.interface import tables
+from loomopt.interface import answer_table
 from loomopt.interface.table_frame import TableFrame
 
 EXPONENT = re.compile(r"\d[eE][-+]\d")
@@ -38,14 +38,14 @@ def test_an_answers_table_shows_rounding_as_zero_and_no_exponents(problem, targe
 
 def test_a_huge_bound_leaves_its_column_readable():
     scene = lo.load("beatup").set("bounds.m4e.max", "1e8 kg")
-    shown = repr(tables.answer(lo.evaluate(scene).result, scene))
+    shown = repr(answer_table.frame(lo.evaluate(scene).result, scene))
     assert EXPONENT.findall(shown) == ["1e+0"], "its own cell alone"
     assert re.search(r"^l1 +mm +31 +30 +35 +True *$", shown, re.MULTILINE)
 
 
 def test_a_small_number_is_not_rounding():
     scene = lo.load("beatup").set("effects.inertia.J4", "1e-10 kg*m^2")
-    assert tables.answer(lo.evaluate(scene).result, scene).loc["J4", "design"] == 1e-10
+    assert answer_table.frame(lo.evaluate(scene).result, scene).loc["J4", "design"] == 1e-10
 
 
 def test_it_is_a_table_as_any_other():

@@ -10,7 +10,7 @@ from support import inch
 
 import loomopt as lo
 from loomopt.base.units import factor, parse_unit
-from loomopt.interface import tables
+from loomopt.interface import answer_table, tables
 from loomopt.interface.files import outputs
 from loomopt.scenes import provenance
 
@@ -71,7 +71,7 @@ def test_the_table_of_an_answer_is_in_the_scenes_own_units(answer):
 
 def test_a_scene_in_inches_gives_a_table_in_inches():
     scene = SCENE.set("mechanism.l1", "1.25 in")
-    table = tables.answer(lo.evaluate(scene).result, scene)
+    table = answer_table.frame(lo.evaluate(scene).result, scene)
     assert table.loc["l1", "unit"] == "in"
     assert table.loc["l1", "design"] == pytest.approx(1.25, rel=1e-14)
 

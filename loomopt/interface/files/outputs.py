@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 from loomopt.base import __version__, quantities
 from loomopt.base.errors import BadInput, misread, refusal
 from loomopt.base.files import atomically, check, check_room, suffix, together
-from loomopt.base.units import QuantityError, factor
-from loomopt.interface import tables
+from loomopt.base.units import QuantityError
+from loomopt.interface import answer_table, tables
 from loomopt.interface.files import sheets
 from loomopt.jobs import registry
 from loomopt.model.program import shortfall
@@ -22,7 +22,7 @@ from loomopt.model.session import working
 from loomopt.scenes import provenance
 from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluated, Solution, UnitFormatter
+from loomopt.solving.answer.solution import Evaluated, Solution
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -105,7 +105,7 @@ def answer(folder: Path, solution: Solution, scene: Scene, comma: bool = False) 
     if _is_workbook(folder):
         sheets.write(folder, answer_sheets(solution, scene))
         return [folder]
-    shown = tables.meaningful(tables.answer(solution, scene))
+    shown = tables.meaningful(answer_table.frame(solution, scene))
     contents = {
         "answer.json": document(solution) + "\n",
         "table.csv": sheets.to_decimal_comma(provenance.csv(shown), comma),
@@ -137,18 +137,9 @@ def _is_workbook(path: Path) -> bool:
 
 def answer_sheets(solution: Solution, scene: Scene) -> "dict[str, pd.DataFrame]":
     """Sheets of an answer's workbook: its design, its figures, its limits and its curves."""
-    import pandas as pd
-
-    shown = tables.meaningful(tables.answer(solution, scene))
+    shown = tables.meaningful(answer_table.frame(solution, scene))
     is_design = [name in solution.design for name in shown.index]
-    formatter = UnitFormatter(scene)
-    rows = []
-    for limit in solution.limits:
-        unit = formatter.unit(limit.name)
-        ends = {"value": limit.value, "min": limit.min, "max": limit.max}
-        record = {key: None if value is None else value / factor(unit) for key, value in ends.items()}
-        rows.append({"name": limit.name, "unit": unit, **record, "held": limit.ok})
-    limits = tables.meaningful(pd.DataFrame(rows, columns=["name", "unit", "value", "min", "max", "held"]))
+    limits = tables.meaningful(answer_table.limits_frame(solution, scene))
     others = [not flag for flag in is_design]
     sheets = {"design": shown[is_design], "figures": shown[others], "limits": limits}
     if solution.members:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from loomopt.base.records import lazy
-from loomopt.interface import forces, tables
+from loomopt.interface import answer_table, forces, tables
 from loomopt.interface.files import outputs, svg
 from loomopt.interface.report import charts, machine, mathml
 from loomopt.interface.report.markup import Block, Markup, Part
@@ -147,7 +147,7 @@ def members(family: Subject) -> list[tuple[str, Status, list[Part]]]:
 def _comparison(subject: Subject) -> Iterator[Part]:
     evaluated, scene, before = subject.evaluated, subject.scene, subject.before
     heading = "nearest" if isinstance(evaluated, Solution) and evaluated.relaxation else "design" if before else "today"
-    blocks: list[Block] = [answers.comparison(evaluated, scene, before, heading), *answers.lists(evaluated, scene)]
+    blocks: list[Block] = [answer_table.text(evaluated, scene, before, heading), *answers.lists(evaluated, scene)]
     yield Part("Today against the design" if before else "Today's machine", tuple(blocks))
 
 

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 from loomopt.base.quantities import shortest_text
 from loomopt.base.units import factor
-from loomopt.interface.tables import largest, rows
+from loomopt.interface import answer_table
 from loomopt.jobs import registry
-from loomopt.model.program import Alias
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
 from loomopt.picture.table import TextTable, unbroken
 from loomopt.scenes.scene import Scene
@@ -37,7 +36,7 @@ def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
         parts.append(answer.message)
         explanation = ""  # the message ends with it
     parts += [text for text in (explanation, UnitFormatter(scene).worse(answer.worse)) if text]
-    parts += [comparison(answer, scene, answer.today, heading)] if answer.design else []
+    parts += [answer_table.text(answer, scene, answer.today, heading)] if answer.design else []
     parts += lists(answer, scene)
     parts += [members(answer, scene)] if answer.members else []
     if answer.certificate:
@@ -63,52 +62,8 @@ def evaluation(evaluated: Evaluated, scene: Scene, before: Evaluated | None) -> 
     verdict = f"NOT admissible: {broken}" if broken else "all limits held"
     if rounded:
         verdict += f"{';' if broken else ','} but for the rounding of the digits given: {rounded}"
-    table = comparison(evaluated, scene, before, "design" if before else "today")
+    table = answer_table.text(evaluated, scene, before, "design" if before else "today")
     return [f"{evaluated.problem}: {verdict}", table, *lists(evaluated, scene)]
-
-
-def comparison(evaluated: Evaluated, scene: Scene, before: Evaluated | None, heading: str) -> TextTable:
-    """Table of design, figures, today's machine and limits; binding limits and reached goals are marked."""
-    table = [
-        row for row in rows(evaluated, scene, before) if not (evaluated.members and _of_member(row["name"], evaluated))
-    ]
-    formatter = UnitFormatter(scene)
-    apart = {
-        limit.name: f", {formatter.shown(limit.name, limit.backed_off, 4)} apart"
-        for limit in evaluated.limits
-        if limit.backed_off
-    }
-    marked = [name for name in ("binds", "reached") if any(row[name] for row in table)]
-    missed = {limit.name: "exceeded by rounding" if limit.rounding else "not held" for limit in evaluated.limits}
-    shown, sizes = {row["name"] for row in table}, largest(table)
-    for entry in evaluated.limits:
-        # Of the margins that every design keeps, and that no scene can set, only those that are not held are told.
-        if entry.name not in shown and (not entry.ok or entry.name not in scene.schema.margins):
-            unit = formatter.unit(entry.name)
-            value, low, high = (None if n is None else n / factor(unit) for n in (entry.value, entry.min, entry.max))
-            value = 0.0 if abs(value or 0.0) <= SHOWN_AS_ZERO * sizes.get(unit, 0.0) else value
-            numbers = {"today": None, "design": value, "min": low, "max": high}
-            table.append({"name": entry.name, "unit": unit, **numbers, "ok": entry.ok, "binds": "", "reached": ""})
-    lines = []
-    for row in table:
-        today = [] if before is None else ["" if row["today"] is None else f"{row['today']:.6g}"]
-        limit = unbroken(_limit(row["min"], row["max"]) + ("" if row["ok"] else f"  <- {missed[row['name']]}"))
-        limit += apart.get(row["name"], "")
-        unit = "" if row["unit"] == "1" else row["unit"]
-        lines.append((row["name"], *today, f"{row['design']:.6g}", unit, limit, *(row[name] for name in marked)))
-    first = ("", "today") if before else ("",)
-    count = len(first)
-    right = tuple(range(1, count + 1))
-    columns_shown = (0, *range(count, count + 3 + len(marked)))
-    return TextTable(
-        "", (*first, heading, "unit", "limits", *marked), tuple(lines), right, first=columns_shown, more="--json"
-    )
-
-
-def _of_member(name: str, evaluated: Evaluated) -> bool:
-    """Whether a name is that of one member's figure, which the table of members shows."""
-    aliases = [figure for figure in evaluated.figures if isinstance(figure, Alias)]
-    return name in aliases or name.removesuffix("_t") in aliases
 
 
 def lists(evaluated: Evaluated, scene: Scene) -> list[str]:
@@ -152,15 +107,6 @@ def design_text(evaluated: Evaluated, scene: Scene) -> str:
             text, unit = shortest_text(value, formatter.unit(name), formatter.kind(name)), formatter.unit(name)
             texts.append(unbroken(f'"{name}": {text}' if unit == "1" else f'"{name}": "{text}"'))
     return f"to retype: {{{', '.join(texts)}}}"
-
-
-def _limit(low: float | None, high: float | None) -> str:
-    """A range as text."""
-    if low is not None and low == high:
-        return f"= {low:.6g}"
-    if low is not None and high is not None:
-        return f"{low:.6g} ... {high:.6g}"
-    return f">= {low:.6g}" if low is not None else f"<= {high:.6g}" if high is not None else ""
 
 
 def relaxation(answer: Solution) -> TextTable:

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from loomopt.base.errors import BadInput
 from loomopt.base.quantities import quantity_of, table_inside
 from loomopt.base.units import SI_UNIT
-from loomopt.interface.tables import PER_SECOND
+from loomopt.interface.answer_table import PER_SECOND
 from loomopt.jobs import registry
 from loomopt.model.curves import split
 from loomopt.model.model import COMPONENTS

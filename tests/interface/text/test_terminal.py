@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import loomopt as lo
 from loomopt.base.quantities import read
-from loomopt.interface import api
+from loomopt.interface import answer_table, api
 from loomopt.interface.text import answers, layout, scenes
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import kinds
@@ -144,7 +144,7 @@ def test_rounding_is_shown_as_zero_but_a_small_number_is_not():
     shown = text(*answers.solution(api.solve(scene).result, scene))
     assert row(shown, "M3_fdc")[1:3] == ["10.0152", "0"]
     tiny = scene.set("effects.inertia.J4", "1e-10 kg*m^2")
-    table = text(answers.comparison(api.evaluate(tiny).result, tiny, None, "today"))
+    table = text(answer_table.text(api.evaluate(tiny).result, tiny, None, "today"))
     assert row(table, "J4")[1] == "1e-10"
 
 

@@ -13,7 +13,7 @@ from flying_frames import JOB, ON, RUBBED, SLOW, figures
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.base.units import factor
-from loomopt.interface import tables
+from loomopt.interface import answer_table
 from loomopt.interface.text import scenes
 from loomopt.jobs import registry
 from loomopt.physics.effects.shedding import separation, weight
@@ -177,10 +177,10 @@ def test_an_inch_frame_at_350_rpm_shows_its_own_units():
     inches = {"length": "in", "force": "lbf", "mass": "lb"}
     metric = ON.set("operation.speed", "350 rpm")
     scene = metric.update({f"display.{kind}": unit for kind, unit in inches.items()})
-    rows = {row["name"]: row for row in tables.rows(lo.evaluate(scene).result, scene)}
+    rows = {row.name: row for row in answer_table.rows(lo.evaluate(scene).result, scene)}
     si = figures(metric)
-    assert (rows["gap_max"]["unit"], rows["landing_energy"]["unit"]) == ("in", "lbf*in")
-    assert rows["gap_max"]["design"] * factor("in") == pytest.approx(si["gap_max"], rel=1e-12)
-    assert rows["landing_energy"]["design"] * factor("lbf*in") == pytest.approx(si["landing_energy"], rel=1e-12)
-    assert rows["landing_speed"]["unit"] == "in/s"
+    assert (rows["gap_max"].unit, rows["landing_energy"].unit) == ("in", "lbf*in")
+    assert rows["gap_max"].value * factor("in") == pytest.approx(si["gap_max"], rel=1e-12)
+    assert rows["landing_energy"].value * factor("lbf*in") == pytest.approx(si["landing_energy"], rel=1e-12)
+    assert rows["landing_speed"].unit == "in/s"
     assert any(" in/s against the cam" in text for text in JOB.views.remarks(scene, {}))
