@@ -1,6 +1,6 @@
 """Sums of a periodic number with the cosines and sines of a turn, by halving: few operations in any number system."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 Number = Any
@@ -55,3 +55,18 @@ class FourierWeights(list[list[Number]]):
 
     def _wave(self, k: int) -> Number:
         return self.waves[k % len(self.waves)]
+
+
+def written_out(
+    cos: Callable[[Number], Number],
+    sin: Callable[[Number], Number],
+    cosines: Sequence[Number],
+    sines: Sequence[Number],
+    phi: Number,
+) -> Number:
+    """Σ cosines[n] cos nφ + sines[n] sin nφ; sines of multiples, for a recurrence would let balls grow."""
+    value = cosines[0]
+    for n in range(1, len(cosines)):
+        angle = n * phi
+        value = value + cosines[n] * cos(angle) + sines[n] * sin(angle)
+    return value

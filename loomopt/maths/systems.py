@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from loomopt.maths.fourier import FourierWeights
+from loomopt.maths.fourier import FourierWeights, written_out
 
 if TYPE_CHECKING:
     pass
@@ -39,6 +39,7 @@ class Maths:
     constant(x): a scalar in the form in which arithmetic with what varies is quickest; the results are the same bits.
     spread(numbers, pattern): numbers as one array, over which `arrays` runs a formula at once, beside numbers that may
     be arrays themselves. weighted(weights, values): a list of the sums Σ weights[k][i] values[i] over such an array.
+    summed: sums of harmonics of a system that does not write them out; see `harmonics`.
     """
 
     name: str
@@ -54,6 +55,11 @@ class Maths:
     weighted: Callable[[Sequence[Sequence[Number]], Number], list[Number]]
     constant: Callable[[Number], Number] = _as_it_is
     floor: Callable[[Number], Number] = _floored
+    summed: Callable[[Sequence[Number], Sequence[Number], Number], Number] | None = None
+
+    def harmonics(self, cosines: Sequence[Number], sines: Sequence[Number], phi: Number) -> Number:
+        """Σ cosines[n] cos nφ + sines[n] sin nφ at a crank angle φ, rad; sines[0] is not read."""
+        return self.summed(cosines, sines, phi) if self.summed else written_out(self.cos, self.sin, cosines, sines, phi)
 
 
 def _chosen(place: Number, values: Sequence[Number]) -> Number:

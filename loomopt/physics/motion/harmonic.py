@@ -139,12 +139,8 @@ class FourierSeries(NamedTuple):
     sines: Sequence[Number]
 
     def at(self, maths: Maths, phi: Number) -> Number:
-        """Sum at a crank angle, rad; sines of multiples, for a recurrence would let balls grow."""
-        value = self.cosines[0]
-        for n in range(1, len(self.cosines)):
-            angle = n * phi
-            value = value + self.cosines[n] * maths.cos(angle) + self.sines[n] * maths.sin(angle)
-        return value
+        """Sum at a crank angle, rad."""
+        return maths.harmonics(self.cosines, self.sines, phi)
 
     def tail(self) -> float:
         """Largest of the last harmonics over the largest of all."""

@@ -14,6 +14,7 @@ from loomopt.model.reading import Rows
 from loomopt.physics.balance import Given, total
 from loomopt.physics.cycle import Floats, Node
 from loomopt.physics.schema import Values
+from loomopt.solving.nlp.mapped_sums import HarmonicSum, SumRecorder, with_recorder
 from loomopt.solving.nlp.rows import NodeParameters, RowFamily, Structure, chain_values
 
 FEW_CHOICES = 8
@@ -68,13 +69,15 @@ class Options(Sequence[Number]):
 
 
 class Lifts:
-    """Lifted variables, created while rows are written; own: the NLP's other variables, a column.
+    """Lifted variables, created while rows are written; variables: the NLP's other variables, a column.
 
-    chained_values: chained values; choices: choices, after all chained values.
+    chained_values: chained values; choices: choices, after all chained values; recorder: sums over angles, which are
+    symbols of the rows but no variables.
     """
 
     def __init__(self, variables: Any) -> None:
-        self.maths: Maths = replace(systems.casadi(), choose=self.choose)
+        self.recorder = SumRecorder()
+        self.maths: Maths = with_recorder(replace(systems.casadi(), choose=self.choose), self.recorder)
         self.chained_values: list[Lifted] = []
         self.choices: list[Lifted] = []
         self._variables = variables
@@ -109,10 +112,9 @@ class Lifts:
         import casadi as ca
 
         if choice_options.key not in self._options:
-            self._options[choice_options.key] = (
-                choice_options,
-                bool(ca.depends_on(choice_options.column, self._variables)),
-            )
+            column = choice_options.column
+            varies = ca.depends_on(column, self._variables) and not ca.depends_on(column, self.recorder.column)
+            self._options[choice_options.key] = choice_options, bool(varies)
         options, varies = self._options[choice_options.key]
         place_key = identity(place), len(options)
         if place_key not in self._places:
@@ -139,11 +141,15 @@ class _Choice(NamedTuple):
 
 
 class _Traced(NamedTuple):
-    """A quantity as a function of numbers, crank angle, switches and choices."""
+    """A quantity as a function of numbers, crank angle, switches, choices and sums of harmonics there.
+
+    harmonics: their coefficients, of cosines and of sines.
+    """
 
     function: Any
     numbers: Any
     choices: tuple[_Choice, ...]
+    harmonics: tuple[tuple[list[Number], list[Number]], ...]
 
 
 class QuantityFunctions:
@@ -161,7 +167,8 @@ class QuantityFunctions:
         self._symbols = list(symbols.values())
         """All symbols stay alive: CasADi reuses the identity of a deleted one."""
         self._worth: dict[object, Any] = {identity(symbol): values[name] for name, symbol in symbols.items()}
-        symbolic = model.given(replace(systems.casadi(), choose=value_at), symbols)
+        # The sums are inputs of every node, whatever their formulas: only which numbers follow from others is read.
+        symbolic = model.given(with_recorder(replace(systems.casadi(), choose=value_at), SumRecorder()), symbols)
         shared = self._shared(symbolic.values, given.values)
         self.given, self._in_symbols = given, Given(shared, symbolic.tables, linkage=symbolic.linkage)
         self.phi, self.switches = ca.SX.sym("phi"), {name: ca.SX.sym(name) for name in switches}
@@ -185,18 +192,35 @@ class QuantityFunctions:
             self._traced[name] = self._trace(name)
         traced = self._traced[name]
         picked = [self.lifts.choose(switch[choice.switch], choice.options) for choice in traced.choices]
-        return traced.function(traced.numbers, phi, *(switch[key] for key in self.switches), *picked)
+        summed = [self.lifts.recorder.harmonics(*coefficients, phi) for coefficients in traced.harmonics]
+        return traced.function(traced.numbers, phi, *(switch[key] for key in self.switches), *picked, *summed)
 
     def _trace(self, name: str) -> _Traced:
         import casadi as ca
 
-        choices = _Choices(self.switches, self._worth)
-        system = replace(systems.casadi(), choose=choices.choose)
+        choices, recorder = _Choices(self.switches, self._worth), SumRecorder()
+
+        def harmonics(cosines: Sequence[Number], sines: Sequence[Number], phi: Number) -> Number:
+            there = identity(phi) == identity(self.phi)
+            return (recorder if there else systems.casadi()).harmonics(cosines, sines, phi)
+
+        system = replace(systems.casadi(), choose=choices.choose, summed=harmonics)
         value = self.model.quantity(system, self._in_symbols, name, Node(self.phi, self.switches))
         symbols = [symbol for symbol in ca.symvar(ca.SX(value)) if identity(symbol) in self._worth]
-        inputs = ca.vertcat(*symbols), self.phi, *self.switches.values(), *choices.symbols
+        sums = [(harmonic, symbol) for harmonic in recorder.harmonic_sums for symbol in harmonic.symbols]
+        more = *choices.symbols, *(symbol for _, symbol in sums)
+        inputs = ca.vertcat(*symbols), self.phi, *self.switches.values(), *more
         formulas = ca.vertcat(*(self._worth[identity(symbol)] for symbol in symbols))
-        return _Traced(ca.Function("quantity", list(inputs), [value]), formulas, tuple(choices))
+        function = ca.Function("quantity", list(inputs), [value])
+        return _Traced(function, formulas, tuple(choices), tuple(self._coefficients(harmonic) for harmonic, _ in sums))
+
+    def _coefficients(self, harmonic: HarmonicSum) -> tuple[list[Number], list[Number]]:
+        """Formulas of the coefficients of harmonics."""
+        cosines, sines = (
+            [self._worth.get(identity(value), value) for value in values]
+            for values in (harmonic.cosines, harmonic.sines)
+        )
+        return cosines, sines
 
 
 class _Choices:

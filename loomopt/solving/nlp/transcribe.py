@@ -10,6 +10,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.solving.nlp.expressions import Expressions, Lifted, expressions
+from loomopt.solving.nlp.mapped_sums import WrittenNlp
 from loomopt.solving.nlp.point import Settings, sampler_at
 from loomopt.solving.nlp.rows import RowMap, Structure, structure
 
@@ -78,7 +79,6 @@ class Elimination:
         self.full = replace(row_map, lifted=len(lifted))
         x, lam_f, lam_g = ca.vertcat(nlp.x, z), ca.SX.sym("f"), ca.SX.sym("g", self.full.size)
         g = ca.vertcat(nlp.g, z - formulas)
-        self.nlp = {"x": x, "p": nlp.p, "f": nlp.f, "g": g}
         start_values, _ = ca.substitute_inplace(
             [lift.symbol for lift in lifted], [lift.formula for lift in lifted], [], False
         )
@@ -89,19 +89,16 @@ class Elimination:
         lagrangian_rows = (
             ca.dot(lam_g, g) if ca.depends_on(definition_slopes, x) else ca.dot(self.full.original_rows(lam_g), nlp.g)
         )
-        hessian: Any = ca.triu(ca.hessian(lam_f * nlp.f + lagrangian_rows, x)[0])
-        self.functions = {
-            "grad_f": ca.Function("nlp_grad_f", [x, nlp.p], [nlp.f, ca.gradient(nlp.f, x)]),
-            "jac_g": ca.Function("nlp_jac_g", [x, nlp.p], [g, slopes]),
-            "hess_lag": ca.Function("nlp_hess_l", [x, nlp.p, lam_f, lam_g], [hessian]),
-        }
-        all_rows, columns, pattern = range(g.numel()), range(x.numel()), slopes.sparsity()
+        written = WrittenNlp(x, nlp.p, nlp.f, g, slopes, lam_f, lam_g, lam_f * nlp.f + lagrangian_rows)
+        self.nlp, self.functions = written.functions(nlp.lifts.recorder)
+        all_rows, columns = range(g.numel()), range(x.numel())
+        pattern = self.functions["jac_g"].sparsity_out(1)
         rows, definitions = self.full.original_rows(all_rows), self.full.definitions(all_rows)
         self._g_x = Entries(pattern, rows, self.full.original_variables(columns))
         self._g_z = Entries(pattern, rows, self.full.lifted_variables(columns))
         self._d_x = Entries(pattern, definitions, self.full.original_variables(columns))
         self._d_z = Entries(pattern, definitions, self.full.lifted_variables(columns))
-        self._bends = Entries(hessian.sparsity(), columns, columns)
+        self._bends = Entries(self.functions["hess_lag"].sparsity_out(0), columns, columns)
 
     def start(self, x: Floats, p: Floats) -> Floats:
         """Values of the lifted variables."""
@@ -165,6 +162,15 @@ class Elimination:
             part = slice(ends[k], ends[k + 1] - 1)
             slopes[k] -= values[part] @ slopes[column[part]]
         return slopes
+
+
+def _written(nlp: Expressions) -> WrittenNlp:
+    """NLP without lifted variables."""
+    import casadi as ca
+
+    lam_f, lam_g = ca.SX.sym("f"), ca.SX.sym("g", nlp.g.numel())
+    lagrangian = lam_f * nlp.f + ca.dot(lam_g, nlp.g)
+    return WrittenNlp(nlp.x, nlp.p, nlp.f, nlp.g, ca.jacobian(nlp.g, nlp.x), lam_f, lam_g, lagrangian)
 
 
 class EliminatedSolver:
@@ -243,7 +249,7 @@ def ipopt_options(settings: Settings, warm: bool) -> dict[str, Any]:
 
 
 def graph_size(program: Program, x: Mapping[str, float]) -> int | None:
-    """Number of nodes of the expressions of objectives and rows, a whole-cycle row at one crank angle.
+    """Number of nodes of the expressions of objectives and rows, whole-cycle rows and sums at one crank angle.
 
     x: variables, SI, of a design with the cycle's pieces; None where the mechanism does not assemble.
     """
@@ -253,7 +259,7 @@ def graph_size(program: Program, x: Mapping[str, float]) -> int | None:
     if sampler is None:
         return None
     nlp = expressions(structure(program, sampler, 1))
-    return int(ca.n_nodes(ca.vertcat(nlp.f, nlp.g)))
+    return int(ca.n_nodes(ca.vertcat(nlp.f, nlp.g, *nlp.lifts.recorder.formulas)))
 
 
 NLPS, CACHE_SIZE = "NLPs", 32
@@ -300,14 +306,16 @@ class Transcription:
 
     def __init__(self, nlp_structure: Structure) -> None:
         self.structure, self.rows = nlp_structure, nlp_structure.rows
-        nlp_expressions = expressions(nlp_structure)
-        self.nlp = {"x": nlp_expressions.x, "p": nlp_expressions.p, "f": nlp_expressions.f, "g": nlp_expressions.g}
-        self._elimination = Elimination(nlp_expressions, self.rows) if nlp_expressions.lifts.variables else None
+        written = expressions(nlp_structure)
+        self.nlp = {"x": written.x, "p": written.p, "f": written.f, "g": written.g}
+        self._elimination = Elimination(written, self.rows) if written.lifts.variables else None
         self._solvers: dict[Hashable, Any] = {}
         self._derivatives: dict[str, Any] = {}
         self._buffered: dict[str, Buffered] = {}
         if self._elimination:
             self.nlp, self._derivatives = self._elimination.nlp, self._elimination.functions
+        elif written.lifts.recorder.column.numel():
+            self.nlp, self._derivatives = _written(written).functions(written.lifts.recorder)
 
     def solver(self, warm: bool, settings: Settings) -> Any:
         """IPOPT for this NLP, for a cold or a warm start."""
