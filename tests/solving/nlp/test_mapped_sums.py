@@ -19,7 +19,9 @@ DESIGN = {"l1": 0.0311, "l2": 0.07, "l3": 0.152, "l4": 0.166, "s": 0.011}
 def sampled_pulse(folder):
     """Curve of the resistance with more intervals than a switch selects one of by a formula."""
     angles = np.linspace(-14.9, 14.9, 13)
-    rows = [f"{angle!r},{745 * np.cos(np.pi * angle / 29.8):.6f},{int(abs(angle) == 14.9)}" for angle in angles.tolist()]
+    rows = [
+        f"{angle!r},{745 * np.cos(np.pi * angle / 29.8):.6f},{int(abs(angle) == 14.9)}" for angle in angles.tolist()
+    ]
     path = folder / "pulse.csv"
     path.write_text("\n".join(["angle [deg],M [N*m],corner", *rows]) + "\n", encoding="utf-8")
     return str(path)
