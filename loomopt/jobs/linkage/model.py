@@ -24,7 +24,7 @@ from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Floats, Node, Where
 from loomopt.physics.effects.coulomb import TURNS
 from loomopt.physics.effects.kinds import Effect, Load, Motion, State
-from loomopt.physics.mechanisms import chain, chain_forces
+from loomopt.physics.mechanisms import chain
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.chain import Chain, Part, Ref, cam_switch
 from loomopt.physics.mechanisms.dead_centres import CrankRockerGroup, crank_rockers
@@ -639,7 +639,7 @@ class Linkage(Kinematics):
         """Linkage whose output is the link, slider or slot of an event."""
         if not place.of:
             return self
-        measure = "angle" if place.of in chain_forces.origins(self.chain) else "slide"
+        measure = "angle" if place.of in self.chain.origins else "slide"
         return dataclasses.replace(self, output=Output(measure, place.of), places=(), path=None)
 
     def corner_words(self, corner: Corner) -> str:

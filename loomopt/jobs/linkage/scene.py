@@ -43,7 +43,7 @@ from loomopt.model.change import CHANGE
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node, Where
 from loomopt.physics.effects import kinds
-from loomopt.physics.mechanisms import chain, chain_forces
+from loomopt.physics.mechanisms import chain
 from loomopt.physics.mechanisms.chain import Chain
 from loomopt.physics.schema import DIGITS, Axis, Figure, Name, Table, Target, TargetTable
 from loomopt.scenes import csv_tables
@@ -193,7 +193,7 @@ def _output(cursor: Cursor, linked: Chain, numbers: Numbers) -> Output:
 def _carrier(linked: Chain, form: str, name: str) -> str:
     """Link or joint that carries the mass of an output: `Output.carrier`."""
     if form == "angle":
-        return name if chain_forces.origins(linked).get(name) in linked.pivots else ""
+        return name if linked.origins.get(name) in linked.pivots else ""
     if form != "slide":
         return name
     part = next(part for part in linked.parts if part.name == name)

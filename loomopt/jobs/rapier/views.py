@@ -97,6 +97,7 @@ def _linkage(d: Dimensions) -> SimpleNamespace:
         dyad=Dyad(link, driving, 2 * d.l5 * d.l6 * sp.sin(phi6 - phi5)),
         sley_dyad=Dyad(rod, sley, 2 * d.l2 * d.l3 * sp.sin(phi3 - phi2)),
         carrier=polar(system, d.l3p, phi3 + d.alpha),
+        main_crank=polar(system, d.l1, symbol("phi1") + symbol("beta") + phi7),
         second_crank=polar(system, d.l4, phi4),
         main_shaft=polar(system, -d.l71, phi7),
         stand=Stand(symbol("beta"), phi7),

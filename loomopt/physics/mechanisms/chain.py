@@ -10,6 +10,7 @@ Interface:
     pose.margins[part].spans[name]()                   1 where a group is singular; `closes(part)` has their phrases
     fault(linked, values, shown)                       sentence on the part that does not close, with the crank angle
     linked.joints, .links, .slides, .pivots            names; .bars, .bodies: what is drawn
+    linked.owners, .origins                            body of each joint; joint about which each link turns
     provides(part), wants(part)                        names that a part places, and names that it depends on
     linked.cams, .corners(cam, …), .switch(…)          cams: a switch of the node selects the interval of each
 A number of a part is a name in `values`, its negative, or a literal (Ref); the literal 0 is in no formula.
@@ -26,7 +27,7 @@ from loomopt.base.units import ShowValue, usual
 from loomopt.maths.systems import FLOAT, Maths, Number, numpy
 from loomopt.physics.mechanisms.assur_groups import Closure, OnGuide, Slide, Slotted, TwoLinks
 from loomopt.physics.mechanisms.dwell_cam import DwellCam, Stretches, stretches
-from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.dyad import Dyad, Vector
 from loomopt.physics.mechanisms.moving import (
     FRAME,
     Joint,
@@ -109,7 +110,10 @@ class Part:
 
 @dataclass
 class ChainPose:
-    """Linkage at crank angles φ, rad, of any shape; values: numbers by name, SI; switch: intervals of the cams."""
+    """Linkage at crank angles φ, rad, of any shape; values: numbers by name, SI; switch: intervals of the cams.
+
+    closed: both links of each RRR group as vectors to its pin.
+    """
 
     maths: Maths
     values: Values
@@ -119,6 +123,7 @@ class ChainPose:
     links: dict[str, Link] = field(default_factory=lambda: {FRAME_NAME: FRAME})
     slides: dict[str, Slide] = field(default_factory=dict)
     margins: dict[str, Closure] = field(default_factory=dict)
+    closed: dict[str, Callable[[], Dyad]] = field(default_factory=dict)
 
     def number(self, part: Part, key: str) -> Number | None:
         """Number of a part; None if it is not given, or a literal 0."""
@@ -259,7 +264,7 @@ def _dyad(pose: ChainPose, part: Part) -> None:
     pose.links.update(zip(names, (begin, end), strict=True))
     # The pin is reached over the second link: fewest terms where its joint is fixed.
     pose.joints[part.word("pin")] = Joint(end.carried(end.heading))
-    pose.margins[part.name] = group
+    pose.margins[part.name], pose.closed[part.name] = group, lambda: group.closed
 
 
 def _slider(pose: ChainPose, part: Part) -> None:
@@ -302,6 +307,11 @@ KINDS: Mapping[str, Callable[[ChainPose, Part], None]] = {
 }
 DRIVERS = frozenset({"crank", "gear", "cam"})
 """Parts that are a link of their own name."""
+
+
+def slider_of(part: str) -> str:
+    """Name of the body that slides in a part."""
+    return f"slider {part}"
 
 
 def joints_of(part: Part) -> tuple[str, ...]:
@@ -415,11 +425,8 @@ class Chain:
     def bars(self) -> tuple[tuple[str, str, str], ...]:
         """(link, joint, joint) of every line that is drawn."""
         triples: list[tuple[str, str, str]] = []
-        origin: dict[str, str] = {}
         for part in self.parts:
-            pin = part.word("pin")
-            starts = part.names("joins") or (part.word("from") or part.word("at"),)
-            origin |= dict(zip(links_of(part), starts, strict=False))
+            pin, origin = part.word("pin"), self.origins
             if part.kind == "slot":
                 triples.append((part.word("link"), part.word("at"), part.word("through")))
             if part.kind == "point":
@@ -427,6 +434,26 @@ class Chain:
             elif pin:
                 triples += [(link, origin[link], pin) for link in links_of(part)]
         return tuple(triples)
+
+    @lazy
+    def origins(self) -> Mapping[str, str]:
+        """Joint about which each link turns, and its moment is reckoned."""
+        joints: dict[str, str] = {}
+        for part in self.parts:
+            starts = part.names("joins") or (part.word("from") or part.word("at"),)
+            joints |= dict(zip(links_of(part), starts, strict=False))
+        return joints
+
+    @lazy
+    def owners(self) -> Mapping[str, str]:
+        """Body that each joint belongs to: a pin of two links to the second one, a slider's to the slider."""
+        bodies: dict[str, str] = {}
+        for part in self.parts:
+            if part.kind in ("pivot", "point"):
+                bodies[part.name] = part.word("on") or FRAME_NAME
+            elif part.word("pin"):
+                bodies[part.word("pin")] = slider_of(part.name) if part.kind == "slider" else links_of(part)[-1]
+        return bodies
 
     @lazy
     def bodies(self) -> Mapping[str, tuple[str, ...]]:

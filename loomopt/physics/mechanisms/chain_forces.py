@@ -7,56 +7,19 @@ the line of centres: what parts the wheels is left out; gears on one axis hand o
 follower no part tells: it gives a torque, and the follower's own pivot stays unknown. Symbols: `joint_forces`.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+import functools
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from loomopt.base.records import lazy
-from loomopt.maths.systems import Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.kinds import Applied
 from loomopt.physics.mechanisms import joint_forces
-from loomopt.physics.mechanisms.chain import FRAME_NAME, Chain, ChainPose, Part
+from loomopt.physics.mechanisms.chain import FRAME_NAME, Chain, ChainPose, Part, slider_of
 from loomopt.physics.mechanisms.dyad import Dyad, Vector, cross, dot
 from loomopt.physics.mechanisms.joint_forces import Wrench, minus, plus
-from loomopt.physics.mechanisms.moving import known, less, polar, total, turned_by
-
-
-def slider_of(part: str) -> str:
-    """Name of the body that slides in a part."""
-    return f"slider {part}"
-
-
-def owners(linked: Chain) -> dict[str, str]:
-    """Body that each joint belongs to."""
-    bodies = {}
-    for part in linked.parts:
-        pin = part.word("pin")
-        if part.kind == "pivot":
-            bodies[part.name] = FRAME_NAME
-        elif part.kind == "point":
-            bodies[part.name] = part.word("on")
-        elif pin:
-            by_kind = {
-                "dyad": part.names("links")[-1:],
-                "slider": (slider_of(part.name),),
-                "slot": (part.word("link"),),
-            }
-            bodies[pin] = by_kind.get(part.kind, (part.name,))[0]
-    return bodies
-
-
-def origins(linked: Chain) -> dict[str, str]:
-    """Joint about which each link's moment is reckoned."""
-    joints: dict[str, str] = {}
-    for part in linked.parts:
-        if part.kind == "dyad":
-            joints |= dict(zip(part.names("links"), part.names("joins"), strict=True))
-        elif part.kind == "slider":
-            joints[part.names("links")[0]] = part.word("from")
-        elif part.kind == "slot":
-            joints[part.word("link")] = part.word("at")
-        elif part.kind in ("crank", "gear", "cam"):
-            joints[part.name] = part.word("at")
-    return joints
+from loomopt.physics.mechanisms.moving import FRAME, Joint, Link, known, less, polar, total, turned_by
+from loomopt.physics.schema import Values
 
 
 def joint_pairs(linked: Chain) -> Iterator[tuple[str, str]]:
@@ -72,14 +35,16 @@ def joint_pairs(linked: Chain) -> Iterator[tuple[str, str]]:
             yield part.word("at"), part.name
 
 
-def names(linked: Chain) -> dict[tuple[str, str], str]:
+@functools.lru_cache(maxsize=64)
+def names(linked: Chain) -> Mapping[tuple[str, str], str]:
     """Names of the forces by joint and part: after the joint, and after the part too where several parts share it."""
     places = list(joint_pairs(linked))
     shared = [joint for joint, _ in places]
     return {place: place[0] if shared.count(place[0]) == 1 else f"{place[0]}_{place[1]}" for place in places}
 
 
-def pin_forces(linked: Chain) -> dict[tuple[str, str], str]:
+@functools.lru_cache(maxsize=64)
+def pin_forces(linked: Chain) -> Mapping[tuple[str, str], str]:
     """Forces in pins: all but those of guides."""
     return {place: name for place, name in names(linked).items() if place[0] != place[1]}
 
@@ -92,13 +57,13 @@ def body_pair(linked: Chain, place: tuple[str, str]) -> tuple[str, str]:
         first, second = part.names("links")
         if joint == part.word("pin"):
             return first, second
-        return owners(linked)[joint], first if joint == part.names("joins")[0] else second
+        return linked.owners[joint], first if joint == part.names("joins")[0] else second
     if part.kind == "slider":
         (link,), slider = part.names("links"), slider_of(name)
         if joint == name:
             return part.word("guide") or FRAME_NAME, slider
-        return (link, slider) if joint == part.word("pin") else (owners(linked)[joint], link)
-    return owners(linked)[joint], part.word("link") if part.kind == "slot" else name
+        return (link, slider) if joint == part.word("pin") else (linked.owners[joint], link)
+    return linked.owners[joint], part.word("link") if part.kind == "slot" else name
 
 
 def guides(linked: Chain) -> dict[str, str]:
@@ -116,17 +81,52 @@ def pin_rotation(linked: Chain, pose: ChainPose, place: tuple[str, str]) -> Numb
 
 def meshing_gears(linked: Chain) -> tuple[str, ...]:
     """Gears that touch their mates at their pitch circles."""
-    joints = origins(linked)
     gears = (part for part in linked.parts if part.kind == "gear" and part.ratio != 1)
-    return tuple(part.name for part in gears if joints[part.word("with")] != part.word("at"))
+    return tuple(part.name for part in gears if linked.origins[part.word("with")] != part.word("at"))
+
+
+class PlacedLink(NamedTuple):
+    """Link of a mechanism with formulas of its own: its vector, length, m, and first derivative of its angle."""
+
+    vector: Callable[[], Vector]
+    length: Number
+    rate: Callable[[], Number]
+
+
+def placed(
+    maths: Maths,
+    values: Values,
+    joints: Mapping[str, Vector],
+    links: Mapping[str, PlacedLink],
+    closed: Mapping[str, Callable[[], Dyad]],
+) -> ChainPose:
+    """Pose of a chain whose mechanism has formulas of its own, as far as forces read it.
+
+    joints: places, m, of those on drivers, of pivots and of points; closed: both links of each RRR group.
+    """
+    at = {name: Joint(functools.partial(_place, place)) for name, place in joints.items()}
+    moving = {
+        name: Link(FRAME.origin, link.vector, functools.partial(_rate, link.rate), link.length)
+        for name, link in links.items()
+    }
+    return ChainPose(maths, values, None, joints=at, links={FRAME_NAME: FRAME, **moving}, closed=dict(closed))
+
+
+def _place(place: Vector, order: int) -> Vector:
+    return place
+
+
+def _rate(rate: Callable[[], Number], order: int) -> Number:
+    return rate()
 
 
 @dataclass
 class Walk:
     """A chain at one instant while its groups are solved.
 
-    forces: by joint and part, on that part's link, N; of a pin between two links of a group on the second one; teeth:
-    by gear, N, of the mate on it; torque: what the main shaft must give, N·m.
+    loads: by body, moments about its joint of `Chain.origins`; forces: by joint and part, on that part's link, N; of a
+    pin between two links of a group on the second one; teeth: by gear, N, of the mate on it; torque: what the main
+    shaft must give, N·m; symbols: all loads of a body, where equations have symbols for them.
     """
 
     linked: Chain
@@ -135,38 +135,41 @@ class Walk:
     forces: dict[tuple[str, str], Vector] = field(default_factory=dict)
     teeth: dict[str, Number] = field(default_factory=dict)
     torque: Number = 0
-
-    @lazy
-    def owners(self) -> Mapping[str, str]:
-        """The body that each joint belongs to."""
-        return owners(self.linked)
-
-    @lazy
-    def origins(self) -> Mapping[str, str]:
-        """The joint about which each link's moment is reckoned."""
-        return origins(self.linked)
+    symbols: dict[str, Wrench] = field(default_factory=dict)
 
     def at(self, joint: str) -> Vector:
         """Position of a joint, m."""
         return self.pose.joints[joint].place
 
-    def push(self, body: str, force: Vector | None, place: Vector, couple: Number | None = None) -> None:
-        """Load a body."""
-        moment = known(couple)
-        if force is not None:
-            turning = cross(place, force)
-            moment = turning if couple is None else moment + turning
-        self.loads.setdefault(body, []).append(Wrench(force or Vector(0, 0), moment))
+    def load(self, body: str, wrench: Wrench) -> None:
+        """Load a body; moment about its own joint."""
+        self.loads.setdefault(body, []).append(wrench)
 
-    def acting(self, body: str, joint: str) -> Wrench | None:
-        """Load on a body about one of its joints; None without any."""
-        wrench = joint_forces.together(self.loads.get(body, ()))
-        return None if wrench is None else Wrench(wrench.force, wrench.moment - cross(self.at(joint), wrench.force))
+    def push(self, body: str, force: Vector | None, place: Vector, couple: Number | None = None) -> None:
+        """Load a body by a force at a place and a couple; the frame and what slides feel no moment."""
+        moment, origin = known(couple), self.linked.origins.get(body)
+        if force is not None and origin is not None:
+            base = self.at(origin)
+            turning = 0 if place is base else cross(plus(place, minus(base)), force)
+            moment = turning if couple is None else moment + turning
+        self.load(body, Wrench(force or Vector(0, 0), moment))
+
+    def acting(self, body: str) -> Wrench | None:
+        """Load on a body; None without any."""
+        return self.symbols.get(body) or joint_forces.together(self.loads.get(body, ()))
 
     def given(self, joint: str, part: Part, force: Vector) -> None:
         """Store the force of a joint on a part's link, and the opposite force on the link of the joint."""
         self.forces[joint, part.name] = force
-        self.push(self.owners[joint], minus(force), self.at(joint))
+        owner = self.linked.owners[joint]
+        if owner != FRAME_NAME:
+            self.push(owner, minus(force), self.at(joint))
+
+    def solve_all(self) -> "Walk":
+        """Walk with all its parts solved, from the last one back to the crank."""
+        for part in reversed(self.linked.parts):
+            self.solve(part)
+        return self
 
     def solve(self, part: Part) -> None:
         """Solve a part that nothing hangs on any more."""
@@ -178,8 +181,7 @@ class Walk:
 
     def _dyad(self, part: Part) -> None:
         (a, b), (first, second), pin = part.names("joins"), part.names("links"), part.word("pin")
-        r1, r2 = plus(self.at(pin), minus(self.at(a))), plus(self.at(pin), minus(self.at(b)))
-        forces = joint_forces.two_links(Dyad(r1, r2, 2 * cross(r1, r2)), self.acting(first, a), self.acting(second, b))
+        forces = joint_forces.two_links(self.pose.closed[part.name](), self.acting(first), self.acting(second))
         self.forces[pin, part.name] = forces.inner
         self.given(a, part, forces.outer1)
         self.given(b, part, forces.outer2)
@@ -187,8 +189,8 @@ class Walk:
     def _slider(self, part: Part) -> None:
         start, pin, guide = part.word("from"), part.word("pin"), part.word("guide") or FRAME_NAME
         along = self.sliding(part)
-        link = self.acting(part.names("links")[0], start) or Wrench(Vector(0, 0), 0)
-        slider = self.acting(slider_of(part.name), pin) or Wrench(Vector(0, 0), 0)
+        link = self.acting(part.names("links")[0]) or NOTHING
+        slider = self.acting(slider_of(part.name)) or NOTHING
         arm = plus(self.at(pin), minus(self.at(start)))
         forces = joint_forces.link_and_slider(arm, along, link, slider.force)
         self.forces[pin, part.name], self.forces[part.name, part.name] = forces.inner, forces.outer2
@@ -202,25 +204,20 @@ class Walk:
 
     def _slot(self, part: Part) -> None:
         pivot, through, link = part.word("at"), part.word("through"), part.word("link")
-        arm, lever = plus(self.at(through), minus(self.at(pivot))), self.acting(link, pivot)
-        nothing = Wrench(Vector(0, 0), 0)
-        forces = joint_forces.slotted_lever(arm, self.pose.links[link].unit(), lever or nothing, nothing)
+        arm, lever = plus(self.at(through), minus(self.at(pivot))), self.acting(link)
+        forces = joint_forces.slotted_lever(arm, self.pose.links[link].unit(), lever or NOTHING, NOTHING)
         self.given(pivot, part, forces.outer1)
         self.given(through, part, forces.outer2)
 
     def _driver(self, part: Part) -> None:
-        joint = part.word("at")
-        wrench = self.acting(part.name, joint)
-        if wrench is None:
-            wrench = Wrench(Vector(0, 0), 0)
-        rate = part.ratio if part.kind == "crank" else known(self.pose.links[part.name].rates(1))
-        self.torque = self.torque - wrench.moment * rate
+        wrench = self.acting(part.name) or NOTHING
+        self.torque = self.torque - wrench.moment * known(self.pose.links[part.name].rates(1))
         if part.kind == "crank":
-            self.given(joint, part, minus(wrench.force))
+            self.given(part.word("at"), part, minus(wrench.force))
 
     def _gear(self, part: Part) -> None:
         joint, mate = part.word("at"), part.word("with")
-        wrench = self.acting(part.name, joint) or Wrench(Vector(0, 0), 0)
+        wrench = self.acting(part.name) or NOTHING
         torque, here = -wrench.moment, self.at(joint)
         if part.name not in meshing_gears(self.linked):
             # On one axis, or side by side with the same speed: a couple, and what is left of it on the carrier.
@@ -228,26 +225,34 @@ class Walk:
             self.push(part.word("carrier") or FRAME_NAME, None, here, (part.ratio - 1) * torque)
             self.given(joint, part, minus(wrench.force))
             return
-        between = plus(self.at(self.origins[mate]), minus(here))
-        distance = self.pose.maths.sqrt(dot(between, between))
-        towards, radius = Vector(between.x / distance, between.y / distance), distance / (1 - part.ratio)
+        between = plus(self.at(self.linked.origins[mate]), minus(here))
+        distance, radius = self.pose.maths.sqrt(dot(between, between)), self.pose.number(part, "radius")
+        towards = Vector(between.x / distance, between.y / distance)
+        radius = distance / (1 - part.ratio) if radius is None else radius
         self.teeth[part.name] = torque / radius
         push = joint_forces.tooth_force(torque, radius, towards)
         self.push(mate, minus(push), Vector(here.x + radius * towards.x, here.y + radius * towards.y))
         self.given(joint, part, minus(plus(wrench.force, push)))
 
 
-def solve_forces(linked: Chain, pose: ChainPose, applied: Sequence[Applied]) -> Walk:
-    """Chain with the forces in all its joints, N, and the torque of the main shaft."""
+NOTHING = Wrench(Vector(0, 0), 0)
+"""Load of a link that carries none."""
+
+
+def loaded(linked: Chain, pose: ChainPose, applied: Sequence[Applied]) -> Walk:
+    """Chain with its loads, not yet solved."""
     walk = Walk(linked, pose)
     for load in applied:
         if load.on in pose.joints:
-            walk.push(walk.owners[load.on], load.force, load.place or walk.at(load.on), load.couple)
+            walk.push(linked.owners[load.on], load.force, load.place or walk.at(load.on), load.couple)
         else:
             walk.push(load.on, load.force, load.place or Vector(0, 0), load.couple)
-    for part in reversed(linked.parts):
-        walk.solve(part)
     return walk
+
+
+def solve_forces(linked: Chain, pose: ChainPose, applied: Sequence[Applied]) -> Walk:
+    """Chain with the forces in all its joints, N, and the torque of the main shaft."""
+    return loaded(linked, pose, applied).solve_all()
 
 
 def shaken(applied: Sequence[Applied], pose: ChainPose, about: Vector) -> Wrench:

@@ -5,8 +5,8 @@ F_J is the force of the part nearer the drive on the next one: frame → crank (
 their force. Weights are those of effect gravity. Shaking force −Σ m a_S, moment −Σ (p_S × m a_S + J α) about A.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+import functools
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Protocol
 
 from loomopt.base.records import lazy
@@ -14,13 +14,16 @@ from loomopt.base.units import ShowValue
 from loomopt.maths.systems import Number
 from loomopt.physics.effects import pins
 from loomopt.physics.effects.beatup import ReedPose, gravity
-from loomopt.physics.effects.kinds import Check, Inputs, LinkMass, Loading
+from loomopt.physics.effects.chain_joints import ChainForces
+from loomopt.physics.effects.kinds import Check, Inputs, LinkMass
 from loomopt.physics.mechanisms import joint_forces
 from loomopt.physics.mechanisms.dyad import Vector, cross
-from loomopt.physics.mechanisms.joint_forces import PairForces, Wrench
+from loomopt.physics.mechanisms.joint_forces import Wrench
 from loomopt.physics.schema import Figure
 
 if TYPE_CHECKING:
+    from loomopt.physics.mechanisms.chain import Chain, ChainPose
+    from loomopt.physics.mechanisms.chain_forces import Walk
     from loomopt.physics.mechanisms.crank_rocker import CrankRockerPose
 
 PLACED = ("mechanism.m4", "mechanism.r4")
@@ -44,6 +47,16 @@ SIDES = {
 }
 
 
+@functools.cache
+def crank_rocker() -> "Chain":
+    """Crank-rocker as a chain of parts."""
+    from loomopt.physics.mechanisms.chain import Chain, Part
+
+    dyad = (("joins", ("B", "D")), ("links", ("rod", "rocker")), ("pin", "C"))
+    crank = Part("crank", "crank", (("at", "A"), ("pin", "B")))
+    return Chain((Part("pivot", "A"), Part("pivot", "D"), crank, Part("dyad", "rod and rocker", dyad)))
+
+
 class Swinging(Protocol):
     """Part of a motion that the masses on the rocking shaft read."""
 
@@ -60,12 +73,43 @@ class Swinging(Protocol):
         """q¨, rad/s²."""
 
 
-@dataclass(frozen=True)
-class CrankRockerForces:
+class CrankRockerForces(ChainForces):
     """Forces in the joints A to D, N, and on the frame, at one instant; each when it is first read."""
 
     at: Inputs[ReedPose]
-    loading: Loading
+
+    @property
+    def linked(self) -> "Chain":
+        """Crank-rocker as a chain of parts."""
+        return crank_rocker()
+
+    @lazy
+    def placed(self) -> "ChainPose":
+        """Crank, rod and rocker at the instant."""
+        from loomopt.physics.mechanisms.chain_forces import PlacedLink, placed
+
+        linkage, sides = self.linkage, self.linkage.lengths
+        links = {
+            "crank": PlacedLink(lambda: linkage.crank, sides.l1, lambda: 1),
+            "rod": PlacedLink(lambda: linkage.dyad.link1, sides.l2, lambda: linkage.rod_1),
+            "rocker": PlacedLink(lambda: linkage.dyad.link2, sides.l3, lambda: -self.at.pose.q1),
+        }
+        joints = {"A": Vector(0, 0), "B": linkage.crank, "D": Vector(sides.l4, 0)}
+        return placed(self.at.maths, self.at.values, joints, links, {"rod and rocker": lambda: linkage.dyad})
+
+    def loaded(self) -> "Walk":
+        """Chain with M3, all masses and weights."""
+        from loomopt.physics.mechanisms.chain_forces import Walk
+
+        walk = Walk(self.linked, self.placed)
+        walk.load("rocker", Wrench(joint_forces.plus(self.swung.force, *self.loading.pushes), self.loading.force))
+        for wrench in (self.rod, self.rod_weight):
+            if wrench is not None:
+                walk.load("rod", wrench)
+        for force in (self.crank, self._crank_weight):
+            if force is not None:
+                walk.push("crank", force, walk.at("A"))
+        return walk
 
     @property
     def linkage(self) -> "CrankRockerPose":
@@ -127,13 +171,6 @@ class CrankRockerForces:
         yield from pairs
 
     @lazy
-    def group(self) -> PairForces:
-        """The group of rod and rocker, loaded by M3, all masses and weights."""
-        force = joint_forces.plus(self.swung.force, *self.loading.pushes)
-        rod = joint_forces.together(wrench for wrench in (self.rod, self.rod_weight) if wrench is not None)
-        return joint_forces.two_links(self.linkage.dyad, rod, Wrench(force, self.loading.force))
-
-    @lazy
     def rod_weight(self) -> Wrench | None:
         """The rod's weight about B; None where it has none."""
         given = self.at.values
@@ -161,27 +198,6 @@ class CrankRockerForces:
         return Vector(-share * carried.x, -share * carried.y)
 
     @lazy
-    def force_A(self) -> Vector:
-        """Of the frame on the crank."""
-        wrenches = (wrench for wrench in (self.crank, self._crank_weight) if wrench is not None)
-        return joint_forces.plus(self.group.outer1, *map(joint_forces.minus, wrenches))
-
-    @property
-    def force_B(self) -> Vector:
-        """Of the crank on the rod."""
-        return self.group.outer1
-
-    @property
-    def force_C(self) -> Vector:
-        """Of the rod on the rocker."""
-        return self.group.inner
-
-    @property
-    def force_D(self) -> Vector:
-        """Of the frame on the rocker."""
-        return self.group.outer2
-
-    @lazy
     def shaking_force(self) -> Vector:
         """Of all moving masses on the frame."""
         others = [self.rod.force] if self.rod else []
@@ -194,19 +210,6 @@ class CrankRockerForces:
         if self.rod is None:
             return about
         return about + self.rod.moment + cross(self.linkage.crank, self.rod.force)
-
-    def heading(self, part: str) -> Vector:
-        """Unit direction of crank, rod or rocker."""
-        linkage = self.linkage
-        vectors = {"crank": (linkage.crank, linkage.lengths.l1), "rod": (linkage.dyad.link1, linkage.lengths.l2)}
-        return joint_forces.unit(*{**vectors, "rocker": (linkage.dyad.link2, linkage.lengths.l3)}[part])
-
-    @lazy
-    def friction_work(self) -> Mapping[str, Number]:
-        """Friction torque per newton in the joints, m per rad of the crank: μ r |δ'|; δ: rotation of the pin."""
-        rod, rocker = self.linkage.rod_1, -self.at.pose.q1
-        turned = {"A": 1, "B": rod - 1, "C": rocker - rod, "D": rocker}
-        return pins.works(self.at, {joint: (f"force_{joint}", turn) for joint, turn in turned.items()})
 
 
 def remark(at: Inputs[object], shown: ShowValue) -> str:

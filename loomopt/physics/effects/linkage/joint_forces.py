@@ -6,19 +6,19 @@ slides; what only turns with the output, or slides with it, shakes the frame wit
 """
 
 import functools
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from loomopt.base.records import lazy
 from loomopt.maths.systems import Number
 from loomopt.physics.effects import pins
+from loomopt.physics.effects.chain_joints import ChainForces
 from loomopt.physics.effects.kinds import Applied, Check, Inputs, Loading
 from loomopt.physics.effects.linkage import LinkagePose
 from loomopt.physics.schema import Figure, Table
 
 if TYPE_CHECKING:
-    from loomopt.physics.mechanisms.chain import Chain
+    from loomopt.physics.mechanisms.chain import Chain, ChainPose
     from loomopt.physics.mechanisms.chain_forces import Walk
     from loomopt.physics.mechanisms.dyad import Vector
     from loomopt.physics.mechanisms.joint_forces import Wrench
@@ -34,16 +34,22 @@ class Parameters(Table):
     """No values of its own."""
 
 
-class LinkageForces:
+class LinkageForces(ChainForces):
     """Forces at one instant, by the names of their figures; each when it is first read."""
 
     def __init__(self, linked: "Chain | None", at: Inputs[Any], loading: Loading) -> None:
         assert linked is not None
-        self.linked, self.at, self.pose, self.loading = linked, at, at.pose, loading
+        self.at, self.loading, self.pose, self._linked = at, loading, at.pose, linked
+
+    @property
+    def linked(self) -> "Chain":
+        """Parts of the linkage."""
+        return self._linked
 
     def output(self, size: Number, inertial: bool = False) -> list[Applied]:
         """Loads that a force or torque at the output is; size: as the output counts it."""
-        from loomopt.physics.mechanisms.chain_forces import Walk, slider_of
+        from loomopt.physics.mechanisms.chain import slider_of
+        from loomopt.physics.mechanisms.chain_forces import Walk
         from loomopt.physics.mechanisms.dyad import Vector
         from loomopt.physics.mechanisms.moving import scaled
 
@@ -72,45 +78,18 @@ class LinkageForces:
             return []
         return self.output(-self.loading.inertia * self.pose.acceleration, True)
 
-    @lazy
-    def walk(self) -> "Walk":
-        """The chain with all its loads, solved."""
+    @property
+    def placed(self) -> "ChainPose":
+        """The linkage at the instant."""
+        pose: ChainPose = self.pose.joints
+        return pose
+
+    def loaded(self) -> "Walk":
+        """The chain with all its loads."""
         from loomopt.physics.mechanisms import chain_forces
 
         loads = [*self.loading.applied, *self.output(-self.loading.force)]
-        return chain_forces.solve_forces(self.linked, self.pose.joints, loads)
-
-    @lazy
-    def _called(self) -> dict[str, tuple[str, str]]:
-        from loomopt.physics.mechanisms import chain_forces
-
-        return {f"force_{name}": place for place, name in chain_forces.names(self.linked).items()}
-
-    def __getattr__(self, name: str) -> "Vector | Number":
-        if name.startswith("teeth_"):
-            return self.walk.teeth[name.removeprefix("teeth_")]
-        if not name.startswith("force_"):
-            raise AttributeError(name)
-        return self.walk.forces[self._called[name]]
-
-    def heading(self, part: str) -> "Vector":
-        """Unit direction of a body; of a slider that of its guide."""
-        from loomopt.physics.mechanisms import chain_forces
-
-        body = chain_forces.guides(self.linked).get(part, part)
-        direction: Vector = self.pose.joints.links[body].unit()
-        return direction
-
-    @lazy
-    def friction_work(self) -> Mapping[str, Number]:
-        """Friction torque per newton in the pins, m per rad of the crank."""
-        from loomopt.physics.mechanisms import chain_forces
-
-        turned = {
-            name: (f"force_{name}", chain_forces.pin_rotation(self.linked, self.pose.joints, place))
-            for place, name in chain_forces.pin_forces(self.linked).items()
-        }
-        return pins.works(self.at, turned)
+        return chain_forces.loaded(self.linked, self.placed, loads)
 
     @lazy
     def _shaken(self) -> "Wrench":

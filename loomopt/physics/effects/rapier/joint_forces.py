@@ -7,29 +7,22 @@ main shaft's, of twice its radius. Left out: what parts the wheels (its pressure
 tooth force at B2, and what beats up, whose forces add.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+import functools
+from typing import TYPE_CHECKING
 
 from loomopt.base.records import lazy
 from loomopt.base.units import ShowValue
 from loomopt.maths.systems import Number
 from loomopt.physics.effects import pins
-from loomopt.physics.effects.kinds import Check, Inputs, Loading, Motion
-from loomopt.physics.mechanisms.dyad import Vector, cross
-from loomopt.physics.mechanisms.joint_forces import (
-    PairForces,
-    Wrench,
-    crank_torque,
-    minus,
-    plus,
-    tooth_force,
-    two_links,
-    unit,
-)
+from loomopt.physics.effects.chain_joints import ChainForces
+from loomopt.physics.effects.kinds import Check, Inputs, Motion
+from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.joint_forces import Wrench, plus
 from loomopt.physics.schema import Figure
 
 if TYPE_CHECKING:
+    from loomopt.physics.mechanisms.chain import Chain, ChainPose
+    from loomopt.physics.mechanisms.chain_forces import Walk
     from loomopt.physics.mechanisms.rapier_drive import RapierPose
 
 JOINTS = {
@@ -57,113 +50,80 @@ SIDES = {
 PINS = {joint: text.removeprefix("peak force in the ") for joint, text in JOINTS.items()}
 
 
-@dataclass(frozen=True)
-class RapierForces:
+@functools.cache
+def drive(pitch_radius: bool) -> "Chain":
+    """Drive as a chain of parts; pitch_radius: whether the scene gives that of the second crank's gear."""
+    from loomopt.physics.mechanisms.chain import Chain, Part, Ref
+
+    gear = (("at", "C0"), ("with", "crank"), ("ratio", -2), ("pin", "C"))
+    radius = (("radius", Ref("gears.pitch_radius")),) if pitch_radius else ()
+    four_bar = (("joins", ("A", "B0")), ("links", ("rod", "sley")), ("pin", "B1"))
+    five_bar = (("joins", ("C", "B2")), ("links", ("link 5", "driving link")), ("pin", "D"))
+    return Chain(
+        (
+            *(Part("pivot", name) for name in ("A0", "B0", "C0")),
+            Part("crank", "crank", (("at", "A0"), ("pin", "A"))),
+            Part("dyad", "four-bar", four_bar),
+            Part("point", "B2", (("on", "sley"),)),
+            Part("gear", "second crank", gear, radius),
+            Part("dyad", "five-bar", five_bar),
+        )
+    )
+
+
+class RapierForces(ChainForces):
     """Forces in the joints, N, at one instant; each when it is first read."""
 
-    at: Inputs[Any]
-    loading: Loading
+    @property
+    def linked(self) -> "Chain":
+        """Drive as a chain of parts."""
+        return drive("gears.pitch_radius" in self.at.values)
+
+    @lazy
+    def placed(self) -> "ChainPose":
+        """Both cranks, both groups and the sley at the instant."""
+        from loomopt.physics.mechanisms.chain_forces import PlacedLink, placed
+
+        pose: RapierPose = self.at.pose.joints
+        d, sense = pose.dimensions, pose.stand.sense
+        links = {
+            "crank": PlacedLink(lambda: pose.main_crank, d.l1, lambda: sense),
+            "rod": PlacedLink(lambda: pose.sley_dyad.link1, d.l2, lambda: sense * pose.four_bar.rod_1),
+            "sley": PlacedLink(lambda: pose.sley_dyad.link2, d.l3, lambda: pose.phi3_1),
+            "second crank": PlacedLink(lambda: pose.second_crank, d.l4, lambda: -2 * sense),
+            "link 5": PlacedLink(lambda: pose.dyad.link1, d.l5, lambda: pose.rates[0]),
+            "driving link": PlacedLink(lambda: pose.dyad.link2, d.l6, lambda: pose.rates[1]),
+        }
+        centre = Vector(d.C0x, d.C0y)
+        joints = {"A0": pose.main_shaft, "B0": Vector(0, 0), "B2": pose.carrier, "C0": centre}
+        joints |= {"A": plus(pose.main_shaft, pose.main_crank), "C": plus(centre, pose.second_crank)}
+        groups = {"four-bar": lambda: pose.sley_dyad, "five-bar": lambda: pose.dyad}
+        return placed(self.at.maths, self.at.values, joints, links, groups)
+
+    @lazy
+    def sley(self) -> Wrench | None:
+        """All loads on the sley, about B0; symbols in equations."""
+        return self._with_tape().solve_all().acting("sley")
+
+    def loaded(self) -> "Walk":
+        """Chain with the couple of the tape."""
+        walk = self._with_tape()
+        walk.symbols.update({"sley": wrench} if (wrench := self.__dict__.get("sley")) else {})
+        return walk
+
+    def _with_tape(self) -> "Walk":
+        """Chain with the couple of the tape on the sley, and its opposite on the driving link."""
+        from loomopt.physics.mechanisms.chain_forces import Walk
+
+        walk, couple = Walk(self.linked, self.placed), self.loading.force * self.at.pose.joints.dimensions.travel
+        walk.load("driving link", Wrench(Vector(0, 0), -couple))
+        walk.load("sley", Wrench(Vector(0, 0), couple))
+        return walk
 
     @property
-    def _drive(self) -> "RapierPose":
-        pose: RapierPose = self.at.pose.joints
-        return pose
-
-    @lazy
-    def couple(self) -> Number:
-        """Of the tape, N·m, on the sley; its opposite on the driving link."""
-        return self.loading.force * self._drive.dimensions.travel
-
-    @lazy
-    def five_bar(self) -> PairForces:
-        """Link 5 (C→D) and driving link (B2→D)."""
-        return two_links(self._drive.dyad, None, Wrench(Vector(0, 0), -self.couple))
-
-    @lazy
-    def sley(self) -> Wrench:
-        """Loads on the sley, about B0."""
-        push = minus(self.force_B2)
-        return Wrench(push, self.couple + cross(self._drive.carrier, push))
-
-    @lazy
-    def four_bar(self) -> PairForces:
-        """Rod (A→B1) and sley (B0→B1)."""
-        return two_links(self._drive.sley_dyad, None, self.sley)
-
-    @lazy
-    def _centres(self) -> tuple[Vector, Number]:
-        """Unit vector C0→A0, and the pitch radius of the second crank's gear, m."""
-        drive, shaft = self._drive, self._drive.main_shaft
-        centres = Vector(shaft.x - drive.dimensions.C0x, shaft.y - drive.dimensions.C0y)
-        length = self.at.maths.sqrt(centres.x**2 + centres.y**2)
-        return unit(centres, length), self.at.values.get("gears.pitch_radius", length / 3)
-
-    @lazy
     def gear_force(self) -> Number:
         """At the pitch circles, on the second crank's gear, to the left of C0→A0."""
-        return crank_torque(self._drive.second_crank, self.force_C) / self._centres[1]
-
-    @lazy
-    def _mesh(self) -> Vector:
-        return tooth_force(self.gear_force, 1, self._centres[0])
-
-    @lazy
-    def force_A0(self) -> Vector:
-        """Of the frame on the main crank with its gear."""
-        return plus(self.force_A, self._mesh)
-
-    @property
-    def force_A(self) -> Vector:
-        """Of the main crank on the rod."""
-        return self.four_bar.outer1
-
-    @property
-    def force_B0(self) -> Vector:
-        """Of the frame on the sley."""
-        return self.four_bar.outer2
-
-    @property
-    def force_B1(self) -> Vector:
-        """Of the rod on the sley."""
-        return self.four_bar.inner
-
-    @property
-    def force_B2(self) -> Vector:
-        """Of the sley on the driving link."""
-        return self.five_bar.outer2
-
-    @lazy
-    def force_C0(self) -> Vector:
-        """Of the frame on the second crank with its gear."""
-        return plus(self.force_C, minus(self._mesh))
-
-    @property
-    def force_C(self) -> Vector:
-        """Of the second crank on link 5."""
-        return self.five_bar.outer1
-
-    @property
-    def force_D(self) -> Vector:
-        """Of link 5 on the driving link."""
-        return self.five_bar.inner
-
-    def heading(self, part: str) -> Vector:
-        """Unit direction of a part."""
-        drive = self._drive
-        d, rod, link = drive.dimensions, drive.sley_dyad, drive.dyad
-        vectors = {"crank": (drive.main_crank, d.l1), "rod": (rod.link1, d.l2), "sley": (rod.link2, d.l3)}
-        vectors |= {"second crank": (drive.second_crank, d.l4), "link 5": (link.link1, d.l5)}
-        return unit(*{**vectors, "driving link": (link.link2, d.l6)}[part])
-
-    @lazy
-    def friction_work(self) -> Mapping[str, Number]:
-        """Friction torque per newton in the joints, m per rad of the main crank."""
-        drive = self._drive
-        sense, sley, (link, driving) = drive.stand.sense, drive.phi3_1, drive.rates
-        rod, second = sense * drive.four_bar.rod_1, -2 * sense
-        turned = {"A0": sense, "A": rod - sense, "B0": sley, "B1": sley - rod, "B2": driving - sley}
-        turned |= {"C0": second, "C": link - second, "D": driving - link}
-        return pins.works(self.at, {joint: (f"force_{joint}", turn) for joint, turn in turned.items()})
+        return self.walk.teeth["second crank"]
 
 
 def remark(at: Inputs[object], shown: ShowValue) -> str:
