@@ -144,8 +144,10 @@ def _share(load: Acting, at: Instant) -> Number:
         if isinstance(load, Load) and load.moved:
             inertia = load.moved(at.given.inputs(at.maths, load))
             return inertia * loading.carried.acceleration * moving
-        (force,) = (term for acting, term in loading.terms if acting is load)
-        return force * moving
+        (term,) = (term for acting, term in loading.terms if acting is load)
+        force = balance.on_output(at.maths, load, term, at.pose, at.given)
+        rest = balance.rest_in_drive(at.maths, model.loads, load, at.pose, at.given)
+        return force * moving if rest is None else force * moving + rest
     others = {acting.name for acting in at.model.loads} - {load.name}
     terms = balance.terms(at.maths, at.model.loads, at.pose, at.given, at.node.switch, others)
     ((_, term),) = terms

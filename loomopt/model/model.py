@@ -310,7 +310,8 @@ def carried_by(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], gi
         force = 0 * phi
         if smooth:
             pose = kinematics.pose(system, given, Node(phi, {}))
-            force = force + balance.total([term for _, term in balance.terms(system, smooth, pose, given, {})])
+            pairs = balance.terms(system, smooth, pose, given, {})
+            force = force + balance.total([balance.on_output(system, load, term, pose, given) for load, term in pairs])
         return system.weighted(weights, force)
 
     return Carried(balance.total(inertias), weigh)

@@ -116,8 +116,25 @@ def crank_torque(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Giv
     pairs = list(terms(maths, loads, pose, given, switch, carried(loads)))
     output = [term for load, term in pairs if load.acts == "output"]
     drive = [term for load, term in pairs if load.acts == "drive"]
+    drive += [rest for load in loads if (rest := rest_in_drive(maths, loads, load, pose, given)) is not None]
     drive += [term for load in loads if (term := inside(maths, load, pose, given)) is not None]
     return total([total(output) * pose.q1, *drive] if output else drive)
+
+
+def on_output(maths: Maths, load: Acting, term: Number, pose: Motion, given: Given) -> Number:
+    """Part of a load's term that acts on the parts on the output, N or N·m there: all of an output term."""
+    share = load.output_share if isinstance(load, Load) else None
+    return share(given.inputs(maths, load, pose)) if share else term
+
+
+def rest_in_drive(
+    maths: Maths, loads: Sequence[Acting], load: Acting, pose: Motion, given: Given
+) -> Number | None:
+    """Part of a drive term, N·m, that a state leaves in the drive when it carries the rest; None for any other load."""
+    if not isinstance(load, Load) or load.output_share is None or load.name not in carried(loads):
+        return None
+    at = given.inputs(maths, load, pose)
+    return load.force(at) - load.output_share(at) * pose.q1
 
 
 def inside(maths: Maths, load: Acting, pose: Motion, given: Given) -> Number | None:
@@ -158,7 +175,9 @@ class Loaded:
         coordinate = state.coordinate(at, reply)
         moving = [(load, term) for load, term in self.terms if load.name in state.carries and isinstance(load, Load)]
         inertia = total([load.moved(self.given.inputs(self.maths, load)) for load, _ in moving if load.moved])
-        pushed = total([term for load, term in moving if not load.moved])
+        pushed = total(
+            [on_output(self.maths, load, term, self.pose, self.given) for load, term in moving if not load.moved]
+        )
         acceleration = (self.force - pushed) / inertia
         motion: Motion = state.moved(at, coordinate, self.force, acceleration)
         return motion
@@ -181,10 +200,11 @@ class Loaded:
     @lazy
     def applied(self) -> Sequence[Applied]:
         """Forces on links and joints by name."""
-        forces: list[Applied] = []
+        forces, gone = list[Applied](), carried(self.loads)
         for load in (load for load in self.loads if isinstance(load, Load) and load.applied):
             assert load.applied is not None
-            forces += load.applied(self.given.inputs(self.maths, load, self.pose, self.switch))
+            pose = self.pose.with_carried(self.carried) if load.name in gone else self.pose
+            forces += load.applied(self.given.inputs(self.maths, load, pose, self.switch))
         return forces
 
 

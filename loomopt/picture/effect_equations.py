@@ -83,7 +83,8 @@ def forces(
         if value is not None:
             within[f"{letter}_{load.name}_drive"] = value
             equations.append(equation(load.name, symbol(f"{letter}_{load.name}_drive"), sympy().sympify(value)))
-    equations += sums(model.loads, at, symbol(total), letter, torque, tuple(map(symbol, within)))
+    drive = [*map(symbol, within), *(-symbol(share) * at.q1 for share in _shares(model, letter).values())]
+    equations += sums(model.loads, at, symbol(total), letter, torque, drive)
     equations += crank_motion(model, at, inputs, torque[1])
     equations += [item for check in model.checks for item in check_equations(check, at, inputs)]
     return equations + joint_equations(model, at, inputs, symbol(total), letter)
@@ -123,12 +124,24 @@ def _load_equations(model: JobModel, load: Acting, pose: Motion, inputs: Given, 
         inertia = balance.total(
             [item.moved(inputs.inputs(systems.sympy(), item)) for item in carried_loads if item.moved]
         )
-        carried = balance.total([symbol(f"{letter}_{item.name}") for item in carried_loads])
+        shares = _shares(model, letter)
+        carried = balance.total([symbol(shares.get(item.name, f"{letter}_{item.name}")) for item in carried_loads])
+        for item in carried_loads:
+            if item.output_share:
+                share = item.output_share(inputs.inputs(systems.sympy(), item, pose))
+                yield equation(item.name, symbol(shares[item.name]), sympy().sympify(share))
         left, right = load.motion(_in_symbols(pose, inertia, carried), inputs.tables[load.name])
         yield equation(load.name, left, right)
         moved, still = map(symbol, load.between)
         yield relation(load.name, symbol("z"), "=", moved - still, "after every turn the same")
     yield term(load, pose, inputs, letter)
+
+
+def _shares(model: JobModel, letter: str) -> dict[str, str]:
+    """Symbols of the parts of drive terms that a state carries, by load."""
+    gone = balance.carried(model.loads)
+    loads = (load for load in model.loads if isinstance(load, Load) and load.output_share and load.name in gone)
+    return {load.name: f"{letter}_{load.name}_shaft" for load in loads}
 
 
 def _in_symbols(pose: Motion, inertia: Expression, carried: Expression) -> "Written":

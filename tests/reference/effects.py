@@ -96,6 +96,10 @@ class Shaft:
     def resistance(self, values, phi):
         raise NotImplementedError
 
+    def weight(self, phi):
+        """Return the moment of the reed's weight against q, N m."""
+        return MP.mpf(0)
+
     def shaft_torsion(self, values, phi):
         """Return k z + c z˙ by convolution: all that ever acted on the reed, faded and turned by e^(λ(t − s)).
 
@@ -120,7 +124,7 @@ class Shaft:
             for begin, end in itertools.pairwise(borders):
                 for x, weight in rule:
                     at = (begin + end + (end - begin) * x) / 2
-                    force = self.carried * self.acceleration(at) + self.resistance(pulse, at)
+                    force = self.carried * self.acceleration(at) + self.resistance(pulse, at) + self.weight(at)
                     self.kept.append((at, weight * (end - begin) / 2, force))
         return self.kept
 
@@ -476,6 +480,11 @@ class Linkage(Shaft):
     def bearing_friction(self, values, phi):
         rate = slope(self.q, phi) * MAIN
         return values["coulomb"] * MP.sign(rate) + values["viscous"] * rate
+
+    def weight(self, phi):
+        name, mass, along = REED_MASS[0], MP.mpf(REED_MASS[1]), MP.mpf(REED_MASS[2]) / 1000
+        arm = self.centre(name, along, phi) - self.joints(phi)["G"]
+        return -(arm.conjugate() * MP.mpf("9.80665") * mass * MP.expj(-PI / 3)).imag
 
     def output_centrifugal(self, values, phi):
         return MP.mpf(REED_MASS[1]) * MP.mpf(REED_MASS[2]) / 1000 * (slope(self.q, phi) * MAIN) ** 2

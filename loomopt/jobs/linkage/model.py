@@ -30,7 +30,7 @@ from loomopt.physics.mechanisms.chain import Chain, Part, Ref, cam_switch
 from loomopt.physics.mechanisms.dead_centres import CrankRockerGroup, crank_rockers
 from loomopt.physics.mechanisms.dwell_cam import stretch
 from loomopt.physics.mechanisms.dyad import Vector, cross, dot
-from loomopt.physics.mechanisms.moving import Joint
+from loomopt.physics.mechanisms.moving import Joint, Link, turned_by
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN, SAME_ANGLE
 
@@ -207,6 +207,7 @@ class LinkageMotion(Motion):
     """Motion of the linkage at crank angles φ, rad, of any shape; quantities are computed when they are read.
 
     joints: its parts; factor: factor of the output, None for 1; zero: direction from which an angle is counted.
+    carried: motion of the parts on the output, None for that of the output.
     """
 
     joints: chain.ChainPose
@@ -215,6 +216,29 @@ class LinkageMotion(Motion):
     omega_dot: Number = None
     factor: Number = None
     zero: Number = None
+    carried: Motion | None = None
+
+    def with_carried(self, motion: Motion) -> "LinkageMotion":
+        """Same pose, where the parts on the output have a motion of their own: its q, velocity and acceleration."""
+        return dataclasses.replace(self, carried=motion)
+
+    @property
+    def is_apart(self) -> bool:
+        """Whether the parts on the output have a motion of their own."""
+        return self.carried is not None
+
+    @lazy
+    def carrier(self) -> Link:
+        """Link with the motion of the parts on the output, which turns about a fixed axis."""
+        link, motion = self.joints.links[self.output.carrier], self.carried
+        if motion is None:
+            return link
+        maths, sign = self.joints.maths, self.output.sign
+        twist = sign * (motion.q - self.q)
+        rates = {1: sign * motion.velocity / self.omega, 2: sign * motion.acceleration / self.omega**2}
+        return Link(
+            link.origin, lambda: turned_by(Vector(maths.cos(twist), maths.sin(twist)), link.unit()), rates.__getitem__
+        )
 
     @property
     def phi(self) -> Number:

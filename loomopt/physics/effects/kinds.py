@@ -43,6 +43,10 @@ class Motion:
         steady = self.q2 * self.omega**2
         return steady if self.omega_dot is None else steady + self.q1 * self.omega_dot
 
+    def with_carried(self, motion: "Motion") -> "Motion":
+        """Same pose, where the parts on the output have a motion of their own."""
+        return self
+
 
 Pose = TypeVar("Pose", contravariant=True)
 AnyPose = TypeVar("AnyPose", covariant=True)
@@ -277,6 +281,8 @@ class Load(Effect, Generic[Pose]):
     acts : "output" (times q' it reaches the crank) or "drive" (it reaches the crank only).
     force(at) : the term, N or N·m.
     inside(at) : of an output term, its further part inside the drive, N·m; None for nothing.
+    output_share(at) : of a drive term, what of it acts on the parts on the output, N·m or N there; None for nothing. A
+        state that carries the load carries this part, and the rest stays in the drive.
     upon(at, loading) : the term where it depends on all other terms.
     corners(at) : crank angles, rad, where the formula changes.
     switch(angle, corners) : formula that is valid at a crank angle inside a piece, as the number `at.switch`.
@@ -296,6 +302,7 @@ class Load(Effect, Generic[Pose]):
     acts: Literal["output", "drive"]
     force: Callable[[Inputs[Pose]], Number]
     inside: Callable[[Inputs[Pose]], Number | None] | None = None
+    output_share: Callable[[Inputs[Pose]], Number] | None = None
     upon: Callable[[Inputs[Pose], Loading], Number] | None = None
     corners: Callable[[Inputs[None]], tuple[Number, ...]] | None = None
     switch: Callable[[float, tuple[float, ...]], float] = constant_switch

@@ -3,8 +3,8 @@
     J z¨ + c z˙ + k z = J q¨ + M_R        in the periodic steady state, at constant speed; linear
     output term k z + c z˙ instead of the terms of what the shaft carries, whose inertia is J
 
-Carried: what turns with the output, its counterweight and the resistance, M_R(φ), which does not see the twist. Masses
-of links stay with q.
+Carried: what turns with the output, its counterweight, their weight and the resistances, M_R(φ), none of which sees the
+twist. Masses of links, and their weight, stay with q.
 """
 
 from collections.abc import Mapping
@@ -153,7 +153,6 @@ def rests(table: Values) -> str:
     )
 
 
-WITHIN = "the weight would act on what the shaft carries, which its steady state does not include yet"
 EFFECT = State(
     name=NAME,
     summary="what the output drives, on a shaft that twists",
@@ -163,13 +162,10 @@ EFFECT = State(
     needs=("operation.speed",),
     companions=("inertia",),
     clashes=(
-        EffectClash("gravity", WITHIN),
         EffectClash("bearing_friction", "it would act on the link or on what the shaft carries, which no source tells"),
         EffectClash("speed_fluctuation", "the steady state of the shaft is that of a constant speed"),
-        EffectClash("forming", "it would act on what the shaft carries, whose travel it does not follow"),
-        EffectClash("joint_forces", "the forces in joints are those of masses that move with the links"),
     ),
-    carries=("inertia", "counterweight", "resistance"),
+    carries=("inertia", "counterweight", "resistance", "forming", "gravity"),
     derived=derived,
     oscillator=oscillator,
     fixed=fixed,

@@ -18,7 +18,13 @@ EFFECTS = {MANY.get(name, name): effect for name, effect in SIX.schema.effects.i
 PHI = ((np.arange(61) + 0.37) * 2 * np.pi / 61).tolist()
 READS_MASSES = {"gravity", "mass.rod", "inertia", "counterweight"}
 """Gravity weighs what the others say has a mass: its term is not the same beside them."""
-NAMES = [(), *itertools.combinations(EFFECTS, 1), *itertools.combinations(EFFECTS, 2)]
+ALONE = ("shaft_torsion", "speed_fluctuation", "bearing_friction")
+"""Effects that do not combine with all others, so that there is one largest combination for each of them."""
+LARGEST = [
+    tuple(name for name in EFFECTS if name not in ALONE or name in on)
+    for on in (("shaft_torsion",), ("speed_fluctuation", "bearing_friction"))
+]
+NAMES = [(), *itertools.combinations(EFFECTS, 1), *itertools.combinations(EFFECTS, 2), *LARGEST]
 
 
 def example(name):
@@ -34,6 +40,11 @@ def completed(names):
 
 def combines(names):
     return not any(faults({EFFECTS[name]: EFFECTS[name].table.model_validate(example(name)) for name in names}))
+
+
+def test_the_largest_combinations_are_among_them():
+    assert set(map(completed, LARGEST)) <= set(COMBINATIONS)
+    assert set(itertools.chain(*LARGEST)) == set(EFFECTS)
 
 
 COMBINATIONS = sorted(filter(combines, set(map(completed, NAMES))), key=lambda names: (len(names), names))

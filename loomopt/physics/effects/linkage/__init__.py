@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.cycle import TURN
 from loomopt.physics.effects.kinds import Applied, Inputs
-from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.dyad import Vector, cross
 from loomopt.physics.mechanisms.moving import Joint, Link, plus, polar, scaled, times, total
 from loomopt.physics.schema import Values
 
@@ -32,6 +32,10 @@ class OutputPart(Protocol):
     @property
     def measure(self) -> str:
         """Measured coordinate: "angle", "slide", "x" or "y"."""
+
+    @property
+    def sign(self) -> int:
+        """1, or −1 where the output is counted in the opposite sense."""
 
     @property
     def name(self) -> str:
@@ -73,6 +77,14 @@ class LinkagePose(Protocol):
     def output(self) -> OutputPart:
         """The part that is the output."""
 
+    @property
+    def carrier(self) -> Link:
+        """Link with the motion of the parts on an output that turns about a fixed axis."""
+
+    @property
+    def is_apart(self) -> bool:
+        """Whether the parts on the output have a motion of their own, on a shaft that twists."""
+
     def travelled(self, given: Values, event: str) -> Number:
         """q − q at an event, rad or m."""
 
@@ -97,7 +109,7 @@ def centre(parts: Parts, name: str, along: Number, across: Number) -> Joint:
 
 def on_output(maths: Maths, pose: LinkagePose, distance: Number, angle: Number | None) -> Joint:
     """Place on the output's link, m from its axis; angle: from the link's line, rad, None along it."""
-    link = pose.joints.links[pose.output.carrier]
+    link = pose.carrier
     return link.point(distance) if angle is None else link.point(*scaled(distance, polar(maths, angle)))
 
 
@@ -139,12 +151,28 @@ def opposite(maths: Maths, pose: LinkagePose, distance: Number, angle: Number | 
     return on_output(maths, pose, -distance if angle is None else distance, angle)
 
 
+def arm_on_output(pose: LinkagePose, mass: OutputMass) -> Vector:
+    """Way from the output's axis to a mass, m."""
+    axis, place = pose.carrier.origin.place, mass.at.place
+    return Vector(place.x - axis.x, place.y - axis.y)
+
+
+def taken_by_shaft(pose: LinkagePose, mass: OutputMass, pull: Vector) -> Number | None:
+    """Couple, N·m, that takes the moment of a pull on a mass off the output's link: the shaft has it; None without."""
+    return -cross(arm_on_output(pose, mass), pull) if pose.is_apart else None
+
+
+def as_counted(pose: LinkagePose, moment: Number) -> Number:
+    """Moment on the output's link, N·m, in the sense in which the output is counted."""
+    return moment if pose.output.sign > 0 else -moment
+
+
 def resistance_of_mass(pose: LinkagePose, mass: Number, distance: Number, at: Joint) -> Applied:
     """Force with which a mass on the output's link resists, N, with a couple that leaves no moment about the axis.
 
     What the mass adds to the moment about the axis is in the inertia of the output term already.
     """
-    square, change, link = pose.omega**2, pose.omega_dot, pose.joints.links[pose.output.carrier]
+    square, change, link = pose.omega**2, pose.omega_dot, pose.carrier
     slower, faster = at.at(1), at.at(2)
     pulled = None if faster is None else scaled(square, faster)
     if change is not None and slower is not None:

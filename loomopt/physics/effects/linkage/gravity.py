@@ -1,4 +1,8 @@
-"""Weight of links and joints with a mass, and of parts that move with the output: drive term −Σ m g·p'."""
+"""Weight of links and joints with a mass, and of parts that move with the output: drive term −Σ m g·p'.
+
+On a shaft that twists the weight of the parts on the output acts on these, as if they were where the link is: the twist
+times the weight's own change with angle is left out.
+"""
 
 from collections.abc import Iterator
 
@@ -7,8 +11,8 @@ from pydantic import Field
 from loomopt.base.quantities import Angle
 from loomopt.maths.systems import Number
 from loomopt.physics.effects.kinds import Applied, Inputs, Load
-from loomopt.physics.effects.linkage import LinkagePose, OutputMass, centre, output_masses
-from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.effects.linkage import LinkagePose, OutputMass, arm_on_output, as_counted, centre, output_masses, taken_by_shaft
+from loomopt.physics.mechanisms.dyad import Vector, cross
 from loomopt.physics.schema import Table
 
 STANDARD_GRAVITY = 9.80665
@@ -23,12 +27,17 @@ class Parameters(Table):
 
 def weighed(at: Inputs[LinkagePose]) -> Iterator[OutputMass]:
     """Yield every mass of links, joints and output."""
+    yield from link_masses(at)
+    yield from output_masses(at)
+
+
+def link_masses(at: Inputs[LinkagePose]) -> Iterator[OutputMass]:
+    """Yield every mass of links and joints."""
     for name in (*at.pose.joints.links, *at.pose.joints.joints):
         mass = at.values.get(f"mass.{name}.mass")
         if mass is not None:
             along, across = (at.values.get(f"mass.{name}.{key}") for key in ("along", "across"))
             yield OutputMass(mass, name, centre(at.pose.joints, name, along, across))
-    yield from output_masses(at)
 
 
 def force(at: Inputs[LinkagePose]) -> Number:
@@ -42,12 +51,26 @@ def force(at: Inputs[LinkagePose]) -> Number:
     return torque
 
 
+def output_share(at: Inputs[LinkagePose]) -> Number:
+    """Moment of the parts on the output about its axis, N·m, against q."""
+    moment = 0
+    for weight in output_masses(at):
+        moment = moment - cross(arm_on_output(at.pose, weight), _pull(at, weight))
+    return as_counted(at.pose, moment)
+
+
+def _pull(at: Inputs[LinkagePose], weight: OutputMass) -> Vector:
+    """Weight of a mass, N, along the way that it moves."""
+    size = at.maths.number(STANDARD_GRAVITY) * weight.mass
+    return weight.along(Vector(size * at.maths.cos(at.table["down"]), size * at.maths.sin(at.table["down"])))
+
+
 def applied(at: Inputs[LinkagePose]) -> list[Applied]:
-    """Weights, each in its centre of mass."""
-    x, y, forces = at.maths.cos(at.table["down"]), at.maths.sin(at.table["down"]), []
-    for weight in weighed(at):
-        size = at.maths.number(STANDARD_GRAVITY) * weight.mass
-        forces.append(Applied(weight.on, weight.along(Vector(size * x, size * y)), weight.at.place))
+    """Weights, each in its centre of mass; of parts on a shaft that twists without their moment about its axis."""
+    forces = [Applied(weight.on, _pull(at, weight), weight.at.place) for weight in link_masses(at)]
+    for weight in output_masses(at):
+        pull = _pull(at, weight)
+        forces.append(Applied(weight.on, pull, weight.at.place, taken_by_shaft(at.pose, weight, pull)))
     return forces
 
 
@@ -58,6 +81,7 @@ EFFECT = Load(
     rank=60,
     acts="drive",
     force=force,
+    output_share=output_share,
     applied=applied,
     examples=({"down": "-90 deg"},),
     of_masses="gravity",

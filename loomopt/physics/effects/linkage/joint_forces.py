@@ -76,7 +76,8 @@ class LinkageForces(ChainForces):
         """Loads by the parts that move with the output."""
         if not self.loading.masses:
             return []
-        return self.output(-self.loading.inertia * self.pose.acceleration, True)
+        moved = [mass.second * motion.acceleration for mass, motion in self.loading.masses]
+        return self.output(-sum(moved[1:], moved[0]), True)
 
     @property
     def placed(self) -> "ChainPose":
