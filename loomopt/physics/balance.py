@@ -127,9 +127,7 @@ def on_output(maths: Maths, load: Acting, term: Number, pose: Motion, given: Giv
     return share(given.inputs(maths, load, pose)) if share else term
 
 
-def rest_in_drive(
-    maths: Maths, loads: Sequence[Acting], load: Acting, pose: Motion, given: Given
-) -> Number | None:
+def rest_in_drive(maths: Maths, loads: Sequence[Acting], load: Acting, pose: Motion, given: Given) -> Number | None:
     """Part of a drive term, N·m, that a state leaves in the drive when it carries the rest; None for any other load."""
     if not isinstance(load, Load) or load.output_share is None or load.name not in carried(loads):
         return None

@@ -87,7 +87,16 @@ def test_shaft_and_crank_torque_are_those_of_a_convolution(changes):
         assert np.max(np.abs(result.at_angles(name, phi) - expected)) <= 1e-10 * np.max(np.abs(expected)), name
 
 
-QUANTITIES = ("shaft_peak", "twist_peak", "carried_max", TORQUE, "force_G", "force_F", "shaking_force", "shaking_moment")
+QUANTITIES = (
+    "shaft_peak",
+    "twist_peak",
+    "carried_max",
+    TORQUE,
+    "force_G",
+    "force_F",
+    "shaking_force",
+    "shaking_moment",
+)
 
 
 def test_two_number_systems_agree():
@@ -95,7 +104,9 @@ def test_two_number_systems_agree():
     many, floats = result.read(systems.mpmath()), result.read(systems.FLOAT)
     for name in QUANTITIES:
         nodes = [(piece, u) for piece in range(result.cycle.pieces) for u in (0.0, 0.4, 1.0)]
-        values = np.array([[float(read.at(name, p, read.maths.number(u))) for p, u in nodes] for read in (many, floats)])
+        values = np.array(
+            [[float(read.at(name, p, read.maths.number(u))) for p, u in nodes] for read in (many, floats)]
+        )
         assert np.max(np.abs(values[0] - values[1])) <= 1e-12 * np.max(np.abs(values[0])), name
 
 

@@ -11,7 +11,15 @@ from pydantic import Field
 from loomopt.base.quantities import Angle
 from loomopt.maths.systems import Number
 from loomopt.physics.effects.kinds import Applied, Inputs, Load
-from loomopt.physics.effects.linkage import LinkagePose, OutputMass, arm_on_output, as_counted, centre, output_masses, taken_by_shaft
+from loomopt.physics.effects.linkage import (
+    LinkagePose,
+    OutputMass,
+    arm_on_output,
+    as_counted,
+    centre,
+    output_masses,
+    taken_by_shaft,
+)
 from loomopt.physics.mechanisms.dyad import Vector, cross
 from loomopt.physics.schema import Table
 
