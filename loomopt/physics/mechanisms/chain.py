@@ -30,9 +30,11 @@ from loomopt.physics.mechanisms.dwell_cam import DwellCam, Stretches, stretches
 from loomopt.physics.mechanisms.dyad import Dyad, Vector
 from loomopt.physics.mechanisms.moving import (
     FRAME,
+    Carrier,
     Joint,
     Link,
     X,
+    carrier,
     polar,
     scaled,
     seen_from,
@@ -112,13 +114,14 @@ class Part:
 class ChainPose:
     """Linkage at crank angles φ, rad, of any shape; values: numbers by name, SI; switch: intervals of the cams.
 
-    closed: both links of each RRR group as vectors to its pin.
+    carriers: as of the chain; closed: both links of each RRR group as vectors to its pin.
     """
 
     maths: Maths
     values: Values
     phi: Number
     switch: Values = field(default_factory=Frozen)
+    carriers: Mapping[str, str] = field(default_factory=Frozen)
     joints: dict[str, Joint] = field(default_factory=dict)
     links: dict[str, Link] = field(default_factory=lambda: {FRAME_NAME: FRAME})
     slides: dict[str, Slide] = field(default_factory=dict)
@@ -133,6 +136,11 @@ class ChainPose:
         if not ref.name:
             return self.maths.number(ref.value) if ref.value else None
         return ref.of(self.values)
+
+    def carrier(self, part: Part, joints: tuple[Joint, Joint]) -> Carrier | None:
+        """Link that carries both joints of a group, which is closed as the link sees it; None without one."""
+        link = self.carriers.get(part.name)
+        return carrier(self.links[link], joints) if link else None
 
     def vector(self, link: str) -> Vector:
         """Link's direction, of any length."""
@@ -257,39 +265,47 @@ def _point(pose: ChainPose, part: Part) -> None:
 
 def _dyad(pose: ChainPose, part: Part) -> None:
     """Place an Assur group RRR."""
-    (first, second), names = (pose.joints[name] for name in part.names("joins")), part.names("links")
+    (first, second), names = part.names("joins"), part.names("links")
+    joints = pose.joints[first], pose.joints[second]
     r1, r2 = (pose.number(part, name) for name in names)
-    group = TwoLinks(pose.maths, first, second, r1, r2, SIDES[part.word("side")])
+    body = pose.carrier(part, joints)
+    group = TwoLinks(pose.maths, *(body.joints if body else joints), r1, r2, SIDES[part.word("side")])
     begin, end = group.links()
+    if body:
+        begin, end = map(body.fixed, joints, body.places, (begin, end))
     pose.links.update(zip(names, (begin, end), strict=True))
     # The pin is reached over the second link: fewest terms where its joint is fixed.
-    pose.joints[part.word("pin")] = Joint(end.carried(end.heading))
-    pose.margins[part.name], pose.closed[part.name] = group, lambda: group.closed
+    pin = Joint(end.carried(end.heading), lambda: begin.arms(Vector(r1, 0)) + end.arms(Vector(r2, 0)))
+    pose.joints[part.word("pin")], pose.margins[part.name] = pin, group
+    pose.closed[part.name] = lambda: Dyad(begin.heading(), end.heading(), group.closed.area4)
 
 
 def _slider(pose: ChainPose, part: Part) -> None:
     """Place an Assur group RRP."""
-    (name,) = part.names("links")
+    (name,), guide = part.names("links"), pose.links[part.word("guide") or FRAME_NAME]
+    joints, length = (pose.joints[part.word("from")], pose.joints[part.word("through")]), pose.number(part, name)
+    body = pose.carrier(part, joints)
     group = OnGuide(
         pose.maths,
-        pose.joints[part.word("from")],
-        pose.joints[part.word("through")],
-        pose.links[part.word("guide") or FRAME_NAME],
+        *(body.joints if body else joints),
+        body.view(guide) if body else guide,
         polar(pose.maths, pose.number(part, "direction")),
         pose.number(part, "offset"),
-        pose.number(part, name),
+        length,
         SIDES[part.word("side")],
     )
-    link = pose.links[name] = group.link()
-    pose.joints[part.word("pin")] = Joint(link.carried(link.heading))
+    link = pose.links[name] = body.fixed(joints[0], body.places[0], group.link()) if body else group.link()
+    pose.joints[part.word("pin")] = Joint(link.carried(link.heading), lambda: link.arms(Vector(length, 0)))
     pose.slides[part.name], pose.margins[part.name] = group.slide(), group
 
 
 def _slot(pose: ChainPose, part: Part) -> None:
     """Place an Assur group RPR."""
-    pivot, through = pose.joints[part.word("at")], pose.joints[part.word("through")]
-    group = Slotted(pose.maths, pivot, through, pose.number(part, "offset"))
-    link = pose.links[part.word("link")] = group.link()
+    joints = pose.joints[part.word("at")], pose.joints[part.word("through")]
+    body = pose.carrier(part, joints)
+    group = Slotted(pose.maths, *(body.joints if body else joints), pose.number(part, "offset"))
+    link = body.fixed(joints[0], body.places[0], group.link()) if body else group.link()
+    pose.links[part.word("link")] = link
     pose.slides[part.name], pose.margins[part.name] = group.slide(), group
     if part.word("pin"):
         pose.joints[part.word("pin")] = link.point(pose.number(part, "length"))
@@ -307,6 +323,8 @@ KINDS: Mapping[str, Callable[[ChainPose, Part], None]] = {
 }
 DRIVERS = frozenset({"crank", "gear", "cam"})
 """Parts that are a link of their own name."""
+GROUPS = frozenset({"dyad", "slider", "slot"})
+"""Parts that close a loop between joints placed before them."""
 
 
 def slider_of(part: str) -> str:
@@ -325,6 +343,11 @@ def links_of(part: Part) -> tuple[str, ...]:
     if part.kind in DRIVERS:
         return (part.name,)
     return (part.word("link"),) if part.word("link") else part.names("links")
+
+
+def starts_of(part: Part) -> tuple[str, ...]:
+    """Joints from which the links of a part are counted, link by link."""
+    return part.names("joins") or (part.word("from") or part.word("at"),)
 
 
 def provides(part: Part) -> tuple[str, ...]:
@@ -383,10 +406,32 @@ class Chain:
 
     def pose(self, maths: Maths, values: Values, phi: Number, switch: Values = NO_SWITCH) -> ChainPose:
         """Linkage at crank angles φ, rad, of any shape; values: numbers by name, SI."""
-        pose = ChainPose(maths, values, phi, switch)
+        pose = ChainPose(maths, values, phi, switch, self.carriers)
         for part in self.parts:
             KINDS[part.kind](pose, part)
         return pose
+
+    @lazy
+    def carriers(self) -> Mapping[str, str]:
+        """Link that carries all joints, and the guide, of a group: the group has no motion of its own. By group."""
+        links: dict[str, set[str]] = {joint: set() for joint in self.joints}
+        roots: dict[str, str] = {}
+        carriers: dict[str, str] = {}
+        for part in self.parts:
+            if part.kind in GROUPS:
+                shared = set.intersection(*(links[joint] for joint in wanted_joints(part))) - roots.keys()
+                guide = part.word("guide") or FRAME_NAME
+                if part.kind == "slider":
+                    shared &= {guide, roots.get(guide, "")}
+                if shared:
+                    carriers[part.name] = body = min(shared)
+                    roots |= dict.fromkeys(links_of(part), body)
+            for link, start in zip(links_of(part), starts_of(part), strict=False):
+                links[start].add(link)
+            for joint in joints_of(part) if part.kind != "pivot" else ():
+                on = {part.word("on")} - {"", FRAME_NAME} or set(links_of(part))
+                links[joint] |= on | {roots[link] for link in on & roots.keys()}
+        return carriers
 
     @lazy
     def cams(self) -> tuple[Part, ...]:
@@ -440,8 +485,7 @@ class Chain:
         """Joint about which each link turns, and its moment is reckoned."""
         joints: dict[str, str] = {}
         for part in self.parts:
-            starts = part.names("joins") or (part.word("from") or part.word("at"),)
-            joints |= dict(zip(links_of(part), starts, strict=False))
+            joints |= dict(zip(links_of(part), starts_of(part), strict=False))
         return joints
 
     @lazy

@@ -135,10 +135,21 @@ def turned(rates: Rates, r: Vector, order: int) -> Vector | None:
     return Vector(radial * r.x - across * r.y, across * r.x + radial * r.y)
 
 
+class Arm(NamedTuple):
+    """Place of a joint on a link: along the link's line from its origin, and to the left of it, m."""
+
+    link: "Link"
+    place: Vector
+
+
 class Joint(NamedTuple):
-    """A point that moves with φ; at(k): the k-th derivative of its place, m; None where that is zero."""
+    """A point that moves with φ; at(k): the k-th derivative of its place, m; None where that is zero.
+
+    arms(): its places on the links that carry it, but for those of which it is the origin.
+    """
 
     at: Callable[[int], Vector | None]
+    arms: Callable[[], tuple[Arm, ...]] = tuple
 
     @property
     def place(self) -> Vector:
@@ -152,7 +163,7 @@ class Link:
 
     origin: the joint that its points are counted from; heading(): its direction, of any length; rates(k): the k-th
     derivative of its angle; span: the length of heading() where that is not 1; angle: its angle from x, rad, where a
-    formula gives it without a branch cut.
+    formula gives it without a branch cut; seat: the link that it is fixed to, if its group has no motion of its own.
     """
 
     origin: Joint
@@ -160,6 +171,7 @@ class Link:
     rates: Rates
     span: Number | None = None
     angle: Callable[[], Number | None] | None = None
+    seat: "Seat | None" = None
 
     @lazy
     def _unit(self) -> Vector:
@@ -178,11 +190,71 @@ class Link:
                 return Vector(0, 0) if along is None else scaled(along, self.unit())
             return turned_by(self.unit(), Vector(0 if along is None else along, across))
 
-        return Joint(self.carried(once(arm)))
+        return Joint(self.carried(once(arm)), lambda: self.arms(Vector(known(along), known(across))))
+
+    def arms(self, place: Vector) -> tuple[Arm, ...]:
+        """Arms of a point of the link: on the link itself, and on the link that it is fixed to."""
+        arm = Arm(self, place)
+        return (arm, self.seat.arm(place)) if self.seat else (arm,)
 
     def carried(self, arm: Callable[[], Vector]) -> Callable[[int], Vector | None]:
         """Motion of the end of an arm of the link, m, from the origin."""
         return by_order(lambda order: plus(self.origin.at(order), turned(self.rates, arm(), order)))
+
+
+class Seat(NamedTuple):
+    """Where a link is fixed to another one: place of its origin on it, m, and its direction (a unit vector) there."""
+
+    link: Link
+    origin: Vector | None
+    direction: Callable[[], Vector]
+
+    def arm(self, place: Vector) -> Arm:
+        """Arm, on the other link, of a point of the link."""
+        turned_place = turned_by(self.direction(), place)
+        return Arm(self.link, plus(self.origin, turned_place) or turned_place)
+
+
+class Carrier(NamedTuple):
+    """Link that carries two joints, and their places on it, m; None: its origin."""
+
+    link: Link
+    places: tuple[Vector | None, Vector | None]
+
+    @property
+    def joints(self) -> tuple[Joint, Joint]:
+        """The joints as seen from the link: they do not move."""
+        first, second = self.places
+        return _fixed(first), _fixed(second)
+
+    def view(self, link: Link) -> Link:
+        """A link as seen from the carrier, which it is or to which it is fixed."""
+        seat = link.seat
+        return Link(_fixed(seat.origin), seat.direction, FRAME.rates) if seat and link is not self.link else FRAME
+
+    def fixed(self, joint: Joint, place: Vector | None, seen: Link) -> Link:
+        """Link that is fixed to the carrier at a joint; seen: that link as seen from the carrier."""
+        return Link(
+            joint,
+            once(lambda: turned_by(self.link.unit(), seen.heading())),
+            self.link.rates,
+            seen.span,
+            seat=Seat(self.link, place, seen.unit),
+        )
+
+
+def _fixed(place: Vector | None) -> Joint:
+    return Joint(lambda order: None if order else place)
+
+
+def carrier(link: Link, joints: tuple[Joint, Joint]) -> Carrier:
+    """Carrier of two joints that are on the link."""
+
+    def place(joint: Joint) -> Vector | None:
+        return None if joint is link.origin else next(arm.place for arm in joint.arms() if arm.link is link)
+
+    first, second = joints
+    return Carrier(link, (place(first), place(second)))
 
 
 FRAME = Link(Joint(lambda order: None), lambda: X, lambda order: None, angle=lambda: None)

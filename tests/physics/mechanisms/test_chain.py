@@ -157,6 +157,55 @@ CASES = {
     "gear on the rod, held by the frame": {
         "wheel": {"kind": "gear", "at": "C", "with": "frame", "carrier": "rod", "ratio": 3, "pin": "P", "length": 0.03}
     },
+    "groups between joints of one link": (
+        CARRIED := E
+        | {
+            "plate": {
+                "kind": "dyad",
+                "joins": ["E", "C"],
+                "pin": "F",
+                "side": "left",
+                "links": {"up": 0.05, "to": 0.06},
+            },
+            "H": {"kind": "point", "on": "up", "along": 0.02, "across": 0.01},
+            "brace": {
+                "kind": "dyad",
+                "joins": ["H", "B"],
+                "pin": "K",
+                "side": "right",
+                "links": {"a": 0.07, "b": 0.04},
+            },
+            "way": {
+                "kind": "slider",
+                "from": "K",
+                "through": "E",
+                "guide": "rod",
+                "direction": 0.4,
+                "offset": 0.01,
+                "pin": "L",
+                "side": "ahead",
+                "links": {"strut": 0.2},
+            },
+            "side": {
+                "kind": "slider",
+                "from": "H",
+                "through": "C",
+                "guide": "up",
+                "pin": "N",
+                "side": "behind",
+                "links": {"prop": 0.2},
+            },
+            "own": {
+                "kind": "slot",
+                "at": "L",
+                "through": "F",
+                "link": "arm",
+                "offset": 0.02,
+                "pin": "P",
+                "length": 0.1,
+            },
+        }
+    ),
     "gear of a crank on a crank": {
         "wheel": {
             "kind": "gear",
@@ -301,6 +350,51 @@ def enclosed(value):
     flint = pytest.importorskip("flint")
     near = float(value)
     return flint.arb(near, max(abs(float(value - near)) * (1 + 1e-9), 1e-300))
+
+
+def test_groups_between_joints_of_one_link_keep_their_angles():
+    """Their spans and transmission angles are constants, bit by bit, and those of the groups without a carrier."""
+    only, digits = linked(CARRIED), systems.mpmath(60)
+    groups = {"plate": "rod", "brace": "rod", "way": "rod", "side": "rod", "own": "rod"}
+    assert dict(only.carriers) == groups
+    constants = set()
+    for angle in ANGLES:
+        pose = only.pose(systems.FLOAT, {}, angle)
+        free = chains.ChainPose(digits, {}, digits.number(angle))
+        for part in only.parts:
+            free.place(part)
+        for group in groups:
+            spans = free.margins[group].spans
+            values = [pose.obliquity(group), *(span() for span in pose.margins[group].spans.values())]
+            expected = [free.obliquity(group), *(span() for span in spans.values())]
+            assert values[:3] == pytest.approx([float(value) for value in expected[:3]], abs=1e-13)
+        for group in ("plate", "brace"):
+            for way, exact_way in zip(pose.closed[group]()[:2], free.closed[group]()[:2], strict=True):
+                assert tuple(way) == pytest.approx([float(part) for part in exact_way], abs=1e-15)
+        constants.add(tuple(pose.obliquity(group) for group in groups))
+        for order in range(4):
+            exact = dict(readings(free, order, only))
+            for name, value in readings(only.pose(digits, {}, digits.number(angle)), order, only):
+                assert abs(value - exact[name]) < 1e-50, (order, name)
+    assert len(constants) == 1
+
+
+def test_groups_whose_guide_or_joint_moves_on_its_own_have_no_carrier():
+    """A slider along the rocker between joints of the rod, and every other case, closes as it did."""
+    moving = E | {
+        "own": {
+            "kind": "slider",
+            "from": "E",
+            "through": "C",
+            "guide": "rocker",
+            "pin": "P",
+            "side": "ahead",
+            "links": {"strut": 0.35},
+        }
+    }
+    assert not linked(moving).carriers
+    for name, case in CASES.items():
+        assert bool(linked(case).carriers) == (case is CARRIED), name
 
 
 @pytest.mark.few(3)

@@ -1,5 +1,7 @@
 """Proofs of dyads in a row, each driven by the rocker before it: enclosures do not widen along the chain."""
 
+import math
+
 import pytest
 
 import loomopt as lo
@@ -75,6 +77,63 @@ def test_five_dyads_in_a_row_are_proven(monkeypatch, sizes):
     found = lo.prove(chain(*sizes))
     assert {proof.limit: proof.status for proof in found.proofs if proof.status != "proven"} == {}
     assert sum(proof.boxes for proof in found.proofs) < 10_000
+
+
+LEG = {
+    "m": 150,
+    "j": 500,
+    "b": 415,
+    "k": 619,
+    "c": 393,
+    "d": 401,
+    "e": 558,
+    "f": 394,
+    "g": 367,
+    "h": 657,
+    "i": 490,
+    "x": -380,
+    "y": -78,
+}
+"""Lengths of Jansen's leg, mm [Jansen, The Great Pretender, 2007]."""
+
+
+def leg():
+    """Scene of a leg of five dyads, of which two close triangles on a link of another: their angles are constant."""
+
+    def dyad(joins, pin, side, *links):
+        return {"kind": "dyad", "joins": joins, "pin": pin, "side": side, "links": {f"link_{n}": n for n in links}}
+
+    return lo.scene(
+        {
+            "problem": {"name": "leg", "job": "linkage", "title": "a leg"},
+            "operation": {"speed": "60 rpm"},
+            "mechanism": {name: f"{length} mm" for name, length in LEG.items()},
+            "parts": {
+                "O": {"kind": "pivot"},
+                "P": {"kind": "pivot", "x": "x", "y": "y"},
+                "crank": {"kind": "crank", "at": "O", "pin": "W", "length": "m"},
+                "up": dyad(["W", "P"], "X", "right", "j", "b"),
+                "low": dyad(["W", "P"], "Y", "left", "k", "c"),
+                "knee": dyad(["X", "P"], "V", "right", "e", "d"),
+                "foot": dyad(["V", "Y"], "U", "right", "f", "g"),
+                "toe": dyad(["U", "Y"], "T", "right", "h", "i"),
+            },
+            "output": {"y": "T"},
+            "targets": {"lift": {"least": ["peak_acceleration"]}},
+        }
+    )
+
+
+def test_constant_angles_of_triangles_on_a_link_are_proven_in_few_boxes():
+    """Their joints keep their distance, which the formula knows: no box of crank angles is halved for them."""
+    found = lo.prove(leg())
+    assert {proof.limit: proof.status for proof in found.proofs if proof.status != "proven"} == {}
+    boxes = {proof.name: proof.boxes for proof in found.proofs}
+    assert boxes["mu.knee"] == boxes["mu.toe"] == 2
+    assert sum(boxes.values()) < 4000
+    b, d, e = (LEG[name] for name in "bde")
+    cosine = (d**2 + e**2 - b**2) / (2 * d * e)
+    assert lo.evaluate(leg()).figures["mu.knee"] == pytest.approx(math.acos(abs(cosine)), rel=1e-14)
 
 
 @pytest.mark.slow
