@@ -68,7 +68,7 @@ def run_timed(make_study: Callable[[], SceneStudy], together: bool) -> tuple[tup
     start = time.process_time()
     if together:
         return run.run(make_study()), time.process_time() - start
-    alone = mock.patch.object(neighbour_newton, "solve_between", lambda tasks: [None] * len(tasks))
+    alone = mock.patch.object(neighbour_newton, "solve_neighbours", lambda tasks: [None] * len(tasks))
     with alone, mock.patch.object(sweep, "MOST_COARSE", 10**6):
         # A study caches its plan, so that other points from scratch need a new study.
         return run.run(make_study()), time.process_time() - start

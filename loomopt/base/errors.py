@@ -19,7 +19,7 @@ _LONGEST = {"file": 240, "key": 190, "problem": 480, "value": 120, "allowed": 48
 """Characters of each part, so that a message is read."""
 WHOLE, MACHINE, GAP, NAME, VALUE = range(5)
 """Grades of mistakes: it hides others, the machine cannot work, a value is missing, a name or a value is wrong."""
-_MOST, _MOST_TOLD = 100, 20
+_MOST, _MOST_PRINTED = 100, 20
 """Number of mistakes after which reading stops; number of mistakes with a line of their own."""
 
 
@@ -94,7 +94,7 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
         """Error with several mistakes, one line for each."""
         error = copy.copy(self)
         error.others = tuple(others)
-        named, more = others[: _MOST_TOLD - 1], len(others) - _MOST_TOLD + 1
+        named, more = others[: _MOST_PRINTED - 1], len(others) - _MOST_PRINTED + 1
         rest = [f"and {more} more: correct these first"] if more > 0 else []
         error.text = "\n".join([*(fault.line for fault in (self, *named)), *rest])
         return error
@@ -141,7 +141,7 @@ class Broken(BadInput):
     """The code of another distribution has failed."""
 
 
-BROUGHT: dict[str, str] = {}
+PLUGINS: dict[str, str] = {}
 """Module that an entry point names → what it brings, and whose it is: "effect beatup.wind of loomopt-wind"."""
 
 
@@ -150,17 +150,17 @@ def blamed(error: BaseException) -> BaseException:
 
     Any other is returned as it is, with a note of what other distributions bring.
     """
-    if isinstance(error, BadInput | KeyboardInterrupt | GeneratorExit) or not BROUGHT:
+    if isinstance(error, BadInput | KeyboardInterrupt | GeneratorExit) or not PLUGINS:
         return error
     message = " ".join(f"{type(error).__name__}: {error}".rstrip(": ").split())
     for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
         module = str(frame.f_globals.get("__name__"))
-        owners = [name for name in BROUGHT if _is_of(module, name)]
+        owners = [name for name in PLUGINS if _is_of(module, name)]
         if owners:
             owner = module if module in owners else owners[0]
             where = f"{frame.f_code.co_name}, line {line} of {module}"
-            return Broken(f"{BROUGHT[owner]} fails in {where}: {message}", remedy="Correct it, or remove it")
-    note = f"other distributions take part: {', '.join(sorted(set(BROUGHT.values())))}"
+            return Broken(f"{PLUGINS[owner]} fails in {where}: {message}", remedy="Correct it, or remove it")
+    note = f"other distributions take part: {', '.join(sorted(set(PLUGINS.values())))}"
     if note not in getattr(error, "__notes__", ()):
         error.add_note(note)
     return error

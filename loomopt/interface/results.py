@@ -87,7 +87,7 @@ class Evaluation(records.Shown):
         """
         from loomopt.interface import tables
 
-        return tables.row(self.result, self.scene, self.sought, self._outcome, si=arguments.flag(si, "si"))
+        return tables.row(self.result, self.scene, self.task_name, self._outcome, si=arguments.flag(si, "si"))
 
     def curves(self) -> "pd.DataFrame":
         """Curves of the design over the cycle, SI, units in the column names."""
@@ -300,9 +300,15 @@ class Evaluation(records.Shown):
         )
 
     @property
-    def sought(self) -> str:
+    def task_name(self) -> str:
         """Target of the solve or of the evaluation, or the summary of its terms."""
         return self.terms.summary if self.terms else self.target
+
+    @property
+    def sought(self) -> str:
+        """Former name of `task_name`."""
+        _warn_of("sought", "task_name")
+        return self.task_name
 
     @property
     def _outcome(self) -> str:
@@ -344,7 +350,7 @@ class Evaluation(records.Shown):
         return designs.flat(self.design).items() <= registry.of(self.scene).today(self.scene).items()
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.problem}, {self.sought}: {self._outcome}; {self._summary}>"
+        return f"<{type(self).__name__} {self.problem}, {self.task_name}: {self._outcome}; {self._summary}>"
 
 
 @dataclass(frozen=True, repr=False)

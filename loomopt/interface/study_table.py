@@ -62,13 +62,13 @@ class ColumnUnits:
 
 
 def columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> dict[str, list[NumberColumn]]:
-    """Numbers of rows as columns: "place", "sought", "design", "figures", "multipliers"; none that is empty.
+    """Numbers of rows as columns: "place", "optimised", "design", "figures", "multipliers"; none that is empty.
 
     In the units of the scene, where what is only rounding beside the largest of its unit is 0; si: in SI, as they are.
     """
     numbers_of: dict[str, Sequence[Mapping[str, float | None]]] = {
         "place": [study.place(row) for row in rows],
-        "sought": [study.sought(row) for row in rows],
+        "optimised": [study.optimised(row) for row in rows],
         "design": [row.design for row in rows],
         "figures": [row.figures for row in rows],
     }
@@ -208,7 +208,7 @@ def frame(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> "pd.DataF
     from loomopt.interface.table_frame import TableFrame
 
     made = columns(study, rows, si)
-    cells: dict[str, object] = {c.heading: _floats(c) for c in (*made["place"], *made["sought"])}
+    cells: dict[str, object] = {c.heading: _floats(c) for c in (*made["place"], *made["optimised"])}
     cells |= {"status": [row.outcome for row in rows], "certified": [row.certified for row in rows]}
     for part in ("design", "figures", "multipliers"):
         cells |= {column.heading: _floats(column) for column in made[part]}
@@ -254,7 +254,7 @@ def shown_columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> l
     known = [*made["design"], *made["figures"], *made["multipliers"]]
     shown = [column for name in study.shown for column in known if column.name == name]
     differing = [column for column in made["design"] if _differs(column) and column not in shown]
-    return [*made["sought"], *shown, *differing]
+    return [*made["optimised"], *shown, *differing]
 
 
 def _differs(column: NumberColumn) -> bool:
@@ -282,7 +282,7 @@ def tables(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str
     number = len(findings.rows) - narrowing
     count = f"{number} point{'' if number == 1 else 's'}" if whole else counted(study, len(rows))
     count += f" and {narrowing} that locate{'s' * (narrowing == 1)} changes ({NARROWS})" if narrowing else ""
-    first_columns = range(min(len(study.kinds) + 2, len(heads)))  # the point, its place, what is sought there
+    first_columns = range(min(len(study.kinds) + 2, len(heads)))  # the point, its place, what is optimised there
     right = tuple(range(len(heads)))
     grid = TextTable(
         "", (*heads, "status"), tuple(lines), right, first=(*first_columns, len(heads)), more="--out F.csv, --json"
@@ -310,7 +310,7 @@ def change_sentence(study: SceneStudy, change: Change, si: bool) -> str:
     key = next(iter(study.kinds))
     unit = ColumnUnits(study, si).of(key)
     limits = [unbroken(side.text) for side in change.limits]
-    low, high = (unbroken(show(value, unit)) for value in change.between)
+    low, high = (unbroken(show(value, unit)) for value in change.interval)
     if change.at is None:
         return f"{unbroken(key)} from {low} to {high}: binding limits change, {', '.join(limits)}"
     where = f"{low} to {high}" if change.kind == "jump" else unbroken(show(change.at, unit))
@@ -329,7 +329,7 @@ def charts(study: SceneStudy, findings: Findings) -> Charts:
     missing = "no row is certified"
     if not places or not any(row.certified for row in rows):
         return Charts(study.heading, [], missing=missing)
-    panels = made["sought"] or shown_columns(study, rows)
+    panels = made["optimised"] or shown_columns(study, rows)
     others = [column for column in shown_columns(study, rows) if column not in panels]
     drawn = [_chart(panel, places, findings) for panel in [*panels, *others]]
     notes = [change_sentence(study, change, False) for change in findings.changes if change.at is not None]

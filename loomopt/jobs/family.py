@@ -106,7 +106,7 @@ class FamilyJob(Job):
         """Design, SI, of each member."""
         return [self.job.design(part.program, part.member_values(x)) for part in self.parts]
 
-    def own_designs(self, design: Numbers) -> list[dict[str, float]]:
+    def member_designs(self, design: Numbers) -> list[dict[str, float]]:
         """Design, SI, of each member, of the whole's."""
         plain = self.job.today(self.members[0])
         named = {name: [of_member(name, k) for k in range(len(self.members))] for name in plain}
@@ -127,7 +127,7 @@ class FamilyJob(Job):
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
         """Variables of a design."""
-        pairs = zip(self.parts, self.own_designs(design), strict=True)
+        pairs = zip(self.parts, self.member_designs(design), strict=True)
         members = [self.job.values(part.program, member_design) for part, member_design in pairs]
         return program.completed(self._joined(members, design))
 

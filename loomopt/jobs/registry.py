@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from loomopt.base import arguments
-from loomopt.base.errors import BROUGHT, BadInput, naming, unknown
+from loomopt.base.errors import PLUGINS, BadInput, naming, unknown
 from loomopt.jobs.base import Job
 from loomopt.model.numbers import words
 from loomopt.physics.effects.kinds import Effect, ranked
@@ -54,7 +54,7 @@ def _single(group: str, name: str, noun: str) -> "EntryPoint | None":
 
 def _loaded(point: "EntryPoint", noun: str, kind: type, name: str) -> Any:
     """Object of an entry point. Raises BadInput with its distribution where loading fails or the type is another."""
-    BROUGHT[point.module] = f"{noun} {point.name} of {_distribution(point)}"
+    PLUGINS[point.module] = f"{noun} {point.name} of {_distribution(point)}"
     try:
         thing = point.load()
     except KeyboardInterrupt:

@@ -55,8 +55,8 @@ def _longest(ring: "NDArray[np.complex128]", tangents: "NDArray[np.complex128]",
 
     def holds(reach: int) -> bool:
         arcs = _biarc(ring[here], tangents[here], ring[reach], tangents[reach])
-        between = ring[here + 1 : reach]
-        return not len(between) or bool(np.max(distance(between, [*arcs, (ring[reach], 0.0)])) <= tolerance)
+        inner = ring[here + 1 : reach]
+        return not len(inner) or bool(np.max(distance(inner, [*arcs, (ring[reach], 0.0)])) <= tolerance)
 
     good = here + 1
     while good < last and holds(min(good + step, last)):

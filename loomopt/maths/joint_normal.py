@@ -105,7 +105,7 @@ def _quadrature(factor: Floats, low: Floats, high: Floats) -> float:
         worth = (worth[:, None] * half[:, None] * weights * density).ravel()
         before = np.column_stack([np.repeat(before, len(nodes), axis=0), at.ravel()])
     first, last = _ends(factor, count - 1, before, low, high)
-    return float(np.sum(worth * (normal.below_each(last) - normal.below_each(first)).clip(min=0.0)))
+    return float(np.sum(worth * (normal.shares_below(last) - normal.shares_below(first)).clip(min=0.0)))
 
 
 def _sampled(factor: Floats, low: Floats, high: Floats) -> float:
@@ -113,7 +113,7 @@ def _sampled(factor: Floats, low: Floats, high: Floats) -> float:
     shares = sobol.points(POINTS, count - 1).clip(2.0**-33, 1.0 - 2.0**-33)
     before, worth = np.zeros((POINTS, 0)), np.ones(POINTS)
     for k in range(count):
-        first, last = (normal.below_each(end) for end in _ends(factor, k, before, low, high))
+        first, last = (normal.shares_below(end) for end in _ends(factor, k, before, low, high))
         room = (last - first).clip(min=0.0)
         worth = worth * room
         if k < count - 1:

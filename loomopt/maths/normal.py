@@ -63,6 +63,6 @@ def below(value: float) -> float:
     return 0.5 * math.erfc(-value / math.sqrt(2))
 
 
-def below_each(values: Floats) -> Floats:
+def shares_below(values: Floats) -> Floats:
     """Shares of the standard normal distribution that lie below values."""
     return np.array([below(float(value)) for value in values.ravel()]).reshape(values.shape)

@@ -28,7 +28,7 @@ WIDEST = math.pi / 2
 """rad; a wider interval holds no sample that says what the curve does: it must be a line between corners."""
 FEWEST = 3
 """Samples of a curve."""
-BESIDE = 8
+NEIGHBOURS = 8
 """Samples on each side of one that is left out: what lies beyond moves the curve there by less than 3e-5 of its own."""
 
 
@@ -252,7 +252,7 @@ def _left_out(rows: Sequence[_Row], places: Sequence[int]) -> list[float]:
     """Squares of how far samples lie off the curve through those beside them."""
     squares = []
     for k in places:
-        near = [row for j, row in enumerate(rows[: k + BESIDE + 1]) if j >= k - BESIDE and j != k]
+        near = [row for j, row in enumerate(rows[: k + NEIGHBOURS + 1]) if j >= k - NEIGHBOURS and j != k]
         place = sum(row.angle < rows[k].angle for row in near) - 1
         t = rows[k].angle - (near[place].angle + near[place + 1].angle) / 2
         c0, c1, c2, c3 = _cubics(near)[place]
@@ -262,8 +262,8 @@ def _left_out(rows: Sequence[_Row], places: Sequence[int]) -> list[float]:
 
 def _spread(rows: Sequence[_Row], closed: bool) -> float | None:
     """Rms of `_left_out` of all samples of a closed curve."""
-    before = [row._replace(angle=row.angle - TURN) for row in rows[-BESIDE:]]
-    after = [row._replace(angle=row.angle + TURN) for row in rows[:BESIDE]]
+    before = [row._replace(angle=row.angle - TURN) for row in rows[-NEIGHBOURS:]]
+    after = [row._replace(angle=row.angle + TURN) for row in rows[:NEIGHBOURS]]
     whole = [*before, *rows, *after]
     return _rms(_left_out(whole, range(len(before), len(before) + len(rows))))
 

@@ -12,7 +12,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.model import drive
 from loomopt.model.kinematics import Arcs, Group, Kinematics
 from loomopt.model.model import DesignRow, Instant
-from loomopt.model.sampling import KEPT, Sampler
+from loomopt.model.sampling import CACHE_SIZE, Sampler
 from loomopt.physics import balance
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Cycle, Floats, Node, Pieces
@@ -37,7 +37,7 @@ def turned(steady: Sampler, scene: Scene) -> Sampler:
         problem = f"effects {motor.name} and {others[0].name} cannot be on together: the crank has one speed"
         raise refusal(problem, scene.origin, f"effects.{others[0].name}", remedy="Take one of them off")
     try:
-        return steady.session.cached("turned", KEPT, (steady, motor), lambda: _turned(steady, motor))
+        return steady.session.cached("turned", CACHE_SIZE, (steady, motor), lambda: _turned(steady, motor))
     except NoTurn:
         problem = f"effect {motor.name}: the crank has no periodic motion without a stop"
         remedy = "Give a larger flywheel, a higher speed, or less load on the crank"

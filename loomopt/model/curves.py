@@ -228,7 +228,7 @@ def _around_tops(columns: Mapping[str, Floats], least: float) -> tuple[list[floa
             rise = _rise(phi, sizes, int(k)) / top if top > 0.0 else 0.0
             worst = max(worst, rise)
             if rise > max(least, ROUNDED):
-                more |= set(_between(phi, sizes, int(k)))
+                more |= set(_angles_around(phi, sizes, int(k)))
     return sorted(more), worst
 
 
@@ -270,7 +270,7 @@ def _bent(phi: Floats, sizes: Floats, k: int, side: int) -> float | None:
     return float(abs(bend) * width**2 / 8) if rises else None
 
 
-def _between(phi: Floats, sizes: Floats, k: int) -> list[float]:
+def _angles_around(phi: Floats, sizes: Floats, k: int) -> list[float]:
     """Angles, rad, between row k and its neighbours: thirds, and the vertex of their parabola."""
     before, after = phi[k] - phi[k - 1], phi[k + 1] - phi[k]
     angles = [phi[k] - share * before for share in (1 / 3, 2 / 3)] if before > 0.0 else []

@@ -16,7 +16,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.model.kinematics import Arcs, Group
 from loomopt.model.limits import CycleLimit, DesignLimit, Limit, RatioLimit
 from loomopt.model.model import CycleQuantity, DesignRow, Formula, Instant, Integral, JobModel, cornered
-from loomopt.model.objectives import Objective, Piece, Sought, Value, Worst
+from loomopt.model.objectives import Objective, ObjectiveSense, Piece, Value, Worst
 from loomopt.model.program import Alias, Move, Numbers, Program, Variable
 from loomopt.model.reading import DATUM
 from loomopt.model.sampling import Sampler, sampled
@@ -218,9 +218,9 @@ class WorstOf(Objective):
         return tuple(name for objective in self.of for name in objective.quantities)
 
     @property
-    def sought(self) -> Sought:
+    def sense(self) -> ObjectiveSense:
         """Sense of the members' objectives: "least" or "most"."""
-        return self.of[0].sought
+        return self.of[0].sense
 
     def worsening(self, now: float, then: float, most: bool) -> float:
         """Amount by which the figure becomes worse from now to then, SI."""

@@ -133,9 +133,9 @@ class Machines:
 
     def at(self, name: str, pieces: Pieces, u: Floats, machines: Places) -> Floats:
         """Quantity, SI, at nodes (pieces, u) of machines; u: (…, chosen), the others (chosen,)."""
-        return self._by_model((name,), machines, lambda rows, part: rows.own_node(pieces[part], u[..., part]), u.shape)[
-            0
-        ]
+        return self._by_model(
+            (name,), machines, lambda rows, part: rows.design_node(pieces[part], u[..., part]), u.shape
+        )[0]
 
     def at_angles(self, names: Sequence[str], angles: Floats, machines: Places | None = None) -> list[Floats]:
         """Quantities that no switch changes, SI, at crank angles, rad, (…, chosen), of machines (chosen,)."""
@@ -163,7 +163,7 @@ class Machines:
 
     def angles(self, tops: Tops) -> Floats:
         """Crank angles of tops, rad, (machines,)."""
-        phi: Floats = self.rows.own_node(tops.piece, tops.u).phi
+        phi: Floats = self.rows.design_node(tops.piece, tops.u).phi
         return phi
 
     def tops(self, name: str, where: Where | None = None, signed: bool = False) -> Tops:

@@ -20,8 +20,8 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE
 
-Sought = Literal["least", "least magnitude", "most"]
-"""End of a figure that is sought."""
+ObjectiveSense = Literal["least", "least magnitude", "most"]
+"""What a figure is optimised for: its least value, its least magnitude or its largest value."""
 
 
 class Piece(NamedTuple):
@@ -75,7 +75,7 @@ class Objective(abc.ABC):
         return type(self).__name__, self.rows
 
     @property
-    def sought(self) -> Sought:
+    def sense(self) -> ObjectiveSense:
         """Sense of the optimisation: "least" or "most" of the figure."""
         return "least" if self.power > 0 else "most"
 
@@ -176,7 +176,7 @@ class Magnitude(Objective):
         return (self.row, 1.0), (self.row, -1.0)
 
     @property
-    def sought(self) -> Sought:
+    def sense(self) -> ObjectiveSense:
         """Sense of the optimisation: "least magnitude"."""
         return "least magnitude"
 

@@ -269,7 +269,7 @@ class BatchReading(Reading):
         switch = {name: column[:, None] for name, column in self.cycle.switch(pieces).items()}
         return Node(begin + u[:, None] * (end - begin), switch)
 
-    def own_node(self, pieces: Pieces, u: Floats) -> Node:
+    def design_node(self, pieces: Pieces, u: Floats) -> Node:
         """Node (pieces, u) of each design, its own; pieces: (designs,), u: (…, designs)."""
         every = np.arange(self.count)
         starts = np.broadcast_to(self._starts, (len(self._starts), self.count))

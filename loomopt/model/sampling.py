@@ -180,10 +180,10 @@ class Sampler:
 
     def grid(self, samples: int = 0) -> tuple[Pieces, Floats]:
         """Nodes spread evenly over the turn, as many as the sampler has by default; ends of pieces included."""
-        return _grid(self._counts(samples) if samples else self._own_counts)
+        return _grid(self._counts(samples) if samples else self._default_counts)
 
     @lazy
-    def _own_counts(self) -> tuple[int, ...]:
+    def _default_counts(self) -> tuple[int, ...]:
         return self._counts(self.samples)
 
     def _counts(self, samples: int) -> tuple[int, ...]:
@@ -255,7 +255,7 @@ class Sampler:
             return None
         left, right = np.empty_like(size), np.empty_like(size)
         left[1:], right[:-1] = size[:-1], size[1:]
-        first, last = _ends(self._own_counts)
+        first, last = _ends(self._default_counts)
         left[first] = right[last] = -np.inf
         return np.flatnonzero((size > left) & (size >= right))
 
@@ -393,7 +393,7 @@ def _is_same(first: Number, second: Number) -> bool:
     return floats and first == second and math.copysign(1.0, first) == math.copysign(1.0, second)
 
 
-SAMPLERS, KEPT = "samplers", 256
+SAMPLERS, CACHE_SIZE = "samplers", 256
 """What a session calls samplers, and how many it keeps: more than the designs that one start, its silent levels and its
 certificate look at, and those of all designs that are certified together."""
 
@@ -409,7 +409,7 @@ def sampled(model: JobModel, values: Mapping[str, float], samples: int = SAMPLES
     def made() -> Sampler:
         return Sampler(model, dict(zip(names, numbers, strict=True)), samples)
 
-    return current().cached(SAMPLERS, KEPT, (model, names, numbers.tobytes(), samples), made)
+    return current().cached(SAMPLERS, CACHE_SIZE, (model, names, numbers.tobytes(), samples), made)
 
 
 class _SampledRows(Rows):

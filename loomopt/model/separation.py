@@ -171,7 +171,7 @@ def _form(sampler: Sampler, event: Event, load: Acting, switch: float) -> Linear
 
 BEYOND = 1.01
 """Share of the largest sampled acceleration that no acceleration exceeds."""
-HELD, GAP = "{}_cam", "gap"
+CAM_COLUMN, GAP = "{}_cam", "gap"
 """Columns of the surface under the output and of its distance from the output."""
 
 
@@ -211,7 +211,7 @@ class Parted:
         face = curves[output]
         flown = curves | (self._flown(curves, columns, stretch) if stretch.piece else {})
         gap = np.maximum(flown[output] - face, 0.0)
-        contact_columns = {f"{HELD.format(name)} [{unit}]": face, f"{GAP} [{unit}]": gap}
+        contact_columns = {f"{CAM_COLUMN.format(name)} [{unit}]": face, f"{GAP} [{unit}]": gap}
         first = {ANGLE: flown[ANGLE], output: flown[output], **contact_columns}
         return first | {column: values for column, values in flown.items() if column not in first}
 

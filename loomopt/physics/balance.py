@@ -71,9 +71,9 @@ def terms(
         at = given.inputs(maths, load, pose, switch)
         if isinstance(load, State):
             yield load, load.force(at, reply_to_corners(maths, load, loads, pose, given, switch))
-        elif load.upon:
+        elif load.force_under_loads:
             others = [acting for acting in loads if acting is not load]
-            yield load, load.upon(at, Loaded(maths, others, pose, given, switch))
+            yield load, load.force_under_loads(at, Loaded(maths, others, pose, given, switch))
         else:
             yield load, load.force(at)
 

@@ -47,7 +47,7 @@ POLISH_STEPS, POLISH_FARTHEST, POLISH_FARTHER, POLISH_RANK = 3, 1e-6, 2e-5, 1e-1
 """Newton steps of polishing; the farthest they may lead, and where that is not certified, twice what IPOPT leaves of
 what just binds, IPOPT_TOLERANCE/BINDING; the singular value below which rows depend."""
 
-POLISH_MET, POLISH_DONE = 1e-12, 1e-13
+POLISH_EXCESS, POLISH_DONE = 1e-12, 1e-13
 """Excess of a polished row that is rounding of its terms, and the step after which there is none left to take."""
 
 SAME_NODE = 1e-3

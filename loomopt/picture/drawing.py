@@ -112,9 +112,7 @@ def pointer(near: Point, angle: float, h: float) -> list[Primitive]:
     return [Line("notes", (near.towards(angle, 1.5 * h), tip)), arrow("notes", tip, angle, 1.2 * h)]
 
 
-def angle_between(
-    centre: Point, radius: float, begin: float, end: float, h: float, both: bool = False
-) -> list[Primitive]:
+def angle_arc(centre: Point, radius: float, begin: float, end: float, h: float, both: bool = False) -> list[Primitive]:
     """An angle's arc from begin to end, rad, with an arrow head at its end, or at both ends."""
     turn = math.copysign(math.pi / 2, end - begin)
     primitives: list[Primitive] = [Arc("dimensions", centre, radius, min(begin, end), max(begin, end))]

@@ -20,9 +20,9 @@ from loomopt.picture.equations import (
     Equation,
     Expression,
     cases,
+    effect_symbols,
     equation,
     latex,
-    own_values,
     relation,
     sums,
     symbol,
@@ -52,7 +52,7 @@ def given(model: JobModel, values: Values) -> Given:
     for effect in model.effects:
         words = model.words_of(effect.name)
         given_keys = [key for key in keys(effect.table) if not has_labels or owned(effect, key) in model.known]
-        symbols_of_effects[effect.name] = own_values(effect, words, given_keys, taken)
+        symbols_of_effects[effect.name] = effect_symbols(effect, words, given_keys, taken)
         taken |= {str(value) for key, value in symbols_of_effects[effect.name].items() if key not in words}
     asks = any(check.joints for check in model.checks)
     asks = asks or (has_labels and any(isinstance(load, Load) and load.inside for load in model.loads))
@@ -132,7 +132,7 @@ def _load_equations(model: JobModel, load: Acting, pose: Motion, inputs: Given, 
                 yield equation(item.name, symbol(shares[item.name]), sympy().sympify(share))
         left, right = load.motion(_in_symbols(pose, inertia, carried), inputs.tables[load.name])
         yield equation(load.name, left, right)
-        moved, still = map(symbol, load.between)
+        moved, still = map(symbol, load.difference)
         yield relation(load.name, symbol("z"), "=", moved - still, "after every turn the same")
     yield term(load, pose, inputs, letter)
 
@@ -249,9 +249,10 @@ def joint_equations(model: JobModel, pose: Motion, inputs: Given, total: Express
             equations[check.name] = Equation(check.name, check.sentence, rf"\text{{{check.sentence}}}")
             continue
         joints = check.joints(inputs.inputs(system, check, pose), loading)
-        for name in check.between:
+        for name in check.link_inertias:
             equations |= {
-                component: equation(check.name, symbol(component), value) for component, value in _between(joints, name)
+                component: equation(check.name, symbol(component), value)
+                for component, value in _link_inertia(joints, name)
             }
         for name in (name for name in (*check.vectors, *check.scalars) if name in model.check_figures):
             parts = [""] if name in check.scalars else [f"_{axis}" for axis in COMPONENTS]
@@ -267,7 +268,7 @@ def joint_equations(model: JobModel, pose: Motion, inputs: Given, total: Express
     return list(equations.values())
 
 
-def _between(joints: Number, name: str) -> Iterator[tuple[str, Expression]]:
+def _link_inertia(joints: Number, name: str) -> Iterator[tuple[str, Expression]]:
     """Yield the inertia force and moment of a link, and replace them by symbols; nothing for a link without mass."""
     joint = getattr(joints, name)
     if joint is not None:

@@ -125,14 +125,14 @@ def sums(
 def _with_symbol(load: Acting, value: Expression) -> Acting:
     """Load whose force is a symbol, without states."""
     if isinstance(load, Load):
-        return dataclasses.replace(load, force=lambda *_: value, response=None, upon=None, inside=None)
+        return dataclasses.replace(load, force=lambda *_: value, response=None, force_under_loads=None, inside=None)
     return dataclasses.replace(load, force=lambda *_: value)
 
 
-def own_values(effect: Effect, words: Mapping[str, str], keys: Iterable[str], taken: Collection[str]) -> Values:
+def effect_symbols(effect: Effect, words: Mapping[str, str], keys: Iterable[str], taken: Collection[str]) -> Values:
     """Symbols of an effect's table; words: values that choose a formula; keys: of its numbers.
 
-    One whose letter is taken, and every one of an instance, is told by whose it is.
+    A symbol whose letter is taken has the effect's name as index; the symbols of an instance begin with its name.
     """
     curve = effect.tabulated.key if isinstance(effect, Load) and effect.tabulated else ""
     letters = {key: effect.letters.get(key, key) for key in keys if key != curve}

@@ -71,7 +71,7 @@ def place(wishes: Iterable[LabelWish], strokes: Floats, unit: float, leader: flo
         spot = _label_spot(wish, strokes, taken, unit, leader)
         taken.append(spot)
         if _gap(spot) > leader * unit:
-            strokes = np.concatenate([strokes, _between(spot, unit)])
+            strokes = np.concatenate([strokes, _leader_points(spot, unit)])
     return taken
 
 
@@ -86,7 +86,7 @@ def _label_spot(wish: LabelWish, strokes: Floats, taken: Sequence[LabelSpot], un
             free = _free(np.array([spot.box for spot in spots]), strokes, taken, CLEAR * unit)
             for turn, spot in itertools.compress(zip(TURNS, spots, strict=True), free):
                 cost = ring + (abs(turn) + which) / 3
-                way = _between(spot, unit)
+                way = _leader_points(spot, unit)
                 has_leader = leader * unit < _gap(spot) < OUTSIDE * unit
                 if cost < least and not (has_leader and _meets(way, taken, unit)):
                     cost += BEHIND if _crosses(way, strokes, unit) else 0.0
@@ -125,7 +125,7 @@ def _gap(spot: LabelSpot) -> float:
     return math.dist(spot.box.nearest(spot.x, spot.y), (spot.x, spot.y))
 
 
-def _between(spot: LabelSpot, unit: float) -> Floats:
+def _leader_points(spot: LabelSpot, unit: float) -> Floats:
     """Points of the leader from a label's point to its box, (n, 2)."""
     end = spot.box.nearest(spot.x, spot.y)
     return np.linspace((spot.x, spot.y), end, 2 + int(_gap(spot) / (STEP * unit)))

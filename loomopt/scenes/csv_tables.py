@@ -36,7 +36,7 @@ TURN = 2 * math.pi + 1e-4
 """Largest angle, rad: one turn, with room for 6.2832."""
 WHOLE = 0.5
 """Half a unit of numbers without decimals."""
-LONGEST_TOLD = 20
+LONGEST_TEXT = 20
 """Characters of a cell that a message repeats: a file that is no table may hold what is not to be shown."""
 FIRST_ROWS = 20
 """Rows among which the heading is looked for: a title may stand above it."""
@@ -310,7 +310,7 @@ def _find_columns(head: Row, rows: Sequence[Row], kinds: Mapping[str, str], orig
 
 def _cell(text: str) -> str:
     """Text of a cell in a message: cut where it is longer than any number or unit."""
-    return shown(text) if len(text) <= LONGEST_TOLD else f"a text of {len(text)} characters"
+    return shown(text) if len(text) <= LONGEST_TEXT else f"a text of {len(text)} characters"
 
 
 def _quote(row: Row) -> str:

@@ -217,7 +217,7 @@ def _fits(quantity: Quantity, value: float) -> bool:
     return value >= quantity.least and quantity.above < value < quantity.below
 
 
-MOST_TOLD, LONGEST_TOLD = 8, 200
+MOST_SENTENCES, LONGEST_TEXT = 8, 200
 """Changes that are listed one by one, the others are counted; characters of one change."""
 PIPE = "-"
 """Name in messages of a design that comes through a pipe."""
@@ -349,8 +349,8 @@ def scene_changes(scene: Scene, given: DesignGiven, origin: str, besides: Call) 
 
 
 def _shorten(sentences: Sequence[str]) -> list[str]:
-    short = [clean(sentence, LONGEST_TOLD) for sentence in sentences[:MOST_TOLD]]
-    return short if len(sentences) <= MOST_TOLD else [*short, f"and {len(sentences) - MOST_TOLD} more"]
+    short = [clean(sentence, LONGEST_TEXT) for sentence in sentences[:MOST_SENTENCES]]
+    return short if len(sentences) <= MOST_SENTENCES else [*short, f"and {len(sentences) - MOST_SENTENCES} more"]
 
 
 def _is_of(call: Call, key: str) -> bool:

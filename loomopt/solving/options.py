@@ -37,7 +37,7 @@ def check(
     scene: Scene, accuracy: float, starts: int | None, seed: int, global_proof: GlobalProof | None = None
 ) -> None:
     """Raise BadInput for a scene that cannot be solved, or for options out of range."""
-    check_sought(scene)
+    check_effects(scene)
     check_numbers(accuracy, starts, seed)
     check_global_proof(global_proof)
 
@@ -96,7 +96,7 @@ def _remedy(name: str, near: str) -> str:
     return f'Perhaps "{near}" is meant' if near else "Choose one of them"
 
 
-def check_sought(scene: Scene, command: str = "solve") -> None:
+def check_effects(scene: Scene, command: str = "solve") -> None:
     """Raise BadInput where an effect takes part only where a given design is evaluated; command: the command."""
     for effect in scene.active:
         if isinstance(effect, EVALUATED):

@@ -63,7 +63,7 @@ def find_differences(now: "pd.DataFrame", then: "pd.DataFrame", objectives: Coll
 
 POINTS = 12
 """Designs of a front, without those that narrow down its changes."""
-BETWEEN = 0.25, 0.5, 0.75
+CHECKED_SHARES = 0.25, 0.5, 0.75
 """Places between the ends where a front is solved again, as shares of the second axis."""
 
 
@@ -123,7 +123,7 @@ def check_front(study: trade.Trade, then: "pd.DataFrame") -> Iterator[tuple[str,
     values = [float(value) for value in then[figure]]
     ends = _front_ends(study, values)
     rows: dict[int, Row] = {}
-    for place in dict.fromkeys((*ends, *_front_between(values))):
+    for place in dict.fromkeys((*ends, *_inner_lines(values))):
         near = _front_start(study, {str(name): str(cell) for name, cell in then.iloc[place].items()})
         if place in ends:
             task = StudyTask(ends.index(place), None, {}, {"end": ends.index(place), "also": near})
@@ -148,11 +148,11 @@ def _front_ends(study: trade.Trade, values: list[float]) -> tuple[int, int]:
     return (last, first) if study.senses[1] == "least" else (first, last)
 
 
-def _front_between(values: list[float]) -> list[int]:
-    """Lines nearest to the shares `BETWEEN` of the second axis, without the ends."""
+def _inner_lines(values: list[float]) -> list[int]:
+    """Lines nearest to the shares `CHECKED_SHARES` of the second axis, without the ends."""
     low, high = values[0], values[-1]
     inner = range(1, len(values) - 1)
-    return [min(inner, key=lambda k: abs(values[k] - low - share * (high - low))) for share in BETWEEN if inner]
+    return [min(inner, key=lambda k: abs(values[k] - low - share * (high - low))) for share in CHECKED_SHARES if inner]
 
 
 def _front_start(study: trade.Trade, line: Mapping[str, str]) -> list[dict[str, dict[str, object]]]:

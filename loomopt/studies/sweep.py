@@ -27,7 +27,7 @@ from loomopt.solving import engine, neighbour_answer
 from loomopt.solving.answer.solution import SIDES, Solution
 from loomopt.solving.certificate.records import worth_of
 from loomopt.solving.nlp.point import Point
-from loomopt.solving.options import check_numbers, check_sought, target_name
+from loomopt.solving.options import check_effects, check_numbers, target_name
 from loomopt.solving.search import neighbour_newton
 from loomopt.solving.search.search import Search
 from loomopt.studies.run import rows
@@ -223,11 +223,11 @@ class Sweep:
             # With several optima at a neighbour, a different one may be best here.
             return StudyTask(point, None, place, {"beyond": []})
         neighbours = (
-            [] if parent is None or across is None else self._optima_between(place, known[parent], known[across])
+            [] if parent is None or across is None else self._neighbour_optima(place, known[parent], known[across])
         )
         return StudyTask(point, parent, place, starts, neighbours=neighbours)
 
-    def _optima_between(self, place: Mapping[str, float], parent: Row, across: Row) -> list[object]:
+    def _neighbour_optima(self, place: Mapping[str, float], parent: Row, across: Row) -> list[object]:
         """Optima of two rows, and the share of the way from the first to the second; empty without an optimum."""
         optima = [row.warm.get("optimum") for row in (parent, across)]
         key = next((k for k, value in parent.place.items() if value != across.place[k]), None)
@@ -243,7 +243,7 @@ class Sweep:
 
     def solve(self, task: StudyTask, parent: Row | None) -> Solution:
         """Answer of a task. Raises BadInput for an invalid combination."""
-        (search,) = self._search_between([task])
+        (search,) = self._search_from_neighbours([task])
         answer = neighbour_answer.answer_of_search(self.scene_at(task.point), self.target, search) if search else None
         return answer if answer and answer.status == "optimal" else self._solve_alone(task, parent)
 
@@ -255,17 +255,19 @@ class Sweep:
         near: list[Point] = [point for data in starts if (point := rows.read(data, program))]
         return engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed, near=near)
 
-    def _search_between(self, tasks: Sequence[StudyTask]) -> list[Search | None]:
+    def _search_from_neighbours(self, tasks: Sequence[StudyTask]) -> list[Search | None]:
         """Searches between the optima of two neighbours; None for a task that must be solved alone."""
         searches: list[Search | None] = [None] * len(tasks)
         starts = [
-            (k, start) for k, task in enumerate(tasks) if task.neighbours and (start := self._start_between(task))
+            (k, start) for k, task in enumerate(tasks) if task.neighbours and (start := self._neighbour_start(task))
         ]
-        for (k, _), search in zip(starts, neighbour_newton.solve_between([start for _, start in starts]), strict=True):
+        for (k, _), search in zip(
+            starts, neighbour_newton.solve_neighbours([start for _, start in starts]), strict=True
+        ):
             searches[k] = search
         return searches
 
-    def _start_between(self, task: StudyTask) -> neighbour_newton.NeighbourTask | None:
+    def _neighbour_start(self, task: StudyTask) -> neighbour_newton.NeighbourTask | None:
         """Start of a search between two neighbours' optima; None for an invalid combination."""
         with contextlib.suppress(BadInput):
             return neighbour_answer.begun(self.scene_at(task.point), self.target, self.accuracy, task.neighbours)
@@ -275,7 +277,7 @@ class Sweep:
         """Values of the swept numbers, SI, at a row."""
         return row.place
 
-    def sought(self, row: Row) -> Mapping[str, float]:
+    def optimised(self, row: Row) -> Mapping[str, float]:
         """Empty: the target has the objectives."""
         return {}
 
@@ -295,8 +297,8 @@ class Sweep:
     def solved_together(self, tasks: Sequence[StudyTask]) -> list[Row | None]:
         """Rows of tasks between two neighbours' optima, independent of the batch; None for the others."""
         start = time.perf_counter()
-        pairs = zip(tasks, self._search_between(tasks), strict=True)
-        rows = [self._row_between(task, search) if search else None for task, search in pairs]
+        pairs = zip(tasks, self._search_from_neighbours(tasks), strict=True)
+        rows = [self._row_of_search(task, search) if search else None for task, search in pairs]
         mean = (time.perf_counter() - start) / max(1, sum(map(bool, rows)))
         return [replace(row, seconds=mean) if row else None for row in rows]
 
@@ -304,7 +306,7 @@ class Sweep:
         """Row of a task by a solve of its scene. Raises BadInput for an invalid combination."""
         return self._row(task, self._solve_alone(task, parent))
 
-    def _row_between(self, task: StudyTask, search: Search) -> Row | None:
+    def _row_of_search(self, task: StudyTask, search: Search) -> Row | None:
         """Row of a search between two neighbours; None where the point must be solved alone."""
         best, program = search.best, search.program
         here = neighbour_answer.evaluated(self.scene_at(task.point), search)
@@ -424,7 +426,7 @@ def plan_sweep(
     axes = tuple(_axis(base, key, texts, ends) for key, texts in listed.items())
     job = registry.of_target(base, name)
     job.demand(base, name)
-    check_sought(base)
+    check_effects(base)
     return Sweep(base, name, axes, float(accuracy), int(seed), bool(job.program(base, name).uniqueness_reason))
 
 

@@ -5,7 +5,7 @@ import itertools
 import pytest
 
 import loomopt as lo
-from loomopt.base.errors import BROUGHT, BadInput, Broken, blamed, clean, naming
+from loomopt.base.errors import PLUGINS, BadInput, Broken, blamed, clean, naming
 from loomopt.interface.cli.app import run
 
 LONGEST_MESSAGE = 2000
@@ -70,7 +70,7 @@ def test_a_scene_of_any_names_is_answered_shortly():
 
 def entry_point_function(monkeypatch, body):
     """Return a function of a module that an entry point names."""
-    monkeypatch.setitem(BROUGHT, "windy.drag", "effect beatup.wind of loomopt-wind")
+    monkeypatch.setitem(PLUGINS, "windy.drag", "effect beatup.wind of loomopt-wind")
     module = {"__name__": "windy.formulas"}
     exec(f"def force(given):\n    {body}", module)
     return module["force"]
@@ -101,6 +101,6 @@ def test_an_error_elsewhere_keeps_its_kind_and_says_once_who_takes_part(monkeypa
         with pytest.raises(TypeError) as caught, naming(), naming():
             len(force({}))
         assert caught.value.__notes__ == ["other distributions take part: effect beatup.wind of loomopt-wind"]
-    monkeypatch.delitem(BROUGHT, "windy.drag")
+    monkeypatch.delitem(PLUGINS, "windy.drag")
     assert blamed(error := ValueError("x")) is error
     assert not hasattr(error, "__notes__")

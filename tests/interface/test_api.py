@@ -205,6 +205,7 @@ METHODS = {
             "simulate",
             "solver",
             "sought",
+            "task_name",
         ),
         *(
             "beside",

@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 
 import loomopt as lo
-from loomopt.base.errors import BROUGHT
+from loomopt.base.errors import PLUGINS
 from loomopt.interface.cli import app
 from loomopt.interface.cli.app import run
 from loomopt.scenes import packaged
@@ -124,7 +124,7 @@ def test_each_help_ends_in_an_example_of_its_own_options(name, capsys):
 
 
 def test_a_shell_completes_commands_whoever_else_takes_part(monkeypatch, capsys):
-    monkeypatch.setitem(BROUGHT, "made_up_effects", "effect beatup.made_up of made_up_effects")
+    monkeypatch.setitem(PLUGINS, "made_up_effects", "effect beatup.made_up of made_up_effects")
     monkeypatch.setenv("_LOOMOPT_COMPLETE", "complete_bash")
     monkeypatch.setenv("COMP_WORDS", "loomopt re")
     monkeypatch.setenv("COMP_CWORD", "1")

@@ -173,6 +173,8 @@ def test_today_beside_an_answer_is_an_evaluation_of_its_scene(answer):
     assert answer.today.figures == lo.evaluate("beatup-light").figures
     with pytest.warns(DeprecationWarning, match="before is now today"):
         assert answer.before is answer.today
+    with pytest.warns(DeprecationWarning, match="sought is now task_name"):
+        assert answer.sought == answer.task_name == "balance"
 
 
 def test_an_evaluation_goes_on_in_its_own_scene_and_target(evaluation):

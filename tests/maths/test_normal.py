@@ -17,5 +17,5 @@ def test_the_quantile_is_that_of_one_value():
 
 def test_what_lies_below_the_quantile_is_the_share():
     shares = np.array(SHARES[1:])
-    assert normal.below_each(normal.quantile(shares)) == pytest.approx(shares, rel=1e-12)
+    assert normal.shares_below(normal.quantile(shares)) == pytest.approx(shares, rel=1e-12)
     assert normal.below(0.0) == 0.5

@@ -94,8 +94,8 @@ def test_what_an_objective_is_never_less_than():
 
 
 def test_a_figure_is_sought_least_or_most_and_worsens_the_other_way():
-    assert [item.sought for item, _ in list(KINDS.values())[:4]] == ["least", "least", "least magnitude", "least"]
-    assert Value("speed", "period", 1.0, power=-1).sought == "most"
+    assert [item.sense for item, _ in list(KINDS.values())[:4]] == ["least", "least", "least magnitude", "least"]
+    assert Value("speed", "period", 1.0, power=-1).sense == "most"
     assert [Value("p", "p", 1.0).worsening(3.0, 5.0, most) for most in (False, True)] == [2.0, -2.0]
     assert Magnitude("p", "p", 1.0).worsening(3.0, -5.0, most=False) == 2.0
 

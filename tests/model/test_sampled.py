@@ -6,7 +6,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.model.sampling import KEPT, SAMPLERS, Sampler, sampled
+from loomopt.model.sampling import CACHE_SIZE, SAMPLERS, Sampler, sampled
 from loomopt.model.session import Session, current, working
 
 SCENE = lo.load("beatup")
@@ -41,7 +41,7 @@ def test_what_is_kept_is_what_would_be_sampled():
 def test_no_more_are_kept_than_one_start_looks_at():
     current().forget(SAMPLERS)
     first = sampled(MODEL, VALUES)
-    for k in range(KEPT):
+    for k in range(CACHE_SIZE):
         sampled(MODEL, {**VALUES, "m4e": 1.0 + k})
     assert sampled(MODEL, VALUES) is not first
 

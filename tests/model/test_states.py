@@ -63,7 +63,7 @@ ARM = State(
     coordinate=lambda *_: 0,
     motion=lambda written, own: (0, 0),
     term=lambda written, own: 0,
-    between=("x_a", "x"),
+    difference=("x_a", "x"),
     rests=lambda own: "two harmonics are all there are",
 )
 DRAG = Load(name="drag", summary="", table=Table, acts="drive", force=drag)

@@ -17,6 +17,7 @@ from loomopt.jobs.rapier.model import HeadPose
 from loomopt.maths import systems
 from loomopt.physics.cycle import Node
 from loomopt.physics.mechanisms import rapier_drive
+from loomopt.physics.mechanisms.moving import seen_from
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley
 from loomopt.picture.job_views import Span
 from reference import crank_rocker_synthesis
@@ -90,7 +91,7 @@ def link_5_at_180():
     sampled = JOB.sampler(RAPIER, built())
     pose = sampled.model.kinematics.pose(systems.FLOAT, sampled.given, Node(math.pi, {}))
     assert isinstance(pose, HeadPose)
-    turned = rapier_drive.between(pose.joints.second_crank, pose.joints.dyad.link1)
+    turned = seen_from(pose.joints.second_crank, pose.joints.dyad.link1)
     return math.degrees(math.atan2(turned.y, turned.x))
 
 

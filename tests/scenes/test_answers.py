@@ -187,7 +187,7 @@ def test_another_scene_of_the_job_is_told_by_its_name_and_not_without_end():
     many = {f"bounds.l{k}.{end}": f"{170 + k} mm" for k in range(1, 5) for end in ("min", "max")}
     many |= {f"mechanism.l{k}": f"{100 * SCENE.mechanism[f'l{k}']} cm" for k in range(1, 5)}
     report = changes(SCENE, SCENE.update(many | {"operation.M0": "1 N*m", "operation.speed": "1 rpm"}))
-    assert len(report) == designs.MOST_TOLD + 1
+    assert len(report) == designs.MOST_SENTENCES + 1
     assert report[-1] == "and 6 more"
     assert len(", ".join(report)) < 2000
 

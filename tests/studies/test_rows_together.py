@@ -68,7 +68,7 @@ def test_rows_are_the_same_bits_in_batches_of_any_size(study, count):
 def test_rows_are_the_same_bits_from_one_worker_and_from_two_and_of_separate_solves(study, monkeypatch):
     together = run.run(study)
     assert digest(run.run(study, run.workers(2))) == digest(together)
-    monkeypatch.setattr(neighbour_newton, "solve_between", lambda starts: [None] * len(starts))
+    monkeypatch.setattr(neighbour_newton, "solve_neighbours", lambda starts: [None] * len(starts))
     # Rounding decides which of two equal gaps is halved last.
     known = {place_key(row): row for row in together if row.certified}
     pairs = [(row, known[place_key(row)]) for row in run.run(study) if row.certified and place_key(row) in known]

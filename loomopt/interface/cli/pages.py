@@ -21,7 +21,7 @@ Problems = Annotated[
     list[str], typer.Argument(metavar="PROBLEM|ANSWER|STORE...", help="Scenes (they are solved), answers and stores.")
 ]
 Page = Annotated[list[Path], typer.Option("--out", metavar="F.html", help="Write this page.")]
-Beside = Annotated[
+Studies = Annotated[
     list[str] | None,
     typer.Option("--study", metavar="S", help="Add budget, tolerance, sensitivity, effects, accuracy or proof."),
 ]
@@ -41,7 +41,7 @@ def report(
     proven: Annotated[
         bool, typer.Option("--prove", help="Also prove every limit of the scenes at every crank angle.")
     ] = False,
-    studies: Beside = None,
+    studies: Studies = None,
 ) -> None:
     """Write one self-contained page of scenes, answers and studies."""
     from loomopt.base.errors import refusal

@@ -148,14 +148,14 @@ def _axes(minimise: list[str], maximise: list[str], against: str) -> tuple[str, 
 
     named = [*minimise, *maximise]
     twice = next((name for name in named if named.count(name) > 1), None)
-    sought = [name for name in named if name != against] or named
+    optimised = [name for name in named if name != against] or named
     remedy = "Write --minimise A --against B, or --maximise A; and --maximise B to maximise B"
     if twice:
         raise refusal("the axis is given twice", "", twice, remedy=remedy)
-    if len(sought) != 1:
-        problem = f"{len(sought)} axes are optimised against {against}" if sought else "no axis is optimised"
-        raise refusal(problem, "", "--minimise", ", ".join(sought) or against, remedy=remedy)
-    return sought[0], against
+    if len(optimised) != 1:
+        problem = f"{len(optimised)} axes are optimised against {against}" if optimised else "no axis is optimised"
+        raise refusal(problem, "", "--minimise", ", ".join(optimised) or against, remedy=remedy)
+    return optimised[0], against
 
 
 def _split_items(items: list[str], option: str, example: str, form: str) -> dict[str, str]:

@@ -8,7 +8,18 @@ from typing import Any
 import numpy as np
 
 from loomopt.base.errors import BadInput
-from loomopt.interface.figures.figure import COLOURS, HEAD_SIZE, STYLES, Entry, below, frame, head, own_style, page, put
+from loomopt.interface.figures.figure import (
+    COLOURS,
+    HEAD_SIZE,
+    STYLES,
+    Entry,
+    below,
+    drawing_style,
+    frame,
+    head,
+    page,
+    put,
+)
 from loomopt.picture.chart import Axis, Bars, Chart, Charts
 from loomopt.picture.shapes import Drawing, extent, plain
 from loomopt.picture.table import restore_spaces
@@ -72,7 +83,7 @@ def draw(charts: Charts, drawings: Sequence[tuple[str, Drawing]] = ()) -> Any:
     high = sum(heights) + rows * ABOVE + FOOT
     names = [(mark.x, mark.name) for mark in charts.marks if mark.name]
     texts = [charts.title, *notes, *(name for _, name in names), *(word for chart in shown for word in _words(chart))]
-    with own_style(*texts):
+    with drawing_style(*texts):
         figure = page(width + SKETCH * bool(drawings), high, charts.title)
         ratios = (width, SKETCH) if drawings else (1.0,)
         left, *right = figure.subfigures(1, len(ratios), width_ratios=ratios, squeeze=False)[0]
@@ -98,8 +109,8 @@ def draw(charts: Charts, drawings: Sequence[tuple[str, Drawing]] = ()) -> Any:
         for axes, chart, key, (row, _) in zip(panels, shown, keys, cells, strict=True):
             on_top = row == 0 or not charts.shared
             over_axes = [*(chart.names if isinstance(chart, Chart) else ()), *names] if on_top else ()
-            own_key = [] if together else [(mark or _blank(), words) for mark, words in key]
-            height = head(axes, "" if alone else chart.title, own_key, over_axes) / 72.0
+            chart_key = [] if together else [(mark or _blank(), words) for mark, words in key]
+            height = head(axes, "" if alone else chart.title, chart_key, over_axes) / 72.0
             above[row] = max(above[row], height - ABOVE)
         figure.finish(max(figure.get_figheight() + foot + sum(above), 1.6 * len(drawings) + FOOT))
     return figure

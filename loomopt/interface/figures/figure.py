@@ -58,7 +58,7 @@ def draw(drawing: Drawing, path: Path) -> None:
     drawing = sheet(drawing)
     box = extent(drawing)
     inches = _PAGE / max(box.right - box.left, box.top - box.bottom)
-    with own_style(*(primitive.text for primitive in drawing.primitives if isinstance(primitive, Text))):
+    with drawing_style(*(primitive.text for primitive in drawing.primitives if isinstance(primitive, Text))):
         figure = blank((box.right - box.left) * inches, (box.top - box.bottom) * inches)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), aspect="equal", frame_on=False)
         axes.set(xlim=(box.left, box.right), ylim=(box.bottom, box.top), xticks=[], yticks=[])
@@ -71,7 +71,7 @@ def draw(drawing: Drawing, path: Path) -> None:
 
 def save(figure: Any, path: Path) -> None:
     """Write a figure as PNG, PDF or SVG, by the path's ending, independent of the user's settings."""
-    with own_style():
+    with drawing_style():
         _save(figure, path)
 
 
@@ -106,7 +106,7 @@ def put(axes: Any, primitive: Primitive, layer: Layer, text_height: float, point
 
 
 @contextmanager
-def own_style(*texts: str) -> Iterator[None]:
+def drawing_style(*texts: str) -> Iterator[None]:
     """Draw texts with matplotlib's defaults, independent of the user's settings; an unknown character is a box."""
     from matplotlib import style
 
@@ -134,7 +134,7 @@ def _save(figure: Any, path: Path) -> None:
     figure.savefig(path, format=kind, dpi=150, metadata=metadata)
 
 
-OWN, BOXES = "DejaVu Sans", "Last Resort High-Efficiency"
+FONT, BOXES = "DejaVu Sans", "Last Resort High-Efficiency"
 """Fonts that come with matplotlib: the usual one, and one that has a box for every character."""
 
 
@@ -142,11 +142,11 @@ def families(text: str) -> list[str]:
     """Fonts for the characters of a text, in order of use; a character without a font is an empty box."""
     from matplotlib import font_manager
 
-    lacking = {character for character in text if character.isprintable()} - _characters(font_manager.findfont(OWN))
-    fonts = [OWN]
+    lacking = {character for character in text if character.isprintable()} - _characters(font_manager.findfont(FONT))
+    fonts = [FONT]
     if lacking:
         plain = (entry for entry in font_manager.fontManager.ttflist if entry.style == "normal" and entry.weight == 400)
-        for name, path in sorted({(entry.name, entry.fname) for entry in plain if entry.name not in (OWN, BOXES)}):
+        for name, path in sorted({(entry.name, entry.fname) for entry in plain if entry.name not in (FONT, BOXES)}):
             had = lacking & _characters(path)
             if had:
                 fonts.append(name)

@@ -30,7 +30,7 @@ def letter_designs(
     spots = {letter: findings.rows.index(row) for letter, row in zip(LETTERS, chosen.values(), strict=False)}
     columns = study_table.columns(study, findings.rows)
     first = columns["place"][0]
-    panels = [*columns["sought"], *study_table.shown_columns(study, findings.rows)]
+    panels = [*columns["optimised"], *study_table.shown_columns(study, findings.rows)]
     by_heading = {panel.heading: panel for panel in panels}
     marked = [
         _mark_designs(chart, first, by_heading[chart.title], spots)
@@ -42,7 +42,7 @@ def letter_designs(
         charts = replace(charts, title=f"{study.heading}. {findings.message}".rstrip(". "))
     if registry.of(study.scene).views.missing(study.scene):
         return charts, ()
-    headings = [*columns["place"], *columns["sought"]]
+    headings = [*columns["place"], *columns["optimised"]]
     return charts, [
         (_heading(letter, headings, findings.rows[k], k), _sketch(study, findings.rows[k]))
         for letter, k in spots.items()

@@ -14,7 +14,7 @@ from loomopt.base.errors import refusal
 from loomopt.interface import results
 from loomopt.interface.results import Answer, Evaluation
 from loomopt.jobs import registry
-from loomopt.model.objectives import Sought
+from loomopt.model.objectives import ObjectiveSense
 from loomopt.physics.tolerances import FEASIBLE, STATIONARY
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
@@ -33,8 +33,8 @@ from loomopt.solving.certificate.records import Certificate, GlobalBound, Global
 
 AGREES = 1e-6
 """Relative; a figure computed anew that differs by less is the one in the file: another machine may have made that."""
-MOST_TOLD = 3
-"""Figures that are told one by one where a file contradicts its design."""
+MOST_DIFFERENCES = 3
+"""Contradictions between a file and its design that are listed one by one."""
 STATUSES = ("optimal", "infeasible", "uncertified", "failed", "interrupted")
 NUMBER = re.compile(r"[-+]?[\d.]+(?:e[-+]?\d+)?")
 Read = TypeVar("Read")
@@ -150,7 +150,7 @@ def _global_bound(record: Mapping[str, Any], figures: Mapping[str, Any]) -> Glob
     levels = []
     for name, bound in record["bound"].items():
         best = float(figures[name])
-        sense: Sought = "most" if bound > best else "least"
+        sense: ObjectiveSense = "most" if bound > best else "least"
         levels.append(
             GlobalLevel(
                 name,
@@ -187,11 +187,11 @@ def _doubts(document: Mapping[str, Any], answer: Answer) -> Iterator[str]:
             continue
         if not abs(printed - value) <= AGREES * max(abs(value), 1e-3 * sizes[answer.units.get(name, "1")]):
             differing += 1
-            if differing <= MOST_TOLD:
+            if differing <= MOST_DIFFERENCES:
                 now, then = (UnitFormatter(answer.scene).shown(name, number, 9) for number in (value, float(printed)))
                 yield f"{name} is {now} for its design, the file says {then}."
-    if differing > MOST_TOLD:
-        yield f"{differing - MOST_TOLD} more of its figures differ too."
+    if differing > MOST_DIFFERENCES:
+        yield f"{differing - MOST_DIFFERENCES} more of its figures differ too."
     if answer.status != "optimal":
         return
     yield from (f"It says optimal, and limit {limit.name} does not hold." for limit in answer.limits if not limit.ok)

@@ -36,7 +36,7 @@ CURVES = (*sheets.ENDINGS, *PICTURES)
 ANSWER = ("answer.json", "table.csv", "curves.csv", "linkage.svg")
 """Files of an answer."""
 TODAY, GIVEN = "today's machine", "a given design"
-FOUND = {
+DESIGN_TEXTS = {
     "optimal": "best design for {}",
     "infeasible": "nearest design for {}",
     "uncertified": "uncertified design for {}",
@@ -300,9 +300,9 @@ def describe_design(evaluated: Evaluated, target: str | None = None, status: str
     broken = tuple(limit.name for limit in evaluated.limits if not limit.ok and not limit.rounding)
     if isinstance(evaluated, Solution):
         missed = shortfall(evaluated.reached) if evaluated.status == "optimal" else ""
-        return DrawnSubject(FOUND[evaluated.status].format(evaluated.sought), broken, missed)
-    if target and status in FOUND and not (broken and status == "optimal"):
-        return DrawnSubject(FOUND[status].format(target), broken, shortfall(evaluated.reached))
+        return DrawnSubject(DESIGN_TEXTS[evaluated.status].format(evaluated.task_name), broken, missed)
+    if target and status in DESIGN_TEXTS and not (broken and status == "optimal"):
+        return DrawnSubject(DESIGN_TEXTS[status].format(target), broken, shortfall(evaluated.reached))
     full_design, scene = flat(evaluated.design), evaluated.scene
     now = registry.of(scene).today(scene) if scene else {}
     return DrawnSubject(TODAY if full_design.items() <= now.items() else GIVEN, broken)

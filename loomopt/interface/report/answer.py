@@ -37,19 +37,19 @@ class Status(NamedTuple):
 class Subject:
     """Design to report on, in its scene; doubts: contradictions in its file, empty for a design just computed.
 
-    target: whose limits it was judged by; sought: what it answers.
+    target: target whose limits are checked; task_name: target, or a summary of the task.
     """
 
     evaluated: Evaluated
     scene: Scene
     target: str = ""
-    sought: str = ""
+    task_name: str = ""
     doubts: tuple[str, ...] = ()
 
     @property
     def heading(self) -> str:
         """Problem and objectives."""
-        return ", ".join(word for word in (self.evaluated.problem, self.sought) if word)
+        return ", ".join(word for word in (self.evaluated.problem, self.task_name) if word)
 
     @lazy
     def before(self) -> Evaluated | None:

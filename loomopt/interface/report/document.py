@@ -27,8 +27,8 @@ class Reported(Protocol):
         """Parts of a page."""
 
 
-class Judged(Protocol):
-    """Design in its scene; target: target of the limits; sought: objectives."""
+class CheckedDesign(Protocol):
+    """Design in its scene, with its limits checked."""
 
     @property
     def result(self) -> Evaluated:
@@ -40,35 +40,35 @@ class Judged(Protocol):
 
     @property
     def target(self) -> str:
-        """Whose limits it was judged by."""
+        """Target whose limits are checked."""
 
     @property
-    def sought(self) -> str:
+    def task_name(self) -> str:
         """Target, or a summary of the task."""
 
 
-def of_answer(judged: Judged, results: Sequence[object] = (), doubts: Sequence[str] = ()) -> list[Chapter]:
-    """Chapter of an answer, of a family one for each of its members too; the rest as of `of_design`."""
-    first = of_design(judged, results, doubts)
-    if not judged.result.members:
+def of_answer(design: CheckedDesign, results: Sequence[object] = (), doubts: Sequence[str] = ()) -> list[Chapter]:
+    """Chapter of an answer, and one for each member of a family; arguments as of `of_design`."""
+    first = of_design(design, results, doubts)
+    if not design.result.members:
         return [first]
     return [
         first,
-        *(Chapter(heading, "", status, parts) for heading, status, parts in answer.members(_subject(judged))),
+        *(Chapter(heading, "", status, parts) for heading, status, parts in answer.members(_subject(design))),
     ]
 
 
-def of_design(judged: Judged, results: Sequence[object] = (), doubts: Sequence[str] = ()) -> Chapter:
-    """Chapter of an answer or an evaluation, which knows its scene.
+def of_design(design: CheckedDesign, results: Sequence[object] = (), doubts: Sequence[str] = ()) -> Chapter:
+    """Chapter of an answer or an evaluation.
 
-    results: studies of the same scene; doubts: why the file is not believed. Raises BadInput.
+    results: studies of the same scene; doubts: contradictions in the design's file. Raises BadInput.
     """
-    subject = _subject(judged, doubts)
+    subject = _subject(design, doubts)
     return _chapter(subject.heading, subject.scene, answer.status(subject), [*answer.parts(subject), *_more(results)])
 
 
-def _subject(judged: Judged, doubts: Sequence[str] = ()) -> Subject:
-    return Subject(judged.result, judged.scene, judged.target, judged.sought, tuple(doubts))
+def _subject(design: CheckedDesign, doubts: Sequence[str] = ()) -> Subject:
+    return Subject(design.result, design.scene, design.target, design.task_name, tuple(doubts))
 
 
 def of_study(plan: SceneStudy, solved: Sequence[Row], results: Sequence[object] = ()) -> Chapter:

@@ -79,6 +79,6 @@ def stages(study: SceneStudy, rows: Sequence[Row]) -> dict[str, MechanismMotion]
         if motion is None:
             return {}
         motions[
-            ", ".join(study_table.value_text(column, k, 5) for column in (*columns["place"], *columns["sought"]))
+            ", ".join(study_table.value_text(column, k, 5) for column in (*columns["place"], *columns["optimised"]))
         ] = motion
     return motions

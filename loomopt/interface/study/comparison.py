@@ -135,7 +135,7 @@ class Comparison(Presentation):
             broken = [limit.name for limit in design.evaluation.limits if not limit.ok and not limit.rounding]
             verdict = f"NOT admissible (!): {', '.join(broken)}" if broken else "all limits held"
             lines.append(
-                f"{design.name}: {design.evaluation.problem}, {design.evaluation.sought or 'no target'}: {verdict}"
+                f"{design.name}: {design.evaluation.problem}, {design.evaluation.task_name or 'no target'}: {verdict}"
             )
         count = len(self.designs)
         return [*lines, text_table(self._columns(), (0, *range(1, count + 1), count + 1))]
@@ -199,14 +199,14 @@ def compare(given_designs: Sequence[object], within: Scene | None = None, names:
         raise refusal("there is nothing to compare", "", "compare", allowed=allowed, remedy="Give two designs at least")
     first = known[0]
     home = within or first.scene
-    judged = []
+    evaluations = []
     for design in given_designs:
         if not isinstance(design, Evaluation):
             target = first.target if home.job == first.scene.job else None
-            judged.append(results.evaluate_design(home, None, target or None))
+            evaluations.append(results.evaluate_design(home, None, target or None))
             continue
         designs.check_job(design.scene.job, home, f"<{design.problem}>")
-        judged.append(_within(design, within) if within else design)
+        evaluations.append(_within(design, within) if within else design)
     called = [
         name or _design_name(design)
         for name, design in zip([*names, *[""] * len(given_designs)], given_designs, strict=False)
@@ -216,7 +216,7 @@ def compare(given_designs: Sequence[object], within: Scene | None = None, names:
     for name in called:
         seen[name] += 1
         unique.append(f"{name} {seen[name]}" if counts[name] > 1 else name)
-    return Comparison(tuple(map(Named, unique, judged)))
+    return Comparison(tuple(map(Named, unique, evaluations)))
 
 
 def _within(evaluation: Evaluation, scene: Scene) -> Evaluation:
@@ -226,7 +226,7 @@ def _within(evaluation: Evaluation, scene: Scene) -> Evaluation:
 
 
 def _design_name(design: object) -> str:
-    return f"{design.problem}, {design.sought}" if isinstance(design, Evaluation) else TODAY
+    return f"{design.problem}, {design.task_name}" if isinstance(design, Evaluation) else TODAY
 
 
 @working()
@@ -235,7 +235,7 @@ def _overlaid(designs: Sequence[tuple[str, Scene, Design]]) -> Charts:
     scene, first = designs[0][1:]
     view, unit = registry.of(scene).views, scene.shown_in("angle")
     turns = [turn.from_table(tables.curves(home, design), _marks(home, design), unit) for _, home, design in designs]
-    columns = tuple(dict.fromkeys(column for one in turns for column in one.columns.columns))
+    columns = tuple(dict.fromkeys(column for curves in turns for column in curves.columns.columns))
     known = view.panels(scene, flat(first), tuple(turns[0].columns.columns))
     panels = [*known, *(panel for panel in each_alone(columns) if panel.columns[0] not in turns[0].columns)]
     axis = turn.axis(turns, view.angle)
@@ -245,9 +245,9 @@ def _overlaid(designs: Sequence[tuple[str, Scene, Design]]) -> Charts:
         for column, label in zip(panel.columns, panel.labels, strict=True):
             size = factor(panel.shown_unit)
             drawn = [
-                Series(one.shown(one.angles), one.of(column) / size, kind, name)
-                for one, (kind, name) in zip(turns, key, strict=True)
-                if column in one.columns
+                Series(curves.shown(curves.angles), curves.of(column) / size, kind, name)
+                for curves, (kind, name) in zip(turns, key, strict=True)
+                if column in curves.columns
             ]
             shown.append(Chart(heading(label, panel.shown_unit), axis, drawn, key=key, cursor=True))
     return Charts(f"{scene.name}: designs compared, curves over the cycle", shown, shared=True)

@@ -55,14 +55,17 @@ class SensitivityStudy(Presentation):
         head = f"{result.scene.name}, {result.target}: how the optimum moves with each number"
         if result.refused:
             return [f"{head} cannot be computed: {result.refused}"]
-        moves = [text_table(_columns(result, sort_rows(result, name), name), (0, 2, 3, 5)) for name in sought(result)]
+        moves = [
+            text_table(_columns(result, sort_rows(result, name), name), (0, 2, 3, 5))
+            for name in moved_objectives(result)
+        ]
         return [head, *moves, _prices(result), *_valid(result)]
 
     def charts(self) -> Charts:
-        """A tornado for each figure sought: by one sigma of a number's tolerance, or by 1 % of it."""
+        """Tornado chart of each optimised figure: by one sigma of a number's tolerance, or by 1 % of it."""
         result = self.result
         shown = []
-        for name in sought(result):
+        for name in moved_objectives(result):
             unit = UnitFormatter(result.scene).unit(name)
             rows = sort_rows(result, name)[:MOST]
             bars = [(f"{row.number} {ARROWS[row.side]}".strip(), (effect(result, row) / factor(unit),)) for row in rows]
@@ -82,8 +85,8 @@ def run_sensitivity(study: sensitivity.Study, on_step: Callable[[str], None] | N
         return SensitivityStudy(sensitivity.run(study, on_step or cell))
 
 
-def sought(result: SensitivityResult) -> list[str]:
-    """Figures that are sought, of which any derivative is not 0; all of them are in the JSON data."""
+def moved_objectives(result: SensitivityResult) -> list[str]:
+    """Optimised figures that have a derivative other than 0; the JSON data have all of them."""
     names = [level.objective for level in result.answer.certificate.levels] if result.answer.certificate else []
     known = {row.of for row in result.rows if row.value}
     return [name for name in dict.fromkeys(names) if name in known]

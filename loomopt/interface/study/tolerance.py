@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 LEAST_SHARE = 0.005
 """Share of a figure's variance below which a terminal omits a number."""
-MOST_TOLD = 3
+MOST_NAMED = 3
 """Number of shares that a terminal shows."""
 
 
@@ -155,7 +155,7 @@ def _size(value: float) -> str:
 
 
 def _shares(spread: Spread) -> str:
-    largest = sorted(spread.shares.items(), key=lambda pair: -pair[1])[:MOST_TOLD]
+    largest = sorted(spread.shares.items(), key=lambda pair: -pair[1])[:MOST_NAMED]
     text = ", ".join(f"{name} {100 * share:.3g} %" for name, share in largest if share >= LEAST_SHARE)
     return f"{text} (a corner)" if spread.corner and text else text
 
@@ -174,10 +174,8 @@ def _yields(result: ToleranceResult) -> TextTable:
 
 def _histogram(result: ToleranceResult, name: str, spread: Spread) -> Chart:
     """Histogram of one figure, with the rejected range shaded."""
-    units, judged = (
-        UnitFormatter(result.plan.scene),
-        next((criterion for criterion in result.plan.criteria if criterion.name == name), None),
-    )
+    units = UnitFormatter(result.plan.scene)
+    criterion = next((criterion for criterion in result.plan.criteria if criterion.name == name), None)
     unit = units.unit(name)
     size = factor(unit)
     edges = (spread.nominal + REACH * spread.sigma_linear * np.linspace(-1, 1, BINS + 1)) / size
@@ -186,7 +184,7 @@ def _histogram(result: ToleranceResult, name: str, spread: Spread) -> Chart:
     steps = np.concatenate([[0.0], np.repeat(shares, 2), [0.0]])
     least, most = (
         None if end is None else min(max(end / size, low), high)
-        for end in ((judged.low, judged.high) if judged else (None, None))
+        for end in ((criterion.low, criterion.high) if criterion else (None, None))
     )
     outside = [(low, least)] if least is not None and least > low else []
     outside += [(most, high)] if most is not None and most < high else []
@@ -231,7 +229,7 @@ def _outward(value: float, sign: float) -> str:
 
 
 def _advice(result: ToleranceResult) -> list[str]:
-    first = [f"{name} ({100 * share:.3g} %)" for name, share in result.tighten[:MOST_TOLD] if share >= LEAST_SHARE]
+    first = [f"{name} ({100 * share:.3g} %)" for name, share in result.tighten[:MOST_NAMED] if share >= LEAST_SHARE]
     lost = any(result.yields[criterion.name].value < 1.0 for criterion in result.plan.criteria)
     of = "the rejected machines" if lost else "the scatter of the objective; no machine is rejected"
     sentences = [f"Tighten first: {', '.join(first)} of {of}."] if first else []

@@ -25,7 +25,7 @@ HEADINGS = {"infeasible": "relaxed", "failed": "stopped"}
 def solution(answer: Solution, scene: Scene) -> list[str | TextTable]:
     """Parts of a solved target: sentence, table, binding limits, certificate, time."""
     heading = HEADINGS.get(answer.status, "design")
-    parts: list[str | TextTable] = [f"{answer.problem}, {answer.sought}: {answer.outcome}"]
+    parts: list[str | TextTable] = [f"{answer.problem}, {answer.task_name}: {answer.outcome}"]
     explanation = answer.explanation
     if answer.relaxation:
         clash = ", ".join(unbroken(limit) for limit in answer.clash)
@@ -81,8 +81,8 @@ def members(solution: Solution, scene: Scene) -> TextTable:
     formatter, levels = UnitFormatter(scene), solution.certificate.levels if solution.certificate else ()
     variables = [name for name in solution.members[0].design if name not in solution.design]
     # A sum of what members reach is named after their figure.
-    sought = {word.strip("|") for level in levels for word in level.objective.split()}
-    names = [*variables, *(name for name in solution.members[0].figures if name in sought)]
+    objective_names = {word.strip("|") for level in levels for word in level.objective.split()}
+    names = [*variables, *(name for name in solution.members[0].figures if name in objective_names)]
     sizes = {name: factor(formatter.unit(name)) for name in names}
     values = [{name: {**member.design, **member.figures}[name] or 0.0 for name in names} for member in solution.members]
     least = {

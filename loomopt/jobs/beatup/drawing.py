@@ -13,7 +13,7 @@ from loomopt.jobs.beatup.model import FRONT, LENGTHS, REAR
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.mechanisms import crank_rocker
-from loomopt.picture.drawing import POINTER, Label, Mass, Skeleton, along, angle_between, around, pointer
+from loomopt.picture.drawing import POINTER, Label, Mass, Skeleton, along, angle_arc, around, pointer
 from loomopt.picture.force_arrows import ForceArrow, Sheet
 from loomopt.picture.motion import MechanismMotion
 from loomopt.picture.shapes import METRIC, Arc, Drawing, Floats, Measure, Point, Primitive, Units
@@ -129,8 +129,8 @@ def _angles(drawing: CrankRockerDrawing) -> list[Primitive]:
     """Draw β at A, the swing at D, and the arrow toward the fell."""
     skeleton, centres, h, (beta, swing) = drawing.skeleton, drawing.centres, drawing.height, drawing.radii
     return [
-        *angle_between(skeleton.pivots["A"], beta, 0.0, centres.beta, h),
-        *angle_between(skeleton.pivots["D"], swing, centres.psi_rear, centres.psi_front, h, both=True),
+        *angle_arc(skeleton.pivots["A"], beta, 0.0, centres.beta, h),
+        *angle_arc(skeleton.pivots["D"], swing, centres.psi_rear, centres.psi_front, h, both=True),
         *pointer(skeleton.joints[FRONT]["C"], drawing.toward_fell, h),
     ]
 

@@ -114,9 +114,9 @@ class BeatupTask(Task):
         names = {*self.scene.limits, *self.traded}
         read = self.changes or bool(names & {"r4", *COUNTERWEIGHT})
         for effect in self.scene.active:
-            judged = isinstance(effect, Check) and (effect.demands or names & {*effect.over_cycle, *effect.rows})
+            is_limited = isinstance(effect, Check) and (effect.demands or names & {*effect.over_cycle, *effect.rows})
             reads = {*effect.reads, *model_of(effect, self.scene.effects[effect.name]).reads}
-            read = read or bool(reads & set(COUNTERWEIGHT) and (isinstance(effect, Load) or judged))
+            read = read or bool(reads & set(COUNTERWEIGHT) and (isinstance(effect, Load) or is_limited))
         fixed = all(self.limited[name][0] == self.limited[name][1] for name in COUNTERWEIGHT)
         return read or fixed or self.limited["r4e"][1] == 0.0
 

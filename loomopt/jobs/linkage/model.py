@@ -38,7 +38,7 @@ OBLIQUITY = "obliquity"
 """Name of the quantity of a part's transmission angle, after the part's name."""
 SCAN = 720
 """Samples of one turn between which turns of the output are sought."""
-BESIDE = 0.0123
+SCAN_START = 0.0123
 """rad; where the samples begin: a linkage drawn in line turns at 0 exactly, where they would see no change of sign."""
 STILL, FEWEST_NODES = 1e-12, 9
 """Share of the largest |q'| below which the output rests, where rounding leaves a cam's ends; nodes of a stretch."""
@@ -633,10 +633,10 @@ class Linkage(Kinematics):
             if (slopes[k] > 0) == (slopes[after] > 0):
                 continue
             extreme = "min" if slopes[after] > slopes[k] else "max"
-            between = (np.arange(k + 1, after) if after > k else np.r_[k + 1 : len(still), 0:after]).tolist()
-            rest = [corners[node] for node in (between[:1] + between[-1:]) if node in corners]
+            still_nodes = (np.arange(k + 1, after) if after > k else np.r_[k + 1 : len(still), 0:after]).tolist()
+            rest = [corners[node] for node in (still_nodes[:1] + still_nodes[-1:]) if node in corners]
             if len(rest) == 2:
-                at = Node(rest[0].angle, {name: float(values[between[0]]) for name, values in nodes.switch.items()})
+                at = Node(rest[0].angle, {name: float(values[still_nodes[0]]) for name, values in nodes.switch.items()})
                 here = self.pose(FLOAT, given, at)
                 turns.append(Turn(rest[0].angle, extreme, float(here.q), abs(float(here.q2)) / largest, tuple(rest)))
                 continue
@@ -681,10 +681,11 @@ class Linkage(Kinematics):
     def _scan(self, given: Given) -> tuple[Node, dict[int, Corner]]:
         """Nodes over one turn in order, and the corners of cams by the index of their node."""
         places = sorted(
-            (BESIDE + (float(angle) - BESIDE) % TURN, place) for place, angle in enumerate(self._corners(FLOAT, given))
+            (SCAN_START + (float(angle) - SCAN_START) % TURN, place)
+            for place, angle in enumerate(self._corners(FLOAT, given))
         )
         if not places:
-            return Node(BESIDE + TURN / SCAN * np.arange(SCAN), {}), {}
+            return Node(SCAN_START + TURN / SCAN * np.arange(SCAN), {}), {}
         begins = np.array([angle for angle, _ in places])
         angles, middles, corners = list[Floats](), list[Floats](), dict[int, Corner]()
         count = 0

@@ -193,16 +193,16 @@ class Numbers:
 
 def multiple(text: str) -> tuple[str, float]:
     """Name in a text such as "-d", "2 * d" or "d / 3", and its factor; the factor 0 where none is possible."""
-    found = _MULTIPLE.fullmatch(text)
-    if found is None or not (found[2] or found[4]):
+    match = _MULTIPLE.fullmatch(text)
+    if match is None or not (match[2] or match[4]):
         name = text.removeprefix("-").strip()
         return name, 1 if name == text else -1
-    top, bottom = (float(found[place] or 1) for place in (2, 4))
+    top, bottom = (float(match[place] or 1) for place in (2, 4))
     size = top / bottom if bottom > 0.0 else 0.0
     if not 0.0 < size < math.inf:
-        return found[3], 0
+        return match[3], 0
     size = int(size) if size == int(size) else size
-    return found[3], -size if found[1] else size
+    return match[3], -size if match[1] else size
 
 
 def _divided(kind: Kind, factor: float) -> Kind:
@@ -296,8 +296,8 @@ def number_schema(number: NumberKey) -> Json:
     quantity = number.kind.__metadata__[0].schema()
     name: Json = {"type": "string", "pattern": r"^[ \t]*-?[ \t]*([0-9.]+[ \t]*\*[ \t]*)?[^\s\d+.*-]"}
     words = re.sub(r" (?:of|from|between|and) (?:\{\w*\})+| \{\w*\}", "", number.text)
-    said = f'{words}: a number of [mechanism], a multiple of one such as "2 * d", or a quantity'
-    return {"if": name, "else": quantity, "description": said}
+    description = f'{words}: a number of [mechanism], a multiple of one such as "2 * d", or a quantity'
+    return {"if": name, "else": quantity, "description": description}
 
 
 def _name_schema() -> Json:

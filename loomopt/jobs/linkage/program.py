@@ -126,7 +126,7 @@ class LinkageTask(Task):
         """Figures of the target in order, each with "least" or "most"; the default target's where there is no table."""
         if not self.target:
             return ()
-        return self.table.sought or ((("peak_torque", "least"),) if self.target == "torque" else ())
+        return self.table.objectives or ((("peak_torque", "least"),) if self.target == "torque" else ())
 
     def _is_figure(self, name: str) -> bool:
         return name in self.scene.schema.figures
@@ -136,8 +136,8 @@ class LinkageTask(Task):
     @lazy
     def limited(self) -> dict[str, Ends]:
         """Lower and upper bound of every number; one that the target seeks is free between its bounds."""
-        sought = {self.scene.full(name): name for name, _ in self.levels if name in self.scene.bounds}
-        free = {full: (self.scene.bounds[name].min, self.scene.bounds[name].max) for full, name in sought.items()}
+        optimised = {self.scene.full(name): name for name, _ in self.levels if name in self.scene.bounds}
+        free = {full: (self.scene.bounds[name].min, self.scene.bounds[name].max) for full, name in optimised.items()}
         return bounds(self.scene, self.known) | free
 
     @lazy
@@ -197,12 +197,12 @@ class LinkageTask(Task):
         The load of a mass falls to 0 with q'', and the angle moves without bound: at 0 the event is no extreme, and
         without a margin there is no best design. Cams are left out: their output may rest at an extreme.
         """
-        linkage, sought = linkage_of(self.plain_model), {*self.traded, *(name for name, _ in self.levels)}
+        linkage, optimised = linkage_of(self.plain_model), {*self.traded, *(name for name, _ in self.levels)}
         read = {**self._loads, **{f"angle.{event}": event for event in self._loads.values()}}
-        events = {read[name] for name in sought if name in read}
-        events |= set(linkages.extremes(linkage.places)) if "sweep" in sought else set()
+        events = {read[name] for name in optimised if name in read}
+        events |= set(linkages.extremes(linkage.places)) if "sweep" in optimised else set()
         known = read_tables(self.scene.document).windows
-        windows = [window for window in known if sought & {f"travel.{window.name}", window.length}]
+        windows = [window for window in known if optimised & {f"travel.{window.name}", window.length}]
         bounding = {name for window in windows for name in (window.after, window.until, window.level)} - events
         shares = {**dict.fromkeys(events, TURNING_SHARE), **dict.fromkeys(bounding, RESTING_SHARE)}
         places = [place for place in linkage.places if place.name in shares and place.extreme and not place.of]

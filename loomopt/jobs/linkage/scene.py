@@ -75,7 +75,7 @@ class LinkageTarget(TargetTable):
     weights: dict[str, PureNumber] = Field({}, description="number → weight of its change from today; 1 by default")
 
     @property
-    def sought(self) -> tuple[tuple[str, str], ...]:
+    def objectives(self) -> tuple[tuple[str, str], ...]:
         """Figures to optimise, in order, each with "least" or "most"."""
         path = ((PATH, "least"),) if self.point else ()
         match = ((MATCH, "least"),) if self.match else ()
@@ -149,7 +149,7 @@ TABLES: Mapping[str, tuple[str, Callable[[], Json]]] = {
     "windows": ("stretches of crank angles after an event", _windows_schema),
 }
 """Tables that only linkage scenes have: their description and JSON Schema."""
-OWN = ("mechanism", *TABLES)
+READ_TABLES = ("mechanism", *TABLES)
 
 
 def _table_schema(name: str) -> Json:
@@ -179,11 +179,11 @@ def _output(cursor: Cursor, linked: Chain, numbers: Numbers) -> Output:
     kind, slides_now = _scale(raw.get("scale", ""), form, numbers.names)
     read = parts.entries(cursor, {**OUTPUT_KEYS, "scale": NumberKey(kind, SCALE)}, numbers)
     joints, links, slides = parts.kinds_of(linked)
-    name = _one_of(cursor.at(form), {"angle": links, "slide": slides}.get(form, joints), FORMS[form])
+    name = _checked_name(cursor.at(form), {"angle": links, "slide": slides}.get(form, joints), FORMS[form])
     for key in ("against", "zero"):
         if key in raw and form != "angle":
             raise cursor.at(key).fault(f"{key} is for an angle alone", remedy="Take it out")
-    against = _one_of(cursor.at("against"), links, "link") if "against" in raw else ""
+    against = _checked_name(cursor.at("against"), links, "link") if "against" in raw else ""
     sense = SENSES[read.words.get("sense", "forward")]
     scale, zero = read.numbers.get("scale"), read.numbers.get("zero")
     carrier = "" if against or scale else _carrier(linked, form, name)
@@ -201,7 +201,7 @@ def _carrier(linked: Chain, form: str, name: str) -> str:
     return part.word("pin") if on_frame else ""
 
 
-def _one_of(cursor: Cursor, known: Iterable[str], sort: str) -> str:
+def _checked_name(cursor: Cursor, known: Iterable[str], sort: str) -> str:
     """Name of one of those that are known. Raises BadInput."""
     return cursor.word(sorted(known), sort)
 
@@ -246,7 +246,7 @@ def _of(cursor: Cursor, linked: Chain, near: float | None) -> str:
         problem = "an extreme of another link needs the crank angle near which it is"
         raise cursor.at("of").fault(problem, remedy='Add near = "60 deg"')
     _, links, slides = parts.kinds_of(linked)
-    return _one_of(cursor.at("of"), [*links, *slides], "link, slider or slot")
+    return _checked_name(cursor.at("of"), [*links, *slides], "link, slider or slot")
 
 
 def _travel(cursor: Cursor, name: str, read: parts.TableEntries, known: Known) -> EventRule:
@@ -254,7 +254,7 @@ def _travel(cursor: Cursor, name: str, read: parts.TableEntries, known: Known) -
     if len(sides) != 1:
         raise cursor.fault("a travel lies before or after another event", remedy='Such as before = "bottom"')
     side = cursor.at(sides[0])
-    reference = _one_of(side, known, "event above it")
+    reference = _checked_name(side, known, "event above it")
     if not known[reference].extreme or known[reference].of:
         problem = f"a travel counts from an extreme of the output, and {reference} is not one"
         raise side.fault(problem, remedy='Name an event with extreme = "max" or "min"')
@@ -269,8 +269,8 @@ def _windows(cursor: Cursor, numbers: Numbers, places: Sequence[EventRule]) -> t
         place.table()
         parts.check_name(place, name)
         read = parts.entries(place, WINDOW_KEYS, numbers, "a window", name)
-        after, level = (_one_of(place.at(word), known, "event") for word in ("after", "level"))
-        until = _one_of(place.at("until"), known, "event") if "until" in read.words else ""
+        after, level = (_checked_name(place.at(word), known, "event") for word in ("after", "level"))
+        until = _checked_name(place.at("until"), known, "event") if "until" in read.words else ""
         begins, ends = read.numbers.get("begins"), read.numbers.get("ends")
         if (until and (begins or ends)) or not (until or (begins and ends)):
             problem = "a window has begins and ends, crank angles from the event, or the event until"
@@ -299,7 +299,7 @@ def _read(text: str) -> LinkageScene:
 
 def read_tables(document: Mapping[str, Any]) -> LinkageScene:
     """Contents of the tables that only linkage scenes have. Raises BadInput."""
-    return _read(json.dumps({name: document.get(name, {}) for name in OWN}, default=repr))
+    return _read(json.dumps({name: document.get(name, {}) for name in READ_TABLES}, default=repr))
 
 
 # Figures, targets and axes.
@@ -466,9 +466,9 @@ EMPTY: Mapping[str, Any] = {
 
 def schema(document: Mapping[str, Any]) -> SceneSchema:
     """Schema of a scene: it depends on the scene's tables. Raises BadInput."""
-    tables = {name: document.get(name, {}) for name in (*OWN, "limits", "targets")}
+    tables = {name: document.get(name, {}) for name in (*READ_TABLES, "limits", "targets")}
     if "parts" not in document:
-        tables |= {**{name: {} for name in OWN}, **EMPTY}
+        tables |= {**{name: {} for name in READ_TABLES}, **EMPTY}
     return _schema(json.dumps(tables, default=repr))
 
 
@@ -695,13 +695,13 @@ def _check_targets(scene: Scene, known: LinkageScene) -> None:
         if not isinstance(table, LinkageTarget):
             continue
         key = f"targets.{name}"
-        if name in scene.document.get("targets", {}) and not table.sought:
+        if name in scene.document.get("targets", {}) and not table.objectives:
             faults.add(
                 refusal(
                     "the target has nothing to optimise", scene.origin, key, remedy='Such as least = ["peak_torque"]'
                 )
             )
-        for figure, sense in dict.fromkeys(table.sought):
+        for figure, sense in dict.fromkeys(table.objectives):
             path_ = f"{key}.{ {PATH: 'point', MATCH: 'match'}.get(figure, sense) }"
             axis = axes_.get(figure)
             if figure not in (*axes_, *bounded):
@@ -711,7 +711,7 @@ def _check_targets(scene: Scene, known: LinkageScene) -> None:
                 verb, way = ("maximised", "minimised") if sense == "most" else ("minimised", "maximised")
                 problem = f"{figure} cannot be {verb}, it can only be {way}"
                 faults.add(refusal(problem, scene.origin, path_, remedy=f"Write {opposite}, or choose another figure"))
-        if len(dict.fromkeys(table.sought)) < len(table.sought):
+        if len(dict.fromkeys(table.objectives)) < len(table.objectives):
             faults.add(refusal("a figure stands twice", scene.origin, key, remedy="Take one out"))
         with faults:
             _check_path(scene, known, name, table)

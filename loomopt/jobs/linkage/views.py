@@ -219,7 +219,7 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
     }
     numbers = Symbols({name: index_symbol for name, index_symbol in effect_symbols.items() if name in model.known})
     numbers |= {event_value(place.name): symbol(f"phi_{place.name}") for place in linkage.places}
-    known = Given(numbers, {effect.name: _own_values(model, effect) for effect in model.effects})
+    known = Given(numbers, {effect.name: _effect_values(model, effect) for effect in model.effects})
     letter = "F" if out.slides else "M"
     kinematics = (*written.equations, equation("output", symbol("q"), _output(out, written)))
     return (*kinematics, *effect_equations.forces(model, at, known, "Q", letter))
@@ -231,7 +231,7 @@ def _effect_value(effect: Effect, key: str) -> Expression:
     return symbol(f"{letter}_{effect.instance}" if effect.instance else letter)
 
 
-def _own_values(model: JobModel, effect: Effect) -> Values:
+def _effect_values(model: JobModel, effect: Effect) -> Values:
     """Symbols and words of an effect's table, of those keys that are given."""
     given = {
         key: _effect_value(effect, key) for key in effect.table.model_fields if f"{effect.name}.{key}" in model.known

@@ -15,7 +15,7 @@ from loomopt.physics.cycle import TURN, Floats
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, RapierPose, Sley
-from loomopt.picture.drawing import POINTER, Label, Skeleton, along, angle_between, around, arrow, pointer
+from loomopt.picture.drawing import POINTER, Label, Skeleton, along, angle_arc, around, arrow, pointer
 from loomopt.picture.force_arrows import ForceArrow, Sheet
 from loomopt.picture.motion import MechanismMotion
 from loomopt.picture.shapes import METRIC, Drawing, Line, Measure, Point, Primitive, Units
@@ -155,9 +155,9 @@ def _angles(drive: Drive) -> list[Primitive]:
     (alpha, swing, phi63), b2 = drive.radii, drive.skeleton.joints[OVER]["B2"]
     strokes: list[Primitive] = [
         Line("dimensions", (b2, b2.towards(start, d.l6))),
-        *angle_between(at["B0"], alpha, front, front + d.alpha, h),
-        *angle_between(at["B0"], swing, rear, front, h),
-        *angle_between(b2, phi63, start, start + drive.phi63, h),
+        *angle_arc(at["B0"], alpha, front, front + d.alpha, h),
+        *angle_arc(at["B0"], swing, rear, front, h),
+        *angle_arc(b2, phi63, start, start + drive.phi63, h),
     ]
     side = drive.sley.stand.frame_angle + math.pi
     for pivot, radius, sense in (("A0", d.l1, 1), ("C0", d.l4, -1)):

@@ -287,7 +287,7 @@ STEPS, FARTHEST, LAST = 6, 1e-3, 1e-15
 them."""
 
 
-def settled_turn(sampler: Sampler, derivatives: tuple[str, str], angle: float) -> float:
+def polished_turn(sampler: Sampler, derivatives: tuple[str, str], angle: float) -> float:
     """Crank angle, rad, of a turning point after Newton's method from nearby.
 
     derivatives: quantities that are the first and the second derivative in the crank angle.
@@ -329,7 +329,7 @@ def read(sampler: Sampler) -> TravelReading:
     outward = max(turns, key=lambda extreme: extreme.value)
     stroke, phi = 0.0, 0.0
     if outward.value > 0.0:
-        phi = settled_turn(sampler, ("S_1", "peak_acceleration"), sampler.angle(outward))
+        phi = polished_turn(sampler, ("S_1", "peak_acceleration"), sampler.angle(outward))
         stroke = sampler.at_angle(("S",), phi)[0]
     room = sampler.given.values.get("s_dwell")
     if room is None:
@@ -354,7 +354,7 @@ def _dwell(sampler: Sampler, extremes: list[float], room: float, side: int) -> f
     return crossing(lambda turned: abs(sampler.at_angle(("S",), side * turned)[0]) - room, low, high)
 
 
-SETTLED_STEPS = 3
+BATCH_STEPS = 3
 """Newton's steps from a refined extreme of many drives, which is right to 1e-6."""
 
 
@@ -362,7 +362,7 @@ def read_many(machines: "Machines") -> TravelReading:
     """Stroke and dwells of many drives at once, (machines,); no number where one does not turn all round."""
     tops = machines.tops("S", signed=True)
     phi = machines.angles(tops)
-    for _ in range(SETTLED_STEPS):
+    for _ in range(BATCH_STEPS):
         slope, bend = machines.at_angles(("S_1", "peak_acceleration"), phi)
         step = slope / bend
         phi = phi - np.where(np.abs(step) <= FARTHEST, step, 0.0)

@@ -43,7 +43,7 @@ from loomopt.scenes.scene import Scene
 if TYPE_CHECKING:
     from loomopt.model.machines import Machines
 
-SPEED_AT_REST, SPEED_STEPS, SPEED_MET = 1e-12, 30, 1e-8
+SPEED_AT_REST, SPEED_STEPS, SPEED_CONVERGED = 1e-12, 30, 1e-8
 """Largest speed that keeps a bound: share of the largest value by which one at rest may miss it, for rounding; Newton's
 steps at most, and the share of the speed after which there is none left to take: the next would be its square."""
 
@@ -114,7 +114,7 @@ def _refined_speed(at_rest: Sampler, name: str, most: float, speed: float) -> fl
             break
         step = (most - top.value) / slope
         speed += step
-        if abs(step) <= SPEED_MET * speed:
+        if abs(step) <= SPEED_CONVERGED * speed:
             break
     return speed
 
@@ -310,8 +310,8 @@ class SheddingTask(Task):
             return ()
         # At its own speed the frame is judged anyway: the same row twice would have no price.
         least = self.scene.limits[CONTACT_SPEED].min
-        judged = self.varies_speed or ("speed" not in self.limited and self.known["speed"] == least)
-        return (AT_REST,) if judged else (AT_REST, FASTEST)
+        is_checked = self.varies_speed or ("speed" not in self.limited and self.known["speed"] == least)
+        return (AT_REST,) if is_checked else (AT_REST, FASTEST)
 
     @lazy
     def model(self) -> JobModel:
@@ -363,8 +363,8 @@ class SheddingTask(Task):
             ends |= {"X0": (known["X0"],) * 2} | ({} if tied else {"K1": (known["K1"],) * 2})
         speed_names = [
             name
-            for name, sought in (("speed", self.varies_speed), (CONTACT_SPEED, self.varies_contact_speed))
-            if sought
+            for name, is_free in (("speed", self.varies_speed), (CONTACT_SPEED, self.varies_contact_speed))
+            if is_free
         ]
         ends |= {name: self.limited.get(name, (1e-3 * self.fastest, math.inf)) for name in speed_names}
         for name in self.fixed_names:

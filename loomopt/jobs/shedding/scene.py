@@ -116,7 +116,7 @@ class LawTarget(TargetTable):
     acceleration: PositiveNumber = Field(CYCLOID, description="largest |s''|")
 
 
-SAID = {
+DESCRIPTIONS = {
     name: field.description or "" for table in (Operation, HealdFrame) for name, field in table.model_fields.items()
 }
 """Descriptions of the scene's numbers, for figures of the same name."""
@@ -126,17 +126,17 @@ VARIABLES = {"K1": "stiffness", "X0": "length"}
 FIGURES = {
     figure.name: figure
     for figure in (
-        Figure("K1", "stiffness", SAID["K1"], sides=()),
-        Figure("X0", "length", SAID["X0"], sides=()),
+        Figure("K1", "stiffness", DESCRIPTIONS["K1"], sides=()),
+        Figure("X0", "length", DESCRIPTIONS["X0"], sides=()),
         Figure("contact_min", "force", "least cam force over the cycle", sides=("min",)),
         Figure("contact_angle", "angle", "cam angle where it is least", sides=()),
         Figure("contact_max", "force", "largest cam force over the cycle", sides=("max",)),
         Figure("contact_speed", "angular speed", "speed up to which the roller stays on the cam", sides=("min",)),
-        Figure("speed", "angular speed", SAID["speed"], sides=()),
+        Figure("speed", "angular speed", DESCRIPTIONS["speed"], sides=()),
         *drive.FIGURES,
         Figure("spring_force_max", "force", "largest force of the return spring", sides=("max",)),
         Figure("spring_stretch", "length", "largest elongation of the return spring", sides=("max",)),
-        Figure("travel", "length", SAID["travel"], sides=()),
+        Figure("travel", "length", DESCRIPTIONS["travel"], sides=()),
         Figure("law_acceleration", "number", "peak |s''| of the cam law", sides=("max",)),
         Figure("pressure_angle_max", "angle", "largest pressure angle", sides=("max",)),
         Figure("curvature_min", "curvature", "least signed curvature of the roller centre's curve", sides=("min",)),

@@ -251,8 +251,8 @@ def _forces(model: JobModel, known: Given) -> list[Equation]:
     pose = _pose(model, segments[0], LEAST)
     equations += sums(model.loads, pose, symbol("N"), "N", torque=("cam torque", "cam_torque"))
     equations += effect_equations.crank_motion(model, pose, known, "cam_torque")
-    judged = [WHERE[s] for s in segments if (SEGMENT, float(s)) in model.known_in]
-    where = " and ".join(judged) if judged else "for every theta"
+    checked = [WHERE[s] for s in segments if (SEGMENT, float(s)) in model.known_in]
+    where = " and ".join(checked) if checked else "for every theta"
     equations.append(relation("contact", symbol("N"), ">=", symbol("N_min"), where))
     moves = _pose(model, RISE, LEAST), _pose(model, RETURN, LEAST)
     return equations + effect_equations.event_equations(model, moves, known, "N")
@@ -546,11 +546,11 @@ def _partly(sampler: Sampler) -> Iterator[str]:
             verb = "act" if " and " in acting else "acts"
             yield (
                 f"{load.name} with {shape} is known in the dwells only: contact is judged there, and not in the moves, "
-                f"where {acting} {verb}. Choose {_others(load, words)} to judge the whole cycle"
+                f"where {acting} {verb}. Choose {_known_choices(load, words)} to judge the whole cycle"
             )
 
 
-def _others(load: Load[Any], words: Mapping[str, str]) -> str:
+def _known_choices(load: Load[Any], words: Mapping[str, str]) -> str:
     """Words of a load's table with which it is known all over the cycle."""
     clauses = []
     for key, word in words.items():

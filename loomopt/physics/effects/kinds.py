@@ -283,7 +283,7 @@ class Load(Effect, Generic[Pose]):
     inside(at) : of an output term, its further part inside the drive, N·m; None for nothing.
     output_share(at) : of a drive term, what of it acts on the parts on the output, N·m or N there; None for nothing. A
         state that carries the load carries this part, and the rest stays in the drive.
-    upon(at, loading) : the term where it depends on all other terms.
+    force_under_loads(at, loading) : the term where it depends on all other terms, in place of `force`.
     corners(at) : crank angles, rad, where the formula changes.
     switch(angle, corners) : formula that is valid at a crank angle inside a piece, as the number `at.switch`.
     known_in(words) : places where the term is known, by the words of its table; empty for the whole cycle.
@@ -303,7 +303,7 @@ class Load(Effect, Generic[Pose]):
     force: Callable[[Inputs[Pose]], Number]
     inside: Callable[[Inputs[Pose]], Number | None] | None = None
     output_share: Callable[[Inputs[Pose]], Number] | None = None
-    upon: Callable[[Inputs[Pose], Loading], Number] | None = None
+    force_under_loads: Callable[[Inputs[Pose], Loading], Number] | None = None
     corners: Callable[[Inputs[None]], tuple[Number, ...]] | None = None
     switch: Callable[[float, tuple[float, ...]], float] = constant_switch
     known_in: Callable[[Mapping[str, str]], tuple[Place, ...]] = nothing_unknown
@@ -396,7 +396,7 @@ class Check(Effect, Generic[Pose]):
         per rad of the crank.
     wanted : scene keys without which a vector, scalar or quantity has no value.
     fitted(chain) : the check of a user's own linkage.
-    between : inertia loads on links, with terms of their own in equations.
+    link_inertias : inertia loads on links, each with an equation of its own.
     sentence : its equations in words, where the symbols of a pose do not tell its links.
     remark(at, shown) : sentence beside its figures, in the reader's units; "" for nothing.
     explain(known, bounds, table, clash, shown) : physical reason why limits (names) clash, in the reader's units.
@@ -416,7 +416,7 @@ class Check(Effect, Generic[Pose]):
     worked: Mapping[str, str] = field(default_factory=dict)
     wanted: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     fitted: "Callable[[Chain], Check[Any]] | None" = None
-    between: tuple[str, ...] = ()
+    link_inertias: tuple[str, ...] = ()
     sentence: str = ""
     remark: Callable[[Inputs[None], ShowValue], str] = nothing_remarked
     explain: Callable[
@@ -482,7 +482,7 @@ class State(Effect):
     columns : columns of the curves, with unit.
     motion(written, table) : both sides of its equation of motion.
     term(written, table) : `force` in the same symbols.
-    between : the symbols whose difference is z, the moving one first.
+    difference : the two symbols whose difference is z, the moving one first.
     rests(table) : what neither proofs nor studies of accuracy cover, a sentence without its full stop.
     """
 
@@ -492,7 +492,7 @@ class State(Effect):
     coordinate: Callable[[Inputs[Any], tuple[Number, Number]], Number]
     motion: "Callable[[Written, Values], tuple[Number, Number]]"
     term: "Callable[[Written, Values], Number]"
-    between: tuple[str, str]
+    difference: tuple[str, str]
     rests: Callable[[Values], str]
     oscillator: "Callable[[Inputs[None]], SteadyOscillator]" = no_oscillator
     fixed: "Callable[[Inputs[None], Carried], Mapping[str, str]]" = lambda at, carried: {}

@@ -225,9 +225,9 @@ class Walk:
             self.push(part.word("carrier") or FRAME_NAME, None, here, (part.ratio - 1) * torque)
             self.given(joint, part, minus(wrench.force))
             return
-        between = plus(self.at(self.linked.origins[mate]), minus(here))
-        distance, radius = self.pose.maths.sqrt(dot(between, between)), self.pose.number(part, "radius")
-        towards = Vector(between.x / distance, between.y / distance)
+        to_mate = plus(self.at(self.linked.origins[mate]), minus(here))
+        distance, radius = self.pose.maths.sqrt(dot(to_mate, to_mate)), self.pose.number(part, "radius")
+        towards = Vector(to_mate.x / distance, to_mate.y / distance)
         radius = distance / (1 - part.ratio) if radius is None else radius
         self.teeth[part.name] = torque / radius
         push = joint_forces.tooth_force(torque, radius, towards)

@@ -16,17 +16,17 @@ from loomopt.physics.mechanisms.dyad import Vector, cross, dot
 
 Rates = Callable[[int], Number | None]
 """rates(k): the k-th derivative of an angle, k = 1, 2, 3."""
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 X = Vector(1, 0)
 """The direction of the frame."""
 
 
-def by_order(formula: Callable[[int], Found]) -> Callable[[int], Found]:
+def by_order(formula: Callable[[int], Result]) -> Callable[[int], Result]:
     """Formula of an order of derivative that is computed when it is first read."""
-    known: dict[int, Found] = {}
+    known: dict[int, Result] = {}
 
-    def read(order: int) -> Found:
+    def read(order: int) -> Result:
         if order not in known:
             known[order] = formula(order)
         return known[order]
@@ -34,11 +34,11 @@ def by_order(formula: Callable[[int], Found]) -> Callable[[int], Found]:
     return read
 
 
-def once(formula: Callable[[], Found]) -> Callable[[], Found]:
+def once(formula: Callable[[], Result]) -> Callable[[], Result]:
     """Formula that is computed when it is first read."""
-    value: list[Found] = []
+    value: list[Result] = []
 
-    def read() -> Found:
+    def read() -> Result:
         if not value:
             value.append(formula())
         return value[0]

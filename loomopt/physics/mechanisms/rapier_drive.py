@@ -21,6 +21,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.physics.mechanisms import crank_rocker, dyad
 from loomopt.physics.mechanisms.crank_rocker import Lengths
 from loomopt.physics.mechanisms.dyad import Dyad, Vector, dot
+from loomopt.physics.mechanisms.moving import seen_from
 
 
 @dataclass(frozen=True)
@@ -53,11 +54,6 @@ class Dimensions:
 def polar(maths: Maths, radius: Number, angle: Number) -> Vector:
     """Vector of a length at an angle, rad."""
     return Vector(radius * maths.cos(angle), radius * maths.sin(angle))
-
-
-def between(first: Vector, second: Vector) -> Vector:
-    """(dot, cross): the second vector as seen from the first, scaled by both lengths."""
-    return Vector(dot(first, second), first.x * second.y - first.y * second.x)
 
 
 @dataclass(frozen=True)
@@ -173,7 +169,7 @@ class RapierPose:
     @lazy
     def relative(self) -> Vector:
         """The driving link l6 as seen from B0→B2: (cos, sin) of its angle, scaled."""
-        return between(self.carrier, self.dyad.link2)
+        return seen_from(self.carrier, self.dyad.link2)
 
     @lazy
     def _base_1(self) -> Vector:
@@ -232,13 +228,13 @@ class RapierPose:
 
     def phi63(self, front: Vector) -> Number:
         """φ6 − φ3 less its value at front dead centre, as one angle; front: `relative` there."""
-        change = between(front, self.relative)
+        change = seen_from(front, self.relative)
         return self.maths.atan2(change.y, change.x)
 
     @lazy
     def obliquity(self) -> Number:
         """Right angle minus the angle at D between l5 and l6, rad; negative where that angle is larger."""
-        angle = between(self.dyad.link1, self.dyad.link2)
+        angle = seen_from(self.dyad.link1, self.dyad.link2)
         return self.maths.atan2(angle.x, -self.stand.mirror * angle.y)
 
     @lazy

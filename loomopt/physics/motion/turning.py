@@ -25,7 +25,7 @@ FEW, MANY, MOST, TAIL = 16, 128, 512, 1e-13
 found; share of the largest ω̇ that the last eighth of a series may have: ω²/2, its integral, is then past rounding, as
 it is where that is rounding of the mean speed's square. The packaged beat-up takes 32 in its pulse and 128 outside, 512
 with a flywheel of 1 g·m²."""
-STEPS, SMALL, MOST_MOVED, MET = 60, 1e-4, 0.5, 1e-10
+STEPS, SMALL, MOST_MOVED, LAST_STEP = 60, 1e-4, 0.5, 1e-10
 """Newton's steps at most; share of the speed by which slopes are taken, exact for loads up to quadratic in the speed;
 share that ω² may move by at once, so that it stays positive; and by which the last step moves it: what is left is the
 square of it."""
@@ -195,7 +195,7 @@ def _newton(points: _Points, motion: _Motion, mean: float, surplus: Surplus) -> 
         if not math.isfinite(size):
             break
         motion = motion.moved(step, 1.0 if size <= MOST_MOVED else MOST_MOVED / size)
-        if size <= MET:
+        if size <= LAST_STEP:
             return motion
     raise NoTurn
 

@@ -24,7 +24,7 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
     value of the member that decides it.
     """
     assert isinstance(job, FamilyJob)
-    machines = zip(job.members, job.parts, job.own_designs(design), strict=True)
+    machines = zip(job.members, job.parts, job.member_designs(design), strict=True)
     results = [alone(member, job.job, part.program, point) for member, part, point in machines]
     members = tuple(replace(item, change=change) for item, change in zip(results, family.changes(scene), strict=True))
     powers = {level.figure: level.power for level in job.parts[0].program.objectives}

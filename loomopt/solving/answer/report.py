@@ -224,7 +224,7 @@ def _with(scene: Scene, target: str, search: Search, best: Candidate) -> Solutio
     solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search), "status": point.status, "iterations": point.iterations}
     today = functools.partial(evaluated, scene, job, target, {})
     here = evaluation(scene, job, program, job.design(program, best.x))
-    extent = _substituted(search, best) if search.substitute else _sought(search)
+    extent = _substitute_sentence(search, best) if search.substitute else _search_extent(search)
     solution = with_optimum(job, scene, target, here, best.certificate, solver, today, extent, search.substitute)
     solution = replace(solution, point=point, optima=_optima(search))
     if search.tradeoff is None:
@@ -310,7 +310,7 @@ def _is_there(candidate: Candidate, best: Candidate) -> bool:
     return abs(candidate.point.value - best.value) <= SAME_OBJECTIVE
 
 
-def _sought(search: Search) -> str:
+def _search_extent(search: Search) -> str:
     """Extent of the search, as a sentence that claims no more than was done."""
     if search.stayed:
         return "Solved again near the given answer; other basins were not searched."
@@ -323,7 +323,7 @@ def _sought(search: Search) -> str:
     return f"{ended} reached by {reached}{looked}."
 
 
-def _substituted(search: Search, best: Candidate) -> str:
+def _substitute_sentence(search: Search, best: Candidate) -> str:
     """Sentence on a known design that replaces the results of all solves."""
     apart = max(abs(best.x[v.name] - search.today.get(v.name, math.inf)) / v.scale for v in search.program.variables)
     name = "today's machine" if apart <= FEASIBLE else "where one of the solves ended"

@@ -587,7 +587,7 @@ class Solution(Evaluated):
         return tuple(change for change in changes if falls(change))
 
     @property
-    def sought(self) -> str:
+    def task_name(self) -> str:
         """Target, or the objectives of its terms."""
         return self.terms.summary if self.terms else self.target
 

@@ -34,10 +34,10 @@ def certify_batch(requests: Sequence[tuple[Program, Mapping[str, float]]], accur
         tie_break.measure_moves([requests[k] for k in places])
     designs = [DesignAt(*requests[k], pair[0], pair[1].rows) for k in places if (pair := samplers[k])]
     slopes = dict(zip(places, jet_derivatives(designs), strict=True))
-    return [_certify_one(*requests[k], samplers[k], slopes.get(k), accuracy) for k in range(len(requests))]
+    return [_certify_single(*requests[k], samplers[k], slopes.get(k), accuracy) for k in range(len(requests))]
 
 
-def _certify_one(
+def _certify_single(
     program: Program,
     x: Mapping[str, float],
     prepared: tuple[Sampler, ActiveSet] | None,

@@ -327,15 +327,15 @@ def _frame_row(row: ActiveRow) -> FrameRow:
 
 def _is_doubtful(local: Local, levels: Sequence[CertifiedLevel]) -> bool:
     """Whether floats leave a verdict in doubt: a quantity near its threshold, or an error as large as one."""
-    for judged_level in levels:
-        level, multipliers = judged_level.level, np.abs(judged_level.multipliers.values)
+    for level_check in levels:
+        level, multipliers = level_check.level, np.abs(level_check.multipliers.values)
         residuals = [level.stationarity / STATIONARY, level.complementarity / COMPLEMENTARY]
         ratios = [*residuals, level.price / LARGEST_PRICE, *(multipliers / POSITIVE)]
         error = JET_ERROR * float(multipliers @ np.abs(local.gradients).max(axis=1, initial=1.0))
         errors = [error / STATIONARY]
-        if judged_level.curvature:
-            ratios += list(judged_level.curvature.ratios)
-            errors.append(judged_level.curvature.error / FLAT)
+        if level_check.curvature:
+            ratios += list(level_check.curvature.ratios)
+            errors.append(level_check.curvature.error / FLAT)
         if max(errors) >= 1.0 or any(1 / DOUBT < ratio < DOUBT for ratio in ratios):
             return True
     return False
@@ -361,7 +361,7 @@ def _cycle_reasons(cycle: WholeCycle, accuracy: float) -> Iterator[str]:
 
 def _optimality_reasons(levels: Sequence[CertifiedLevel]) -> Iterator[str]:
     """Yield the reasons against optimality: first order of each level, then second order."""
-    for level in (judged_level.level for judged_level in levels):
+    for level in (level_check.level for level_check in levels):
         if not level.stationarity <= STATIONARY:
             yield f"{level.objective} can still fall: stationarity {level.stationarity:.2g}"
         if not level.complementarity <= COMPLEMENTARY:
@@ -369,15 +369,15 @@ def _optimality_reasons(levels: Sequence[CertifiedLevel]) -> Iterator[str]:
         if level.price > LARGEST_PRICE:
             yield f"the price of limit {level.dearest} is too large: {level.price:.2g}, no KKT point"
     falling = [
-        judged_level.level.objective
-        for judged_level in levels
-        if judged_level.curvature and judged_level.curvature.higher == "falls"
+        level_check.level.objective
+        for level_check in levels
+        if level_check.curvature and level_check.curvature.higher == "falls"
     ]
     if falling:
         yield f"second order does not decide: {falling[-1]} falls along a direction without curvature"
-    elif any(judged_level.curvature.higher == "open" for judged_level in levels if judged_level.curvature):
+    elif any(level_check.curvature.higher == "open" for level_check in levels if level_check.curvature):
         yield SECOND_ORDER_OPEN
-    if not all(judged_level.curvature.minimum for judged_level in levels if judged_level.curvature):
+    if not all(level_check.curvature.minimum for level_check in levels if level_check.curvature):
         yield "second order fails: along some direction the objective falls (a saddle or a maximum)"
 
 
@@ -408,7 +408,7 @@ def _price_limits(local: Local, levels: Sequence[CertifiedLevel]) -> Prices:
     bindings: dict[int, Binding] = {}
     together: list[JointBinding] = []
     many_priced: set[int] = set()
-    for level, judged_level in enumerate(levels):
+    for level, level_check in enumerate(levels):
         known = KnownMultipliers(level_multipliers(local, levels, level))
         tied: list[list[int]] = []
         for name, row_places in list(places.items()):
@@ -417,7 +417,7 @@ def _price_limits(local: Local, levels: Sequence[CertifiedLevel]) -> Prices:
                 continue
             del places[name]
             if math.isfinite(high - low) and high - low <= ONE_PRICE * max(1.0, abs(high)):
-                shares = {k: float(judged_level.multipliers.values[k]) for k in row_places}
+                shares = {k: float(level_check.multipliers.values[k]) for k in row_places}
                 bindings |= {
                     k: _binding(local, level, k, share) for k, share in shares.items() if abs(share) > POSITIVE
                 }

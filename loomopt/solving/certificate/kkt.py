@@ -225,15 +225,15 @@ def vanishing_multipliers(system: System, rows: int) -> LevelMultipliers:
 
 def solve_system(gradients: Floats, system: System) -> LevelMultipliers:
     """Multipliers of one level by non-negative least squares; gradients: (rows, variables)."""
-    slopes, target, one_sided = _equations(gradients, system)
-    matrix = np.hstack([slopes, -slopes[:, one_sided:]])
+    slopes, target, inequality_count = _equations(gradients, system)
+    matrix = np.hstack([slopes, -slopes[:, inequality_count:]])
     weights = nnls(matrix, target)
     signed = weights[: slopes.shape[1]].copy()
-    signed[one_sided:] -= weights[slopes.shape[1] :]
-    free = one_sided + len(system.equalities)
+    signed[inequality_count:] -= weights[slopes.shape[1] :]
+    free = inequality_count + len(system.equalities)
     values = signed[free:] @ system.higher_levels
-    values[[*system.pieces, *system.inequalities]] += signed[:one_sided]
-    values[list(system.equalities)] += signed[one_sided:free]
+    values[[*system.pieces, *system.inequalities]] += signed[:inequality_count]
+    values[list(system.equalities)] += signed[inequality_count:free]
     return LevelMultipliers(values, float(np.abs(matrix @ weights - target).max()))
 
 
@@ -244,14 +244,14 @@ def replaceable_rows(gradients: Floats, system: System, multipliers: LevelMultip
     other slopes, less the residual of y. For slopes A = U S V' of length 1 that distance is 1/‖(S⁻¹ V')_k‖; zero
     singular values are replaced by rounding, so that a row in a vanishing sum has distance 0.
     """
-    slopes, _, one_sided = _equations(gradients, system)
+    slopes, _, inequality_count = _equations(gradients, system)
     lengths = np.linalg.norm(slopes, axis=0)
     _, sizes, turned = np.linalg.svd(slopes / np.where(lengths > 0.0, lengths, 1.0))
     rounded = np.full(len(turned), sys.float_info.epsilon)
     rounded[: len(sizes)] = np.maximum(sizes, sys.float_info.epsilon)
     distances = lengths / np.linalg.norm(turned / rounded[:, None], axis=0)
     reach = math.sqrt(len(slopes)) * (multipliers.residual + most)
-    places = zip([*system.pieces, *system.inequalities], distances[:one_sided], strict=True)
+    places = zip([*system.pieces, *system.inequalities], distances[:inequality_count], strict=True)
     near = [
         k for k, distance in places if multipliers.values[k] > POSITIVE and distance * multipliers.values[k] <= reach
     ]
@@ -267,15 +267,15 @@ def multiplier_set(
     """
     apart = [row.excess < -FEASIBLE and abs(multipliers.values[k]) <= POSITIVE for k, row in enumerate(active.rows)]
     rows = [k for k in (*system.pieces, *system.inequalities, *system.equalities) if not apart[k]]
-    held_pieces = [int(np.argmax(row)) for row in system.higher_levels]
-    of_pieces = [float(k in system.pieces) for k in (*rows, *held_pieces)]
-    columns = np.vstack([gradients[[*rows, *held_pieces]].T, of_pieces])
+    level_pieces = [int(np.argmax(row)) for row in system.higher_levels]
+    of_pieces = [float(k in system.pieces) for k in (*rows, *level_pieces)]
+    columns = np.vstack([gradients[[*rows, *level_pieces]].T, of_pieces])
     lengths = np.linalg.norm(columns, axis=0)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
     _, sizes, turned = np.linalg.svd(columns / lengths)
     null_space = turned[int(np.sum(sizes > RANK)) :].T / lengths[:, None]
     directions = np.zeros((len(active.rows), null_space.shape[1]))
-    directions[[*rows, *held_pieces]] = null_space
+    directions[[*rows, *level_pieces]] = null_space
     signed = np.zeros(len(active.rows), dtype=bool)
     signed[[*system.pieces, *system.inequalities]] = True
     return MultiplierSet(np.where(signed, np.maximum(multipliers.values, 0.0), multipliers.values), directions, signed)
@@ -290,6 +290,8 @@ def _equations(gradients: Floats, system: System) -> tuple[Floats, Floats, int]:
     norm = np.zeros(count)
     norm[list(system.pieces)] = 1.0
     slopes = np.vstack([gradients.T, norm])
-    one_sided = [*system.pieces, *system.inequalities]
-    columns = np.hstack([slopes[:, one_sided], slopes[:, list(system.equalities)], slopes @ system.higher_levels.T])
-    return columns, np.append(np.zeros(size), 1.0), len(one_sided)
+    inequality_count = [*system.pieces, *system.inequalities]
+    columns = np.hstack(
+        [slopes[:, inequality_count], slopes[:, list(system.equalities)], slopes @ system.higher_levels.T]
+    )
+    return columns, np.append(np.zeros(size), 1.0), len(inequality_count)

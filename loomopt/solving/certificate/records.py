@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from loomopt.model.limits import Limit
-from loomopt.model.objectives import Objective, Sought
+from loomopt.model.objectives import Objective, ObjectiveSense
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ROUNDED
 from loomopt.solving.certificate.multiplier_set import MultiplierSet
@@ -158,7 +158,7 @@ class GlobalLevel(NamedTuple):
     """
 
     objective: str
-    sense: Sought
+    sense: ObjectiveSense
     best: float
     bound: float
     gap: float

@@ -28,7 +28,7 @@ from loomopt.maths.nnls import least_on_cone
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.physics.tolerances import FEASIBLE, FLAT, POLISH_DONE, POLISH_MET, RANK
+from loomopt.physics.tolerances import FEASIBLE, FLAT, POLISH_DONE, POLISH_EXCESS, RANK
 from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet, LevelMultipliers, System, move_rows
 from loomopt.solving.nlp.point import sampler_at
@@ -287,7 +287,7 @@ class FeasibleCurve:
             residuals = self.sums @ (values - self._here)
             largest = float(np.abs(residuals).max(initial=0.0))
             if not np.any(valley_step) and (largest <= POLISH_DONE or last_residual <= 2 * largest):
-                return x if largest <= POLISH_MET else None
+                return x if largest <= POLISH_EXCESS else None
             step, last_residual = step - self._back @ residuals + valley_step, largest
         return None
 

@@ -20,8 +20,8 @@ from loomopt.physics.tolerances import (
     CONVERGED,
     NEEDED,
     POLISH_DONE,
+    POLISH_EXCESS,
     POLISH_FARTHEST,
-    POLISH_MET,
     POLISH_RANK,
     POLISH_STEPS,
     SAME_NODE,
@@ -101,13 +101,13 @@ def newton_onto_active_rows(
     while True:
         trial = _newton_onto_rows(jacobian, start, p, rows, free)
         values = np.asarray(jacobian(trial, p)[0]).ravel()
-        broken = used & ~rows & (values > POLISH_MET)
+        broken = used & ~rows & (values > POLISH_EXCESS)
         small = np.abs(trial - x).max() <= farthest
         if not small or not broken.any():
             break
         rows = rows | broken
-    inside = np.all(trial >= lower - POLISH_MET) and np.all(trial <= upper + POLISH_MET)
-    feasible = np.all(values <= arguments["ubg"] + POLISH_MET) and np.all(values >= arguments["lbg"] - POLISH_MET)
+    inside = np.all(trial >= lower - POLISH_EXCESS) and np.all(trial <= upper + POLISH_EXCESS)
+    feasible = np.all(values <= arguments["ubg"] + POLISH_EXCESS) and np.all(values >= arguments["lbg"] - POLISH_EXCESS)
     return np.clip(trial, lower, upper) if small and inside and feasible else None
 
 

@@ -36,8 +36,8 @@ in another local optimum. Room for three and two of a start take a rapier drive 
 a front of ten in an optimum that is 1.8 % worse.
 """
 
-BESIDE_STATIONS = 2, 1
-"""The same where rows stand at corners from the first. None of 28 free cam laws of 16 and 64 intervals, with every
+SLOTS_WITH_STATIONS = 2, 1
+"""Both numbers where rows stand at corners from the first. None of 28 free cam laws of 16 and 64 intervals, with every
 effect, ends at a node beside its knots, and each that there is room for takes a twentieth of building."""
 
 FIRST_SHARE, FIRST_ROOM = 1.01, 0.01
@@ -60,7 +60,7 @@ class Calls:
         self.is_elastic = elastic is not None
         self.families, self.epigraphs = families(program, self.is_elastic), epigraphs(program, self.is_elastic)
         names = [variable.name for variable in program.variables]
-        self.slots, self.leading = BESIDE_STATIONS if chain_names(program.model, names) else (FIRST_SLOTS, LEADING)
+        self.slots, self.leading = SLOTS_WITH_STATIONS if chain_names(program.model, names) else (FIRST_SLOTS, LEADING)
         count = len(program.objectives)
         self.weights = [settings.penalty ** (count - 1 - k) for k in range(count)]
         self.build_seconds = 0.0

@@ -24,8 +24,8 @@ from loomopt.solving.proof.task import BoxTask, OpenError, reduced, silent
 from loomopt.solving.proof.tree import Question, Tree, grown, multipliers
 from loomopt.solving.search.search import Search, certify_best, compare, solve_from
 
-HELD = SAME_OBJECTIVE
-"""What an earlier level's objective may exceed the answer's by, scale: that much counts as the same optimum."""
+LEVEL_SLACK = SAME_OBJECTIVE
+"""Amount, scaled, by which an earlier level's objective may exceed the answer's: it counts as the same optimum."""
 LEAST_SIZE = 1e-3
 """Share of its scale below which an optimum is as good as 0: the gap is then relative to that share."""
 
@@ -131,7 +131,7 @@ def _no_larger(program: Program, merits: list[float]) -> dict[str, float]:
     first = program.objectives[0]
     if not first.is_smooth or first.row not in {v.name for v in program.variables}:
         return {}
-    return {first.row: (merits[0] + HELD) * first.scale}
+    return {first.row: (merits[0] + LEVEL_SLACK) * first.scale}
 
 
 class _Level:
@@ -141,7 +141,7 @@ class _Level:
         self.task, self.place, self.gap = task, place, gap
         self.objective, self.best = task.program.objectives[place], merits[place]
         lowest = _lessened(self.objective, self.best, gap)
-        higher_levels = tuple(merit + HELD for merit in merits[:place])
+        higher_levels = tuple(merit + LEVEL_SLACK for merit in merits[:place])
         point = task.place(x)
         reader = Reader(task, place + 1, point)
         weights = multipliers(reader, point, place)
@@ -159,7 +159,7 @@ class _Level:
         """Grow the tree; returns a better design, the program's variables, SI, if one turns up."""
         while not self.tree.closed and time.perf_counter() < until:
             better = grown(self.tree, self.question, until)
-            say(f"proving {self.objective.figure}: {self._gap_said()}, {self.tree.boxes} boxes")
+            say(f"proving {self.objective.figure}: {self._gap_text()}, {self.tree.boxes} boxes")
             if better is not None:
                 return self.task.design(better)
         return None
@@ -192,15 +192,15 @@ class _Level:
         bound = _figure(objective, max(least, self.least))
         best = _figure(objective, self.best)
         gap = self.gap if self.proven and self.tree.boxes else abs(best - bound) / _size(objective, best)
-        band = abs(_figure(objective, self.best + HELD) - best)
-        return GlobalLevel(objective.figure, objective.sought, best, bound, gap, band, self.proven)
+        band = abs(_figure(objective, self.best + LEVEL_SLACK) - best)
+        return GlobalLevel(objective.figure, objective.sense, best, bound, gap, band, self.proven)
 
     def why(self) -> str:
         """Reason why the level is not proven."""
         small = ", and what is left open is too small to halve" if self.tree.closed else ""
-        return f"{self.objective.figure} is open, {self._gap_said()}{small}"
+        return f"{self.objective.figure} is open, {self._gap_text()}{small}"
 
-    def _gap_said(self) -> str:
+    def _gap_text(self) -> str:
         gap = self.shown().gap
         return f"gap {100 * gap:.2g} %" if math.isfinite(gap) else "no bound yet"
 

@@ -28,7 +28,7 @@ from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Proof, Proofs, Sentences, Solution, UnitFormatter
 from loomopt.solving.certificate import taylor_bounds
 from loomopt.solving.certificate.taylor_bounds import Boxes
-from loomopt.solving.options import check_sought, target_name
+from loomopt.solving.options import check_effects, target_name
 
 RANK = {"proven": 0, "undecided": 1, "violated": 2}
 """Statuses from best to worst."""
@@ -40,22 +40,22 @@ def prove(
     design: Mapping[str, float],
     target: str | None = None,
     slack: float = SLACK,
-    judged_by: Program | None = None,
+    limits_of: Program | None = None,
 ) -> Proofs:
     """Proofs of a design's limits (SI; numbers that it does not name are today's).
 
-    slack: what is left open, relative to each quantity's largest magnitude over the cycle; judged_by: a program whose
-    limits they are, the target's own without one. Raises BadInput.
+    slack: what is left open, relative to each quantity's largest magnitude over the cycle; limits_of: a program whose
+    limits are proven; those of the target by default. Raises BadInput.
     """
     allowed, remedy = f"{LEAST_SLACK:g} to {MOST_SLACK:g}", "Give 1e-8, or leave it out."
     if not LEAST_SLACK <= arguments.number(slack, "slack", allowed, remedy) <= MOST_SLACK:
         raise BadInput("the slack is out of range", key="slack", value=f"{slack:g}", allowed=allowed, remedy=remedy)
     job, name = registry.of(scene), target_name(scene, target)
-    check_sought(scene, "prove")
+    check_effects(scene, "prove")
     job.demand(scene, name)
     full = {**job.today(scene), **design}
-    program_scene, program_target = (scene, name) if judged_by else job.adopted(scene, full, name)
-    program = judged_by or job.program(program_scene, program_target)
+    program_scene, program_target = (scene, name) if limits_of else job.adopted(scene, full, name)
+    program = limits_of or job.program(program_scene, program_target)
     reads = _readings(program_scene, job, program, full, slack)
     formatter = UnitFormatter(program_scene)
     proofs = tuple(

@@ -413,8 +413,8 @@ def _progress(lattice: Lattice, best: Solution | None, bound: Solution) -> str:
     figures = ", ".join(f"{name} {formatter.shown(name, best.figures[name] or 0.0, 6)}" for name in names)
     gaps = {name: abs((best.figures[name] or 0.0) - (bound.figures[name] or 0.0)) for name in names}
     sizes = {level.figure: level.scale ** (1 / level.power) for level in lattice.program.objectives}
-    open_ones = [f"{name} {formatter.shown(name, gap, 2)}" for name, gap in gaps.items() if gap > AGREES * sizes[name]]
-    return f"best {figures}; gap {', '.join(open_ones) or '0'}"
+    gap_texts = [f"{name} {formatter.shown(name, gap, 2)}" for name, gap in gaps.items() if gap > AGREES * sizes[name]]
+    return f"best {figures}; gap {', '.join(gap_texts) or '0'}"
 
 
 def _distance(lattice: Lattice, name: str, value: float) -> float | None:
@@ -432,8 +432,8 @@ def _nearest(grid: tuple[float, ...], value: float) -> float:
 
 def _split(lattice: Lattice, ends: Ends, answer: Solution) -> tuple[str, int]:
     """Number that is farthest from a size, and the place of the size below it."""
-    open_ones = [name for name, (low, high) in ends.items() if low < high]
-    name = max(open_ones, key=lambda number: _distance(lattice, number, float(answer.design[number])) or 0.0)
+    gap_texts = [name for name, (low, high) in ends.items() if low < high]
+    name = max(gap_texts, key=lambda number: _distance(lattice, number, float(answer.design[number])) or 0.0)
     low, high = ends[name]
     value = float(answer.design[name])
     below = max((k for k in range(low, high) if lattice.sizes[name][k] <= value), default=low)

@@ -109,7 +109,7 @@ class NeighbourTask(NamedTuple):
         return max(abs(self.first.x[v.name] - self.second.x[v.name]) / v.scale for v in variables)
 
 
-def solve_between(requests: Sequence[NeighbourTask]) -> list[Search | None]:
+def solve_neighbours(requests: Sequence[NeighbourTask]) -> list[Search | None]:
     """Searches of programs with their optima; None for a program that must be solved alone."""
     searches: list[Search | None] = [None] * len(requests)
     for turn in range(2):
@@ -205,8 +205,8 @@ def _newton(starts: Sequence[_StartDesign]) -> list[dict[str, float] | None]:
         )
     farthest = np.abs((x - first_x) / batch.sizes).max(axis=1)
     # A row with a negative multiplier stops no design: such an end is dropped before it is certified.
-    one_sided = np.array([row.side != 0 or place > 0.0 for row, place in zip(starts[0].frame, pieces, strict=True)])
-    failed |= (np.where(one_sided, weights, 0.0) < -POSITIVE).any(axis=1)
+    is_inequality = np.array([row.side != 0 or place > 0.0 for row, place in zip(starts[0].frame, pieces, strict=True)])
+    failed |= (np.where(is_inequality, weights, 0.0) < -POSITIVE).any(axis=1)
     return [
         _at_bounds(start, dict(zip(batch.names, x[lane].tolist(), strict=True)))
         if converged[lane] and not failed[lane] and farthest[lane] <= NEAR + 2 * start.width

@@ -372,10 +372,7 @@ def correct(search: Search, candidate: Candidate) -> Candidate:
         return candidate
     _, x, draft = _draft_at(search, x)
     certificate = draft.whole
-    ranks = [
-        (not each_certificate.passed, each_certificate.residual)
-        for each_certificate in (certificate, candidate.certificate)
-    ]
+    ranks = [(not checked.passed, checked.residual) for checked in (certificate, candidate.certificate)]
     return candidate._replace(moved=x, certificate=certificate) if ranks[0] <= ranks[1] else candidate
 
 

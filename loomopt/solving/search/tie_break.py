@@ -59,7 +59,7 @@ def apply_moves_in_batch(designs: Sequence[tuple[Program, Numbers]]) -> list[tup
             if reading.change > UNCHANGED:
                 continue
             program, x, (end,) = path
-            share = _share_between(program, x, end, *reading.excesses)
+            share = _admissible_share(program, x, end, *reading.excesses)
             sizes = [share * abs(end[v.name] - x[v.name]) / v.scale for v in program.variables if v.name in end]
             if max(sizes, default=0.0) > MOVED:
                 rules[k].append(f"{program.moves[turn].name}: {wish.reason}")
@@ -88,7 +88,7 @@ def measure_moves(designs: Sequence[tuple[Program, Numbers]]) -> None:
     _changes_along([move for program, x in designs if not program.cycle_limits for move in _directions(program, x)])
 
 
-TESTED_MOVES, TESTED_MOST = "judged moves", 256
+TESTED_MOVES, TESTED_MOST = "tested moves", 256
 """Name of the tested moves in a session, and how many it keeps: curvature and least change test the same ones, and a
 batch of designs tests all of its moves at once."""
 
@@ -290,11 +290,15 @@ def _batch_excesses(designs: BatchReading, limits: Sequence[Sequence[Limit]], sh
 
 def reachable_share(program: Program, x: Numbers, goal: Numbers) -> float:
     """Largest share of the way along which no limit becomes worse than allowed."""
-    return _share_between(program, x, goal, _excesses(program, x), _excesses(program, {**x, **goal}))
+    return _admissible_share(program, x, goal, _excesses(program, x), _excesses(program, {**x, **goal}))
 
 
-def _share_between(program: Program, x: Numbers, goal: Numbers, start_excesses: Floats, goal_excesses: Floats) -> float:
-    """The same share; here, goal_excesses: scaled excesses of the limits at x and at the goal.
+def _admissible_share(
+    program: Program, x: Numbers, goal: Numbers, start_excesses: Floats, goal_excesses: Floats
+) -> float:
+    """Largest share of the way from x to the goal along which no limit becomes worse than allowed.
+
+    start_excesses, goal_excesses: scaled excesses of the limits at x and at the goal.
 
     The share is 0 where a touched limit rises from the start: the allowed rise is for rounding only, and a step into it
     would leave the bounds of the design.

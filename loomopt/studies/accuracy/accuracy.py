@@ -13,7 +13,7 @@ from loomopt.model import model
 from loomopt.model.session import working
 from loomopt.scenes import provenance
 from loomopt.scenes.scene import Scene
-from loomopt.solving.options import check_sought
+from loomopt.solving.options import check_effects
 from loomopt.studies.accuracy import optima, readings
 from loomopt.studies.accuracy.subject import (
     EPSILON,
@@ -91,7 +91,7 @@ def climbs(
     ladders: Sequence[Ladders] = LADDERS,
 ) -> Iterator[Climb]:
     """Yield every ladder with its rows as soon as it is done. Raises BadInput for a scene that does not assemble."""
-    check_sought(scene, "accuracy")
+    check_effects(scene, "accuracy")
     subject = Subject(scene)
     for make in ladders:
         for ladder in make(subject, full):

@@ -18,14 +18,14 @@ from loomopt.scenes import numbers
 from loomopt.scenes.former_names import current
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import UnitFormatter
-from loomopt.solving.options import check_numbers, check_sought, target_name
+from loomopt.solving.options import check_effects, check_numbers, target_name
 from loomopt.studies.front.trade import POINTS, Trade
 
 FEWEST = 3
 """Points of a front."""
 ENDS = "LO:HI UNIT as text, or both ends as numbers in SI"
 """How a range is given."""
-SOUGHT: Mapping[Sense, str] = {"least": "min", "most": "max"}
+LIMITING_SIDE: Mapping[Sense, str] = {"least": "min", "most": "max"}
 """End of an axis to reach → side of a limit that stands in its way."""
 NONE = "none"
 """What is given in place of a target, where the scene's limits alone hold."""
@@ -67,7 +67,7 @@ def trade(
     does not bound they bound it. A number that the scene holds is freed as an axis. Raises BadInput.
     """
     check_numbers(accuracy, None)
-    check_sought(scene)
+    check_effects(scene)
     if target is not None:
         target_name(scene, target)
     first, second = _two(scene, axes)
@@ -125,7 +125,7 @@ def _lifted(scene: Scene, senses: Mapping[str, Sense]) -> tuple[Scene, tuple[str
             continue
         ends = {"min": limit.min, "max": limit.max}
         is_equality = limit.min is not None and limit.min == limit.max
-        sides = [side for side in ends if ends[side] is not None and (is_equality or side == SOUGHT[sense])]
+        sides = [side for side in ends if ends[side] is not None and (is_equality or side == LIMITING_SIDE[sense])]
         if sides:
             scene = scene.without_limit(name, sides)
             most = "" if is_equality else " at least" if sides == ["min"] else " at most"

@@ -124,7 +124,7 @@ def values(rows: Sequence[Row], axis: str) -> list[float]:
 
 def spots(rows: Sequence[Row], scale: FrontScale) -> tuple[list[Spot], list[tuple[Row, int]]]:
     """Points of the front by b, and the dominated rows, each with the point that dominates it."""
-    candidates = _best_of_each([row for row in rows if row.certified], scale)
+    candidates = _without_repetitions([row for row in rows if row.certified], scale)
     sorted_spots = sorted((_spot(row, scale) for row in candidates), key=lambda spot: (spot.b, spot.a, spot.point))
     front: list[Spot] = []
     dominated: list[tuple[Row, int]] = []
@@ -139,7 +139,7 @@ def spots(rows: Sequence[Row], scale: FrontScale) -> tuple[list[Spot], list[tupl
     return front, dominated
 
 
-def _best_of_each(rows: Sequence[Row], scale: FrontScale) -> list[Row]:
+def _without_repetitions(rows: Sequence[Row], scale: FrontScale) -> list[Row]:
     """Certified rows without vain repetitions, and without rows that a repetition improves.
 
     A repetition that differs by rounding is vain; in place of the first row it would have to be repeated again.
@@ -193,13 +193,13 @@ def following(rows: Sequence[Row], scale: FrontScale, points: int) -> list[Next]
     rows_left = MOST_MORE * points - (len(rows) - len(again))
     if points_left > 0 and rows_left > 0 and len(next_points) < BATCH:
         next_points += [
-            _between(front, b, apart)
+            _next_point(front, b, apart)
             for b in _halved(front, failed_positions, min(BATCH - len(next_points), points_left))
         ]
     if next_points:
         return next_points
     changing = _narrowed(front, failed_positions, apart) if rows_left > 0 else []
-    narrowed = [_between(front, b, apart)._replace(fine=True) for b in changing]
+    narrowed = [_next_point(front, b, apart)._replace(fine=True) for b in changing]
     if narrowed and any(row.warm.get("fine") for row in rows):
         return narrowed
     next_points = _trials(front, by_point, 1, scale)
@@ -339,7 +339,7 @@ def _changing(left: Spot, right: Spot) -> set[str]:
     return {touched_side.side.limit for touched_side in set(left.active) ^ set(right.active)}
 
 
-def _between(front: Sequence[Spot], b: float, apart: Collection[frozenset[int]]) -> Next:
+def _next_point(front: Sequence[Spot], b: float, apart: Collection[frozenset[int]]) -> Next:
     """A point with its parent, the nearest one (of two the lower), and the other neighbour if it touches others.
 
     The design of the lower neighbour is admissible there. Between two basins the designs of both neighbours are used.

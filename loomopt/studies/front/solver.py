@@ -174,7 +174,7 @@ class Solver:
         for request, (*optima, share) in zip(requests, ends, strict=True):
             first, second = map(neighbour_newton.read_optimum, optima)
             tasks.append(neighbour_newton.NeighbourTask(self._begun(request), first, second, share, self._peaks))
-        searches = zip(requests, neighbour_newton.solve_between(tasks), strict=True)
+        searches = zip(requests, neighbour_newton.solve_neighbours(tasks), strict=True)
         return [
             self._result(search, request_of_search)
             if search and self._priced(search, request_of_search) and fallback.is_no_worse_than_today(search)
@@ -538,7 +538,7 @@ def _certified(
     if result.reason:
         sentences = Sentences(f"A design was reached but not certified: {result.reason}.")
     else:
-        sentences = Sentences(_sought(formatter, terms, request), report.stops(prices, joint))
+        sentences = Sentences(_extent(formatter, terms, request), report.stops(prices, joint))
     return Solution(
         **vars(evaluated),
         target=terms.target or "",
@@ -588,7 +588,7 @@ def _explicit(terms: FrontTerms, certificate: Certificate) -> Certificate:
     )
 
 
-def _sought(formatter: UnitFormatter, terms: FrontTerms, request: Subproblem) -> str:
+def _extent(formatter: UnitFormatter, terms: FrontTerms, request: Subproblem) -> str:
     """The optimised axis and the limits as a sentence."""
     optimised, other = terms.traded[request.first], terms.traded[1 - request.first]
     caps = [

@@ -109,8 +109,8 @@ class Trade:
     @property
     def conditions(self) -> dict[str, object]:
         """Conditions of every row, for people."""
-        formatter, sought = UnitFormatter(self.scene), zip(self.senses, self.labels, strict=True)
-        conditions: dict[str, object] = {"axes": ", ".join(f"{sense} {label}" for sense, label in sought)}
+        formatter, optimised = UnitFormatter(self.scene), zip(self.senses, self.labels, strict=True)
+        conditions: dict[str, object] = {"axes": ", ".join(f"{sense} {label}" for sense, label in optimised)}
         demanded, dropped = self.demands
         conditions["held"] = ", ".join(["the scene's limits", *demanded])
         conditions |= {"not held": ", ".join(dropped)} if dropped else {}
@@ -284,7 +284,7 @@ class Trade:
         """Second axis of a row, SI: its value there, or the requested one."""
         return self._figures(row, 1)
 
-    def sought(self, row: Row) -> dict[str, float]:
+    def optimised(self, row: Row) -> dict[str, float]:
         """First axis of a row, SI."""
         return self._figures(row, 0)
 
@@ -294,7 +294,7 @@ class Trade:
 
     def row_json(self, row: Row) -> dict[str, object]:
         """JSON data of a row for `--json`, with both axes."""
-        return {**row.row_json(), "axes": {**self.place(row), **self.sought(row)}}
+        return {**row.row_json(), "axes": {**self.place(row), **self.optimised(row)}}
 
     def read(self, rows: Sequence[Row]) -> Findings:
         """Points of the front in the order of the second axis, then rows without a design."""
@@ -321,7 +321,7 @@ class Trade:
     def solved_together(self, tasks: Sequence[StudyTask]) -> list[Row | None]:
         """Rows of tasks between two neighbours' optima, independent of the batch; None for the others."""
         began = time.perf_counter()
-        results = self._solve_between(tasks)
+        results = self._solve_from_neighbours(tasks)
         shared = (time.perf_counter() - began) / max(1, sum(map(bool, results)))
         return [_row(task, result, shared) if result else None for task, result in zip(tasks, results, strict=True)]
 
@@ -333,10 +333,10 @@ class Trade:
 
     def reach(self, task: StudyTask, parent: Row | None) -> TaskResult:
         """Result of a task."""
-        (result,) = self._solve_between([task])
+        (result,) = self._solve_from_neighbours([task])
         return result or self._alone(task, parent)
 
-    def _solve_between(self, tasks: Sequence[StudyTask]) -> list[TaskResult | None]:
+    def _solve_from_neighbours(self, tasks: Sequence[StudyTask]) -> list[TaskResult | None]:
         """Results of tasks between two neighbours' optima; None for a task that must be solved alone."""
         results: list[TaskResult | None] = [None] * len(tasks)
         places = [k for k, task in enumerate(tasks) if task.neighbours and "trial" not in task.ask]
@@ -344,9 +344,9 @@ class Trade:
         for k, request, point_result in zip(
             places, requests, self.solver.solve_neighbours(requests, [tasks[k].neighbours for k in places]), strict=True
         ):
-            kept_result = point_result and _with_levels_checked(point_result, tasks[k].ask["held"])
-            if kept_result and kept_result.certified:
-                marked_result = replace(kept_result, warm={**kept_result.warm, "between": True})
+            checked_result = point_result and _with_levels_checked(point_result, tasks[k].ask["held"])
+            if checked_result and checked_result.certified:
+                marked_result = replace(checked_result, warm={**checked_result.warm, "between": True})
                 results[k] = TaskResult(marked_result, request, dict(tasks[k].place))
         places = [k for k, task in enumerate(tasks) if task.neighbours and "trial" in task.ask]
         requests = [self.subproblem(tasks[k].place) for k in places]

@@ -46,7 +46,7 @@ SEARCHES = 3
 """Times that a search from scratch may lead to another optimum, with standard deviations of its own."""
 MOST_SIGMAS = 12.0
 """Largest allowed number of standard deviations; nothing is lost beyond 8."""
-TRIALS, MOST_BESIDE = 12, 0.5
+TRIALS, MOST_BEYOND = 12, 0.5
 """Sampled yields that are looked at on the way to one that is asked for, and how far beyond it one may be, in standard
 errors."""
 EDGE, CAPPED = 1e-3, 0.99
@@ -317,10 +317,10 @@ def _try(request: Request, trials: Trials) -> Trials:
                 trials = trials._replace(enough=attempt, high=min(trials.high, (point, estimate.value)))
             else:
                 trials = trials._replace(low=max(trials.low, (point, estimate.value)))
-            grain = max(MOST_BESIDE * estimate.se, 2.0 / request.back_off.samples)
+            grain = max(MOST_BEYOND * estimate.se, 2.0 / request.back_off.samples)
             if 0.0 <= estimate.value - least <= grain or trials.high[0] - trials.low[0] <= CONVERGED:
                 return trials
-            following = _between(attempt, trials.low, trials.high, estimate.value, least)
+            following = _next_back_off(attempt, trials.low, trials.high, estimate.value, least)
         if not trials.enough and trials.edge - trials.low[0] <= EDGE:
             return trials
         if not trials.enough and following >= trials.edge:
@@ -339,7 +339,9 @@ def _reach(request: Request, start: Pass, sigmas: Sigmas) -> Pass | Obstacle:
     return result if isinstance(result, Pass) else Obstacle(result.message.rstrip("."), result.clash)
 
 
-def _between(at: Pass, low: tuple[float, float], high: tuple[float, float], estimate: float, least: float) -> float:
+def _next_back_off(
+    at: Pass, low: tuple[float, float], high: tuple[float, float], estimate: float, least: float
+) -> float:
     """Next back-off: Newton's step on the yield, with the slope of the linear yield, within the bracket."""
     step = 1e-4
     sides = [_quantile(share(at.margins, at.sigmas + shift, at.applied, at.caps)) for shift in (0.0, step)]

@@ -16,8 +16,8 @@ from loomopt.solving.answer.solution import SIDES, UnitFormatter
 from loomopt.studies.tolerance.plan import Criterion, Plan
 from loomopt.studies.tolerance.study import Slopes, slopes
 
-MET = 1e-5
-"""Share of a back-off by which a side's room may differ from it and the side counts as met."""
+ROOM_TOLERANCE = 1e-5
+"""Share of a back-off by which the room of a side may differ from it while the side counts as active."""
 
 
 class Margin(NamedTuple):
@@ -94,7 +94,7 @@ def _left(plan: Plan, criterion: Criterion, slope: Slopes, side: str) -> dict[st
     end = plan.scene.full(criterion.name) if side in criterion.follows else None
     left = {name: slope.steeper[name] - (name == end) for name in plan.tolerances}
     # A figure that is its own limit's number moves with it, and what is left of its slope is rounding.
-    return {name: 0.0 if name == end and abs(value) <= MET else value for name, value in left.items()}
+    return {name: 0.0 if name == end and abs(value) <= ROOM_TOLERANCE else value for name, value in left.items()}
 
 
 def share(
@@ -120,7 +120,7 @@ def share(
 
 def _room(margin: Margin, back_off: float, applied: float) -> float:
     """Room of a side for the mean machine with another back-off, SI; a side that stopped the design moves with it."""
-    is_active = margin.room + margin.shift <= applied * (1 + MET) + MET * margin.sigma
+    is_active = margin.room + margin.shift <= applied * (1 + ROOM_TOLERANCE) + ROOM_TOLERANCE * margin.sigma
     return back_off - margin.shift if is_active else max(margin.room, back_off - margin.shift)
 
 

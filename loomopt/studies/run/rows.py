@@ -213,16 +213,16 @@ class Change(NamedTuple):
     kind: "jump", "kink" or "active set"; at: place of the change; None if only the two values are known.
     """
 
-    between: tuple[float, float]
+    interval: tuple[float, float]
     kind: str
     limits: tuple[Side, ...]
     at: float | None = None
 
     def as_dict(self) -> dict[str, object]:
         """JSON data."""
-        at = self.between if self.at is None else self.at
+        at = self.interval if self.at is None else self.at
         data: dict[str, object] = {"at": at, "kind": self.kind, "limits": tuple(side.text for side in self.limits)}
-        return data if self.at is None else {**data, "between": self.between}
+        return data if self.at is None else {**data, "between": self.interval}
 
 
 class Findings(NamedTuple):
@@ -281,7 +281,7 @@ class SceneStudy(Study, Protocol):
     def place(self, row: Row) -> Mapping[str, float]:
         """Place of a row, SI."""
 
-    def sought(self, row: Row) -> Mapping[str, float]:
+    def optimised(self, row: Row) -> Mapping[str, float]:
         """Quantities that it optimises besides its target, at a row, SI."""
 
     def row_json(self, row: Row) -> dict[str, object]:

@@ -32,7 +32,7 @@ TABLES = {
     "row": f"CREATE TABLE row (study TEXT NOT NULL REFERENCES study (key), {', '.join(COLUMNS)},"
     " checksum TEXT NOT NULL, PRIMARY KEY (study, point))",
 }
-_OTHER = "Name another file"
+_REMEDY = "Name another file"
 
 
 def _is_number(value: object) -> bool:
@@ -108,11 +108,11 @@ class Store:
             self._file.execute(f"PRAGMA application_id = {APPLICATION}")
             self._file.execute(f"PRAGMA user_version = {VERSION}")
         elif head != (APPLICATION, VERSION):
-            raise BadInput("the file is not a store of this version", file=str(self.path), key="store", remedy=_OTHER)
+            raise BadInput("the file is not a store of this version", file=str(self.path), key="store", remedy=_REMEDY)
         elif stored != TABLES:  # a view or a trigger would be run whenever a row is read or written
             names = sorted({*stored, *TABLES} - {name for name, table in TABLES.items() if stored.get(name) == table})
             problem = f"it has tables that no store has: {', '.join(names)}"
-            raise BadInput(problem, file=str(self.path), key="store", remedy=_OTHER)
+            raise BadInput(problem, file=str(self.path), key="store", remedy=_REMEDY)
 
     @contextlib.contextmanager
     def _transaction(self) -> Iterator[None]:
@@ -134,7 +134,7 @@ class Store:
                 raise KeyboardInterrupt from None
             busy = "locked" in str(error)
             problem = "another run has it open" if busy else f"it cannot be used as a store: {error}"
-            remedy = "Wait for that run, or name another file" if busy else _OTHER
+            remedy = "Wait for that run, or name another file" if busy else _REMEDY
             raise BadInput(problem, file=str(self.path), key="store", remedy=remedy) from None
 
     def __enter__(self) -> "Store":
@@ -154,7 +154,7 @@ class Store:
             records = self._file.execute("SELECT key, told FROM study ORDER BY rowid").fetchall()
         read = {key: _read_description(description) for key, description in records}
         if not all(read.values()):
-            raise BadInput("its description of a study is damaged", file=str(self.path), key="store", remedy=_OTHER)
+            raise BadInput("its description of a study is damaged", file=str(self.path), key="store", remedy=_REMEDY)
         return read
 
     def rows(self, key: str) -> list[Row]:
@@ -174,7 +174,7 @@ class Store:
         if not record or not all(holds(record[name]) for name, holds in KINDS.items()):
             problem = f"the row of point {shown(values[0])} is damaged"
             remedy = (
-                f"{_OTHER}, or take the row out (DELETE FROM row WHERE point = {shown(values[0])}): it is solved again"
+                f"{_REMEDY}, or take the row out (DELETE FROM row WHERE point = {shown(values[0])}): it is solved again"
             )
             raise BadInput(problem, file=str(self.path), key="store", remedy=remedy)
         return Row.from_dict(record)

@@ -298,7 +298,7 @@ def _track_extreme(row: ActiveRow, sampler: Sampler) -> ActiveRow:
     where = row.limit.where if isinstance(row.limit, CycleLimit) else None
     angle = sampler.angle(node or row.node)
     same_sign = [e for e in sampler.extremes(row.reads, where) if e.sign == row.node.sign]
-    near = [e for e in same_sign if angle_between(sampler.angle(e), angle) <= EXTREME_REACH]
+    near = [e for e in same_sign if angle_distance(sampler.angle(e), angle) <= EXTREME_REACH]
     best = max(near, key=lambda extreme: extreme.height, default=None)
     if best and (node is None or best.height > node.height + HEIGHT_ROUNDING * row.scale):
         node = best
@@ -307,7 +307,7 @@ def _track_extreme(row: ActiveRow, sampler: Sampler) -> ActiveRow:
     return row._replace(node=node)
 
 
-def angle_between(first: float, second: float) -> float:
+def angle_distance(first: float, second: float) -> float:
     """Smaller angle between two crank angles, rad."""
     return abs((first - second + math.pi) % TURN - math.pi)
 

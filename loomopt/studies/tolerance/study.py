@@ -234,7 +234,7 @@ def draw_machines(plan: Plan, scramble: int, first: int, count: int) -> dict[str
                 root, rest = math.sqrt(tolerance.correlation), math.sqrt(1 - tolerance.correlation)
                 deviations = root * common[tolerance.group] + rest * deviations
             if tolerance.uniform:
-                deviations = (2 * normal.below_each(deviations) - 1) / UNIFORM
+                deviations = (2 * normal.shares_below(deviations) - 1) / UNIFORM
         numbers[name] = plan.nominal[name] + plan.shifts[name] + plan.sigmas[name] * deviations
     return numbers
 

@@ -17,9 +17,9 @@ QUICK = ((CHINESE, "png"), (FRAKTUR, "svg"))
 
 
 def test_a_text_is_written_in_the_first_font_that_has_it():
-    assert figure.families("Webstuhl, métier à tisser, ткацкий станок: φ ± 5°") == [figure.OWN]
+    assert figure.families("Webstuhl, métier à tisser, ткацкий станок: φ ± 5°") == [figure.FONT]
     assert len(figure.families(f"a{FRAKTUR}")) == 2
-    assert figure.families("") == [figure.OWN]
+    assert figure.families("") == [figure.FONT]
 
 
 def test_what_no_font_has_takes_no_font_of_boxes():

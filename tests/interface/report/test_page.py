@@ -70,7 +70,7 @@ def altered(result, **changes):
 
 
 def status(result):
-    return answer.status(Subject(result.result, result.scene, result.target, result.sought))
+    return answer.status(Subject(result.result, result.scene, result.target, result.task_name))
 
 
 def verdict(html):

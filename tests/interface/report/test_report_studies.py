@@ -74,7 +74,10 @@ def test_each_study_has_a_chart_of_its_numbers(studies):
         for name in ("swing [deg]", "theta [deg]", "mu_min [deg]", "M3_fdc [N*m]", "peak_torque [N*m]")
     ]
     assert f"{100 * studies['tolerance'].yields['swing'].value:.4g} % accepted" in plain(pages["tolerance"])
-    for how, count in (("sensitivity", len(sensitivity.sought(studies["sensitivity"].result))), ("effects", 2)):
+    for how, count in (
+        ("sensitivity", len(sensitivity.moved_objectives(studies["sensitivity"].result))),
+        ("effects", 2),
+    ):
         assert len(drawn(pages[how])) == count
 
 

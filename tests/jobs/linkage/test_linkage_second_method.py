@@ -41,7 +41,7 @@ def change(six):
     return sum(((six.v[name] - today[name]) / (high - low)) ** 2 for name, (low, high) in bounds.items())
 
 
-def six_bar(sought, *, balanced=False, resting=False):
+def six_bar(objectives, *, balanced=False, resting=False):
     """Return what `least` asks of the sley: what is sought, the scene's limits, the balance at front dead centre."""
 
     def formulas(v):
@@ -53,7 +53,7 @@ def six_bar(sought, *, balanced=False, resting=False):
         if resting:
             travel = six.travel(v.get("end", REST))
             limits += [tops(sign * travel, closed=False) - QUARTER for sign in (1, -1)]
-        return sought(six), np.concatenate(limits), [six.balance / six.CLOTH] if balanced else []
+        return objectives(six), np.concatenate(limits), [six.balance / six.CLOTH] if balanced else []
 
     return formulas
 

@@ -10,7 +10,7 @@ from steps import COUNT, HEIGHTS, NAMES, program
 
 from loomopt.model.program import Variable
 from loomopt.solving.nlp.expressions import FEW_CHOICES, Lifts, Options, expressions, identity, value_at
-from loomopt.solving.nlp.ipopt import BESIDE_STATIONS, FIRST_SLOTS, LEADING, Calls
+from loomopt.solving.nlp.ipopt import FIRST_SLOTS, LEADING, SLOTS_WITH_STATIONS, Calls
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.nlp.rows import structure
 
@@ -109,4 +109,4 @@ def test_what_hangs_on_no_variable_is_no_chain():
     assert (values.chained_values, values.stations, values.station_rows) == ((), (), [[]])
     assert expressions(values).lifts.variables == []
     assert (calls.slots, calls.leading) == (FIRST_SLOTS, LEADING)
-    assert (Calls(program(), Settings()).slots, BESIDE_STATIONS) == (2, (2, 1))
+    assert (Calls(program(), Settings()).slots, SLOTS_WITH_STATIONS) == (2, (2, 1))

@@ -10,7 +10,7 @@ from support import kepler, toy
 
 from loomopt.maths.intervals import Enclosure
 from loomopt.model.sampling import Sampler
-from loomopt.solving.proof.levels import HELD, Levels, _Level, _read, monotone_slack
+from loomopt.solving.proof.levels import LEVEL_SLACK, Levels, _Level, _read, monotone_slack
 from loomopt.solving.proof.task import reduced, silent
 from loomopt.solving.proof.tree import grown
 
@@ -143,7 +143,7 @@ def test_a_vanishing_magnitude_needs_no_boxes_and_leaves_a_band_that_is_told():
     assert first.proven
     assert first.bound == 0.0
     assert first.gap <= 1e-12
-    assert first.band == pytest.approx(HELD * solved("beatup", "balance").program.objectives[0].scale)
+    assert first.band == pytest.approx(LEVEL_SLACK * solved("beatup", "balance").program.objectives[0].scale)
     assert second.bound > 88.0
 
 

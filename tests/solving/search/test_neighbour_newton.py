@@ -38,7 +38,7 @@ def digits(result):
 @pytest.mark.slow
 def test_what_comes_of_it_is_what_a_solve_alone_comes_to(optima):
     resistances = 755.0, 771.0
-    made = neighbour_newton.solve_between([neighbour_task(resistance, ENDS, optima) for resistance in resistances])
+    made = neighbour_newton.solve_neighbours([neighbour_task(resistance, ENDS, optima) for resistance in resistances])
     for result, resistance in zip(made, resistances, strict=True):
         alone, _ = ended(resistance)
         best = result.best
@@ -54,11 +54,11 @@ def test_what_comes_of_it_is_what_a_solve_alone_comes_to(optima):
 @pytest.mark.slow
 def test_it_is_the_same_bits_in_batches_of_any_size(optima):
     several = [neighbour_task(float(m), ENDS, optima) for m in np.linspace(*ENDS, 12)[1:-1]]
-    whole = neighbour_newton.solve_between(several * 20)
+    whole = neighbour_newton.solve_neighbours(several * 20)
     assert len(whole) == 200
     for size in (1, 8):
         parts = [
-            neighbour_newton.solve_between(several[begin : begin + size]) for begin in range(0, len(several), size)
+            neighbour_newton.solve_neighbours(several[begin : begin + size]) for begin in range(0, len(several), size)
         ]
         assert digits(whole[:10]) == digits([item for part in parts for item in part]) == digits(whole[-10:])
 
@@ -72,7 +72,7 @@ def test_extremes_that_figures_read_are_found_with_the_certificates_and_not_agai
 
     scene, task = lo.load("beatup").set("operation.M0", "755.0 N*m"), neighbour_task(755.0, ENDS, optima)
     assert set(task.peaks) == {"peak_torque", "peak_power", "obliquity"}
-    (search,) = neighbour_newton.solve_between([task])
+    (search,) = neighbour_newton.solve_neighbours([task])
     monkeypatch.setattr(Sampler, "_sampled", counted)
     here = neighbour_answer.evaluated(scene, search)
     assert sampled == []
@@ -95,14 +95,14 @@ def test_beyond_a_change_of_what_binds_the_other_neighbours_rows_are_tried():
     kinds = [{row.kind for row in of.frame} for of in optima]
     assert kinds[0] != kinds[1]
     for resistance, kind in ((697.0, kinds[0]), (704.0, kinds[1])):
-        (result,) = neighbour_newton.solve_between([neighbour_task(resistance, ends, optima)])
+        (result,) = neighbour_newton.solve_neighbours([neighbour_task(resistance, ends, optima)])
         assert result.passed
         assert {row.kind for row in result.best.certificate.frame} == kind
 
 
 def test_a_way_that_ends_at_no_optimum_is_left(optima):
     """Rows of another stretch: their Newton's method ends where a limit breaks, or no price is right."""
-    assert neighbour_newton.solve_between(
+    assert neighbour_newton.solve_neighbours(
         [neighbour_task(880.0, ENDS, optima), neighbour_task(620.0, ENDS, optima)]
     ) == [None, None]
 

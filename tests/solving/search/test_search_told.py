@@ -30,13 +30,13 @@ def left(value):
     ],
 )
 def test_what_was_done_is_told(made, sentence):
-    assert report._sought(made) == sentence
+    assert report._search_extent(made) == sentence
 
 
 def test_why_no_other_basin_was_looked_for():
     made = search()
     made = replace(made, program=replace(made.program, uniqueness_reason="it is linear"))
-    assert report._sought(made) == "Other basins were not searched: it is linear."
+    assert report._search_extent(made) == "Other basins were not searched: it is linear."
 
 
 def test_solves_that_ended_in_the_best_are_those_there_and_those_left_at_its_value():

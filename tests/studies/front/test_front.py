@@ -201,10 +201,10 @@ def test_the_counterweight_that_is_used_up_is_told():
     used, left = (
         next(c for c in second_front.changes if Side.read(name) in c.limits) for name in ("m4e min", "theta max")
     )
-    assert used.between[0] < 45.3960098 < used.between[1]
+    assert used.interval[0] < 45.3960098 < used.interval[1]
     assert used.kind == "active set"
-    assert left.between[0] < 45.639 < left.between[1]
-    assert all(c.between[1] - c.between[0] < 0.07 for c in (used, left))
+    assert left.interval[0] < 45.639 < left.interval[1]
+    assert all(c.interval[1] - c.interval[0] < 0.07 for c in (used, left))
 
 
 @pytest.mark.few(1)

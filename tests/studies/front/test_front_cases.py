@@ -71,7 +71,7 @@ def test_a_row_is_bettered_by_its_neighbours_design_and_a_jump_of_design_is_told
     for angle, torque in best.items():
         at_least = min(value for place, value in axes.items() if place >= angle - 1e-3)
         assert at_least == pytest.approx(torque, rel=1e-6), angle
-    jumps = [change.between for change in second_front.findings.changes if change.kind == "jump"]
+    jumps = [change.interval for change in second_front.findings.changes if change.kind == "jump"]
     assert any(min(two) < 82.7 * math.pi / 180 < max(two) for two in jumps)
     assert not any(min(two) < 81.6 * math.pi / 180 < max(two) for two in jumps)
     assert second_front.as_dict()["bettered"] == second_front.findings.bettered > 0

@@ -156,9 +156,9 @@ def test_rows_between_two_optima_that_are_worse_than_today_are_solved_anew(monke
     trade = front.trade(lo.load("beatup"), ("peak_torque", "m4e"), "balance")
     low, high = (trade.solver.solve(Subproblem(0, (None, cap)), [], False) for cap in (3.0, 5.0))
     ends = [row.warm["optimum"] for row in (low, high)]
-    between = Subproblem(0, (None, 4.0))
-    (row,) = trade.solver.solve_neighbours([between], [[*ends, 0.5]])
+    middle = Subproblem(0, (None, 4.0))
+    (row,) = trade.solver.solve_neighbours([middle], [[*ends, 0.5]])
     assert row is not None
     assert row.certified
     monkeypatch.setattr(fallback, "is_no_worse_than_today", lambda search: False)
-    assert trade.solver.solve_neighbours([between], [[*ends, 0.5]]) == [None]
+    assert trade.solver.solve_neighbours([middle], [[*ends, 0.5]]) == [None]

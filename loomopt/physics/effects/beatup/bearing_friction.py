@@ -48,7 +48,7 @@ def force(at: Inputs[ReedPose]) -> Number:
     return friction + at.table["viscous"] * at.pose.velocity if "viscous" in at.table else friction
 
 
-def upon(at: Inputs[ReedPose], loading: Loading) -> Number:
+def force_under_loads(at: Inputs[ReedPose], loading: Loading) -> Number:
     """Term, N·m; with the load in closed form, for the force in D that friction itself adds to.
 
     F_D = H + T e, T = a |F_D|, a = μ r, e = −sgn q˙ r1/(r1 × r2), H what all else gives: one root, while a |e| < 1.
@@ -76,7 +76,7 @@ EFFECT = Load(
     rank=70,
     acts="output",
     force=force,
-    upon=upon,
+    force_under_loads=force_under_loads,
     models={
         "constant": ModelNeeds(("coulomb", "viscous")),
         "load": ModelNeeds(("mu", "radius"), ("mechanism.m4", "mechanism.r4"), ("m4e", "r4e"), ("viscous",)),

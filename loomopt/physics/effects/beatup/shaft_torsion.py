@@ -19,7 +19,7 @@ EFFECT = replace(
         *(clash for clash in shaft_torsion.EFFECT.clashes if clash.effect == "speed_fluctuation"),
     ),
     carries=("inertia", "counterweight_inertia", "resistance"),
-    between=("psi_r", "psi"),
+    difference=("psi_r", "psi"),
     figures=(
         Figure("shaft_peak", "torque", "peak |reed torque| over the cycle", sides=("max",)),
         Figure("twist_peak", "angle", "peak |twist| of the reed against the rocker", sides=("max",)),

@@ -94,7 +94,7 @@ def event_angle(given: Values, event: str) -> Number:
     return given[f"event {event}"]
 
 
-def between(angle: float, corners: tuple[float, ...]) -> float:
+def window_switch(angle: float, corners: tuple[float, ...]) -> float:
     """1 between two crank angles, rad, and 0 outside: a load that acts from the first to the second."""
     begin, end = corners
     return 1.0 if (angle - begin) % TURN < (end - begin) % TURN else 0.0

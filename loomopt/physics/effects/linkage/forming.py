@@ -8,7 +8,7 @@ from pydantic import Field
 from loomopt.base.quantities import Force, Torque
 from loomopt.maths.systems import Number, within_turn
 from loomopt.physics.effects.kinds import Inputs, Load
-from loomopt.physics.effects.linkage import LinkagePose, between, event_angle
+from loomopt.physics.effects.linkage import LinkagePose, event_angle, window_switch
 from loomopt.physics.schema import Name, Table
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ EFFECT = Load(
     force=force,
     corners=corners,
     response=response,
-    switch=between,
+    switch=window_switch,
     cases={1.0: "from where it begins to where it ends", 0.0: "elsewhere"},
     examples=({"torque": "50 N*m", "begins": "rear", "ends": "front"},),
 )

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from loomopt.physics.mechanisms.joint_forces import Wrench
 
 
-SAID = (
+SENTENCE = (
     "every group from the last part back to the crank: of a dyad R = (N2 r1 + N1 r2)/(r1 x r2), N the moment of all "
     "that acts on a link about its outer joint, masses included; of a slider and of a slot what keeps each link still"
 )
@@ -150,7 +150,7 @@ EFFECT: Check[LinkagePose] = Check(
     rank=90,
     joints=functools.partial(LinkageForces, None),
     fitted=fitted,
-    sentence=SAID,
+    sentence=SENTENCE,
     examples=({},),
     of_masses="forces in the joints and on the frame",
 )

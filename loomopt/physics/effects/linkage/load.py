@@ -9,7 +9,7 @@ from loomopt.base.quantities import SignedForce
 from loomopt.maths.periodic_cubic import interval_at
 from loomopt.maths.systems import Number
 from loomopt.physics.effects.kinds import Applied, Inputs, Load, LoadTable
-from loomopt.physics.effects.linkage import LinkagePose, between, event_angle
+from loomopt.physics.effects.linkage import LinkagePose, event_angle, window_switch
 from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.mechanisms.moving import total
 from loomopt.physics.schema import DIGITS, Name, Table
@@ -43,7 +43,7 @@ def corners(at: Inputs[object]) -> tuple[Number, ...]:
 def switch(angle: float, corners: tuple[float, ...]) -> float:
     """1 where it acts and 0 elsewhere, of a table the interval."""
     if len(corners) == 2:
-        return between(angle, corners)
+        return window_switch(angle, corners)
     return interval_at(angle, corners) if corners else 1.0
 
 

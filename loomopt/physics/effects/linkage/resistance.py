@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from loomopt.physics.effects.kinds import SteadyOscillator
 
 PULSE, AT = "crank angle δ through which it acts, about the event", "event about which it acts"
-SAID = "CSV file of the resistance, in place of pulse: angle [deg] from the event, {}, corner"
+TABLE_TEXT = "CSV file of the resistance, in place of pulse: angle [deg] from the event, {}, corner"
 
 
 class Parameters(Table):
@@ -30,7 +30,7 @@ class Parameters(Table):
     torque: Torque | None = Field(None, description="largest torque; operation.M0 is the same number")
     pulse: PulseAngle | None = Field(None, description=PULSE)
     at: Name = Field("front", description=AT)
-    table: Name | None = Field(None, description=SAID.format("M [N*m]"))
+    table: Name | None = Field(None, description=TABLE_TEXT.format("M [N*m]"))
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
 
@@ -40,7 +40,7 @@ class Sliding(Table):
     force: Force | None = Field(None, description="largest force")
     pulse: PulseAngle | None = Field(None, description=PULSE)
     at: Name = Field("front", description=AT)
-    table: Name | None = Field(None, description=SAID.format("F [N]"))
+    table: Name | None = Field(None, description=TABLE_TEXT.format("F [N]"))
     digits: int | None = Field(None, ge=0, le=15, description=DIGITS)
 
 

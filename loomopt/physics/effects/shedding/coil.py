@@ -284,8 +284,8 @@ def tensile(maths: Maths, table: Values) -> Number:
 
 def _length(at: Inputs[object]) -> Number:
     """Length inside the hooks with the shed open downward, m."""
-    own_coil = coil(at.table)
-    return own_coil.free_length + at.values["X0"] + at.values["travel"] - own_coil.initial_tension / own_coil.rate
+    spring = coil(at.table)
+    return spring.free_length + at.values["X0"] + at.values["travel"] - spring.initial_tension / spring.rate
 
 
 def _bending_share(at: Inputs[object]) -> Number:
