@@ -47,7 +47,7 @@ def frame(evaluated: Evaluated, scene: Scene) -> "TableFrame":
 
     more, heading = dict[str, object](), "design"
     if isinstance(evaluated, Solution):
-        more = {"target": evaluated.sought, "accuracy": evaluated.solver["accuracy"]}
+        more = {"target": evaluated.task_name, "accuracy": evaluated.solver["accuracy"]}
         heading = "relaxed" if evaluated.relaxation else "design"
     made = columns(evaluated, rows(evaluated, scene), scene, heading, None)
     return table_frame.frame(made, provenance(scene, **more), "name")
