@@ -48,6 +48,9 @@ _BRACKETS = re.compile(r"[\[(](.*)[\])]")
 _BLANK_GROUPS = re.compile(r"(?<=\d)[ \u00a0\u2009\u202f'’](?=\d{3}(?!\d))")
 _GROUPS = {sign: re.compile(rf"[+-]?\d{{1,3}}(?:\{sign}\d{{3}})+") for sign in (POINT, COMMA)}
 _NUMBER = re.compile(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?", re.ASCII)
+_WITH_UNIT = re.compile(
+    r"([+\-\u2212\u2013]?[\d.,]*\d(?:[eE][+-]?\d+)?)[ \u00a0\u2009\u202f]*([^\W\d_].*|[\u00b0\"'/].*)"
+)
 _MAYBE_GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _DIGITS = re.compile(r"[+-]?(\d*)\.?(\d*)(?:[eE]([+-]?\d+))?")
 SIGNIFICANT = 0.5
@@ -201,7 +204,7 @@ def _table(
         raise refusal("the table is empty", origin, allowed=header(kinds), remedy="Give a header and rows")
     head, rows = _split_heading(cells, kinds)
     columns, units = _find_columns(head, rows, kinds, origin)
-    rows = rows[units:]
+    rows = [_without_units(row, columns, origin) for row in rows[units:]]
     for row in rows:
         _check_length(row, head, cells.separator, origin)
     if columns[0].kind == "angle" and not twice:
@@ -209,7 +212,7 @@ def _table(
     if not fewest <= len(rows) <= MOST_ROWS:
         problem = f"the table has {len(rows)} rows below its header"
         raise refusal(problem, origin, allowed=f"{fewest} to {MOST_ROWS}", remedy="Give more, or fewer")
-    decimal, remarks = _decimal_sign(rows, columns, cells.separator, origin)
+    decimal, remarks = _decimal_sign(rows, columns, cells, origin)
     texts = {column: [_plain(row.cell(column.place), decimal) for row in rows] for column in columns}
     values = {
         column.name: tuple(
@@ -298,7 +301,10 @@ def _find_columns(head: Row, rows: Sequence[Row], kinds: Mapping[str, str], orig
             cell = rows[0].cell(there[0])
             inside = _BRACKETS.fullmatch(cell)
             text = inside[1].strip() if inside else cell
-            if text and plain_number(_plain(text, POINT)) is None and plain_number(_plain(text, COMMA)) is None:
+            number = _number_and_unit(cell, kind)
+            if number:
+                unit, where = number[1], f"line {rows[0].line}, column {called}"
+            elif text and plain_number(_plain(text, POINT)) is None and plain_number(_plain(text, COMMA)) is None:
                 unit, below, where = text, 1, f"line {rows[0].line}, column {called}"
         if unit is None:
             problem = f"{where}: the unit is missing, so column {name} has none"
@@ -329,6 +335,33 @@ def _size(unit: str, kind: str, where: str, usual: str, origin: str) -> tuple[fl
     raise refusal(f"{where}: {_cell(unit)} is not a unit of this column", origin, allowed=usual, remedy=remedy)
 
 
+def _number_and_unit(cell: str, kind: str) -> tuple[str, str] | None:
+    """Number and unit of a cell such as "12.5 deg"; None for a cell without a unit of this kind of quantity."""
+    match = _WITH_UNIT.fullmatch(cell)
+    if match is None:
+        return None
+    unit = ascii_unit(match[2])
+    try:
+        return (match[1], unit) if unit == DISPLAY_UNIT[kind] or fits(unit, kind) else None
+    except QuantityError:
+        return None
+
+
+def _without_units(row: Row, columns: Sequence[_Column], origin: str) -> Row:
+    """Row without the units that stand in its cells. Raises BadInput for another unit than the column's."""
+    values = list(row.cells)
+    for column in columns:
+        number = _number_and_unit(row.cell(column.place), column.kind)
+        if number is None:
+            continue
+        if number[1] != column.text:
+            cell = _cell(row.cell(column.place))
+            problem = f"line {row.line}, column {column.called}: {cell} has another unit than its column"
+            raise refusal(problem, origin, allowed=column.text, remedy="Write one unit in the whole column")
+        values[column.place] = number[0]
+    return row._replace(cells=tuple(values))
+
+
 def _check_length(row: Row, head: Row, separator: str, origin: str) -> None:
     """Raise BadInput for a row with more cells than the header: a decimal comma splits a number."""
     strange = [cell for place, cell in enumerate(row.cells) if cell and not head.cell(place)]
@@ -345,15 +378,18 @@ def _check_length(row: Row, head: Row, separator: str, origin: str) -> None:
 
 
 def _decimal_sign(
-    rows: Sequence[Row], columns: Sequence[_Column], separator: str, origin: str
+    rows: Sequence[Row], columns: Sequence[_Column], cells: Cells, origin: str
 ) -> tuple[str, tuple[str, ...]]:
     """Decimal sign of the columns that are read, and remarks on it. Raises BadInput where it may be both.
 
-    A cell shows it where it has both signs, one of them twice, or one that groups no three digits.
+    A cell shows it where it has both signs, one of them twice, or one that groups no three digits. In rows with commas
+    between cells, and in a workbook's numbers, a point alone is the decimal sign.
     """
+    separator = cells.separator
     proof: dict[str, str] = {}
     unsure: dict[str, str] = {}
-    grouped = False
+    grouped = proven = False
+    doubtful_point = ""
     for row in rows:
         for column in columns:
             text = _bare(row.cell(column.place))
@@ -362,6 +398,7 @@ def _decimal_sign(
                 continue
             where = f"{_cell(text)} (line {row.line}, column {column.called})"
             other_sign = COMMA if signs[-1] == POINT else POINT
+            is_text = (row.line, column.place) not in cells.numbers
             if len(set(signs)) == 2:
                 proof.setdefault(signs[-1], where)
                 grouped = True
@@ -370,8 +407,12 @@ def _decimal_sign(
                 grouped = True
             elif _MAYBE_GROUP.fullmatch(text):
                 unsure.setdefault(signs[0], where)
+                if signs[0] == POINT and (is_text if cells.numbers else separator != COMMA):
+                    doubtful_point = doubtful_point or where
             else:
                 proof.setdefault(signs[0], where)
+                proven = proven or is_text
+    decimal_points = (f"points are read as decimal points: {doubtful_point}",) if doubtful_point else ()
     signs = list(proof)
     remedy = "Write all numbers with one decimal sign, and nothing between thousands"
     if len(signs) == 2:
@@ -383,7 +424,7 @@ def _decimal_sign(
         if other_sign in unsure and not grouped:
             problem = f"it may be a decimal sign or part thousands: {unsure[other_sign]}, beside {proof[sign]}"
             raise refusal(problem, origin, remedy=remedy)
-        return sign, ()
+        return sign, () if proven or grouped or sign == COMMA else decimal_points
     if len(unsure) == 2:
         problem = f"the decimal sign may be a point or a comma: {unsure[POINT]}, {unsure[COMMA]}"
         raise refusal(problem, origin, remedy=remedy)
@@ -393,9 +434,7 @@ def _decimal_sign(
             remedy = "Write decimal points, or one more decimal, or semicolons between cells"
             raise refusal(problem, origin, remedy=remedy)
         return COMMA, (f"commas are read as decimal commas, since semicolons part the cells: {unsure[COMMA]}",)
-    if POINT in unsure and separator == ";":
-        return POINT, (f"points are read as decimal points: {unsure[POINT]}",)
-    return POINT, ()
+    return POINT, decimal_points
 
 
 def _bare(text: str) -> str:
@@ -428,6 +467,12 @@ def _number(text: str, row: Row, column: _Column, origin: str, gap: bool) -> flo
         cell = row.cell(column.place)
         problem = f"{where}: {_cell(cell)} is no number" if cell else f"{where}: the cell is empty"
         remedy = "Write digits and a decimal sign, such as 12.5 or 1.25e1"
+        if cell.startswith("="):
+            problem = f"{where}: the formula {_cell(cell)} has no stored value"
+            remedy = "Open the file in a spreadsheet and save it, or write the value"
+        elif table_cells.ERROR_VALUE.fullmatch(cell):
+            problem = f"{where}: {_cell(cell)} is an error of the spreadsheet, or a column too narrow for its numbers"
+            remedy = "Correct the cell in the spreadsheet, and save the file again"
         raise refusal(problem, origin, remedy=remedy)
     return value * column.unit
 

@@ -25,6 +25,8 @@ BLANKS = " \t\r\n\u00a0\u2009\u202f"
 """Blanks around a cell, those that do not break a line included."""
 MOST_UNPACKED = 50_000_000
 """Bytes of a workbook's parts together."""
+ERROR_VALUE = re.compile(r"#(?:N/A|NV|[A-Z\u00c0-\u00de/0]+[!?]|#+)")
+"""Error of a spreadsheet, or a number that its column was too narrow to show: a cell, not a remark."""
 _SEPARATOR_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE)
 _TO_EXCEL = "Save it as .xlsx or as CSV"
 
@@ -41,11 +43,15 @@ class Row(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Non-empty rows of a file; separator: between cells, "" in a workbook; remarks: lines that begin with #."""
+    """Non-empty rows of a file; separator: between cells; remarks: lines that begin with #.
+
+    numbers: line and place of the cells of a workbook that are numbers there, not text.
+    """
 
     rows: tuple[Row, ...]
     separator: str
     remarks: tuple[Row, ...] = ()
+    numbers: frozenset[tuple[int, int]] = frozenset()
 
 
 def read(raw: bytes, origin: str) -> Iterator[Cells]:
@@ -55,7 +61,8 @@ def read(raw: bytes, origin: str) -> Iterator[Cells]:
     """
     if len(raw) > LARGEST_FILE:
         raise refusal("the table is too large", origin, allowed="up to 1 MB", remedy="Thin it out")
-    content = text(raw, origin)
+    sheet = _sheet_of(raw, origin)
+    content = text(raw, origin) if sheet is None else _csv_text(sheet)
     lines = content.split("\n")
     first = next((k for k, line in enumerate(lines) if line.strip()), 0)
     match = _SEPARATOR_LINE.fullmatch(lines[first].strip("\r\n ")) if lines else None
@@ -66,15 +73,20 @@ def read(raw: bytes, origin: str) -> Iterator[Cells]:
     if not tables:
         remedy = "Write short cells, and close every quotation mark on its own line"
         raise refusal("the table is not CSV", origin, remedy=remedy)
-    yield from tables
+    numbers = frozenset(
+        (line, place)
+        for line, row in enumerate(sheet or (), 1)
+        for place, cell in enumerate(row)
+        if isinstance(cell, int | float)
+    )
+    yield from (cells._replace(numbers=numbers) for cells in tables)
 
 
 def text(raw: bytes, origin: str) -> str:
     """Table as text, a workbook's first sheet as CSV with commas. Raises BadInput if the file is not a table."""
-    if raw.startswith(WORKBOOK):
-        return _csv_text(_sheet(raw, origin))
-    if raw.startswith(PARQUET):
-        return _csv_text(_parquet(raw, origin))
+    sheet = _sheet_of(raw, origin)
+    if sheet is not None:
+        return _csv_text(sheet)
     if raw.startswith(OLD_WORKBOOK):
         raise refusal("it is a workbook of Excel 97 (.xls)", origin, remedy=_TO_EXCEL)
     encoding = next((name for mark, name in ENCODINGS.items() if raw.startswith(mark)), "") or _encoding_without_mark(
@@ -87,6 +99,13 @@ def text(raw: bytes, origin: str) -> str:
             place = error.start
     remedy = "Save the file as UTF-8"
     raise refusal(f"it is not text in UTF-8, UTF-16 or Windows-1252 (byte {place})", origin, remedy=remedy)
+
+
+def _sheet_of(raw: bytes, origin: str) -> list[Sequence[object]] | None:
+    """Rows of cells of a workbook or a Parquet file; None for text."""
+    if raw.startswith(WORKBOOK):
+        return _sheet(raw, origin)
+    return _parquet(raw, origin) if raw.startswith(PARQUET) else None
 
 
 def _encoding_without_mark(raw: bytes) -> str:
@@ -104,17 +123,23 @@ def _split_cells(lines: Sequence[str], separator: str) -> Cells | None:
 
     def data_lines() -> Iterator[str]:
         for number, line in enumerate(lines, 1):
-            if line.strip() and not line.lstrip().startswith("#"):
+            if line.strip() and not _is_remark(line, separator):
                 numbers.append(number)
                 yield line + "\n"
 
     try:
         rows = [_row(numbers[-1], cells) for cells in csv.reader(data_lines(), delimiter=separator, strict=True)]
-        remarks = [(k, line.lstrip()[1:].strip()) for k, line in enumerate(lines, 1) if line.lstrip().startswith("#")]
+        remarks = [(k, line.lstrip()[1:].strip()) for k, line in enumerate(lines, 1) if _is_remark(line, separator)]
         remark_rows = tuple(_row(k, next(csv.reader([line], delimiter=separator), [])) for k, line in remarks[:20])
     except (csv.Error, ValueError):
         return None
     return Cells(tuple(row for row in rows if row.cells), separator, remark_rows)
+
+
+def _is_remark(line: str, separator: str) -> bool:
+    """Whether a line begins with #; not if its first of several cells is an error value of a spreadsheet."""
+    first, between, _ = line.strip().partition(separator)
+    return first.startswith("#") and not (between and ERROR_VALUE.fullmatch(first.rstrip(BLANKS)))
 
 
 def _row(line: int, cells: Iterable[str]) -> Row:
@@ -134,7 +159,10 @@ def _csv_text(rows: Iterable[Sequence[object]]) -> str:
 
 
 def _sheet(raw: bytes, origin: str) -> list[Sequence[object]]:
-    """Rows of a workbook's first sheet that is not empty; one empty row for a workbook without cells."""
+    """Rows of a workbook's first sheet that is not empty; none for a workbook without cells.
+
+    A formula without a stored value is its text, which begins with =.
+    """
     import warnings
 
     from openpyxl import load_workbook
@@ -144,12 +172,21 @@ def _sheet(raw: bytes, origin: str) -> list[Sequence[object]]:
             raise refusal("the workbook is too large", origin, allowed="up to 50 MB unpacked", remedy="Thin it out")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of what a sheet has beside its cells
-            book = load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
-            for sheet in book.worksheets:
-                rows = itertools.islice(sheet.iter_rows(max_col=MOST_COLUMNS, values_only=True), MOST_ROWS)
-                values: list[Sequence[object]] = [[_value(cell) for cell in row] for row in rows]
-                if any(cell is not None for row in values for cell in row):
-                    return values
+            books = [load_workbook(io.BytesIO(raw), read_only=True, data_only=stored) for stored in (True, False)]
+            for sheets in zip(*(book.worksheets for book in books), strict=True):
+                values, formulas = (
+                    list(itertools.islice(sheet.iter_rows(max_col=MOST_COLUMNS, values_only=True), MOST_ROWS))
+                    for sheet in sheets
+                )
+                rows: list[Sequence[object]] = [
+                    [
+                        _value(formula if value is None else value)
+                        for value, formula in itertools.zip_longest(row, formula_row)
+                    ]
+                    for row, formula_row in zip(values, formulas, strict=False)
+                ]
+                if any(cell is not None for row in rows for cell in row):
+                    return rows
     except BadInput:
         raise
     except (zipfile.BadZipFile, KeyError, ValueError, OSError, TypeError, AttributeError, EOFError) as error:
@@ -173,4 +210,5 @@ def _parquet(raw: bytes, origin: str) -> list[Sequence[object]]:
         raise refusal("the Parquet file cannot be read", origin, remedy=_TO_EXCEL) from None
     if frame.index.name is not None:
         frame = frame.reset_index()
-    return [list(map(str, frame.columns)), *(list(row) for row in frame.itertuples(index=False))]
+    rows = ([None if cell != cell else cell for cell in row] for row in frame.itertuples(index=False))
+    return [list(map(str, frame.columns)), *rows]

@@ -1,6 +1,7 @@
 """Every format that offices write, for every kind of table that a scene names: the same numbers as plain CSV."""
 
 import io
+import re
 
 import pandas as pd
 import pytest
@@ -133,6 +134,19 @@ def turned_columns(columns):
     ).encode()
 
 
+def units_in_cells(columns):
+    _, *body = rows(columns)
+    units = [unit for _, unit, _ in columns]
+    cells = [[f"{cell} {unit}" for cell, unit in zip(row, units, strict=True)] for row in body]
+    return joined([[name for name, _, _ in columns], *cells], ";", comma=True).replace(" deg", "°").encode()
+
+
+def units_in_headings_and_cells(columns):
+    head, *body = rows(columns)
+    cells = [[f"{cell}{unit}" for cell, (_, unit, _) in zip(row, columns, strict=True)] for row in body]
+    return joined([head, *cells]).encode()
+
+
 def workbook(columns):
     head, *body = rows(columns)
     book, out = Workbook(), io.BytesIO()
@@ -146,7 +160,7 @@ def workbook(columns):
 
 FORMATS = [
     *(semicolons, separator_line, tabs, utf16, utf16_big, trailing_empty, descending, units_below, round_brackets),
-    *(quoted_commas, turned_columns, workbook),
+    *(quoted_commas, turned_columns, units_in_cells, units_in_headings_and_cells, workbook),
 ]
 
 
@@ -159,6 +173,97 @@ def test_a_format_gives_the_numbers_of_plain_csv(tmp_path, form, kind):
     known.write_bytes(plain(KINDS[kind]))
     path.write_bytes(form(KINDS[kind]))
     assert kind(path) == kind(known)
+
+
+def with_cell(text, place, cell):
+    """Return a CSV table with semicolons, and one cell of its fourth line exchanged."""
+    lines = [line.split(";") for line in text.split("\n")]
+    lines[3][place] = cell
+    return "\n".join(";".join(line) for line in lines).encode()
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize(
+    "cell", ["#N/A", "#NV", "#DIV/0!", "#REF!", "#VALUE!", "#BEZUG!", "#ÜBERLAUF!", "#NAME?", "####"]
+)
+@pytest.mark.few(24)
+def test_an_error_of_a_spreadsheet_is_no_remark(tmp_path, kind, place, cell):
+    path = tmp_path / "error.csv"
+    path.write_bytes(with_cell(joined(rows(KINDS[kind]), ";"), place, cell))
+    with pytest.raises(BadInput, match=rf'line 4, column {KINDS[kind][place][0]}: "{re.escape(cell)}" is an error'):
+        kind(path)
+
+
+def test_lines_of_remarks_are_no_cells(tmp_path):
+    path, known = tmp_path / "remarks.csv", tmp_path / "known.csv"
+    text = joined(rows(KINDS[law]))
+    known.write_text(text, encoding="utf-8")
+    remarks = "#########\n# made on Monday, by hand\n#N/A: not measured\n#!\n"
+    path.write_text(remarks + text + remarks, encoding="utf-8")
+    assert law(path) == law(known)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_a_cell_in_another_unit_than_its_column_is_refused(tmp_path, kind):
+    path = tmp_path / "units.csv"
+    path.write_bytes(with_cell(joined(rows(KINDS[kind]), ";"), 0, "0.5 rad"))
+    with pytest.raises(BadInput, match=r"line 4, column .*another unit than its column"):
+        kind(path)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_formula_without_a_stored_value_is_named(tmp_path, kind, place):
+    from openpyxl import load_workbook
+
+    path = tmp_path / "formula.xlsx"
+    path.write_bytes(workbook(KINDS[kind]))
+    book = load_workbook(path)
+    book.worksheets[0].cell(4, place + 1).value = "=A2+1"
+    book.save(path)
+    with pytest.raises(BadInput, match=r'line 4, column .*: the formula "=A2\+1" has no stored value'):
+        kind(path)
+
+
+@pytest.mark.parametrize("sign", [";", "\t", "|"])
+def test_points_that_may_part_thousands_are_read_by_a_rule_that_is_told(sign):
+    loads = ["1.955", "1.922", *["955"] * 10]
+    for texts, remarks in ((loads, 1), ([*loads[:-1], "0.5"], 0)):
+        cells = list(zip(TURN, texts, strict=True))
+        table = table_of(joined([["angle [deg]", "M [N*m]"], *cells], sign).encode())
+        assert len(table.remarks) == remarks
+        assert table.columns["M"][0] == 1.955
+
+
+def test_points_in_texts_of_a_workbook_are_told_and_those_of_its_numbers_are_not():
+    for loads, remarks in (
+        ([1.955] * 12, 0),
+        (["1.955"] * 12, 1),
+        (["1.955", *[0.5] * 11], 1),
+        (["1.5", *[1.955] * 11], 0),
+    ):
+        book, out = Workbook(), io.BytesIO()
+        for row in [("angle [deg]", "M [N*m]"), *zip(map(int, TURN), loads, strict=True)]:
+            book.worksheets[0].append(row)
+        book.save(out)
+        assert len(table_of(out.getvalue()).remarks) == remarks
+
+
+def table_of(raw):
+    """Return the table that the bytes of a file make."""
+    return csv_tables._table(list(table_cells.read(raw, "t.csv")), "t.csv", {"angle": "angle", "M": "torque"})
+
+
+def test_a_parquet_file_has_the_gaps_of_csv(tmp_path):
+    frame = pd.DataFrame({"phi [deg]": [0.0, 90.0, 180.0], "Md [N*m]": [1.0, None, 3.0]})
+    found = []
+    for ending, write in (("csv", frame.to_csv), ("parquet", frame.to_parquet)):
+        write(tmp_path / f"p.{ending}", index=False)
+        columns = csv_tables.read_measured(tmp_path / f"p.{ending}", {"phi": "angle", "Md": "torque"}).columns
+        found.append(str(dict(columns)))
+    assert found[0] == found[1]
+    assert "nan" in found[0]
 
 
 NUMBERS = (
