@@ -9,6 +9,7 @@ from pydantic import Field
 from loomopt.base.errors import BadInput, refusal, unknown
 from loomopt.base.records import Frozen
 from loomopt.physics.schema import Name, Target, TargetTable
+from loomopt.scenes import synonyms
 from loomopt.scenes.document import removed
 from loomopt.scenes.scene import TABLES, Scene, build, cached, places
 from loomopt.scenes.tables import FAMILY
@@ -106,7 +107,8 @@ def _changes(scene: Scene, place: int) -> dict[str, Any]:
         raise refusal("the member changes nothing", scene.origin, at, remedy='Write { M0 = "600 N*m" }')
     changes: dict[str, Any] = {}
     free = {f"{p.table}.{p.key}" for p in places(scene) if (bound := scene.bounds.get(p.label)) and bound.free}
-    for key, value in _flat(scene, at, given):
+    for raw_key, value in _flat(scene, at, given):
+        key = synonyms.current_key(raw_key, scene.schema.synonyms, scene.document)
         if key in changes:
             raise refusal("it is changed twice", scene.origin, f"{at}.{key}", remedy="Take one of them out")
         if key in free:
@@ -124,6 +126,7 @@ def _flat(scene: Scene, at: str, given: Mapping[str, Any]) -> Iterator[tuple[str
             yield from _leaves(name, value)
             continue
         keys = [f"{p.table}.{p.key}" for p in numbers if name in (p.key, p.label) and p.given]
+        keys = keys or synonyms.keys_of(name, scene.schema.synonyms, scene.document)
         if len(keys) != 1:
             known = sorted({p.label for p in numbers if p.given})
             if not keys:

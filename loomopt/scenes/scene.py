@@ -13,7 +13,7 @@ from loomopt.base.records import Frozen, Shown, freeze, lazy
 from loomopt.base.units import show
 from loomopt.physics.effects.kinds import Effect, Load, label, owned, required
 from loomopt.physics.schema import Table
-from loomopt.scenes import display, former_names
+from loomopt.scenes import display, former_names, synonyms
 from loomopt.scenes import tables as read
 from loomopt.scenes.cursor import Cursor
 from loomopt.scenes.document import Paths, copied, looked_up, removed, replaced
@@ -235,7 +235,8 @@ class Scene(Shown):
         >>> lo.load("beatup").given("operation.M0")
         '745 N*m'
         """
-        value = looked_up(self.document, arguments.text(key, "key", *_KEY).split("."))
+        name = synonyms.current_key(arguments.text(key, "key", *_KEY), self.schema.synonyms, self.document)
+        value = looked_up(self.document, name.split("."))
         if value is None or isinstance(value, Mapping):
             return None
         return value if isinstance(value, str) else shown(value)
@@ -406,7 +407,8 @@ class Scene(Shown):
         BadInput : a change is invalid.
         """
         keys = {key: former_names.current_key(key, self.schema.former_names) for key in call.set}
-        values = Frozen({keys[key]: value for key, value in copied(call.set, self.origin).items()})
+        by_key = {keys[key]: value for key, value in copied(call.set, self.origin).items()}
+        values = Frozen(synonyms.current_values(by_key, self.schema.synonyms, self.document, self.origin))
         document = self._off(self._on(self._set(values), call.on), call.off)
         new_call = self.call.then(replace(call, set=values, free=()))
         if document is not self.document:
@@ -680,6 +682,7 @@ def _build_scene(
     try:
         schema = jobs.schema(problem.job, original, named)
         current = former_names.current_document(original, schema.former_names, origin)
+        current = synonyms.current_document(current, schema.synonyms, origin)
         if current is not original:
             original, schema = current, jobs.schema(problem.job, current, named)
     except BadInput as error:

@@ -15,6 +15,7 @@ from loomopt.base.units import ShowValue
 from loomopt.physics.effects.kinds import Check, Effect, Event, Load, Speed, instance, label, model_of, needed, required
 from loomopt.physics.schema import Axis, Conflict, Figure, Sense, Table, Target
 from loomopt.scenes.cursor import Cursor
+from loomopt.scenes.synonyms import Synonym
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class SceneSchema:
     instead: keys of [mechanism] → those that each stands for: a scene gives it, or them.
     own_axes: axes that are read otherwise than under their own name.
     conflict: the two axes whose front stands among the reference results, for the scene that is named after its job.
-    former_names: today's names of figures by their former ones.
+    former_names: today's names of figures by their former ones. synonyms: keys of one number.
     """
 
     name: str
@@ -60,6 +61,7 @@ class SceneSchema:
     instead: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     conflict: Conflict | None = None
     former_names: Mapping[str, str] = field(default_factory=dict)
+    synonyms: tuple[Synonym, ...] = ()
 
     @lazy
     def figures(self) -> dict[str, Figure]:

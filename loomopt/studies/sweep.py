@@ -18,7 +18,7 @@ from loomopt.jobs import registry
 from loomopt.model.program import Program
 from loomopt.model.session import current
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.scenes import designs, numbers
+from loomopt.scenes import designs, numbers, synonyms
 from loomopt.scenes.former_names import current_key
 from loomopt.scenes.numbers import files, quantity
 from loomopt.scenes.provenance import versions
@@ -414,7 +414,9 @@ def plan_sweep(
         remedy = 'Name a number and its values: --over "operation.speed=300:600:50 rpm"'
         raise refusal("there is nothing to sweep over", scene.origin, "over", remedy=remedy)
     former = scene.schema.former_names
-    listed = {current_key(key, former): _values(given, key) for key, given in over.items()}
+    keys = {key: current_key(key, former) for key in over}
+    keys = {key: synonyms.current_key(now, scene.schema.synonyms, scene.document) for key, now in keys.items()}
+    listed = {keys[key]: _values(given, key) for key, given in over.items()}
     for key, texts in listed.items():
         if not texts:
             raise refusal("there is no value to sweep over", scene.origin, key, remedy="Give at least one value")

@@ -11,6 +11,7 @@ from loomopt.model import drive
 from loomopt.physics.effects import kinds
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target, TargetTable
+from loomopt.scenes.synonyms import Synonym
 from loomopt.scenes.tables import SceneSchema
 
 
@@ -127,4 +128,5 @@ SCHEMA = SceneSchema(
     own_axes=AXES,
     conflict=Conflict(("peak_torque", "m4e"), "balance"),
     own_margins=dict.fromkeys(CrankRocker().groups[""].margins, "length"),
+    synonyms=(Synonym("operation.M0", "effects.resistance.torque", "torque", without_other=True),),
 )

@@ -49,6 +49,7 @@ from loomopt.physics.schema import DIGITS, Axis, Figure, Name, Table, Target, Ta
 from loomopt.scenes import csv_tables
 from loomopt.scenes.cursor import Cursor
 from loomopt.scenes.scene import Scene, cursor
+from loomopt.scenes.synonyms import Synonym
 from loomopt.scenes.tables import SceneSchema
 
 
@@ -495,6 +496,7 @@ def _schema(text: str) -> SceneSchema:
         own_axes=axes(known, document),
         tables={name: functools.partial(_table_schema, name) for name in TABLES},
         former_names=former_names(known.linkage),
+        synonyms=(Synonym("effects.resistance.torque", "operation.M0", "torque", without_other=False),),
     )
 
 
@@ -664,11 +666,11 @@ def _check_effects(scene: Scene, known: LinkageScene) -> None:
 
 
 def _check_resistance(scene: Scene, effect: kinds.Effect, values: Mapping[str, Any], path: str) -> None:
-    """Raise BadInput where the torque of the resistance is not given, or twice."""
+    """Raise BadInput where the torque of the resistance is not given."""
     if effect.name != PULSED or "torque" not in values or values["table"] is not None:
         return
-    if (values["torque"] is None) == ("M0" not in scene.operation):
-        problem = "the torque of the resistance is " + ("missing" if values["torque"] is None else "given twice")
+    if values["torque"] is None and "M0" not in scene.operation:
+        problem = "the torque of the resistance is missing"
         raise refusal(problem, scene.origin, f"{path}.torque", remedy="Give torque here, or operation.M0")
 
 

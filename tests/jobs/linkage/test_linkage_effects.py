@@ -1,5 +1,8 @@
 """Effects on a linkage: energy, tables, springs of both kinds, and nothing of what is off."""
 
+import copy
+import functools
+import json
 import math
 
 import numpy as np
@@ -10,6 +13,8 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.cycle import Node
+from loomopt.scenes import family
+from loomopt.studies import sweep
 
 JOB = registry.find("linkage")
 FRONT_TABLE = [(-14.9, 0.0, 1), (-7.45, 526.79, ""), (0.0, 745.0, ""), (7.45, 526.79, ""), (14.9, 0.0, 1), (180, 0, "")]
@@ -119,9 +124,49 @@ def test_the_torque_of_the_resistance_is_given_once_under_either_name():
     assert lo.evaluate(moved.set("operation.M0", "800 N*m")).figures["moment.front"] == pytest.approx(
         lo.evaluate(given.set("effects.resistance.torque", "800 N*m")).figures["moment.front"], rel=1e-14
     )
-    for changes, problem in (
-        ({"operation": {"M0": "745 N*m"}}, "given twice"),
-        ({"effects": {"resistance": {"torque": None}}}, "missing"),
-    ):
-        with pytest.raises(lo.BadInput, match=f"resistance.torque: the torque of the resistance is {problem}"):
-            four_bar(**changes)
+    with pytest.raises(lo.BadInput, match="resistance.torque: the torque of the resistance is missing"):
+        four_bar(effects={"resistance": {"torque": None}})
+
+
+BOTH = ("operation.M0", "effects.resistance.torque")
+
+
+@pytest.mark.parametrize("name", ["beatup", "sixbar-sley"])
+def test_M0_and_the_torque_of_the_resistance_are_one_number_in_both_jobs(name):
+    scene = lo.load(name)
+    first, other = (scene.set(key, "800 N*m") for key in BOTH)
+    assert first.hash == other.hash != scene.hash
+    assert scene.update(dict.fromkeys(BOTH, "800 N*m")).hash == first.hash
+    assert scene.update({BOTH[0]: "800 N*m", BOTH[1]: "0.8 kN*m"}).hash == first.hash
+    with pytest.raises(lo.BadInput, match="are one number, and 800 N\\*m and 700 N\\*m differ. Give one of them"):
+        scene.update({BOTH[0]: "800 N*m", BOTH[1]: "700 N*m"})
+
+
+@pytest.mark.parametrize("name", ["beatup", "sixbar-sley"])
+def test_a_scene_may_give_it_under_either_name_or_both_alike(name):
+    tables = json.loads(json.dumps(lo.load(name).document, default=dict))
+    expected = lo.evaluate(lo.scene(tables)).figures
+    for keys in (BOTH[:1], BOTH[1:], BOTH):
+        other = copy.deepcopy(tables)
+        other["operation"].pop("M0", None), other["effects"]["resistance"].pop("torque", None)
+        for key in keys:
+            *path, last = key.split(".")
+            functools.reduce(dict.__getitem__, path, other)[last] = "745 N*m"
+        assert lo.evaluate(lo.scene(other)).figures == expected
+    other["effects"]["resistance"]["torque"] = "740 N*m"
+    with pytest.raises(lo.BadInput, match="are one number"):
+        lo.scene(other)
+    other["effects"]["resistance"]["torque"] = "740"
+    with pytest.raises(lo.BadInput, match="effects.resistance.torque"):
+        lo.scene(other)
+
+
+@pytest.mark.parametrize("name", ["beatup", "sixbar-sley"])
+def test_sweeps_and_families_take_either_name(name):
+    scene = lo.load(name)
+    plans = [sweep.plan_sweep(scene, {key: "700:740:20 N*m"}) for key in BOTH]
+    assert plans[0].axes == plans[1].axes
+    members = [[{key: "700 N*m"}, {key: "745 N*m"}] for key in (*BOTH, "M0")]
+    changes = [family.changes(scene.set("targets.family.members", each)) for each in members]
+    assert changes[0] == changes[1] == changes[2]
+    assert scene.given(BOTH[0]) == scene.given(BOTH[1]) == "745 N*m"
