@@ -10,7 +10,7 @@ from loomopt.scenes.document import looked_up, removed, replaced
 
 
 class Synonym(NamedTuple):
-    """Key `name` and another one, `other`, for one number of a kind; without_other: whether the job reads `name` only."""
+    """Two keys, `name` and `other`, for one number of a kind; without_other: whether the job reads `name` only."""
 
     name: str
     other: str
@@ -48,9 +48,7 @@ def current_values(
     return result
 
 
-def current_document(
-    document: Mapping[str, Any], synonyms: tuple[Synonym, ...], origin: str
-) -> Mapping[str, Any]:
+def current_document(document: Mapping[str, Any], synonyms: tuple[Synonym, ...], origin: str) -> Mapping[str, Any]:
     """Tables with one key for each number; the same object where they are so. Raises BadInput where both differ."""
     for synonym in synonyms:
         other = looked_up(document, synonym.other.split("."))

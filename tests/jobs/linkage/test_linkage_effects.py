@@ -124,7 +124,7 @@ def test_the_torque_of_the_resistance_is_given_once_under_either_name():
     assert lo.evaluate(moved.set("operation.M0", "800 N*m")).figures["moment.front"] == pytest.approx(
         lo.evaluate(given.set("effects.resistance.torque", "800 N*m")).figures["moment.front"], rel=1e-14
     )
-    with pytest.raises(lo.BadInput, match="resistance.torque: the torque of the resistance is missing"):
+    with pytest.raises(lo.BadInput, match=r"resistance\.torque: the torque of the resistance is missing"):
         four_bar(effects={"resistance": {"torque": None}})
 
 
@@ -138,7 +138,7 @@ def test_M0_and_the_torque_of_the_resistance_are_one_number_in_both_jobs(name):
     assert first.hash == other.hash != scene.hash
     assert scene.update(dict.fromkeys(BOTH, "800 N*m")).hash == first.hash
     assert scene.update({BOTH[0]: "800 N*m", BOTH[1]: "0.8 kN*m"}).hash == first.hash
-    with pytest.raises(lo.BadInput, match="are one number, and 800 N\\*m and 700 N\\*m differ. Give one of them"):
+    with pytest.raises(lo.BadInput, match=r"are one number, and 800 N\*m and 700 N\*m differ\. Give one of them"):
         scene.update({BOTH[0]: "800 N*m", BOTH[1]: "700 N*m"})
 
 
@@ -157,7 +157,7 @@ def test_a_scene_may_give_it_under_either_name_or_both_alike(name):
     with pytest.raises(lo.BadInput, match="are one number"):
         lo.scene(other)
     other["effects"]["resistance"]["torque"] = "740"
-    with pytest.raises(lo.BadInput, match="effects.resistance.torque"):
+    with pytest.raises(lo.BadInput, match=r"effects\.resistance\.torque"):
         lo.scene(other)
 
 
