@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from loomopt.physics.effects.kinds import Check
 
 if TYPE_CHECKING:
+    from loomopt.model.sampling import Sampler
     from loomopt.picture.equations import Equation
     from loomopt.picture.force_arrows import ForceArrow
+    from loomopt.picture.mechanism_drawing import MechanismDrawing
     from loomopt.picture.motion import MechanismMotion
     from loomopt.picture.panels import Curve, Panel
     from loomopt.picture.shapes import Drawing, Floats
@@ -93,3 +95,37 @@ class JobViews(abc.ABC):
     def missing(self, scene: "Scene") -> tuple[str, ...]:
         """Keys without which the scene cannot be drawn."""
         return ()
+
+
+class LinkViews(JobViews):
+    """Views of a mechanism of links, drawn and moved by its `MechanismDrawing`."""
+
+    @abc.abstractmethod
+    def drawn(self, scene: "Scene", design: Numbers) -> "MechanismDrawing":
+        """Mechanism of a design. Raises BadInput where it cannot be drawn."""
+
+    @abc.abstractmethod
+    def sampler(self, scene: "Scene", design: Numbers) -> "Sampler":
+        """Samples of a design, for the forces in its joints."""
+
+    def linkage(self, scene: "Scene", design: Numbers) -> "Drawing":
+        """Mechanism at its events, at full scale, with the forces that active effects give. Raises BadInput."""
+        from loomopt.picture import force_arrows
+        from loomopt.picture.shapes import drawn_units
+
+        drawn, forces = self.drawn(scene, design), None
+        if tells_forces(scene):
+            events = (drawn.force_event,) if drawn.force_event else ()
+            arrows = force_arrows.joint_forces(self.sampler(scene, design), events, drawn.force_joints())
+            forces = force_sizes(scene, arrows)
+        return drawn.drawing(scene.name, drawn_units(scene), forces)
+
+    def joints_csv(self, scene: "Scene", design: Numbers) -> str:
+        """Joints and centres of mass as CSV. Raises BadInput."""
+        from loomopt.picture.shapes import drawn_units
+
+        return self.drawn(scene, design).skeleton.csv(drawn_units(scene))
+
+    def motion(self, scene: "Scene", design: Numbers, angles: "Floats") -> "MechanismMotion":
+        """Mechanism at crank angles, rad. Raises BadInput."""
+        return self.drawn(scene, design).motion(angles)

@@ -28,8 +28,8 @@ def test_every_job_has_its_views():
 def test_numbers_a_design_leaves_out_are_todays():
     scene = lo.load("beatup")
     view = registry.of(scene).views
-    assert view.linkage(scene, {}) == crank_rocker_drawing.linkage(scene.mechanism, scene.name)
-    changed = crank_rocker_drawing.linkage({**scene.mechanism, "l2": 0.07}, scene.name)
+    assert view.linkage(scene, {}) == crank_rocker_drawing.of(scene.mechanism).drawing(scene.name)
+    changed = crank_rocker_drawing.of({**scene.mechanism, "l2": 0.07}).drawing(scene.name)
     assert view.linkage(scene, {"l2": 0.07}) == changed
     assert view.joints_csv(scene, {"l2": 0.07}) != view.joints_csv(scene, {})
 

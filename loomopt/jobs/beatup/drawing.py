@@ -1,6 +1,5 @@
 """The crank-rocker drawn at full scale in both dead centres, with the centres of mass that swing with its rocker."""
 
-import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from loomopt.base.errors import BadInput
+from loomopt.base.records import lazy
 from loomopt.base.units import show
 from loomopt.jobs.beatup.model import FRONT, LENGTHS, REAR
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.picture.drawing import POINTER, Label, Mass, Skeleton, along, angle_arc, around, pointer
-from loomopt.picture.force_arrows import ForceArrow, Sheet
-from loomopt.picture.motion import MechanismMotion
-from loomopt.picture.shapes import METRIC, Arc, Drawing, Floats, Measure, Point, Primitive, Units
+from loomopt.picture.mechanism_drawing import MechanismDrawing
+from loomopt.picture.shapes import Arc, Floats, Measure, Point, Primitive, Units
 
 REED, COUNTERWEIGHT = "G", "E"
 MASSES = {REED: ("m4", "r4"), COUNTERWEIGHT: ("m4e", "r4e")}
@@ -24,7 +23,7 @@ MASSES = {REED: ("m4", "r4"), COUNTERWEIGHT: ("m4e", "r4e")}
 
 
 @dataclass(frozen=True)
-class CrankRockerDrawing:
+class CrankRockerDrawing(MechanismDrawing):
     """The crank-rocker in both dead centres: lengths in m, angles in rad.
 
     masses: by joint; offset: of the reed's centre of mass from the rocker's line, rad.
@@ -35,22 +34,31 @@ class CrankRockerDrawing:
     masses: Mapping[str, Mass]
     offset: float
 
-    @functools.cached_property
-    def skeleton(self) -> Skeleton:
-        """Joints and links; crank and rod begin at B, so that folded their dashes coincide."""
-        sides, at, a, d = self.lengths, self.centres, Point(0.0, 0.0), Point(self.lengths.l4, 0.0)
-        joints = {
-            FRONT: {"B": a.towards(at.beta, sides.l1), "C": a.towards(at.beta, sides.l1 + sides.l2)},
-            REAR: {"B": a.towards(at.beta_r, -sides.l1), "C": a.towards(at.beta_r, sides.l2 - sides.l1)},
-        }
-        for event, psi in ((FRONT, at.psi_front), (REAR, at.psi_rear)):
-            for name, mass in self.masses.items():
-                side = -mass.radius if name == COUNTERWEIGHT else mass.radius
-                joints[event][name] = d.towards(psi + self.offset, side)
+    @property
+    def events(self) -> Mapping[str, float]:
+        """Crank angles of both dead centres."""
+        return {FRONT: self.centres.beta, REAR: math.pi + self.centres.beta_r}
+
+    @lazy
+    def base(self) -> Skeleton:
+        """Pivots, links, the crank's circle and the path of C; crank and rod begin at B, so that dashes coincide."""
+        sides, at, d = self.lengths, self.centres, Point(self.lengths.l4, 0.0)
         apart = [at for at, mass in self.masses.items() if at != REED or self.offset or not 0 < mass.radius < sides.l3]
         path = Arc("paths", d, sides.l3, at.psi_front, at.psi_rear)
         links = (("A", "D"), ("B", "A"), ("B", "C"), ("D", "C"), *(("D", name) for name in apart))
-        return Skeleton({"A": a, "D": d}, joints, links, (("A", sides.l1),), (path,), masses=self.masses)
+        pivots = {"A": Point(0.0, 0.0), "D": d}
+        return Skeleton(pivots, {}, links, (("A", sides.l1),), (path,), masses=self.masses)
+
+    def places(self, angles: Floats) -> Mapping[str, Floats]:
+        """Moving joints and centres of mass at crank angles."""
+        pose = crank_rocker.CrankRockerPose(systems.numpy(), self.lengths, angles)
+        at = {"B": np.column_stack(pose.crank)}
+        at["C"] = at["B"] + np.column_stack(pose.dyad.link1)
+        turned = pose.psi + self.offset
+        for name, mass in self.masses.items():
+            side = -mass.radius if name == COUNTERWEIGHT else mass.radius
+            at[name] = np.asarray(self.base.pivots["D"]) + side * np.column_stack([np.cos(turned), np.sin(turned)])
+        return at
 
     @property
     def toward_fell(self) -> float:
@@ -67,6 +75,28 @@ class CrankRockerDrawing:
         """Text height, m."""
         return 0.02 * float(self.lengths.l4 + self.lengths.l1)
 
+    def strokes(self) -> list[Primitive]:
+        """Draw β at A, the swing at D, and the arrow toward the fell."""
+        skeleton, centres, h, (beta, swing) = self.skeleton, self.centres, self.height, self.radii
+        return [
+            *angle_arc(skeleton.pivots["A"], beta, 0.0, centres.beta, h),
+            *angle_arc(skeleton.pivots["D"], swing, centres.psi_rear, centres.psi_front, h, both=True),
+            *pointer(skeleton.joints[FRONT]["C"], self.toward_fell, h),
+        ]
+
+    def measures(self) -> tuple[Measure, ...]:
+        """Lengths of crank, rod, rocker and frame, at front dead centre."""
+        at, ends = self.skeleton.at(FRONT), (("A", "B"), ("B", "C"), ("D", "C"), ("A", "D"))
+        return tuple(Measure(name, at[begin], at[end]) for name, (begin, end) in zip(LENGTHS, ends, strict=True))
+
+    def labels(self, units: Units) -> list[Label]:
+        """Names of joints, links with lengths, angles in degrees, masses."""
+        return _labels(self, units)
+
+    def legend(self, units: Units) -> tuple[tuple[str, str], ...]:
+        """Lines on both positions, the masses and θ."""
+        return _legend(self, units)
+
 
 def of(design: Mapping[str, float]) -> CrankRockerDrawing:
     """Crank-rocker l1, l2, l3, l4 (m) with its masses where it has any (kg, m; offset in rad).
@@ -81,58 +111,6 @@ def of(design: Mapping[str, float]) -> CrankRockerDrawing:
     masses = {at: Mass(*(design.get(name, 0.0) for name in names)) for at, names in MASSES.items()}
     there = {at: mass for at, mass in masses.items() if mass.mass and mass.radius}
     return CrankRockerDrawing(lengths, crank_rocker.DeadCentres(FLOAT, lengths), there, design.get("offset", 0.0))
-
-
-def linkage(
-    design: Mapping[str, float],
-    title: str,
-    units: Units = METRIC,
-    forces: Mapping[ForceArrow, str] | None = None,
-) -> Drawing:
-    """Crank-rocker of a design in both dead centres, at full scale. Raises BadInput.
-
-    forces: in its joints at some crank angles, each labelled with its size.
-    """
-    drawing = of(design)
-    strokes = [*drawing.skeleton.strokes(drawing.height), *_angles(drawing)]
-    labels, legend, measures = _labels(drawing, units), _legend(drawing, units), _measures(drawing)
-    sheet = Sheet(title, drawing.height, strokes, labels, legend, units, FRONT, measures)
-    return sheet.drawing(forces, functools.partial(motion, design))
-
-
-def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:
-    """Joints that `linkage` draws as CSV; digits round-trip. Raises BadInput."""
-    return of(design).skeleton.csv(units)
-
-
-def motion(design: Mapping[str, float], angles: Floats) -> MechanismMotion:
-    """Crank-rocker at crank angles, rad, its centres of mass with it. Raises BadInput."""
-    drawing = of(design)
-    pose, skeleton = crank_rocker.CrankRockerPose(systems.numpy(), drawing.lengths, angles), drawing.skeleton
-    rod, at = pose.dyad.link1, {"B": np.column_stack(pose.crank)}
-    at["C"] = at["B"] + np.column_stack(rod)
-    turned = pose.psi + drawing.offset
-    for name, mass in drawing.masses.items():
-        side = -mass.radius if name == COUNTERWEIGHT else mass.radius
-        at[name] = np.asarray(skeleton.pivots["D"]) + side * np.column_stack([np.cos(turned), np.sin(turned)])
-    return MechanismMotion(angles, skeleton.pivots, at, skeleton.links, skeleton.guides)
-
-
-def _measures(drawing: CrankRockerDrawing) -> tuple[Measure, ...]:
-    """Lengths of crank, rod, rocker and frame, at front dead centre."""
-    at = drawing.skeleton.at(FRONT)
-    ends = (("A", "B"), ("B", "C"), ("D", "C"), ("A", "D"))
-    return tuple(Measure(name, at[begin], at[end]) for name, (begin, end) in zip(LENGTHS, ends, strict=True))
-
-
-def _angles(drawing: CrankRockerDrawing) -> list[Primitive]:
-    """Draw β at A, the swing at D, and the arrow toward the fell."""
-    skeleton, centres, h, (beta, swing) = drawing.skeleton, drawing.centres, drawing.height, drawing.radii
-    return [
-        *angle_arc(skeleton.pivots["A"], beta, 0.0, centres.beta, h),
-        *angle_arc(skeleton.pivots["D"], swing, centres.psi_rear, centres.psi_front, h, both=True),
-        *pointer(skeleton.joints[FRONT]["C"], drawing.toward_fell, h),
-    ]
 
 
 def _labels(drawing: CrankRockerDrawing, units: Units) -> list[Label]:

@@ -20,7 +20,7 @@ from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.mechanisms.dyad import Dyad, Vector
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Equation, Expression, Symbols, equation, loop, moving, symbol, sympy
-from loomopt.picture.job_views import JobViews, Marks, Span, force_sizes, tells_forces
+from loomopt.picture.job_views import LinkViews, Marks, Span
 from loomopt.scenes.scene import Scene
 
 
@@ -99,40 +99,24 @@ def _pose() -> balance.Pose:
 
 
 if TYPE_CHECKING:
+    from loomopt.model.sampling import Sampler
     from loomopt.picture.equations import Equation
-    from loomopt.picture.motion import MechanismMotion
+    from loomopt.picture.mechanism_drawing import MechanismDrawing
     from loomopt.picture.panels import Curve
-    from loomopt.picture.shapes import Drawing, Floats
 
 
-class BeatupViews(JobViews):
+class BeatupViews(LinkViews):
     """The crank-rocker in both dead centres, its equations, and where the cloth resists."""
 
-    def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
-        """Crank-rocker in both dead centres at full scale. Raises BadInput."""
-        from loomopt.jobs.beatup import drawing
-        from loomopt.picture.shapes import drawn_units
-
-        numbers, forces = _numbers(scene, design), None
-        if tells_forces(scene):
-            from loomopt.picture import force_arrows
-
-            drawing.of(numbers)  # one that cannot be drawn says so first
-            forces = force_sizes(scene, force_arrows.joint_forces(registry.of(scene).sampler(scene, design), (FRONT,)))
-        return drawing.linkage(numbers, scene.name, drawn_units(scene), forces)
-
-    def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Joints and centres of mass as CSV. Raises BadInput."""
-        from loomopt.jobs.beatup import drawing
-        from loomopt.picture.shapes import drawn_units
-
-        return drawing.joints_csv(_numbers(scene, design), drawn_units(scene))
-
-    def motion(self, scene: Scene, design: Mapping[str, float], angles: "Floats") -> "MechanismMotion":
-        """Crank-rocker at crank angles, rad. Raises BadInput."""
+    def drawn(self, scene: Scene, design: Mapping[str, float]) -> "MechanismDrawing":
+        """Crank-rocker in both dead centres. Raises BadInput."""
         from loomopt.jobs.beatup import drawing
 
-        return drawing.motion(_numbers(scene, design), angles)
+        return drawing.of(_numbers(scene, design))
+
+    def sampler(self, scene: Scene, design: Mapping[str, float]) -> "Sampler":
+        """Samples of a design."""
+        return registry.of(scene).sampler(scene, design)
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
         """Equations the scene really uses."""

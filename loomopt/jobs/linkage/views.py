@@ -27,13 +27,13 @@ from loomopt.physics.mechanisms.moving import Joint, Link, total
 from loomopt.physics.schema import Values
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Angle, Equation, Expression, Symbols, equation, loop, moving, symbol, sympy
-from loomopt.picture.job_views import JobViews, Marks, Span, force_sizes, tells_forces
+from loomopt.picture.job_views import LinkViews, Marks, Span
 from loomopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from loomopt.picture.motion import MechanismMotion
+    from loomopt.model.sampling import Sampler
+    from loomopt.picture.mechanism_drawing import MechanismDrawing
     from loomopt.picture.panels import Curve
-    from loomopt.picture.shapes import Drawing, Floats
 
 LITERAL, FINEST = 1e-14, 720
 """Relative error up to which a literal is shown as a fraction, and largest denominator of a fraction of pi."""
@@ -240,30 +240,18 @@ def _effect_values(model: JobModel, effect: Effect) -> Values:
     return {**given, **words, **({"instance": effect.instance} if effect.instance else {})}
 
 
-class LinkageViews(JobViews):
+class LinkageViews(LinkViews):
     """The linkage at its events, its equations, and where its windows lie."""
 
-    def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
-        """Linkage at its events, full scale. Raises BadInput."""
-        from loomopt.jobs.linkage import drawing
-        from loomopt.picture.shapes import drawn_units
+    def drawn(self, scene: Scene, design: Mapping[str, float]) -> "MechanismDrawing":
+        """Linkage at its events. Raises BadInput."""
+        from loomopt.jobs.linkage.drawing import LinkageDrawing
 
-        sampler = registry.of(scene).sampler(scene, design)
-        forces = force_sizes(scene, drawing.forces(sampler)) if tells_forces(scene) else None
-        return drawing.linkage(sampler, scene.name, drawn_units(scene), forces)
+        return LinkageDrawing(self.sampler(scene, design))
 
-    def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Joints at the events as CSV. Raises BadInput."""
-        from loomopt.jobs.linkage import drawing
-        from loomopt.picture.shapes import drawn_units
-
-        return drawing.joints_csv(registry.of(scene).sampler(scene, design), drawn_units(scene))
-
-    def motion(self, scene: Scene, design: Mapping[str, float], angles: "Floats") -> "MechanismMotion":
-        """Linkage at crank angles, rad. Raises BadInput."""
-        from loomopt.jobs.linkage import drawing
-
-        return drawing.motion(registry.of(scene).sampler(scene, design), angles)
+    def sampler(self, scene: Scene, design: Mapping[str, float]) -> "Sampler":
+        """Samples of a design."""
+        return registry.of(scene).sampler(scene, design)
 
     def equations(self, scene: Scene) -> tuple[Equation, ...]:
         """Equations the scene really uses."""

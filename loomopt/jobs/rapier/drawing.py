@@ -1,6 +1,5 @@
 """The rapier drive drawn at full scale: in both dead centres of the sley and where it hands the weft over."""
 
-import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from loomopt.base.errors import BadInput
+from loomopt.base.records import lazy
 from loomopt.jobs.rapier.model import DIMENSIONS
 from loomopt.maths import systems, turning_points
 from loomopt.maths.systems import FLOAT
@@ -16,9 +16,8 @@ from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, RapierPose, Sley
 from loomopt.picture.drawing import POINTER, Label, Skeleton, along, angle_arc, around, arrow, pointer
-from loomopt.picture.force_arrows import ForceArrow, Sheet
-from loomopt.picture.motion import MechanismMotion
-from loomopt.picture.shapes import METRIC, Drawing, Line, Measure, Point, Primitive, Units
+from loomopt.picture.mechanism_drawing import MechanismDrawing, pairs
+from loomopt.picture.shapes import Line, Measure, Point, Primitive, Units
 
 FRONT, REAR, OVER = "front dead centre", "rear dead centre", "hand-over"
 LINKS = (("A0", "A"), ("A", "B1"), ("B0", "B1"), ("B0", "B2"), ("C0", "C"), ("C", "D"), ("B2", "D"))
@@ -29,12 +28,12 @@ SAMPLES = 360
 
 
 @dataclass(frozen=True)
-class Drive:
+class Drive(MechanismDrawing):
     """The drive that assembles at every crank angle; lengths m, angles rad."""
 
     dimensions: Dimensions
 
-    @functools.cached_property
+    @lazy
     def sley(self) -> Sley:
         """The sley four-bar."""
         return Sley(FLOAT, self.dimensions)
@@ -43,23 +42,23 @@ class Drive:
         """Drive at crank angles, rad."""
         return RapierPose(systems.numpy(), self.dimensions, self.sley.stand, phi1)
 
-    @functools.cached_property
+    @lazy
     def front(self) -> Vector:
         """The driving link as seen from the sley at front dead centre."""
         return RapierPose(FLOAT, self.dimensions, self.sley.stand, 0.0).relative
 
-    @functools.cached_property
-    def phi1(self) -> dict[str, float]:
+    @lazy
+    def events(self) -> dict[str, float]:
         """Crank angle of each position, rad; the hand-over is where the travel is greatest."""
         turns = np.array(turning_points.turns(lambda phi: self.turn(phi).phi63_1))
         over = float(turns[np.argmax(self.turn(turns).phi63(self.front))])
         rear = math.pi + self.sley.centres.beta_r - self.sley.centres.beta
         return {FRONT: 0.0, REAR: float(rear), OVER: over % TURN}
 
-    @functools.cached_property
+    @lazy
     def poses(self) -> dict[str, RapierPose]:
         """The drive in each position."""
-        return {name: RapierPose(FLOAT, self.dimensions, self.sley.stand, at) for name, at in self.phi1.items()}
+        return {name: RapierPose(FLOAT, self.dimensions, self.sley.stand, at) for name, at in self.events.items()}
 
     @property
     def phi63(self) -> float:
@@ -82,20 +81,42 @@ class Drive:
         """Text height, m: 1.1 % of the machine, as l4 is small."""
         return 0.011 * float(self.dimensions.l71 + self.dimensions.l1)
 
-    @functools.cached_property
-    def skeleton(self) -> Skeleton:
-        """Joints and links, both cranks' circles and the path of D."""
-        joints = {event: {name: Point(*at) for name, at in pose.joints.items()} for event, pose in self.poses.items()}
+    @lazy
+    def base(self) -> Skeleton:
+        """Pivots and links, both cranks' circles and the path of D."""
         path = self.turn(np.asarray(TURN / SAMPLES * np.arange(SAMPLES), dtype=np.float64)).joints["D"]
         d = tuple(Point(float(x), float(y)) for x, y in zip(path.x, path.y, strict=True))
         return Skeleton(
-            {name: joints[FRONT][name] for name in PIVOTS},
-            {event: {name: at[name] for name in MOVING} for event, at in joints.items()},
+            {name: Point(*self.poses[FRONT].joints[name]) for name in PIVOTS},
+            {},
             (("A0", "B0"), *LINKS),
             (("A0", self.dimensions.l1), ("C0", self.dimensions.l4)),
             (Line("paths", d, closed=True),),
             {"C": 0.2, "D": 0.2},
         )
+
+    def places(self, angles: Floats) -> dict[str, Floats]:
+        """Moving joints at crank angles."""
+        at = self.turn(angles).joints
+        return {name: pairs(at[name], len(angles)) for name in MOVING}
+
+    def strokes(self) -> list[Primitive]:
+        """Angles α, swing and φ63, the sense of both cranks, and the arrow toward the fell."""
+        return _angles(self)
+
+    def labels(self, units: Units) -> list[Label]:
+        """Names of joints, links with lengths, angles in degrees, and the fell."""
+        return [*_joints(self), *_labels(self, units)]
+
+    def legend(self, units: Units) -> tuple[tuple[str, str], ...]:
+        """Lines on the three positions, the stroke and the second shaft."""
+        return _legend(self, units)
+
+    def measures(self) -> tuple[Measure, ...]:
+        """Lengths of the links and of the frame, at front dead centre."""
+        at = self.skeleton.at(FRONT)
+        ends = [("l71", ("A0", "B0")), *zip(("l1", "l2", "l3", "l3p", "l4", "l5", "l6"), LINKS, strict=True)]
+        return tuple(Measure(name, at[begin], at[end]) for name, (begin, end) in ends)
 
 
 def of(design: Mapping[str, float]) -> Drive:
@@ -109,43 +130,6 @@ def of(design: Mapping[str, float]) -> Drive:
         key = "l1, l2, l3, l71, l3p, alpha, l4, l5, l6, C0x, C0y, phi40"
         raise BadInput(f"the drive cannot be drawn: {fault}", key=key, remedy="Correct them")
     return Drive(dimensions)
-
-
-def linkage(
-    design: Mapping[str, float],
-    title: str,
-    units: Units = METRIC,
-    forces: Mapping[ForceArrow, str] | None = None,
-) -> Drawing:
-    """Drive in both dead centres of the sley and at the hand-over, at full scale. Raises BadInput.
-
-    forces: in its joints at some crank angles, each labelled with its size.
-    """
-    drive = of(design)
-    strokes = [*drive.skeleton.strokes(drive.height), *_angles(drive)]
-    labels, legend, measures = [*_joints(drive), *_labels(drive, units)], _legend(drive, units), _measures(drive)
-    sheet = Sheet(title, drive.height, strokes, labels, legend, units, FRONT, measures)
-    return sheet.drawing(forces, functools.partial(motion, design))
-
-
-def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:
-    """Joints that `linkage` draws as CSV; digits round-trip. Raises BadInput."""
-    return of(design).skeleton.csv(units)
-
-
-def motion(design: Mapping[str, float], angles: Floats) -> MechanismMotion:
-    """Drive at crank angles, rad. Raises BadInput."""
-    drive = of(design)
-    at, skeleton = drive.turn(angles).joints, drive.skeleton
-    moving = {name: np.column_stack(np.broadcast_arrays(*at[name])) for name in MOVING}
-    return MechanismMotion(angles, skeleton.pivots, moving, LINKS, skeleton.guides)
-
-
-def _measures(drive: Drive) -> tuple[Measure, ...]:
-    """Lengths of the links and of the frame, at front dead centre."""
-    at = drive.skeleton.at(FRONT)
-    ends = [("l71", ("A0", "B0")), *zip(("l1", "l2", "l3", "l3p", "l4", "l5", "l6"), LINKS, strict=True)]
-    return tuple(Measure(name, at[begin], at[end]) for name, (begin, end) in ends)
 
 
 def _angles(drive: Drive) -> list[Primitive]:
@@ -206,7 +190,7 @@ def _legend(drive: Drive, units: Units) -> tuple[tuple[str, str], ...]:
     """Lines below the drawing, each with its layer."""
     d, c0 = drive.dimensions, drive.skeleton.pivots["C0"]
     rows = [
-        (at, f"A{prime} B1{prime} C{prime} D{prime}  {at}, crank at {math.degrees(drive.phi1[at]):.2f}°")
+        (at, f"A{prime} B1{prime} C{prime} D{prime}  {at}, crank at {math.degrees(drive.events[at]):.2f}°")
         for at, prime in drive.skeleton.primes.items()
     ]
     stroke, wheel = units.size(d.travel * drive.phi63), units.size(d.wheel)

@@ -15,7 +15,7 @@ from loomopt.physics.mechanisms.dyad import Dyad
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley, Stand, polar
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Angle, Equation, Symbols, equation, loop, moving, symbol, sympy
-from loomopt.picture.job_views import JobViews, Marks, Span, force_sizes, tells_forces
+from loomopt.picture.job_views import LinkViews, Marks, Span
 from loomopt.scenes.scene import Scene
 
 
@@ -115,44 +115,26 @@ def _forces(model: JobModel) -> list[Equation]:
 
 
 if TYPE_CHECKING:
+    from loomopt.model.sampling import Sampler
     from loomopt.picture.equations import Equation
-    from loomopt.picture.motion import MechanismMotion
+    from loomopt.picture.mechanism_drawing import MechanismDrawing
     from loomopt.picture.panels import Curve
-    from loomopt.picture.shapes import Drawing, Floats
 
 SWUNG = "of sley and driving link"
 
 
-class RapierViews(JobViews):
+class RapierViews(LinkViews):
     """The drive in both dead centres of the sley and at the hand-over, its equations, and where the head dwells."""
 
-    def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
-        """Drive in both dead centres and at the hand-over, at full scale. Raises BadInput."""
-        from loomopt.jobs.rapier import drawing
-        from loomopt.picture.shapes import drawn_units
-
-        numbers, forces = registry.of(scene).numbers_of(scene, design), None
-        if tells_forces(scene):
-            from loomopt.picture import force_arrows
-
-            drawing.of(numbers)  # one that cannot be drawn says so first
-            forces = force_sizes(
-                scene, force_arrows.joint_forces(registry.of(scene).sampler(scene, design), (drawing.FRONT,))
-            )
-        return drawing.linkage(numbers, scene.name, drawn_units(scene), forces)
-
-    def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Joints as CSV. Raises BadInput."""
-        from loomopt.jobs.rapier import drawing
-        from loomopt.picture.shapes import drawn_units
-
-        return drawing.joints_csv(registry.of(scene).numbers_of(scene, design), drawn_units(scene))
-
-    def motion(self, scene: Scene, design: Mapping[str, float], angles: "Floats") -> "MechanismMotion":
-        """Drive at crank angles, rad. Raises BadInput."""
+    def drawn(self, scene: Scene, design: Mapping[str, float]) -> "MechanismDrawing":
+        """Drive in both dead centres and at the hand-over. Raises BadInput."""
         from loomopt.jobs.rapier import drawing
 
-        return drawing.motion(registry.of(scene).numbers_of(scene, design), angles)
+        return drawing.of(registry.of(scene).numbers_of(scene, design))
+
+    def sampler(self, scene: Scene, design: Mapping[str, float]) -> "Sampler":
+        """Samples of a design."""
+        return registry.of(scene).sampler(scene, design)
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
         """Equations the scene really uses."""

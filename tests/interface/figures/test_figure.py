@@ -39,7 +39,7 @@ def write_curves(frame, path, title):
 @pytest.mark.parametrize("ending", figure.SUFFIXES)
 def test_drawing_and_curves_are_written_in_the_format_asked_for(tmp_path, frame, ending):
     for name, write in (
-        ("d", lambda path: figure.draw(crank_rocker_drawing.linkage(PAPER, "A $title_ <&"), path)),
+        ("d", lambda path: figure.draw(crank_rocker_drawing.of(PAPER).drawing("A $title_ <&"), path)),
         ("c", lambda path: write_curves(frame, path, "A $title_ <&")),
     ):
         path, again = tmp_path / f"{name}{ending}", tmp_path / f"{name}2{ending}"
@@ -50,7 +50,7 @@ def test_drawing_and_curves_are_written_in_the_format_asked_for(tmp_path, frame,
 
 
 def test_a_drawing_as_svg_is_the_one_at_full_scale(tmp_path):
-    drawn = crank_rocker_drawing.linkage(PAPER, "t")
+    drawn = crank_rocker_drawing.of(PAPER).drawing("t")
     figure.draw(drawn, tmp_path / "a.svg")
     assert (tmp_path / "a.svg").read_text(encoding="utf-8") == svg.render(drawn)
 
@@ -59,7 +59,7 @@ def test_a_drawing_as_svg_is_the_one_at_full_scale(tmp_path):
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
 def test_a_picture_has_the_same_size_for_any_machine(tmp_path, size):
     figure.draw(
-        crank_rocker_drawing.linkage({name: size * value for name, value in PAPER.items()}, "t"), tmp_path / "a.png"
+        crank_rocker_drawing.of({name: size * value for name, value in PAPER.items()}).drawing("t"), tmp_path / "a.png"
     )
     image = matplotlib.image.imread(tmp_path / "a.png")
     assert max(image.shape[:2]) == pytest.approx(1417, abs=2)
@@ -70,7 +70,7 @@ def test_a_picture_has_the_same_size_for_any_machine(tmp_path, size):
 
 def test_another_ending_is_bad_input(tmp_path):
     with pytest.raises(BadInput, match=r"\.png, \.pdf, \.svg"):
-        figure.draw(crank_rocker_drawing.linkage(PAPER, "t"), tmp_path / "a.jpg")
+        figure.draw(crank_rocker_drawing.of(PAPER).drawing("t"), tmp_path / "a.jpg")
     assert not list(tmp_path.iterdir())
 
 

@@ -19,14 +19,14 @@ import sys
 from pathlib import Path
 from loomopt.interface.files import dxf
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
-dxf.write(crank_rocker_drawing.linkage(dict(l1=0.031, l2=0.065, l3=0.155, l4=0.167), "t"), Path(sys.argv[1]))
+dxf.write(crank_rocker_drawing.of(dict(l1=0.031, l2=0.065, l3=0.155, l4=0.167)).drawing("t"), Path(sys.argv[1]))
 """
 
 
 @pytest.fixture(scope="module")
 def document(tmp_path_factory):
     path = tmp_path_factory.mktemp("dxf") / "linkage.dxf"
-    dxf.write(crank_rocker_drawing.linkage(PAPER, "Reed\n β\x00"), path)
+    dxf.write(crank_rocker_drawing.of(PAPER).drawing("Reed\n β\x00"), path)
     return ezdxf.readfile(path)
 
 
@@ -92,7 +92,7 @@ def test_circle_and_arc_are_the_paths_of_the_joints(document):
 
 
 def test_the_counterweight_is_on_its_layer_at_its_radius_with_its_mass(tmp_path):
-    dxf.write(crank_rocker_drawing.linkage(PAPER | {"m4e": 3.0, "r4e": 0.05}, "t"), tmp_path / "a.dxf")
+    dxf.write(crank_rocker_drawing.of(PAPER | {"m4e": 3.0, "r4e": 0.05}).drawing("t"), tmp_path / "a.dxf")
     space = ezdxf.readfile(tmp_path / "a.dxf").modelspace()
     for circle in (result := space.query('CIRCLE[layer=="masses"]')):
         assert circle.dxf.center.distance((167, 0)) == pytest.approx(50, abs=1e-9)
@@ -127,5 +127,5 @@ def test_the_same_drawing_gives_the_same_bytes_in_any_process(tmp_path):
 
 def test_ezdxf_is_left_as_it_was(tmp_path):
     before = ezdxf.options.write_fixed_meta_data_for_testing
-    dxf.write(crank_rocker_drawing.linkage(PAPER, "t"), tmp_path / "a.dxf")
+    dxf.write(crank_rocker_drawing.of(PAPER).drawing("t"), tmp_path / "a.dxf")
     assert ezdxf.options.write_fixed_meta_data_for_testing is before

@@ -18,7 +18,7 @@ def numbers(text):
 
 @pytest.fixture(scope="module")
 def root():
-    return ElementTree.fromstring(svg.render(crank_rocker_drawing.linkage(PAPER, "Reed <& 'co'>")))
+    return ElementTree.fromstring(svg.render(crank_rocker_drawing.of(PAPER).drawing("Reed <& 'co'>")))
 
 
 def layer(root, name):
@@ -66,7 +66,7 @@ def test_every_primitive_is_written_once_on_its_layer():
 
 def test_titles_are_escaped_and_control_characters_do_not_break_the_file(root):
     assert root.find(f"{SPACE}title").text == "Reed <& 'co'>"
-    ElementTree.fromstring(svg.render(crank_rocker_drawing.linkage(PAPER, "a\x00\x1b]</svg>")))
+    ElementTree.fromstring(svg.render(crank_rocker_drawing.of(PAPER).drawing("a\x00\x1b]</svg>")))
 
 
 def test_a_sheet_lies_under_the_drawing_and_every_colour_is_legible_on_it(root):
@@ -79,4 +79,6 @@ def test_a_sheet_lies_under_the_drawing_and_every_colour_is_legible_on_it(root):
 
 
 def test_the_same_drawing_gives_the_same_text():
-    assert svg.render(crank_rocker_drawing.linkage(PAPER, "t")) == svg.render(crank_rocker_drawing.linkage(PAPER, "t"))
+    assert svg.render(crank_rocker_drawing.of(PAPER).drawing("t")) == svg.render(
+        crank_rocker_drawing.of(PAPER).drawing("t")
+    )

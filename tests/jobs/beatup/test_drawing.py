@@ -51,7 +51,7 @@ def designs(draw):
 @few
 @given(design=designs())
 def test_links_are_drawn_at_full_scale_and_meet(layer, design):
-    crank, rod, rocker = links(crank_rocker_drawing.linkage(design, ""), layer)
+    crank, rod, rocker = links(crank_rocker_drawing.of(design).drawing(""), layer)
     lengths = [math.dist(*link) for link in (crank, rod, rocker)]
     assert lengths == pytest.approx([design[name] for name in ("l1", "l2", "l3")], rel=0, abs=1e-11 * design["l4"])
     assert crank[0] == rod[0]
@@ -61,7 +61,7 @@ def test_links_are_drawn_at_full_scale_and_meet(layer, design):
 
 
 def test_crank_and_rod_are_stretched_in_front_and_folded_at_the_rear():
-    drawn = crank_rocker_drawing.linkage(PAPER, "")
+    drawn = crank_rocker_drawing.of(PAPER).drawing("")
     for layer, length in (("front dead centre", 0.096), ("rear dead centre", 0.034)):
         (b, a), (_, c), _ = links(drawn, layer)
         assert math.dist(a, c) == pytest.approx(length, rel=1e-12)
@@ -69,7 +69,7 @@ def test_crank_and_rod_are_stretched_in_front_and_folded_at_the_rear():
 
 
 def test_the_path_of_the_rocker_is_the_swing_and_the_crank_turns_on_its_circle():
-    drawn = crank_rocker_drawing.linkage(PAPER, "")
+    drawn = crank_rocker_drawing.of(PAPER).drawing("")
     path = next(p for p in drawn.primitives if isinstance(p, Arc) and p.layer == "paths")
     assert path.radius == pytest.approx(0.155, rel=1e-14)
     assert math.degrees(path.end - path.begin) == pytest.approx(23.0875, abs=1e-3)
@@ -81,13 +81,13 @@ def test_the_path_of_the_rocker_is_the_swing_and_the_crank_turns_on_its_circle()
 
 
 def test_the_arrow_to_the_fell_points_toward_decreasing_psi():
-    (start, tip), _ = links(crank_rocker_drawing.linkage(PAPER, ""), "notes")
+    (start, tip), _ = links(crank_rocker_drawing.of(PAPER).drawing(""), "notes")
     angles = [math.atan2(point.y, point.x - 0.167) for point in (start, tip)]
     assert angles[1] < angles[0]
 
 
 def test_labels_carry_lengths_in_mm_and_angles_in_degrees():
-    shown = " | ".join(text.text for text in texts(sheet(crank_rocker_drawing.linkage(PAPER, "Reed"))))
+    shown = " | ".join(text.text for text in texts(sheet(crank_rocker_drawing.of(PAPER).drawing("Reed"))))
     for part in (
         "Reed",
         "l1 = 31",
@@ -100,7 +100,7 @@ def test_labels_carry_lengths_in_mm_and_angles_in_degrees():
         "θ",
     ):
         assert part in shown
-    assert {"A", "B", "C", "D", "B'", "C'"} <= {text.text for text in texts(crank_rocker_drawing.linkage(PAPER, ""))}
+    assert {"A", "B", "C", "D", "B'", "C'"} <= {text.text for text in texts(crank_rocker_drawing.of(PAPER).drawing(""))}
 
 
 @pytest.mark.slow
@@ -109,13 +109,13 @@ def test_labels_carry_lengths_in_mm_and_angles_in_degrees():
 def test_labels_are_clear_of_links_and_of_each_other(design):
     title = "A crank-rocker of the beat-up, drawn with a rather long title over two lines"
     masses = {"m4": 50.0, "r4": 0.3 * design["l4"], "m4e": 3.0, "r4e": 0.4 * design["l4"]}
-    assert clear.faults_of(crank_rocker_drawing.linkage({**design, **masses}, title)) == []
+    assert clear.faults_of(crank_rocker_drawing.of({**design, **masses}).drawing(title)) == []
 
 
 @few
 @given(design=designs())
 def test_the_extent_holds_every_joint_and_every_text(design):
-    drawn = sheet(crank_rocker_drawing.linkage(design, "title"))
+    drawn = sheet(crank_rocker_drawing.of(design).drawing("title"))
     box = shapes.extent(drawn)
     points = [point for p in drawn.primitives if isinstance(p, Line) for point in p.points]
     for text in texts(drawn):
@@ -126,7 +126,7 @@ def test_the_extent_holds_every_joint_and_every_text(design):
 
 def test_a_drawing_scales_with_its_machine():
     large = {name: 1000 * value for name, value in PAPER.items()}
-    small, big = (crank_rocker_drawing.linkage(design, "t") for design in (PAPER, large))
+    small, big = (crank_rocker_drawing.of(design).drawing("t") for design in (PAPER, large))
     assert big.height == pytest.approx(1000 * small.height)
     for layer in ("frame", "front dead centre", "rear dead centre", "dimensions", "notes"):
         for item, other in zip(links(small, layer), links(big, layer), strict=True):
@@ -134,17 +134,16 @@ def test_a_drawing_scales_with_its_machine():
 
 
 def test_every_layer_drawn_on_has_a_style():
-    assert {primitive.layer for primitive in crank_rocker_drawing.linkage(PAPER, "t").primitives} <= LAYERS.keys()
+    assert {primitive.layer for primitive in crank_rocker_drawing.of(PAPER).drawing("t").primitives} <= LAYERS.keys()
 
 
 def test_lengths_that_are_no_crank_rocker_are_refused():
-    for draw in (crank_rocker_drawing.joints_csv, lambda design: crank_rocker_drawing.linkage(design, "t")):
-        with pytest.raises(BadInput, match=r"l1 \+ l4 < l2 \+ l3 fails"):
-            draw({"l1": 0.1, "l2": 0.02, "l3": 0.02, "l4": 0.1})
+    with pytest.raises(BadInput, match=r"l1 \+ l4 < l2 \+ l3 fails"):
+        crank_rocker_drawing.of({"l1": 0.1, "l2": 0.02, "l3": 0.02, "l4": 0.1})
 
 
 def test_joints_are_written_in_mm_with_every_digit():
-    rows = list(csv.DictReader(io.StringIO(crank_rocker_drawing.joints_csv(PAPER))))
+    rows = list(csv.DictReader(io.StringIO(crank_rocker_drawing.of(PAPER).skeleton.csv())))
     at = {row["joint"]: (float(row["x [mm]"]), float(row["y [mm]"])) for row in rows}
     assert list(at) == ["A", "D", "B", "C", "B'", "C'"]
     for b, c in (("B", "C"), ("B'", "C'")):
@@ -193,9 +192,9 @@ def test_the_centres_of_mass_stand_off_the_rocker_by_the_offset_of_the_effect_th
 
 
 def test_mass_and_radius_stand_in_drawing_and_table():
-    shown = [text.text for text in texts(crank_rocker_drawing.linkage(BALANCED, ""))]
+    shown = [text.text for text in texts(crank_rocker_drawing.of(BALANCED).drawing(""))]
     assert {"G  m4 = 56.8 kg, r4 = 45", "E  m4e = 3 kg, r4e = 50", "G'", "E'"} <= set(shown)
-    rows = {row["joint"]: row for row in csv.DictReader(io.StringIO(crank_rocker_drawing.joints_csv(BALANCED)))}
+    rows = {row["joint"]: row for row in csv.DictReader(io.StringIO(crank_rocker_drawing.of(BALANCED).skeleton.csv()))}
     assert list(rows) == ["A", "D", "B", "C", "G", "E", "B'", "C'", "G'", "E'"]
     for name, mass, radius in (("E", 3.0, 50.0), ("E'", 3.0, 50.0), ("G", 56.8, 45.0)):
         assert float(rows[name]["mass [kg]"]) == mass
@@ -207,12 +206,12 @@ def test_mass_and_radius_stand_in_drawing_and_table():
 
 @pytest.mark.parametrize(("m4e", "r4e"), [(0.0, 0.05), (3.0, 0.0)])
 def test_a_counterweight_that_is_not_there_is_not_drawn(m4e, r4e):
-    drawn = crank_rocker_drawing.linkage(PAPER | {"m4e": m4e, "r4e": r4e}, "")
+    drawn = crank_rocker_drawing.of(PAPER | {"m4e": m4e, "r4e": r4e}).drawing("")
     assert not [p for p in drawn.primitives if p.layer == "masses"]
-    assert "mass" not in crank_rocker_drawing.joints_csv(PAPER | {"m4e": m4e, "r4e": r4e})
+    assert "mass" not in crank_rocker_drawing.of(PAPER | {"m4e": m4e, "r4e": r4e}).skeleton.csv()
 
 
 def test_a_reed_beyond_its_rocker_is_joined_to_the_shaft():
     for radius, count in ((0.1, 3), (0.2, 4)):
-        drawn = crank_rocker_drawing.linkage(PAPER | {"m4": 1.0, "r4": radius}, "")
+        drawn = crank_rocker_drawing.of(PAPER | {"m4": 1.0, "r4": radius}).drawing("")
         assert len(links(drawn, "front dead centre")) == count

@@ -63,7 +63,7 @@ def travel(design, phi1):
 @pytest.mark.parametrize("layer", [FRONT, REAR, OVER])
 @pytest.mark.parametrize("design", [PAPER, WIDER])
 def test_links_are_drawn_at_full_scale_and_meet(design, layer):
-    drawn = links(rapier_drawing.linkage(design, ""), layer)
+    drawn = links(rapier_drawing.of(design).drawing(""), layer)
     assert [math.dist(*link) for link in drawn] == pytest.approx([design[name] for name in SIZES], rel=1e-11)
     at = {name: point for ends, link in zip(LINKS, drawn, strict=True) for name, point in zip(ends, link, strict=True)}
     for ends, link in zip(LINKS, drawn, strict=True):
@@ -75,7 +75,7 @@ def test_links_are_drawn_at_full_scale_and_meet(design, layer):
 
 def test_crank_and_rod_are_in_line_in_both_dead_centres():
     for layer, length in ((FRONT, 0.076385 + 0.275705), (REAR, 0.275705 - 0.076385)):
-        (a0, _), (_, b1), *_ = links(rapier_drawing.linkage(PAPER, ""), layer)
+        (a0, _), (_, b1), *_ = links(rapier_drawing.of(PAPER).drawing(""), layer)
         assert math.dist(a0, b1) == pytest.approx(length, rel=1e-10)
 
 
@@ -83,14 +83,14 @@ def test_crank_and_rod_are_in_line_in_both_dead_centres():
 def test_the_hand_over_is_where_the_travel_is_greatest(design):
     result = rapier_drawing.of(design)
     S, _ = travel(design, np.linspace(0, 2 * np.pi, 100_001))
-    at, rate = travel(design, np.array(result.phi1[OVER]))
+    at, rate = travel(design, np.array(result.events[OVER]))
     assert abs(rate) < 1e-12
     assert 0 <= at - S.max() < 1e-8
     assert result.phi63 * result.dimensions.travel == pytest.approx(float(at), rel=1e-12)
 
 
 def test_labels_carry_lengths_angles_the_stroke_and_the_three_positions():
-    drawn = sheet(rapier_drawing.linkage(PAPER, "Rapier"))
+    drawn = sheet(rapier_drawing.of(PAPER).drawing("Rapier"))
     shown = [text.text for text in texts(drawn)]
     for part in ("Rapier", "l1 = 76.385", "l2 = 275.705", "l3 = 684", "l71 = 773", "l3p = 180", "l4 = 12", "l6 = 185"):
         assert part in shown
@@ -105,7 +105,7 @@ def test_labels_carry_lengths_angles_the_stroke_and_the_three_positions():
 
 
 def test_both_cranks_have_their_circles_and_d_its_path_through_every_position():
-    drawn = rapier_drawing.linkage(WIDER, "")
+    drawn = rapier_drawing.of(WIDER).drawing("")
     circles = [p.radius for p in drawn.primitives if isinstance(p, Circle) and p.layer == "paths"]
     assert circles == pytest.approx([0.076385, 0.030], rel=1e-12)
     (path,) = [p for p in drawn.primitives if isinstance(p, Line) and p.closed]
@@ -116,13 +116,13 @@ def test_both_cranks_have_their_circles_and_d_its_path_through_every_position():
 
 def test_labels_are_clear_of_links_and_of_each_other_with_a_long_title():
     title = "The rapier drive, drawn with a rather long title that runs over two lines " * 2
-    drawn = rapier_drawing.linkage(WIDER, title)
+    drawn = rapier_drawing.of(WIDER).drawing(title)
     assert clear.faults_of(drawn) == []
     assert {primitive.layer for primitive in drawn.primitives} <= LAYERS.keys()
 
 
 def test_joints_are_written_in_mm_with_every_digit():
-    rows = list(csv.DictReader(io.StringIO(rapier_drawing.joints_csv(PAPER))))
+    rows = list(csv.DictReader(io.StringIO(rapier_drawing.of(PAPER).skeleton.csv())))
     at = {row["joint"]: (float(row["x [mm]"]), float(row["y [mm]"])) for row in rows}
     assert len(at) == len(rows) == 3 + 3 * 5
     for position, prime in PRIMES.items():
@@ -141,18 +141,17 @@ def test_joints_are_written_in_mm_with_every_digit():
     ],
 )
 def test_a_drive_that_does_not_assemble_is_refused(change, reason):
-    for draw in (rapier_drawing.joints_csv, lambda design: rapier_drawing.linkage(design, "")):
-        with pytest.raises(BadInput, match=reason):
-            draw(PAPER | change)
+    with pytest.raises(BadInput, match=reason):
+        rapier_drawing.of(PAPER | change)
 
 
 def test_a_refused_sley_is_named_by_its_own_lengths():
     with pytest.raises(BadInput, match=r"l1 \+ l71 < l2 \+ l3"):
-        rapier_drawing.linkage(PAPER | {"l1": 0.2}, "")
+        rapier_drawing.of(PAPER | {"l1": 0.2}).drawing("")
 
 
 def test_svg_dxf_and_png_hold_the_drive(tmp_path):
-    drawn = rapier_drawing.linkage(PAPER, "Rapier")
+    drawn = rapier_drawing.of(PAPER).drawing("Rapier")
     assert 'data-layer="hand-over"' in svg.render(drawn)
     dxf.write(drawn, tmp_path / "a.dxf")
     document = ezdxf.readfile(tmp_path / "a.dxf")
