@@ -32,7 +32,7 @@ from loomopt.model.program import (
     goals,
     nothing_follows,
 )
-from loomopt.model.sampling import Sampler, sampled
+from loomopt.model.sampling import Sampler, sampled, search_together
 from loomopt.model.session import working
 from loomopt.physics.cycle import Floats, Where
 from loomopt.physics.effects.kinds import Check, Event, UnsteadyError, label, owned
@@ -602,6 +602,21 @@ class Job(abc.ABC):
         BadInput : the scene lacks what the target needs, or a limit cannot be met.
         """
         return cached(scene, (self.name, target), lambda: self.task(scene, target).program())
+
+    def search_scales(self, scenes: Sequence[Scene], target: str) -> None:
+        """Compute the extremes of today's machines that the scales of programs are read from, in one pass.
+
+        Parameters
+        ----------
+        scenes : scenes of the same structure, with all their numbers, SI.
+        target : name of a target of the scenes.
+        """
+        if self.members or len(scenes) < 2:
+            return
+        self.program(scenes[0], target)
+        names = self.task(scenes[0], target).sampler.searched
+        if names:
+            search_together([self.task(scene, target).sampler for scene in scenes[1:]], names)
 
     def schema(self, document: Mapping[str, Any]) -> SceneSchema:
         """Schema of a scene.

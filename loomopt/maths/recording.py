@@ -15,7 +15,8 @@ from loomopt.maths.systems import Maths
 
 Number = Any
 """A recorded number, or one of any number system that stands in a formula as it is."""
-Function = Callable[..., tuple[Number, ...]]
+Function = functools.partial[tuple[Number, ...]]
+"""function(*called): outputs; its one argument is what it reads of what is known before it is called."""
 Bind = Callable[[Sequence[Number]], Function]
 """bind(known): the function, with these values of what is known before it is called."""
 Program = Callable[[Sequence[Maths]], Bind]
@@ -178,7 +179,7 @@ class Tape:
         needed = sorted(self.needed(outputs, since))
         written = _Written(self.operations, needed, list(map(self.place, outputs)), levels)
         code = compile(written.text(names), "<recorded formula>", "exec")
-        space: dict[str, Number] = {"__name__": __name__, **written.literals}
+        space: dict[str, Number] = {"__name__": __name__, "partial": functools.partial, **written.literals}
         exec(code, space)
         compiled: Program = space["program"]
         return compiled
@@ -278,16 +279,20 @@ class _Written:
         known, called = (
             [name for place, name in inputs.items() if self.level[place] == level] for level in (KNOWN, CALLED)
         )
+        bound = [*known, *(line.split(" = ", 1)[0] for line in lines[KNOWN])]
+        read = {*re.findall(r"\w+", " ".join((*lines[CALLED], result)))}
+        handed = "".join(f"{name}, " for name in bound if name in read)
         return "\n".join(
             [
                 "def program(systems):",
                 *(f" {line}" for line in (*taken, "constant = systems[-1].constant", *lines[ALWAYS])),
                 " def bind(known):",
                 *(f"  {line}" for line in ([f"{', '.join(known)}, = known"] if known else []) + [*lines[KNOWN]]),
-                f"  def function({', '.join(called)}):",
-                *(f"   {line}" for line in lines[CALLED]),
-                f"   return ({result})",
-                "  return function",
+                f"  return partial(function, ({handed}))",
+                f" def function({', '.join(('bound', *called))}):",
+                *([f"  {handed}= bound"] if handed else []),
+                *(f"  {line}" for line in lines[CALLED]),
+                f"  return ({result})",
                 " return bind",
             ]
         )

@@ -3,7 +3,7 @@
 import abc
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from loomopt.base.records import lazy
 from loomopt.maths import recording
 from loomopt.maths.jets import Jet
-from loomopt.maths.recording import Bind, Program, Recorded, Tape
+from loomopt.maths.recording import Bind, Function, Program, Recorded, Tape
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.model import Integral, JobModel, Stills
 from loomopt.model.session import current
@@ -31,33 +31,89 @@ piece's width over its distance from what is not analytic, 1 rad or so, to the p
 WORTH_IT = 64
 """Evaluations after which a formula is recorded: that takes 1 to 3 ms, and saves some 30 us of each."""
 
-AtNode = Callable[[Node], tuple[Number, ...]]
-
 
 @dataclass(frozen=True)
 class Recording:
     """Quantities written down.
 
-    known: names of what they read of a design; switches: of what they read of a node beside φ.
+    known: names of what they read of a design; switches: of what they read of a node beside φ; elementwise: whether
+    each node is read by itself, so that nodes of several designs may be read in one call.
     """
 
     program: Program
     known: tuple[str, ...]
     switches: tuple[str, ...]
+    elementwise: bool = False
     _bind: dict[tuple[Maths, Maths], Bind] = field(default_factory=dict)
 
-    def bind(self, systems: tuple[Maths, Maths], given: Given) -> AtNode:
+    def bind(self, systems: tuple[Maths, Maths], given: Given) -> "Bound":
         """Quantities of one design as a function of the node."""
         if systems not in self._bind:
             self._bind[systems] = self.program(systems)
-        values, names = given.values, self.switches
-        function = self._bind[systems]([values[name] for name in self.known])
+        values = given.values
+        return Bound(self, self._bind[systems]([values[name] for name in self.known]))
 
-        def at(node: Node) -> tuple[Number, ...]:
-            switch = node.switch
-            return function(node.phi, *[switch[name] for name in names])
 
-        return at
+@dataclass(frozen=True)
+class Bound:
+    """Quantities of a design, or of several, at nodes."""
+
+    recording: Recording
+    function: Function
+
+    def __call__(self, node: Node) -> tuple[Number, ...]:
+        """Quantities at a node, or at nodes."""
+        switch = node.switch
+        return self.function(node.phi, *[switch[name] for name in self.recording.switches])
+
+    @property
+    def values(self) -> tuple[Number, ...]:
+        """Values that the function reads of the design."""
+        values: tuple[Number, ...] = self.function.args[0]
+        return values
+
+    def of(self, values: Iterable[Number]) -> "Bound":
+        """The same quantities with other values."""
+        return Bound(self.recording, Function(self.function.func, tuple(values)))
+
+
+def bind_together(designs: Sequence["Quantities"], names: tuple[str, ...], switches: tuple[str, ...]) -> Bound | None:
+    """Quantities of several designs of one model, their values (designs, 1) where they differ; None if unrecorded."""
+    bounds = [design.bound(names, switches) for design in designs]
+    first = bounds[0]
+    if first is None or not first.recording.elementwise:
+        return None
+    values = [bound.values for bound in bounds if bound and bound.function.func is first.function.func]
+    if len(values) < len(designs):
+        return None
+    try:
+        return first.of(map(_column, zip(*values, strict=True)))
+    except (TypeError, ValueError):
+        # What a formula reads of a design may be more than a number.
+        return None
+
+
+def at_places(bound: Bound, places: Pieces) -> Bound:
+    """The same quantities, each node of its own design, by the designs' places (nodes,)."""
+    return bound.of(_at_places(value, places) for value in bound.values)
+
+
+def _column(values: Sequence[Number]) -> Number:
+    """Values of several designs as (designs, 1), or that of all; tuples entry by entry. Raises for other objects."""
+    if isinstance(values[0], tuple):
+        return tuple(map(_column, zip(*values, strict=True)))
+    column = np.array(values, dtype=np.float64)
+    if column.ndim != 1:
+        raise ValueError("a value of a design is an array")
+    # A zero of the other sign is another value.
+    digits = column.view(np.int64)
+    return values[0] if (digits == digits[0]).all() else column[:, None]
+
+
+def _at_places(value: Number, places: Pieces) -> Number:
+    if isinstance(value, tuple):
+        return tuple(_at_places(entry, places) for entry in value)
+    return value[places, 0] if np.ndim(value) else value
 
 
 @dataclass
@@ -80,21 +136,25 @@ class Quantities:
         self, model: JobModel, systems: tuple[Maths, Maths], given: Given, record_at_once: bool = False
     ) -> None:
         self.model, self.systems, self.given, self.record_at_once = model, systems, given, record_at_once
-        self._bound: dict[tuple[tuple[str, ...], tuple[str, ...]], AtNode] = {}
+        self._bound: dict[tuple[tuple[str, ...], tuple[str, ...]], Bound] = {}
 
     def __call__(self, names: tuple[str, ...], node: Node) -> tuple[Number, ...]:
         """Quantities by their names at a node, or at nodes, in one pass."""
-        switches = tuple(node.switch)
-        run = self._bound.get((names, switches))
-        if run is None:
-            history = current().cached_for(self.model, (names, switches, self.given.known), _History)
-            run = self._run(names, switches, history)
+        run = self.bound(names, tuple(node.switch))
         if run is None:
             read = self.model.together(self.systems[1], self.given, node)
             return tuple([read(name) for name in names])
         return run(node)
 
-    def _run(self, names: tuple[str, ...], switches: tuple[str, ...], history: _History) -> AtNode | None:
+    def bound(self, names: tuple[str, ...], switches: tuple[str, ...]) -> Bound | None:
+        """Recorded quantities of this design, None where there is no recording, or not yet."""
+        run = self._bound.get((names, switches))
+        if run is None:
+            history = current().cached_for(self.model, (names, switches, self.given.known), _History)
+            run = self._run(names, switches, history)
+        return run
+
+    def _run(self, names: tuple[str, ...], switches: tuple[str, ...], history: _History) -> Bound | None:
         """Recorded quantities of this design, None where there is no recording, or not yet."""
         history.evaluations += 1
         worth_it = self.record_at_once or history.evaluations > WORTH_IT
@@ -131,8 +191,12 @@ def recorded_quantities(
     used = {place: of for place, of in inputs.items() if place in needed}
     called = {name: operand for name, operand in switch.items() if operand.place in needed}
     program = tape.program(outputs, (phi, *called.values()), [Recorded(tape, place) for place in used], since)
-    return Recording(program, tuple(used.values()), tuple(called))
+    elementwise = not any(tape.operations[place].template.startswith(ACROSS_NODES) for place in needed)
+    return Recording(program, tuple(used.values()), tuple(called), elementwise)
 
+
+ACROSS_NODES = "spread_", "weighted_"
+"""Operations that make an array of numbers, or sum over one."""
 
 DATUM = "datum"
 """The switch that hands a quantity the number that an integral has at each of its own angles."""

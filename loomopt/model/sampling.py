@@ -3,8 +3,9 @@
 import functools
 import itertools
 import math
+import operator
 from array import array
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,16 @@ from loomopt.maths import systems, turning_points
 from loomopt.maths.systems import Number
 from loomopt.maths.turning_points import inside_samples, vertex
 from loomopt.model.model import Integral, JobModel, Stills
-from loomopt.model.reading import Quantities, Reading, Rows, fixed_nodes, quadrature
+from loomopt.model.reading import (
+    Bound,
+    Quantities,
+    Reading,
+    Rows,
+    at_places,
+    bind_together,
+    fixed_nodes,
+    quadrature,
+)
 from loomopt.model.session import current
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Cycle, Floats, Node, Pieces, Where
@@ -83,6 +93,8 @@ class Sampler:
         self.cycle: Cycle = model.split(systems.FLOAT, self.given)
         self.samples = max(samples, model.samples(self.given))
         self._extremes: dict[str, list[Extreme]] = {}
+        self._at_closest: dict[tuple[tuple[str, ...], tuple[float, ...]], list[Floats]] = {}
+        self._scanned: dict[tuple[str, int], Floats] = {}
 
     @lazy
     def corner_count(self) -> int:
@@ -180,10 +192,11 @@ class Sampler:
 
     def grid(self, samples: int = 0) -> tuple[Pieces, Floats]:
         """Nodes spread evenly over the turn, as many as the sampler has by default; ends of pieces included."""
-        return _grid(self._counts(samples) if samples else self._default_counts)
+        return _grid(self._counts(samples) if samples else self.counts)
 
     @lazy
-    def _default_counts(self) -> tuple[int, ...]:
+    def counts(self) -> tuple[int, ...]:
+        """Numbers of nodes of the pieces on the sampler's own grid."""
         return self._counts(self.samples)
 
     def _counts(self, samples: int) -> tuple[int, ...]:
@@ -191,6 +204,11 @@ class Sampler:
         widths = self.cycle.starts[1:] - self.cycle.starts[:-1]
         least = max(samples // max(LEAST_SHARE, len(widths) // 2), LEAST_NODES)
         return tuple((np.maximum(np.ceil(samples * widths / TURN).astype(int), least) + 1).tolist())
+
+    @lazy
+    def grid_key(self) -> Hashable:
+        """Key of designs that can be sampled in one pass: equal model, numbers, pieces and grid."""
+        return id(self.model), self.given.known, self.counts, self.cycle.names
 
     def extremes(self, name: str, where: Where | None = None) -> list[Extreme]:
         """Local extremes of |quantity| (of a signed one, its maxima), largest first, right to rounding.
@@ -203,6 +221,11 @@ class Sampler:
         on = self.on(name, where)
         return [e for e in tops if on[e.piece]]
 
+    @property
+    def searched(self) -> tuple[str, ...]:
+        """Names of the quantities whose extremes are computed already."""
+        return tuple(self._extremes)
+
     def knows(self, name: str) -> bool:
         """Whether the extremes of a quantity are computed already."""
         return name in self._extremes
@@ -213,20 +236,7 @@ class Sampler:
 
     def search(self, names: Iterable[str]) -> None:
         """Compute the extremes of several quantities in one pass."""
-        new = [name for name in dict.fromkeys(names) if name not in self._extremes]
-        if not new:
-            return
-        values = {name: self._sampled(name) for name in new}
-        peaks = {name: self._peaks(self.heights(name, of)) for name, of in values.items()}
-        refined = self._refined(values, {name: at for name, at in peaks.items() if at is not None})
-        for name in new:
-            extremes = refined.get(name)
-            if extremes is None:
-                self._extremes[name] = [Extreme(0, 0.0, float("inf"))]
-                continue
-            if self.singular:
-                extremes += self._spikes(name)
-            self._extremes[name] = sorted(extremes, key=lambda extreme: -extreme.height)
+        search_together((self,), names)
 
     def share(self) -> None:
         """Take the extremes of the last sampler of the same design, with fewer or other names of its numbers.
@@ -247,29 +257,50 @@ class Sampler:
             return False
         mine, others = self.given.values, other.given.values
         # Derived numbers come last, and differ where any number does.
-        return all(_is_same(mine.get(name), others[name]) for name in reversed([*others]))
+        return all(_is_same(mine.get(name), others[name]) for name in other.names_from_last)
 
-    def _peaks(self, size: Floats) -> Pieces | None:
-        """Places where heights on the sampler's grid are locally largest; None where a height is not a number."""
-        if not np.all(np.isfinite(size)):
-            return None
-        left, right = np.empty_like(size), np.empty_like(size)
-        left[1:], right[:-1] = size[:-1], size[1:]
-        first, last = _ends(self._default_counts)
-        left[first] = right[last] = -np.inf
-        return np.flatnonzero((size > left) & (size >= right))
+    @lazy
+    def names_from_last(self) -> tuple[str, ...]:
+        """Names of the design's numbers, the derived ones first."""
+        return tuple(reversed([*self.given.values]))
 
-    def _sampled(self, name: str) -> Floats:
+    def learn(self, extremes: Mapping[str, list[Extreme] | None]) -> None:
+        """Record the extremes of quantities; None for one that is not a number somewhere on the grid."""
+        for name, known in extremes.items():
+            if known is None:
+                self._extremes[name] = [Extreme(0, 0.0, float("inf"))]
+                continue
+            spikes = self._spikes(name) if self.singular else []
+            self._extremes[name] = sorted([*known, *spikes], key=lambda extreme: -extreme.height)
+
+    def learn_closest(self, names: tuple[str, ...], angles: Sequence[float], values: list[Floats]) -> None:
+        """Record quantities that measure the distance to a singular position at crank angles, rad."""
+        self._at_closest[names, tuple(angles)] = values
+
+    def learn_scan(self, points: int, highest: Mapping[str, Floats]) -> None:
+        """Record the highest values of quantities on each piece at many points of the turn, SI."""
+        self._scanned |= {(name, points): of for name, of in highest.items()}
+
+    def knows_scan(self, name: str, points: int) -> bool:
+        """Whether the highest values of a quantity at many points are computed already."""
+        return (name, points) in self._scanned
+
+    def scanned(self, name: str, points: int, where: Where | None = None) -> float:
+        """Highest |quantity| (of a signed one, value) at many points of the turn, or of the pieces `where`, SI."""
+        scan_together((self,), (name,), points)
+        return float(self._scanned[name, points][self.on(name, where)].max(initial=-np.inf))
+
+    def on_grid(self, name: str) -> Floats:
         """Quantity on the sampler's own grid; one that fits in the cache keeps its poses for the next."""
         pieces, u = self.grid()
         if len(u) > CHUNK:
             return self.at(name, pieces, u)
         self.session.positions += len(u)
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.array(np.broadcast_to(self._on_grid(name), u.shape), dtype=np.float64)
+            return np.array(np.broadcast_to(self._read_on_grid(name), u.shape), dtype=np.float64)
 
     @lazy
-    def _on_grid(self) -> Callable[[str], Number]:
+    def _read_on_grid(self) -> Callable[[str], Number]:
         return self.model.together(systems.numpy(), self.given, self.node(*self.grid()))
 
     @lazy
@@ -277,7 +308,8 @@ class Sampler:
         """Crank angles, rad, where the mechanism is close to a singular position."""
 
         def squares(names: tuple[str, ...], phi: Floats) -> Sequence[Floats]:
-            return [np.zeros(phi.shape) + values for values in self.quantities(names, self.node_at(phi))]
+            known = self._at_closest.get((names, tuple(phi.tolist())))
+            return [np.zeros(phi.shape) + of for of in known or self.quantities(names, self.node_at(phi))]
 
         return self.model.singular(squares)
 
@@ -303,53 +335,6 @@ class Sampler:
     def heights(self, name: str, values: Floats) -> Floats:
         """Part of a quantity's values that is compared with a bound: the magnitude, or the signed value."""
         return values if name in self.model.signed else np.abs(values)
-
-    def _refined(self, values: Mapping[str, Floats], peaks: Mapping[str, Pieces]) -> dict[str, list[Extreme]]:
-        """Refine sampled peaks: a parabola through the samples, then a quartic; a piece's end may stay the peak.
-
-        values: of each quantity on the sampler's own grid; peaks: where each is locally largest there.
-        """
-        names, counts = tuple(peaks), [len(at) for at in peaks.values()]
-        if not sum(counts):
-            return {name: [] for name in names}
-        ends = list(itertools.accumulate(counts, initial=0))
-        spans = {name: slice(*span) for name, span in zip(names, itertools.pairwise(ends), strict=True)}
-        pieces, u = self.grid()
-        at = np.concatenate(list(peaks.values()))
-        piece = pieces[at]
-        inner = at + (u[at] == 0.0) - (u[at] == 1.0)
-        sampled, sign, neighbours = np.empty(len(at)), np.ones(len(at)), np.empty((3, len(at)))
-        for name, span in spans.items():
-            sampled[span] = values[name][at[span]]
-            neighbours[:, span] = values[name][inner[span] + SIDES]
-            if name not in self.model.signed:
-                sign[span] = np.sign(sampled[span])
-        sampled *= sign
-        step = u[inner + 1] - u[inner]
-        centre = u[inner] + step * vertex(sign * neighbours)
-        step = CLOSER * step
-        centre = inside_samples(centre, 2 * step)
-        nodes = centre + step * np.arange(-2, 3)[:, None]
-        around = self._values_at(spans, np.broadcast_to(piece, nodes.shape), nodes)
-        top = inside_samples(centre + step * vertex(sign * around), np.zeros_like(step))
-        refined = sign * self._values_at(spans, piece, top)
-        # A level stretch's extreme is its beginning.
-        bent = (around[0] != around[2]) | (around[4] != around[2])
-        better = (refined >= sampled) & bent
-        best_u, best = np.where(better, top, u[at]), sign * np.where(better, refined, sampled)
-        tops = list(zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True))
-        signed = self.model.signed
-        return {n: [Extreme(*extreme, signed=n in signed) for extreme in tops[span]] for n, span in spans.items()}
-
-    def _values_at(self, spans: Mapping[str, slice], pieces: Pieces, u: Floats) -> Floats:
-        """Values of quantities, SI, each at its columns of nodes (pieces, u)."""
-        read = self.together(tuple(spans), pieces.ravel(), u.ravel())
-        if len(spans) == 1:
-            return read[next(iter(spans))].reshape(u.shape)
-        values = np.empty(u.shape)
-        for name, span in spans.items():
-            values[..., span] = read[name].reshape(u.shape)[..., span]
-        return values
 
     def angle(self, extreme: Extreme) -> float:
         """Crank angle of an extreme, rad."""
@@ -385,6 +370,208 @@ class Sampler:
         """Mask of the nodes where Q is not negative."""
         force = self.model.instant(systems.numpy(), self.given, self.node(pieces, u)).force
         return np.broadcast_to(np.asarray(force) >= 0.0, u.shape)
+
+
+def search_together(samplers: Iterable[Sampler], names: Iterable[str]) -> None:
+    """Compute the extremes of several quantities of several designs in one pass.
+
+    The extremes of a design do not depend on the others, to the last bit.
+    """
+    names = tuple(dict.fromkeys(names))
+    new = {sampler: tuple(name for name in names if not sampler.knows(name)) for sampler in samplers}
+    for searched, designs in _groups({sampler: absent for sampler, absent in new.items() if absent}):
+        designs.search(searched)
+
+
+def scan_together(samplers: Iterable[Sampler], names: Iterable[str], points: int) -> None:
+    """Read quantities of several designs at many points of the turn, and record the highest values of each piece."""
+    names = tuple(dict.fromkeys(names))
+    new = {sampler: tuple(name for name in names if not sampler.knows_scan(name, points)) for sampler in samplers}
+    for scanned, designs in _groups({sampler: absent for sampler, absent in new.items() if absent}):
+        designs.scan(scanned, points)
+
+
+def _groups(requests: "Mapping[Sampler, tuple[str, ...]]") -> "Iterator[tuple[tuple[str, ...], _Designs]]":
+    """Yield the designs that can be read in one pass, with the names of their quantities."""
+    groups: dict[tuple[tuple[str, ...], Hashable], list[Sampler]] = {}
+    for sampler, names in requests.items():
+        groups.setdefault((names, sampler.grid_key), []).append(sampler)
+    for (names, _), group in groups.items():
+        most = max(1, CHUNK // len(group[0].grid()[1]))
+        for begin in range(0, len(group), most):
+            yield names, _Designs(group[begin : begin + most])
+
+
+class _Designs:
+    """Designs of one model on equal grids, sampled in one pass."""
+
+    def __init__(self, samplers: Sequence[Sampler]) -> None:
+        self.samplers, self.first = samplers, samplers[0]
+        self.model, self.signed = self.first.model, self.first.model.signed
+        self.pieces, self.u = self.first.grid()
+        self._bounds: dict[tuple[str, ...], Bound | None] = {}
+
+    def search(self, names: tuple[str, ...]) -> None:
+        """Compute the extremes of quantities that no design knows yet."""
+        values = self._on_grid(names)
+        extremes = self._refined(
+            values, {name: self._peaks(self.first.heights(name, of)) for name, of in values.items()}
+        )
+        for design, sampler in enumerate(self.samplers):
+            sampler.learn({name: extremes[name][design] for name in names})
+
+    def _on_grid(self, names: tuple[str, ...]) -> dict[str, Floats]:
+        """Quantities on the grid, (designs, nodes), SI."""
+        bound = self._bound(names)
+        if bound is None:
+            return {name: np.array([sampler.on_grid(name) for sampler in self.samplers]) for name in names}
+        node = self._node(operator.methodcaller("node", self.pieces, self.u))
+        return dict(zip(names, self._read(bound, node, len(self.u)), strict=True))
+
+    def _node(self, node_of: Callable[[Sampler], Node]) -> Node:
+        """Nodes of all designs, (designs, nodes); (nodes,) where they are those of each."""
+        cycles = {(sampler.cycle.starts.tobytes(), sampler.cycle.switches.tobytes()) for sampler in self.samplers}
+        if len(cycles) == 1:
+            return node_of(self.first)
+        nodes = [node_of(sampler) for sampler in self.samplers]
+        switch = {name: np.array([node.switch[name] for node in nodes]) for name in nodes[0].switch}
+        return Node(np.array([node.phi for node in nodes]), switch)
+
+    def _read(self, bound: Bound, node: Node, count: int) -> list[Floats]:
+        """Quantities of all designs at nodes, (designs, count)."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            read = bound(node)
+        self.first.session.positions += len(self.samplers) * count * len(read)
+        return [np.broadcast_to(value, (len(self.samplers), count)) for value in read]
+
+    def _read_closest(self) -> None:
+        """Read what measures the distance to singular positions at the crank angles where that is known to be least."""
+        for prefix, group in self.model.kinematics.groups.items():
+            names = tuple(prefix + name for name in group.closes.values())
+            bound = self._bound(names) if group.closest and names else None
+            if bound is not None:
+                node = self._node(operator.methodcaller("node_at", np.array(group.closest)))
+                read = self._read(bound, node, len(group.closest))
+                for design, sampler in enumerate(self.samplers):
+                    sampler.learn_closest(names, group.closest, [values[design] for values in read])
+
+    def scan(self, names: tuple[str, ...], points: int) -> None:
+        """Read quantities at many points, and record the highest of each piece."""
+        pieces, u = self.first.grid(points)
+        starts = [*np.flatnonzero(np.diff(pieces, prepend=-1)).tolist(), len(u)]
+        highest = {name: np.full((len(self.samplers), len(starts) - 1), -np.inf) for name in names}
+        bound, step = self._bound(names), max(1, CHUNK // len(self.samplers))
+        for piece, (first, last) in enumerate(itertools.pairwise(starts)):
+            for begin in range(first, last, step):
+                part = slice(begin, min(begin + step, last))
+                at = pieces[part], u[part]
+                if bound is None:
+                    read = [sampler.together(names, *at) for sampler in self.samplers]
+                    values = [np.array([of[name] for of in read]) for name in names]
+                else:
+                    node = self._node(operator.methodcaller("node", *at))
+                    values = self._read(bound, node, len(at[1]))
+                for name, of in zip(names, values, strict=True):
+                    tops = self.first.heights(name, of).max(axis=1)
+                    highest[name][:, piece] = np.maximum(highest[name][:, piece], tops)
+        for design, sampler in enumerate(self.samplers):
+            sampler.learn_scan(points, {name: of[design] for name, of in highest.items()})
+
+    def _bound(self, names: tuple[str, ...]) -> Bound | None:
+        """Quantities of all designs, None for one design, or where its formulas are not recorded."""
+        if len(self.samplers) == 1:
+            return None
+        if names not in self._bounds:
+            designs = [sampler.quantities for sampler in self.samplers]
+            self._bounds[names] = bind_together(designs, names, self.first.cycle.names)
+        return self._bounds[names]
+
+    def _at(self, names: tuple[str, ...], designs: Pieces, pieces: Pieces, u: Floats) -> dict[str, Floats]:
+        """Quantities, SI, at nodes (pieces, u) of designs, by their places; all (nodes,)."""
+        if len(self.samplers) == 1:
+            return self.first.together(names, pieces, u)
+        bound = self._bound(names)
+        if bound is None:
+            values = {name: np.empty(u.shape) for name in names}
+            for design, sampler in enumerate(self.samplers):
+                places = np.flatnonzero(designs == design)
+                for name, read in sampler.together(names, pieces[places], u[places]).items():
+                    values[name][places] = read
+            return values
+        self.first.session.positions += len(u) * len(names)
+        starts = np.array([sampler.cycle.starts for sampler in self.samplers])
+        switches = np.array([sampler.cycle.switches for sampler in self.samplers])[designs, pieces]
+        phi = starts[designs, pieces] * (1 - u) + starts[designs, pieces + 1] * u
+        with np.errstate(invalid="ignore", divide="ignore"):
+            here = at_places(bound, designs)(Node(phi, dict(zip(self.first.cycle.names, switches.T, strict=True))))
+        return {name: np.broadcast_to(value, u.shape) for name, value in zip(names, here, strict=True)}
+
+    def _peaks(self, size: Floats) -> tuple[Pieces, Pieces, NDArray[np.bool_]]:
+        """Designs and nodes of the local maxima of heights on the grid, and which designs' heights are all numbers."""
+        finite = np.asarray(np.isfinite(size).all(axis=1))
+        left, right = np.empty_like(size), np.empty_like(size)
+        left[:, 1:], right[:, :-1] = size[:, :-1], size[:, 1:]
+        first, last = _ends(self.first.counts)
+        left[:, first] = right[:, last] = -np.inf
+        designs, nodes = np.nonzero((size > left) & (size >= right) & finite[:, None])
+        return designs, nodes, finite
+
+    def _refined(
+        self, values: Mapping[str, Floats], peaks: Mapping[str, tuple[Pieces, Pieces, NDArray[np.bool_]]]
+    ) -> dict[str, list[list[Extreme] | None]]:
+        """Refine sampled peaks: a parabola through the samples, then a quartic; a piece's end may stay the peak.
+
+        values: of each quantity on the grid; peaks: where it is locally largest there. Returns the extremes of each
+        design, None where a value is not a number.
+        """
+        names, counts = tuple(peaks), [len(nodes) for _, nodes, _ in peaks.values()]
+        extremes: dict[str, list[list[Extreme] | None]] = {
+            name: [[] if known else None for known in finite] for name, (_, _, finite) in peaks.items()
+        }
+        if not sum(counts):
+            return extremes
+        ends = list(itertools.accumulate(counts, initial=0))
+        spans = {name: slice(*span) for name, span in zip(names, itertools.pairwise(ends), strict=True)}
+        designs, at = (np.concatenate([of[k] for of in peaks.values()]) for k in range(2))
+        u, piece = self.u, self.pieces[at]
+        inner = at + (u[at] == 0.0) - (u[at] == 1.0)
+        sampled, sign, neighbours = np.empty(len(at)), np.ones(len(at)), np.empty((3, len(at)))
+        for name, span in spans.items():
+            sampled[span] = values[name][designs[span], at[span]]
+            neighbours[:, span] = values[name][designs[span], inner[span] + SIDES]
+            if name not in self.signed:
+                sign[span] = np.sign(sampled[span])
+        sampled *= sign
+        step = u[inner + 1] - u[inner]
+        centre = u[inner] + step * vertex(sign * neighbours)
+        step = CLOSER * step
+        centre = inside_samples(centre, 2 * step)
+        nodes = centre + step * np.arange(-2, 3)[:, None]
+        around = self._values_at(spans, designs, piece, nodes)
+        top = inside_samples(centre + step * vertex(sign * around), np.zeros_like(step))
+        refined = sign * self._values_at(spans, designs, piece, top)
+        # A level stretch's extreme is its beginning.
+        bent = (around[0] != around[2]) | (around[4] != around[2])
+        better = (refined >= sampled) & bent
+        best_u, best = np.where(better, top, u[at]), sign * np.where(better, refined, sampled)
+        tops = list(zip(designs.tolist(), piece.tolist(), best_u.tolist(), best.tolist(), strict=True))
+        for name, span in spans.items():
+            for design, of_piece, at_u, value in tops[span]:
+                known = extremes[name][design]
+                if known is not None:
+                    known.append(Extreme(of_piece, at_u, value, name in self.signed))
+        return extremes
+
+    def _values_at(self, spans: Mapping[str, slice], designs: Pieces, pieces: Pieces, u: Floats) -> Floats:
+        """Values of quantities, SI, each at its columns of nodes (pieces, u) of designs."""
+        designs, pieces = np.broadcast_to(designs, u.shape), np.broadcast_to(pieces, u.shape)
+        read = self._at(tuple(spans), designs.ravel(), pieces.ravel(), u.ravel())
+        if len(spans) == 1:
+            return read[next(iter(spans))].reshape(u.shape)
+        values = np.empty(u.shape)
+        for name, span in spans.items():
+            values[..., span] = read[name].reshape(u.shape)[..., span]
+        return values
 
 
 def _is_same(first: Number, second: Number) -> bool:

@@ -258,6 +258,7 @@ class Sweep:
     def _search_from_neighbours(self, tasks: Sequence[StudyTask]) -> list[Search | None]:
         """Searches between the optima of two neighbours; None for a task that must be solved alone."""
         searches: list[Search | None] = [None] * len(tasks)
+        self._search_scales([task for task in tasks if task.neighbours])
         starts = [
             (k, start) for k, task in enumerate(tasks) if task.neighbours and (start := self._neighbour_start(task))
         ]
@@ -266,6 +267,13 @@ class Sweep:
         ):
             searches[k] = search
         return searches
+
+    def _search_scales(self, tasks: Sequence[StudyTask]) -> None:
+        """Compute what the programs of tasks are scaled by, in one pass; what fails fails again for its task."""
+        with contextlib.suppress(ArithmeticError, BadInput, TypeError, ValueError):
+            scenes = [self.scene_at(task.point) for task in tasks]
+            if scenes:
+                registry.of_target(scenes[0], self.target).search_scales(scenes, self.target)
 
     def _neighbour_start(self, task: StudyTask) -> neighbour_newton.NeighbourTask | None:
         """Start of a search between two neighbours' optima; None for an invalid combination."""

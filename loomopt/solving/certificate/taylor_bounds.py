@@ -19,7 +19,7 @@ from loomopt.maths.systems import Number
 from loomopt.model.model import Integral
 from loomopt.model.program import Program
 from loomopt.model.reading import Quantities, Reading
-from loomopt.model.sampling import Sampler
+from loomopt.model.sampling import Sampler, scan_together
 from loomopt.physics.cycle import Node, Where
 
 MOST_BOXES, MEAN_BOXES = 20_000, 2048
@@ -269,12 +269,6 @@ def cycle_rows(program: Program) -> list[CycleRow]:
 
 def scan_excess(sampler: Sampler, rows: Sequence[CycleRow], points: int) -> float:
     """Excess of an independent dense scan over the refined peaks, relative to the row's scale."""
-    pieces, u = sampler.grid(points)
-    values = sampler.together(list(dict.fromkeys(name for name, _, _ in rows)), pieces, u)
-    worst = 0.0
-    for name, scale, where in rows:
-        on = sampler.on(name, where)
-        known = values[name] if on.all() else values[name][on[pieces]]
-        highest = float(sampler.heights(name, known).max(initial=-np.inf))
-        worst = max(worst, (highest - sampler.peak(name, where)) / scale)
-    return worst
+    scan_together((sampler,), (name for name, _, _ in rows), points)
+    excesses = ((sampler.scanned(n, points, where) - sampler.peak(n, where)) / scale for n, scale, where in rows)
+    return max((excess for excess in excesses if excess > 0.0), default=0.0)

@@ -1,15 +1,16 @@
 """Records of a solve: settings, end point, and results of other solves."""
 
+import contextlib
 import functools
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from loomopt.model.program import Program
-from loomopt.model.sampling import Extreme, Sampler, sampled
+from loomopt.model.sampling import Extreme, Sampler, sampled, search_together
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import NEAR, POLISH_FARTHEST, ROUNDING, SAMPLES
 from loomopt.solving.nlp.rows import Multipliers
@@ -150,6 +151,18 @@ def sampler_at(program: Program, x: Mapping[str, float], samples: int = SAMPLES)
         return sampler if all(map(math.isfinite, sampler.static.values())) else None
     except (ValueError, ZeroDivisionError, FloatingPointError):
         return None
+
+
+def search_extremes(samplers: Iterable[tuple[Sampler | None, tuple[str, ...]]]) -> None:
+    """Compute the extremes of quantities of designs, those of equal names in one pass; None: no design."""
+    by_names: dict[tuple[str, ...], list[Sampler]] = {}
+    for sampler, names in samplers:
+        if sampler is not None:
+            by_names.setdefault(names, []).append(sampler)
+    for names, group in by_names.items():
+        # A design without a number fails again where its extremes are read.
+        with contextlib.suppress(ArithmeticError, TypeError, ValueError):
+            search_together(group, names)
 
 
 def excess(program: Program, x: Mapping[str, float]) -> float:

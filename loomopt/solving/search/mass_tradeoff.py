@@ -4,9 +4,10 @@ The levels of a target are limited to that share above their values at the best 
 then the levels again with no more mass. The result is certified as an optimum.
 """
 
+import itertools
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from loomopt.model.limits import Limit
@@ -15,7 +16,7 @@ from loomopt.model.program import Added, Program
 from loomopt.model.sampling import sampled
 from loomopt.physics.tolerances import INDIFFERENT, MOVED, SAME_OBJECTIVE, SHOWN_AS_ZERO
 from loomopt.solving.certificate.records import Level
-from loomopt.solving.nlp.point import Known
+from loomopt.solving.nlp.point import Known, sampler_at, search_extremes
 from loomopt.solving.search.search import (
     Candidate,
     MassTradeoff,
@@ -67,6 +68,35 @@ def simplify(search: Search) -> Search:
     )
 
 
+def sample_without_mass(searches: Iterable[Search]) -> None:
+    """Compute the extremes that `simplify` reads of designs without added mass, all in one pass."""
+    designs = []
+    for search in searches:
+        program, best, added = search.program, search.best, search.program.added
+        if best is None or added is None or not added.without or best.x[added.least.row] <= MOVED * added.least.scale:
+            continue
+        without = {**best.x, **added.without}
+        count = sum(1 for _ in itertools.takewhile(lambda level: not level.quantities, program.objectives))
+        if not _is_far_worse(program, best.x, without, added.share or INDIFFERENT, count):
+            names = tuple(name for objective in program.objectives for name in objective.quantities)
+            designs.append((sampler_at(program, without), names))
+    search_extremes(designs)
+
+
+def _is_far_worse(
+    program: Program, x: Mapping[str, float], without: Mapping[str, float], share: float, count: int | None = None
+) -> bool:
+    """Whether one of the first `count` levels (of all by default) is worse without added mass by many shares.
+
+    x, without: variables of both designs, SI.
+    """
+    levels = zip(objective_values(program, x), objective_values(program, without), strict=True)
+    return any(
+        value_without - value > MOST_SHARES * share * max(1.0, abs(value))
+        for value, value_without in itertools.islice(levels, count)
+    )
+
+
 def _without(search: Search, best: Candidate, added: Added) -> Search | None:
     """The search with the best design without added mass; None where a level is worse by more than the share.
 
@@ -76,8 +106,7 @@ def _without(search: Search, best: Candidate, added: Added) -> Search | None:
     if not removed:
         return None
     share = added.share or INDIFFERENT
-    levels = zip(objective_values(program, best.x), objective_values(program, {**best.x, **removed}), strict=True)
-    if any(value_without - value > MOST_SHARES * share * max(1.0, abs(value)) for value, value_without in levels):
+    if _is_far_worse(program, best.x, {**best.x, **removed}, share):
         return None
     variables = (
         v._replace(lower=removed[v.name], upper=removed[v.name]) if v.name in removed else v for v in program.variables

@@ -25,7 +25,7 @@ from loomopt.solving.certificate.batch_derivatives import DesignAt, Designs, Row
 from loomopt.solving.certificate.kkt import ActiveRow
 from loomopt.solving.certificate.records import Certificate, FrameRow
 from loomopt.solving.certificate.taylor_bounds import cycle_rows
-from loomopt.solving.nlp.point import Point, sampler_at
+from loomopt.solving.nlp.point import Point, sampler_at, search_extremes
 from loomopt.solving.search import tie_break
 from loomopt.solving.search.search import Candidate, Search, objectives, printed_design
 
@@ -294,39 +294,46 @@ def _certify_group(ends: Sequence[tuple[NeighbourTask, dict[str, float]]]) -> It
         [(search.program, x) for search, x in zip(searches, tidy_designs, strict=True)]
     )
     designs = [printed_design(search, x) for search, (x, _) in zip(searches, tie_breaks, strict=True)]
-    places = [
-        k for k, (request, _) in enumerate(ends) if _is_admissible(request.search.program, designs[k], request.peaks)
-    ]
+    requests = [(request.search.program, x, request.peaks) for (request, _), x in zip(ends, designs, strict=True)]
+    places = [k for k, is_admissible in enumerate(_are_admissible(requests)) if is_admissible]
     certificate_requests = [(searches[k].program, designs[k]) for k in places]
     accuracies = {search.settings.accuracy for search in searches}
     certificates = dict(zip(places, certify_batch(certificate_requests, min(accuracies, default=1.0)), strict=True))
-    for k, ((_, x), search) in enumerate(zip(ends, searches, strict=True)):
-        program, accuracy, certificate = search.program, search.settings.accuracy, certificates.get(k)
+    found: list[Search | None] = [None] * len(ends)
+    for k, certificate in certificates.items():
+        search, (chosen, rules) = searches[k], tie_breaks[k]
+        program, accuracy = search.program, search.settings.accuracy
         precise = max(min(PRECISE, accuracy), ROUNDING)
-        if certificate is None or not (
-            certificate.passed and certificate.residual <= precise and certificate.error <= accuracy
-        ):
+        if not (certificate.passed and certificate.residual <= precise and certificate.error <= accuracy):
+            continue
+        point = Point(ends[k][1], "Solve_Succeeded", True, structure=program.structure)
+        candidate = Candidate(
+            point, objectives(program, designs[k]), 0.0, chosen, replace(certificate, tie_breaks=rules)
+        )
+        found[k] = replace(search, candidates=(candidate,), best=candidate, stayed=True)
+    mass_tradeoff.sample_without_mass([search for search in found if search])
+    for certified in found:
+        best = certified.best if certified else None
+        if certified is None or best is None:
             yield None
             continue
-        best, rules = tie_breaks[k]
-        point = Point(x, "Solve_Succeeded", True, structure=program.structure)
-        candidate = Candidate(point, objectives(program, designs[k]), 0.0, best, replace(certificate, tie_breaks=rules))
-        next_search = replace(search, candidates=(candidate,), best=candidate, stayed=True)
-        is_open = certificate.level and len(least_change.undecided(next_search, candidate)[1])
+        is_open = best.certificate.level and len(least_change.undecided(certified, best)[1])
         # A design with open directions, or with a possible mass trade-off, is solved alone.
-        yield next_search if not is_open and mass_tradeoff.simplify(next_search) is next_search else None
+        yield certified if not is_open and mass_tradeoff.simplify(certified) is certified else None
 
 
-def _is_admissible(program: Program, x: Mapping[str, float], peaks: Sequence[str]) -> bool:
-    """Whether every limit holds at variables x (SI).
+def _are_admissible(designs: Sequence[tuple[Program, Mapping[str, float], Sequence[str]]]) -> list[bool]:
+    """Whether every limit holds at variables x (SI) of each program.
 
-    The extremes of the certificate's quantities and of `peaks` are searched in one pass.
+    The extremes of the certificate's quantities and of `peaks`, the last entry, are searched in one pass.
     """
-    sampler = sampler_at(program, x)
-    if sampler is None:
-        return False
-    sampler.search((*(name for name, _, _ in cycle_rows(program)), *peaks))
-    return all(limit.violation(sampler) <= FEASIBLE for limit in program.limits)
+    samplers = [sampler_at(program, x) for program, x, _ in designs]
+    names = [(*(name for name, _, _ in cycle_rows(program)), *peaks) for program, _, peaks in designs]
+    search_extremes(zip(samplers, names, strict=True))
+    return [
+        sampler is not None and all(limit.violation(sampler) <= FEASIBLE for limit in program.limits)
+        for sampler, (program, _, _) in zip(samplers, designs, strict=True)
+    ]
 
 
 def optimum(job: Job, program: Program, x: Mapping[str, float], certificate: Certificate) -> Optimum | None:

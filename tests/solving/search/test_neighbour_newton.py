@@ -64,7 +64,7 @@ def test_it_is_the_same_bits_in_batches_of_any_size(optima):
 
 
 def test_extremes_that_figures_read_are_found_with_the_certificates_and_not_again(optima, monkeypatch):
-    sampled, read = [], Sampler._sampled
+    sampled, read = [], Sampler.on_grid
 
     def counted(sampler, name):
         sampled.append(name)
@@ -73,7 +73,7 @@ def test_extremes_that_figures_read_are_found_with_the_certificates_and_not_agai
     scene, task = lo.load("beatup").set("operation.M0", "755.0 N*m"), neighbour_task(755.0, ENDS, optima)
     assert set(task.peaks) == {"peak_torque", "peak_power", "obliquity"}
     (search,) = neighbour_newton.solve_neighbours([task])
-    monkeypatch.setattr(Sampler, "_sampled", counted)
+    monkeypatch.setattr(Sampler, "on_grid", counted)
     here = neighbour_answer.evaluated(scene, search)
     assert sampled == []
     peaks = {"peak_torque", "peak_power", "mu_min"}
