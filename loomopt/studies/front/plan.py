@@ -217,8 +217,9 @@ def _trials(front: Sequence[Spot], rows: Mapping[int, Row], steps: int, scale: F
     }
     lost_pairs = _redone(list(rows.values())) - steps_done.keys()
     trials = []
+    sizes = {name: _width(front, name) for name in {name for spot in front for name in spot.x}}
     for k, (left, right) in enumerate(itertools.pairwise(front)):
-        if _is_one_branch(front, k):
+        if _is_one_branch(front, k, sizes):
             continue
         wide = right.b - left.b > 2 * NARROW and (_changing(left, right) or _sheer(left, right))
         for spot, neighbour in ((left, right), (right, left)):
@@ -230,11 +231,17 @@ def _trials(front: Sequence[Spot], rows: Mapping[int, Row], steps: int, scale: F
     return trials
 
 
-def _is_one_branch(front: Sequence[Spot], k: int) -> bool:
+def _width(front: Sequence[Spot], name: str) -> float:
+    """Width of the range of a variable on the front, SI."""
+    numbers = [spot.x[name] for spot in front if name in spot.x]
+    return max(numbers) - min(numbers)
+
+
+def _is_one_branch(front: Sequence[Spot], k: int, sizes: Mapping[str, float]) -> bool:
     """Whether points k and k + 1 lie on one branch.
 
     They touch the same sides, their slopes enclose the fall between them, and their designs differ as they differ from
-    the next point's.
+    the next point's. sizes: width of each variable's range on the front, SI.
     """
     left, right = front[k], front[k + 1]
     fall = (right.a - left.a) / (right.b - left.b)
@@ -242,13 +249,13 @@ def _is_one_branch(front: Sequence[Spot], k: int) -> bool:
     if left.active != right.active or not (left.x and slopes[0] - ALIKE <= fall <= slopes[1] + ALIKE):
         return False
     neighbours = [spot for spot in (*front[max(k - 1, 0) : k], *front[k + 2 : k + 3]) if spot.active == left.active]
-    sizes = {name: max(spot.x[name] for spot in front) - min(spot.x[name] for spot in front) for name in left.x}
 
     def is_alike(other: Spot) -> bool:
         near = left if other.b < left.b else right
         share = (right.b - left.b) / abs(near.b - other.b)
         sign = 1 if near is left else -1
-        for name, size in sizes.items():
+        for name in left.x:
+            size = sizes[name]
             change, expected = right.x[name] - left.x[name], share * sign * (near.x[name] - other.x[name])
             if abs(change - expected) > ALIKE * size + BRANCH * max(abs(change), abs(expected)):
                 return False
