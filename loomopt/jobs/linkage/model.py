@@ -138,7 +138,8 @@ def output_value(event: str, axis: str) -> str:
 class Window(NamedTuple):
     """Interval of the crank angle after an event; the travel in it counts from the output at the event `level`.
 
-    It begins and ends at angles after the event, or it begins at the event and ends at the event `until`.
+    It begins and ends at angles after the event, or it begins at the event and ends at the event `until`. output:
+    another coordinate whose travel is meant, None for the output itself; value: what it counts from without `level`.
     """
 
     name: str
@@ -147,6 +148,14 @@ class Window(NamedTuple):
     ends: Ref | None
     level: str
     until: str = ""
+    output: Output | None = None
+    value: Ref | None = None
+
+    def coordinate(self, pose: "LinkageMotion") -> "LinkageMotion":
+        """Pose whose output is the coordinate of this window."""
+        if self.output is None:
+            return pose
+        return dataclasses.replace(pose, output=self.output, factor=None, zero=None)
 
     @property
     def length(self) -> str:
@@ -292,6 +301,13 @@ class LinkageMotion(Motion):
         if self.output.measure != "angle":
             return self.q - there.q
         return self._turned(there.direction)
+
+    def beyond(self, value: Number) -> Number:
+        """Travel of the output from a value of it, m, or rad of an angle from x."""
+        if self.output.measure != "angle":
+            return self.q - value
+        maths = self.joints.maths
+        return self._turned(Vector(maths.cos(value), maths.sin(value)))
 
     def _turned(self, since: Vector) -> Number:
         """Change of the output from another direction."""
@@ -959,7 +975,10 @@ class Reach(NamedTuple):
 
 
 def _window_travel(window: Window, at: Instant) -> Number:
-    return at.node.switch[window.switch] * at.pose.since(_at(at, window.level))
+    pose = window.coordinate(at.pose)
+    if window.value is None:
+        return at.node.switch[window.switch] * pose.since(window.coordinate(_at(at, window.level)))
+    return at.node.switch[window.switch] * pose.beyond(number(at.maths, at.values, window.value))
 
 
 def _window_length(window: Window, at: Instant) -> Number:

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, create_model
 
 from loomopt.base.errors import Faults, refusal, unknown
-from loomopt.base.quantities import Angle, PositiveLength, PositiveNumber, PureNumber, Speed, Torque, read
+from loomopt.base.quantities import Angle, Coordinate, PositiveLength, PositiveNumber, PureNumber, Speed, Torque, read
 from loomopt.base.units import QuantityError, ShowValue, usual
 from loomopt.jobs.linkage import parts
 from loomopt.jobs.linkage.model import (
@@ -91,6 +91,7 @@ FEWEST = 2
 FORMS = {"angle": "link", "slide": "slider or slot", "x": "joint", "y": "joint"}
 """Key of [output] → what it measures."""
 SCALE, TRAVEL = "what the output is multiplied by", "travel between {} and {before}{after}"
+VALUE = "value from which the travel over window {} counts"
 OUTPUT_KEYS: parts.Keys = {
     **{form: WordKey(description) for form, description in FORMS.items()},
     "against": WordKey(parts.LINK),
@@ -118,7 +119,9 @@ WINDOW_KEYS: parts.Keys = {
     "begins": NumberKey(Angle, "crank angle from {after} where window {} begins"),
     "ends": NumberKey(Angle, "crank angle from {after} where window {} ends"),
     "until": WordKey(parts.EVENT),
-    "level": WordKey(parts.EVENT, True),
+    "level": WordKey(parts.EVENT),
+    **{form: WordKey(description) for form, description in FORMS.items()},
+    "value": NumberKey(Coordinate, VALUE),
 }
 
 
@@ -139,8 +142,8 @@ def _events_schema() -> Json:
 
 def _windows_schema() -> Json:
     """JSON Schema of [windows]."""
-    window_schema = parts.keys_schema(WINDOW_KEYS)
-    return {"type": "object", "propertyNames": parts.NAME_SCHEMA, "additionalProperties": window_schema}
+    forms = [parts.keys_schema({**WINDOW_KEYS, "value": NumberKey(kind, VALUE)}) for kind in (Coordinate, Angle)]
+    return {"type": "object", "propertyNames": parts.NAME_SCHEMA, "additionalProperties": {"anyOf": forms}}
 
 
 TABLES: Mapping[str, tuple[str, Callable[[], Json]]] = {
@@ -264,20 +267,43 @@ def _travel(cursor: Cursor, name: str, read: parts.TableEntries, known: Known) -
     return EventRule(name, travel=read.numbers["travel"], reference=reference, side=before, rise=rise)
 
 
-def _windows(cursor: Cursor, numbers: Numbers, places: Sequence[EventRule]) -> tuple[Window, ...]:
+def _windows(cursor: Cursor, linked: Chain, numbers: Numbers, places: Sequence[EventRule]) -> tuple[Window, ...]:
     known, windows = [place.name for place in places], []
     for name, place in cursor.entries().items():
         place.table()
         parts.check_name(place, name)
-        read = parts.entries(place, WINDOW_KEYS, numbers, "a window", name)
-        after, level = (_checked_name(place.at(word), known, "event") for word in ("after", "level"))
-        until = _checked_name(place.at("until"), known, "event") if "until" in read.words else ""
+        kind = Angle if "angle" in place.table() else Coordinate
+        keys = {**WINDOW_KEYS, "value": NumberKey(kind, VALUE)}
+        read = parts.entries(place, keys, numbers, "a window", name)
+        after = _checked_name(place.at("after"), known, "event")
+        until, level = (
+            _checked_name(place.at(word), known, "event") if word in read.words else "" for word in ("until", "level")
+        )
+        output, value = _coordinate(place, linked, read.words), read.numbers.get("value")
+        if bool(level) == bool(value):
+            problem = "the travel over a window counts from an event, level, or from a value: one of them"
+            raise place.fault(problem, remedy='Such as level = "rear"')
+        if value and output is None:
+            remedy = f"Name the coordinate that it is a value of: {', '.join(FORMS)}"
+            raise place.at("value").fault("the window has no coordinate", remedy=remedy)
         begins, ends = read.numbers.get("begins"), read.numbers.get("ends")
         if (until and (begins or ends)) or not (until or (begins and ends)):
             problem = "a window has begins and ends, crank angles from the event, or the event until"
             raise place.fault(problem, remedy='Such as begins = "130 deg", ends = "240 deg", or until = "leave"')
-        windows.append(Window(name, after, begins, ends, level, until))
+        windows.append(Window(name, after, begins, ends, level, until, output, value))
     return tuple(windows)
+
+
+def _coordinate(cursor: Cursor, linked: Chain, words: Mapping[str, Any]) -> Output | None:
+    """Coordinate of a window that is not the output; None where none is named."""
+    forms = [form for form in FORMS if form in words]
+    if len(forms) > 1:
+        raise cursor.fault(f"a window has one coordinate, not {' and '.join(forms)}", remedy="Take one out")
+    if not forms:
+        return None
+    form, (joints, links, slides) = forms[0], parts.kinds_of(linked)
+    name = _checked_name(cursor.at(form), {"angle": links, "slide": slides}.get(form, joints), FORMS[form])
+    return Output(form, name, slides=form != "angle")
 
 
 @functools.lru_cache(maxsize=64)
@@ -289,7 +315,7 @@ def _read(text: str) -> LinkageScene:
     linked = parts.linked(scene.at("parts"), numbers)
     output = _output(scene.at("output"), linked, numbers)
     places = _places(scene.at("events"), linked, numbers, output)
-    windows = _windows(scene.at("windows"), numbers, places)
+    windows = _windows(scene.at("windows"), linked, numbers, places)
     for name in mechanism:
         place = scene.at("mechanism").at(name)
         parts.check_name(place, name)
@@ -356,8 +382,13 @@ def figures(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Figur
         figure_list.append(Figure(f"peak_{name}", kind, f"peak |{text}| of the output", sides=("max",)))
     figure_list += [Figure(f"mu.{n}", "angle", f"least transmission angle of {n}", ("min",)) for n in linkage.oblique]
     for window in known.windows:
+        out, kind = window.output, travel
         text = f"largest travel from {window.level} over window {window.name}"
-        figure_list.append(Figure(f"travel.{window.name}", travel, text, sides=("max",)))
+        if out is not None:
+            kind = "length" if out.slides else "angle"
+            begin = window.level or "its value"
+            text = f"largest distance of the {out.measure} of {out.name} from {begin} over window {window.name}"
+        figure_list.append(Figure(f"travel.{window.name}", kind, text, sides=("max",)))
         if window.until:
             text = f"crank angle of window {window.name}, {window.after} to {window.until}"
             figure_list.append(Figure(window.length, "angle", text))
