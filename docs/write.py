@@ -19,9 +19,9 @@ from pathlib import Path
 from unittest import mock
 
 from loomopt.interface import api
+from loomopt.interface.answer_table import rows
 from loomopt.interface.cli.app import run
 from loomopt.interface.files import outputs, svg
-from loomopt.interface.tables import rows
 from loomopt.interface.text import glossary
 from loomopt.jobs import registry
 from loomopt.picture.table import TextTable
@@ -143,7 +143,7 @@ def symbols(name: str) -> str:
     scene = registry.load(name)
     meanings = {symbol.name: symbol.text for symbol in glossary.symbols(scene)}
     formatter = UnitFormatter(scene)
-    shown = [row["name"] for row in rows(api.evaluate(scene).result, scene)]
+    shown = [row.name for row in rows(api.evaluate(scene).result, scene)]
     lines = tuple((f"`{name}`", formatter.unit(name).removeprefix("1"), meanings[name]) for name in shown)
     return table(TextTable("", ("symbol", "unit", "what it is"), lines))
 
