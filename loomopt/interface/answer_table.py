@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.base.units import factor
+from loomopt.interface.rounding import Rounding
 from loomopt.model.program import Alias
-from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.table import Column, TextTable, text_table, unbroken, words
 from loomopt.scenes.provenance import provenance
 from loomopt.scenes.scene import Scene
@@ -77,13 +77,12 @@ def text(evaluated: Evaluated, scene: Scene, before: Evaluated | None, heading: 
     table = [
         row for row in rows(evaluated, scene, before) if not (evaluated.members and _of_member(row.name, evaluated))
     ]
-    names, sizes = {row.name for row in table}, largest(table)
+    names, rounding = {row.name for row in table}, _rounding(table)
     for limit in evaluated.limits:
         # Of the margins that every design keeps, and that no scene can set, only those that are not held are shown.
         if limit.name not in names and (not limit.ok or limit.name not in scene.schema.margins):
             row = _limit_row(limit, UnitFormatter(scene))
-            rounding = abs(row.value) <= SHOWN_AS_ZERO * sizes.get(row.unit, 0.0)
-            table.append(row._replace(value=0.0) if rounding else row)
+            table.append(row._replace(value=rounding.shown(row.unit, row.value)))
     made = columns(evaluated, table, scene, heading, before)
     count = sum(column.head is not None for column in made)
     begin = 2 if before else 1
@@ -168,21 +167,14 @@ def _per_second(row: AnswerRow, kind: str, scene: Scene, speed: float | None) ->
     yield AnswerRow(f"{row.name}_t", unit, today, value, None, None, True, reached=row.reached)
 
 
-def largest(table: Sequence[AnswerRow]) -> dict[str, float]:
-    """Largest magnitude in rows of each unit."""
-    sizes: dict[str, float] = {}
-    for row in table:
-        sizes[row.unit] = max(sizes.get(row.unit, 0.0), abs(row.value), abs(row.today or 0.0))
-    return sizes
+def _rounding(table: Sequence[AnswerRow]) -> Rounding:
+    return Rounding((row.unit, number) for row in table for number in (row.value, row.today))
 
 
 def _without_rounding(table: Sequence[AnswerRow]) -> Iterator[AnswerRow]:
-    """Yield rows whose numbers are 0 where they are only rounding beside the largest one of their unit."""
-    sizes = largest(table)
+    rounding = _rounding(table)
     for row in table:
-        least = SHOWN_AS_ZERO * sizes[row.unit]
-        today = 0.0 if row.today is not None and abs(row.today) <= least else row.today
-        yield row._replace(today=today, value=0.0 if abs(row.value) <= least else row.value)
+        yield row._replace(today=rounding.shown(row.unit, row.today), value=rounding.shown(row.unit, row.value))
 
 
 def _limit_row(limit: Finding, formatter: UnitFormatter) -> AnswerRow:

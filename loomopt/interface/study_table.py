@@ -13,7 +13,7 @@ from loomopt.base import arguments
 from loomopt.base.errors import refusal
 from loomopt.base.quantities import read
 from loomopt.base.units import SI_UNIT, QuantityError, factor, show
-from loomopt.physics.tolerances import SHOWN_AS_ZERO
+from loomopt.interface.rounding import Rounding
 from loomopt.picture.chart import COLOURS, Axis, Chart, Charts, Series, fit_axis
 from loomopt.picture.shapes import Floats
 from loomopt.picture.table import TextTable, unbroken
@@ -187,18 +187,13 @@ def _nonempty(columns: Iterable[NumberColumn]) -> list[NumberColumn]:
 
 
 def _without_rounding(parts: dict[str, list[NumberColumn]]) -> dict[str, list[NumberColumn]]:
-    sizes: dict[str, float] = {}
-    for column in itertools.chain(*parts.values()):
-        sizes[column.unit] = max(sizes.get(column.unit, 0.0), *(abs(value or 0.0) for value in column.values))
-    return {
-        part: [_clean(column, sizes[column.unit]) for column in columns_of_part]
-        for part, columns_of_part in parts.items()
-    }
+    every = list(itertools.chain(*parts.values()))
+    rounding = Rounding((column.unit, value) for column in every for value in column.values)
+    return {part: [_clean(column, rounding) for column in columns] for part, columns in parts.items()}
 
 
-def _clean(column: NumberColumn, largest: float) -> NumberColumn:
-    tiny = SHOWN_AS_ZERO * largest
-    return column._replace(values=tuple(v if v is None or abs(v) > tiny else 0.0 for v in column.values))
+def _clean(column: NumberColumn, rounding: Rounding) -> NumberColumn:
+    return column._replace(values=tuple(rounding.shown(column.unit, value) for value in column.values))
 
 
 def frame(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> "pd.DataFrame":

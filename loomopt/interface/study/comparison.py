@@ -11,10 +11,10 @@ from loomopt.base.errors import refusal
 from loomopt.base.units import factor
 from loomopt.interface import results, tables
 from loomopt.interface.results import Evaluation
+from loomopt.interface.rounding import Rounding
 from loomopt.interface.study_result import Presentation
 from loomopt.jobs import registry
 from loomopt.model.session import working
-from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture import turn
 from loomopt.picture.chart import COLOURS, Chart, Charts, Series, heading
 from loomopt.picture.job_views import Marks
@@ -165,13 +165,9 @@ def _row(
 
 def _clean(rows: Sequence[ComparedRow]) -> list[ComparedRow]:
     """Rows with 0 for values that are rounding relative to the largest of their unit."""
-    sizes: dict[str, float] = {}
+    rounding, cleaned = Rounding((row.unit, value) for row in rows for value in row.values), []
     for row in rows:
-        sizes[row.unit] = max(sizes.get(row.unit, 0.0), *(abs(value or 0.0) for value in row.values))
-    cleaned = []
-    for row in rows:
-        tiny = SHOWN_AS_ZERO * sizes[row.unit]
-        values = tuple(value if value is None or abs(value) > tiny else 0.0 for value in row.values)
+        values = tuple(rounding.shown(row.unit, value) for value in row.values)
         cleaned.append(row._replace(values=values, differs=row.differs and len(set(values)) > 1))
     return cleaned
 

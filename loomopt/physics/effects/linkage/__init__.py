@@ -10,7 +10,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.physics.cycle import TURN
 from loomopt.physics.effects.kinds import Applied, Inputs
 from loomopt.physics.mechanisms.dyad import Vector, cross
-from loomopt.physics.mechanisms.moving import Joint, Link, plus, polar, scaled, times, total
+from loomopt.physics.mechanisms.moving import Joint, Link, less, plus, polar, scaled, times, total
 from loomopt.physics.schema import Values
 
 
@@ -167,16 +167,24 @@ def as_counted(pose: LinkagePose, moment: Number) -> Number:
     return moment if pose.output.sign > 0 else -moment
 
 
+def inertia_load(
+    pose: LinkagePose, on: str, link: Link | None, mass: Number, centre: Joint, inertia: Number | None
+) -> Applied:
+    """Inertia load of a body, N in its centre of mass and N·m.
+
+    on, link: what carries it, None where that is a joint alone; inertia: about the centre of mass, None for none.
+    """
+    square, change, slower, faster = pose.omega**2, pose.omega_dot, centre.at(1), centre.at(2)
+    quicker = None if slower is None or change is None else scaled(change, slower)
+    pulled = plus(None if faster is None else scaled(square, faster), quicker)
+    push = None if pulled is None else scaled(-mass, pulled)
+    turned = None if link is None else total(times(square, link.rates(2)), times(change, link.rates(1)))
+    return Applied(on, push, centre.place, less(times(inertia, turned)), True)
+
+
 def resistance_of_mass(pose: LinkagePose, mass: Number, distance: Number, at: Joint) -> Applied:
-    """Force with which a mass on the output's link resists, N, with a couple that leaves no moment about the axis.
+    """Inertia load of a mass on the output's link, with a couple that leaves no moment about the axis.
 
     What the mass adds to the moment about the axis is in the inertia of the output term already.
     """
-    square, change, link = pose.omega**2, pose.omega_dot, pose.carrier
-    slower, faster = at.at(1), at.at(2)
-    pulled = None if faster is None else scaled(square, faster)
-    if change is not None and slower is not None:
-        pulled = plus(pulled, scaled(change, slower))
-    turned = total(times(square, link.rates(2)), times(change, link.rates(1)))
-    push = None if pulled is None else scaled(-mass, pulled)
-    return Applied(pose.output.carrier, push, at.place, times(mass * distance**2, turned), True)
+    return inertia_load(pose, pose.output.carrier, pose.carrier, mass, at, -(mass * distance**2))

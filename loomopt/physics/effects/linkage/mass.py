@@ -9,9 +9,9 @@ from pydantic import Field
 from loomopt.base.quantities import Coordinate, Inertia, PositiveMass
 from loomopt.maths.systems import Number
 from loomopt.physics.effects.kinds import Applied, Inputs, Load
-from loomopt.physics.effects.linkage import LinkagePose, centre
+from loomopt.physics.effects.linkage import LinkagePose, centre, inertia_load
 from loomopt.physics.mechanisms.dyad import dot
-from loomopt.physics.mechanisms.moving import less, plus, scaled, times, total
+from loomopt.physics.mechanisms.moving import Joint, Link, times, total
 from loomopt.physics.schema import Table
 
 
@@ -24,10 +24,16 @@ class Parameters(Table):
     J: Inertia | None = Field(None, description="inertia about the centre of mass")
 
 
+def _body(at: Inputs[LinkagePose]) -> tuple[Link | None, Joint]:
+    """Link that carries it, None for a joint, and its centre of mass."""
+    name = at.table["instance"]
+    body = centre(at.pose.joints, name, at.table.get("along"), at.table.get("across"))
+    return at.pose.joints.links.get(name), body
+
+
 def force(at: Inputs[LinkagePose]) -> Number:
     """Crank torque that moves it, N·m."""
-    link = at.pose.joints.links.get(at.table["instance"])
-    body = centre(at.pose.joints, at.table["instance"], at.table.get("along"), at.table.get("across"))
+    link, body = _body(at)
     p1, p2, inertia = body.at(1), body.at(2), at.table.get("J")
     w1, w2 = (link.rates(1), link.rates(2)) if link is not None else (None, None)
     gained = total(None if p1 is None or p2 is None else at.table["mass"] * dot(p1, p2), times(inertia, w1, w2))
@@ -39,17 +45,9 @@ def force(at: Inputs[LinkagePose]) -> Number:
 
 
 def applied(at: Inputs[LinkagePose]) -> list[Applied]:
-    """Inertia force of the mass, in its centre."""
-    link = at.pose.joints.links.get(at.table["instance"])
-    body = centre(at.pose.joints, at.table["instance"], at.table.get("along"), at.table.get("across"))
-    square, change, inertia = at.pose.omega**2, at.pose.omega_dot, at.table.get("J")
-    p1, p2 = body.at(1), body.at(2)
-    faster = None if p1 is None or change is None else scaled(change, p1)
-    pulled = plus(None if p2 is None else scaled(square, p2), faster)
-    push = None if pulled is None else scaled(-at.table["mass"], pulled)
-    w1, w2 = (link.rates(1), link.rates(2)) if link is not None else (None, None)
-    turned = total(times(square, w2), times(change, w1))
-    return [Applied(at.table["instance"], push, body.place, less(times(inertia, turned)), True)]
+    """Inertia load of the mass, in its centre."""
+    link, body = _body(at)
+    return [inertia_load(at.pose, at.table["instance"], link, at.table["mass"], body, at.table.get("J"))]
 
 
 EFFECT = Load(
