@@ -11,7 +11,7 @@ from loomopt.base.errors import BadInput, Faults, clean, refusal, shown
 from loomopt.base.quantities import Quantity, described, quantities_of, quantity_of
 from loomopt.base.records import Frozen
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, show
-from loomopt.physics.effects.kinds import label
+from loomopt.physics.effects.kinds import Check, label
 from loomopt.scenes.cursor import LARGEST_FILE, Cursor
 from loomopt.scenes.document import Paths, copied, looked_up
 from loomopt.scenes.scene import Call, Jobs, Scene, build
@@ -147,6 +147,12 @@ def checked(data: object, scene: Scene, origin: str = "<design>") -> dict[str, f
     if fault:
         remedy = "Correct its lengths; numbers without a unit are metres and radians"
         raise whole.fault(f"the design does not assemble: {fault}", remedy=remedy)
+    for effect, table in zip(scene.active, scene.effects.values(), strict=True):
+        numbers = {key: design.get(label(effect, key), value) for key, value in table}
+        fault = effect.fault(numbers) if isinstance(effect, Check) else ""
+        if fault:
+            remedy = "Correct its lengths; numbers without a unit are metres"
+            raise whole.fault(f"the {effect.name} cannot be made: {fault}", remedy=remedy)
     return design
 
 

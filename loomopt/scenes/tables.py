@@ -248,6 +248,12 @@ def check_needs(
     for effect, table in active.items():
         if any(value != value for _, value in table):  # where it is known depends on a value that cannot be read
             continue
+        problem = effect.fault(dict(table)) if isinstance(effect, Check) else ""
+        if problem:
+            remedy = "Correct one of its numbers"
+            faults.add(
+                scene.at("effects").at(effect.name).fault(f"the {effect.name} cannot be made: {problem}", remedy=remedy)
+            )
         words = {key: value for key, value in table if isinstance(value, str)}
         if isinstance(effect, Load) and effect.known_in(words) and not schema.partly_known:
             problem = (

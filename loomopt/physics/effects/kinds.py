@@ -357,6 +357,11 @@ def nothing_sold(parameters: Any) -> Mapping[str, Sequence[float]]:
     return {}
 
 
+def no_fault(numbers: Mapping[str, Any]) -> str:
+    """Empty: numbers of the effect that are each in their range work together."""
+    return ""
+
+
 def nothing_remarked(at: Inputs[None], shown: ShowValue) -> str:
     """Empty: the figures need no explanation."""
     return ""
@@ -385,6 +390,7 @@ class Check(Effect, Generic[Pose]):
     rows : value(at) by name, of the design alone.
     demands : what rows or quantities must keep while the effect is on.
     sold(table) : stock sizes of numbers of its table, SI, ascending.
+    fault(numbers) : reason why numbers of its table, by key, SI, cannot work together; "" when they can.
     joints(at, loading) : object with the attributes `vectors` and `scalars`; unit directions are its `heading(part)`.
     vectors : attributes whose size is the quantity, with their components.
     scalars : attributes that are quantities themselves.
@@ -406,6 +412,7 @@ class Check(Effect, Generic[Pose]):
     rows: Mapping[str, Callable[[Inputs[None]], Number]] = field(default_factory=dict)
     demands: tuple[Demand, ...] = ()
     sold: Callable[[Any], Mapping[str, Sequence[float]]] = nothing_sold
+    fault: Callable[[Mapping[str, Any]], str] = no_fault
     joints: Callable[[Inputs[Pose], Loading], Any] | None = None
     vectors: tuple[str, ...] = ()
     scalars: tuple[str, ...] = ()

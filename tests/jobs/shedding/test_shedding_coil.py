@@ -3,16 +3,20 @@
 Formulas: Shigley's Mechanical Engineering Design, ch. 10; recomputed here and in `coil_by_hand` in plain arithmetic.
 """
 
+import copy
 import functools
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 from support import slow
 from support.shedding_cases import plain, product
 
 import loomopt as lo
+from loomopt.interface.text import json_schema
+from loomopt.jobs import registry
 from loomopt.physics.effects.shedding.coil import WIRES
 from loomopt.solving.answer.report import evaluate
 from reference.coils import Contact, Steel, hook, length, lightest, mass, rate, shear, softest, surge, tensile, winding
@@ -334,3 +338,62 @@ def test_a_design_of_coils_evaluates_to_its_own_figures():
     again = evaluate(answer.scene, answer.design)
     assert dict(again.figures) == dict(answer.figures)
     assert again.admissible
+
+
+def coil_keys(**changes):
+    """Return a scene's keys of the coil, its numbers of today and others."""
+    scene = lo.load("shedding")
+    return scene.set("effects.coil", {**scene.document["available"]["coil"], **changes})
+
+
+@pytest.mark.parametrize("diameter", ["6 mm", "5.999 mm", "1 mm"])
+@pytest.mark.parametrize("factor", ["Wahl", "EN 13906"])
+def test_a_coil_no_wider_than_its_wire_is_refused_in_scenes_and_in_designs(diameter, factor):
+    with pytest.raises(lo.BadInput, match=r"effects\.coil: the coil cannot be made: its diameter is not larger"):
+        coil_keys(diameter=diameter, factor=factor)
+    scene = coil_keys(factor=factor).set("bounds.wire", {"min": "1 mm", "max": "50 mm"})
+    scene = scene.set("bounds.diameter", {"min": "1 mm", "max": "50 mm"})
+    with pytest.raises(lo.BadInput, match="the coil cannot be made"):
+        lo.evaluate(scene, {"wire": "6 mm", "diameter": diameter})
+
+
+def test_hooks_bent_to_half_their_wire_are_refused():
+    with pytest.raises(lo.BadInput, match="hook_factor is not larger than wire / diameter"):
+        coil_keys(diameter="12 mm", hook_factor="0.5")
+    assert lo.evaluate(coil_keys(diameter="12 mm", hook_factor="0.51")).figures["bending_share"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "part"),
+    [
+        ({"initial_tension": {"min": "20 N"}}, "initial_tension: it is no band of two forces"),
+        ({"initial_tension": {"min": "20 N", "max": "3 mm"}}, "initial_tension: it is no band of two forces"),
+        ({"initial_tension": {"min": "20 N", "max": "30 N", "most": "3 N"}}, "it is no band of two forces"),
+        (
+            {"initial_tension": {"min": "30 N", "max": "20 N"}},
+            "initial_tension_max: the largest initial tension is less",
+        ),
+        ({"initial_tension_min": "30 N", "initial_tension_max": "20 N"}, "initial_tension_max: the largest initial"),
+        ({"initial_tension": ["20 N", "30 N"]}, "initial_tension: it is not a quantity"),
+        ({"hook_length": "20 mm"}, 'hook_length: .*Write hooks = "free"'),
+    ],
+)
+def test_a_key_of_the_wrong_shape_or_without_effect_is_refused(changes, part):
+    with pytest.raises(lo.BadInput, match=part):
+        coil_keys(**changes)
+
+
+@pytest.mark.parametrize(
+    ("tension", "accepted"),
+    [
+        ("100 N", True),
+        ({"min": "20 N", "max": "30 N"}, True),
+        ({"min": "20 N"}, False),
+        ({"min": "2 N", "max": "3"}, False),
+    ],
+)
+def test_the_json_schema_accepts_a_band_of_the_initial_tension(tension, accepted):
+    document = copy.deepcopy(dict(coil_keys().document))
+    document["effects"]["coil"]["initial_tension"] = tension
+    schema = json_schema.scene(registry.declared("shedding"))
+    assert Draft202012Validator(schema).is_valid(document) is accepted

@@ -8,9 +8,9 @@ must give K1, and keep what material, winding and space allow.
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from loomopt.base.quantities import (
     Force,
@@ -20,6 +20,7 @@ from loomopt.base.quantities import (
     PositiveNumber,
     PositivePressure,
     PureNumber,
+    message_schema,
 )
 from loomopt.base.quantities import read as quantity
 from loomopt.base.units import QuantityError, ShowValue, usual
@@ -190,6 +191,20 @@ LEAST_INITIAL, MOST_INITIAL = (
 OPENED = "coils are drawn open at the top"
 
 
+TENSION = 'a force such as "25 N", or a band { min = "20 N", max = "30 N" }'
+"""What initial_tension may be, in words."""
+
+
+def _schema_of_tension(force: dict[str, Any]) -> None:
+    """Change the JSON Schema of a force, in place, so that it accepts a band of two forces too."""
+    end = {key: value for key, value in force.items() if key not in ("description", "title")}
+    band = {"type": "object", "properties": {"min": end, "max": end}, "required": ["min", "max"]}
+    accepted = {"anyOf": [end, band | {"additionalProperties": False}]}
+    head = {key: force[key] for key in ("description", "title") if key in force}
+    force.clear()
+    force.update(head | message_schema(accepted, TENSION))
+
+
 class Parameters(Table):
     """Coils of a return spring, their steel, and their limits."""
 
@@ -197,7 +212,9 @@ class Parameters(Table):
     wire: PositiveLength = Field(description="diameter of the wire")
     diameter: PositiveLength = Field(description="mean diameter of the coil")
     turns: PositiveNumber = Field(description="active turns")
-    initial_tension: Force = Field(description="force at which the turns begin to separate")
+    initial_tension: Force = Field(
+        description="force at which the turns begin to separate", json_schema_extra=_schema_of_tension
+    )
     shear_modulus: PositivePressure = Field(description="shear modulus of the steel")
     elasticity: PositivePressure = Field(description="modulus of elasticity of the steel")
     density: PositiveDensity = Field(description="density of the steel")
@@ -234,6 +251,33 @@ class Parameters(Table):
     sizes: Literal["preferred", "any"] = Field(
         "preferred", description="sizes of a free wire: those that are sold, or any"
     )
+
+    @field_validator("hook_length")
+    @classmethod
+    def _of_free_hooks(cls, length: float | None, read: ValidationInfo) -> float | None:
+        """Refuse the length of hooks that are loops of the last coil."""
+        if length is not None and read.data.get("hooks") == "loops":
+            problem = "the length of the hooks is given, and hooks is not free"
+            raise QuantityError(problem, "", 'Write hooks = "free", or take hook_length out')
+        return length
+
+    @field_validator("initial_tension_max")
+    @classmethod
+    def _not_below_the_least(cls, most: float | None, read: ValidationInfo) -> float | None:
+        """Refuse a band of the initial tension whose ends are exchanged."""
+        least = read.data.get("initial_tension_min")
+        if most is not None and least is not None and most < least:
+            problem = "the largest initial tension is less than the least"
+            raise QuantityError(problem, "min <= max", "Exchange or correct them")
+        return most
+
+    @field_validator("initial_tension", mode="before")
+    @classmethod
+    def _force_or_band(cls, raw: object) -> object:
+        """Refuse a table that is no band: `_band_of_initial_tension` has read the others."""
+        if isinstance(raw, Mapping):
+            raise QuantityError("it is no band of two forces", TENSION, "Give min and max, each a force")
+        return raw
 
     @model_validator(mode="before")
     @classmethod
@@ -322,6 +366,15 @@ FIGURES = (
 )
 
 
+def fault(numbers: Mapping[str, Any]) -> str:
+    """Reason why wire and coil, SI, make no spring: the stresses are finite for a coil around its wire only."""
+    if numbers["diameter"] <= numbers["wire"]:
+        return "its diameter is not larger than its wire"
+    if numbers["hook_factor"] * numbers["diameter"] <= numbers["wire"]:
+        return "its hooks are bent to half the wire or less: hook_factor is not larger than wire / diameter"
+    return ""
+
+
 def sold(parameters: Parameters) -> Mapping[str, Sequence[float]]:
     """Preferred wire diameters, m, where the wire must have one of them."""
     return {"wire": WIRES} if parameters.sizes == "preferred" else {}
@@ -370,6 +423,7 @@ EFFECT: Check[object] = Check(
     least="spring_mass",
     axes=(FlatNumber(name="initial tension", key="initial_tension"),),
     sold=sold,
+    fault=fault,
     explain=explain,
     demands=(
         Demand("coil_index", -1, INDEX[0]),
