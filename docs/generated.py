@@ -73,7 +73,7 @@ def _plain(text: str) -> str:
 # Scenes
 
 
-OWN_NAMES = (
+USER_NAMES = (
     "The scene chooses the names of dimensions and parts: [parts and their keys](linkages.md). Further tables: {}."
 )
 EFFECTS = (
@@ -95,7 +95,7 @@ def scene(job: str) -> str:
     free = bool(schema.tables)  # a job in which the scene chooses the names
     full = json_schema.scene(dataclasses.replace(schema, tables={}) if free else schema)
     tables, known = full["properties"], full["$defs"] | {NEEDED: _needed(schema)}
-    parts = [OWN_NAMES.format(_listed(schema.tables))] if free else []
+    parts = [USER_NAMES.format(_listed(schema.tables))] if free else []
     parts += [
         _table("problem", tables["problem"], known),
         _table("operation", tables["operation"], known),
@@ -140,7 +140,7 @@ def _table(name: str, table: Mapping[str, Any], known: Mapping[str, Any], level:
     head = f"{'#' * level} [{name}]\n\n{_sentence(table.get('description', ''))}\n"
     if not rows:
         return f"{head}\nNo values of its own.\n" if level > 2 else head
-    lines = "\n".join(f"| `{key}` | {_cell(_plain(what))} | {_cell(_plain(form))} |" for key, what, form in rows)
+    lines = "\n".join(f"| `{key}` | {_cell(_plain(meaning))} | {_cell(_plain(form))} |" for key, meaning, form in rows)
     return f"{head}\n| key | what it is | allowed values |\n| --- | --- | --- |\n{lines}\n"
 
 
@@ -200,8 +200,8 @@ def _ranges(name: str, text: str, table: Mapping[str, Any], known: Mapping[str, 
     """Table with the same keys for every number."""
     first = next(iter(table["properties"].values()))
     rows = [
-        f"| `{key}` | {_cell(_plain(what))} | {_cell(_plain(form.replace(', optional', '')))} |"
-        for key, what, form in _keys(first.get("then", {}), known)
+        f"| `{key}` | {_cell(_plain(meaning))} | {_cell(_plain(form.replace(', optional', '')))} |"
+        for key, meaning, form in _keys(first.get("then", {}), known)
     ]
     names = f"Numbers: {_listed(table['properties'])}.\n" if listed else ""
     head = f"## [{name}]\n\n{text} Keys of each number, such as `{next(iter(table['properties']))}`:\n\n"
@@ -393,14 +393,14 @@ def expand(text: str) -> str:
 def _read(app: Sphinx, name: str, source: list[str]) -> None:
     path = app.env.doc2path(name)
     if path.suffix == ".ipynb":
-        source[0] = nbformat.writes(run.kept(Path(path)))
+        source[0] = nbformat.writes(run.stored_run(Path(path)))
     else:
         source[0] = expand(source[0])
 
 
 def _run_all(app: Sphinx) -> None:
     with ThreadPoolExecutor(WORKERS) as pool:
-        list(pool.map(run.kept, run.paths()))
+        list(pool.map(run.stored_run, run.paths()))
 
 
 def _inline(writer: Any, node: nodes.math) -> None:

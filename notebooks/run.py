@@ -24,7 +24,7 @@ from PIL import Image
 
 FOLDER = Path(__file__).parent
 ROOT = FOLDER.parent
-KEPT = ROOT / "build" / "executed"
+STORE = ROOT / "build" / "executed"
 LONGEST = 600
 """Seconds that a cell may take."""
 CLOSE, NOTHING = 1e-5, 1e-8
@@ -57,15 +57,15 @@ def read(path: Path) -> NotebookNode:
 def executed(path: Path) -> NotebookNode:
     """Return a notebook run from a clean kernel, without what differs from run to run. Raises what a cell raises."""
     notebook = read(path)
-    with tempfile.TemporaryDirectory() as own:  # no start-up files and no history of the user's
-        environment = os.environ | {"PYTHONPATH": str(ROOT), "IPYTHONDIR": own}
+    with tempfile.TemporaryDirectory() as folder:  # no start-up files and no history of the user's
+        environment = os.environ | {"PYTHONPATH": str(ROOT), "IPYTHONDIR": folder}
         client = NotebookClient(
             notebook,
             timeout=LONGEST,
             kernel_name="python3",
             record_timing=False,
             coalesce_streams=True,
-            resources={"metadata": {"path": own}},
+            resources={"metadata": {"path": folder}},
             extra_arguments=["--log-level=ERROR"],
         )
         client.execute(env=environment)
@@ -73,7 +73,7 @@ def executed(path: Path) -> NotebookNode:
     for cell in notebook.cells:
         cell.metadata = {}
         if "outputs" in cell:  # progress is an empty line in the end, and there where a cell has taken a second
-            cell.outputs = [each for each in cell.outputs if each.get("data") != {"text/plain": ""}]
+            cell.outputs = [output for output in cell.outputs if output.get("data") != {"text/plain": ""}]
         for output in cell.get("outputs", ()):
             if "data" in output:
                 output.metadata = {}
@@ -83,23 +83,23 @@ def executed(path: Path) -> NotebookNode:
 
 def program() -> str:
     """Return what all that notebooks say depends on: a digest of the program, its problems and this file."""
-    found = hashlib.sha256()
+    state = hashlib.sha256()
     for path in sorted([*ROOT.glob("loomopt/**/*"), *ROOT.glob("problems/*"), Path(__file__)]):
         if path.is_file() and path.suffix != ".pyc":
-            found.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
-    return found.hexdigest()
+            state.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    return state.hexdigest()
 
 
-def kept(path: Path) -> NotebookNode:
+def stored_run(path: Path) -> NotebookNode:
     """Return `executed`; of a notebook and a program that were run before what came of it then, from build/executed."""
     sources = "\0".join(f"{cell.cell_type} {cell.source}" for cell in read(path).cells)
     digest = hashlib.sha256(f"{program()}\0{sources}".encode()).hexdigest()[:16]
-    place = KEPT / f"{path.stem}-{digest}.ipynb"
+    place = STORE / f"{path.stem}-{digest}.ipynb"
     if not place.exists():
-        found = executed(path)
+        executed_notebook = executed(path)
         place.parent.mkdir(parents=True, exist_ok=True)
         unfinished = place.with_suffix(f".{os.getpid()}")
-        nbformat.write(found, unfinished)
+        nbformat.write(executed_notebook, unfinished)
         unfinished.replace(place)
     return read(place)
 
@@ -116,13 +116,13 @@ def _clean(data: NotebookNode) -> None:
 
 def _small(picture: str) -> str:
     """Return a PNG, base64, in at most 256 colours: a diagram has no more."""
-    drawn, found = Image.open(io.BytesIO(base64.b64decode(picture))), io.BytesIO()
+    drawn, reduced = Image.open(io.BytesIO(base64.b64decode(picture))), io.BytesIO()
     few = drawn.convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-    few.save(found, "PNG", optimize=True)
-    return base64.b64encode(found.getvalue()).decode()
+    few.save(reduced, "PNG", optimize=True)
+    return base64.b64encode(reduced.getvalue()).decode()
 
 
-def said(notebook: NotebookNode) -> Iterator[tuple[str, str]]:
+def texts(notebook: NotebookNode) -> Iterator[tuple[str, str]]:
     """Yield each code cell's id with all that its outputs say; of a picture its letters, or that it is one."""
     for cell in notebook.cells:
         if cell.cell_type == "code":
@@ -144,12 +144,12 @@ def _letters(drawn: str) -> str:
     return "\n".join(_LETTERS.findall(drawn))
 
 
-def differences(stored: NotebookNode, found: NotebookNode) -> list[str]:
+def differences(stored: NotebookNode, executed_notebook: NotebookNode) -> list[str]:
     """Return what two runs of a notebook say differently, cell by cell; numbers agree to the digits that are shown."""
-    before, after = dict(said(stored)), dict(said(found))
+    before, after = dict(texts(stored)), dict(texts(executed_notebook))
     if list(before) != list(after):
         return ["the notebook has other cells"]
-    return [f"{name}: {what}" for name in before for what in _apart(before[name], after[name])]
+    return [f"{name}: {change}" for name in before for change in _apart(before[name], after[name])]
 
 
 def _apart(before: str, after: str) -> list[str]:
@@ -157,11 +157,11 @@ def _apart(before: str, after: str) -> list[str]:
     if _NUMBER.sub("#", before) != _NUMBER.sub("#", after):
         return [f"other words: {before!r} and {after!r}"]
     pairs = zip(_NUMBER.findall(before), _NUMBER.findall(after), strict=True)
-    return [f"{one} is now {other}" for one, other in pairs if not _alike(float(one), float(other))][:1]
+    return [f"{first} is now {second}" for first, second in pairs if not _alike(float(first), float(second))][:1]
 
 
-def _alike(one: float, other: float) -> bool:
-    return math.isclose(one, other, rel_tol=CLOSE, abs_tol=NOTHING)
+def _alike(first: float, second: float) -> bool:
+    return math.isclose(first, second, rel_tol=CLOSE, abs_tol=NOTHING)
 
 
 def main(names: list[str]) -> None:

@@ -34,7 +34,7 @@ from benchmarks import harness
 
 BETTER = 1e-6
 """What counts as better, in units of the scale; an earlier objective counts as held within 1e-9."""
-HELD = 1e-9
+FEASIBLE_EXCESS = 1e-9
 BROKEN = 1e-7
 """What a certified answer may be off the referee's figures and limits: ten times the accuracy it was asked for."""
 JOBS = ("rapier", "beatup", "shedding", "linkage")
@@ -66,7 +66,7 @@ def better(first: tuple[float, ...], other: tuple[float, ...]) -> bool:
     for a, b in zip(first, other, strict=True):
         if a < b - BETTER:
             return True
-        if a > b + HELD:
+        if a > b + FEASIBLE_EXCESS:
             return False
     return False
 
@@ -93,7 +93,7 @@ class Trial:
         self.task, self.seed = task, seed
         known = getattr(task, "document", None)
         self.scene = lo.scene(known) if known else lo.load(task.base).update(task.changes)
-        self.found: tuple[dict[str, float], tuple[float, ...]] | None = None
+        self.best_known: tuple[dict[str, float], tuple[float, ...]] | None = None
         self.admissible: list[tuple[float, ...]] = []
         self.answers: dict[str, Any] = {}
         self.verdicts: list[tuple[str, str]] = []
@@ -107,7 +107,7 @@ class Trial:
             self.answers[name] = lo.solve(self.scene, self.task.target, **(CALLS | GLOBAL_CALL)[name])
         self.answer = next(iter(self.answers.values()))
 
-    def judged(self) -> None:
+    def compare_answer(self) -> None:
         """Attack the answer and note what became of it."""
         answer, task = self.answer, self.task
         claimed = task.objectives(answer.design) if answer.status == "optimal" else None
@@ -125,9 +125,9 @@ class Trial:
             )
         self._attack(claimed)
         self.verdicts += [("false bound", why) for why in self.false_bounds()]
-        if self.found is None:
+        if self.best_known is None:
             return
-        design, objectives = self.found
+        design, objectives = self.best_known
         if answer.status == "infeasible":
             self.verdicts.append(("refuted", f"{design} is admissible, objectives {objectives}"))
         elif claimed is not None and better(objectives, claimed):
@@ -137,11 +137,11 @@ class Trial:
         """Keep the best admissible design: of what does not know the answer, then around it and by more starts."""
         for design in self.task.attack(self.seed, claimed):
             self._keep(design)
-            if self.answer.status == "infeasible" and self.found is not None:
+            if self.answer.status == "infeasible" and self.best_known is not None:
                 return
         if claimed is None:
             return
-        self.matched = self.found is not None and near(self.found[1], claimed)
+        self.matched = self.best_known is not None and near(self.best_known[1], claimed)
         for design in self.task.attack(self.seed, claimed, self.answer.design):
             self._keep(design)
         for answer in self.answers.values():
@@ -160,23 +160,23 @@ class Trial:
                     break
 
     def _keep(self, design: Mapping[str, float]) -> None:
-        if self.task.excess(design) <= HELD:
+        if self.task.excess(design) <= FEASIBLE_EXCESS:
             objectives = self.task.objectives(design)
             self.admissible.append(objectives)
-            if self.found is None or better(objectives, self.found[1]):
-                self.found = dict(design), objectives
+            if self.best_known is None or better(objectives, self.best_known[1]):
+                self.best_known = dict(design), objectives
 
     def hits(self) -> dict[str, bool]:
         """Say which ways to solve found the best known."""
-        assert self.found is not None
-        best = self.found[1]
+        assert self.best_known is not None
+        best = self.best_known[1]
         return {
             name: answer.status == "optimal" and not better(best, self.task.objectives(answer.design))
             for name, answer in self.answers.items()
         }
 
 
-def told(job: str, seed: int, number: int, task: Any, verdicts: list[tuple[str, str]]) -> list[str]:
+def report(job: str, seed: int, number: int, task: Any, verdicts: list[tuple[str, str]]) -> list[str]:
     """Line for each failure, from which it can be made again."""
     known = getattr(task, "document", None)
     made = f"lo.scene({known!r})" if known else f"lo.load({task.base!r}).update({task.changes!r})"
@@ -212,16 +212,16 @@ def outcome(job: str, seed: int, number: int, compare: bool, is_global: bool = F
     try:
         trial = Trial(task, number)
         trial.solved([*(GLOBAL_CALL if is_global else ["default"]), *(CALLS if compare else [])])
-        trial.judged()
+        trial.compare_answer()
     except Exception:
-        return Outcome(["tried", "raised"], told(job, seed, number, task, [("raised", traceback.format_exc())]))
+        return Outcome(["tried", "raised"], report(job, seed, number, task, [("raised", traceback.format_exc())]))
     counted = ["tried", trial.answer.status, *{kind for kind, _ in trial.verdicts}, *["matched"] * trial.matched]
     if trial.answer.global_bound and trial.answer.status == "optimal":
         counted.append("proven" if trial.answer.global_bound.proven else "open")
-    if compare and trial.found is not None:
+    if compare and trial.best_known is not None:
         counted += ["comparable", *(f"best by {name}" for name, hit in trial.hits().items() if hit)]
     verdicts = [(kind, f"{why}\n    answer {dict(trial.answer.design)}") for kind, why in trial.verdicts]
-    return Outcome(counted, told(job, seed, number, task, verdicts))
+    return Outcome(counted, report(job, seed, number, task, verdicts))
 
 
 def outcomes(options: argparse.Namespace) -> Iterator[tuple[str, Outcome]]:

@@ -49,11 +49,11 @@ class Machine:
 
     @property
     def _M0(self):
-        return self.hand.M0 if "resistance" in self.hand.own else 0.0
+        return self.hand.M0 if "resistance" in self.hand.effect_values else 0.0
 
     @property
     def _corners(self):
-        half = self.hand.own["resistance"]["pulse"] / 2 if "resistance" in self.hand.own else 0.0
+        half = self.hand.effect_values["resistance"]["pulse"] / 2 if "resistance" in self.hand.effect_values else 0.0
         return np.array([-half, half])
 
     def point(self, design):

@@ -80,14 +80,14 @@ class Rows:
     task: Task
     angles: tuple[np.ndarray, ...]
     level: int
-    held: tuple[float, ...]
+    bounds: tuple[float, ...]
     at: bytes = b""
 
     def values(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows no less than 0 and rows that are 0 at points (z, T)."""
         view = viewed(self.task, y[:, :-1], self.angles)
         above = y[:, -1:] - view.levels[self.level]
-        before = [most - level for most, level in zip(self.held, view.levels, strict=False)]
+        before = [most - level for most, level in zip(self.bounds, view.levels, strict=False)]
         return np.hstack([above, view.firm, *before]), view.equal
 
     def part(self, kind: int) -> dict[str, object]:

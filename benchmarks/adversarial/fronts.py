@@ -37,7 +37,7 @@ SHARE = 0.5
 COUNTED = ("tried", "certified", "infeasible", "refused", "uncertified", "beaten", "rows attacked")
 
 
-class Asked(NamedTuple):
+class Request(NamedTuple):
     """A front to be made: of which scene, which two axes, of which of them the most is sought, whose demands hold."""
 
     scene: Any
@@ -68,7 +68,7 @@ def linkage(number: int) -> tuple[Any, str]:
             continue
 
 
-def drawn(number: int, jobs: tuple[str, ...] = JOBS) -> Asked:
+def drawn(number: int, jobs: tuple[str, ...] = JOBS) -> Request:
     """Front of scene `number`; always the same one."""
     import numpy as np
 
@@ -94,7 +94,7 @@ def drawn(number: int, jobs: tuple[str, ...] = JOBS) -> Asked:
         except BadInput:
             # The scene has not what this axis needs.
             continue
-        return Asked(scene, axes, most, target)
+        return Request(scene, axes, most, target)
 
 
 def beaten(study: Any, rows: int) -> tuple[int, list[dict[str, Any]]]:
@@ -103,7 +103,7 @@ def beaten(study: Any, rows: int) -> tuple[int, list[dict[str, Any]]]:
     from loomopt.studies.front import plan
 
     trade, result = study.study, list[dict[str, Any]]()
-    sought = trade.solver.axes[0]
+    axis = trade.solver.axes[0]
     known = [row for row in study.rows if row.certified and trade.axes[1] in row.place]
     chosen = known[:: max(1, len(known) // rows)][:rows]
     for row in chosen:
@@ -111,19 +111,19 @@ def beaten(study: Any, rows: int) -> tuple[int, list[dict[str, Any]]]:
         others = [other.warm for other in study.rows if other.certified and other is not row]
         with working():
             ends = [trade.solver.solve(request, (), True), trade.solver.solve(request, others, None)]
-        mine = sought.value(plan.value(row, trade.axes[0]))
+        mine = axis.value(plan.value(row, trade.axes[0]))
         for by, end in zip(("search", "rows"), ends, strict=True):
             remaining = all(
                 a <= b + plan.ALIKE for a, b in zip(end.warm.get("held", ()), row.warm["held"], strict=False)
             )
-            apart = mine - sought.value(end.warm["axes"][trade.axes[0]]) if end.certified and remaining else 0.0
-            if apart > BETTER * sought.objective.scale:
-                share = apart / sought.objective.scale
+            apart = mine - axis.value(end.warm["axes"][trade.axes[0]]) if end.certified and remaining else 0.0
+            if apart > BETTER * axis.objective.scale:
+                share = apart / axis.objective.scale
                 result.append({"point": row.point, "place": dict(row.place), "by": by, "apart": share})
     return len(chosen), result
 
 
-def told(number: int, points: int, rows: int, jobs: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
+def outcome(number: int, points: int, rows: int, jobs: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
     """Return what became of a front: a word, and what tells it apart."""
     import loomopt as lo
     from loomopt.base.errors import BadInput
@@ -165,7 +165,7 @@ def main() -> None:
     for number in range(request.first, request.to + 1):
         if time.monotonic() - began > request.seconds:
             break
-        word, message = told(number, request.points, request.rows, tuple(request.jobs.split(",")))
+        word, message = outcome(number, request.points, request.rows, tuple(request.jobs.split(",")))
         counts.update(["tried", word])
         counts["rows attacked"] += message.get("attacked", 0)
         if word in ("uncertified", "beaten"):

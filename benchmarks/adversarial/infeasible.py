@@ -63,7 +63,7 @@ def drawn(generator: random.Random) -> tuple[str, str | None, dict[str, Any]]:
     )
 
 
-def told(name: str, target: str | None, changes: dict[str, Any]) -> dict[str, Any]:
+def summary(name: str, target: str | None, changes: dict[str, Any]) -> dict[str, Any]:
     """Return what is said of a scene, and the CPU seconds that took."""
     began = time.process_time()
     answer = lo.solve(lo.load(name).update(changes), target)
@@ -76,7 +76,7 @@ def run(count: int, seed: int, out: Path | None) -> None:
     generator, result = random.Random(seed), {}
     for place in range(count):
         name, target, changes = drawn(generator)
-        result[f"{place} {name}"] = told(name, target, changes)
+        result[f"{place} {name}"] = summary(name, target, changes)
         print(place, name, result[f"{place} {name}"], flush=True)
         if out:
             out.write_text(json.dumps(result, indent=1), encoding="utf-8")

@@ -68,7 +68,7 @@ def mutants(file: str) -> Iterator[Mutant]:
     source = (TOP / file).read_text(encoding="utf-8")
     lines = [line.encode() for line in source.splitlines()]
 
-    def between(left: ast.expr, right: ast.expr, old: str, new: str) -> Iterator[Mutant]:
+    def operator_mutants(left: ast.expr, right: ast.expr, old: str, new: str) -> Iterator[Mutant]:
         if left.end_lineno != right.lineno or left.end_col_offset is None:
             return
         at = lines[right.lineno - 1].find(old.encode(), left.end_col_offset, right.col_offset)
@@ -82,10 +82,10 @@ def mutants(file: str) -> Iterator[Mutant]:
                 yield Mutant(file, node.lineno, node.col_offset, node.end_col_offset, old, new)
         elif isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in OPERATORS:
             old = OPERATORS[type(node.ops[0])]
-            yield from between(node.left, node.comparators[0], f" {old} ", f" {COMPARED[old]} ")
+            yield from operator_mutants(node.left, node.comparators[0], f" {old} ", f" {COMPARED[old]} ")
         elif isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
             old = OPERATORS[type(node.op)]
-            yield from between(node.left, node.right, f" {old} ", f" {SIGNS[old]} ")
+            yield from operator_mutants(node.left, node.right, f" {old} ", f" {SIGNS[old]} ")
         elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
             yield Mutant(file, node.lineno, node.col_offset, node.col_offset + 1, "-", "+")
 

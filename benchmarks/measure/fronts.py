@@ -106,36 +106,36 @@ def main() -> None:
         rows = run.run(trade)
         spent = time.process_time() - began
         second_front = read_front(trade, rows)
-        told(case, trade, second_front, spent)
+        print_front(case, trade, second_front, spent)
         if options.cold:
             searched(trade, second_front)
 
 
-def told(case: Case, trade: trade.Trade, result: Findings, spent: float) -> None:
+def print_front(case: Case, trade: trade.Trade, result: Findings, spent: float) -> None:
     """Print a front's points beside known ones, its ends, its changes and its speed."""
     first, second = case.axes
-    sought, paid = plan.values(result.rows, first), plan.values(result.rows, second)
+    optimised, paid = plan.values(result.rows, first), plan.values(result.rows, second)
     print(f"\n{case.problem}: {first} against {second}, {result.message}")
     for k in (0, -1):
-        print(f"  end: {second} {paid[k]:.9g}, {first} {sought[k]:.9g}")
+        print(f"  end: {second} {paid[k]:.9g}, {first} {optimised[k]:.9g}")
     for change in result.changes:
         limits = ", ".join(side.text for side in change.limits)
         print(f"  {change.kind} at {second} {change.at:.9g}: {limits}")
     for value, expected in case.known.items():
-        row = asked_at(trade, result, value)
+        row = row_at(trade, result, value)
         reached = plan.value(row, first)
         print(f"  {second} {value:.9g}: {reached:.9f}, known {expected:.9f}, apart {reached / expected - 1:+.1e}")
     if second == "m4e":
-        corners = [(x, CORNER[1] - y) for x, y in zip([*paid, CORNER[0]], [*sought, sought[-1]], strict=True)]
+        corners = [(x, CORNER[1] - y) for x, y in zip([*paid, CORNER[0]], [*optimised, optimised[-1]], strict=True)]
         area = sum((b[0] - a[0]) * (a[1] + b[1]) / 2 for a, b in itertools.pairwise(corners))
         print(f"  area to {CORNER}: {area:.6f}, known {LARGEST_AREA}, apart {area / LARGEST_AREA - 1:+.1e}")
     certified = [row for row in result.rows if row.certified]
-    between = [row for row in certified if row.place]
+    inner = [row for row in certified if row.place]
     print(f"  {len(certified) / spent:.1f} certified points per CPU second, searches and ends included", end="")
-    print(f" (asked: {case.least:g}); median {sorted(row.seconds for row in between)[len(between) // 2]:.3f} s a point")
+    print(f" (asked: {case.least:g}); median {sorted(row.seconds for row in inner)[len(inner) // 2]:.3f} s a point")
 
 
-def asked_at(trade: trade.Trade, result: Findings, value: float) -> Row:
+def row_at(trade: trade.Trade, result: Findings, value: float) -> Row:
     """Row with the second axis at a value, solved from its nearest neighbour on the front."""
     near = min((row for row in result.rows if row.certified), key=lambda row: abs(trade_value(trade, row) - value))
     ask = {"also": [], "held": near.warm["held"], "wide": False}
@@ -150,15 +150,15 @@ def trade_value(trade: trade.Trade, row: Row) -> float:
 def searched(trade: trade.Trade, result: Findings) -> None:
     """Print which of every third point a search from scratch is better at, and which it is worse at."""
     better, worse, count = [], [], 0
-    sought = trade.solver.axes[0]
+    optimised = trade.solver.axes[0]
     for row in [row for row in result.rows if row.certified and row.place][::3]:
         cap = trade.solver.axes[1].value(row.place[trade.axes[1]])
         cold = trade.solver.solve(Subproblem(0, (None, cap)), (), wide=True)
         if not cold.certified:
             continue
         count += 1
-        mine, its = (sought.value(item.warm["axes"][trade.axes[0]]) for item in (row, cold))
-        apart = (mine - its) / sought.objective.scale
+        mine, its = (optimised.value(item.warm["axes"][trade.axes[0]]) for item in (row, cold))
+        apart = (mine - its) / optimised.objective.scale
         better += [(row.place, apart)] if apart > SAME_OBJECTIVE else []
         worse += [(row.place, apart)] if apart < -SAME_OBJECTIVE else []
     print(f"  of {count} searches from scratch {len(better)} are better, {len(worse)} worse", *better)

@@ -41,7 +41,7 @@ class Case:
     problem: str
     target: str
     spread: tuple[str, ...]
-    asked: tuple[str, ...] = ()
+    figures: tuple[str, ...] = ()
 
 
 LINKS = ("l1", "l2", "l3", "l4", "m4e", "r4e")
@@ -70,7 +70,7 @@ class Task:
         self.known = self.job.numbers_of(self.scene, self.design)
         self.model = self.job.model(self.scene, self.design)
         self.spread = [name if name in self.known else self.scene.full(f"effects.{name}") for name in case.spread]
-        self.asked = case.asked
+        self.figures = case.figures
 
     def drawn(self, count: int) -> Iterator[dict[str, Any]]:
         """Yield machines, a block at a time."""
@@ -89,7 +89,7 @@ class Task:
         like = sampled(self.model, self.known)
 
         def figures(machines: Any) -> Any:
-            return self.job.figures_of(self.scene, machines, self.asked or EVERY)
+            return self.job.figures_of(self.scene, machines, self.figures or EVERY)
 
         return read_all(self.model, {**self.known, **drawn}, like, figures, self.alone)
 
@@ -124,7 +124,7 @@ def measured(case: Case, machines: int, alone: int, repeats: int) -> dict[str, A
     return {
         "scene": f"{case.problem} {case.target}",
         "spread": len(case.spread),
-        "figures": ", ".join(case.asked) or "every figure",
+        "figures": ", ".join(case.figures) or "every figure",
         "s for 1e5": times["many"] * 1e5 / machines,
         "times as fast": harness.spread(ratios)["median"],
         "lowest": min(ratios),

@@ -42,7 +42,7 @@ app()"""
 FEW = ("--version", "evaluate beatup", "solve beatup --starts 1")
 COMMANDS = (*FEW, "list", "solve beatup")
 SOLVE, REST = "loomopt solve beatup --starts 1", "loomopt solve beatup, less the solve"
-TOLD = """import sys, time
+TIMED = """import sys, time
 from loomopt.interface import api; from loomopt.interface.cli import app as cli
 solve = api.solve
 def timed(*arguments, **options):
@@ -86,13 +86,13 @@ def spent(code, words, cache):
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stderr
 
 
-def one_round(cache, commands):
+def time_round(cache, commands):
     """Processor's milliseconds of each command, run once."""
     results = {ALONE: spent(ALONE, (), cache)[0], FLOOR: spent(LIBRARIES, ("solve", "beatup"), cache)[0]}
     for words in commands:
         results[f"loomopt {words}"] = spent(MAIN, words.split(), cache)[0]
     if commands == COMMANDS:
-        whole, solved = spent(TOLD, SOLVE.split()[1:], cache)
+        whole, solved = spent(TIMED, SOLVE.split()[1:], cache)
         results[REST] = whole - float(solved)
     return {name: 1e3 * seconds for name, seconds in results.items()}
 
@@ -110,8 +110,8 @@ def main():
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as cache:
         commands = FEW if options.quick else COMMANDS
-        one_round(cache, commands)
-        rounds = [one_round(cache, commands) for _ in range(QUICK if options.quick else ROUNDS)]
+        time_round(cache, commands)
+        rounds = [time_round(cache, commands) for _ in range(QUICK if options.quick else ROUNDS)]
         counted = calls(cache)
     floor, rows = statistics.median(item[FLOOR] for item in rounds), []
     for name in rounds[0]:

@@ -60,7 +60,7 @@ def best_known(cloths):
     return result
 
 
-def judged(designs, best):
+def quality(designs, best):
     """Worst errors of designs, M0 → (design, claimed peak or None)."""
     worst = {"M3 off [N*m]": 0.0, "peak off": 0.0, "peak understated": None, "limits broken": 0.0}
     for M0, (design, claimed) in designs.items():
@@ -184,17 +184,17 @@ def fast(best):
     count, build = len(SWEEP), took["first"] - took["cold"]
     rows = [
         row("loomopt: build, once (what the first solve takes longer)", 1, float(np.median(build))),
-        row("loomopt: solve from today's machine", 1, parts["cold"], judged(cold, best)),
-        row("loomopt: re-solve", count, parts["loomopt"], judged(runs["loomopt"][-1][1], best)),
+        row("loomopt: solve from today's machine", 1, parts["cold"], quality(cold, best)),
+        row("loomopt: re-solve", count, parts["loomopt"], quality(runs["loomopt"][-1][1], best)),
         row("loomopt: silent levels and certificate", count, parts["certificate"]),
-        row("loomopt: whole call, with report", count, parts["call"], judged(answers, best)),
+        row("loomopt: whole call, with report", count, parts["call"], quality(answers, best)),
         row(
             "IPOPT by hand, the answer's NLP, from today's machine",
             count,
             parts["ipopt"],
-            judged(runs["ipopt"][-1][1], best),
+            quality(runs["ipopt"][-1][1], best),
         ),
-        row("SciPy SLSQP, 360 points: re-solve", count, parts["slsqp"], judged(runs["slsqp"][-1][1], best)),
+        row("SciPy SLSQP, 360 points: re-solve", count, parts["slsqp"], quality(runs["slsqp"][-1][1], best)),
     ]
     ratios = {
         "resolve_to_slsqp": took["loomopt"] / took["slsqp"],
@@ -227,7 +227,7 @@ def slow(best):
         z, _ = method()
         taken = time.perf_counter() - began
         claimed = z[5] * peers.TORQUE if len(z) == 7 else None
-        rows.append(row(name, 1, taken, judged({SINGLE: (peers.design(z), claimed)}, best)))
+        rows.append(row(name, 1, taken, quality({SINGLE: (peers.design(z), claimed)}, best)))
     return rows
 
 

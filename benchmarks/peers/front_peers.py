@@ -18,7 +18,7 @@ import numpy as np
 
 import loomopt as lo
 from benchmarks import harness
-from benchmarks.measure.fronts import asked_at
+from benchmarks.measure.fronts import row_at
 from benchmarks.peers.front_rivals import Rival, Spot, beatup, rapier, shedding
 from loomopt.studies.front import front, plan, trade
 from loomopt.studies.front.trade import read_front
@@ -73,15 +73,15 @@ def compared(rival: Rival, points: int) -> list[dict[str, object]]:
     second_front = read_front(trade, run.run(trade))
     spent, name = time.process_time() - began, " against ".join(rival.axes)
     certified = [row for row in second_front.rows if row.certified]
-    mine = _judged(rival, [rival.own(row) for row in certified])
+    mine = _spots(rival, [rival.variables(row) for row in certified])
     if not harness.installed("pymoo"):
         absent = f"{name}: pymoo is not installed (extra `bench`)"
         return [_row(f"{name}: loomopt", spent, len(certified), mine, mine), _row(absent, 0.0, 0, [], mine)]
     designs, looked = evolved(rival, points, LONGER * spent)
-    theirs = _judged(rival, list(designs))
+    theirs = _spots(rival, list(designs))
     began = time.process_time()
-    requests = [row for _, second in theirs if (row := _asked(trade, second_front, rival.sign * second))]
-    fuller = [*mine, *_judged(rival, [rival.own(row) for row in requests])]
+    requests = [row for _, second in theirs if (row := _row_at(trade, second_front, rival.sign * second))]
+    fuller = [*mine, *_spots(rival, [rival.variables(row) for row in requests])]
     longer = spent + time.process_time() - began
     whole = [*fuller, *theirs]
     return [
@@ -91,14 +91,14 @@ def compared(rival: Rival, points: int) -> list[dict[str, object]]:
     ]
 
 
-def _judged(rival: Rival, designs: Sequence[np.ndarray]) -> list[Spot]:
+def _spots(rival: Rival, designs: Sequence[np.ndarray]) -> list[Spot]:
     return [spot for design in designs if (spot := rival.judge(design))]
 
 
-def _asked(trade: trade.Trade, result: Findings, second: float) -> Row | None:
+def _row_at(trade: trade.Trade, result: Findings, second: float) -> Row | None:
     """Front's design at a place; None beside the front."""
     paid = plan.values(result.rows, trade.axes[1])
-    row = asked_at(trade, result, second) if min(paid) < second < max(paid) else None
+    row = row_at(trade, result, second) if min(paid) < second < max(paid) else None
     return row if row and row.certified else None
 
 

@@ -18,7 +18,7 @@ M0 = 745.0
 SCENE = plain_shedding.PAPER
 BROKEN = 1e-8
 """By how much a design may exceed a limit, relative or in rad, and still count."""
-FARTHEST, FEW, SECANTS, ON_GRID, BETWEEN = np.radians(90), 120, 8, 1e-4, 3e-7
+FARTHEST, FEW, SECANTS, ON_GRID, GRID_MARGIN = np.radians(90), 120, 8, 1e-4, 3e-7
 """Of the rapier: the longest dwell that a peer's grid sees; angles that a stroke is read on, steps to its l4, and how
 closely that meets it: the referee sets l4 to the stroke itself; what a parabola on the grid misses of a cosine."""
 
@@ -39,7 +39,7 @@ class Rival(NamedTuple):
     high: np.ndarray
     evaluate: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
     judge: Callable[[np.ndarray], Spot | None]
-    own: Callable[[Row], np.ndarray]
+    variables: Callable[[Row], np.ndarray]
     target: str | None = None
     sign: float = 1.0
 
@@ -60,12 +60,12 @@ def beatup() -> Rival:
             return None
         return float(balance.peaks(design, M0)[0][1]), abs(float(balance.front_torque(*(*design, M0))))
 
-    def own(row: Row) -> np.ndarray:
+    def variables(row: Row) -> np.ndarray:
         known = {**lo.load("beatup").mechanism, **row.design}
         return np.array([*(known[name] for name in ("l1", "l2", "l3", "l4")), known["m4e"] * known["r4e"] ** 2]) / size
 
     low, high = balance.LOWER / size, balance.UPPER / size
-    return Rival("beatup", ("peak_torque", "M3_fdc"), low, high, evaluate, judge, own)
+    return Rival("beatup", ("peak_torque", "M3_fdc"), low, high, evaluate, judge, variables)
 
 
 def shedding() -> Rival:
@@ -85,10 +85,10 @@ def shedding() -> Rival:
         needed = float(plain_shedding.least_stiffness(replace(SCENE, X0=preload))[0])
         return (stiffness, preload) if stiffness >= needed * (1 - BROKEN) else None
 
-    def own(row: Row) -> np.ndarray:
+    def variables(row: Row) -> np.ndarray:
         return np.array([row.design["K1"], row.design["X0"]]) / size
 
-    return Rival("shedding", ("K1", "X0"), np.zeros(2), np.ones(2), evaluate, judge, own)
+    return Rival("shedding", ("K1", "X0"), np.zeros(2), np.ones(2), evaluate, judge, variables)
 
 
 def rapier() -> Rival:
@@ -111,7 +111,7 @@ def rapier() -> Rival:
         arcs = [_arc(np.abs(travel), side) for travel in neighbours]
         rows = [
             np.abs(_top(S) / layouts.NEEDS.stroke - 1) - ON_GRID,
-            _top(np.abs(cosine)) - np.cos(layouts.NEEDS.transmission) + BETWEEN,
+            _top(np.abs(cosine)) - np.cos(layouts.NEEDS.transmission) + GRID_MARGIN,
             layouts.MARGIN - (l5 + l6) / reach.max(axis=1),
             layouts.MARGIN - reach.min(axis=1) / np.abs(l5 - l6),
         ]
@@ -126,11 +126,11 @@ def rapier() -> Rival:
             remaining = layouts.violation(design, needs) <= BROKEN
         return (float(layouts.peak(design)), -float(dwell)) if remaining else None
 
-    def own(row: Row) -> np.ndarray:
+    def variables(row: Row) -> np.ndarray:
         return (np.array([row.design[name] for name in layouts.NAMES[1:]]) - low) / width
 
     axes, sides = ("peak_acceleration", "dwell"), (np.zeros(7), np.ones(7))
-    return Rival("rapier", axes, *sides, evaluate, judge, own, "stroke-dwell", -1.0)
+    return Rival("rapier", axes, *sides, evaluate, judge, variables, "stroke-dwell", -1.0)
 
 
 def _secant(strokes: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarray:

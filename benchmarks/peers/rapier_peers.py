@@ -234,7 +234,7 @@ class Loomopt:
         return np.array([result[name] for name in plain.NAMES])
 
 
-def judged(runs, best):
+def quality(runs, best):
     """Columns of one method: runs are (seconds of each turn, design)."""
     off = np.array([abs(plain.peak(result) / best - 1) for _, result in runs])
     broken = np.array([plain.violation(result) for _, result in runs])
@@ -257,16 +257,16 @@ def timed(methods, starts, repeats):
     for start in starts:
         designs: dict = {}
 
-        def kept(name, start=start, designs=designs):
+        def run_method(name, start=start, designs=designs):
             designs[name] = methods[name](start)
 
-        taken = harness.turns({name: functools.partial(kept, name) for name in methods}, repeats)
+        taken = harness.turns({name: functools.partial(run_method, name) for name in methods}, repeats)
         for name in methods:
             runs[name].append(([turn[name] for turn in taken], designs[name]))
     return runs
 
 
-def beside(ours, theirs):
+def ratio(ours, theirs):
     """Spread over the turns of how long the median start takes beside another method's."""
     times = [np.median([took for took, _ in runs], axis=0) for runs in (ours, theirs)]
     return harness.spread((times[0] / times[1]).tolist())
@@ -291,7 +291,7 @@ def main():
         runs |= timed({"SciPy differential evolution, 360 points": evolution}, range(6), 1)
         hybrid = "SciPy differential evolution, 100 generations, then SLSQP"
         runs |= timed({hybrid: lambda seed: added(evolution(seed, 100))}, range(6), 1)
-    rows = [{"method": name, **judged(of, best)} for name, of in runs.items()]
+    rows = [{"method": name, **quality(of, best)} for name, of in runs.items()]
     harness.show(
         rows,
         options.json,
@@ -300,9 +300,9 @@ def main():
         first_call_s=values.first_time,
         build_s=values.first.time["build_s"],
         certify_s=values.answer.time["certify_s"],
-        call_to_slsqp=beside(*(runs[name] for name in calls)),
-        solve_to_slsqp=beside(runs["loomopt: solve"], runs["SciPy SLSQP, 360 points"]),
-        solve_to_slsqp_exchange=beside(runs["loomopt: solve"], runs[exact]),
+        call_to_slsqp=ratio(*(runs[name] for name in calls)),
+        solve_to_slsqp=ratio(runs["loomopt: solve"], runs["SciPy SLSQP, 360 points"]),
+        solve_to_slsqp_exchange=ratio(runs["loomopt: solve"], runs[exact]),
     )
 
 

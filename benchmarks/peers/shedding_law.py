@@ -35,7 +35,7 @@ from reference import shedding as plain
 SCENES = {"shedding": plain.PAPER, "shedding-printed-travel": plain.PRINTED}
 BOUND = 2 * np.pi
 RAISED = (2, 4, 8)
-BESIDE, TURNS = (16, 64, 256), 5
+SIZES, TURNS = (16, 64, 256), 5
 """Intervals of the laws beside IPOPT alone."""
 IPOPT: dict[str, Any] = {
     "tol": 1e-13,
@@ -153,13 +153,13 @@ def clocked(call):
     return call(), time.process_time() - began
 
 
-def beside(name, n):
+def cost_ratio(name, n):
     """Row of one size beside IPOPT alone: medians of turns, the ratio by its spread."""
     scene = lo.load(name).set("targets.law.intervals", n)
     taken: dict[str, list[float]] = {"build": [], "solve": [], "loomopt": []}
     for _ in range(TURNS):
-        (solver, asked, unit), built = clocked(lambda: by_hand(SCENES[name], n))
-        message, solved = clocked(lambda: solver(**asked))  # noqa: B023
+        (solver, arguments, unit), built = clocked(lambda: by_hand(SCENES[name], n))
+        message, solved = clocked(lambda: solver(**arguments))  # noqa: B023
         session.current().forget(transcribe.NLPS)
         answer, values = clocked(lambda: lo.solve(scene, "law"))
         for part, seconds in zip(taken.values(), (built, solved, values), strict=True):
@@ -192,7 +192,7 @@ def main():
     softest = {name: dict(zip(("K1", "law"), fixed(case), strict=True)) for name, case in SCENES.items()}
     bounds = {name: raised(name, sizes[-1]) for name in SCENES}
     lo.solve(lo.load("shedding"))  # what is imported once is no answer's
-    costs = [beside("shedding", n) for n in BESIDE]
+    costs = [cost_ratio("shedding", n) for n in SIZES]
     facts = {"softest_fixed_law": softest, "orders": orders(rows), "bound_raised": bounds}
     harness.show(rows, options.json, **facts, beside_ipopt_alone=costs)
 

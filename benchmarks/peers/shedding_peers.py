@@ -185,7 +185,7 @@ SLOW: dict[str, Callable] = {
 }
 
 
-def judged(result, best):
+def quality(result, best):
     """Columns of one method: the worst of its cases."""
     off = {name: float(mp.mpf(K1) / best[name] - 1) for name, (K1, _) in result.items()}
     lost = [lift_off(CASES[name], *at) for name, at in result.items()]
@@ -218,27 +218,27 @@ def main():
     first = time.perf_counter() - began
     methods, result = METHODS if options.quick else METHODS | SLOW, {}
 
-    def kept(name):
+    def run_method(name):
         result[name] = {of: methods[name](case) for of, case in CASES.items()}
 
-    turns = harness.turns({name: functools.partial(kept, name) for name in methods}, TURNS)
+    turns = harness.turns({name: functools.partial(run_method, name) for name in methods}, TURNS)
     times = harness.medians(turns)
     unit = times["loomopt: whole call"]
-    table = [{"method": name, "time": times[name] / unit, **judged(result[name], best)} for name in methods]
+    table = [{"method": name, "time": times[name] / unit, **quality(result[name], best)} for name in methods]
     pressed = {count: float(plain.uniform_grid(plain.PRESSED, count) / best["pressed on"] - 1) for count in GRIDS}
     rounds = [PARTS[k : k + len(CASES)] for k in range(1, len(PARTS), len(CASES))]
     parts = {part: [sum(call[part] for call in item) for item in rounds] for part in ("solve", "certify")}
 
-    def beside(part, method):
+    def ratio(part, method):
         return harness.spread([values / turn[method] for values, turn in zip(parts[part], turns, strict=True)])
 
     lowest = "SciPy SLSQP, 36 points and the lowest added"
     harness.show(
         table,
         options.json,
-        solve_to_call=beside("solve", "loomopt: whole call"),
-        certify_to_call=beside("certify", "loomopt: whole call"),
-        solve_to_slsqp_lowest=beside("solve", lowest),
+        solve_to_call=ratio("solve", "loomopt: whole call"),
+        certify_to_call=ratio("certify", "loomopt: whole call"),
+        solve_to_slsqp_lowest=ratio("solve", lowest),
         call_to_slsqp_lowest=harness.spread([turn["loomopt: whole call"] / turn[lowest] for turn in turns]),
         pressed_on_equal_points_off=pressed,
         ms_a_call=1e3 * unit / len(CASES),

@@ -22,7 +22,7 @@ FACE = ("__init__", "__main__")
 FLOOR = {name: floor for floor, name in enumerate((*ROOMS, *FACE))}
 IN_A_JOB = {"__init__", "scene", "model", "program", "job", "views", "drawing"}
 """The files that every job's folder has, beside template.toml."""
-OWN_IN_A_JOB = {"linkage": {"parts"}}
+MORE_IN_A_JOB = {"linkage": {"parts"}}
 """What one job has beside them: a linkage is described in the scene."""
 COMMON = {"load", "counterweight"}
 """Names of effects that are names of other things too: a public function, a move of the beat-up."""
@@ -126,12 +126,12 @@ def test_imports_of_a_module_below_or_beside_are_allowed():
 def arrows():
     """Return every module with the modules it imports."""
     known = {name.removesuffix(".__init__"): path for name, path in modules().items()}
-    found_ = {}
+    counts = {}
     for name, path in known.items():
         named = [other for other, _ in imports(text_of(path))]
         homes = {other if other in known else other.rpartition(".")[0] for other in named}
-        found_[name] = {home for home in homes if home in known and home != name and known[home].stem != "__init__"}
-    return found_
+        counts[name] = {home for home in homes if home in known and home != name and known[home].stem != "__init__"}
+    return counts
 
 
 def test_no_file_reaches_itself():
@@ -185,7 +185,7 @@ def test_an_effect_is_named_in_its_own_file_only_and_where_a_target_needs_it(job
 def test_jobs_have_the_same_files():
     for job in JOBS:
         folder = PACKAGE / "jobs" / job
-        assert {path.stem for path in folder.glob("*.py")} == IN_A_JOB | OWN_IN_A_JOB.get(job, set()), job
+        assert {path.stem for path in folder.glob("*.py")} == IN_A_JOB | MORE_IN_A_JOB.get(job, set()), job
         assert (folder / "template.toml").is_file()
 
 
@@ -257,8 +257,8 @@ def counted(source):
 
 def test_the_order_of_an_nlps_rows_and_variables_is_known_in_one_file():
     files = {name: path for name, path in modules().items() if name.startswith(SEE_ROWS) and name not in ORDERED_IN}
-    found_ = {name: counted(text_of(path)) for name, path in files.items()}
-    assert {name: lines for name, lines in found_.items() if lines} == {}
+    counts = {name: counted(text_of(path)) for name, path in files.items()}
+    assert {name: lines for name, lines in counts.items() if lines} == {}
 
 
 @pytest.mark.parametrize(

@@ -179,9 +179,9 @@ def test_whatever_is_given_is_taken_or_told_in_one_line(monkeypatch, tmp_path, o
                 call(odd) if several else call(**{**others, parameter: odd})
             except TakenError:
                 pass
-            except lo.BadInput as told:
-                if not all(line.isprintable() for line in str(told).split("\n")):
-                    wrong.append((parameter, type(odd), repr(str(told))))
+            except lo.BadInput as message:
+                if not all(line.isprintable() for line in str(message).split("\n")):
+                    wrong.append((parameter, type(odd), repr(str(message))))
             except BaseException as error:
                 wrong.append((parameter, type(odd), f"{error!r}"[:150]))
     assert not wrong, "\n".join(map(str, wrong))

@@ -99,9 +99,9 @@ def test_a_certified_optimum_of_the_wrong_basin_is_beaten(attack, monkeypatch):
     trial.solved(["default"])
     assert trial.answer.certificate.passed
     assert trial.answer.figures["peak_acceleration"] == pytest.approx(0.9253096, abs=1e-6)
-    trial.judged()
+    trial.compare_answer()
     assert [kind for kind, _ in trial.verdicts] == ["beaten"]
-    assert trial.found[1][0] == pytest.approx(0.84455731, abs=1e-7)
+    assert trial.best_known[1][0] == pytest.approx(0.84455731, abs=1e-7)
 
 
 @pytest.fixture
@@ -122,7 +122,7 @@ def verdicts(trial, **spoilt):
         }
         | spoilt
     )
-    trial.judged()
+    trial.compare_answer()
     return [kind for kind, _ in trial.verdicts]
 
 

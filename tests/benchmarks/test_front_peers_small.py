@@ -39,7 +39,9 @@ def test_the_referee_of_the_beat_up_reads_the_published_optimum(peers):
     beatup = peers.beatup()
     report = check.read_reference(packaged.results_path() / "beatup.balance.csv").iloc[0]
     design = {str(name).split(" [")[0]: cell for name, cell in report.items()}
-    best = beatup.own(SimpleNamespace(design={n: float(design[n]) for n in ("l1", "l2", "l3", "l4", "m4e", "r4e")}))
+    best = beatup.variables(
+        SimpleNamespace(design={n: float(design[n]) for n in ("l1", "l2", "l3", "l4", "m4e", "r4e")})
+    )
     assert beatup.judge(best) == pytest.approx((88.689413492, 0.0), abs=1e-6)
     assert beatup.judge(best * [1.1, 1, 1, 1, 1]) is None
     seen, rows = beatup.evaluate(best[None])
@@ -51,7 +53,7 @@ def test_the_referee_of_the_rapier_reads_the_published_optimum(peers):
     rapier = peers.rapier()
     report = check.read_reference(packaged.results_path() / "rapier.stroke-dwell.csv").iloc[0]
     design = {str(name).split(" [")[0]: float(cell) for name, cell in report.items() if str(name)[0] in "laCp"}
-    best = rapier.own(SimpleNamespace(design=design))
+    best = rapier.variables(SimpleNamespace(design=design))
     peak, dwell = rapier.judge(best)
     assert peak == pytest.approx(0.694984753570, rel=1e-6)
     assert -np.degrees(dwell) == pytest.approx(30.0, rel=1e-6)

@@ -13,7 +13,7 @@ def infeasible():
 
 
 def test_a_scene_without_room_is_told_with_what_it_needs(infeasible):
-    result = infeasible.told("beatup", "balance", {"bounds.l1": {"min": "80 mm", "max": "81 mm"}})
+    result = infeasible.summary("beatup", "balance", {"bounds.l1": {"min": "80 mm", "max": "81 mm"}})
     assert result["status"] == "infeasible"
     assert result["cpu"] > 0.0
     assert all(need > 0.0 for need in result["relaxed"].values())

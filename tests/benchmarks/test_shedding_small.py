@@ -21,7 +21,7 @@ PEERS, LAW = "peers.shedding_peers", "peers.shedding_law"
 CALL, FORMULA = "loomopt: whole call", "formula, 360 points, the highest refined"
 EXCHANGE = "SciPy SLSQP, 36 points and the lowest added"
 BOUND = 2 * math.pi
-KEPT = ((6176.1875, 119.21, 177.46), (8029.14, 144.51, 227.45))
+PRINTED_ROWS = ((6176.1875, 119.21, 177.46), (8029.14, 144.51, 227.45))
 """A spring's K1 and the rpm up to which it keeps contact at 65.6 and at 14.5 mm: statics, and 30 % more [Qiu21]."""
 
 
@@ -113,7 +113,7 @@ def test_statics_alone_gives_the_spring_of_the_dwell(plain):
     assert float(plain.least_stiffness(replace(plain.PAPER, shape="levels"))[0]) == pytest.approx(6176.1875, rel=1e-14)
 
 
-@pytest.mark.parametrize(("K1", "paper", "printed"), KEPT)
+@pytest.mark.parametrize(("K1", "paper", "printed"), PRINTED_ROWS)
 def test_the_referees_contact_speeds(plain, K1, paper, printed):
     for scene, rpm in ((plain.PAPER, paper), (plain.PRINTED, printed)):
         result = plain.contact_speed(scene, K1)
@@ -287,7 +287,7 @@ def test_loomopts_least_cam_force_and_its_speed_are_the_referees(peers, plain):
         assert answer.status == "optimal"
         assert answer.figures["contact_max"] == pytest.approx(peak, rel=1e-10)
         assert [answer.design["K1"], answer.design["X0"]] == pytest.approx([K1, X0], rel=1e-9)
-    for K1, *_ in KEPT:
+    for K1, *_ in PRINTED_ROWS:
         for case in (plain.PAPER, plain.PRINTED):
             answer = lo.solve(peers.scene(case).set("mechanism.K1", f"{K1} N/m"), "speed")
             rpm = plain.contact_speed(case, K1)

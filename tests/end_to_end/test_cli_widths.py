@@ -10,7 +10,7 @@ from loomopt.picture.table import TextTable, restore_spaces
 
 M0 = ("--over", "operation.M0=700:760:60 N*m", "--over", "operation.speed=500:600:100 rpm", "--with", "gravity")
 FRONT = ("shedding-static", "--minimise", "K1", "--against", "contact_max", "--points", "3")
-ASKED = {  # command -> headings that stay at any width
+LASTING = {  # command -> headings that stay at any width
     ("list",): ["problem", "what it is"],
     ("show", "shedding"): ["key", "as given", "effect", "target", "figure"],
     ("show", "beatup", "--symbols"): ["symbol", "unit", "what it is"],
@@ -57,7 +57,7 @@ def words(text):
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize("columns", WIDTHS)
-@pytest.mark.parametrize("command", ASKED, ids=" ".join)
+@pytest.mark.parametrize("command", LASTING, ids=" ".join)
 def test_no_digit_is_cut_and_what_is_asked_for_is_there(printed, command, columns):
     texts, _ = printed(command)
     text, pipe = texts[columns], texts[None]
@@ -67,12 +67,12 @@ def test_no_digit_is_cut_and_what_is_asked_for_is_there(printed, command, column
     whole = [word for word in pipe.split() if len(word) > layout.LONGEST_WORD]  # addresses
     new = {word for word in words(message) - words(pipe) if re.search(r"\d", word)}
     assert {word for word in new if not any(word in item for item in whole)} == set()
-    assert [heading for heading in ASKED[command] if not re.search(rf"\b{re.escape(heading)}\b", text)] == []
+    assert [heading for heading in LASTING[command] if not re.search(rf"\b{re.escape(heading)}\b", text)] == []
 
 
 @pytest.mark.few(5)
 @pytest.mark.parametrize("columns", WIDTHS)
-@pytest.mark.parametrize("command", [command for command in ASKED if command[0] != "simulate"], ids=" ".join)
+@pytest.mark.parametrize("command", [command for command in LASTING if command[0] != "simulate"], ids=" ".join)
 def test_columns_that_have_gone_are_named_with_how_to_see_them(printed, command, columns):
     texts, parts = printed(command)
     for grid in (part for part in parts if isinstance(part, TextTable)):

@@ -30,7 +30,7 @@ WRITTEN = {**PAGES, **{name: (ROOT / name).read_text(encoding="utf-8") for name 
 LONGEST_README = 120
 
 
-OWN_TESTS = ("docs/development/", "docs/hard-cases.md")
+TESTED_ELSEWHERE = ("docs/development/", "docs/hard-cases.md")
 """Pages whose code other tests run: test_extending.py, test_hard_chapter.py."""
 SLOW = (
     *("docs/how-to/", "docs/ideas/effects.md", "docs/own-loom/linkage.md", "docs/own-loom/rapier.md"),
@@ -39,7 +39,7 @@ SLOW = (
 CARRIED_OUT = [
     pytest.param(page, marks=[pytest.mark.slow] if page.startswith(SLOW) else [])
     for page, text in PAGES.items()
-    if write.STEP.search(text) and not page.startswith(OWN_TESTS)
+    if write.STEP.search(text) and not page.startswith(TESTED_ELSEWHERE)
 ]
 
 

@@ -29,7 +29,7 @@ PICTURES = (
     ("simulate", "--out", "c.csv", "--out", "c.svg"),
     ("export", "--out", "x.dxf", "--out", "x.csv", "--out", "x.svg"),
 )
-ONE_SOLVE = (
+SINGLE_SOLVES = (
     ("solve", "--starts", "1", "--out", "found", "--json"),
     ("solve", "--starts", "1", "--prove", "--json"),
     ("prove", "--json"),
@@ -128,7 +128,7 @@ def test_pictures(name, on, place, capsys):
 @pytest.mark.parametrize(("name", "on"), SUBJECTS)
 def test_one_solve(name, on, place, capsys):
     where = place(name)
-    for words in ONE_SOLVE:
+    for words in SINGLE_SOLVES:
         if called(words, where, on, capsys) == 0 and "found" in words:
             for made in (
                 ("compare", "found/answer.json", "--json"),
@@ -158,5 +158,5 @@ def test_commands_of_a_job(job, capsys, tmp_path):
 
 
 def test_every_command_is_called():
-    words = {words[0] for words in (*CHEAP, *PICTURES, *ONE_SOLVE, *STUDIES)}
+    words = {words[0] for words in (*CHEAP, *PICTURES, *SINGLE_SOLVES, *STUDIES)}
     assert COMMANDS.keys() == words | {"pareto", "compare", "list", "schema", "new", "check"}

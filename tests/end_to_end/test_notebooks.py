@@ -24,7 +24,7 @@ def test_there_is_one_for_each_job_and_one_on_accuracy():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STORED)
 def test_a_notebook_run_from_a_clean_kernel_says_what_stands_there(name):
-    result = run.kept(ROOT / "notebooks" / f"{name}.ipynb")
+    result = run.stored_run(ROOT / "notebooks" / f"{name}.ipynb")
     assert run.differences(STORED[name], result) == [], "make notebooks writes it anew"
 
 
@@ -40,7 +40,7 @@ def test_a_notebook_stands_there_as_it_was_run_from_top_to_bottom(name):
 
 @pytest.mark.parametrize("name", STORED)
 def test_a_notebook_holds_no_path_date_or_time_of_a_machine(name):
-    for where, text in run.said(STORED[name]):
+    for where, text in run.texts(STORED[name]):
         assert LOCAL.findall(text) == [], where
     assert [cell.id for cell in STORED[name].cells if cell.metadata] == []
 

@@ -22,10 +22,17 @@ from loomopt.interface.cli.app import COMMANDS
 ROOT = Path(__file__).parents[2]
 SITE = ROOT / "build" / "site"
 FIRST = SITE / "docs" / "index.html"
-OWN = {"index.html", "genindex.html", "search.html"}
+BUILT = {"index.html", "genindex.html", "search.html"}
 """Pages of Sphinx's, beside those that are written."""
 CLICKS = 3
-ASKED = {("script", "src"), ("link", "href"), ("img", "src"), ("iframe", "src"), ("source", "src"), ("object", "data")}
+REQUESTS = {
+    ("script", "src"),
+    ("link", "href"),
+    ("img", "src"),
+    ("iframe", "src"),
+    ("source", "src"),
+    ("object", "data"),
+}
 """What a browser fetches by itself."""
 OUTSIDE = re.compile(r"^(?:[a-z]+:)?//")
 
@@ -50,7 +57,7 @@ class Read(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.links, self.asked, self.anchors, self.equations, self.words = [], [], set(), 0, []
+        self.links, self.requests, self.anchors, self.equations, self.words = [], [], set(), 0, []
         self.feed(text)
 
     def handle_starttag(self, tag, attributes):
@@ -59,13 +66,13 @@ class Read(HTMLParser):
         self.equations += tag == "math"
         if tag == "a" and given.get("href"):
             self.links.append(given["href"])
-        for name, key in ASKED:
+        for name, key in REQUESTS:
             if tag == name and given.get(key) and given.get("rel") not in ("index", "search", "next", "prev"):
-                self.asked.append(given[key])
-        self.asked += re.findall(r"url\(([^)]+)\)", given.get("style") or "")
+                self.requests.append(given[key])
+        self.requests += re.findall(r"url\(([^)]+)\)", given.get("style") or "")
         if given.get("srcdoc"):
             inner = Read(given["srcdoc"])
-            self.asked += inner.asked
+            self.requests += inner.requests
 
     def handle_data(self, data):
         self.words.append(data)
@@ -88,7 +95,7 @@ def inside(page, link):
 def test_no_page_asks_for_anything_outside_the_site():
     assert len(pages()) > 35
     for page, read in pages().items():
-        requests = [item for item in read.asked if not item.startswith("data:")]
+        requests = [item for item in read.requests if not item.startswith("data:")]
         assert [item for item in requests if OUTSIDE.match(item)] == [], page
         assert [item for item in requests if not (SITE / inside(page, item)[0]).exists()] == [], page
 
@@ -101,7 +108,7 @@ def test_no_style_or_script_asks_for_anything_outside_the_site():
         named = re.findall(r"url\(\s*[\"']?([^\"')]+)", text) + re.findall(r"@import\s+[\"']([^\"']+)", text)
         assert [item for item in named if OUTSIDE.match(item)] == [], style.name
     for page, read in pages().items():
-        assert "mathjax" not in " ".join(read.asked).lower(), page
+        assert "mathjax" not in " ".join(read.requests).lower(), page
 
 
 def test_mathematics_is_mathml():
@@ -126,7 +133,7 @@ def test_every_page_is_reached_from_the_first_one_in_three_clicks():
     for _ in range(CLICKS):
         edge = {inside(page, link)[0] for page in edge for link in pages()[page].links} & pages().keys() - result
         result = result | edge
-    assert pages().keys() - OWN <= result
+    assert pages().keys() - BUILT <= result
 
 
 def test_no_page_names_a_path_of_this_machine():

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PRESS = ROOT / "tests" / "plugin" / "press" / "loomopt_press"
-KEPT = ("loomopt", "problems", "results", "tests/reference", "tests/support", "tests/conftest.py")
+FOLDERS = ("loomopt", "problems", "results", "tests/reference", "tests/support", "tests/conftest.py")
 REFERENCE = "tests/physics/effects/test_effects_reference.py"
 EFFECT = '''"""Clock spring on the rocking shaft: output term T."""
 
@@ -50,7 +50,7 @@ class Copy:
 
     def __init__(self, folder):
         self.folder = folder
-        for name in (*KEPT, REFERENCE):
+        for name in (*FOLDERS, REFERENCE):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             if (ROOT / name).is_dir():
                 shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))

@@ -57,12 +57,12 @@ CENTRES = ("beta", "beta_r", "theta", "swing", "psi_front", "psi_rear")
 def centres(side):
     """Return a function of the lengths that gives CENTRES [Yuan24, eq 12], by arc cosines."""
 
-    def found(l1, l2, l3, l4):
+    def height(l1, l2, l3, l4):
         beta, beta_r = angle(l2 + l1, l4, l3), angle(l2 - l1, l4, l3)
         front, rear = MP.pi - angle(l3, l4, l2 + l1), MP.pi - angle(l3, l4, l2 - l1)
         return side * beta, side * beta_r, side * (beta - beta_r), rear - front, side * front, side * rear
 
-    return found
+    return height
 
 
 def transmission(l1, l2, l3, l4):

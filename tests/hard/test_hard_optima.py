@@ -36,7 +36,7 @@ def worths(answer):
 
 # Limits said twice, or for nothing -------------------------------------------------------------------------------
 
-SAID_TWICE = {
+EQUAL_LIMITS = {
     "preload and length of the spring": ("shedding", {"limits.spring_stretch.max": "145.6 mm"}),
     "the same but for 1e-12": ("shedding", {"limits.spring_stretch.max": f"{145.6 * (1 + 1e-12)!r} mm"}),
     "contact and demand": ("shedding", {"limits.contact_min.min": "0 N"}),
@@ -47,11 +47,11 @@ SAID_TWICE = {
 }
 
 
-@pytest.mark.parametrize("name", SAID_TWICE)
+@pytest.mark.parametrize("name", EQUAL_LIMITS)
 @pytest.mark.few(2)
 def test_a_limit_said_twice_or_for_nothing_changes_nothing(name):
     """Design and figures to 1e-9; the price may stand with either of the two."""
-    problem, changes = SAID_TWICE[name]
+    problem, changes = EQUAL_LIMITS[name]
     once, twice = optimal(lo.load(problem)), optimal(lo.load(problem).update(changes))
     for figure, value in once.figures.items():
         assert twice.figures[figure] == (value if value is None else pytest.approx(value, rel=1e-8, abs=1e-8)), figure

@@ -304,22 +304,22 @@ def test_an_answer_of_another_job_stands_for_nothing():
 
 def test_an_answer_is_evaluated_simulated_and_proven_in_its_own_scene_for_its_own_target():
     scene = lo.load("shedding").with_effect("dry_friction").set("operation.speed", "400 rpm")
-    own_answer = lo.solve(scene, "speed")
-    again = own_answer.evaluate()
-    assert own_answer.status == "optimal"
-    assert (again.admissible, again.effects, again.limits) == (True, own_answer.effects, own_answer.limits)
+    answer = lo.solve(scene, "speed")
+    again = answer.evaluate()
+    assert answer.status == "optimal"
+    assert (again.admissible, again.effects, again.limits) == (True, answer.effects, answer.limits)
     assert {n: v for n, v in again.figures.items() if v is not None} == pytest.approx(
-        {n: v for n, v in own_answer.figures.items() if v is not None}, rel=1e-12, abs=1e-9
+        {n: v for n, v in answer.figures.items() if v is not None}, rel=1e-12, abs=1e-9
     )
-    assert not lo.evaluate(scene, own_answer).admissible, "today's speed is a limit of the default target"
-    assert lo.evaluate(scene, own_answer, "speed").limits == again.limits
-    curves = own_answer.simulate()
-    assert curves.equals(own_answer.curves())
+    assert not lo.evaluate(scene, answer).admissible, "today's speed is a limit of the default target"
+    assert lo.evaluate(scene, answer, "speed").limits == again.limits
+    curves = answer.simulate()
+    assert curves.equals(answer.curves())
     assert "dry_friction [N]" in curves
-    assert (curves.attrs["target"], curves.attrs["effects"]) == ("speed", ", ".join(own_answer.effects))
-    assert len(own_answer.simulate(accuracy=1e-3)) < len(curves)
-    assert own_answer.prove().target == "speed"
-    assert own_answer.prove(slack=1e-7).passed
+    assert (curves.attrs["target"], curves.attrs["effects"]) == ("speed", ", ".join(answer.effects))
+    assert len(answer.simulate(accuracy=1e-3)) < len(curves)
+    assert answer.prove().target == "speed"
+    assert answer.prove(slack=1e-7).passed
 
 
 def test_no_message_speaks_of_the_command_line_to_python():

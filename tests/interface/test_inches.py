@@ -20,7 +20,7 @@ from loomopt.solving.answer.solution import UnitFormatter
 
 WISH = packaged.problems()["rapier"].parent / "rapier-wish.csv"
 TABLE = {"targets__match__table": str(WISH)}
-SAID = re.compile(r"[A-Za-z]+(?:[*/^]\(?[A-Za-z0-9]+\)?)*|1/[a-z]+(?:\^\d)?")
+UNIT_WORD = re.compile(r"[A-Za-z]+(?:[*/^]\(?[A-Za-z0-9]+\)?)*|1/[a-z]+(?:\^\d)?")
 CASES = ["beatup-light balance", "rapier stroke-dwell", "shedding stiffness", "shedding force"]
 MIXED = {
     "linkage": {"problem.title": "Lengths in inches, all else as written", "display.length": "in"},
@@ -47,7 +47,7 @@ def all_on(scene):
 def masked(parts):
     """Return a text with its numbers as # and its units as U, and the room that tables give them left out."""
     text = layout.render(parts, None)
-    text = SAID.sub(lambda word: "U" if _is_unit(word[0]) else word[0], text)
+    text = UNIT_WORD.sub(lambda word: "U" if _is_unit(word[0]) else word[0], text)
     text = re.sub(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?", "#", text)
     return re.sub(r"[-\s]+", " ", text)
 

@@ -68,13 +68,13 @@ def test_on_the_crank_a_force_that_turns_with_it_stands_still():
 @pytest.mark.slow
 def test_the_figure_has_sizes_and_a_diagram_of_each_and_no_text_runs_into_anything(scene, tmp_path):
     drawn = lo.evaluate(scene).plot_forces(tmp_path / "forces.pdf")
-    assert overlaps.found(drawn) == []
+    assert overlaps.overlapping(drawn) == []
     assert len(drawn.axes) == 3
     assert (tmp_path / "forces.pdf").read_bytes()[:4] == b"%PDF"
 
 
 LEVER = {"mechanism.lever": {"arm": "150 mm", "direction": "80 deg"}}
-OWN = {
+PAIRS = {
     "beatup": {"force_A": ["crank"], "force_B": ["crank", "rod"], "force_C": ["rod", "rocker"], "force_D": ["rocker"]},
     "rapier": {"force_B2": ["sley", "driving link"], "force_C": ["second crank", "link 5"], "force_B0": ["sley"]},
     "knuckle-press": {
@@ -87,13 +87,13 @@ OWN = {
 """Packaged scene → some of its forces, with the parts that turn beside each joint."""
 
 
-@pytest.mark.parametrize("name", OWN)
+@pytest.mark.parametrize("name", PAIRS)
 def test_each_force_is_shown_on_the_parts_that_it_is_between(name):
     values = lo.load(name).with_effect("joint_forces", *(["head_inertia"] if name == "rapier" else []))
     values = values.update(LEVER) if name == "shedding" else values
     evaluated = lo.evaluate(values)
     forces = from_curves(values, evaluated.simulate(), evaluated.design).by_name
-    for force, parts in OWN[name].items():
+    for force, parts in PAIRS[name].items():
         assert list(forces[force].headings) == parts
         for part in parts:
             assert np.hypot(*forces[force].headings[part]) == pytest.approx(1.0, rel=1e-12)
@@ -114,14 +114,14 @@ def test_each_force_is_shown_on_the_parts_that_it_is_between(name):
 
 
 def test_a_two_force_member_carries_its_force_along_its_line():
-    own_scene = lo.load("beatup").with_effect("joint_forces")
-    x, y = from_curves(own_scene, lo.simulate(own_scene)).by_name["force_C"].on("rod")
+    scene = lo.load("beatup").with_effect("joint_forces")
+    x, y = from_curves(scene, lo.simulate(scene)).by_name["force_C"].on("rod")
     assert np.max(np.abs(y)) < 1e-9 * np.max(np.abs(x))
 
 
 def test_the_figure_of_every_joint_of_a_machine_is_free_of_overlaps():
     drawn = lo.evaluate(lo.load("beatup").with_effect("joint_forces")).plot_forces()
-    assert overlaps.found(drawn) == []
+    assert overlaps.overlapping(drawn) == []
 
 
 def test_the_command_tells_and_draws_them(scene, tmp_path, capsys):

@@ -30,7 +30,7 @@ def evaluation(answer):
 
 
 @pytest.fixture(params=["answer", "evaluation"])
-def found(request):
+def evaluated(request):
     return request.getfixturevalue(request.param)
 
 
@@ -39,21 +39,21 @@ def tree(html):
 
 
 @pytest.mark.few(1)
-def test_a_plot_is_a_figure_that_shows_itself_and_is_written_where_asked(found, tmp_path):
-    figure = found.plot(tmp_path / "curves.svg")
+def test_a_plot_is_a_figure_that_shows_itself_and_is_written_where_asked(evaluated, tmp_path):
+    figure = evaluated.plot(tmp_path / "curves.svg")
     assert isinstance(figure, Figure)
     assert isinstance(figure, ShownFigure)
     assert figure._repr_png_().startswith(PNG)
     of = (
         "best design for balance, M3_fdc not reached"
-        if isinstance(found, lo.Answer)
+        if isinstance(evaluated, lo.Answer)
         else "a given design, limits not held"
     )
-    assert figure.get_suptitle() == f"{found.scene.name}: {of}, curves over the cycle"
-    assert len(figure.axes) >= len(found.curves().columns) / 3
+    assert figure.get_suptitle() == f"{evaluated.scene.name}: {of}, curves over the cycle"
+    assert len(figure.axes) >= len(evaluated.curves().columns) / 3
     assert ElementTree.parse(tmp_path / "curves.svg").getroot().tag.endswith("svg")
     with pytest.raises(lo.BadInput):
-        found.plot(tmp_path / "curves.txt")
+        evaluated.plot(tmp_path / "curves.txt")
     assert [path.name for path in tmp_path.iterdir()] == ["curves.svg"]
 
 
@@ -66,8 +66,8 @@ def test_a_plot_is_the_picture_of_the_command(answer, tmp_path, monkeypatch):
     assert Path("python.png").read_bytes() == Path("command.png").read_bytes()
 
 
-def test_a_drawing_shows_itself(found):
-    drawn = found.draw()
+def test_a_drawing_shows_itself(evaluated):
+    drawn = evaluated.draw()
     texts = {element.text for element in tree(drawn._repr_svg_()).iter() if element.text}
     assert {"A", "B", "C", "D"} <= texts
     assert 'mm" height="' in drawn.svg, "at true scale; as it shows itself: tests/interface/text/test_notebook.py"
@@ -92,21 +92,21 @@ def test_an_evaluation_is_exported_too_and_other_files_are_refused(evaluation, t
     assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
 
 
-def test_one_row_holds_all_of_the_design_and_its_figures_in_the_tables_units(found):
-    frame, table = found.to_frame(), found.table()
+def test_one_row_holds_all_of_the_design_and_its_figures_in_the_tables_units(evaluated):
+    frame, table = evaluated.to_frame(), evaluated.table()
     assert len(frame) == 1
     row = frame.iloc[0]
     for name, unit, value in zip(table.index, table["unit"], table["design"], strict=True):
         assert row[f"{name} [{unit}]"] == value
-    assert frame.attrs["scene_hash"] == found.scene.hash
-    assert frame.attrs["target"] == found.target
+    assert frame.attrs["scene_hash"] == evaluated.scene.hash
+    assert frame.attrs["target"] == evaluated.target
 
 
-def test_one_row_in_si_is_design_and_figures_themselves(found):
-    row = found.to_frame(si=True).iloc[0]
-    for name, value in {**found.design, **found.figures}.items():
+def test_one_row_in_si_is_design_and_figures_themselves(evaluated):
+    row = evaluated.to_frame(si=True).iloc[0]
+    for name, value in {**evaluated.design, **evaluated.figures}.items():
         if value is not None:
-            assert row[f"{name} [{found.units[name]}]"] == value
+            assert row[f"{name} [{evaluated.units[name]}]"] == value
 
 
 def test_rows_of_answers_compare_and_those_of_other_units_do_in_si(answer):

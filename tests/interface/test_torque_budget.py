@@ -77,7 +77,7 @@ def test_the_figure_has_a_curve_for_each_share_and_no_text_runs_into_anything(tm
     budget = lo.budget(scene)
     assert len(budget.rows) >= 7
     drawn = budget.plot(tmp_path / "budget.svg")
-    assert overlaps.found(drawn) == []
+    assert overlaps.overlapping(drawn) == []
     (axes,) = drawn.axes
     curves = [y for y in (np.asarray(line.get_ydata()) for line in axes.lines) if len(y) > 2]
     assert len(curves) == len(budget.rows) + 1, "the shares and their sum"

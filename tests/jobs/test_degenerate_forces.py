@@ -35,13 +35,13 @@ def test_next_to_a_change_point_forces_are_numbers_that_grow():
     assert nearer["force_C"] > 3 * near["force_C"]
 
 
-OTHERS = {
+CHANGES = {
     "rapier": {"mechanism.l2": "165.385 mm"},
     "sixbar-sley": {"mechanism.l3": "99 mm"},
     "shedding": {"mechanism.base_radius": "10 mm"},
 }
 """Packaged scene → what puts today's machine at a change point; a cam's roller in line with its arm and its shaft."""
-SAID = {
+MESSAGES = {
     "rapier": "does not turn all round: the sley four-bar is not a crank-rocker",
     "sixbar-sley": "does not turn all round",
     "shedding": "base_radius 10 mm must be greater than the difference 10 mm",
@@ -61,10 +61,10 @@ def forces_of(scene):
     }, evaluation.undefined
 
 
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("name", CHANGES)
 def test_every_machine_at_a_change_point_is_one_message(name):
-    with pytest.raises(BadInput, match=SAID[name]) as caught:
-        lo.evaluate(loaded(name).update(OTHERS[name]))
+    with pytest.raises(BadInput, match=MESSAGES[name]) as caught:
+        lo.evaluate(loaded(name).update(CHANGES[name]))
     assert len(str(caught.value).splitlines()) == 1
 
 

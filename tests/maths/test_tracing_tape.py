@@ -63,9 +63,9 @@ WITHOUT_NUMPY = "mpmath", "balls"
 )
 def test_every_operation_gives_the_same_bits_in_every_system(name, system, called):
     """Whatever is known beforehand: nothing, one of the numbers, or both."""
-    formula, (own, number) = FORMULAS[name], SYSTEMS[system]
+    formula, (maths, number) = FORMULAS[name], SYSTEMS[system]
     x, y = number(X), number(Y)
-    assert bits(run(written(formula, called), own, x, y, called)) == bits(formula(own, x, y))
+    assert bits(run(written(formula, called), maths, x, y, called)) == bits(formula(maths, x, y))
 
 
 def counting(system=systems.FLOAT):
@@ -142,10 +142,10 @@ def test_two_systems_share_a_formula():
     first, second = recording.recorded(tape, 0), recording.recorded(tape, 1)
     x, y = tape.input(), tape.input()
     program = tape.program((first.sin(x) * second.sin(y) * second.sin(x),), [y], [x])
-    item, by_one, _ = counting()
-    two, by_two, _ = counting()
+    item, by_first, _ = counting()
+    two, by_second, _ = counting()
     assert program([item, two])([X])(Y)[0] == math.sin(X) * math.sin(Y) * math.sin(X)
-    assert (by_one, by_two) == ([X], [X, Y])
+    assert (by_first, by_second) == ([X], [X, Y])
 
 
 def test_outputs_may_be_inputs_numbers_and_several():

@@ -13,10 +13,10 @@ from loomopt.maths.systems import within_half_turn, within_turn
 TURN = 2 * math.pi
 CASES = [(0.3, 0.5, 0.3), (0.3 + TURN, 0.5, 0.3), (-3.0 - 2 * TURN, 0.5, -3.0), (-1.0, 0.0, TURN - 1.0)]
 """Angle, share of a turn behind 0, and where it lies then."""
-each_case = pytest.mark.parametrize(("angle", "behind", "expected"), CASES)
+cases = pytest.mark.parametrize(("angle", "behind", "expected"), CASES)
 
 
-@each_case
+@cases
 @pytest.mark.parametrize("system", [systems.FLOAT, systems.numpy(), systems.mpmath(40), systems.jets()])
 def test_an_angle_is_brought_onto_a_turn(system, angle, behind, expected):
     assert float(within_turn(system, system.number(angle), behind)) == pytest.approx(expected, abs=2e-15)
@@ -29,7 +29,7 @@ def test_one_that_lies_there_is_the_same_to_the_last_bit():
     assert np.array_equal(within_half_turn(systems.numpy(), angles), angles)
 
 
-@each_case
+@cases
 def test_its_slope_is_one(angle, behind, expected):
     import casadi as ca
 
@@ -43,7 +43,7 @@ def test_its_slope_is_one(angle, behind, expected):
     assert [float(item) for item in function(angle)] == pytest.approx([expected, 1.0], abs=2e-15)
 
 
-@each_case
+@cases
 def test_balls_and_boxes_enclose_it(angle, behind, expected):
     ball = within_turn(systems.balls(), systems.ball_series(angle, 1e-3), behind)
     assert ball[0].contains(arb(expected))

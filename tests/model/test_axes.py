@@ -114,9 +114,9 @@ def test_a_bounded_number_is_an_axis():
 
 def test_structures_do_not_depend_on_the_number_that_is_held():
     _, _, (_, mass) = traded("beatup", "balance", peak_torque="least", m4e="least")
-    (one,), (other,) = mass.limits("m4e", 0.0), mass.limits("m4e", 5.0)
-    assert one.structure == other.structure
-    assert (one.value, other.value) == (0.0, 5.0)
+    (first,), (second,) = mass.limits("m4e", 0.0), mass.limits("m4e", 5.0)
+    assert first.structure == second.structure
+    assert (first.value, second.value) == (0.0, 5.0)
 
 
 @pytest.mark.parametrize(("axis", "sense"), [("peak_torque", "most"), ("mu_min", "least"), ("M3_fdc", "most")])

@@ -61,10 +61,10 @@ ARM = State(
     derived=harmonics,
     force=passed_on,
     coordinate=lambda *_: 0,
-    motion=lambda written, own: (0, 0),
-    term=lambda written, own: 0,
+    motion=lambda written, values: (0, 0),
+    term=lambda written, values: 0,
     difference=("x_a", "x"),
-    rests=lambda own: "two harmonics are all there are",
+    rests=lambda values: "two harmonics are all there are",
 )
 DRAG = Load(name="drag", summary="", table=Table, acts="drive", force=drag)
 STIFF = JobModel(

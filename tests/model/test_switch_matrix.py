@@ -88,7 +88,7 @@ JOBS = ("beatup", "rapier", "shedding")
 """Those whose effects are on a machine of their own; those of a linkage described in a scene: its own tests."""
 
 
-class One(NamedTuple):
+class Choice(NamedTuple):
     """One effect with one of its examples."""
 
     effect: str
@@ -102,7 +102,7 @@ class Combination(NamedTuple):
     """A job with some of its effects on."""
 
     job: str
-    ones: tuple[One, ...]
+    ones: tuple[Choice, ...]
 
     def __str__(self):
         return f"{self.job}: {' + '.join(map(str, self.ones)) or 'none'}"
@@ -116,7 +116,7 @@ def completed(combination):
     """Return a combination with the effects that its own need beside them, at their first example."""
     effects = packaged(combination.job).schema.effects
     needed = {name for item in combination.ones for name in effects[item.effect].companions} - set(combination.names)
-    ones = {item.effect: item for item in (*combination.ones, *(One(name, 0) for name in needed))}
+    ones = {item.effect: item for item in (*combination.ones, *(Choice(name, 0) for name in needed))}
     return combination._replace(ones=tuple(ones[name] for name in effects if name in ones))
 
 
@@ -141,7 +141,7 @@ def tried():
     """Yield nothing, all, each alone and every pair."""
     for job in JOBS:
         effects = packaged(job).schema.effects
-        items = {name: [One(name, k) for k in range(len(effect.examples))] for name, effect in effects.items()}
+        items = {name: [Choice(name, k) for k in range(len(effect.examples))] for name, effect in effects.items()}
         yield Combination(job, ())
         for k in range(max(map(len, items.values()))):
             whole = Combination(job, tuple(ones[min(k, len(ones) - 1)] for ones in items.values()))
@@ -189,7 +189,7 @@ def at_phi(table, column):
 def offered(job):
     """Return the names of all numbers of a job's effects and tables."""
     effects = packaged(job).schema.effects
-    lasts = [completed(Combination(job, (One(name, len(effect.examples) - 1),))) for name, effect in effects.items()]
+    lasts = [completed(Combination(job, (Choice(name, len(effect.examples) - 1),))) for name, effect in effects.items()]
     return frozenset().union(*(registry.find(job).numbers(scene_of(last)) for last in lasts))
 
 
@@ -239,13 +239,13 @@ def has(kind):
     ]
 
 
-def each_of(combinations):
+def every_case(combinations):
     return pytest.mark.parametrize("combination", combinations, ids=str)
 
 
 IN_MOTION = frozenset(has(State | Speed))
-every, stated, turned = each_of(COMBINATIONS), each_of(has(State)), each_of(has(Speed))
-algebraic = each_of([each for each in COMBINATIONS if each not in IN_MOTION])
+every, stated, turned = every_case(COMBINATIONS), every_case(has(State)), every_case(has(Speed))
+algebraic = every_case([combination for combination in COMBINATIONS if combination not in IN_MOTION])
 
 
 def loads_of(combination):
@@ -390,7 +390,7 @@ def test_figures_of_absent_effects_are_undefined(combination):
             there = there and figure.name not in job.model(scene).undefined
             assert (figures[figure.name] is not None) == there, (name, figure.name)
     for figure, givers in WITH[combination.job].items():
-        known = One("warp_tension", 2) not in combination.ones
+        known = Choice("warp_tension", 2) not in combination.ones
         assert (figures[figure] is not None) == (known and bool(givers & set(combination.names))), figure
     if combination.job == "beatup":
         loads = loads_of(combination)

@@ -74,7 +74,7 @@ def switched(sampler, piece):
 RECORDED = functools.cache(reading.recorded_quantities)
 
 
-def told(read):
+def outcome(read):
     """Return what is read, bit for bit, or what it raises."""
     try:
         with np.errstate(all="ignore"):
@@ -91,8 +91,8 @@ def alike(model, systems, given, node, whole=lambda value: value):
     results = []
     for name in quantities(model):
         recording = RECORDED(model, (name,), tuple(node.switch), given.known)
-        results.append(told(lambda: [whole(model.quantity(systems[1], given, name, node))]))  # noqa: B023
-        assert told(lambda: map(whole, recording.bind(systems, given)(node))) == results[-1], name  # noqa: B023
+        results.append(outcome(lambda: [whole(model.quantity(systems[1], given, name, node))]))  # noqa: B023
+        assert outcome(lambda: map(whole, recording.bind(systems, given)(node))) == results[-1], name  # noqa: B023
     return results
 
 

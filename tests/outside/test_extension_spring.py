@@ -13,9 +13,9 @@ from loomopt.maths.systems import FLOAT
 from loomopt.physics.effects.shedding.coil import Coil
 
 FORCE, RATE = 22.24, 3130.0
-OWN = {"wire": 0.88e-3, "diameter": 5.41e-3, "turns": 12.0, "shear_modulus": 80e9, "elasticity": 197.9e9}
-OWN |= {"hook_factor": 2 * 2.69 / 5.41, "initial_tension": 5.29}
-SPRING = Coil(**{field.name: OWN.get(field.name, 1.0) for field in dataclasses.fields(Coil)})
+DATA = {"wire": 0.88e-3, "diameter": 5.41e-3, "turns": 12.0, "shear_modulus": 80e9, "elasticity": 197.9e9}
+DATA |= {"hook_factor": 2 * 2.69 / 5.41, "initial_tension": 5.29}
+SPRING = Coil(**{field.name: DATA.get(field.name, 1.0) for field in dataclasses.fields(Coil)})
 
 
 def test_stresses_are_those_published():

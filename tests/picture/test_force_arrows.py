@@ -18,13 +18,13 @@ TODAY = {row["quantity"]: float(row["value"]) for row in REFERENCE if row["case"
 SCENE = lo.load("beatup").with_effect("joint_forces")
 
 
-def told(scene):
+def peak_forces(scene):
     job = registry.of(scene)
     return force_arrows.joint_forces(job.sampler(scene, job.today(scene)), ("front dead centre",))
 
 
 def test_forces_are_told_at_front_dead_centre_and_at_their_peaks():
-    forces = told(SCENE)
+    forces = peak_forces(SCENE)
     assert [(force.joint, bool(force.event)) for force in forces] == [
         (pin, entry) for entry in (True, False) for pin in "ABCD"
     ]
@@ -40,7 +40,7 @@ def test_forces_are_told_at_front_dead_centre_and_at_their_peaks():
 
 
 def test_arrows_point_as_the_forces_do_and_are_as_long_as_they_are_large():
-    drawing, forces = outputs.drawing(SCENE, {}), told(SCENE)
+    drawing, forces = outputs.drawing(SCENE, {}), peak_forces(SCENE)
     largest = max(force.size for force in forces)
     lines = [part for part in drawing.primitives if part.layer == "forces" and isinstance(part, Line)]
     shafts = [part.points for part in lines if len(part.points) == 2]
@@ -65,7 +65,7 @@ def texts_of(drawing):
 
 
 LEVER = {"mechanism.lever": {"arm": "150 mm", "direction": "80 deg"}}
-OTHERS = {
+EFFECTS = {
     "rapier": ("head_inertia", "tape_friction"),
     "sixbar-sley": (),
     "knuckle-press": (),
@@ -76,9 +76,9 @@ OTHERS = {
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("name", EFFECTS)
 def test_every_job_draws_its_pins_at_their_peaks_and_no_label_runs_into_anything(name):
-    scene = lo.load(name).with_effect("joint_forces", *OTHERS[name])
+    scene = lo.load(name).with_effect("joint_forces", *EFFECTS[name])
     scene = scene.update(LEVER) if name == "shedding" else scene
     drawing, figures = outputs.drawing(scene, {}), lo.evaluate(scene).figures
     assert clear.faults_of(drawing) == []

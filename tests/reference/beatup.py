@@ -58,9 +58,10 @@ class Machine:
         self.w, self.M0 = number.get("speed", 0.0), number.get("M0", 0.0)
         self.m4, self.r4 = number.get("m4", 0.0), number.get("r4", 0.0)
         self.crank = dict(scene.tables["mechanism"]).get("crank")
-        self.own = {name: table.model_dump() for name, table in scene.effects.items()}
-        self.own = {
-            name: values | {key: freed[key] for key in values.keys() & freed} for name, values in self.own.items()
+        self.effect_values = {name: table.model_dump() for name, table in scene.effects.items()}
+        self.effect_values = {
+            name: values | {key: freed[key] for key in values.keys() & freed}
+            for name, values in self.effect_values.items()
         }
         self.today = {name: scene.mechanism[name] for name in DESIGN}
         given = {name: (bound.min, bound.max) for name, bound in scene.bounds.items()}
@@ -75,34 +76,37 @@ class Machine:
         w, m4e, r4e = self.w, design["m4e"], design["r4e"]
         inertia = 0.0
         for effect, key in (("inertia", "J4"), ("rocker_inertia", "J3"), ("counterweight_inertia", "JS")):
-            inertia = inertia + self.own.get(effect, {}).get(key, 0.0)
-        if "inertia" in self.own:
+            inertia = inertia + self.effect_values.get(effect, {}).get(key, 0.0)
+        if "inertia" in self.effect_values:
             inertia = inertia + m4e * r4e**2
         M3 = -inertia * psi_2 * w**2
-        if "resistance" in self.own:
-            delta = self.own["resistance"]["pulse"]
+        if "resistance" in self.effect_values:
+            delta = self.effect_values["resistance"]["pulse"]
             away = np.mod(phi - beta + np.pi, 2 * np.pi) - np.pi
             M3 = M3 + np.where(np.abs(away) < delta / 2, self.M0 * np.cos(np.pi * away / delta), 0.0)
-        if "gravity" in self.own:
-            tilt, offset = self.own["gravity"]["tilt"], self.own["gravity"]["offset"]
+        if "gravity" in self.effect_values:
+            tilt, offset = self.effect_values["gravity"]["tilt"], self.effect_values["gravity"]["offset"]
             M3 = M3 - G * (self.m4 * self.r4 - m4e * r4e) * np.cos(psi + offset + tilt)
-            rocker = self.own.get("rocker_inertia", {})
+            rocker = self.effect_values.get("rocker_inertia", {})
             M3 = M3 - G * (rocker.get("m3") or 0.0) * (rocker.get("s3") or 0.0) * np.cos(psi + tilt)
-        if "bearing_friction" in self.own:
-            values = self.own["bearing_friction"]
+        if "bearing_friction" in self.effect_values:
+            values = self.effect_values["bearing_friction"]
             opening = np.mod(phi - beta - 1e-12, 2 * np.pi) < np.mod(np.pi + beta_r - beta, 2 * np.pi)
             M3 = M3 - values["coulomb"] * np.where(opening, 1.0, -1.0) - values["viscous"] * psi_1 * w
         Md = -M3 * psi_1
-        if "gravity" in self.own:
+        if "gravity" in self.effect_values:
             up = np.exp(1j * (np.pi / 2 - tilt))
             rates = 1j * l1 * np.exp(1j * phi), 1j * psi_1 * l3 * np.exp(1j * psi)
             if self.crank is not None:
                 Md = Md + G * self.crank.mass * self.crank.centre / l1 * (np.conj(up) * rates[0]).real
-            if "rod_inertia" in self.own:
-                rod_mass, part = self.own["rod_inertia"]["m2"], self.own["rod_inertia"]["s2"] / self.today["l2"]
+            if "rod_inertia" in self.effect_values:
+                rod_mass, part = (
+                    self.effect_values["rod_inertia"]["m2"],
+                    self.effect_values["rod_inertia"]["s2"] / self.today["l2"],
+                )
                 Md = Md + G * rod_mass * (np.conj(up) * ((1 - part) * rates[0] + part * rates[1])).real
-        if "rod_inertia" in self.own:
-            values = self.own["rod_inertia"]
+        if "rod_inertia" in self.effect_values:
+            values = self.effect_values["rod_inertia"]
             share = values["s2"] / self.today["l2"]
             if values["model"] == "lumped":
                 Md = Md + values["m2"] * share * l3**2 * psi_1 * psi_2 * w**2
@@ -128,8 +132,8 @@ class Machine:
         }
         results["M3_fdc"] = float(self.torques(design, np.array([beta]))[0][0])
         results["alpha_fdc"] = float(motion(design, np.array([beta]))[2][0]) * self.w**2
-        results["J4"] = self.own.get("inertia", {}).get("J4", math.nan) + m4e * r4e**2
-        results["J4"] += self.own.get("counterweight_inertia", {}).get("JS", 0.0)
+        results["J4"] = self.effect_values.get("inertia", {}).get("J4", math.nan) + m4e * r4e**2
+        results["J4"] += self.effect_values.get("counterweight_inertia", {}).get("JS", 0.0)
         results["r4"] = (self.m4 * self.r4 - m4e * r4e) / (self.m4 + m4e) if self.m4 else math.nan
         return results
 
@@ -138,17 +142,17 @@ class Machine:
 
         Gauss rules on either side of front dead centre, where Coulomb friction jumps.
         """
-        if "resistance" not in self.own:
+        if "resistance" not in self.effect_values:
             return math.nan
         at, weights = np.polynomial.legendre.leggauss(nodes)
         beta = dead_centres(*(design[name] for name in LENGTHS))[0]
-        halves = np.concatenate([at - 1, at + 1]) * self.own["resistance"]["pulse"] / 4
+        halves = np.concatenate([at - 1, at + 1]) * self.effect_values["resistance"]["pulse"] / 4
         return float(np.sqrt(np.tile(weights, 2) @ self.torques(design, beta + halves)[0] ** 2 / 4))
 
     def grid(self, design, points):
         """Return crank angles over one turn from front dead centre, the pulse's corners among them."""
         beta = dead_centres(*(design[name] for name in LENGTHS))[0]
-        corners = [self.own["resistance"]["pulse"] / 2] if "resistance" in self.own else []
+        corners = [self.effect_values["resistance"]["pulse"] / 2] if "resistance" in self.effect_values else []
         offsets = np.linspace(0, 2 * np.pi, points, endpoint=False)
         return beta + np.concatenate([offsets, corners, [-corner for corner in corners]])
 
@@ -158,12 +162,12 @@ class Machine:
         psi, psi_1, psi_2, rod, rod_1, rod_2 = motion(design, phi)
         moment = self.m4 * self.r4 - design["m4e"] * design["r4e"]
         speed, acceleration = psi_1 * self.w, psi_2 * self.w**2
-        leaning = psi + self.own.get("gravity", {}).get("offset", 0.0)
+        leaning = psi + self.effect_values.get("gravity", {}).get("offset", 0.0)
         shaking = moment * (1j * acceleration - speed**2) * np.exp(1j * leaning)
-        if "rod_inertia" in self.own:
-            s2 = self.own["rod_inertia"]["s2"] / self.today["l2"] * design["l2"]
+        if "rod_inertia" in self.effect_values:
+            s2 = self.effect_values["rod_inertia"]["s2"] / self.today["l2"] * design["l2"]
             middle = s2 * (1j * rod_2 - rod_1**2) * np.exp(1j * rod) - design["l1"] * np.exp(1j * phi)
-            shaking = shaking + self.own["rod_inertia"]["m2"] * middle * self.w**2
+            shaking = shaking + self.effect_values["rod_inertia"]["m2"] * middle * self.w**2
         return {
             "peak_torque": float(np.abs(self.torques(design, phi)[1]).max()),
             "reed_centrifugal": float(np.abs(moment * speed**2).max()),
@@ -204,7 +208,7 @@ def least(machine, objective, start, firm=(), equal=(), offsets=UNIFORM):
     def design(z):
         return {**fixed, **dict(zip(names, low + width * z[: len(names)], strict=True))}
 
-    def kept(z):
+    def margins(z):
         here, rows = design(z), []
         figures = machine.static(here)
         for name, (least_value, most) in machine.limits.items():
@@ -220,7 +224,7 @@ def least(machine, objective, start, firm=(), equal=(), offsets=UNIFORM):
     box = [(0.0, 1.0)] * len(names)
     if epigraph:
         z, box = np.append(z, 1.0), [*box, (0.0, None)]
-    rows = [{"type": "ineq", "fun": kept}]
+    rows = [{"type": "ineq", "fun": margins}]
     rows += [{"type": "eq", "fun": lambda z: np.array([row(design(z)) for row in equal])}] if equal else []
     with np.errstate(all="ignore"):
         optimum = minimize(
@@ -232,7 +236,7 @@ def least(machine, objective, start, firm=(), equal=(), offsets=UNIFORM):
             options={"ftol": 1e-14, "maxiter": 80},
         )
         here = design(np.clip(optimum.x, 0.0, 1.0 if not epigraph else None))
-        misses = np.array([*(abs(row(here)) for row in equal), -kept(optimum.x).min()])
+        misses = np.array([*(abs(row(here)) for row in equal), -margins(optimum.x).min()])
     return here if np.all(misses < 1e-7) else None
 
 

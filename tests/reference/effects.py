@@ -120,13 +120,13 @@ class Shaft:
             corners = [(self.front + side * pulse["pulse"] / 2) % (2 * PI) for side in (-1, 1)]
             borders = sorted([*corners, *(k * STEP * PI / 180 for k in range(360 // STEP + 1))])
             rule = GaussLegendre(MP).calc_nodes(4, MP.prec)
-            self.kept = []
+            self.quadrature = []
             for begin, end in itertools.pairwise(borders):
                 for x, weight in rule:
                     at = (begin + end + (end - begin) * x) / 2
                     force = self.carried * self.acceleration(at) + self.resistance(pulse, at) + self.weight(at)
-                    self.kept.append((at, weight * (end - begin) / 2, force))
-        return self.kept
+                    self.quadrature.append((at, weight * (end - begin) / 2, force))
+        return self.quadrature
 
 
 class Reed(Shaft):

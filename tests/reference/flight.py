@@ -44,7 +44,7 @@ class Frame:
         s = u - m.sin(turn) / (2 * m.pi), (1 - m.cos(turn)) * rate, 2 * m.pi * m.sin(turn) * rate**2
         return tuple(self.travel * item for item in s)
 
-    def held(self, x):
+    def spring_force(self, x):
         """Return what holds the frame back at rest, friction apart: K1 (X + X0) − G − T."""
         share = 1 - 2 * x / self.travel
         pull = self.T1 * share if share > 0 else self.T2 * share
@@ -53,7 +53,7 @@ class Frame:
     def force(self, theta, m=math):
         """Return N while the frame moves with its cam."""
         x, v, a = self.cam(theta, m)
-        return self.M * a + self.C * v + self.held(x) + self.F * (1 if v >= 0 else -1)
+        return self.M * a + self.C * v + self.spring_force(x) + self.F * (1 if v >= 0 else -1)
 
     def lift_off(self, near):
         """Return where N falls through zero near an angle, in 30 digits."""
@@ -89,7 +89,7 @@ def flown(frame, theta, v, x=None):
     while t < end:
 
         def slope(t, y, sign=sign):
-            return [y[1], -(frame.held(y[0]) + frame.C * y[1] + sign * frame.F) / frame.M]
+            return [y[1], -(frame.spring_force(y[0]) + frame.C * y[1] + sign * frame.F) / frame.M]
 
         known = {"rtol": 1e-13, "atol": 1e-17, "method": "DOP853", "max_step": 0.02 / w}
         result = solve_ivp(slope, (t, end), state, events=(gap, middle, turned, parting), **known)

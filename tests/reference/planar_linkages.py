@@ -14,7 +14,7 @@ SAMPLES, SECTIONS, WITHIN = 1024, 16, 160
 """Crank angles of a turn; sections each with a peak of its own; crank angles of a part of the turn."""
 PHI = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
 ORDERS = np.fft.fftfreq(SAMPLES, 1 / SAMPLES)
-KEPT = np.abs(ORDERS) <= 64
+LOW_ORDERS = np.abs(ORDERS) <= 64
 STEP = 1e-7
 """Of finite differences, in widths of the bounds."""
 GRAVITY = 9.80665
@@ -23,27 +23,27 @@ GRAVITY = 9.80665
 @functools.lru_cache(maxsize=4)
 def _waves(phi):
     """Return e^(i n φ) of crank angles that are given as bytes, (angles, orders)."""
-    return np.exp(1j * np.outer(np.frombuffer(phi), ORDERS[KEPT]))
+    return np.exp(1j * np.outer(np.frombuffer(phi), ORDERS[LOW_ORDERS]))
 
 
 class Series:
     """A periodic function of crank angle through its samples."""
 
     def __init__(self, samples):
-        self.coefficients = np.fft.fft(samples) * KEPT
+        self.coefficients = np.fft.fft(samples) * LOW_ORDERS
         self.is_real = np.isrealobj(samples)
 
-    def _own(self, values):
+    def _real(self, values):
         return values.real if self.is_real else values
 
     def over(self, order=0):
         """Return it, or its derivative, at the samples."""
-        return self._own(np.fft.ifft(self.coefficients * (1j * ORDERS) ** order))
+        return self._real(np.fft.ifft(self.coefficients * (1j * ORDERS) ** order))
 
     def at(self, phi, order=0):
         """Return it, or its derivative, at any crank angles."""
-        coefficients = (self.coefficients * (1j * ORDERS) ** order)[KEPT]
-        return self._own(np.sum(_waves(np.atleast_1d(phi).tobytes()) * coefficients, axis=1) / SAMPLES)
+        coefficients = (self.coefficients * (1j * ORDERS) ** order)[LOW_ORDERS]
+        return self._real(np.sum(_waves(np.atleast_1d(phi).tobytes()) * coefficients, axis=1) / SAMPLES)
 
     def extreme(self, near):
         """Return where it turns, near a crank angle."""

@@ -101,8 +101,8 @@ class Drive:
     def mu_min(self):
         """Return the least transmission angle at D, rad: between links 5 and 6, at most a right angle."""
         _, B2, C, D = self.joints(self.even)
-        between = np.abs(np.angle((D - C) / (D - B2)))
-        return -summit(-np.minimum(between, np.pi - between))
+        angles = np.abs(np.angle((D - C) / (D - B2)))
+        return -summit(-np.minimum(angles, np.pi - angles))
 
     def spans(self):
         """Return least and largest |B2C| over |l5 − l6| and l5 + l6: how the five-bar's dyad closes."""
@@ -117,8 +117,8 @@ class Drive:
         l1, l2, l3, l71 = (self.numbers[name] for name in ("l1", "l2", "l3", "l71"))
         rock = [math.acos((l3**2 + l71**2 - reach**2) / (2 * l3 * l71)) for reach in (l2 + l1, l2 - l1)]
         crank = [math.acos((reach**2 + l71**2 - l3**2) / (2 * reach * l71)) for reach in (l2 + l1, l2 - l1)]
-        between = [math.acos((l2**2 + l3**2 - reach**2) / (2 * l2 * l3)) for reach in (l71 - l1, l71 + l1)]
-        return rock[0] - rock[1], crank[1] - crank[0], min(min(angle, math.pi - angle) for angle in between)
+        angles = [math.acos((l2**2 + l3**2 - reach**2) / (2 * l2 * l3)) for reach in (l71 - l1, l71 + l1)]
+        return rock[0] - rock[1], crank[1] - crank[0], min(min(angle, math.pi - angle) for angle in angles)
 
     def tape_force(self):
         """Return the force in the tape, N: F = m S¨ + F_t sgn S˙."""

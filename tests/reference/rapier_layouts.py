@@ -86,11 +86,11 @@ def meeting(p, q, rp, rq):
     u, v = (1 + (rp * rp - rq * rq) / square) / 2, area / (2 * square)
     a = u * along[0] - v * along[1], u * along[1] + v * along[0]
     joint = p[0][0] + a[0], p[0][1] + a[1]
-    b, between = minus(joint, q[0]), cross(a, minus(joint, q[0]))
+    b, determinant = minus(joint, q[0]), cross(a, minus(joint, q[0]))
 
     def moving(da, db):
         """Solve a·v = da, b·v = db."""
-        return (da * b[1] - db * a[1]) / between, (db * a[0] - da * b[0]) / between
+        return (da * b[1] - db * a[1]) / determinant, (db * a[0] - da * b[0]) / determinant
 
     first = moving(dot(a, p[1]), dot(b, q[1]))
     sway, swing = minus(first, p[1]), minus(first, q[1])

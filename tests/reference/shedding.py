@@ -423,8 +423,8 @@ def least_law(scene, n, amax=2 * np.pi, symmetric=False):
         f, f0, g, g0 = contact_rows(scene, n, np.concatenate([np.arange(n + 1) / n, more]))
         need = ((f @ at + f0) / (g @ at + g0)).max()
         f, f0, g, g0 = dense
-        between = ((f @ at + f0) / (g @ at + g0)).reshape(-1, len(within)).max(axis=0)
-        worst = (between[1:-1] >= between[:-2]) & (between[1:-1] > between[2:]) & (between[1:-1] > need * (1 + 1e-12))
+        heights = ((f @ at + f0) / (g @ at + g0)).reshape(-1, len(within)).max(axis=0)
+        worst = (heights[1:-1] >= heights[:-2]) & (heights[1:-1] > heights[2:]) & (heights[1:-1] > need * (1 + 1e-12))
         more = np.append(more, within[1:-1][worst])
         if abs(need / K1 - 1) < 1e-13 and not worst.any():
             break

@@ -182,10 +182,12 @@ def test_a_wrong_shape_is_one_line_with_key_given_and_allowed(key, value, proble
         assert "\n" not in str(caught.value)
 
 
-OWN = [shape for shape in SHAPES if shape[0].split(".")[0] in ("targets", "output", "parts", "events", "windows")]
+USER_SHAPES = [
+    shape for shape in SHAPES if shape[0].split(".")[0] in ("targets", "output", "parts", "events", "windows")
+]
 
 
-@pytest.mark.parametrize(("key", "value"), [s[:2] for s in OWN], ids=[f"{s[0]}-{s[1]}" for s in OWN])
+@pytest.mark.parametrize(("key", "value"), [s[:2] for s in USER_SHAPES], ids=[f"{s[0]}-{s[1]}" for s in USER_SHAPES])
 def test_the_json_schema_refuses_the_same_shapes(key, value):
     jsonschema = pytest.importorskip("jsonschema")
     checker = jsonschema.Draft202012Validator(json_schema.scene(registry.declared("linkage")))

@@ -40,7 +40,7 @@ JOBS = {
     "shedding": (S, "stiffness", "K1"),
     "law": (S.set("targets.law.intervals", 8), "law", "K1"),
 }
-OTHERS = {
+FLAT_CASES = {
     "heavier cloth": (B.set("operation.M0", "900 N*m"), "balance"),
     "slow loom": (B.set("operation.speed", "450 rpm"), "balance"),
     "short pulse": (B.set("effects.resistance.pulse", "1 deg"), "balance"),
@@ -59,8 +59,8 @@ OTHERS = {
     "narrow lobe": (NARROW, "stiffness"),
     "uneven lobes": (lobes(173, 90, 7, 90).update(STIFF), "stiffness"),
 }
-ASKED = (1e-2, 1e-10)
-CASES = {**{name: case[:2] for name, case in JOBS.items()}, **OTHERS}
+REQUESTED = (1e-2, 1e-10)
+CASES = {**{name: case[:2] for name, case in JOBS.items()}, **FLAT_CASES}
 
 
 ANGLES = {"theta", "swing", "beta", "mu_min", "sley_mu_min", "phi_stroke", "contact_angle"}
@@ -122,7 +122,7 @@ FLAT = {("match", 1e-10)}
 
 @pytest.mark.parametrize(
     ("name", "accuracy"),
-    known([(name, accuracy) for name in OTHERS for accuracy in ASKED], FLAT, "a flat optimum's figures"),
+    known([(name, accuracy) for name in FLAT_CASES for accuracy in REQUESTED], FLAT, "a flat optimum's figures"),
 )
 @pytest.mark.few(4)
 def test_the_promise_holds_for_other_machines_and_targets(name, accuracy):
@@ -130,7 +130,7 @@ def test_the_promise_holds_for_other_machines_and_targets(name, accuracy):
 
 
 @pytest.mark.few(8)
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("name", FLAT_CASES)
 def test_the_best_answer_estimates_no_more_than_it_promises(name):
     answer = solved(name, BEST)
     assert answer.status == "optimal"
@@ -158,7 +158,7 @@ def test_the_softest_spring_is_right_to_what_is_asked_against_thirty_digits():
 @pytest.mark.parametrize(("name", "angles"), [("narrow lobe", (4, 176, 4, 176)), ("uneven lobes", (173, 90, 7, 90))])
 def test_narrow_lobes_are_not_stepped_over(name, angles):
     least = plain.least_stiffness(plain.replace(plain.PAPER, angles=angles))[0]
-    for accuracy in ASKED:
+    for accuracy in REQUESTED:
         assert abs(float(solved(name, accuracy).figures["K1"] / least - 1)) <= accuracy
 
 
@@ -213,9 +213,9 @@ def test_no_more_is_computed_than_it_takes(name):
 
 
 @pytest.mark.few(6)
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("name", FLAT_CASES)
 def test_other_machines_cost_more_where_more_is_asked(name):
-    counts = [solved(name, accuracy).solver["evaluations"] for accuracy in (*ASKED, BEST)]
+    counts = [solved(name, accuracy).solver["evaluations"] for accuracy in (*REQUESTED, BEST)]
     if name in ("pulse", "retrofit"):
         # They have nothing that holds all round; samples of their own for a coarse answer read one mean more.
         assert max(counts) - min(counts) <= GAUSS_NODES

@@ -231,9 +231,9 @@ def test_contact_up_to_a_speed_holds_with_friction_and_a_free_law(cam):
 
 
 def test_a_speed_that_no_spring_survives_tells_how_far_it_must_give_way(cam):
-    sought = lo.solve(cam.set("limits.contact_speed.min", "700 rpm"), "speed")
-    assert sought.status == "infeasible"
-    (need,) = (relaxation for relaxation in sought.relaxation if relaxation.limit == "contact_speed")
+    fast = lo.solve(cam.set("limits.contact_speed.min", "700 rpm"), "speed")
+    assert fast.status == "infeasible"
+    (need,) = (relaxation for relaxation in fast.relaxation if relaxation.limit == "contact_speed")
     assert need.needed / RPM == pytest.approx(144.508702549, rel=1e-6)
     answer = lo.solve(cam.set("limits.contact_speed.min", "5000 rpm"))
     assert answer.status == "infeasible"

@@ -222,7 +222,7 @@ PARABOLA = _wave(lambda m, v, phi: m.cos(phi) ** 2 - v["x"] * m.cos(phi) - v["y"
 DISC = _wave(lambda m, v, phi: v["x"] * m.cos(phi) + v["y"] * m.sin(phi))
 SHIFT = _wave(lambda m, v, phi: v["x"] + m.cos(phi))
 ELLIPSE = _wave(lambda m, v, phi: v["x"] * m.cos(phi) + 2 * v["y"] * m.sin(phi))
-ONE = (("w", 1, 1.0),)
+EQUAL_ONE = (("w", 1, 1.0),)
 BEYOND = {"a": lambda v: v["x"] + v["y"] - 5, "b": lambda v: (v["x"] - v["y"] - 2) ** 2}
 CYCLES = {
     "T3: least deviation of a cubic, 1/4": (
@@ -232,22 +232,22 @@ CYCLES = {
         toy.program("xy", waves=PARABOLA, objectives=("peak w",)), {"w": 0.5, "x": 0.0, "y": 0.5},
     ),
     "a corner cut by all tangents of a circle": (
-        toy.program("xy", {"f": lambda v: -v["x"] - v["y"]}, DISC, ONE),
+        toy.program("xy", {"f": lambda v: -v["x"] - v["y"]}, DISC, EQUAL_ONE),
         {"f": -sqrt(2), "x": sqrt(0.5), "y": sqrt(0.5)},
     ),
     "the nearest point of a disc to (3, 4)": (
-        toy.program("xy", {"f": lambda v: (v["x"] - 3) ** 2 + (v["y"] - 4) ** 2}, DISC, ONE),
+        toy.program("xy", {"f": lambda v: (v["x"] - 3) ** 2 + (v["y"] - 4) ** 2}, DISC, EQUAL_ONE),
         {"f": 16.0, "x": 0.6, "y": 0.8},
     ),
     "all tangents of an ellipse": (
-        toy.program("xy", {"f": lambda v: -v["x"] - v["y"]}, ELLIPSE, ONE),
+        toy.program("xy", {"f": lambda v: -v["x"] - v["y"]}, ELLIPSE, EQUAL_ONE),
         {"f": -sqrt(1.25), "x": 1 / sqrt(1.25), "y": 0.25 / sqrt(1.25)},
     ),
     "a magnitude out of reach, then nothing left to choose": (
-        toy.program("xy", BEYOND, DISC, ONE, ("|a|", "b")), {"a": sqrt(2) - 5, "b": 4.0},
+        toy.program("xy", BEYOND, DISC, EQUAL_ONE, ("|a|", "b")), {"a": sqrt(2) - 5, "b": 4.0},
     ),
     "a magnitude brought to 0, then the rest": (
-        toy.program("xy", {"a": lambda v: v["x"] + v["y"] - 1, "b": BEYOND["b"]}, DISC, ONE, ("|a|", "b")),
+        toy.program("xy", {"a": lambda v: v["x"] + v["y"] - 1, "b": BEYOND["b"]}, DISC, EQUAL_ONE, ("|a|", "b")),
         {"a": 0.0, "b": 1.0, "x": 1.0, "y": 0.0},
     ),
     "a peak, then a value": (

@@ -11,7 +11,7 @@ from loomopt.model.limits import DesignLimit
 from loomopt.model.program import Goal, goals
 from loomopt.physics.tolerances import FEASIBLE
 
-ASKED = {
+REQUESTED = {
     "beatup": {"balance": ["M3_fdc"], "pulse": [], "torque": ["M3_fdc"], "retrofit": ["M3_fdc"]},
     "rapier": {
         "stroke-dwell": ["stroke", "dwell_after", "dwell_before"],
@@ -23,11 +23,11 @@ ASKED = {
 }
 
 
-@pytest.mark.parametrize("name", ASKED)
+@pytest.mark.parametrize("name", REQUESTED)
 def test_every_target_says_what_it_asks_of_which_figure(name):
     scene = lo.load(name)
-    assert list(ASKED[name]) == list(scene.schema.targets)
-    for target, figures in ASKED[name].items():
+    assert list(REQUESTED[name]) == list(scene.schema.targets)
+    for target, figures in REQUESTED[name].items():
         program = registry.of(scene).program(scene, target)
         assert [goal.figure for goal in program.goals] == figures
         assert set(figures) <= set(scene.schema.figures)

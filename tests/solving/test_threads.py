@@ -102,10 +102,10 @@ def test_what_is_kept_goes_by_use_and_when_it_is_let_go():
         made.append(key)
         return key
 
-    def kept(key):
+    def cached(key):
         return values.cached(SAMPLERS, 2, key, lambda: made_of(key))
 
-    assert [kept(key) for key in (1, 2, 1, 3, 1, 2)] == [1, 2, 1, 3, 1, 2]
+    assert [cached(key) for key in (1, 2, 1, 3, 1, 2)] == [1, 2, 1, 3, 1, 2]
     assert made == [1, 2, 3, 2], "the least recently used has gone"
     values.forget(SAMPLERS)
     assert values.count(SAMPLERS) == 0

@@ -34,7 +34,7 @@ LENGTHS = {"beatup": "l2", "rapier": "l5", "shedding": "K1", "linkage": "l2"}
 """Number with a tolerance."""
 COUNTS = {"landings", "period"}
 """Figures that are whole numbers."""
-SOLVED, EVALUATED, SLOPE, ONE_SIDED, STEP = 1e-6, 1e-9, 1e-3, 1e-2, 1e-4
+SOLVED, EVALUATED, SLOPE, SIDED, STEP = 1e-6, 1e-9, 1e-3, 1e-2, 1e-4
 """Relative differences of a row from a solve and from an evaluation, of a slope from a central difference and from a
 one-sided one, and the step of differences."""
 
@@ -54,8 +54,8 @@ def test_rows_of_a_front_are_single_solves(job, name):
     front = lo.pareto(scene, (figure, against), points=3)
     assert front.rows
     for row in front.rows:
-        held = {**row.design, **row.figures, **row.place}.get(against)
-        answer = lo.solve(scene if held is None else scene.set(limit, f"{held * (1 + 1e-12)!r} {unit}"))
+        limit_value = {**row.design, **row.figures, **row.place}.get(against)
+        answer = lo.solve(scene if limit_value is None else scene.set(limit, f"{limit_value * (1 + 1e-12)!r} {unit}"))
         if not row.certified:
             assert answer.status != "optimal" or not all(answer.reached.values()), row.reason
             continue
@@ -81,7 +81,7 @@ def test_slopes_of_a_tolerance_are_differences_of_evaluations(job, name):
         above, below = (values[0] - values[2]) / step, (values[2] - values[1]) / step
         size = max(abs(above), abs(below), abs(values[2]) / design[number])
         if slopes.corner:
-            assert abs(abs(slopes.steeper[number]) - max(abs(above), abs(below))) <= ONE_SIDED * size, figure
+            assert abs(abs(slopes.steeper[number]) - max(abs(above), abs(below))) <= SIDED * size, figure
         else:
             assert abs(slopes.by_number[number] - (above + below) / 2) <= SLOPE * size, figure
         compared += 1

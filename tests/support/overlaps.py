@@ -14,16 +14,16 @@ SIZES = (6.0, 4.5), (11.0, 8.0), (16.0, 9.0)
 """Inches: as in a paper, on a page, on a slide."""
 
 
-def found_at_every_size(figure):
+def overlapping_at_every_size(figure):
     """Return what is found in a figure as it is, and at each of SIZES, smaller and larger in turn."""
-    message = found(figure)
+    message = overlapping(figure)
     for size in (*SIZES, SIZES[0]):
         figure.set_size_inches(*size)
-        message += [f"at {size}: {item}" for item in found(figure)]
+        message += [f"at {size}: {item}" for item in overlapping(figure)]
     return message
 
 
-def found(figure):
+def overlapping(figure):
     """Return in words every text or legend that meets another, a line, or leaves the figure."""
     figure.draw_without_rendering()
     canvas = figure.canvas.get_renderer()

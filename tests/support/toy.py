@@ -197,17 +197,17 @@ class ToyJob(Job):
     name = "toy"
 
     def __init__(self, values: Program) -> None:
-        self.own = values
+        self.toy_program = values
 
     def schema(self, document: Mapping[str, Any]) -> SceneSchema:
-        figures = [*self.own.model.own_rows, *self.own.model.quantities]
+        figures = [*self.toy_program.model.own_rows, *self.toy_program.model.quantities]
         return SceneSchema(
             name="toy",
             title="A toy",
             operation=Nothing,
             mechanism=Nothing,
             effects={},
-            variables={v.name: "number" for v in self.own.variables},
+            variables={v.name: "number" for v in self.toy_program.variables},
             own_figures={name: Figure(name, "number", name) for name in figures},
             targets={"least": Target("least", "least of all", Nothing)},
             default_target="least",
@@ -218,17 +218,17 @@ class ToyJob(Job):
         pass
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
-        return self.own.model
+        return self.toy_program.model
 
     def program(self, scene: Scene, target: str) -> Program:
-        return self.own
+        return self.toy_program
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
         return dict(x)
 
     def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
         sampler = self.sampler(scene, design)
-        return {**sampler.figures, **{name: sampler.peak(name) for name in self.own.model.quantities}}
+        return {**sampler.figures, **{name: sampler.peak(name) for name in self.toy_program.model.quantities}}
 
     def say(self, scene: Scene, target: str, figures: Mapping[str, float | None]) -> str:
         return "Least."
@@ -237,7 +237,7 @@ class ToyJob(Job):
         return Columns({}, "1")
 
     def numbers(self, scene: Scene) -> dict[str, float]:
-        return {**self.own.parameters, **self.own.completed(self.own.starts[0])}
+        return {**self.toy_program.parameters, **self.toy_program.completed(self.toy_program.starts[0])}
 
     @property
     def views(self) -> JobViews:

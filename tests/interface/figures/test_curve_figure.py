@@ -78,7 +78,7 @@ def curves_of(axes):
 @pytest.mark.few(3)
 def test_nothing_runs_into_anything_and_all_panels_show_the_turn(name, kind):
     figure = drawn(name, kind)
-    assert overlaps.found(figure) == []
+    assert overlaps.overlapping(figure) == []
     for axes in figure.axes:
         assert axes.get_xlim() == pytest.approx((0, 360))
         assert all(line.get_xdata()[[0, -1]] == pytest.approx([0, 360], abs=1e-6) for line in curves_of(axes))
@@ -92,7 +92,7 @@ def test_nothing_runs_into_anything_and_all_panels_show_the_turn(name, kind):
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "kind"), slow.after(4, SIZED))
 def test_nothing_runs_into_anything_at_any_size(name, kind):
-    assert overlaps.found_at_every_size(drawn(name, kind)) == []
+    assert overlaps.overlapping_at_every_size(drawn(name, kind)) == []
 
 
 @pytest.mark.few(5)
@@ -214,7 +214,7 @@ def test_each_column_with_a_unit_has_a_panel_in_degrees(frame):
 @pytest.mark.parametrize("count", [2, 7])
 def test_marks_stand_where_they_belong(frame, count):
     figure = figure_of(frame.iloc[:, :count], MARKS)
-    assert overlaps.found(figure) == []
+    assert overlaps.overlapping(figure) == []
     axes = figure.axes[0]
     at = sorted(line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2)
     assert any(x == pytest.approx(np.degrees(1.15)) for x in at)
@@ -261,7 +261,7 @@ def test_what_is_nowhere_known_or_marked_nowhere_has_no_point(frame):
 def test_crank_angles_are_in_the_unit_of_all_angles():
     scene = lo.load("beatup").set("display.angle", "rad")
     figure = outputs.plot_curves(tables.curves(scene, {}), scene, {})
-    assert overlaps.found(figure) == []
+    assert overlaps.overlapping(figure) == []
     texts = [text.get_text() for text in figure.findobj(Text) if text.get_text()]
     assert {text for text in texts if "phi [" in text} == {"crank angle phi [rad]"}
     assert "6.28" in texts

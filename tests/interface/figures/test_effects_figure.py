@@ -53,17 +53,17 @@ def test_what_gets_less_has_a_bar_to_the_other_side(shedding):
 
 @pytest.mark.slow
 def test_nothing_meets(shedding):
-    assert overlaps.found_at_every_size(shedding.plot()) == []
+    assert overlaps.overlapping_at_every_size(shedding.plot()) == []
     long = EffectsStudy(
         replace(shedding.result, rows=tuple(replace(row, effect=row.effect * 3) for row in shedding.rows[:2]))
     )
-    assert overlaps.found(long.plot()) == []
+    assert overlaps.overlapping(long.plot()) == []
 
 
 @pytest.mark.slow
 def test_an_inch_machine_at_350_rpm():
     study = lo.effects(uncoiled.scene(inch.scene("shedding-static", operation__speed="350 rpm")))
-    assert overlaps.found(study.plot()) == []
+    assert overlaps.overlapping(study.plot()) == []
     assert "lbf/in" in study._repr_html_()
     assert "N/m" not in study._repr_html_()
 

@@ -49,7 +49,7 @@ def test_panels_show_the_objective_and_what_differs_with_gaps_and_three_designs(
     assert axes[1].get_xlabel() == "operation.M0 [N*m]"
     sizes = {round(axis.get_xlim()[1] - axis.get_xlim()[0], 12) for axis in axes[2:]}
     assert len(sizes) == 1, "designs are of one scale"
-    assert overlaps.found_at_every_size(figure) == []
+    assert overlaps.overlapping_at_every_size(figure) == []
 
 
 def test_without_a_certified_row_there_is_nothing_to_draw():
@@ -114,7 +114,7 @@ def test_a_front_is_one_panel_with_its_changes_named_and_a_jump_left_open():
         "B: m4e 0.8 kg\npeak_torque 95.2 N*m",
         "C: m4e 2 kg\npeak_torque 90 N*m",
     ]
-    assert overlaps.found_at_every_size(figure) == []
+    assert overlaps.overlapping_at_every_size(figure) == []
 
 
 @pytest.mark.slow
@@ -132,7 +132,7 @@ def test_many_changes_close_together_are_numbered_without_meeting():
     assert len(numbers) >= 23
     assert all(item.get_position()[0] < other.get_position()[0] for item, other in itertools.pairwise(numbers))
     assert len(listed.texts[0].get_text().splitlines()) >= len(numbers)
-    assert overlaps.found_at_every_size(figure) == []
+    assert overlaps.overlapping_at_every_size(figure) == []
 
 
 def test_one_design_that_is_best_in_both_is_drawn():
@@ -145,7 +145,7 @@ def test_one_design_that_is_best_in_both_is_drawn():
     figure.draw_without_rendering()
     texts = [[label.get_text() for label in axis.get_ticklabels()] for axis in (panel.xaxis, panel.yaxis)]
     assert texts == [["2"], ["90"]], "the point's own values, and nothing beside them"
-    assert overlaps.found_at_every_size(figure) == []
+    assert overlaps.overlapping_at_every_size(figure) == []
 
 
 @pytest.mark.slow
@@ -153,7 +153,7 @@ def test_a_front_of_an_inch_machine_is_drawn_in_inches():
     scene = inch.scene("beatup", operation__speed="350 rpm")
     figure = plot(replace(FRONT, scene=front.trade(scene, FRONT.axes, ranges=RANGES).scene), JUMPING)
     assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == ("m4e [lb]", "peak_torque [lbf*in]")
-    assert overlaps.found_at_every_size(figure) == []
+    assert overlaps.overlapping_at_every_size(figure) == []
 
 
 @pytest.mark.slow
@@ -174,7 +174,7 @@ def test_a_sweep_of_all_that_a_rapier_has_shows_all_of_it():
     shown = [column.heading for column in study_table.shown_columns(plan, rows)]
     assert len(shown) > 5
     assert [axes.get_title("left") for axes in figure.axes[: len(shown)]] == shown
-    assert overlaps.found_at_every_size(figure) == []
+    assert overlaps.overlapping_at_every_size(figure) == []
 
 
 def two_ways(first, second):
@@ -197,7 +197,7 @@ def two_ways(first, second):
 @pytest.mark.parametrize(("first", "second"), slow.after(2, [(2, 2), (3, 17), (5, 7), (1, 4)]))
 def test_nothing_of_a_two_way_sweep_runs_into_anything(first, second):
     figure = two_ways(first, second)
-    assert overlaps.found_at_every_size(figure) == []
+    assert overlaps.overlapping_at_every_size(figure) == []
     (legend,) = figure.subfigs[0].legends
     drawn = [text.get_text() for text in legend.get_texts()]
     if second <= study_table.LINES:
@@ -220,7 +220,7 @@ def test_a_row_that_misses_its_goal_is_marked_and_named():
     titles = [axes.get_title() for axes in figure.axes[2:]]
     assert titles[0] == "A: operation.M0 700 N*m\nM3_fdc not reached"
     assert "not reached" not in titles[-1]
-    assert overlaps.found_at_every_size(figure) == []
+    assert overlaps.overlapping_at_every_size(figure) == []
 
 
 def test_a_size_that_is_given_is_the_figures_size_and_texts_are_as_large_as_there_is_room():

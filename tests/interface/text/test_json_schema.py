@@ -33,7 +33,7 @@ def of(job):
     return json_schema.scene(registry.declared(job))
 
 
-def judged(data):
+def is_valid(data):
     """Return what the schema says of a scene; where the package of that name is installed it must say the same."""
     result = json_walk.valid(of("beatup") if "job" not in data["problem"] else of(data["problem"]["job"]), data)
     try:
@@ -65,7 +65,7 @@ def taken(data):
 @pytest.mark.parametrize("name", ALL)
 def test_every_packaged_scene_and_template_is_valid(name):
     assert taken(ALL[name])
-    assert judged(json.loads(json.dumps(ALL[name])))
+    assert is_valid(json.loads(json.dumps(ALL[name])))
 
 
 GOOD: dict[str, list[Any]] = {
@@ -104,7 +104,7 @@ BAD: dict[str, list[Any]] = {
 def test_what_the_program_takes_is_valid(key, value):
     data = changed(SCENES["beatup"], key, value)
     assert taken(data)
-    assert judged(data)
+    assert is_valid(data)
 
 
 @pytest.mark.parametrize(("key", "value"), [(key, value) for key, values in BAD.items() for value in values])
@@ -114,7 +114,7 @@ def test_what_the_program_refuses_and_a_schema_can_see_is_not_valid(key, value):
     if key == "problem.job":
         assert not json_walk.valid(of("beatup"), data)
     else:
-        assert not judged(data)
+        assert not is_valid(data)
 
 
 @pytest.mark.parametrize(("key", "value"), [(key, value) for key, values in BAD.items() for value in values])
@@ -136,8 +136,8 @@ def test_what_an_editor_says_of_a_quantity_names_an_example():
 
 def test_an_effect_asks_for_what_it_needs():
     short = changed(SCENES["beatup"], "effects.centrifugal", {})
-    assert judged(short)
-    assert not judged(changed(short, "mechanism.m4", None))
+    assert is_valid(short)
+    assert not is_valid(changed(short, "mechanism.m4", None))
 
 
 @pytest.mark.parametrize("kind", [kind for kind in SI_UNIT if kind != "number"])

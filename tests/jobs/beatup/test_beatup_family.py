@@ -124,9 +124,9 @@ def test_the_order_of_members_changes_nothing(answer):
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("own_names", [(), ("m4e",)])
-def test_equal_members_are_the_plain_target(own_names):
-    second_answer = lo.solve(family((745, 745), own_names), "family", starts=1)
+@pytest.mark.parametrize("free_names", [(), ("m4e",)])
+def test_equal_members_are_the_plain_target(free_names):
+    second_answer = lo.solve(family((745, 745), free_names), "family", starts=1)
     plain = lo.solve(lo.load("beatup"), starts=1)
     assert second_answer.status == "optimal"
     for member in second_answer.members:

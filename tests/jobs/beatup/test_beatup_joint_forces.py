@@ -27,15 +27,15 @@ REFERENCE = list(csv.DictReader((Path(__file__).parents[2] / "reference" / "join
 OPTIMUM = {"l1": 0.03, "l2": 0.07700377159563804, "l3": 0.14809052790626273, "l4": 0.167}
 OPTIMUM |= {"m4e": 6.286039692052168, "r4e": 0.08}
 LIGHT = {"l1": 0.03, "l2": 0.08406025074670463, "l3": 0.15131449394054833, "l4": 0.167, "m4e": 0.0, "r4e": 0.0}
-OTHERS = ("rod_inertia", "gravity", "bearing_friction", "counterweight_inertia", "rocker_inertia")
+EFFECTS = ("rod_inertia", "gravity", "bearing_friction", "counterweight_inertia", "rocker_inertia")
 EXACT = {"effects.rod_inertia.model": "exact"}
 REACH = {"effects.resistance.reach": "200 mm"}
 ROCKER = {"effects.rocker_inertia.m3": "6 kg", "effects.rocker_inertia.s3": "77.5 mm"}
 CASES = {
     "today": ((), {}, {}),
     "optimum": ((), {}, OPTIMUM),
-    "today, all effects": (OTHERS, EXACT, {}),
-    "optimum, all effects": (OTHERS, EXACT, OPTIMUM),
+    "today, all effects": (EFFECTS, EXACT, {}),
+    "optimum, all effects": (EFFECTS, EXACT, OPTIMUM),
     "rod, exact": (("rod_inertia",), EXACT, {}),
     "rod, lumped": (("rod_inertia",), {}, {}),
     "gravity": (("gravity",), {}, {}),
@@ -54,8 +54,8 @@ WEIGHED = {
     "rocker, weighed": (("rocker_inertia", "gravity"), ROCKER, {}),
     "rod, weighed": (("rod_inertia", "gravity"), {}, OPTIMUM),
     "crank, weighed": (("gravity",), CRANK, {}),
-    "all weighed": (OTHERS, EXACT | ROCKER | CRANK, OPTIMUM),
-    "all weighed, no constant speed": ((*OTHERS, "speed_fluctuation"), ROCKER | CRANK, {}),
+    "all weighed": (EFFECTS, EXACT | ROCKER | CRANK, OPTIMUM),
+    "all weighed, no constant speed": ((*EFFECTS, "speed_fluctuation"), ROCKER | CRANK, {}),
 }
 """Cases that the reference does not have: every mass that a scene can give, with its weight."""
 EVERY: dict[str, Any] = CASES | WEIGHED
@@ -254,11 +254,11 @@ def newton_euler(case, phi):
             push = mass * plain.G * down
             loaded(1, push, (np.conj(centre) * push).imag)
     if "crank.mass" in values:
-        own_mass, place = values["crank.mass"], values["crank.centre"] / design["l1"] * crank
+        crank_mass, place = values["crank.mass"], values["crank.centre"] / design["l1"] * crank
         # Its inertia about A is part of the flywheel's.
-        loaded(0, -own_mass * (1j * change - omega**2) * place, 0.0)
+        loaded(0, -crank_mass * (1j * change - omega**2) * place, 0.0)
         if "gravity" in parameters:
-            push = own_mass * plain.G * down
+            push = crank_mass * plain.G * down
             loaded(0, push, (np.conj(place) * push).imag)
     return np.linalg.solve(matrix, right)
 

@@ -22,7 +22,7 @@ BINDING = {
     900: {"r4e <= 80 mm", "m4e <= 12.4 kg", "swing <= 23.4 deg", "mu_min >= 56.5 deg"},
 }
 
-each_resistance = pytest.mark.parametrize("M0", BEST)
+resistances = pytest.mark.parametrize("M0", BEST)
 
 
 def scene_of(M0):
@@ -34,7 +34,7 @@ def answers():
     return {M0: lo.solve(scene_of(M0), starts=1) for M0 in BEST}
 
 
-@each_resistance
+@resistances
 def test_best_known_optimum_is_reached_and_certified(answers, M0):
     answer, (M3, peak) = answers[M0], BEST[M0]
     assert answer.status == "optimal"
@@ -43,7 +43,7 @@ def test_best_known_optimum_is_reached_and_certified(answers, M0):
     assert answer.figures["peak_torque"] == pytest.approx(peak, rel=1e-9)
 
 
-@each_resistance
+@resistances
 def test_independent_evaluation_confirms_optimum_and_limits(answers, M0):
     machine, (M3, peak) = Machine(scene_of(M0)), BEST[M0]
     figures = machine.figures(answers[M0].design, points=100_000)
@@ -52,21 +52,21 @@ def test_independent_evaluation_confirms_optimum_and_limits(answers, M0):
     assert machine.excess(answers[M0].design) <= 1e-9
 
 
-@each_resistance
+@resistances
 def test_figures_shown_are_those_of_the_design_shown(answers, M0):
     figures = Machine(scene_of(M0)).figures(answers[M0].design)
     for name in ("swing", "theta", "beta", "mu_min", "alpha_fdc", "J4", "r4", "pulse_rms"):
         assert answers[M0].figures[name] == pytest.approx(figures[name], rel=1e-11, abs=1e-11), name
 
 
-@each_resistance
+@resistances
 def test_limits_that_bind_are_as_many_as_the_design_can_choose(answers, M0):
     assert {price.text for price in answers[M0].binding} == BINDING[M0]
     assert answers[M0].certificate.minimum
 
 
 @pytest.mark.few(2)
-@each_resistance
+@resistances
 @pytest.mark.parametrize("count", [FEW, pytest.param(STARTS, marks=pytest.mark.slow)])
 def test_every_random_start_reaches_the_same_design(answers, M0, count, monkeypatch, record_property):
     """The two silent levels leave nothing to the start: designs agree to 1e-7 of each bound's width."""
@@ -103,7 +103,7 @@ def test_the_start_itself_may_be_the_optimum(answers):
     assert again.figures["peak_torque"] == pytest.approx(answers[745].figures["peak_torque"], rel=1e-11)
 
 
-@each_resistance
+@resistances
 def test_a_warm_start_from_a_neighbour_ends_where_a_cold_one_does(answers, M0):
     neighbour = lo.solve(scene_of(M0 + 30), starts=1)
     warm = lo.solve(scene_of(M0), warm_start=neighbour)

@@ -18,7 +18,7 @@ BEATUP = kinds.of("loomopt.physics.effects.beatup")
 SPEED = 62.83185307179586
 NUMBERS = {"l1": 0.031, "l2": 0.066, "l3": 0.155, "l4": 0.167, "today.l2": 0.065, "speed": SPEED, "M0": 745.0}
 NUMBERS |= {"m4e": 3.0, "r4e": 0.05, "m4": 56.8, "r4": 0.045}
-OWN = {
+VALUES = {
     "inertia": {"J4": 0.62},
     "resistance": {"pulse": 0.52},
     "rocker_inertia": {"J3": 0.05, "m3": 6.0, "s3": 0.0775},
@@ -56,7 +56,7 @@ def numbers(given, pose, phi):
     named |= {"psi'": pose.joints.psi_1, "psi''": pose.joints.psi_2, "gamma": math.atan2(rod.y, rod.x)}
     named |= {"gamma'": pose.joints.rod_1, "gamma''": pose.joints.rod_2, "beta": given.values["beta"]}
     named |= {"beta_r": given.values["beta_r"], "l2_today": NUMBERS["today.l2"]} | NUMBERS
-    for entry in OWN.values():
+    for entry in VALUES.values():
         named |= {
             {"pulse": "delta", "offset": "chi", "coulomb": "T_c", "viscous": "c"}.get(k, k): v for k, v in entry.items()
         }
@@ -71,10 +71,10 @@ def value(expression, named):
 def setting(result, phi):
     """Return the scene's numbers, the pose and the switches at a crank angle, by plain floats."""
     on = {effect.name for effect in result.effects}
-    own_numbers = (
-        (name, key, number) for name, parameters in OWN.items() if name in on for key, number in parameters.items()
+    effect_numbers = (
+        (name, key, number) for name, parameters in VALUES.items() if name in on for key, number in parameters.items()
     )
-    values = NUMBERS | {f"{name}.{key}": number for name, key, number in own_numbers}
+    values = NUMBERS | {f"{name}.{key}": number for name, key, number in effect_numbers}
     given = result.given(FLOAT, values)
     split = result.split(FLOAT, given)
     switches = split.switch(split.place(phi)[0])
@@ -85,7 +85,7 @@ def setting(result, phi):
 @pytest.mark.parametrize("phi", [0.3, 1.0, 1.15, 1.3, 2.0, 4.0, 4.5, 6.0])
 @pytest.mark.few(3)
 def test_printed_terms_are_the_balance(rod, phi):
-    second_model = model(*OWN, rod=rod)
+    second_model = model(*VALUES, rod=rod)
     given, pose, switches = setting(second_model, phi)
     named, symbolic = numbers(given, pose, phi), beatup_equations.terms(second_model)
     for load, term in balance.terms(FLOAT, second_model.loads, pose, given, switches):
@@ -273,7 +273,7 @@ def test_the_cranks_own_equation_of_motion_is_written_and_holds():
 
 
 def test_at_constant_speed_nothing_is_written_of_a_change_of_speed():
-    assert not words(beatup_equations.equations(model(*OWN))) & {
+    assert not words(beatup_equations.equations(model(*VALUES))) & {
         "omega_dot",
         "no_load_speed",
         "M_motor",

@@ -11,7 +11,7 @@ import loomopt as lo
 from reference.beatup import DESIGN, LENGTHS, Machine, dead_centres, least, least_peak, motion, random_designs
 
 TARGETS = ("balance", "pulse", "torque", "retrofit")
-each_draw = pytest.mark.parametrize("seed", slow.after(3, range(10)))
+draws = pytest.mark.parametrize("seed", slow.after(3, range(10)))
 INCHES = {
     "l1": ("1.5 in", "1.3 in", "1.7 in"),
     "l2": ("3.25 in", "2.9 in", "3.6 in"),
@@ -264,7 +264,7 @@ def random_scene(seed):
 
 
 @pytest.mark.few(1)
-@each_draw
+@draws
 def test_random_machines_are_optimal_and_slsqp_finds_nothing_better(seed):
     scene = random_scene(seed)
     answer = lo.solve(scene)
@@ -285,7 +285,7 @@ def test_random_machines_are_optimal_and_slsqp_finds_nothing_better(seed):
 
 
 @pytest.mark.few(4)
-@each_draw
+@draws
 @pytest.mark.parametrize("target", ["torque", "retrofit", "pulse"])
 def test_random_machines_are_optimal_or_honestly_infeasible(seed, target):
     scene = random_scene(seed)

@@ -123,7 +123,7 @@ def test_torque_without_tolerance_is_the_balance_of_two_levels(answer_of):
 @pytest.mark.parametrize("M0", RESISTANCES)
 def test_pulse_rms_is_the_integral_scipy_computes(answer_of, M0):
     machine, design = Machine(scene_of(M0)), answer_of(M0, "pulse").design
-    delta = machine.own["resistance"]["pulse"]
+    delta = machine.effect_values["resistance"]["pulse"]
     beta = dead_centres(*(design[name] for name in ("l1", "l2", "l3", "l4")))[0]
     begin, end = beta - delta / 2, beta + delta / 2
     area, _ = scipy.integrate.quad(

@@ -75,15 +75,15 @@ def test_every_pin_has_a_figure_and_components(name):
 
 
 def test_a_beat_up_told_as_a_linkage_has_the_forces_of_the_beat_up():
-    own_sampler = sampler(lo.scene(REED))
+    reed = sampler(lo.scene(REED))
     beatup = lo.load("beatup").with_effect("joint_forces", "rod_inertia").without_effect("resistance")
     other = sampler(beatup.set("effects.rod_inertia.model", "exact"))
     for name in ("force_A", "force_B", "force_C", "force_D", "shaking_force", "shaking_moment"):
-        assert own_sampler.peak(name) == pytest.approx(other.peak(name), rel=1e-11), name
+        assert reed.peak(name) == pytest.approx(other.peak(name), rel=1e-11), name
     phi = np.linspace(0.1, 6.2, 50)
     for name in ("force_A", "force_C", "force_D", "shaking_force"):
         for axis in "xy":
-            values = [item.at_angles(f"{name}_{axis}", phi) for item in (own_sampler, other)]
+            values = [item.at_angles(f"{name}_{axis}", phi) for item in (reed, other)]
             assert values[0] == pytest.approx(values[1], rel=1e-10, abs=1e-9 * other.peak(name))
 
 

@@ -44,9 +44,9 @@ def plain(scene):
         back = (phi - at) % (2 * np.pi)
         # The nodes of the panel that phi divides are replaced by those of its two parts.
         place = int(np.searchsorted(borders, phi, side="right")) - 1
-        own = slice(place * NODES, (place + 1) * NODES)
+        part_nodes = slice(place * NODES, (place + 1) * NODES)
         terms = shares * loads * np.exp(rate * back / six.OMEGA)
-        total = terms.sum() - terms[own].sum()
+        total = terms.sum() - terms[part_nodes].sum()
         for begin, end in ((borders[place], phi), (phi, borders[place + 1])):
             nodes = begin + (end - begin) * (x + 1) / 2
             back = (phi - nodes) % (2 * np.pi)

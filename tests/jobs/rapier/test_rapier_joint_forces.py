@@ -82,7 +82,7 @@ def newton_euler(case, phi):
     order = {name: 2 * k for k, name in enumerate(JOINTS)}
     matrix, right = np.zeros((18, 18)), np.zeros(18)
 
-    def held(body, name, sign, place):
+    def transmitted(body, name, sign, place):
         row, column = 3 * body, order[name]
         matrix[row, column] = matrix[row + 1, column + 1] = sign
         matrix[row + 2, column : column + 2] = -sign * place.imag, sign * place.real
@@ -98,9 +98,9 @@ def newton_euler(case, phi):
         ("D", link, driving, D),
         ("B2", sley, driving, B2),
     ):
-        held(taker, name, 1, place)
+        transmitted(taker, name, 1, place)
         if giver is not None:
-            held(giver, name, -1, place)
+            transmitted(giver, name, -1, place)
     towards = (A0 - C0) / abs(A0 - C0)
     mesh, push = C0 + towards * abs(A0 - C0) / 3, 1j * towards
     for body, sign in ((second, 1), (main, -1)):

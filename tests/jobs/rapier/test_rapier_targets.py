@@ -34,7 +34,7 @@ def moved(scene, name, side, value):
     return scene.set(f"{table}.{name}.{side}", f"{value!r} {unit}")
 
 
-def assert_held(scene, answer, slack=1e-9):
+def assert_satisfied(scene, answer, slack=1e-9):
     """Assert stroke, dwells, transmission angle, closing and bounds of a design on the independent scan."""
     drive, needed = Drive(scene, answer.design), scene.operation
     assert drive.stroke() == pytest.approx(needed["stroke"], rel=slack)
@@ -50,7 +50,7 @@ def assert_held(scene, answer, slack=1e-9):
 
 def test_stroke_dwells_and_limits_hold_between_points(scene, best):
     assert best.status == "optimal"
-    assert_held(scene, best)
+    assert_satisfied(scene, best)
     drive = Drive(scene, best.design)
     assert min(drive.dwells()) >= DWELL - 1e-7
     for name, order in (("peak_acceleration", 2), ("peak_jerk", 3)):
@@ -71,7 +71,7 @@ def test_each_target_is_best_in_its_own_objective(scene, best):
     drives = {name: Drive(scene, answer.design) for name, answer in chosen.items()}
     assert drives["stroke-dwell"].peak(2) < 0.999 * drives["smooth"].peak(2)
     assert drives["smooth"].rms(3) < (1 - 1e-4) * drives["stroke-dwell"].rms(3)
-    assert_held(scene, chosen["smooth"])
+    assert_satisfied(scene, chosen["smooth"])
 
 
 @pytest.mark.slow
@@ -95,7 +95,7 @@ def test_gain_at_the_papers_own_stroke_dwells_and_transmission_angle_is_four_per
     changed_scene = scene.update({key: f"{today[n]!r} {'m' if n == 'stroke' else 'rad'}" for key, n in keys.items()})
     answer = lo.solve(changed_scene, starts=1)
     assert answer.status == "optimal"
-    assert_held(changed_scene, answer)
+    assert_satisfied(changed_scene, answer)
     assert Drive(scene, answer.design).peak(2) / PAPER_PEAK == pytest.approx(0.96, abs=0.005)
 
 
@@ -131,7 +131,7 @@ def test_a_limit_on_jerk_force_or_torque_is_held_and_priced(scene, best, name):
         name
     ]()
     assert size == pytest.approx(limit, rel=1e-8)
-    assert_held(loaded, answer)
+    assert_satisfied(loaded, answer)
     (price,) = [price for price in answer.binding if price.limit == name]
     slope = (tight.figures["peak_acceleration"] - loose.figures["peak_acceleration"]) / (2e-5 * limit)
     assert answer.figures["peak_acceleration"] > best.figures["peak_acceleration"]
@@ -162,7 +162,7 @@ def test_a_limit_on_the_torque_of_the_head_alone_is_held_and_priced(scene, best)
     tight, loose = (lo.solve(item, warm_start=answer) for item in requests[1:])
     assert [item.status for item in (tight, answer, loose)] == ["optimal"] * 3
     assert Drive(loaded, answer.design).peak_torque() == pytest.approx(limit, rel=1e-9)
-    assert_held(loaded, answer)
+    assert_satisfied(loaded, answer)
     (price,) = [price for price in answer.binding if price.limit == "peak_torque"]
     slope = (tight.figures["peak_acceleration"] - loose.figures["peak_acceleration"]) / (2e-5 * limit)
     assert price.worth["peak_acceleration"] == pytest.approx(slope, rel=1e-3)
@@ -182,7 +182,7 @@ def test_a_freed_sley_is_better_and_keeps_its_limits(scene, best):
     answer = lo.solve(freed, starts=1)
     assert answer.status == "optimal"
     assert set(answer.design) == {*best.design, "l1", "l2", "l3", "l71"}
-    assert_held(freed, answer)
+    assert_satisfied(freed, answer)
     drive = Drive(freed, answer.design)
     assert drive.peak(2) < 0.999 * best.figures["peak_acceleration"]
     swing, theta, transmission = drive.sley()
@@ -216,4 +216,4 @@ def test_other_strokes_and_dwells_are_optimal_and_certified(scene, stroke, dwell
     answer = lo.solve(changed_scene, starts=1)
     assert answer.status == "optimal", answer.message
     assert answer.certificate.passed
-    assert_held(changed_scene, answer)
+    assert_satisfied(changed_scene, answer)

@@ -17,8 +17,8 @@ from loomopt.physics.mechanisms.cam_spline import cycloid_like, spline
 
 SCENE = lo.load("shedding")
 LOADS = ("weight", "warp_tension", "inertia", "damping", "dry_friction")
-OWN = {"weight": ["G"], "warp_tension": ["T1", "T2"], "inertia": ["M"], "damping": ["C"], "dry_friction": ["F"]}
-OWN["coil"] = ["wire", "turns", "shear_modulus"]
+KEYS = {"weight": ["G"], "warp_tension": ["T1", "T2"], "inertia": ["M"], "damping": ["C"], "dry_friction": ["F"]}
+KEYS["coil"] = ["wire", "turns", "shear_modulus"]
 
 
 def with_effects(*names):
@@ -152,7 +152,7 @@ def test_an_effect_has_its_term_and_its_symbols_exactly_when_it_is_on(on):
     words = set(
         " ".join(f" {equation.text} " for equation in equations).translate(str.maketrans("*/^()+-,", " " * 8)).split()
     )
-    for effect, symbols in OWN.items():
+    for effect, symbols in KEYS.items():
         assert (effect in names) == (effect in on)
         for symbol in symbols:
             assert (symbol in words) == (effect in on), symbol

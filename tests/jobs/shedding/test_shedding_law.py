@@ -35,7 +35,7 @@ DIGITS = {
     ("14.5 mm", 16, True): 27323.257558294088,
 }
 UNEVEN = (100, 70, 130, 60)
-OTHERS: dict[str, dict[str, Any]] = {
+VARIANTS: dict[str, dict[str, Any]] = {
     "damped": {"C": 35},
     "a demand": {"N_min": 100},
     "damped, a demand, friction": {"C": 35, "N_min": 100, "F": 20},
@@ -73,9 +73,9 @@ def test_the_least_spring_is_that_of_the_linear_programmes(travel, n, symmetric)
 
 @pytest.mark.few(4)
 @pytest.mark.parametrize("symmetric", [False, True])
-@pytest.mark.parametrize(("travel", "name"), slow.grid(TRAVELS, OTHERS))
+@pytest.mark.parametrize(("travel", "name"), slow.grid(TRAVELS, VARIANTS))
 def test_it_is_so_with_every_effect_and_uneven_segments(travel, name, symmetric):
-    case = replace(TRAVELS[travel], **OTHERS[name])
+    case = replace(TRAVELS[travel], **VARIANTS[name])
     answer = freed(case, 8, symmetric)
     assert (answer.status, answer.certificate.whole_cycle) == ("optimal", "bounded")
     assert answer.figures["K1"] == pytest.approx(programmed(case, 8, symmetric), rel=1e-9)
@@ -84,7 +84,7 @@ def test_it_is_so_with_every_effect_and_uneven_segments(travel, name, symmetric)
 @pytest.mark.few(2)
 @pytest.mark.parametrize(("travel", "name"), OTHER_DIGITS)
 def test_it_is_so_with_16_intervals(travel, name):
-    answer = freed(replace(TRAVELS[travel], **OTHERS[name]), 16)
+    answer = freed(replace(TRAVELS[travel], **VARIANTS[name]), 16)
     assert answer.status == "optimal"
     assert answer.figures["K1"] == pytest.approx(OTHER_DIGITS[travel, name], rel=1e-9)
 
@@ -106,10 +106,10 @@ def test_laws_of_many_intervals_are_those_of_the_linear_programmes_too(travel, n
     assert answer.solver["iterations"] < 60
 
 
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("name", VARIANTS)
 @pytest.mark.few(1)
 def test_they_are_with_every_effect(name):
-    case = replace(PRINTED, **OTHERS[name])
+    case = replace(PRINTED, **VARIANTS[name])
     answer = freed(case, 64)
     assert answer.status == "optimal"
     assert answer.figures["K1"] == pytest.approx(programmed(case, 64), rel=1e-12)
@@ -141,20 +141,20 @@ def test_how_much_softer_than_with_the_best_fixed_law(travel):
 
 # The law that is found -------------------------------------------------------------------------------------------
 
-FOUND = {
+OPTIMAL_LAWS = {
     "free": (PAPER, 8, False),
     "of 16 intervals": (PRINTED, 16, False),
     "symmetric": (PAPER, 16, True),
-    "damped, a demand, friction": (replace(PAPER, **OTHERS["damped, a demand, friction"]), 8, False),
+    "damped, a demand, friction": (replace(PAPER, **VARIANTS["damped, a demand, friction"]), 8, False),
     "uneven": (replace(PRINTED, angles=UNEVEN), 8, False),
     "step": (replace(PRINTED, shape="step"), 8, True),
 }
 
 
-@pytest.mark.parametrize("name", FOUND)
+@pytest.mark.parametrize("name", OPTIMAL_LAWS)
 def test_the_found_law_is_a_cam_law(name):
     """s from 0 to 1 at rest and still at both ends, never falling, C², |s''| in bound, ∫ s'' = 0, ∫ s' = 1."""
-    case, n, symmetric = FOUND[name]
+    case, n, symmetric = OPTIMAL_LAWS[name]
     law = freed(case, n, symmetric).design["law"]
     assert len(law) == n + 1
     assert (law[0], law[-1]) == (0.0, 0.0)
@@ -174,9 +174,9 @@ def test_the_found_law_is_a_cam_law(name):
         assert before[:3] == after[:3], "exactly: s, s', s'' have no jump"
 
 
-@pytest.mark.parametrize("name", FOUND)
+@pytest.mark.parametrize("name", OPTIMAL_LAWS)
 def test_the_derivatives_of_the_found_law_are_derivatives(name):
-    law = freed(*FOUND[name]).design["law"]
+    law = freed(*OPTIMAL_LAWS[name]).design["law"]
     made, n, h = spline(MANY, [MANY.number(value) for value in law]), len(law) - 1, MANY.number(1e-15)
     for k in range(n):
         u = (k + MANY.number(0.37)) / n
@@ -186,10 +186,10 @@ def test_the_derivatives_of_the_found_law_are_derivatives(name):
 
 
 @pytest.mark.few(3)
-@pytest.mark.parametrize("name", FOUND)
+@pytest.mark.parametrize("name", OPTIMAL_LAWS)
 def test_contact_holds_between_the_knots(name):
     """A dense scan by the plain reference, then its least stiffness of this law in 30 digits."""
-    case, n, symmetric = FOUND[name]
+    case, n, symmetric = OPTIMAL_LAWS[name]
     answer = freed(case, n, symmetric)
     law, K1 = answer.design["law"], answer.design["K1"]
     low, high = lowest(case, law, K1)
@@ -204,7 +204,7 @@ def test_contact_holds_between_the_knots(name):
 
 @pytest.mark.parametrize("name", ["symmetric", "step"])
 def test_a_symmetric_law_is_symmetric_to_the_last_bit(name):
-    law = freed(*FOUND[name]).design["law"]
+    law = freed(*OPTIMAL_LAWS[name]).design["law"]
     made, n = spline(EXACT, [Fraction(value) for value in law]), len(law) - 1
     assert law == tuple(-value for value in reversed(law))
     for k in range(n):

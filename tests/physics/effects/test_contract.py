@@ -27,7 +27,7 @@ KEYS = {"most": "made_up_peak", "high": "made_up_size"}
 
 
 @pytest.fixture(autouse=True)
-def brought(monkeypatch):
+def plugins(monkeypatch):
     """Have another distribution bring the made-up effects."""
     monkeypatch.setattr(registry, "entry_points", made_up.points)
 

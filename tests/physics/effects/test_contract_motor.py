@@ -18,7 +18,7 @@ AT_SPEED = {"rapier": {"effects.head_inertia": {"mass": "0.35 kg"}}, "beatup": {
 
 
 @pytest.fixture(autouse=True)
-def brought(monkeypatch):
+def plugins(monkeypatch):
     """Have another distribution bring the made-up effects."""
     monkeypatch.setattr(registry, "entry_points", made_up.points)
 

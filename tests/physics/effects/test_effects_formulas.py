@@ -35,7 +35,7 @@ GIVEN = {
     "beta_r": 1.11,
     "no_load_speed": 63.5,
 }
-OWN = {
+VALUES = {
     "inertia": {"J4": 0.62},
     "resistance": {"pulse": 0.52},
     "rocker_inertia": {"J3": 0.05},
@@ -58,17 +58,17 @@ def cases():
     for name, effect in BEATUP.items():
         if isinstance(effect, Check):
             for key, quantity in effect.quantities.items():
-                yield f"{name}: {key}", quantity, OWN[name]
+                yield f"{name}: {key}", quantity, VALUES[name]
         elif isinstance(effect, Speed):
-            yield name, driving(effect), OWN[name]
+            yield name, driving(effect), VALUES[name]
         elif name == "rod_inertia":
             for model in ("lumped", "exact"):
-                yield f"{name}: {model}", switched(effect, 1), OWN[name] | {"model": model}
+                yield f"{name}: {model}", switched(effect, 1), VALUES[name] | {"model": model}
         elif isinstance(effect, Load) and effect.corners:
             for switch in (-1, 0, 1):
-                yield f"{name}: switch {switch}", switched(effect, switch), OWN[name]
+                yield f"{name}: switch {switch}", switched(effect, switch), VALUES[name]
         else:
-            yield name, switched(effect, 0), OWN[name]
+            yield name, switched(effect, 0), VALUES[name]
 
 
 def switched(effect, switch):
@@ -85,7 +85,7 @@ def driving(effect):
     return left
 
 
-CASES = {label: (function, own) for label, function, own in cases()}
+CASES = {label: (function, values) for label, function, values in cases()}
 
 
 def setting(number, phi, omega_dot, values):
@@ -104,9 +104,9 @@ def value(system, function, values, phi, omega_dot=None):
 
 
 def test_every_effect_has_its_case():
-    assert OWN.keys() == BEATUP.keys()
+    assert VALUES.keys() == BEATUP.keys()
     assert all(
-        set(OWN[name]) == set(effect.table.model_fields) - {"model", "table", "digits"} - PLACING
+        set(VALUES[name]) == set(effect.table.model_fields) - {"model", "table", "digits"} - PLACING
         for name, effect in BEATUP.items()
     )
 

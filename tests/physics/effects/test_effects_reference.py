@@ -58,7 +58,7 @@ def called(job, effect):
     return INSTANCES[effect] if EFFECTS[job, effect].many else effect
 
 
-def asked(effect):
+def required(effect):
     """Return what an effect must have rows of, for each of its examples."""
     if isinstance(effect, Speed):
         return set(effect.rows)
@@ -76,7 +76,7 @@ def lacked(job, effect):
 def test_every_effect_has_its_rows(job, name):
     # What a check tells may depend on the scene.
     effect = registry.load(packaged_of(job)).schema.effects[name]
-    report = asked(effect) - set(lacked(job, effect))
+    report = required(effect) - set(lacked(job, effect))
     expected = {(str(k), subject) for k in range(len(effect.examples)) for subject in report}
     assert {(row[2], row[5]) for row in ROWS if row[:2] == (job, name)} == expected
 

@@ -14,7 +14,7 @@ from loomopt.jobs import registry
 from reference import beatup as plain
 
 RADII = {"A": 25.0, "B": 20.0, "C": 15.0, "D": 25.0}
-OTHERS = ("rod_inertia", "gravity", "bearing_friction", "counterweight_inertia", "rocker_inertia")
+EFFECTS = ("rod_inertia", "gravity", "bearing_friction", "counterweight_inertia", "rocker_inertia")
 PINS = {f"effects.joint_forces.pins.{pin}": {"mu": "0.1", "radius": f"{r} mm"} for pin, r in RADII.items()}
 
 
@@ -26,12 +26,12 @@ def scene_of(*effects, **mu):
 
 @pytest.mark.parametrize(("pin", "energy"), [("A", 39.7), ("B", 32.7), ("C", 7.9), ("D", 2.58)])
 def test_what_each_pin_takes_a_turn(pin, energy):
-    scene = scene_of(*OTHERS, **{pin: "0.1"}).set("effects.rod_inertia.model", "exact")
+    scene = scene_of(*EFFECTS, **{pin: "0.1"}).set("effects.rod_inertia.model", "exact")
     assert lo.evaluate(scene).figures["friction_loss"] / 10 == pytest.approx(energy, abs=0.05)
 
 
 def test_the_sum_of_all_pins():
-    scene = scene_of(*OTHERS).set("effects.rod_inertia.model", "exact")
+    scene = scene_of(*EFFECTS).set("effects.rod_inertia.model", "exact")
     assert lo.evaluate(scene).figures["friction_loss"] == pytest.approx(829, abs=0.5)
 
 

@@ -13,11 +13,11 @@ from loomopt.maths import systems
 from loomopt.physics.cycle import Node
 
 MU, RADIUS = 0.1, 0.025
-OWN = {"model": "load", "mu": "0.1", "radius": "25 mm"}
+VALUES = {"model": "load", "mu": "0.1", "radius": "25 mm"}
 
 
 def scene_of(**values):
-    return lo.load("beatup").with_effect("joint_forces").set("effects.bearing_friction", OWN | values)
+    return lo.load("beatup").with_effect("joint_forces").set("effects.bearing_friction", VALUES | values)
 
 
 @functools.cache
@@ -84,7 +84,7 @@ def test_its_numbers_are_asked_for_by_name():
     with pytest.raises(BadInput, match=r"effects.bearing_friction.radius"):
         plain.set("effects.bearing_friction", {"model": "load", "mu": "0.1"})
     with pytest.raises(BadInput, match=r"coulomb belongs to model constant"):
-        plain.set("effects.bearing_friction", OWN | {"coulomb": "2 N*m"})
+        plain.set("effects.bearing_friction", VALUES | {"coulomb": "2 N*m"})
     with pytest.raises(BadInput, match=r"effects.bearing_friction.viscous"):
         plain.set("effects.bearing_friction", {"coulomb": "2 N*m"})
     with pytest.raises(BadInput, match=r"mu belongs to model load"):

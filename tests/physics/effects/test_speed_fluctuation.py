@@ -22,7 +22,7 @@ from reference import turn as plain_turn
 BEATUP = lo.load("beatup")
 JOB = registry.of(BEATUP)
 ON = BEATUP.with_effect("speed_fluctuation")
-OTHERS = ("rocker_inertia", "counterweight_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
+EFFECTS = ("rocker_inertia", "counterweight_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
 TABLE = {
     1: (0.0160330062223, 63.1995008701, 1.38883148675, 92.11073444, 62.8364088031),
     2: (0.00805602236175, 63.0152913702, 5.71736602802, 92.94952857, 62.8350660434),
@@ -113,7 +113,7 @@ def rule(sampler):
     return pieces, np.tile((x + 1) / 2, len(widths)), np.repeat(widths, len(x)) * np.tile(weights / 2, len(widths))
 
 
-ALL = functools.reduce(lambda scene, name: scene.with_effect(name), OTHERS, ON)
+ALL = functools.reduce(lambda scene, name: scene.with_effect(name), EFFECTS, ON)
 EXACT = ALL.set("effects.rod_inertia.model", "exact")
 
 
@@ -306,7 +306,7 @@ a speed of its own, but for the shaking force, which has components and the rod,
 brought onto its turn, and the rod's weight inside the drive: 121 nodes where both gravity and a rod are on, none else.
 """
 ALGEBRAIC = {
-    "beatup": OTHERS,
+    "beatup": EFFECTS,
     "rapier": ("head_inertia", "tape_friction"),
     "shedding": ("damping", "dry_friction", "coil"),
 }

@@ -186,10 +186,10 @@ def test_two_intervals_cannot_start():
 def test_the_table_is_the_clamped_cubic_of_scipy(points):
     u, s = points
     result, known = tabulated(u, s), CubicSpline(u, s, bc_type="clamped")
-    between = np.setdiff1d(GRID, u)
+    inner = np.setdiff1d(GRID, u)
     assert result.breaks == tuple(u[1:-1].tolist())
     for order, tolerance in enumerate((1e-13, 1e-12, 1e-10, 1e-8)):
-        assert sampled(result, between)[order] == pytest.approx(known(between, order), rel=0, abs=tolerance)
+        assert sampled(result, inner)[order] == pytest.approx(known(inner, order), rel=0, abs=tolerance)
     assert result.v == pytest.approx(known(u, 1), rel=0, abs=1e-12)
     assert result.a == pytest.approx(known(u, 2), rel=0, abs=1e-10)
 

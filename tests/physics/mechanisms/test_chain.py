@@ -487,7 +487,7 @@ def test_a_rapier_drive_as_a_chain_is_the_rapier_drive():
         assert np.allclose(here, right, rtol=0, atol=1e-13 * np.max(np.abs(right))), name
 
 
-def told(parts):
+def fault_at(parts):
     """Return what a chain's fault says, and at which crank angle, deg."""
     message, _, angle = fault(parts, {}).partition(" fails at crank angle ")
     return message, float(angle.removesuffix(" deg"))
@@ -496,13 +496,13 @@ def told(parts):
 def test_a_closed_chain_has_no_fault_and_one_that_does_not_names_part_and_crank_angle():
     assert fault(four_bar(*LENGTHS), {}) == ""
     assert fault(four_bar(0.031, 0.065, 0.12, 0.167), {}) == "drive: B to D < rod + rocker fails at crank angle 180 deg"
-    assert told(four_bar(0.031, 0.3, 0.155, 0.167)) == ("drive: B to D > |rod - rocker|", 0)
+    assert fault_at(four_bar(0.031, 0.3, 0.155, 0.167)) == ("drive: B to D > |rod - rocker|", 0)
 
 
 @pytest.mark.parametrize("start", [0.0, 0.004363, 1.0, 2.5])
 def test_a_dyad_that_only_touches_its_singular_position_between_samples_is_told(start):
     """A change point: l1 + l4 = l2 + l3 stretches it in one position; what closes by 1e-9 does not touch."""
-    message, angle = told(four_bar(1, 2, 3, 4, start=start))
+    message, angle = fault_at(four_bar(1, 2, 3, 4, start=start))
     assert message == "drive: B to D < rod + rocker"
     assert angle == pytest.approx(math.degrees(math.pi - start), abs=1e-3)
     assert fault(four_bar(1, 2 + 1e-9, 3, 4, start=start), {}) == ""
@@ -520,7 +520,7 @@ def test_a_slot_whose_pin_passes_over_its_pivot_is_told_in_any_unit():
         )
 
     for size in (1e-3, 1.0, 1e3):
-        message, angle = told(slotted(size, 0.3))
+        message, angle = fault_at(slotted(size, 0.3))
         assert message == "slot: B keeps away from O"
         assert angle == pytest.approx(math.degrees(2 * math.pi - 1), abs=1e-3)
         assert fault(slotted(size, 0.299), {}) == ""
@@ -528,7 +528,7 @@ def test_a_slot_whose_pin_passes_over_its_pivot_is_told_in_any_unit():
 
 def test_a_kite_whose_joints_meet_is_told():
     """Links of one length close over any base but none: a crank as long as the frame passes over the other joint."""
-    assert told(four_bar(0.3, 0.4, 0.4, 0.3, start=1.0)) == (
+    assert fault_at(four_bar(0.3, 0.4, 0.4, 0.3, start=1.0)) == (
         "drive: B keeps away from D",
         pytest.approx(302.704, abs=1e-3),
     )
@@ -544,13 +544,14 @@ def test_a_gear_that_counts_past_its_end_or_does_not_come_back_is_told():
     assert fault(geared(ratio=-1.375, zero=1.9, **{"with": "rocker"}), {}) == ""
     unit = linked({}).pose(systems.FLOAT, {}, 2.0).links["rocker"].unit()
     passed = math.atan2(unit.y, unit.x)
-    message, angle = told(geared(ratio=-1.375, zero=passed + math.pi, **{"with": "rocker"}))
+    message, angle = fault_at(geared(ratio=-1.375, zero=passed + math.pi, **{"with": "rocker"}))
     assert message == "wheel: rocker keeps within half a turn of zero"
     unit = linked({}).pose(systems.FLOAT, {}, math.radians(angle)).links["rocker"].unit()
     assert math.atan2(unit.y, unit.x) == pytest.approx(passed, abs=0.01)
-    told_ = fault(geared(ratio=0.5, **{"with": "crank"}), {})
+    sentence = fault(geared(ratio=0.5, **{"with": "crank"}), {})
     assert (
-        told_ == "wheel: its angle does not repeat after a turn of the crank, because its ratio is not a whole number"
+        sentence
+        == "wheel: its angle does not repeat after a turn of the crank, because its ratio is not a whole number"
     )
     assert fault(geared(ratio=2, **{"with": "crank"}), {}) == ""
 
@@ -561,8 +562,8 @@ def test_a_cam_of_more_than_a_turn_is_told():
         "arm": {"kind": "cam", "at": "A", "law": "harmonic", "lift": 0.1, "rise": "a", "return": "a"},
     }
     assert fault(chain(parts), {"a": 3.1}) == ""
-    told_ = fault(chain(parts), {"a": math.radians(190)})
-    assert told_ == "arm: rise, far_dwell and return take 380 deg, more than one turn"
+    sentence = fault(chain(parts), {"a": math.radians(190)})
+    assert sentence == "arm: rise, far_dwell and return take 380 deg, more than one turn"
 
 
 def test_a_slider_that_stands_across_its_guide_is_told():
@@ -657,13 +658,13 @@ def test_a_chain_is_at_most_twice_as_slow_on_arrays_as_the_crank_rockers_own_ker
         vector = pose.vector("rocker")
         return maths.atan2(vector.y, vector.x), pose.links["rocker"].rates(1), pose.links["rocker"].rates(2)
 
-    def own():
+    def closed_form():
         pose = crank_rocker.CrankRockerPose(maths, crank_rocker.Lengths(*LENGTHS), phi)
         return pose.psi, pose.psi_1, pose.psi_2
 
     least = [math.inf, math.inf]
     for _ in range(60):
-        for k, run in enumerate((as_chain, own)):
+        for k, run in enumerate((as_chain, closed_form)):
             began = time.process_time()
             for _ in range(20):
                 run()

@@ -84,10 +84,10 @@ def test_events_are_those_of_the_scan(seed):
     hints = other.hints(given, ())
     assert len(hints) == 3  # both events, and how many turns lie between them
     closed = linkage.derived(FLOAT, given, ())
-    sought = other.derived(FLOAT, Given(values | hints, {}), ())
+    scanned = other.derived(FLOAT, Given(values | hints, {}), ())
     for event in linkage.closed:
         name = event_value(event)
-        assert closed[name] == pytest.approx(sought[name], abs=1e-12), event
+        assert closed[name] == pytest.approx(scanned[name], abs=1e-12), event
 
 
 @pytest.mark.parametrize("seed", range(8))

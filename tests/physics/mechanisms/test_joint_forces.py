@@ -181,16 +181,16 @@ def test_groups_run_in_every_number_system(name):
     along = (0.28, 0.96)
 
     def forces(of):
-        def own(pair):
+        def vector(pair):
             return Vector(of(float(pair[0])), of(float(pair[1])))
 
-        group = dyad.Dyad(own(r1), own(r2), 2 * (of(r1[0]) * of(r2[1]) - of(r1[1]) * of(r2[0])))
-        loads = [Wrench(own(force), of(float(moment))) for force, moment in ((force1, moment1), (force2, moment2))]
-        mass = inertia(of(2.0), own(r1), of(3.0), (of(1.5), of(-0.5)), own(r2))
+        group = dyad.Dyad(vector(r1), vector(r2), 2 * (of(r1[0]) * of(r2[1]) - of(r1[1]) * of(r2[0])))
+        loads = [Wrench(vector(force), of(float(moment))) for force, moment in ((force1, moment1), (force2, moment2))]
+        mass = inertia(of(2.0), vector(r1), of(3.0), (of(1.5), of(-0.5)), vector(r2))
         yield from two_links(group, together([loads[0], mass]), loads[1])
-        yield from link_and_slider(own(r1), own(along), loads[0], own(force2))
-        yield from slotted_lever(own(r2), own(along), *loads)
-        yield tooth_force(of(3.0), of(0.5), own(along))
+        yield from link_and_slider(vector(r1), vector(along), loads[0], vector(force2))
+        yield from slotted_lever(vector(r2), vector(along), *loads)
+        yield tooth_force(of(3.0), of(0.5), vector(along))
 
     for value, expected in zip(forces(number), forces(float), strict=True):
         for item, plain in zip(value, expected, strict=True):

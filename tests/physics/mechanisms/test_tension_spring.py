@@ -247,12 +247,12 @@ def test_every_number_system_gives_the_same_figures(parameters, coil, force):
         (systems.mpmath(), systems.mpmath().number),
         (systems.sympy(), sp.Rational),
     ):
-        *values, own_force = map(convert, data)
-        results = [float(np.ravel(value)[-1]) for value in map(_evaluated, figures(system, made(values), own_force))]
+        *values, preload = map(convert, data)
+        results = [float(np.ravel(value)[-1]) for value in map(_evaluated, figures(system, made(values), preload))]
         assert results == pytest.approx(reference, rel=1e-12)
     symbols = ca.SX.sym("x", len(data))
-    *values, own_force = ca.vertsplit(symbols)
-    function = ca.Function("figures", [symbols], [ca.vertcat(*figures(systems.casadi(), made(values), own_force))])
+    *values, preload = ca.vertsplit(symbols)
+    function = ca.Function("figures", [symbols], [ca.vertcat(*figures(systems.casadi(), made(values), preload))])
     assert function(data).full().ravel() == pytest.approx(np.array(reference), rel=1e-12)
 
 

@@ -19,7 +19,7 @@ EXACT = systems.mpmath(50)
 MP = mpmath.MPContext()
 MP.dps = 50
 OMEGA, J = 20 * math.pi, 0.625
-GIVEN, OWN = {"M0": 745.0, "beta": 1.15}, {"pulse": 0.52}
+GIVEN, VALUES = {"M0": 745.0, "beta": 1.15}, {"pulse": 0.52}
 DAMPED = {
     "lightly": (2e6, 45.0, "under"),
     "nearly critically": (2e4, 2 * math.sqrt(2e4 * J) * (1 - 1e-9), "under"),
@@ -41,15 +41,15 @@ def oscillator(system, damped):
 def answer(system, damped, phi):
     """Return z and z˙ in answer to the pulse at a crank angle, rad, in any turn."""
     given = {name: system.number(value) for name, value in GIVEN.items()}
-    values = {name: system.number(value) for name, value in OWN.items()}
-    inside = float(abs(math.remainder(float(phi) - GIVEN["beta"], 2 * math.pi)) < OWN["pulse"] / 2)
+    values = {name: system.number(value) for name, value in VALUES.items()}
+    inside = float(abs(math.remainder(float(phi) - GIVEN["beta"], 2 * math.pi)) < VALUES["pulse"] / 2)
     pose: Any = Pose(phi, system.number(OMEGA), None, None, None)
     return resistance.response(Inputs(system, given, values, pose, inside), oscillator(system, damped))
 
 
 def pulse(phi):
     away = (phi - GIVEN["beta"] + MP.pi) % (2 * MP.pi) - MP.pi
-    return GIVEN["M0"] * MP.cos(MP.pi * away / OWN["pulse"]) if abs(away) < OWN["pulse"] / 2 else 0
+    return GIVEN["M0"] * MP.cos(MP.pi * away / VALUES["pulse"]) if abs(away) < VALUES["pulse"] / 2 else 0
 
 
 @every
@@ -68,7 +68,7 @@ def test_the_answer_obeys_the_equation_of_motion(damped, phi):
 
 @every
 def test_the_answer_goes_on_through_the_corners_and_comes_back_after_a_turn(damped):
-    corners = [GIVEN["beta"] + side * OWN["pulse"] / 2 for side in (-1, 1)]
+    corners = [GIVEN["beta"] + side * VALUES["pulse"] / 2 for side in (-1, 1)]
     step = EXACT.number(10) ** -25
     size = abs(answer(EXACT, damped, EXACT.number(1.2))[0])
     for corner in corners:
@@ -84,13 +84,13 @@ def test_the_answer_goes_on_through_the_corners_and_comes_back_after_a_turn(damp
 def test_the_answer_is_that_of_an_integrator_over_a_turn(damped):
     """From z and z˙ at the pulse's beginning, piece by piece, over the turn that follows."""
     k, c, _ = DAMPED[damped]
-    begin, end = (GIVEN["beta"] + side * OWN["pulse"] / 2 for side in (-1, 1))
+    begin, end = (GIVEN["beta"] + side * VALUES["pulse"] / 2 for side in (-1, 1))
     begun = [float(item) for item in answer(systems.FLOAT, damped, begin + 1e-12)]
     state, result, exact = begun, list[list[float]](), list[list[float]]()
     for low, high, pushed in ((begin, end, GIVEN["M0"]), (end, begin + 2 * math.pi, 0.0)):
 
         def slope(phi, state, pushed=pushed):
-            load = pushed * math.cos(math.pi * (phi - GIVEN["beta"]) / OWN["pulse"])
+            load = pushed * math.cos(math.pi * (phi - GIVEN["beta"]) / VALUES["pulse"])
             return [state[1] / OMEGA, (load - c * state[1] - k * state[0]) / J / OMEGA]
 
         angles = np.linspace(low, high, 41)

@@ -67,7 +67,7 @@ def test_a_limit_of_the_complement_is_told_as_what_is_asked():
     limits = tuple(replace(limit, complement=1.0) if limit.row == "w" else limit for limit in program.limits)
     assert limits[0].bound == 0.75
     job = toy.ToyJob(replace(program, limits=limits))
-    result = report.evaluation(toy.scene_of(job), job, job.own, {"x": 0.7, "y": 0.0}).limits[0]
+    result = report.evaluation(toy.scene_of(job), job, job.toy_program, {"x": 0.7, "y": 0.0}).limits[0]
     assert (result.name, result.min, result.ok) == ("w", 0.25, True)
     assert result.value == pytest.approx(0.3)
 
@@ -176,7 +176,7 @@ def named(kind, name, row, sign, value):
     program = toy.program("xy", ROWS, WAVES)
     limit = kind(name, sign, row, value, 1.0)
     job = toy.ToyJob(replace(program, limits=(limit,)))
-    result = report.evaluation(toy.scene_of(job), job, job.own, {"x": 2.0, "y": 3.0}).limits
+    result = report.evaluation(toy.scene_of(job), job, job.toy_program, {"x": 2.0, "y": 3.0}).limits
     return [(item.name, item.value, item.ok) for item in result]
 
 
@@ -204,5 +204,5 @@ def test_a_limit_may_be_missed_by_just_a_billionth(sign):
 def test_a_weighed_limit_is_held_to_a_billionth_of_one(excess, ok):
     program = toy.program("xy", ROWS, WAVES)
     job = toy.ToyJob(replace(program, limits=(RatioLimit("p", 1, "p", 0.0, 50.0, "y"),)))
-    result = report.evaluation(toy.scene_of(job), job, job.own, {"x": excess, "y": 0.0}).limits
+    result = report.evaluation(toy.scene_of(job), job, job.toy_program, {"x": excess, "y": 0.0}).limits
     assert [item.ok for item in result] == [ok]

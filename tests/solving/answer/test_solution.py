@@ -8,11 +8,11 @@ import pytest
 from loomopt.solving.answer.solution import Evaluated, Finding, Relaxation, Solution, certificate_dict
 from loomopt.solving.certificate.records import Certificate, Level
 
-HELD, BROKEN = Finding("p", 1.0, None, 2.0, True), Finding("q", 3.0, None, 2.0, False)
+SATISFIED, BROKEN = Finding("p", 1.0, None, 2.0, True), Finding("q", 3.0, None, 2.0, False)
 
 
 def solution(**more):
-    return Solution("toy", (), {"x": 1.0}, {"f": 2.0}, {"x": "1"}, (HELD,), **more)
+    return Solution("toy", (), {"x": 1.0}, {"f": 2.0}, {"x": "1"}, (SATISFIED,), **more)
 
 
 def test_other_optima_are_told_only_where_there_are_any():
@@ -30,7 +30,7 @@ def test_what_helps_is_told_only_where_limits_clash():
     assert (report["clash"], report["relaxation"]) == (["p <= 1"], [relaxation._asdict()])
 
 
-@pytest.mark.parametrize(("limits", "admissible"), [((), True), ((HELD,), True), ((HELD, BROKEN), False)])
+@pytest.mark.parametrize(("limits", "admissible"), [((), True), ((SATISFIED,), True), ((SATISFIED, BROKEN), False)])
 def test_a_design_is_admissible_where_every_limit_holds(limits, admissible):
     assert Evaluated("toy", (), {}, {}, {}, limits).admissible == admissible
 

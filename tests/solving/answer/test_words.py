@@ -144,7 +144,7 @@ def test_a_relaxation_that_ends_at_rounding_ends_at_zero(noise, text):
     assert (result.needed == 0.0) == (abs(noise) < 0.1)
 
 
-def told(limit, fair, alone):
+def relaxation(limit, fair, alone):
     return Relaxation(limit, "max", 1.0, 2.0, alone, limit, fair)
 
 
@@ -160,7 +160,7 @@ def told(limit, fair, alone):
 )
 def test_what_is_out_of_proportion_is_told_last(relaxations, order):
     """Capitals are out of proportion; joined by a comma, limits give way together."""
-    results = [told(n, n.islower(), "," not in group) for group in relaxations.split() for n in group.split(",")]
+    results = [relaxation(n, n.islower(), "," not in group) for group in relaxations.split() for n in group.split(",")]
     assert [tuple(item.limit for item in remedy) for remedy in remedies(results)] == order
 
 

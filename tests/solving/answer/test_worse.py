@@ -26,11 +26,11 @@ NAMES = ["beatup", pytest.param("rapier", marks=pytest.mark.slow), "shedding", "
 def test_what_is_worse_by_more_than_a_percent_is_told_once_and_nothing_else(name):
     second_answer = answer(name)
     today, figures = lo.evaluate(second_answer.scene).figures, second_answer.scene.schema.figures
-    sought = {level.objective for level in second_answer.certificate.levels}
+    objectives = {level.objective for level in second_answer.certificate.levels}
     record = {item.figure: item for item in second_answer.worse}
     for figure, known in figures.items():
         then, now = today.get(figure), second_answer.figures.get(figure)
-        if figure in sought or len(known.sides) != 1 or then is None or now is None or abs(then) < 1e-6:
+        if figure in objectives or len(known.sides) != 1 or then is None or now is None or abs(then) < 1e-6:
             assert figure not in record or abs(then) < 1e-6
             continue
         rise = (now - then) / abs(then) * (1 if known.sides == ("max",) else -1)

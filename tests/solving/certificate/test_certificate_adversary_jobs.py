@@ -26,7 +26,7 @@ OPTIMA: dict[str, tuple[str, str, dict[str, object]]] = {
     "shedding force": ("shedding", "force", {}),
     "shedding law": ("shedding", "law", {"targets.law.intervals": 8}),
 }
-each_optimum = pytest.mark.parametrize("name", OPTIMA)
+optima = pytest.mark.parametrize("name", OPTIMA)
 
 
 @functools.cache
@@ -57,7 +57,7 @@ def nudged(program, x, name, share):
 
 
 @pytest.mark.few(6)
-@each_optimum
+@optima
 def test_the_optimum_itself_passes(name):
     program, x = optimum(name)
     assert certify(program, x, ACCURACY).passed
@@ -87,7 +87,7 @@ def test_one_variable_off_is_refused_or_no_better(name, share):
 
 
 @pytest.mark.few(8)
-@each_optimum
+@optima
 @pytest.mark.parametrize("size", [1e-5, 1e-3])
 def test_an_optimum_stretched_in_all_variables_is_refused(name, size):
     """By turns up and down, so that no common scale of the lengths is hit."""

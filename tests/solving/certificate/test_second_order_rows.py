@@ -131,7 +131,7 @@ def read(monkeypatch):
     """Return what the Lagrangian is asked: prices, held levels, directions and the slope that is left."""
     requests = []
 
-    class Told:
+    class Stub:
         def __init__(self, program, x, level, prices, fixed):
             self.of = level, prices, fixed
 
@@ -139,7 +139,7 @@ def read(monkeypatch):
             requests.append((*self.of, direction, slope))
             return False
 
-    monkeypatch.setattr(second_order, "Lagrangian", Told)
+    monkeypatch.setattr(second_order, "Lagrangian", Stub)
     return requests
 
 

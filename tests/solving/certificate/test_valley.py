@@ -67,9 +67,9 @@ def test_third_derivatives_in_floats_are_those_of_40_digits_to_their_own_error(e
     x = {v.name: value for v in program.variables for value in [program.starts[0][v.name]]}
     quick, exact = (local_by(item, program, x).derivatives for item in (JetDerivatives, MpmathDerivatives))
     line, basis = np.eye(len(quick.names))[0], np.eye(len(quick.names))[:, 1:3]
-    (one, error), (other, _) = quick.thirds(line, basis), exact.thirds(line, basis)
-    assert np.abs(other).max() > 1.0
-    assert np.all(np.abs(one - other).max(axis=(1, 2)) <= 10 * error + 1e-9 * np.abs(other).max(axis=(1, 2)))
+    (first, error), (second, _) = quick.thirds(line, basis), exact.thirds(line, basis)
+    assert np.abs(second).max() > 1.0
+    assert np.all(np.abs(first - second).max(axis=(1, 2)) <= 10 * error + 1e-9 * np.abs(second).max(axis=(1, 2)))
 
 
 # How a valley bends -------------------------------------------------------------------------------------------------

@@ -115,5 +115,5 @@ def test_nodes_are_for_what_no_station_holds():
     )
     point = exchange.solve(task, task.starts[0], Settings())
     assert point.violation <= 1e-10
-    held_there = calls.violation(calls.peaks(calls.sampler(point.x)), np.zeros(0))
-    assert held_there <= 1e-10, "at corners too"
+    violation = calls.violation(calls.peaks(calls.sampler(point.x)), np.zeros(0))
+    assert violation <= 1e-10, "at corners too"

@@ -37,7 +37,7 @@ def proofs_of(name, target=None):
     return lo.prove(lo.load(name), solved(name, target).design, target)
 
 
-def found(proofs, limit):
+def proof_of(proofs, limit):
     """Return the first proof of a limit: what it says itself comes before what it implies."""
     return next(proof for proof in proofs.proofs if proof.limit == limit)
 

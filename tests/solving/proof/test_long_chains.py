@@ -74,9 +74,9 @@ def chain(crank, *dyads):
 @pytest.mark.parametrize("sizes", CHAINS, ids=["a", "b", "c"])
 def test_five_dyads_in_a_row_are_proven(monkeypatch, sizes):
     monkeypatch.setattr(whole_cycle, "SECONDS", 1e9)
-    found = lo.prove(chain(*sizes))
-    assert {proof.limit: proof.status for proof in found.proofs if proof.status != "proven"} == {}
-    assert sum(proof.boxes for proof in found.proofs) < 10_000
+    proof_of = lo.prove(chain(*sizes))
+    assert {proof.limit: proof.status for proof in proof_of.proofs if proof.status != "proven"} == {}
+    assert sum(proof.boxes for proof in proof_of.proofs) < 10_000
 
 
 LEG = {
@@ -126,9 +126,9 @@ def leg():
 
 def test_constant_angles_of_triangles_on_a_link_are_proven_in_few_boxes():
     """Their joints keep their distance, which the formula knows: no box of crank angles is halved for them."""
-    found = lo.prove(leg())
-    assert {proof.limit: proof.status for proof in found.proofs if proof.status != "proven"} == {}
-    boxes = {proof.name: proof.boxes for proof in found.proofs}
+    proof_of = lo.prove(leg())
+    assert {proof.limit: proof.status for proof in proof_of.proofs if proof.status != "proven"} == {}
+    boxes = {proof.name: proof.boxes for proof in proof_of.proofs}
     assert boxes["mu.knee"] == boxes["mu.toe"] == 2
     assert sum(boxes.values()) < 4000
     b, d, e = (LEG[name] for name in "bde")
@@ -149,8 +149,8 @@ def test_a_long_chain_with_little_time_says_what_is_open(monkeypatch):
 def test_a_chain_beyond_its_boxes_is_undecided_and_says_where(monkeypatch):
     monkeypatch.setattr(whole_cycle, "SECONDS", -1.0)
     monkeypatch.setattr(whole_cycle, "FIRST_BOXES", 20)
-    found = lo.prove(chain(*CHAINS[0][:4]))
-    open_ = [proof for proof in found.proofs if proof.status == "undecided"]
+    proof_of = lo.prove(chain(*CHAINS[0][:4]))
+    open_ = [proof for proof in proof_of.proofs if proof.status == "undecided"]
     assert open_
     assert all(proof.open is not None and proof.boxes < 150 for proof in open_)
-    assert "is left open from crank angle" in "\n".join(map(str, answers.proofs(found)))
+    assert "is left open from crank angle" in "\n".join(map(str, answers.proofs(proof_of)))

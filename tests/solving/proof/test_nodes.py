@@ -10,7 +10,7 @@ from loomopt.model.sampling import Sampler
 from loomopt.solving.proof.reading import layouts
 
 
-def own_layout(task, at):
+def layout_of(task, at):
     ((layout, _),) = layouts(task, at[:, None], {})
     return layout
 
@@ -21,7 +21,7 @@ def test_the_worst_node_of_a_middle_is_close_to_its_true_peak():
     task = solution.task
     for x, _ in designs(solution.program, 20):
         at = task.place(x)
-        layout = own_layout(task, at)
+        layout = layout_of(task, at)
         spot = layout.worst(task, "peak_torque", at[:, None])
         sampler = Sampler(solution.program.model, task.values(at))
         corners = solution.program.model.corners(systems.FLOAT, sampler.given)
@@ -51,7 +51,7 @@ def test_an_order_is_certain_only_where_no_corner_can_pass_another():
     solution = solved("beatup", "balance")
     task, model = solution.task, solution.program.model
     at = task.place(solution.x)
-    layout = own_layout(task, at)
+    layout = layout_of(task, at)
     half = np.array([0.0, 1e-3, 3e-2])[None] * np.ones((4, 1)) * np.array([1.0, 1.0, 1.0, 0.0])[:, None]
     given = model.given(systems.boxes(), task.numbers(at[:, None] - half, at[:, None] + half))
     events = {name: model.event(systems.boxes(), given, name) for name in model.events_read}
@@ -62,7 +62,7 @@ def test_an_event_that_is_a_corner_is_where_it_always_is():
     solution = solved("beatup", "balance", "bearing_friction")
     task, model = solution.task, solution.program.model
     at = task.place(solution.x)
-    layout = own_layout(task, at)
+    layout = layout_of(task, at)
     given = model.given(systems.boxes(), task.numbers(at[:, None] - 1e-4, at[:, None] + 1e-4))
     corners = model.corners(systems.boxes(), given)
     events = {name: model.event(systems.boxes(), given, name) for name in model.events_read}

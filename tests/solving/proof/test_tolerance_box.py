@@ -94,7 +94,7 @@ def test_corners_that_may_change_places_leave_a_box_open():
     name = next(key for key in known if key.endswith("pulse"))
     with pytest.raises(OpenError, match="change places"):
         NumberBox(job.model(scene), known, {name: (0.5, 6.25)})
-    own_scene = registry.load("beatup").with_effect("shaft_torsion")
-    model, known = job.model(own_scene), job.numbers(own_scene)
+    twisting = registry.load("beatup").with_effect("shaft_torsion")
+    model, known = job.model(twisting), job.numbers(twisting)
     with pytest.raises(OpenError, match="shaft_torsion"):
         NumberBox(model, known, {"l1": (0.03, 0.031)})

@@ -26,7 +26,7 @@ PAIRS = [
     ),
     *(("path-18", "path"), ("knuckle-press", "torque"), ("shaper", "torque"), ("sixbar-sley", "balance")),
 ]
-each_pair = pytest.mark.parametrize(("name", "target"), slow.after(len(PAIRS) - 2, PAIRS))
+pairs = pytest.mark.parametrize(("name", "target"), slow.after(len(PAIRS) - 2, PAIRS))
 CLOSED = {
     "beatup": {"B to D < l2 + l3", "B to D > |l2 - l3|"},
     "rapier": {
@@ -47,7 +47,7 @@ CLOSED = {
     },
 }
 """What says that a mechanism assembles, by job; of linkages by scene."""
-KEPT = {
+OPEN = {
     "stroke-dwell": {"stroke is reached", DWELL.format("before"), DWELL.format("after")},
     "dwell": {"stroke is reached", DWELL.format("before"), DWELL.format("after")},
     "torque": {"M3_fdc"},
@@ -63,7 +63,7 @@ ROUNDS = 6
 
 
 @pytest.mark.few(7)
-@each_pair
+@pairs
 def test_every_packaged_answer_is_proven_and_no_entry_is_missing(name, target):
     scene, answer = lo.load(name), solved(name, target)
     proofs = proofs_of(name, target)
@@ -74,7 +74,7 @@ def test_every_packaged_answer_is_proven_and_no_entry_is_missing(name, target):
     known = name if name in CLOSED else scene.job
     wanted = {*scene.limits, *CLOSED[known], *(f"peak {item}" for item in CLAIMED[known])}
     free = {"swing", "theta", "sley_mu_min"} if scene.job == "rapier" else set()
-    remaining = KEPT.get(target, set()) if scene.job in JOBS else set()
+    remaining = OPEN.get(target, set()) if scene.job in JOBS else set()
     assert named >= (wanted | remaining) - free
     if answer.status == "optimal":
         assert proofs.passed, violated(proofs)
@@ -84,7 +84,7 @@ def test_every_packaged_answer_is_proven_and_no_entry_is_missing(name, target):
         assert {item.name for item in answer.limits if not item.ok} >= {"swing"}
 
 
-@each_pair
+@pairs
 def test_margins_are_those_of_the_refined_figures(name, target):
     answer = solved(name, target)
     limits = {limit.name: limit for limit in answer.limits}

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from proofs import DWELL, FULL, SLACK, cam_force, found, proofs_of, solved, violated
+from proofs import DWELL, FULL, SLACK, cam_force, proof_of, proofs_of, solved, violated
 from support import toy
 from support.shedding_cases import flat, freed, product
 
@@ -31,10 +31,10 @@ def test_every_effect_of_the_beat_up_runs_on_balls(model):
     for share, status in ((1e-6, "proven"), (-1e-6, "violated")):
         limits = {"peak_torque": f"{peak * (1 + share)!r} N*m", "pulse_rms": f"{rms * (1 + share)!r} N*m"}
         proofs = lo.prove(scene.update({f"limits.{name}.max": value for name, value in limits.items()}), design)
-        assert [found(proofs, name).status for name in limits] == [status] * 2
+        assert [proof_of(proofs, name).status for name in limits] == [status] * 2
         claims = ("peak_torque", "reed_centrifugal", "shaking_force", "mu_min")
-        assert [found(proofs, f"peak {name}").status for name in claims] == ["proven"] * 4
-    angle = found(proofs, "peak_torque").angle
+        assert [proof_of(proofs, f"peak {name}").status for name in claims] == ["proven"] * 4
+    angle = proof_of(proofs, "peak_torque").angle
     assert abs(machine.torques(design, np.array([angle]))[1][0]) > peak * (1 - 1e-6)
 
 
@@ -48,7 +48,7 @@ def test_levels_are_judged_in_the_dwells_alone():
         assert statuses == [status]
         claimed = {proof.limit: proof.status for proof in proofs.proofs}
         assert claimed["peak contact_min"] == claimed["peak contact_max"] == "proven"
-    assert 300 <= math.degrees(found(proofs, "N_min").angle) <= 360, "the upper dwell"
+    assert 300 <= math.degrees(proof_of(proofs, "N_min").angle) <= 360, "the upper dwell"
 
 
 @pytest.mark.parametrize(("intervals", "symmetric"), [(6, False), (8, True)])
@@ -57,7 +57,7 @@ def test_a_free_law_is_proven_with_its_own_knots_whatever_the_target_has(interva
     scene, design = product(plain.PAPER), flat(answer.design)
     for target in ("law", "stiffness"):
         assert lo.prove(scene, answer.design, target).passed, target
-        soft = found(lo.prove(scene, {**design, "K1": design["K1"] * (1 - 1e-6)}, target), "N_min")
+        soft = proof_of(lo.prove(scene, {**design, "K1": design["K1"] * (1 - 1e-6)}, target), "N_min")
         assert soft.status == "violated"
         case = replace(plain.PAPER, law=tuple(answer.design["law"]))
         assert min(cam_force(case, design["K1"] * (1 - 1e-6), soft.angle)) < 0
@@ -135,10 +135,10 @@ def test_a_peak_beside_a_change_point_is_no_lower_than_what_is_proven_of_it(l1, 
     near = np.sqrt(gap) * np.concatenate([-np.geomspace(1e-6, 1e3, 20_000), [0.0], np.geomspace(1e-6, 1e3, 20_000)])
     highest = float(np.abs(Machine(scene).torques(design, math.pi + near)[1]).max())
     proofs = lo.prove(scene)
-    claim = found(proofs, "peak peak_torque")
+    claim = proof_of(proofs, "peak peak_torque")
     assert claim.status in ("proven", "undecided")
     below = lo.prove(scene.set("limits.peak_torque.max", f"{highest * (1 - 1e-6)!r} N*m"))
-    assert found(below, "peak_torque").status != "proven"
+    assert proof_of(below, "peak_torque").status != "proven"
     if claim.status == "proven":
         assert claim.slack / SLACK > 0.1 * highest
 
@@ -161,7 +161,7 @@ def test_a_link_that_turns_right_over_has_no_stroke_to_prove(monkeypatch):
     lengths = {"C0x": -0.06, "C0y": 0.17, "l4": 0.3, "l5": 0.2, "l6": 0.2, "phi40": 0.0}
     monkeypatch.setattr(taylor_bounds, "MOST_BOXES", 2000)
     try:
-        claim = found(lo.prove(lo.load("rapier"), lengths), "peak stroke")
+        claim = proof_of(lo.prove(lo.load("rapier"), lengths), "peak stroke")
     except BadInput:
         return
     assert claim.status != "proven"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from proofs import FULL, cam_force, dense, found, solved
+from proofs import FULL, cam_force, dense, proof_of, solved
 from support.shedding_cases import framed
 
 import loomopt as lo
@@ -23,7 +23,7 @@ PEAK_ACCELERATION = "limits.peak_acceleration.max", "m/rad^2"
 def edged(scene, key, unit, value, design, name):
     """Assert that a limit a millionth below a true peak is refuted, one a millionth above it proven."""
     for share, status in ((-1e-6, "violated"), (1e-6, "proven")):
-        proof = found(lo.prove(scene.set(key, f"{value * (1 + share)!r} {unit}"), design), name)
+        proof = proof_of(lo.prove(scene.set(key, f"{value * (1 + share)!r} {unit}"), design), name)
         assert proof.status == status
         yield proof, value * (1 + share)
 
@@ -80,7 +80,7 @@ def test_random_frames_are_proven_with_their_softest_spring_and_refuted_below(da
     )
     scene, least = framed(case), float(softest(case, case.X0))
     for share, status in ((-1e-6, "violated"), (1e-6, "proven")):
-        proof = found(lo.prove(scene, {"K1": least * (1 + share), "X0": case.X0}), "N_min")
+        proof = proof_of(lo.prove(scene, {"K1": least * (1 + share), "X0": case.X0}), "N_min")
         assert proof.status == status
         assert proof.angle is None or min(cam_force(case, least * (1 + share), proof.angle)) < 1e-9 * least * case.X0
     assert least > 50 * RPM

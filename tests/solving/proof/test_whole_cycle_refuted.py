@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from proofs import CLAIMED, JOBS, SLACK, cam_force, dense, found, solved, violated
+from proofs import CLAIMED, JOBS, SLACK, cam_force, dense, proof_of, solved, violated
 from support.shedding_cases import framed, product
 
 import loomopt as lo
@@ -31,7 +31,7 @@ def test_todays_machines_are_refuted_for_what_evaluate_says_fails(name):
 
 @pytest.mark.parametrize("case", [plain.PAPER, plain.PRINTED], ids=["paper", "printed travel"])
 def test_todays_spring_lifts_off_at_the_angle_that_is_told(case):
-    proof = found(lo.prove(product(case)), "N_min")
+    proof = proof_of(lo.prove(product(case)), "N_min")
     assert proof.status == "violated"
     assert max(cam_force(case, 8029.14, proof.angle)) < 0
     assert 0 <= proof.angle < 2 * math.pi
@@ -54,15 +54,15 @@ def test_a_spring_a_millionth_too_soft_is_refuted_and_the_softest_is_proven(name
     case = FRAMES[name]
     scene, least = framed(case), float(plain.least_stiffness(case)[0])
 
-    def judged(share, slack=SLACK):
-        return found(lo.prove(scene, {"K1": least * (1 + share), "X0": case.X0}, slack=slack), "N_min")
+    def proof_at(share, slack=SLACK):
+        return proof_of(lo.prove(scene, {"K1": least * (1 + share), "X0": case.X0}, slack=slack), "N_min")
 
-    soft = judged(-1e-6)
+    soft = proof_at(-1e-6)
     assert soft.status == "violated"
     assert min(cam_force(case, least * (1 - 1e-6), soft.angle)) < case.N_min
-    assert [judged(share).status for share in (-1e-9, 1e-9)] == ["proven"] * 2
-    assert judged(-1e-9, 1e-12).status == "violated"
-    assert judged(1e-9, 1e-12).status == "proven"
+    assert [proof_at(share).status for share in (-1e-9, 1e-9)] == ["proven"] * 2
+    assert proof_at(-1e-9, 1e-12).status == "violated"
+    assert proof_at(1e-9, 1e-12).status == "proven"
 
 
 LOADED = {
@@ -114,8 +114,8 @@ def test_peaks_are_proven_and_limits_a_millionth_tighter_refuted(job):
             limits[f"limits.{name}.{side}"] = f"{values[name] * (1 + sign * share)!r} {unit}".strip()
         proofs = lo.prove(scene.update(limits))
         for name, value in values.items():
-            assert found(proofs, f"peak {name}").status == "proven"
-            proof = found(proofs, name)
+            assert proof_of(proofs, f"peak {name}").status == "proven"
+            proof = proof_of(proofs, name)
             assert proof.status == status, (name, share)
             if status == "violated":
                 true = beyond(job, name, proof.angle)
@@ -146,7 +146,7 @@ STATIC = {
     "rapier": {"swing": "rad", "theta": "rad", "sley_mu_min": "rad"},
     "pulse": {"pulse_rms": "N*m"},
 }
-ONE_SIDED = {"mu_min": "min", "sley_mu_min": "min", "pulse_rms": "max", "J4": "max"}
+SIDES = {"mu_min": "min", "sley_mu_min": "min", "pulse_rms": "max", "J4": "max"}
 
 
 @pytest.mark.few(1)
@@ -166,12 +166,12 @@ def test_limits_of_one_position_are_judged_at_their_edge(case):
         true = {**Machine(scene).static(design), "pulse_rms": Machine(scene).pulse_rms(design)}
     for share, status in ((1e-6, "violated"), (1e-9, "proven"), (-1e-9, "proven")):
         for side, sign in (("min", 1), ("max", -1)):
-            names = [name for name in STATIC[case] if ONE_SIDED.get(name, side) == side]
+            names = [name for name in STATIC[case] if SIDES.get(name, side) == side]
             limits = {}
             for name in names:
                 size = max(abs(true[name]), {"rad": 1.0, "N*m": 88.0}.get(STATIC[case][name], 0.0))
                 limits[f"limits.{name}"] = {side: f"{float(true[name] + sign * share * size)!r} {STATIC[case][name]}"}
             proofs = lo.prove(scene.update(limits), design) if names else None
             for name in names:
-                proof = found(proofs, name)
+                proof = proof_of(proofs, name)
                 assert (proof.status, proof.angle) == (status, None), (name, side, share)

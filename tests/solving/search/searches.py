@@ -36,8 +36,8 @@ def certified(monkeypatch):
     def begun(program, x, accuracy, shown):
         seen.append(x["x"])
         answer = answers.get(x["x"], answers.get("all", GOOD))
-        judged = answer(len(seen)) if callable(answer) else answer
-        return Draft(lambda cycle: judged)
+        certificate = answer(len(seen)) if callable(answer) else answer
+        return Draft(lambda cycle: certificate)
 
     monkeypatch.setattr(searching, "draft_certificate", begun)
     return seen, answers

@@ -38,16 +38,16 @@ def rows_of(batch, starts):
 @pytest.mark.parametrize(("job", "target", "effects"), TASKS)
 def test_objectives_and_residuals_are_those_of_each_design_alone(job, target, effects):
     program, batch, starts = task(job, target, effects)
-    judged = batch.values(rows_of(batch, starts))
+    read = batch.values(rows_of(batch, starts))
     for k, start in enumerate(starts):
         sampler = sampler_at(program, start)
         if sampler.cycle.order != batch.like.cycle.order:
             continue
         for level, objective in enumerate(program.objectives):
             alone = objective.merit(sampler) / objective.scale
-            assert judged.objectives[k, level] == pytest.approx(alone, rel=CLOSE, abs=CLOSE), objective
+            assert read.objectives[k, level] == pytest.approx(alone, rel=CLOSE, abs=CLOSE), objective
         cycle = program.cycle_limits.values()
-        for limit, residual in zip(batch.limits, judged.residuals, strict=True):
+        for limit, residual in zip(batch.limits, read.residuals, strict=True):
             tolerance = CLOSE * max(1.0, abs(limit.excess(sampler))) if limit in cycle else 1e-9
             assert residual[k] == pytest.approx(limit.excess(sampler), abs=tolerance), limit
 

@@ -21,10 +21,10 @@ ROWS = {
 
 
 def program(*limits, objectives=("f",), waves=None, any_numbers=True):
-    own_program = toy.program(
+    problem = toy.program(
         ("x", "y", "z"), ROWS, waves, (("product", -1, 4.0), *limits), objectives, start=TODAY, bounds=BOUNDS
     )
-    return replace(own_program, any_numbers=any_numbers)
+    return replace(problem, any_numbers=any_numbers)
 
 
 def solved(values):
@@ -54,19 +54,19 @@ def test_a_number_that_serves_no_level_ends_as_near_to_todays_as_limits_allow(li
     "limits", [(("room", 1, 0.25), ("reach", -1, 3.0)), (("sum", 0, 7.0),)], ids=["both ways", "an equality"]
 )
 def test_where_limits_ask_both_more_and_less_of_it_it_is_sought_as_any_other(limits):
-    own_program = program(*limits)
-    design, certificate = solved(own_program)
+    problem = program(*limits)
+    design, certificate = solved(problem)
     assert not any("serves no level" in tie_break for tie_break in certificate.tie_breaks)
     assert design["x"] + design["y"] == pytest.approx(4, abs=1e-8)
-    plain, _ = solved(replace(own_program, any_numbers=False))
+    plain, _ = solved(replace(problem, any_numbers=False))
     assert design == plain
 
 
 def test_a_number_that_only_moves_where_a_wave_is_read_serves_no_level():
     """The wave's own variables do; one that nothing reads does not, though all nodes move alike."""
     waves = {"wave": lambda m, v, phi: v["x"] * (2 + m.sin(phi)) + v["y"]}
-    own_program = program(objectives=("peak wave",), waves=waves)
-    design, certificate = solved(own_program)
+    problem = program(objectives=("peak wave",), waves=waves)
+    design, certificate = solved(problem)
     assert design["z"] == pytest.approx(5, abs=1e-9)
     assert any("serves no level" in tie_break for tie_break in certificate.tie_breaks)
 
@@ -90,15 +90,13 @@ def _noted(request, function, search, unread):
 
 def test_a_wrong_guess_costs_a_second_search_and_no_answer():
     """Held at the end where the limits ask most, the target has no answer; the whole program has."""
-    own_program = program(("room", 1, 0.25))
+    problem = program(("room", 1, 0.25))
 
     def worst(search, unread):
-        fixed = (
-            v._replace(lower=9.0, upper=9.0, range=(9.0, 9.0)) if v.name == "z" else v for v in own_program.variables
-        )
+        fixed = (v._replace(lower=9.0, upper=9.0, range=(9.0, 9.0)) if v.name == "z" else v for v in problem.variables)
         return replace(search.program, variables=tuple(fixed))
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(inactive_variables, "fix_inactive", worst)
-        design, _ = solved(own_program)
+        design, _ = solved(problem)
     assert design["x"] + design["y"] == pytest.approx(4, abs=1e-8)

@@ -290,12 +290,12 @@ def test_a_rapier_turns_back_toward_today_as_far_as_its_bounds_allow(unsettled):
 def test_no_earlier_objective_changes(scene, target, monkeypatch):
     seen = []
 
-    def kept(search):
+    def unchanged(search):
         after = with_least_change(search)
         seen.append([objectives(search.program, item.best.x) for item in (search, after)])
         return after
 
-    monkeypatch.setattr(least_change, "with_least_change", kept)
+    monkeypatch.setattr(least_change, "with_least_change", unchanged)
     answer = lo.solve(scene, target, starts=1)
     assert answer.status == "optimal"
     assert answer.certificate.tie_breaks

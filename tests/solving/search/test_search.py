@@ -201,9 +201,9 @@ def test_the_first_level_alone_keeps_the_rows_of_all_levels(certified, solved):
     points.append(Point({"x": 0.0, "y": 0.0}, "Solve_Succeeded", True, nodes=((),), structure="first level"))
     both = candidate(1, x=1.0)
     both = both._replace(point=replace(both.point, nodes=((), ()), structure="both levels"))
-    found = certify_best(replace(empty(candidates=(both,)), settings=Settings(penalty=1e7)))
-    assert (found.passed, found.best.x) == (True, {"x": 0.0, "y": 0.0})
-    assert found.best.point == replace(both.point, x={"x": 0.0, "y": 0.0})
+    search = certify_best(replace(empty(candidates=(both,)), settings=Settings(penalty=1e7)))
+    assert (search.passed, search.best.x) == (True, {"x": 0.0, "y": 0.0})
+    assert search.best.point == replace(both.point, x={"x": 0.0, "y": 0.0})
 
 
 # Newton's corrections ---------------------------------------------------------------------------------------------

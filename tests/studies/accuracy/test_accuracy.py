@@ -53,7 +53,7 @@ def test_no_text_of_the_figure_overlaps(studies):
     for study in studies.values():
         figure = AccuracyStudy(study).plot()
         assert figure.axes
-        assert overlaps.found(figure) == []
+        assert overlaps.overlapping(figure) == []
 
 
 def errors(rows):

@@ -44,7 +44,7 @@ def computed(answer, points=40):
     return rows
 
 
-def told(rows):
+def findings(rows):
     return plan.changes_and_gaps(plan.spots(rows, SCALE)[0], SCALE)
 
 
@@ -117,7 +117,7 @@ def test_a_kink_is_found_where_it_is():
     def answer(b):
         return (b, 1 - 2 * b, -2.0, ("l1 min",)) if b < 0.3 else (b, 0.4 * (1 - b) / 0.7, -0.4 / 0.7, ("l2 max",))
 
-    (change,), gaps = told(computed(answer))
+    (change,), gaps = findings(computed(answer))
     assert change.kind == "kink"
     assert change.limits == (Side("l1", "min"), Side("l2", "max"))
     assert change.at == pytest.approx(0.3, abs=1e-9)
@@ -130,7 +130,7 @@ def test_a_change_without_a_corner_is_an_active_set():
         past = max(b - 0.3, 0.0)
         return b, 1 - 1.5 * b + 0.75 * past**2, slope, ("l1 min",) if b < 0.3 else ()
 
-    (change,), _ = told(computed(answer))
+    (change,), _ = findings(computed(answer))
     assert change.kind == "active set"
     assert change.limits == (Side("l1", "min"),)
     assert change.at == pytest.approx(0.3, abs=NARROW)
@@ -144,7 +144,7 @@ def test_a_stretch_where_nothing_is_better_is_a_gap_with_a_jump_at_its_end():
         return (0.2, 0.8, 0.0, ("l1 min",)) if b < 0.6 else (b, 0.5 * (1 - b) / 0.4, -1.25, ("l2 max",))
 
     rows = computed(answer)
-    changes, gaps = told(rows)
+    changes, gaps = findings(rows)
     jump = next(change for change in changes if change.kind == "jump")
     assert jump.at == pytest.approx(0.6, abs=2 * NARROW)
     assert gaps == [(pytest.approx(0.2), pytest.approx(0.6, abs=2 * NARROW))]
@@ -154,7 +154,7 @@ def test_a_sheer_fall_is_a_jump():
     def answer(b):
         return (b, 1 - 0.1 * b, -0.1, ("l1 min",)) if b < 0.4 else (b, 0.2 * (1 - b), -0.2, ("l1 min",))
 
-    (change,), _ = told(computed(answer))
+    (change,), _ = findings(computed(answer))
     assert change.kind == "jump"
     assert change.at == pytest.approx(0.4, abs=2 * NARROW)
 
@@ -235,6 +235,6 @@ def test_an_end_that_another_row_dominates_is_sought_again_from_it():
 
 def test_a_jump_that_rows_did_not_suffice_to_narrow_down_is_one_with_its_gap():
     front = [row(1, 0.0, 1.0, -0.01), row(2, 0.999, 0.9, -0.01), row(0, 1.0, 0.0, 0.0, active=("l2 max",))]
-    (change,), (gap,) = told(front)
+    (change,), (gap,) = findings(front)
     assert change.kind == "jump"
     assert gap == (0.999, 1.0)

@@ -61,10 +61,10 @@ def edited(folder, line, column, new):
 def test_ends_of_the_fronts_are_the_published_ones(name):
     ((second, first, ends),) = KNOWN[name]
     result = front(name)
-    paid, sought = ([float(value) for value in result[axis]] for axis in (second, first))
+    paid, optimised = ([float(value) for value in result[axis]] for axis in (second, first))
     assert paid == sorted(paid)
     assert [paid[0], paid[-1]] == pytest.approx(sorted(ends), rel=1e-6, abs=1e-9)
-    assert [sought[0], sought[-1]] == pytest.approx([ends[key] for key in sorted(ends)], rel=2e-9)
+    assert [optimised[0], optimised[-1]] == pytest.approx([ends[key] for key in sorted(ends)], rel=2e-9)
     assert set(result["status"]) == {"optimal"}
     assert len(result) > check.POINTS
 

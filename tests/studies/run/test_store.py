@@ -160,7 +160,7 @@ def test_what_no_row_holds_is_damage_whatever_its_checksum_says(tmp_path, wrong)
 
 
 ENDLESS = "WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT"
-OTHERS = {
+SUBJECTS = {
     "view": ("DROP TABLE row", f"CREATE VIEW row AS {ENDLESS} {', '.join(f'i AS {name}' for name in COLUMNS)} FROM n"),
     "trigger": (f"CREATE TRIGGER slow AFTER INSERT ON study BEGIN INSERT INTO study {ENDLESS} i, 'x' FROM n; END",),
     "table": ("CREATE TABLE mine (a)",),
@@ -170,10 +170,10 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("subject", OTHERS)
+@pytest.mark.parametrize("subject", SUBJECTS)
 def test_what_no_store_holds_is_refused_at_once(tmp_path, subject):
     path = write_store(tmp_path / "s.db")
-    damaged(path, *(OTHERS[subject]))
+    damaged(path, *(SUBJECTS[subject]))
     before = path.read_bytes()
     name = {"view": "row", "trigger": "slow", "column": "row", "missing": "row"}.get(subject, "mine")
     with pytest.raises(BadInput, match=f"it has tables that no store has: {name}"):
