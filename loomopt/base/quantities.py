@@ -266,7 +266,7 @@ def _misreading(text: str, kind: str, problem: str = "", remedy: str = "") -> Qu
     if text.lstrip("+-").lower().startswith(("nan", "inf")):
         return _refusal(kind, "it is not a finite number")
     if re.match(r"[+-]?[0-9. ]*,", text):
-        return _refusal(kind, "a comma stands in the number", "Write a decimal point and no thousands separators")
+        return _refusal(kind, "the number has a comma", "Write a decimal point and no thousands separators")
     if re.match(_GROUPED, text):
         return _refusal(kind, "the digits are grouped", "Write the digits without separators")
     if kind == "angular speed" and re.fullmatch(rf"{NUMBER_PATTERN} */ *(min|s|sec)", text):
@@ -275,7 +275,7 @@ def _misreading(text: str, kind: str, problem: str = "", remedy: str = "") -> Qu
     if fraction:
         whole, over, under = (int(digits or 0) for digits in fraction.groups()[:3])
         decimal = f': "{whole + over / under:.10g} {ascii_unit(fraction[4])}"' if under else ""
-        return _refusal(kind, "a fraction stands for the number", f"Write a decimal number{decimal}")
+        return _refusal(kind, "the number is a fraction", f"Write a decimal number{decimal}")
     feet = re.fullmatch(_FEET, text) if kind == "length" else None
     if feet:
         inches = 12 * float(feet[1]) + float(feet[2])
@@ -289,7 +289,7 @@ def _misreading(text: str, kind: str, problem: str = "", remedy: str = "") -> Qu
             "Write a number" if kind == "number" else "Write a number and its unit",
         )
     if kind == "number" and _QUANTITY.fullmatch(text):
-        return _refusal(kind, "a unit stands after a number that has none", "Take the unit off")
+        return _refusal(kind, "this number has no unit", "Take the unit off")
     return _refusal(kind, problem or "it is not one number with one unit", remedy)
 
 

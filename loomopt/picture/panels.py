@@ -185,7 +185,7 @@ def twist_remarks(scene: Scene, sampler: Sampler) -> tuple[str, ...]:
                 names.append(
                     f"while {load.name} acts the twist reaches {scene.show(largest, 'angle', 3)}, "
                     f"{100 * largest / travel:.3g} % of the rocker's travel there ({scene.show(travel, 'angle', 3)}): "
-                    f"{load.name} as a function of the crank angle no longer stands. What helps: a stiffer shaft, or a "
-                    f"measured pulse"
+                    f"{load.name} as a function of the crank angle is then not valid. Make the shaft stiffer, or give "
+                    f"a measured pulse"
                 )
     return tuple(names)

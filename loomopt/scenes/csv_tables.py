@@ -555,7 +555,7 @@ def _check_angles(column: _Column, angles: Sequence[float], rows: Sequence[Row],
         there = places[angle]
         if len(there) > 1 + twice or (len(there) == 2 and there[1] != there[0] + 1):
             text = _cell(rows[k].cell(column.place))
-            problem = f"line {rows[k].line}, column {name}: the angle {text} stands in line {rows[there[0]].line} too"
+            problem = f"line {rows[k].line}, column {name}: the angle {text} is also in line {rows[there[0]].line}"
             remedy = "Keep one row for each angle"
             remedy += ", or two rows, one below the other, for both sides of a corner" if twice else ""
             raise refusal(problem, origin, remedy=remedy)

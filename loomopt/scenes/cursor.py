@@ -209,7 +209,7 @@ class Cursor(NamedTuple):
             return place.fault(cause.problem, value, cause.allowed, cause.remedy)
         choices = str(error.get("ctx", {}).get("expected", "")).replace("'", '"')
         if choices:
-            return place.fault("it is none of the known choices", value, choices, "Correct the value")
+            return place.fault("unknown choice", value, choices, "Correct the value")
         problem, allowed = _PROBLEMS.get(error["type"], (error["msg"], ""))
         remedy = f"Write [{shown(value)}]" if allowed == "a list" and isinstance(value, str) else "Correct the value"
         return place.fault(problem, value, _limits(model, names) or allowed, remedy)

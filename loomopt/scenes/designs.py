@@ -287,7 +287,7 @@ def read_answer(path: Path, jobs: Jobs) -> tuple[Scene, DesignGiven]:
     """Scene of an answer in a file, and the contents of the file. Raises BadInput."""
     given, origin = read_given(path), named(path)
     if given.document is None:
-        remedy = "Give what `loomopt solve --json` prints; a design alone goes with a scene: --design"
+        remedy = "Give what `loomopt solve --json` prints; give a design alone by --design, with its scene"
         raise refusal("it is not an answer with its scene", origin, remedy=remedy)
     call = given.call.then(Call(target=given.target))
     try:

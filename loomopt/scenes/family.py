@@ -23,12 +23,12 @@ class FamilyTarget(TargetTable):
 
     of: Name | None = Field(None, description="the target of each member; the job's default without it")
     combine: Literal["worst", "sum"] = Field(
-        "worst", description="what of the members' figures is sought the least of: the worst, or the sum"
+        "worst", description="minimise the worst member, or the sum over the members"
     )
     members: list[dict[str, Any]] = Field(
-        [], description='what each member changes of the scene: { M0 = "600 N*m" }, or dotted keys'
+        [], description='scene numbers of each member: { M0 = "600 N*m" }, or dotted keys'
     )
-    own: list[Name] = Field([], description="design variables of which each member has its own")
+    own: list[Name] = Field([], description="design variables that each member has for itself; all others are shared")
 
 
 TARGET = Target(FAMILY, "one machine for several sets of numbers: the least worst of its members", FamilyTarget)

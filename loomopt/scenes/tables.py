@@ -157,7 +157,7 @@ def problem(cursor: Cursor, jobs: JobNames) -> Problem:
     if not isinstance(read.job, str):
         raise faults.error()
     if isinstance(read.name, str) and (not _NAME.fullmatch(read.name) or read.name.lower() in _TAKEN):
-        remedy = "Name it as a file could be named anywhere, such as beatup-wide"
+        remedy = "Choose a name that is valid as a file name on every system, such as beatup-wide"
         allowed = "up to 64 letters, digits, - and _, a letter or digit first, but for CON, NUL and the like"
         faults.add(cursor.at("name").fault("it is not a name", read.name, allowed, remedy))
     if read.job in jobs:

@@ -114,7 +114,7 @@ def _remarks(scene: Scene, loads: "tuple[balance.Acting, ...]") -> list[str]:
     for state in (load for load in loads if isinstance(load, State)):
         carried = [load.name for load in loads if load.name in state.carries]
         if carried:
-            part = "whose share is the difference" if state.moved else "whose share contains them"
+            part = "and its share is the difference" if state.moved else "and its share contains them"
             remarks.append(f"{' and '.join(carried)} reach the crank through {state.name}, {part}")
     for effect in scene.active:
         if isinstance(effect, Event):

@@ -113,7 +113,7 @@ def test_without_any_admissible_design_the_status_is_3_and_rows_are_printed(cli,
     status, out, err = cli("effects", "static.toml", "--set", "bounds.K1.max=100 N/m", "--figure", "bars.png")
     assert status == 3
     assert err == "bars.png is not written: no effect was measured\n"
-    assert "The reference has no design, so that no influence can be measured." in out
+    assert "The influence of effects cannot be measured, because the reference has no design." in out
     assert out.count("limits that clash") >= 4
 
 

@@ -71,7 +71,7 @@ def test_the_command_tells_the_rms_and_writes_both(measured, tmp_path):
         ("phi [deg],chi [deg]\n0,1\n", "no column of the curves"),
         ("psi [deg]\n1\n", "no column phi"),
         ("phi [deg],psi [mm]\n0,1\n", "is not a unit of this column"),
-        ("phi [deg],psi [deg]\n0,1\n0,2\n0,3\n", "stands in line 2 too"),
+        ("phi [deg],psi [deg]\n0,1\n0,2\n0,3\n", "is also in line 2"),
         ("phi [deg],psi [deg]\n0,\n", "column psi is empty"),
         ("", "empty"),
     ],

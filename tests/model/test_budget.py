@@ -173,7 +173,7 @@ def test_what_carries_others_says_so():
     budget = lo.budget(SCENES["beat-up, elastic shaft"]())
     inertia, resistance, shaft = budget.rows
     assert (inertia.effect, resistance.effect, shaft.effect) == ("inertia", "resistance", "shaft_torsion")
-    message = "inertia and resistance reach the crank through shaft_torsion, whose share is the difference"
+    message = "inertia and resistance reach the crank through shaft_torsion, and its share is the difference"
     assert budget.remarks == (message,)
     # What swings gives back all that it takes; the shaft keeps what its damping takes, c z'^2 of each turn.
     assert inertia.energy == 0.0

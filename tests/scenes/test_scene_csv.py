@@ -55,7 +55,7 @@ REFUSED = {
     "too small to compute with": (with_row("150,1e-400"), "line 7"),
     "another unit in the cell": (with_row("150,1 cm"), 'line 7, column S: "1 cm" has another unit than its column'),
     "a unit of another kind in the cell": (with_row("150,10 kg"), 'line 7, column S: "10 kg" is no number'),
-    "one angle twice": (with_row("120,5"), 'line 7, column phi1: the angle "120" stands in line 6 too'),
+    "one angle twice": (with_row("120,5"), 'line 7, column phi1: the angle "120" is also in line 6'),
     "one angle twenty times": (HEAD + "90,5\n" * 20, "the table has 1 rows below its header"),
     "angles of two turns": (HEAD + "\n".join(f"{60 * k},{k}" for k in range(12)), "phi1 go beyond one turn"),
     "angles of the second turn": (HEAD + "\n".join(f"{361 + k},{k}" for k in range(12)), "beyond one turn"),
@@ -147,7 +147,7 @@ def test_the_packaged_table_is_read_to_the_last_digit():
 
 @pytest.mark.parametrize(
     ("row", "part"),
-    [("50,5,25", "line 7: 3 cells stand"), ("40,5", 'line 7, column angle: the angle "40" stands in line 6')],
+    [("50,5,25", "line 7: 3 cells stand"), ("40,5", 'line 7, column angle: the angle "40" is also in line 6')],
 )
 def test_cam_laws_are_read_as_strictly(tmp_path, row, part):
     path = tmp_path / "law.csv"

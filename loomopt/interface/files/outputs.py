@@ -155,7 +155,7 @@ def check_answer(path: Path) -> None:
     """
     if path.suffix and not path.is_dir():
         if path.suffix.lower() != WORKBOOK:
-            allowed = f"{WORKBOOK}, or a folder, whose name has no ending"
+            allowed = f"{WORKBOOK}, or a folder name without an ending"
             name = path.stem or "answer"
             remedy = f"Name another folder, such as {name}, or a workbook, {name}{WORKBOOK}"
             problem = "the name's ending does not name a format that an answer can be written in"

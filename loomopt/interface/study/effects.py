@@ -232,7 +232,7 @@ def verdict(result: EffectsResult) -> list[str]:
     if not result.finished:
         return ["Not finished: the effects that may be left out are not known."]
     if not result.reference.scales:
-        return ["The reference has no design, so that no influence can be measured."]
+        return ["The influence of effects cannot be measured, because the reference has no design."]
     sentence = f"{list_text(result.left_out)} may be left out" if result.left_out else "no effect may be left out"
     lines = [f"At {share}, {sentence}{': ' if solve else ''}{solve}"]
     if result.together and result.largest_omission:

@@ -689,7 +689,7 @@ class Linkage(Kinematics):
             pieces = len(LAWS[cam.word("law")].breaks) + 1
             if place < 2 * (pieces + 1):
                 motion, piece = ("rise", place) if place <= pieces else ("return", place - pieces - 1)
-                does = {0: "begins", pieces: "ends"}.get(piece, "goes over into its next piece")
+                does = {0: "begins", pieces: "ends"}.get(piece, "passes to its next piece")
                 return f"the {motion} of {cam.name} {does}"
             place -= 2 * (pieces + 1)
         raise ValueError(f"the cams have no corner {corner.place}")

@@ -108,7 +108,7 @@ KEYS: Mapping[str, Keys] = {
         "with": WordKey(LINK, True),
         "carrier": WordKey(LINK),
         "ratio": WordKey(RATIO, True),
-        "start": NumberKey(Angle, "angle of gear {} where its mate stands at zero"),
+        "start": NumberKey(Angle, "angle of gear {} when its mate is at the angle zero"),
         "zero": NumberKey(Angle, "angle of the mate of gear {} from which it counts"),
     },
     "cam": {

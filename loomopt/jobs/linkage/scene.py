@@ -148,7 +148,7 @@ def _windows_schema() -> Json:
 
 TABLES: Mapping[str, tuple[str, Callable[[], Json]]] = {
     "parts": (f"the parts of the linkage by name: {', '.join(list(KEYS)[:-1])} or {list(KEYS)[-1]}", parts.schema),
-    "output": ("what of the linkage is its output: angle, slide, x or y of a link, part or joint", _output_schema),
+    "output": ("output of the linkage: angle, slide, x or y of a link, part or joint", _output_schema),
     "events": ("named crank angles: extremes of the output, travels from them, or angles", _events_schema),
     "windows": ("stretches of crank angles after an event", _windows_schema),
 }
@@ -281,7 +281,7 @@ def _windows(cursor: Cursor, linked: Chain, numbers: Numbers, places: Sequence[E
         )
         output, value = _coordinate(place, linked, read.words), read.numbers.get("value")
         if bool(level) == bool(value):
-            problem = "the travel over a window counts from an event, level, or from a value: one of them"
+            problem = "a window needs level or value, not both: its travel is measured from there"
             raise place.fault(problem, remedy='Such as level = "rear"')
         if value and output is None:
             remedy = f"Name the coordinate that it is a value of: {', '.join(FORMS)}"
@@ -745,7 +745,7 @@ def _check_targets(scene: Scene, known: LinkageScene) -> None:
                 problem = f"{figure} cannot be {verb}, it can only be {way}"
                 faults.add(refusal(problem, scene.origin, path_, remedy=f"Write {opposite}, or choose another figure"))
         if len(dict.fromkeys(table.objectives)) < len(table.objectives):
-            faults.add(refusal("a figure stands twice", scene.origin, key, remedy="Take one out"))
+            faults.add(refusal("a figure is listed twice", scene.origin, key, remedy="Take one out"))
         with faults:
             _check_path(scene, known, name, table)
     faults.tell()
@@ -759,8 +759,8 @@ def _check_windows(scene: Scene, known: LinkageScene) -> None:
         ends = [scene.mechanism[ref.name] if ref.name else ref.value for ref in (window.begins, window.ends)]
         if not 0.0 < ends[1] - ends[0] < 2 * math.pi:
             span = " to ".join(scene.show(end, "angle") for end in ends)
-            remedy = "Let it end after it begins, within a turn"
-            raise refusal(f"the window goes from {span}", scene.origin, f"windows.{window.name}.ends", remedy=remedy)
+            remedy = "Give an end after the begin, within one turn"
+            raise refusal(f"the window is from {span}", scene.origin, f"windows.{window.name}.ends", remedy=remedy)
 
 
 def _check_output(scene: Scene, linkage: Linkage) -> None:
@@ -771,7 +771,7 @@ def _check_output(scene: Scene, linkage: Linkage) -> None:
     q = np.broadcast_to(np.asarray(linkage.pose(systems.numpy(), given, node).order(0), dtype=np.float64), phi.shape)
     form, name = linkage.output.measure, linkage.output.name
     if np.ptp(q) == 0.0:
-        problem = f"the output {form} of {name} stands still"
+        problem = f"the output {form} of {name} does not move"
         raise refusal(problem, scene.origin, f"output.{form}", remedy="Name a part that moves")
     scale = 1.0 if linkage.output.scale is None else number(systems.numpy(), scene.mechanism, linkage.output.scale)
     q = q / scale  # rad, of an angle

@@ -28,8 +28,8 @@ def parameters(pins: Mapping[str, str]) -> type[Table]:
     """Table of an effect with friction in pins; pins: name → description."""
     fields = {name: (Pin | None, Field(None, description=text)) for name, text in pins.items()}
     inner = create_model("Pins", __base__=Table, __module__=__name__, __doc__="Friction of each pin.", **fields)  # type: ignore[call-overload]
-    whole = (inner | None, Field(None, description="friction of the pins, for what they lose: a figure only"))
-    doc = "What only the loss by friction reads."
+    whole = (inner | None, Field(None, description="friction of the pins; it is read by friction_loss only"))
+    doc = "Values that only friction_loss reads."
     model: type[Table] = create_model("Parameters", __base__=Table, __module__=__name__, __doc__=doc, pins=whole)  # type: ignore[arg-type]
     return model
 

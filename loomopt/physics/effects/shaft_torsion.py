@@ -155,14 +155,14 @@ def rests(table: Values) -> str:
 
 EFFECT = State(
     name=NAME,
-    summary="what the output drives, on a shaft that twists",
+    summary="twisting shaft between the output and the parts it drives",
     table=Parameters,
     letters={"stiffness": "k", "damping": "c"},
     rank=85,
     needs=("operation.speed",),
     companions=("inertia",),
     clashes=(
-        EffectClash("bearing_friction", "it would act on the link or on what the shaft carries, which no source tells"),
+        EffectClash("bearing_friction", "no source says whether it acts on the link or on the parts on the shaft"),
         EffectClash("speed_fluctuation", "the steady state of the shaft is that of a constant speed"),
     ),
     carries=("inertia", "counterweight", "resistance", "forming", "gravity"),

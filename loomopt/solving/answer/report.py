@@ -390,7 +390,7 @@ def _little(formatter: UnitFormatter, comparison: Alternative, answer: Solution)
         if abs(change) > SHOWN_AS_ZERO * max(alike, default=0.0):
             text = formatter.shown(figure, change, 3)
             texts.append(f"{figure} {'' if text.startswith('-') else '+'}{text}")
-    changes = ", ".join(texts) or "nothing that is sought changes"
+    changes = ", ".join(texts) or "no objective changes"
     amount = formatter.shown(name, comparison.other.design[name])
     little = f"{100 * comparison.share:g} %"
     if not comparison.chosen:
@@ -488,4 +488,4 @@ def cost_sentence(
         if abs(change) > negligible * largest:
             share = f" ({100 * change / abs(then):+.3g} %)" if abs(then) > negligible * largest else ""
             costs.append(f"{name} {formatter.shown(name, now, 9)} instead of {formatter.shown(name, then, 9)}{share}")
-    return f"{subject} {', '.join(costs) or 'nothing of what is sought'}."
+    return f"{subject} {', '.join(costs) or 'no objective'}."

@@ -197,7 +197,7 @@ class _Level:
 
     def why(self) -> str:
         """Reason why the level is not proven."""
-        small = ", and what is left open is too small to halve" if self.tree.closed else ""
+        small = ", and the open boxes are too small to halve" if self.tree.closed else ""
         return f"{self.objective.figure} is open, {self._gap_text()}{small}"
 
     def _gap_text(self) -> str:

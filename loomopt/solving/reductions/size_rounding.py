@@ -189,9 +189,9 @@ def _check_goals(lattice: Lattice, nominal: Solution, answer: Solution) -> None:
         lost = nominal.reached.get(name) and not answer.reached.get(name)
         if lost and not (name in bands and value is not None and abs(value) <= bands[name] + abs(goal.high)):
             residual = UnitFormatter(scene).shown(name, value or 0.0)
-            problem = f"no sizes meet {name} exactly: the nearest found leave {residual}"
+            problem = f"no sizes give {name} exactly; with the nearest ones {residual} remain"
             near = UnitFormatter(scene).shown(name, abs(value or 0.0), 3)
-            remedy = f'Leave a number that moves it free, or say within what it is met: [accept] {name} = "{near}"'
+            remedy = f'Leave a number that changes it free, or accept a deviation: [accept] {name} = "{near}"'
             raise refusal(problem, scene.origin, f"accept.{name}", remedy=remedy)
 
 
@@ -471,7 +471,7 @@ def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) 
 
 def _without_sizes(lattice: Lattice, nominal: Solution, best: Best) -> Solution:
     """Answer without a certificate: no admissible point was found."""
-    helps = "Take smaller steps or wider bounds; the design told is the optimum without sizes."
+    helps = "Take smaller steps or wider bounds; the given design is the optimum without sizes."
     if best.gap:
         status = "failed"
         problem = f"No admissible sizes were found in {best.boxes} boxes of a lattice of {lattice.points} points."

@@ -57,7 +57,7 @@ def simplify(search: Search) -> Search:
     began = time.perf_counter()
     if best.x[added.least.row] <= MOVED * added.least.scale:
         return search
-    search.settings.at("looking at what is added")
+    search.settings.at("checking the added mass")
     result = _without(search, best, added)
     if result is None and not added.wholly and added.share:
         result = _with_less(search, best, added)
@@ -143,7 +143,7 @@ def _with_less(search: Search, best: Candidate, added: Added) -> Search | None:
 
 def _with_result(search: Search, task: Program, candidate: Candidate, tradeoff: MassTradeoff) -> Search:
     """The search with a design of less added mass as its best, and its program."""
-    reason = f"{tradeoff.added.least.figure}: least added mass, every figure held to {100 * tradeoff.share:g} %"
+    reason = f"{tradeoff.added.least.figure}: least added mass with every figure within {100 * tradeoff.share:g} %"
     certificate = replace(candidate.certificate, tie_breaks=(*candidate.certificate.tie_breaks, reason))
     best = search.best
     assert best is not None

@@ -171,7 +171,8 @@ def _read(text: str, kind: str, name: str) -> float:
 
 def _two(scene: Scene, axes: Sequence[str]) -> tuple[str, str]:
     """Two axes that differ. Raises BadInput."""
-    allowed, remedy = ", ".join(scene.schema.axes), 'Write ("A", "B"): the axis that is sought, and the one that pays'
+    allowed = ", ".join(scene.schema.axes)
+    remedy = 'Write ("A", "B"): the optimised axis, then the axis that it is traded against'
     given = arguments.texts(axes, "axes", allowed, remedy)
     named = tuple(current(name, scene.schema.former_names) for name in given)
     if len(set(named)) != 2 or len(named) != 2:

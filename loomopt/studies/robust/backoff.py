@@ -119,7 +119,7 @@ class BackOff:
         plan = request.plan(answer, {})
         start = Pass(answer, plan, margins(plan))
         if not any(margin.sigma for margin in start.margins if not margin.fixed):
-            problem = "the numbers in [tolerances] change no limited figure, so that there is nothing to back off"
+            problem = "no number in [tolerances] changes a limited figure, so no limit needs a margin"
             remedy = "Give more numbers a tolerance, or take it off"
             raise refusal(problem, task.scene.origin, "tolerances", remedy=remedy)
         request.say("drawing machines of the optimum")
@@ -474,9 +474,7 @@ def _percent(share_of: Yield) -> str:
 
 def _infeasible(request: Request, answer: Solution, why: str) -> Solution:
     """Answer without a certificate: no design keeps its limits with the back-off."""
-    return _uncertified(
-        request, answer, "infeasible", f"No admissible design keeps clear of its limits as asked: {why}."
-    )
+    return _uncertified(request, answer, "infeasible", f"No admissible design has the requested margins: {why}.")
 
 
 def _not_optimal(request: Request, answer: Solution, sigmas: float) -> Solution:

@@ -63,7 +63,7 @@ def margins(plan: Plan) -> tuple[Margin, ...]:
     for criterion in plan.criteria:
         value = float(values[criterion.name][0]) if criterion.name in values else math.nan
         if not math.isfinite(value) or not all(map(math.isfinite, by_criterion[criterion.name].by_number.values())):
-            problem = f"the spread of {criterion.name} is unknown, so that it cannot be backed off"
+            problem = f"{criterion.name} cannot have a margin, because its spread is unknown"
             raise refusal(problem, plan.scene.origin, f"limits.{criterion.name}", remedy="Take the limit out")
         for sign, end, side in ((-1, criterion.low, "low"), (1, criterion.high, "high")):
             if end is not None and math.isfinite(end):

@@ -243,9 +243,8 @@ def plan_sensitivity(scene: Scene, answer: Solution) -> Study:
     demand_single(answer, "derivatives")
     if answer.status != "optimal" or answer.point is None or not answer.certificate:
         problem = f"only a certified optimum has derivatives, and this answer is {answer.status}"
-        raise refusal(
-            problem, scene.origin, "sensitivity", remedy="Correct what the message of the answer names, and solve again"
-        )
+        remedy = "Correct the scene as the message of the answer says, and solve again"
+        raise refusal(problem, scene.origin, "sensitivity", remedy=remedy)
     return Study(scene, answer.target, answer)
 
 

@@ -101,14 +101,14 @@ def test_a_lattice_without_an_admissible_point():
     result = rounded("beatup", {"l1": "15 mm", "l2": "1 mm", "l3": "70 mm", "l4": "1 mm"})
     assert result.status == "infeasible"
     assert "keeps all limits" in result.message
-    assert "the design told is the optimum without sizes" in result.message
+    assert "the given design is the optimum without sizes" in result.message
 
 
 @pytest.mark.slow
 def test_sizes_that_leave_a_goal_out_of_reach_ask_for_a_band():
     links = {"bounds.l1": "30 mm", "bounds.l2": "75.5 mm", "bounds.l3": "149 mm", "bounds.l4": "167 mm"}
     steps = {"m4e": "2 kg", "r4e": "40 mm"}
-    with pytest.raises(BadInput, match=r"no sizes meet M3_fdc exactly.*within.*\[accept\] M3_fdc = \""):
+    with pytest.raises(BadInput, match=r"no sizes give M3_fdc exactly.*deviation.*\[accept\] M3_fdc = \""):
         rounded("beatup", steps, **links)
     result = rounded("beatup", steps, **links, **{"accept.M3_fdc": "50 N*m"})
     assert result.status == "optimal"

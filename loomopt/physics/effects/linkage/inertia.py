@@ -33,7 +33,7 @@ class Parameters(Table):
                 "centre is missing: m needs the place of its centre", "neither, or both", 'Add centre = "45 mm"'
             )
         if m is not None and centre is not None and inertia is not None and inertia < m * centre**2:
-            problem = f"J is less than m*centre^2 = {m * centre**2:.6g} kg*m^2, the least that such a mass has"
+            problem = f"J is less than m*centre^2 = {m * centre**2:.6g} kg*m^2, the least inertia of this mass"
             raise QuantityError(problem, "J >= m*centre^2", "Give J about the output link's axis, not about the centre")
         return m
 

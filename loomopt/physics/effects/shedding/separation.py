@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from loomopt.physics.motion.flight import Cam, Course
     from loomopt.physics.motion.free import Body
 
-UNKNOWN = "the frame in flight goes by its travel X, where that pull is not known"
+UNKNOWN = "the load of the frame in flight depends on its travel X, and this pull is not known by travel"
 
 
 class Parameters(Table):
