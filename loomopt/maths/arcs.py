@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 STRAIGHT = 1e-12
 """Bulge below which an arc is a straight line."""
+SHORTEST = 1e-9
+"""Chord of an arc, as a share of the curve's size, below which it is left out: where a curve turns back on itself."""
 Arcs = list[tuple[complex, float]]
 """Points where arcs begin, and their bulges: tan of a quarter of their angle, positive to the left."""
 
@@ -22,7 +24,8 @@ Arcs = list[tuple[complex, float]]
 def closed_biarcs(points: Sequence[tuple[float, float]], tolerance: float) -> Arcs:
     """Arcs of a closed curve through points (the last is not the first), each point within the tolerance of them.
 
-    tolerance: in the unit of the points. Raises ValueError where it is not positive.
+    No arc is without length, not even where the curve turns back on itself. tolerance: in the unit of the points.
+    Raises ValueError where it is not positive.
     """
     if not tolerance > 0.0:
         raise ValueError("the tolerance must be positive")
@@ -38,7 +41,9 @@ def closed_biarcs(points: Sequence[tuple[float, float]], tolerance: float) -> Ar
         reach = _longest(ring, turned, here, tolerance)
         arcs += _biarc(ring[here], turned[here], ring[reach], turned[reach])
         here = reach
-    return arcs
+    shortest = SHORTEST * np.max(np.abs(at - at[0]))
+    ends = [begin for begin, _ in arcs[1:] + arcs[:1]]
+    return [arc for arc, end in zip(arcs, ends, strict=True) if abs(end - arc[0]) > shortest]
 
 
 def _tangents(at: "NDArray[np.complex128]") -> "NDArray[np.complex128]":

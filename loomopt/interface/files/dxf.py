@@ -86,6 +86,8 @@ def _document(drawing: Drawing, version: str) -> Any:
         corners += _add_dimensions(document, space, drawing)
     least, most = (tuple(pick(axis) for axis in zip(*corners, strict=True)) for pick in (min, max))
     space.reset_extents((*least, 0.0), (*most, 0.0))
+    # ezdxf copies the extents of the space to the header, but not a corner at the origin.
+    document.header["$EXTMIN"], document.header["$EXTMAX"] = (*least, 0.0), (*most, 0.0)
     for name in sorted(document.entitydb.dxf_types_in_use()):
         document.classes.add_class(name)  # else ezdxf adds them in the order of a set
     return document

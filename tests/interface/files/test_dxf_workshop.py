@@ -80,6 +80,41 @@ def test_biarcs_of_a_circle_are_the_circle(tolerance):
     assert len(arcs) <= 8
 
 
+@pytest.mark.parametrize("name", ["knuckle-press", "shaper"])
+@pytest.mark.parametrize("tolerance", ["0.1 mm", "0.01 mm"])
+def test_a_path_that_turns_back_on_itself_has_no_arc_without_length(tmp_path, name, tolerance):
+    scene, path = lo.load(name), tmp_path / "paths.dxf"
+    outputs.linkage(path, scene, lo.evaluate(scene).design, how=outputs.workshop(arcs=tolerance, only="paths"))
+    for polyline in ezdxf.readfile(path).modelspace().query("LWPOLYLINE"):
+        at = [complex(x, y) for x, y, _ in polyline.get_points("xyb")]
+        size = max(abs(point - at[0]) for point in at)
+        assert min(abs(point - before) for point, before in zip(at, at[-1:] + at[:-1], strict=True)) > 1e-9 * size
+
+
+@pytest.mark.parametrize("name", ["beatup", "rapier", "shedding", "knuckle-press", "sixbar-sley"])
+@pytest.mark.parametrize("arcs", [None, "0.01 mm"])
+@pytest.mark.few(2)
+def test_each_layer_alone_tells_what_it_covers(tmp_path, name, arcs):
+    from ezdxf import bbox
+
+    scene = lo.load(name)
+    design = lo.evaluate(scene).design
+    for layer in outputs.drawing(scene, design).layers:
+        path = tmp_path / "layer.dxf"
+        try:
+            outputs.linkage(path, scene, design, how=outputs.workshop(arcs=arcs, only=layer))
+        except BadInput as error:
+            assert "does not have this layer" in str(error)  # noqa: PT017 (a layer without a primitive)
+            continue
+        document = ezdxf.readfile(path)
+        low, high = document.header["$EXTMIN"], document.header["$EXTMAX"]
+        box = bbox.extents([entity for entity in document.modelspace() if entity.dxftype() not in ("TEXT", "MTEXT")])
+        if box.has_data:
+            room = 1e-3 * max(box.size)
+            assert all(low[k] <= box.extmin[k] + room and high[k] >= box.extmax[k] - room for k in range(2)), layer
+        assert -1e6 < low[0] <= high[0] < 1e6
+
+
 @pytest.mark.parametrize(
     ("options", "report"),
     [
