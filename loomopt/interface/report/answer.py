@@ -11,6 +11,7 @@ from loomopt.interface.report import charts, machine, mathml
 from loomopt.interface.report.markup import Block, Markup, Part
 from loomopt.interface.text import answers, scenes
 from loomopt.jobs import registry
+from loomopt.model.program import shortfall
 from loomopt.physics.tolerances import FEASIBLE, STATIONARY
 from loomopt.picture.table import TextTable
 from loomopt.scenes import family as family_table
@@ -103,7 +104,7 @@ def status(subject: Subject) -> Status:
 def _certified_status(solution: Solution, scene: Scene) -> Status:
     """Verdict on a certified optimum, and the requested proofs that failed."""
     opened, proofs = list[str](), list[str]()
-    missed = solution.outcome.partition(" but ")[2]
+    missed = shortfall(solution.reached)
     if missed:
         opened.append(missed)
     if solution.proofs and not solution.proofs.passed:

@@ -264,7 +264,7 @@ class Trials(NamedTuple):
 
 
 class Obstacle(NamedTuple):
-    """Reason why there is no design with a back-off, and the limits that have no room for it."""
+    """Reason, in sentences, why there is no design with a back-off, and the limits that have no room for it."""
 
     why: str
     limits: tuple[str, ...] = ()
@@ -298,7 +298,7 @@ def _try(request: Request, trials: Trials) -> Trials:
         # The sides that nothing backs off, or no farther, lose machines however far the others are backed off.
         top = share(start.margins, MOST_SIGMAS, start.applied, start.caps)
         following = max(linear(start, top * (1 - 1 / SAMPLES)), trials.low[0])
-        trials = trials._replace(edge=following, obstacle=trials.obstacle or _fixed(start))
+        trials = trials._replace(edge=following, obstacle=trials.obstacle or f"{_fixed(start)}.")
         attempt = _reach(request, start, lambda at: following)
     else:
         attempt = _reach(request, start, lambda at: linear(at, least))
@@ -335,8 +335,8 @@ def _reach(request: Request, start: Pass, sigmas: Sigmas) -> Pass | Obstacle:
     try:
         result = _converge(request, start, sigmas)
     except BadInput as error:
-        return Obstacle(error.problem)
-    return result if isinstance(result, Pass) else Obstacle(result.message.rstrip("."), result.clash)
+        return Obstacle(f"{error.problem}.")
+    return result if isinstance(result, Pass) else Obstacle(result.message, result.clash)
 
 
 def _next_back_off(
@@ -524,7 +524,7 @@ def _most(request: Request, largest: Yield, here: Pass, obstacle: str) -> Soluti
     problem = (
         f"{least:.6g} % of the machines cannot hold all limits: the most that was found is "
         f"{_percent(largest)}, the yield of the design shown, with {_backed(here)}. Obstacle to a higher yield: "
-        f"{obstacle or f'{TRIALS} back-offs were tried'}. Tighten the tolerances, widen the limits or ask for less."
+        f"{obstacle or f'{TRIALS} back-offs were tried.'} Tighten the tolerances, widen the limits or ask for less."
     )
     return _uncertified(request, here.answer, "infeasible", problem)
 
