@@ -142,7 +142,7 @@ class Broken(BadInput):
 
 
 PLUGINS: dict[str, str] = {}
-"""Module that an entry point names → what it brings, and whose it is: "effect beatup.wind of loomopt-wind"."""
+"""Module of an entry point → description and distribution, such as "effect beatup.wind of loomopt-wind"."""
 
 
 def blamed(error: BaseException) -> BaseException:

@@ -14,9 +14,9 @@ PROBE = 1_000_000
 
 
 def atomically(path: Path, write: Callable[[Path], None]) -> None:
-    """Have `write` fill a new file beside `path`, of the same suffix, and rename it once it is complete.
+    """Write a file as a whole: `write` fills a temporary file in the same folder, which is renamed when it is complete.
 
-    After any exception or Ctrl-C nothing is left behind and an existing file is as it was; links stay links.
+    After an exception or Ctrl-C the temporary file is removed and an existing file is unchanged; links stay links.
     Raises BadInput where the file cannot be written: no such folder, no permission, not a file, no space.
     """
     together({path: write})

@@ -379,7 +379,7 @@ def _is_number(value: object) -> bool:
 
 
 MOST_MODELS = 256
-"""Models whose fields are remembered: a scene's tables say which models it has, and every scene asks of all of them."""
+"""Number of models whose fields are cached: each scene has models of its own, and all of them are read."""
 
 
 def quantity_of(model: type[BaseModel], field: str) -> Quantity | None:

@@ -20,10 +20,10 @@ REACHED = {None: "", True: "yes", False: "no"}
 
 
 class AnswerRow(NamedTuple):
-    """Number of a design or figure, in a unit of the scene; ok: whether its limit is held.
+    """Number of a design or figure, in a unit of the scene; ok: whether its limit is satisfied.
 
-    today, low, high: None where there is no such number; binds: side, min or max, on which the limit of a solved design
-    binds; reached: yes or no where the target asks for what may be out of reach.
+    today, low, high: today's value and the ends of the limit, or None; binds: side (min or max) on which the limit of a
+    solved design binds; reached: yes or no for a goal of the target, else "".
     """
 
     name: str
@@ -54,7 +54,7 @@ def frame(evaluated: Evaluated, scene: Scene) -> "TableFrame":
 
 
 def limits_frame(evaluated: Evaluated, scene: Scene) -> "TableFrame":
-    """Table of the limits of a design, in the units of the scene: values, ends and whether each is held."""
+    """Table of the limits of a design, in the units of the scene: values, ends, and whether each is satisfied."""
     from loomopt.interface import table_frame
 
     limits = [_limit_row(limit, UnitFormatter(scene)) for limit in evaluated.limits]

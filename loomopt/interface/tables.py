@@ -49,7 +49,7 @@ def row(solution: Evaluated, scene: Scene, target: str, outcome: str, *, si: boo
 
 
 SHAFT = "omega"
-"""The column of curves that is the shaft's speed, told in the unit of the scene's own; what swings is in rad/s."""
+"""Column of the shaft's speed, in the scene's unit of the speed; other angular speeds are in rad/s."""
 EVALUATED = 14
 """Significant digits of what is computed of a given design: two less than float64 has."""
 
@@ -70,7 +70,7 @@ def to_file(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
 def meaningful(frame: "pd.DataFrame", digits: int | None = None) -> "pd.DataFrame":
     """Table with the significant digits of its numbers, and 0 in place of -0 and of rounding errors.
 
-    digits: significant ones; without, two more than the accuracy that the table says it was found with.
+    digits: number of significant digits; by default two more than the accuracy that the table names.
     """
     if digits is None:
         digits = 2 + math.ceil(-math.log10(float(frame.attrs.get("accuracy", ACCURACY))))
@@ -95,7 +95,7 @@ def curves(
     """Curves of a design (SI; numbers that it does not name are today's) over one turn, SI.
 
     Every half degree; or, with an accuracy, as few rows as show each column's largest magnitude to it, relative.
-    target: what the design was found for, where that is known. measured: a CSV file of measured curves, `phi [deg]` and
+    target: target of the design, if known. measured: a CSV file of measured curves, `phi [deg]` and
     columns named as the curves; they become columns NAME_measured, in rows at the measured angles.
     """
     import pandas as pd
@@ -130,7 +130,7 @@ def curves(
 
 
 PHI, MEASURED, RMS = "phi", "_measured", "rms_"
-"""The column of crank angles; what ends the name of a column that was measured, and begins what is told of it."""
+"""Column of crank angles; suffix of a measured column, and prefix of its rms difference."""
 
 
 def _kinds(columns: "Mapping[str, Floats]") -> dict[str, str]:

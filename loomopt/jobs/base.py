@@ -51,8 +51,8 @@ Minima = Mapping[str, Sequence[tuple[str, float]]]
 class Task(abc.ABC):
     """Steps from a scene and a target to a program; a job overrides the steps in which it differs.
 
-    target: "" for none; traded: axes, which are sought in place of the target's objectives. What a target asks of an
-    axis falls away.
+    target: "" for none; traded: axes, which are optimised in place of the target's objectives. A demand of the target
+    on an axis does not apply.
     """
 
     read_from: Mapping[str, Sequence[str]] = Frozen()
@@ -229,7 +229,7 @@ class Task(abc.ABC):
     def demands(self) -> list[Limit]:
         """Limits that the checks that are on set to their rows and quantities.
 
-        What a table asks for may give way; what the nature of the thing demands may not.
+        A limit of the scene can be relaxed; a limit of the mechanism itself cannot.
         """
         limits = []
         for check in self.model.checks:
@@ -245,7 +245,7 @@ class Task(abc.ABC):
         return 0.0
 
     def margins(self) -> list[Limit]:
-        """Margins by which the links close, which nobody can give up."""
+        """Margins by which the links close; they cannot be relaxed."""
         rows = [row for group in self.model.kinematics.groups.values() for row in group.margins]
         return [DesignLimit(row, -1, row, 0.0, self.length, relaxable=False) for row in rows]
 
@@ -474,8 +474,8 @@ EVERY = Every()
 def balance_sentence(load: str, at: str, value: str, rest: str) -> str:
     """Sentence on a target that makes a load of the output zero first.
 
-    load, at: its name, and where it acts, such as "at front dead centre"; value: the least that is possible, in words,
-    "" for zero; rest: what is sought then, and its value, "" for nothing.
+    load, at: its name, and where it acts, such as "at front dead centre"; value: its least possible value as text, ""
+    for zero; rest: the next objective and its value, "" for none.
     """
     then = f", and then {rest}." if rest else "."
     if not value:

@@ -23,9 +23,9 @@ class SeriesTerms(NamedTuple):
 
 
 class IntervalSeries(Enclosure):
-    """A number along u; what stands beside it in a formula, an enclosure of the design, has no slope in u.
+    """Series of a number in u. An enclosure in the same formula depends on the design only: it has no slope in u.
 
-    An enclosure's own class steps back for it, for Python asks a subclass first.
+    It is a subclass of `Enclosure` so that Python calls its operators first.
     """
 
     __slots__ = ("terms",)

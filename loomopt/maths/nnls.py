@@ -1,6 +1,6 @@
 """Non-negative least squares (Lawson and Hanson 1974), and the least curvature over the cone that multipliers leave.
 
-Multipliers owe nothing to the solver. The columns in use are held as Q and R⁻¹ of their QR factors, by Gram and
+The multipliers are independent of the solver. The columns in use are held as Q and R⁻¹ of their QR factors, by Gram and
 Schmidt's method, each column twice [Daniel, Gragg, Kaufman and Stewart, Math. Comp. 30 (1976), 772-795]: one more costs
 two products with Q, not a factorization.
 """
@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 CONE_STEPS = 30
-"""Projected gradient steps from each eigenvector by which the least curvature on the critical cone is sought. A
-heuristic, for the problem is NP-hard: of 2800 random cones of 3 to 5 dimensions, of which under 2 % falls, none was
-missed; with one step some are (tests/maths/test_cone.py)."""
+"""Projected gradient steps from each eigenvector that locate the least curvature on the critical cone. This is
+a heuristic, because the problem is NP-hard: of 2800 random cones of 3 to 5 dimensions, of which under 2 % have a
+negative curvature, none was missed; with one step some are (tests/maths/test_cone.py)."""
 
 CONE_OPEN, CONE_TIP = 1e-9, 1e-9
 """Slope up to which a unit direction does not leave a limit, and length below which a projection is the cone's tip:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from loomopt.maths.systems import Number
 
 TURN_SAMPLES, CROSSING_STEPS, CROSSING_WIDTH = 720, 200, 4e-16
-"""Samples between which a motion's turn is sought, as many as an extreme; secants and halvings of what brackets it (a
-third of them halve: 66 are past any float), and the share of an angle that two neighbouring floats are apart."""
+"""Samples of one turn between which turning points are located, as many as for an extreme; steps of secants and
+halvings in a bracket (a third of them halve: 66 reach any float); relative distance of two neighbouring floats."""
 
 NEWTON_DONE = 1e-10
 """Share of an angle after a step of which Newton's method has none left to take: the next would be its square."""
@@ -103,8 +103,8 @@ def crossings(excess: Callable[[Floats, NDArray[np.intp]], tuple[Floats, Floats]
 
 
 SPIKE_WIDEST, SPIKE_HALVINGS, SPIKE_SECTIONS = 0.02, 44, 90
-"""Crank angle, rad, within which a spike beside a singular position is sought: two samples; its halvings, to rounding
-of an angle of 2π (0.02/2^44 = 1e-15); golden sections of what brackets it: 0.618^90 = 1e-19."""
+"""Crank angle, rad, around a singular position in which a spike is located: two samples; its halvings, to rounding of
+an angle of 2π (0.02/2^44 = 1e-15); golden sections of the bracket: 0.618^90 = 1e-19."""
 
 
 def inside_samples(values: Floats, margin: Floats) -> Floats:

@@ -14,13 +14,13 @@ from loomopt.model.program import Program
 from loomopt.physics.schema import Axis, Sense
 
 Requested = Mapping[str, Sense]
-"""Axis → the end that is sought, least or most."""
+"""Axis → its sense, least or most."""
 FORMS: Mapping[str, type[Objective]] = {"value": Value, "magnitude": Magnitude, "peak": Peak}
 """Form of an axis → the kind of its objective."""
 
 
 class Traded(NamedTuple):
-    """An axis and the end of it that is sought: the least value, of which figure = offset + sign · value^(1/power)."""
+    """Axis of a front, its sense, and the objective; figure = offset + sign · value^(1/power)."""
 
     axis: Axis
     sense: Sense

@@ -36,7 +36,7 @@ class Group(NamedTuple):
     quantities: over the cycle: the squares of the base over what the links span (1 where they are stretched or folded:
     `closes` names them by phrase) and the obliquity of the transmission angle. rows: of the design alone, angles and
     margins; margins: those of them that are never negative. closest: crank angles, rad, where the spans are largest,
-    in closed form; sought between samples without one.
+    in closed form; located between samples if there is none.
     """
 
     quantities: Mapping[str, OfPhi]
@@ -116,9 +116,9 @@ class Following(NamedTuple):
     """The events of one design that hints lead to.
 
     hints: names of their hints; events: in an order in which each reads those before it; turns: every crank angle of
-    one turn at which the output turns; sure(maths, given, turns): what must be positive, with what is said where it is
-    not, so that a scan of another design finds the same events; turns: their crank angles there. paths: where the way
-    to an event begins, by the name of its value, and the event: what its `rates` give is positive between them.
+    one turn at which the output turns; sure(maths, given, turns): conditions, expressions that must be positive so that
+    a scan of another design locates the same events, each with a message; turns: their crank angles there. paths: by
+    the name of an event's value, the start of the travel to it, and the event; its `rates` are positive between them.
     """
 
     hints: frozenset[str]

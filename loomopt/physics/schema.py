@@ -54,14 +54,14 @@ class Target(NamedTuple):
 
 
 Sense = Literal["least", "most"]
-"""End of an axis that is sought."""
+"""Sense in which an axis is optimised."""
 BOTH: tuple[Sense, ...] = ("least", "most")
 
 
 class Conflict(NamedTuple):
-    """Two axes of a job that cost each other, the first one sought; target: whose demands hold, None for none.
+    """Two axes of a job that conflict, the first one optimised; target: target whose demands hold, None for none.
 
-    maximise: axes of which the most is sought.
+    maximise: axes that are maximised.
     """
 
     axes: tuple[str, str]
@@ -72,9 +72,9 @@ class Conflict(NamedTuple):
 class Axis(NamedTuple):
     """Axis of a front: a figure or a number of the design, and how a program reads it.
 
-    rows: rows, or one whole-cycle quantity, that it is read from, itself without any; form: one smooth "value" (of
-    several rows the worst), a "magnitude", or the "peak" of a quantity; "" for a peak where the model has a quantity of
-    its name, else a value. senses: the ends that can be sought. The figure is offset + sign · value^(1/power).
+    rows: rows, or one whole-cycle quantity, from which it is read; by default that of its own name. form: one smooth
+    "value" (the worst of several rows), a "magnitude", or the "peak" of a quantity; "" is a peak if the model has a
+    quantity of its name, else a value. senses: senses that are possible. The figure is offset + sign · value^(1/power).
     """
 
     name: str

@@ -14,10 +14,10 @@ OPTION = "\ue001"
 class TextTable:
     """Table of texts; right: indices of right-aligned columns, the others may be wrapped; headings may have lines.
 
-    Where a terminal is too narrow columns go, the last of what is asked for first. first: places in the order in which
-    they are asked for, those that it does not name after them, from the left; units: places of columns that are the
-    unit of the one before, and go with it; names: what columns are called that have gone, their headings without; more:
-    where else all columns are.
+    Wide tables drop their last columns. first: indices of the columns that are dropped last, in order; the other
+    columns follow them from the left. units: indices of columns that are the unit of the column before them and are
+    dropped with it. names: names of dropped columns in the remark, by default their headings. more: place where all
+    columns are found.
     """
 
     title: str

@@ -95,9 +95,9 @@ class Record(NamedTuple):
 class Table(NamedTuple):
     """Columns of a file.
 
-    file: as it was named; columns: by name, SI; halves: half a unit of the last digit of each number, SI, by name, 0 of
-    whole degrees; marks: columns of marks by name; lines: of the file, for each row; units: as written, by column;
-    remarks: how what can be read in two ways was read, a sentence each without its full stop.
+    file: its name in the scene or call; columns: numbers by name, SI; halves: half a unit of the last digit of each
+    number, SI, by name, 0 for whole degrees; marks: columns of marks by name; lines: line in the file of each row;
+    units: units as written, by column; remarks: how ambiguous numbers were read, sentences without full stop.
     """
 
     file: str

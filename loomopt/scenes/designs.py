@@ -230,10 +230,10 @@ PIPE = "-"
 
 
 class DesignGiven(NamedTuple):
-    """Contents of a design file: a design, unchecked; of a whole answer more.
+    """Contents of a design file: an unchecked design, and further data of a whole answer.
 
-    call: what its call changed in its scene; target, status: its own; document: the tables it was found in; files: the
-    text of those that these name.
+    call: changes of its scene by its call; target, status: those of the answer; document: tables of its scene; files:
+    text of the files that these tables name.
     """
 
     design: object

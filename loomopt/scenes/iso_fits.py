@@ -2,7 +2,7 @@
 
 Fundamental deviations are the values of the tables of ISO 286-1:2010 (tables 2 to 5), not of their formulas; they are
 printed alike in DIN ISO 286-1 and in handbooks. Letters: shafts d e f g h js k m n p r s, holes D E F G H JS K M N P R
-S; grades IT5 to IT11, of k m n and K M N up to IT8, of which the tables tell them.
+S; grades IT5 to IT11; for k m n and K M N the tables end at IT8.
 """
 
 import math

@@ -62,8 +62,8 @@ def read_request(
 ) -> DesignRequest:
     """Scene of the file, with the changes of an answer's call and of the command line.
 
-    An answer in place of the file is judged in its own scene. A remark names what is otherwise than in the file, and
-    what the answer was found in that does not count. read_call: reads the changes.
+    An answer in place of the file is evaluated in its own scene. A remark lists the changes of the answer's call and
+    the differences between the answer's scene and the file. read_call: reads the changes of the command line.
     """
     from loomopt.jobs import registry
     from loomopt.scenes import designs

@@ -43,7 +43,7 @@ INK, GHOST, DESIGN, PIECE, PAPER = "#111827", "#9ca3af", "#1d4ed8", "#047857", "
 class MovingPicture:
     """A mechanism, or several stages of one, through the turn; in Jupyter it shows itself, with a slider.
 
-    stages: told → motion; ghost: the machine behind it.
+    stages: description of each stage → its motion; ghost: machine that is drawn dashed behind it.
     """
 
     title: str

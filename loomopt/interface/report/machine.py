@@ -88,8 +88,8 @@ def widget(
 ) -> str:
     """Animation with a slider: of one design, or of several stages, such as points of a front.
 
-    ghost: the machine behind it; angle, unit: what phi is and in which unit it is told; first: the pose that is shown
-    at first, and that remains where no script runs; labels: one for each stage.
+    ghost: machine that is drawn dashed behind it; angle, unit: name of φ and its unit; first: index of the first pose,
+    the only one without scripts; labels: one for each stage.
     """
     frame = frame_of([*stages, *([ghost] if ghost else [])])
     at_first = max(range(len(stages)), key=lambda k: len(stages[k].joints))  # some have parts that others have not

@@ -183,8 +183,8 @@ def _broken(row: ComparedRow, designs: Sequence[Named]) -> list[str]:
 def compare(given_designs: Sequence[object], within: Scene | None = None, names: Sequence[str] = ()) -> Comparison:
     """Designs side by side: answers, evaluations, or "today" for the first one's machine as it is.
 
-    within: a scene that all are judged in; each in its own without it. names: of each, what it is called. Raises
-    BadInput for what is none of them, for one design alone, and for designs of different jobs.
+    within: scene in which all designs are evaluated; by default each in its own. names: name of each design. Raises
+    BadInput for another type, for a single design, and for designs of different jobs.
     """
     known = [design for design in given_designs if isinstance(design, Evaluation)]
     stray = next((design for design in given_designs if not isinstance(design, Evaluation) and design != TODAY), None)
@@ -216,7 +216,7 @@ def compare(given_designs: Sequence[object], within: Scene | None = None, names:
 
 
 def _within(evaluation: Evaluation, scene: Scene) -> Evaluation:
-    """A design judged in another scene, by the same target where that has one of its name."""
+    """Evaluation of a design in another scene, with the same target if that scene has it."""
     target = evaluation.target if evaluation.target in scene.schema.targets else None
     return results.evaluate_design(scene, designs.checked(evaluation.design, scene), target)
 

@@ -37,7 +37,7 @@ from loomopt.physics.tolerances import ASSEMBLY_MARGIN, SAME_ANGLE
 OBLIQUITY = "obliquity"
 """Name of the quantity of a part's transmission angle, after the part's name."""
 SCAN = 720
-"""Samples of one turn between which turns of the output are sought."""
+"""Samples of one turn between which the turning points of the output are located."""
 SCAN_START = 0.0123
 """rad; where the samples begin: a linkage drawn in line turns at 0 exactly, where they would see no change of sign."""
 STILL, FEWEST_NODES = 1e-12, 9

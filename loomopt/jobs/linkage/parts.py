@@ -560,8 +560,8 @@ SAYS_NOTHING = ("problem", "mechanism", "parts")
 def demand_used(linked: Chain, document: Mapping[str, Any]) -> None:
     """Raise BadInput for parts that nothing reads; document: the raw scene.
 
-    A part is read where another hangs on it or where a table beside [parts] says its name, or that of a joint or link
-    of it. A point is drawn with its path, so it may stand for that alone.
+    A part is read if another part uses it, or if another table names it, one of its joints or one of its links. A point
+    may be unread, because its path is drawn.
     """
     words = {word for name, table in document.items() if name not in SAYS_NOTHING for word in _words(table)}
     table, wanted = Cursor(linked, "parts", Faults()), set[str]()

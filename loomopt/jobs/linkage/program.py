@@ -34,11 +34,11 @@ from loomopt.physics.cycle import Node
 from loomopt.scenes.scene import Scene
 
 TURNING_SHARE = 0.01
-"""Share of today's largest |q''| that |q''| keeps at an extreme whose load or angle is sought: of a six-bar a tenth of
-it is reached by 2 of 12 starts, this by 7 of 7."""
+"""Least |q''| at an extreme whose load or angle is optimised, as a share of today's largest |q''|. With a tenth of this
+share 2 of 12 starts of a six-bar end in an optimum, with this one 7 of 7."""
 RESTING_SHARE = 0.001
-"""The same at events of a window whose travel or length is sought: a rest needs a small |q''|. 11 of 11 starts reach
-a six-bar's least travel; without it the best of 27 starts has no certificate."""
+"""The same share at events of a window whose travel or length is optimised: a rest needs a small |q''|. With it 11 of
+11 starts reach a six-bar's least travel; without it the best of 27 starts has no certificate."""
 
 
 def model(scene: Scene, target: str = "", design: Numbers | None = None) -> JobModel:
@@ -62,7 +62,7 @@ def model(scene: Scene, target: str = "", design: Numbers | None = None) -> JobM
 
 @final
 class LinkageTask(Task):
-    """The linkage with figures and numbers that are sought in the scene's own order."""
+    """Design task of a linkage: figures and numbers are optimised in the order of the scene."""
 
     any_numbers = True
 
@@ -73,7 +73,7 @@ class LinkageTask(Task):
 
     @lazy
     def model(self) -> JobModel:
-        """The same with the opposites of numbers of which the most is sought."""
+        """Linkage with its effects, and with the opposites of numbers that are maximised."""
         model = self.plain_model
         for name, sense in self.levels:
             full = self.scene.full(name)
@@ -192,7 +192,7 @@ class LinkageTask(Task):
         ]
 
     def _turning_margins(self) -> list[Limit]:
-        """Rows by which the output still turns back at an extreme whose load, crank angle or window is sought.
+        """Rows by which the output still turns back at an extreme whose load, crank angle or window is optimised.
 
         The load of a mass falls to 0 with q'', and the angle moves without bound: at 0 the event is no extreme, and
         without a margin there is no best design. Cams are left out: their output may rest at an extreme.

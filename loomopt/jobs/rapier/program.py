@@ -48,7 +48,7 @@ TURN = (0.0, 2 * math.pi)
 def model(
     scene: Scene, goal_names: Collection[str] = (), read: bool = True, dwell_numbers: Collection[str] | None = None
 ) -> JobModel:
-    """Drive with the effects of the scene and the sought figures; read: whether effects are read.
+    """Drive with the effects of the scene and the optimised figures; read: whether effects are read.
 
     goal_names: the target, or the axes; dwell_numbers: names of the dwells that are demanded, else the operation's.
     """
@@ -77,7 +77,7 @@ def hand_over(model: JobModel, values: Numbers) -> Numbers:
 
 @final
 class RapierTask(Task):
-    """The drive with its stroke and dwells: kept as variables without room, which gives them a price, or sought."""
+    """Design task of a drive; its stroke and dwells are optimised, or fixed variables, which gives them a price."""
 
     read_from = Frozen(sley_mu_min=("sley_mu_near", "sley_mu_far"), stroke=("reach",))
     tops = Frozen(phi_stroke="S")
@@ -126,7 +126,7 @@ class RapierTask(Task):
 
     @lazy
     def model(self) -> JobModel:
-        """Drive with the sought figures, and with the effects if one of their figures is read."""
+        """Drive with the optimised figures, and with the effects if one of their figures is read."""
         checks = [effect for effect in self.scene.active if isinstance(effect, Check)]
         given = {name for check in checks for name in (*check.over_cycle, *check.rows)}
         read = bool((given | set(LOADED)) & {*self.scene.limits, *self.goal_names})
@@ -243,8 +243,8 @@ class RapierTask(Task):
     def definitions(self) -> list[Limit]:
         """Limits that define stroke and dwells: the head rests at its stroke, and stays within s_dwell on the arcs.
 
-        Where no stroke is kept, the hand-over that is traded or limited might be another rest, such as front dead
-        centre: it is one at which the head turns back, outside its dwells.
+        Without a demanded stroke, the row of the rest alone would also accept front dead centre as the hand-over. The
+        hand-over is therefore a position outside the dwells at which the head turns back.
         """
         reached = {*self.required_names, *self.minima, *(name for name in self.goal_names if name in LOOSE)}
         size, rows = 1.0, {"head at rest at phi_stroke": "rest"}

@@ -1,8 +1,8 @@
 """The shedding job: the least return spring that keeps the roller on the cam [Qiu21].
 
-What target law tends to with ever more intervals stands here too, where it is known in closed form
-(mechanisms/cam_limit.py). Which loads act is not asked, only whether their sum is what the closed form knows: a steady
-force, one in proportion to the shed on either side of its middle, and inertia.
+The limit of target `law` over all numbers of intervals is given too, where it has a closed form
+(mechanisms/cam_limit.py). The closed form holds for loads whose sum is a steady force, a force in proportion to the
+shed on either side of its middle, and inertia.
 """
 
 import math

@@ -271,7 +271,7 @@ def _term(model: JobModel, segments: Sequence[int], load: Acting, known: Given) 
 
 
 def _in_segment(model: JobModel, load: Acting, segment: int, force: Callable[..., Expression]) -> Case:
-    """Term in one segment, with the segment; what a dwell leaves open, and what nobody knows, in words."""
+    """Term in one segment, with the segment; a term that is unknown there is a text."""
     known_in = load.known_in(model.words_of(load.name)) if isinstance(load, Load) else ()
     if known_in and (SEGMENT, float(segment)) not in known_in:
         return "not known", WHERE[segment]

@@ -37,7 +37,7 @@ from loomopt.solving.reductions.reduction import Solve
 from loomopt.solving.search.search import objectives
 
 MOST_POINTS, BLOCK = 10_000_000, 2**16
-"""Points of a lattice that are all looked at, and how many at once."""
+"""Largest number of points of a lattice that are all evaluated, and number of points in a batch."""
 MOST_BOXES = 600
 """Boxes of sizes that are solved at most."""
 AFFINE = 1e-9
@@ -50,7 +50,7 @@ AGREES = 1e-7
 class SizeRounding:
     """Reduction of a task with sizes to tasks without them.
 
-    steps: sizes by number or pattern, such as {"l*": "0.5 mm"}, beside [steps] and [stock] of the scene.
+    steps: sizes by number or pattern, such as {"l*": "0.5 mm"}, in addition to [steps] and [stock] of the scene.
     """
 
     steps: Mapping[str, object] | None = None
@@ -128,9 +128,9 @@ class Lattice:
 def read_sizes(scene: Scene, given: Mapping[str, object] | None) -> dict[str, tuple[float, ...]]:
     """Sizes of numbers, SI, ascending, within their bounds.
 
-    given: steps by number or pattern beside the scene's own. Raises BadInput for numbers that have no sizes.
+    given: steps by number or pattern in addition to those of the scene. Raises BadInput for numbers that have no sizes.
     """
-    # A pattern speaks of what is free, a name of itself: the refusal of one that is not tells it.
+    # A pattern matches free numbers only. A name that is not free is refused with a message.
     loose = [key for key, bound in scene.bounds.items() if bound.free or key in (given or ())]
     source = scene.update({f"steps.{key}": step for key, step in sizes.named(given, loose).items()}) if given else scene
     steps, stock = numbers.sizes(source)

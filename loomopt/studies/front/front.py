@@ -115,8 +115,7 @@ def trade(
 def _lifted(scene: Scene, senses: Mapping[str, Sense]) -> tuple[Scene, tuple[str, ...]]:
     """Scene without the limits that exclude a requested end of the front, and those limits in words.
 
-    Of an axis of which the least is sought that is a minimum, of one of which the most is sought a maximum; a limit to
-    one value stands in the way of both ends.
+    On a minimised axis this is a minimum, on a maximised one a maximum. A limit to one value excludes both ends.
     """
     formatter, texts = UnitFormatter(scene), []
     for name, sense in senses.items():

@@ -47,11 +47,10 @@ SEARCHES = 3
 MOST_SIGMAS = 12.0
 """Largest allowed number of standard deviations; nothing is lost beyond 8."""
 TRIALS, MOST_BEYOND = 12, 0.5
-"""Sampled yields that are looked at on the way to one that is asked for, and how far beyond it one may be, in standard
-errors."""
+"""Largest number of sampled yields on the way to the requested one, and its accepted excess, in standard errors."""
 EDGE, CAPPED = 1e-3, 0.99
-"""How near the largest back-off that can be is found, in standard deviations, and the share of it that a limit keeps
-which has no room for more: with all of it the others could hardly move."""
+"""Accuracy of the largest possible back-off, in standard deviations, and the share of it that a limit without more room
+keeps: with all of it the other limits could hardly move."""
 ROOT, ROOTS = 1e-12, 60
 """Last step to a linear yield's root, in standard deviations, and steps at most."""
 
