@@ -25,15 +25,15 @@ from loomopt.physics.effects.kinds import Event, Speed
 from loomopt.physics.tolerances import SAME_ANGLE
 
 GRID = 72
-"""Nodes of the turn; a piece has at least nine. Where a parabola through three of them misses the quartic's window, the
-window follows, so that this is no accuracy: only tops that stand between two nodes without a trace are missed."""
+"""Nodes of the turn; a piece has at least nine. The number does not limit the accuracy: a window that misses the top
+moves after it. Only a top that no node of the grid shows is missed."""
 
 BLOCK, POSITIONS = 1024, 8192
 """Machines read together, and positions evaluated at once: what formulas need of these stays in the cache."""
 
 WINDOWS = 48
-"""Windows of the quartic that follow each other at most, each to the vertex of the one before, closer beside an end: a
-parabola's vertex lies within a step, which is eight of theirs."""
+"""Largest number of windows of the quartic, each at the vertex of the one before, or nearer at an end of a piece. The
+vertex of the parabola is within one step of the grid, which is eight steps of a window."""
 
 SHARP, CLOSEST = 1e-3, CLOSER**3
 """Fourth difference over the second from which a top is too sharp for its window, and the closest one, in grid steps:

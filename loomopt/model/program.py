@@ -1,4 +1,4 @@
-"""A design task as data: variables, limits, ordered objectives, and the model whose formulas they speak of.
+"""A design task as data: variables, limits, ordered objectives, and the model with their formulas.
 
 A program knows no grid and no solver. Its structure (what is in it) is apart from its numbers, so that one built NLP
 serves every scene of the same structure.
@@ -262,7 +262,7 @@ class Program:
     def backed_off(self, off: Mapping[tuple[str, int], float]) -> "Program":
         """Task with limits tightened; off: name and sign of limits → by how much, SI.
 
-        Bounds of variables that stand for figures, such as a dwell that is kept, move with their limits.
+        Bounds of variables that are figures themselves, such as a demanded dwell, move with their limits.
         """
         if not off:
             return self

@@ -34,10 +34,11 @@ WORTH_IT = 64
 
 @dataclass(frozen=True)
 class Recording:
-    """Quantities written down.
+    """Recorded formulas of quantities.
 
-    known: names of what they read of a design; switches: of what they read of a node beside φ; elementwise: whether
-    each node is read by itself, so that nodes of several designs may be read in one call.
+    known: names of the numbers of a design that they read; switches: names of the values of a node that they read,
+    apart from φ; elementwise: whether each node is read by itself, so that nodes of several designs may be read in one
+    call.
     """
 
     program: Program
@@ -275,7 +276,7 @@ class Rows(abc.ABC):
     def highest(self, name: str, where: Where | None = None) -> Number:
         """Largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI.
 
-        Only where the cycle has been looked at as a whole: in samples.
+        Only a reading of the sampled cycle has it.
         """
         raise NotImplementedError(f"{name} is read at nodes here")
 

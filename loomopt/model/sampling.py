@@ -32,15 +32,15 @@ from loomopt.physics.cycle import TURN, Cycle, Floats, Node, Pieces, Where
 from loomopt.physics.tolerances import LEAST_SHARE, SAMPLES
 
 LEAST_NODES = 8
-"""Nodes that the narrowest of many pieces gets at least: more than 16 pieces share twice the samples. A piece of a free
-cam law is one cubic, which the five points that refine an extreme hold exactly."""
+"""Least number of nodes of a piece where there are many: more than 16 pieces share twice the samples. A piece of a free
+cam law is one cubic, which the five points that refine an extreme represent exactly."""
 
 CLOSER = 1 / 8
 """Step, in samples, of the five points that refine a sampled extreme: their quartic errs by the step's 6th power, 4e-6
 of what the samples' own would, and values a step apart still differ by far more than rounding."""
 
 SIDES = np.arange(-1, 2)[:, None]
-"""A sample and those beside it."""
+"""Offsets of a sample and its two neighbours."""
 
 CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""
@@ -314,7 +314,7 @@ class Sampler:
         return self.model.singular(squares)
 
     def _spikes(self, name: str) -> list[Extreme]:
-        """Extremes beside singular positions that even samples may miss."""
+        """Extremes next to singular positions, which equidistant samples may miss."""
 
         def heights(angles: Floats) -> Floats:
             return self.heights(name, self.at_angles(name, angles))

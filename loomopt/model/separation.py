@@ -1,7 +1,7 @@
 """Loads on an output that has left its mechanism: their formulas, tried and used only if they are linear.
 
-A load that goes by the crank angle, by the mechanism's position or by anything but the output's position, speed,
-acceleration and direction of motion cannot be followed, and is refused by name.
+A load may depend on the output's position, speed, acceleration and direction of motion only. A load that depends on
+the crank angle or on another position of the mechanism is refused by name.
 """
 
 import bisect

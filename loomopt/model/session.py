@@ -76,13 +76,13 @@ def current() -> Session:
 
 @contextlib.contextmanager
 def working(session: Session | None = None) -> Iterator[Session]:
-    """Compute in a session, the current one where none is given, while no other thread does; yields the session.
+    """Compute in a session, the current one by default, with the lock that keeps other threads out; yields the session.
 
-    A thread that has begun may begin again, as a solve within a solve does. Where the code of another distribution
-    fails meanwhile, BadInput says whose it is. A search meets designs that do not close: their numbers are not finite,
-    which whoever reads them tests, and NumPy warns of none of them, whatever Python does with warnings.
+    A thread that holds the lock may call it again, as a solve within a solve does. If the code of another distribution
+    fails, BadInput names the distribution. NumPy's warnings of numbers that are not finite are off: a search evaluates
+    designs that do not assemble, and its readers test for such numbers.
     """
-    # Nothing that computes comes without NumPy; what only reads a scene may.
+    # Every computation imports NumPy; the commands that only read a scene do not.
     import numpy as np
 
     with LOCK, naming(), np.errstate(all="ignore"):

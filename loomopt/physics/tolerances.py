@@ -28,7 +28,7 @@ START_ROOM = 0.01
 #
 # Variables, rows and objectives divided by their scales. The experiment: benchmarks/measure/tolerances.py solves every
 # target of three packaged scenes, and two neighbours of each, with one number at a time a tenth and ten times as large
-# (counts: half and double). What is not said below changes no objective there by 4e-11, nor IPOPT's iterations by a
+# (counts: half and double). A number without a remark below changes no objective by 4e-11, nor IPOPT's iterations by a
 # tenth.
 
 NEAR, ROUNDING = 1e-8, 1e-12
@@ -69,7 +69,7 @@ STATIONARY = 1e-6
 """Slope that KKT multipliers may leave: an objective that curves by 1 is then within 1e-12 of its least."""
 
 ACTIVE = 1e-7
-"""Distance from its bound at which a row takes part in the KKT system: ten times what complementarity lets pass."""
+"""Distance from its bound at which a row takes part in the KKT system: ten times the tolerance of complementarity."""
 
 POSITIVE = 1e-8
 """Multiplier above which a limit binds: below it, a relaxation by the whole scale gains less than the accuracy."""
@@ -85,10 +85,10 @@ FLAT = 1e-7
 """Curvature, and slope of a touching row, that counts as none: ACTIVE's effect on a slope, where curvature is 1."""
 
 JET_ERROR, DOUBT = 1e-10, 10.0
-"""Error of jets, relative to the largest derivative of a row where that exceeds 1: eighty times what is seen. 1500
-certificates of adversaries and hard cases show 2e-13, rapier drives beside their optimum 1.2e-12, where an extreme is
-read 6e-13 beside its place (see test_derivatives_jets.py). And the factor from its threshold within which a figure that
-decides is looked at again in 40 digits."""
+"""Error of jets, relative to the largest derivative of a row where that exceeds 1: eighty times the largest one seen.
+1500 certificates of adversaries and hard cases show 2e-13, rapier drives beside their optimum 1.2e-12, where an extreme
+is read 6e-13 beside its place (see test_derivatives_jets.py). And the factor from its threshold within which a decisive
+number is computed again in 40 digits."""
 
 CORRECTIONS, PRECISE = 4, 1e-9
 """Newton's steps after a solve, each of which doubles the digits (1e-6 needs two), and the residual that ends them."""
@@ -114,7 +114,7 @@ PRICED, NEEDED, CHEAP, SCREENED = 1e-6, 1e-9, 1e-9, 1e-5
 limit that is tried alone, beside 1 of all others; their sum from which it does not suffice."""
 
 SLACK, LEAST_SLACK, MOST_SLACK = 1e-8, 1e-13, 0.1
-"""What a proof leaves open, relative to a quantity's largest magnitude: usual, what balls resolve, most allowed."""
+"""Slack of a proof, relative to a quantity's largest magnitude: default, least that balls resolve, largest allowed."""
 
 ROUNDED = 1e-15
 """Least error that an answer claims, relative to the scale: nothing is known better."""

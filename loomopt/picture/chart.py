@@ -115,8 +115,8 @@ class Chart:
 class Bars:
     """Horizontal bars from 0 to both sides, one row for each name.
 
-    key: kind and words of the first, second, ... of a row; axis: fitted without one; places: vertical lines; place:
-    what they are; numbers: what stands beside each bar.
+    key: kind and text of the first, second, ... bar of a row; axis: by default fitted to the bars; places: vertical
+    lines; place: their name; numbers: text at each bar.
     """
 
     title: str
@@ -166,9 +166,9 @@ class Mark(NamedTuple):
 class Charts:
     """The charts of a study.
 
-    shared: whether all stand over the same axis, with the same key; first: how many of them a figure of one page shows;
-    notes: what its numbered places are; missing: why there is nothing to draw; marks: of the shared axis; key: that of
-    all together, beside the key of each; without it that of the charts is shared.
+    shared: whether all have the same axis and key; first: number of charts in a figure of one page; notes: texts of its
+    numbered places; missing: reason why there is nothing to draw; marks: marks of the shared axis; key: common key, in
+    addition to that of each chart; by default the charts share theirs.
     """
 
     title: str

@@ -180,8 +180,8 @@ class Paths:
     def located(self, given: str, key: str, origin: str) -> Path:
         """Path of the file that a dotted key names. Raises BadInput for a file that a scene may not name.
 
-        What a scene file says is looked for beside it, and with all links resolved must lie in its folder or below.
-        A caller's path is looked for from the working folder, then beside the scene.
+        A path in a scene file starts at the file's folder and, with all links resolved, must lie in it or below. A path
+        of the caller starts at the working folder, then at the scene's folder.
         """
         try:
             if self.folder is None or self._is_own(_on(key)):

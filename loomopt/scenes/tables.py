@@ -25,7 +25,7 @@ class SceneSchema:
     operation, mechanism: models of those tables; keys that are required only by what reads them are optional there.
     effects: by name, in the order of the job. variables: design variables → kind of quantity, in the order shown.
     figures: the job's own; those of its effects come with them (`all_figures`).
-    fault(design, shown): why a design, SI, cannot work as this mechanism, its numbers as `shown` tells them; "" when
+    fault(design, shown): reason why a design, SI, cannot work as this mechanism, with numbers as text by `shown`; "" if
     it can.
     margins: limits that every design keeps → kind of quantity; their names are whole phrases.
     groups: name → bounds that --free frees together.

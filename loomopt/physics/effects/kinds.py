@@ -152,7 +152,7 @@ class Demand(NamedTuple):
 
 
 class FlatNumber(NamedTuple):
-    """A number of an effect's table that may change nothing, and then stays nearest to today's; name: as settled."""
+    """Number of an effect that may change nothing, and then stays nearest to today's; name: name of the tie-break."""
 
     name: str
     key: str
@@ -281,22 +281,22 @@ class Load(Effect, Generic[Pose]):
     acts : "output" (times q' it reaches the crank) or "drive" (it reaches the crank only).
     force(at) : the term, N or N·m.
     inside(at) : of an output term, its further part inside the drive, N·m; None for nothing.
-    output_share(at) : of a drive term, what of it acts on the parts on the output, N·m or N there; None for nothing. A
-        state that carries the load carries this part, and the rest stays in the drive.
+    output_share(at) : of a drive term, its part on the links of the output, N·m or N; None for nothing. A state that
+        carries the load carries this part, and the rest stays in the drive.
     force_under_loads(at, loading) : the term where it depends on all other terms, in place of `force`.
     corners(at) : crank angles, rad, where the formula changes.
     switch(angle, corners) : formula that is valid at a crank angle inside a piece, as the number `at.switch`.
     known_in(words) : places where the term is known, by the words of its table; empty for the whole cycle.
-    moved(at) : inertia, kg·m² or kg, that it adds to what moves with the output.
+    moved(at) : inertia, kg·m² or kg, that it adds to the output.
     response(at, oscillator) : z, rad or m, and z˙ of an oscillator that carries the load, in the periodic steady state;
         a load with corners cannot be carried without it.
     symbol : heading of its column of the curves; its name by default.
-    cases : for each switch, the range where its formula is valid, in words; by default the corners tell it.
+    cases : for each switch, the range where its formula is valid, in words; by default that between the corners.
     tabulated : table of a curve that may replace its values; None for none.
     mass(at) : the moving mass of one link.
-    push(at, term) : force on the link of the output, N, whose moment or work is the term; None where the table does not
-        tell it.
-    applied(at) : forces on links and joints, where those have names. The last three are read for joint forces only.
+    push(at, term) : force on the link of the output, N, whose moment or work is the term; None where the table does
+        not determine it.
+    applied(at) : forces on links and joints, where those have names. Only joint forces read the last three.
     """
 
     acts: Literal["output", "drive"]
@@ -403,8 +403,8 @@ class Check(Effect, Generic[Pose]):
     wanted : scene keys without which a vector, scalar or quantity has no value.
     fitted(chain) : the check of a user's own linkage.
     link_inertias : inertia loads on links, each with an equation of its own.
-    sentence : its equations in words, where the symbols of a pose do not tell its links.
-    remark(at, shown) : sentence beside its figures, in the reader's units; "" for nothing.
+    sentence : its equations in words, where a pose has no symbols of its links.
+    remark(at, shown) : sentence printed with its figures, in the reader's units; "" for nothing.
     explain(known, bounds, table, clash, shown) : physical reason why limits (names) clash, in the reader's units.
     """
 
@@ -578,7 +578,7 @@ class Event(Effect):
 
 
 EVALUATED = (Speed,)
-"""Kinds with which a design is evaluated and simulated, but neither sought nor proven."""
+"""Kinds with which a design is evaluated and simulated, but neither optimised nor proven."""
 
 
 @functools.cache

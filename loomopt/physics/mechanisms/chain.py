@@ -509,9 +509,9 @@ class Chain:
 
 
 SAMPLES, WORTH_A_LOOK, SINGULAR = 720, 0.99, 1e-12
-"""Samples of one turn between which the closest position of a group is sought; its span there from which that is done:
-half a degree beside its top a span is lower by less than a hundredth; and the share of its span by which a group must
-close, a hundred times the rounding of a place."""
+"""Samples of one turn between which the closest position of a group is located; sampled span above which it is located
+(half a degree from its top a span is lower by less than a hundredth); share of its span by which a group must close, a
+hundred times the rounding of a place."""
 
 
 def fault(chain: Chain, values: Values, shown: ShowValue = usual) -> str:

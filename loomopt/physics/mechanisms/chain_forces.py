@@ -1,10 +1,11 @@
 """Forces in every joint of a chain of parts: the groups are solved from the last part back to the crank.
 
-What acts on a body is one force and one moment about the axes' origin. Solving a part gives the forces in its joints;
-their opposites are loads of the bodies that it hangs on. A slider's pin is a body of its own; a pin of two links
-belongs to the second one, and what else hangs there pushes on that. Gears touch where their pitch circles do, across
-the line of centres: what parts the wheels is left out; gears on one axis hand on a couple. Where a cam touches its
-follower no part tells: it gives a torque, and the follower's own pivot stays unknown. Symbols: `joint_forces`.
+The load of a body is one force and one moment about the origin of the axes. Solving a part gives the forces in its
+joints; their opposites are loads of the bodies that carry it. The pin of a slider is a body of its own. A pin of two
+links belongs to the second one, which takes the forces of further parts there. Gears touch at their pitch circles, with
+a force across the line of centres; the force that separates the wheels is left out. Gears on one axis transmit a
+couple. The contact point of a cam is unknown: it gives a torque, and the force in the follower's pivot stays unknown.
+Symbols: `joint_forces`.
 """
 
 import functools

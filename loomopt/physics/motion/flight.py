@@ -1,9 +1,9 @@
 """A body that a cam pushes: where it leaves the cam, how it flies, where it lands. Every piece is in closed form.
 
 x: position, m, with the cam at x_c; the gap x − x_c is never negative. In flight the motion is linear piece by piece
-(motion/free.py), so no equation is integrated step by step. Where pieces end, by a landing, at a corner of x or where
-the motion turns, is found by steps that no root can be inside of: a bound on the second derivative says how far. In
-contact the body is at x_c, and it leaves where the force that would hold it there falls below zero.
+(motion/free.py), so no equation is integrated step by step. A piece ends at a landing, at a corner of x or where the
+motion reverses. Its end is located by steps that contain no root, by a bound on the second derivative. In contact the
+body is at x_c, and it leaves when the contact force falls below zero.
 """
 
 import math
@@ -20,7 +20,7 @@ CHATTER = 1e-6
 REPEATED = 1e-9
 """Share of the stroke, and of the stroke times the cam's speed, by which two states may differ and be one."""
 LEAST_STEP = 1e-15
-"""Share of a turn that counts as no time: rounding of the angle; the hops that CHATTER lets pass take 1e-6 of one."""
+"""Share of a turn that counts as no time: rounding of the angle; hops above CHATTER take 1e-6 of a turn."""
 MOST_PIECES = 100_000
 """Pieces of flight in one turn beyond which it does not end: of a restitution of 0.9999 1.4e5 hops are left."""
 GAP_SAMPLES = 720

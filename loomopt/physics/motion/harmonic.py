@@ -17,7 +17,7 @@ from loomopt.maths.systems import Maths, Number
 FEWEST, MOST = 32, 512
 """Harmonics of a smooth force: doubled from the fewest until the last of them are below TAIL of the largest."""
 TAIL, LAST = 1e-14, 4
-"""Share of the largest harmonic, and how many of the last are looked at: both parities, and two more."""
+"""Share of the largest harmonic, and number of last harmonics that must be below it: both parities, and two more."""
 CRITICAL = 1e-12
 """Share of k/J by which it may differ from (c/2J)² where damping counts as critical: what either formula then errs."""
 Weigh = Callable[[Sequence[Number], Sequence[Sequence[Number]]], list[Number]]

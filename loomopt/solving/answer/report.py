@@ -43,8 +43,8 @@ from loomopt.solving.search.search import Candidate, Search, compare
 def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: str | None = None) -> Evaluated:
     """Figures and limits of a design (SI; today's without one), nothing optimised.
 
-    target: whose limits, the job's default without one. A limit that is exceeded by less than the rounding of the
-    digits given says so. Raises BadInput for a design that does not assemble.
+    target: target of the limits; the job's default without it. A limit that is exceeded by less than the rounding of
+    the given digits is marked. Raises BadInput for a design that does not assemble.
     """
     job, name = registry.of(scene), target_name(scene, target)
     if target:
@@ -72,7 +72,7 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
 
         return family.evaluation(scene, job, program, design, evaluation)
     sampler = job.sampler(scene, design)
-    # The certificate has just looked for most of what is told.
+    # The certificate has just computed most of the extremes.
     sampler.share()
     quantities = [limit.row for limit in program.cycle_limits.values() if not limit.hidden]
     quantities += [name for objective in program.objectives for name in objective.quantities]
@@ -110,7 +110,7 @@ def _findings(
             continue
         if isinstance(limit, CycleLimit):
             if not sampler.model.has_quantity(limit.row):
-                # A row of the program alone: what it limits is told by the figure that it is read for.
+                # Only the program has this row; the figure that is computed from it shows its limit.
                 continue
             peaks[limit.name] = limit.figure(sampler)
         elif not any(limit.name in values for values in sources):

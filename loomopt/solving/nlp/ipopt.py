@@ -38,7 +38,7 @@ a front of ten in an optimum that is 1.8 % worse.
 
 SLOTS_WITH_STATIONS = 2, 1
 """Both numbers where rows stand at corners from the first. None of 28 free cam laws of 16 and 64 intervals, with every
-effect, ends at a node beside its knots, and each that there is room for takes a twentieth of building."""
+effect, ends with a node other than its knots, and each node with room adds a twentieth to the time of building."""
 
 FIRST_SHARE, FIRST_ROOM = 1.01, 0.01
 """Factor and room by which a first epigraph variable stands above its rows: inside, so that IPOPT need not move it."""

@@ -20,8 +20,8 @@ from loomopt.physics.balance import Given, total
 from loomopt.physics.cycle import Cycle, Node
 
 STRIPS = ((0.1, 8), (0.03, 16), (0.0, 32))
-"""Strips of a piece over which a mean is enclosed, by the width of boxes as a share of the whole: what strips leave
-falls with the cube of their width (0.04 % of pulse_rms from 32), and does not count beside a wide box's own."""
+"""Strips of a piece over which a mean is enclosed, by the width of boxes as a share of the whole. The error of strips
+falls with the cube of their width (0.04 % of pulse_rms with 32); that of a wide box is much larger."""
 
 
 def strips(widths: Floats) -> int:

@@ -94,8 +94,8 @@ ROOM = 1e-14
 class Tree:
     """State of a search.
 
-    low, high: (names, boxes) of open boxes; least: what the objective is at least in each, scale; boxes: how
-    many were read; stuck: the least of those that are too small to halve.
+    low, high: (names, boxes) of open boxes; least: lower bound of the objective in each, scaled; boxes:
+    number of boxes read; stuck: least bound of the boxes that are too small to halve.
     """
 
     low: Floats

@@ -133,10 +133,10 @@ def _readings(
     scene: Scene, job: Job, program: Program, design: Mapping[str, float], slack: float
 ) -> tuple[_Read, _Read]:
     """Design read by the target's program, and by the job as a whole."""
-    # What has no room in the program stands where the program holds it: limits may ask for more than the scene's own.
+    # A fixed variable has the program's value, which a limit may move from the scene's.
     known = {name: value for name, value in job.numbers(scene).items() if name not in program.fixed}
     design_numbers = {scene.full(name): value for name, value in design.items()}
-    # What the target's program does not choose is the design's own too, and today's where it names nothing.
+    # A number that the program does not choose is that of the design, or today's where the design has none.
     parameters = {n: design_numbers.get(n, value) for n, value in program.parameters.items()}
     design_program = replace(program, parameters=parameters)
     values = {**parameters, **job.values(design_program, {**known, **design_numbers})}

@@ -459,7 +459,7 @@ def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) 
         texts.append(f"None of the {lattice.points} points of the lattice is better{counts}: {best.rests}.")
     design = {scene.full(name): value for name, value in designs.flat(answer.design).items()}
     here = report.evaluated(scene, lattice.job, lattice.task.target, design)
-    # A size is what was chosen and no limit; and how far today's machine is goes by the widths of the scene's bounds.
+    # A chosen size is no limit. The change from today is relative to the widths of the scene's bounds.
     binding = tuple(price for price in answer.binding if price.limit not in lattice.sizes)
     together = tuple(price for price in answer.bind_together if not {*price.limits} & {*lattice.sizes})
     figures = {**answer.figures, **{name: here.figures[name] for name in ("change",) if name in answer.figures}}

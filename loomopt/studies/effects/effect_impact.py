@@ -149,8 +149,8 @@ class ReferenceDesign:
     def combine(self, omission: EffectImpact, scene: Scene, row: Row, tolerance: float) -> EffectImpact:
         """Impact of effects that are left out together, some of which solve does not accept.
 
-        omission: impact of those that it accepts. scene: the reference with the rest on. row: the solve without all of
-        them.
+        omission: impact of those that solve accepts. scene: the reference with the other ones on. row: row of the solve
+        without all of them.
         """
         addition = self.measure_addition(omission.effect, scene, tolerance)
         shifts = zip(omission.shift.items(), addition.shift.values(), strict=True)

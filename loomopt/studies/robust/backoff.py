@@ -70,11 +70,11 @@ class Pass(NamedTuple):
     frozen: "Mapping[str, Band]" = Frozen()
     """Bands, m, of numbers whose class would flip from pass to pass."""
     applied: Mapping[tuple[str, int], float] = MappingProxyType({})
-    """What each side was tightened by, SI."""
+    """Back-off of each side, SI."""
     caps: Mapping[str, float] = Frozen()
-    """The most standard deviations of limits that have no room for more."""
+    """Largest number of standard deviations of limits that have no room for more."""
     linear: float | None = None
-    """Standard deviations that the linear joint normal asks for, where a yield is."""
+    """Standard deviations by the linear joint normal distribution, if a yield is requested."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,7 @@ def _same(first: Solution, second: Solution) -> bool:
 
 
 SAME = 1e-8
-"""Share of the largest figure sought by which two answers' figures may differ and be one."""
+"""Share of the largest objective by which the figures of two equal answers may differ."""
 
 
 def _converge(request: Request, here: Pass, sigmas: Sigmas) -> Pass | Solution:

@@ -1,8 +1,8 @@
 """A durable store of studies in one SQLite file: each row in a transaction of its own, written by the driver alone.
 
-Rollback journal and synchronous=FULL: a row that was written is there after a crash, also of the machine; unlike a
-write-ahead log both work on network file systems. One run at a time has the file to itself. Each row has a checksum:
-what became of the file since it was written is told, not taken for a result.
+Rollback journal and synchronous=FULL: a written row survives a crash, also of the machine; unlike a write-ahead log
+both work on network file systems. One run at a time has the file to itself. Each row has a checksum: a file that was
+changed since it was written is refused.
 """
 
 import contextlib

@@ -72,7 +72,7 @@ def pushed(at: Inputs[LinkagePose]) -> Number:
 
 
 PLACES = "output at events"
-"""What the motion must tell: where the output is at its events."""
+"""Feature of a motion that has the output at its events."""
 TURNING = Load(
     name="spring",
     summary="spring on the output",

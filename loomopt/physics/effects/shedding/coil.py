@@ -1,8 +1,8 @@
 """The return spring as coils that can be made: rate, stresses, hooks, initial tension, surge, space [Shigley, ch. 10].
 
-Where the scene says so, stress is corrected, and the initial tension is judged, as in EN 13906-2 and DIN 2089-2.
-It takes no part in the balance: K1 (X + X0) stays the whole force of all springs together. Their wire, coil and turns
-must give K1, and keep what material, winding and space allow.
+If the scene requests it, stress is corrected and the initial tension is checked as in EN 13906-2 and DIN 2089-2. The
+effect does not change the balance: K1 (X + X0) is the force of all springs together. Wire, diameter and turns must give
+K1, and satisfy the limits of material, winding and space.
 """
 
 import math

@@ -4,10 +4,10 @@ T is T1 with the shed open upward (X = 0) and −T2 with it open downward. Betwe
     linear   in proportion to the shed: T1 (1 − 2X/h) above the middle, −T2 (2X/h − 1) below; a corner where
              X = h/2, the event half_open; of a motion in segments too that moves down once and up once
     step     the cubic STEP of eq 8 over the rise and over the return
-    levels   nothing is said: T is T1 and −T2 in the dwells, and contact is judged there only
+    levels   unknown: T is T1 and −T2 in the dwells, and contact is checked there only
 
-Or T(θ) is a curve of one's own, through the samples of a table over the cam angle: the pull of the warp as measured, or
-any load that the frame carries in step with its cam (negative where it presses the roller on the cam).
+Or T(θ) is a curve through the samples of a table over the cam angle: a measured pull of the warp, or any load of the
+frame that depends on the cam angle (negative where it presses the roller on the cam).
 """
 
 from collections.abc import Callable, Mapping
