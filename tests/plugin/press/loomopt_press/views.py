@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.model.model import JobModel
+from loomopt.model.sampling import Sampler
 from loomopt.physics import balance
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Equation, Symbols, equation, symbol
-from loomopt.picture.job_views import JobViews
+from loomopt.picture.job_views import LinkViews
 from loomopt.picture.panels import Panel
-from loomopt.picture.shapes import Drawing, drawn_units
 from loomopt.scenes.scene import Scene
-from loomopt_press import drawing
+from loomopt_press.drawing import PressDrawing
 from loomopt_press.model import BOTTOM, TOP, SlidePose
 
 
@@ -28,16 +28,17 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
     return (*written, *effect_equations.forces(model, pose, known, "Q", "Q"))
 
 
-class PressViews(JobViews):
+class PressViews(LinkViews):
     """A crank above, the slide below."""
 
-    def linkage(self, scene: Scene, design: Mapping[str, float]) -> Drawing:
-        """Press in both dead centres and half way, at full scale."""
-        return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name, drawn_units(scene))
+    def drawn(self, scene: Scene, design: Mapping[str, float]) -> PressDrawing:
+        """Press in both dead centres and half way."""
+        numbers = registry.of(scene).numbers_of(scene, design)
+        return PressDrawing(numbers["crank"], numbers["rod"])
 
-    def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Its joints as CSV."""
-        return drawing.skeleton(registry.of(scene).numbers_of(scene, design)).csv(drawn_units(scene))
+    def sampler(self, scene: Scene, design: Mapping[str, float]) -> Sampler:
+        """Samples of a design."""
+        return registry.of(scene).sampler(scene, design)
 
     def equations(self, scene: Scene) -> tuple[Equation, ...]:
         """Equations the scene really uses."""
