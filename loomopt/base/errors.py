@@ -39,7 +39,7 @@ class FormerNameWarning(FutureWarning):
 class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch it by this name)
     """Input that cannot be worked with, as one plain message.
 
-    file: where it stands; key: dotted path; value: as given; allowed: what may stand there; remedy: what to do;
+    file: name of the file; key: dotted path; value: as given; allowed: allowed values; remedy: what to do;
     grade: how bad it is, 0 the worst. Of several mistakes the message has a line each, and all else is of the first.
     """
 

@@ -48,7 +48,7 @@ _RATIO_PATTERN = rf"^[ \t]*{NUMBER_PATTERN}(?: */ *{NUMBER_PATTERN})?[ \t]*$"
 def pattern_schema(kind: str, least: float, above: float, below: float, allowed: str) -> dict[str, Any]:
     """JSON Schema of a quantity's raw value; least, above, below: range, SI; allowed: range in words.
 
-    Under the key `QUANTITY` stands a name that equal ones share. `message_schema` adds the message.
+    The key `QUANTITY` has a name that equal quantities share. `message_schema` adds the message.
     """
     refused = [_NEGATIVE] if max(least, above) >= 0 else []
     refused += [_ZERO] if above >= 0 else []
@@ -402,7 +402,7 @@ def quantities_of(model: type[BaseModel]) -> Mapping[str, Quantity]:
 
 
 def table_inside(model: type[BaseModel], field: str) -> type[BaseModel] | None:
-    """Model of a table that a model's field is, also for `X | None`; None for a field that is none."""
+    """Model of a field that is a table, also for `X | None`; None for another field."""
     annotation = model.model_fields[field].annotation
     parts = (annotation, *(part for part in typing.get_args(annotation) if typing.get_origin(annotation) is not tuple))
     return next((part for part in parts if isinstance(part, type) and issubclass(part, BaseModel)), None)

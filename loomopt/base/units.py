@@ -111,7 +111,7 @@ _USUAL: dict[str, str] = {
     "power": "W kW hp",
     "energy": "J N*m lbf*in",
 }
-"""Units that people write, by kind of quantity, beside those of `SI_UNIT`."""
+"""Units that people write, by kind of quantity, in addition to those of `SI_UNIT`."""
 
 
 def usual_units(kind: str) -> str:
@@ -124,7 +124,7 @@ _LARGEST_EXPONENT, _LONGEST_UNIT = 4, 20
 _TOKEN = re.compile(r"\*\*|[*/^()]|[+-]?[0-9]+|[^\W\d_]+|.", re.DOTALL)
 _SUPERSCRIPT = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _MISTAKEN = {"Nm": "N*m", "Nmm": "N*mm", "kNm": "kN*m", "Ns": "N*s", "Nms": "N*m*s", "grad": "deg"}
-"""Text that pint would read as a yarn count, a plural or a gon → the unit that is meant."""
+"""Text that pint would read as a yarn count, a plural or a gon → the intended unit."""
 _QUOTES = str.maketrans({"″": '"', "”": '"', "′": "'", "’": "'"})
 _LOOKALIKE = str.maketrans({"·": "*", "⋅": "*", "µ": "u", "μ": "u", "°": "deg"})
 

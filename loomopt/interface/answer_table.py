@@ -79,7 +79,7 @@ def text(evaluated: Evaluated, scene: Scene, before: Evaluated | None, heading: 
     ]
     names, rounding = {row.name for row in table}, _rounding(table)
     for limit in evaluated.limits:
-        # Of the margins that every design keeps, and that no scene can set, only those that are not held are shown.
+        # Margins of the mechanism itself, which no scene sets, are shown only where they are violated.
         if limit.name not in names and (not limit.ok or limit.name not in scene.schema.margins):
             row = _limit_row(limit, UnitFormatter(scene))
             table.append(row._replace(value=rounding.shown(row.unit, row.value)))

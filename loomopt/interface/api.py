@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 Given = Scene | Evaluation | str | os.PathLike[str]
 """A scene, an answer in its own scene, or what `load` takes: a packaged name or a path."""
-if TYPE_CHECKING:  # a file's name does not tell type checkers what `load` returns, and most name scenes
+if TYPE_CHECKING:  # the name of a file does not show type checkers what `load` returns
     Loaded = Scene | Any
 else:
     Loaded = Scene | Evaluation

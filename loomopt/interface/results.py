@@ -34,7 +34,7 @@ PICTURE = arguments.PICTURE
 class Evaluation(records.Shown):
     """Figures and limits of a given design in its scene, SI and rad, without optimisation.
 
-    target: whose limits it was judged by.
+    target: target of the limits.
     """
 
     result: solution.Evaluated
@@ -222,7 +222,7 @@ class Evaluation(records.Shown):
         return animation.animate(self.scene, self.design, place, outputs.describe_design(self.result))
 
     def evaluate(self) -> "Evaluation":
-        """Figures and limits of the design in its own scene, judged by the limits of its own target."""
+        """Figures and limits of the design in its own scene, with the limits of its own target."""
         solution.demand_single(self.result, "figures to evaluate")
         design = designs.checked(self.design, self.scene)
         if self.terms:

@@ -1,4 +1,4 @@
-"""Numbers of a table that are only rounding beside the largest of their unit: they are shown as 0."""
+"""Numbers of a table that are rounding errors relative to the largest one of their unit: they are shown as 0."""
 
 from collections.abc import Iterable
 from typing import overload

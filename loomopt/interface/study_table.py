@@ -64,7 +64,7 @@ class ColumnUnits:
 def columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> dict[str, list[NumberColumn]]:
     """Numbers of rows as columns: "place", "optimised", "design", "figures", "multipliers"; none that is empty.
 
-    In the units of the scene, where what is only rounding beside the largest of its unit is 0; si: in SI, as they are.
+    In the units of the scene, with rounding errors as 0; si: in SI, without a change.
     """
     numbers_of: dict[str, Sequence[Mapping[str, float | None]]] = {
         "place": [study.place(row) for row in rows],

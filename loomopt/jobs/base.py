@@ -45,7 +45,7 @@ from loomopt.scenes.tables import SceneSchema
 Ends = tuple[float, float]
 """Lower and upper bound."""
 Minima = Mapping[str, Sequence[tuple[str, float]]]
-"""Variable → which limits ask how much of it at least."""
+"""Variable → the limits that demand a minimum of it, and these minima."""
 
 
 class Task(abc.ABC):
@@ -160,9 +160,9 @@ class Task(abc.ABC):
 
     @lazy
     def variables(self) -> tuple[Variable, ...]:
-        """The variables, no less than limits on their figures ask for. Raises BadInput.
+        """The variables, with the minima that limits on their figures demand. Raises BadInput.
 
-        One without room, or one that does not exist yet, stands at the largest minimum.
+        A variable without room, or without a value today, starts at the largest minimum.
         """
         variables = {v.name: v for v in self.bounded}
         for name, pairs in self.minima.items():
@@ -180,7 +180,7 @@ class Task(abc.ABC):
         return tuple(variables.values())
 
     def _minimum_variable(self, name: str) -> Variable:
-        """Variable that limits ask something of; one that is not there yet stands at the most of it."""
+        """Variable with minima demanded by limits; without a value today it starts at the largest of them."""
         least = max(value for _, value in self.minima[name])
         return next((v for v in self.bounded if v.name == name), Variable(name, least, least, least, (least, least)))
 
@@ -922,7 +922,7 @@ class Job(abc.ABC):
         -------
         Variables by name, SI.
         """
-        # What it has not, such as a free law, stands in the task: others may follow from that.
+        # Numbers that it lacks, such as a free law, are those of the task; others may follow from them.
         return {**self.values(program, {**self.today(scene), **program.today}), **program.today}
 
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:

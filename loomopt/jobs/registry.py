@@ -81,7 +81,7 @@ def names() -> tuple[str, ...]:
 
 @functools.cache
 def find(name: str) -> Job:
-    """Job by name. Raises BadInput for one that nobody brings, that several bring, or that does not import."""
+    """Job by name. Raises BadInput for an unknown job, one of several distributions, or one that does not import."""
     if name in builtin_names():
         job: Job = importlib.import_module(f"loomopt.jobs.{name}.job").JOB
         return job
@@ -151,7 +151,7 @@ def _with_family(schema: SceneSchema) -> SceneSchema:
 
 
 def _external_effect(schema: SceneSchema, name: str) -> Effect | None:
-    """Another distribution's effect of a job; None where nobody brings it. Raises BadInput."""
+    """Another distribution's effect of a job; None if no distribution has it. Raises BadInput."""
     point = _single(EFFECTS, f"{schema.name}.{name}", "effect")
     if point is None:
         return None

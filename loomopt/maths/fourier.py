@@ -64,7 +64,7 @@ def written_out(
     sines: Sequence[Number],
     phi: Number,
 ) -> Number:
-    """Σ cosines[n] cos nφ + sines[n] sin nφ; sines of multiples, for a recurrence would let balls grow."""
+    """Σ cosines[n] cos nφ + sines[n] sin nφ; by sines of multiples, because a recurrence would widen balls."""
     value = cosines[0]
     for n in range(1, len(cosines)):
         angle = n * phi

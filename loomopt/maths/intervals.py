@@ -67,7 +67,7 @@ class Interval:
             products = self.low * other.low, self.low * other.high, self.high * other.low, self.high * other.high
         low = np.fmin(np.fmin(products[0], products[1]), np.fmin(products[2], products[3]))
         high = np.fmax(np.fmax(products[0], products[1]), np.fmax(products[2], products[3]))
-        # Nothing times an end without bound is no number in floats, and 0 here: fmin passes over it beside others.
+        # 0 times an unbounded end is NaN in floats, and 0 here: fmin ignores NaN.
         empty = np.isnan(low)
         if empty.any():
             low, high = np.where(empty, 0.0, low), np.where(empty, 0.0, high)
@@ -130,7 +130,7 @@ class Interval:
 
 
 MANY = 256
-"""Elements from which the next float comes by arithmetic: `np.nextafter` takes each by itself, ten times as long."""
+"""Elements from which the next float comes by arithmetic: `np.nextafter` takes ten times as long."""
 STEP, LEAST = 2.0**-53 * (1 + 2.0**-52), 5e-324
 """x ± (STEP |x| + LEAST), rounded, is the next float, or beside the least normal ones the one after it [Rump,
 Zimmermann, Boldo and Melquiond, BIT 49 (2009), 419-431, Theorem 2.2]."""
@@ -158,7 +158,7 @@ def _outward(x: Floats, sign: float) -> Floats:
 
 
 def interval(x: Number) -> Interval:
-    """Number as an interval; a float, or an array of them, is one that holds nothing else."""
+    """Number as an interval; a float, or an array of floats, becomes intervals of width 0."""
     return x if isinstance(x, Interval) else Interval(x, x)
 
 

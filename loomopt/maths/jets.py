@@ -20,7 +20,7 @@ class Jet:
     """A number that knows its derivatives along n directions.
 
     v: value, a float or of shape S; g: slopes, S + (n,); h: second derivatives, S + (n, n), None to first order. Shapes
-    S broadcast as NumPy's do: nodes of one design are (nodes,), of several (designs, nodes) beside (designs, 1).
+    S broadcast as NumPy's do: nodes of one design are (nodes,), of several (designs, nodes) with numbers (designs, 1).
     """
 
     __slots__ = ("g", "h", "v")

@@ -1,8 +1,8 @@
 """Non-negative least squares (Lawson and Hanson 1974), and the least curvature over the cone that multipliers leave.
 
-The multipliers are independent of the solver. The columns in use are held as Q and R⁻¹ of their QR factors, by Gram and
-Schmidt's method, each column twice [Daniel, Gragg, Kaufman and Stewart, Math. Comp. 30 (1976), 772-795]: one more costs
-two products with Q, not a factorization.
+The multipliers are independent of the solver. The columns in use are stored as Q and R⁻¹ of their QR factors, by Gram
+and Schmidt's method, each column twice [Daniel, Gragg, Kaufman and Stewart, Math. Comp. 30 (1976), 772-795]: one more
+costs two products with Q, not a factorization.
 """
 
 import numpy as np

@@ -123,7 +123,7 @@ class PeriodicCubics(NamedTuple):
 def misfit(angles: Sequence[float], values: Sequence[float]) -> float | None:
     """Rms by which samples, left out one at a time, lie off the curve of the others; None without a curve.
 
-    angles: rad, of one turn or less; where they leave a gap, the samples beside it are corners.
+    angles: rad, of one turn or less; the samples at both sides of a gap are corners.
     """
     count = len(angles)
     for ends in ((), (0, count - 1)):
@@ -249,7 +249,7 @@ def _slopes(widths: "Floats", chords: "Floats", closed: bool) -> "Floats":
 
 
 def _left_out(rows: Sequence[_Row], places: Sequence[int]) -> list[float]:
-    """Squares of how far samples lie off the curve through those beside them."""
+    """Squares of the distances of samples from the curve through their neighbours."""
     squares = []
     for k in places:
         near = [row for j, row in enumerate(rows[: k + NEIGHBOURS + 1]) if j >= k - NEIGHBOURS and j != k]

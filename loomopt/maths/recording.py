@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, NoReturn
 from loomopt.maths.systems import Maths
 
 Number = Any
-"""A recorded number, or one of any number system that stands in a formula as it is."""
+"""A recorded number, or a constant of any number system in a formula."""
 Function = functools.partial[tuple[Number, ...]]
 """function(*called): outputs; its one argument is what it reads of what is known before it is called."""
 Bind = Callable[[Sequence[Number]], Function]
@@ -26,7 +26,7 @@ DEEPEST = 16
 INPUT, LITERAL = "input", "literal"
 ARITHMETIC = frozenset({"{0} + {1}", "{0} - {1}", "{0} * {1}", "{0} / {1}"})
 HARMLESS = re.compile(r"input|literal|pi_\d+|\(.*\)|[-+]\{0\}|\{0\} [-+*] \{1\}")
-"""What raises in no number system. All else is done even where nothing needs its result, for it might fail there."""
+"""Operations that raise in no number system. Others are run even if no result needs them, because they may raise."""
 
 
 class RecordedOperation(NamedTuple):
@@ -118,7 +118,7 @@ class Tape:
         return self._at(len(self.operations), RecordedOperation(INPUT))
 
     def known(self, number: Recorded) -> Recorded:
-        """Input that stands for a number known when the function is bound; an input stands for itself."""
+        """Input in place of a number that is known when the function is bound; an input is returned as it is."""
         return number if self.operations[number.place].template == INPUT else self.input()
 
     def call(self, system: int, function: str, *operands: Number) -> Recorded:

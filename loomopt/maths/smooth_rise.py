@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 EXACT = 1e-11
 """Share of the rise; points that are rounded more finely are interpolated."""
 MARGIN = 1.3
-"""Largest change of a point, in halves of its last digit's unit: the estimate is a little beside the true curve."""
+"""Largest change of a point, in halves of its last digit's unit: the estimate differs a little from the true curve."""
 FEWEST_SMOOTHED = 8
 """Intervals of a part below which nothing is smoothed."""
 FEWEST_JUMPING = 12
-"""Intervals of a part below which no jump is looked for."""
+"""Least number of intervals of a part in which a jump is located."""
 MOST = 720
 """Intervals of the curve; of more points some are left out."""
 SHARP, STEEPEST = 8.0, 4
@@ -38,7 +38,7 @@ SHARP, STEEPEST = 8.0, 4
 JUMP, SURE, MOST_JUMPS = 0.5, 6.0, 6
 """Share of a part's roughness that a jump explains, its standard deviations at least, and jumps of a part at most."""
 SMALLEST = 0.05
-"""Share of the largest s'' below which a jump is none."""
+"""Share of the largest s'' below which a jump is ignored."""
 SAFETY = 2.0
 """Ratio of the reported uncertainty to the estimated one."""
 LESS = 30.0
@@ -51,7 +51,7 @@ class SmoothRise(NamedTuple):
     u, s, v: argument, value and slope at each point; after, before: s'' behind and ahead of each. change: the largest
     change made to a given value; uncertainty: of s'', as a share of its largest size; noise: the part of it that more
     digits lessen; misfit: rms by which inner points, left out one at a time, lie off the curve of the others; jumps,
-    dwells: points, by number, where s'' jumps, and between which the curve stands still.
+    dwells: points, by number, where s'' jumps, and between which the curve is constant.
     """
 
     u: tuple[float, ...]
@@ -153,7 +153,7 @@ def _still(values: "Floats") -> _Columns:
 
 
 def _dwells(values: "Floats", unit: float) -> tuple[tuple[int, int], ...]:
-    """Points between which the curve stands still; unit: of the last digit.
+    """Points between which the curve is constant; unit: of the last digit.
 
     Rounding too makes equal values, where a law sets out slowly: as u^`STEEPEST` it reaches `SHARP` units at twice the
     length of the equal values. A dwell ends where such a law, seen from behind, would set out.
@@ -318,7 +318,7 @@ def _noise(spline: _Spline, half: "Floats", jumps: Sequence[int]) -> "Floats":
 def _jump(spline: _Spline, s: "Floats", half: "Floats", weight: float, jumps: Sequence[int]) -> int | None:
     """Inner point, counted from 0, at which a further jump of s'' explains most; None where none does.
 
-    What is penalised is seen as noise of variance 1/λ beside that of rounding; a jump is a known pattern in it.
+    The penalised differences are noise of variance 1/λ, in addition to rounding; a jump is a known pattern in it.
     """
     import numpy as np
 
@@ -346,7 +346,7 @@ def _jump(spline: _Spline, s: "Floats", half: "Floats", weight: float, jumps: Se
 def _coarseness(before: "Floats", after: "Floats", jumps: Sequence[int]) -> "Floats":
     """Error of s'' at points from the spacing: a cubic's s'' is off by a twelfth of its second difference.
 
-    Each point has the largest of its own and its neighbours'; a difference across a jump is none.
+    Each point has the largest of its own and its neighbours'; a difference across a jump does not count.
     """
     import numpy as np
 

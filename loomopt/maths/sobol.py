@@ -52,7 +52,7 @@ def points(count: int, dimensions: int, seed: int = 0, first: int = 0) -> Floats
 
 
 def _directions(coordinate: int) -> list[int]:
-    """Direction numbers of a coordinate, one for each bit, as integers of so many bits."""
+    """Direction numbers of a coordinate, one for each bit, as integers of that number of bits."""
     if coordinate == 0:
         return [1 << (BITS - 1 - bit) for bit in range(BITS)]
     degree, inner, first = POLYNOMIALS[coordinate - 1]

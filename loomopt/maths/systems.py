@@ -204,7 +204,7 @@ def casadi() -> Maths:
 
 @functools.cache
 def mpmath(digits: int = 40) -> Maths:
-    """Reference digits: mpmath numbers of a context of their own, so that nobody else's precision changes.
+    """Reference digits: mpmath numbers of a separate context, so that the precision of other code does not change.
 
     digits: decimal digits of the context.
     """
@@ -272,7 +272,7 @@ def ball_series(centre: float, half: float) -> Number:
 
 @functools.cache
 def centred_balls() -> Maths:
-    """Taylor series over balls, narrowed by those at their middles, beside plain balls."""
+    """Taylor series over balls, narrowed by those at their middles, together with plain balls."""
     from loomopt.maths.centred_series import CentredSeries
 
     system = balls()
@@ -294,7 +294,7 @@ def centred_balls() -> Maths:
 
 
 def centred_ball_series(centre: float, half: float) -> Number:
-    """Series of a variable itself over the ball centre ± half, beside that at its middle."""
+    """Series of a variable itself over the ball centre ± half, with that at its middle."""
     from loomopt.maths.centred_series import CentredSeries, Offsets
 
     ball: Callable[..., Number] = balls().number

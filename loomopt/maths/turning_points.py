@@ -1,4 +1,4 @@
-"""Where a sampled curve is highest, beside a spike too, and where it turns, followed in any number system."""
+"""Highest points of a sampled curve, spikes included, and its turning points, in any number system."""
 
 from collections.abc import Callable
 from typing import Any
@@ -34,7 +34,7 @@ def turns(slope: Callable[[Floats], Any]) -> list[float]:
     """Crank angles, rad, where slope(angles) changes its sign, the first of them from − to +.
 
     None where it never does, or where the motion has no real position somewhere. A sample where the slope is 0 has no
-    sign: those beside it tell, across the turn's end too.
+    sign: its neighbours decide, across the turn's end too.
     """
     angles = np.linspace(0.0, 2 * np.pi, TURN_SAMPLES + 1)[:-1]
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -122,7 +122,7 @@ def _demand(program: Program, name: str, rows: Sequence[str]) -> None:
 
 @functools.lru_cache(maxsize=64)
 def opposing(model: JobModel, rows: tuple[str, ...]) -> JobModel:
-    """Model with the opposites of rows or numbers beside its own rows."""
+    """Model with its rows and the opposites of rows or numbers."""
     return replace(model, own_rows={**model.own_rows, **{opposite(row): _opposed(model, row) for row in rows}})
 
 

@@ -24,7 +24,7 @@ from loomopt.scenes.scene import Scene
 FLOATS = ("float", "numpy")
 """Number systems of float64."""
 PIECE, NO_LOAD = "piece of the turn", "no_load_speed"
-"""The switch that tells a corner's sides apart, and the motor's speed without load among a design's numbers, rad/s."""
+"""Name of the switch for the two sides of a corner, and of the motor's speed without load, rad/s."""
 
 
 def turned(steady: Sampler, scene: Scene) -> Sampler:

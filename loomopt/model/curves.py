@@ -33,7 +33,7 @@ SPARSE_NEARLY, SPARSE_LEVEL = 0.8, 2e-13
 than a fifth above them. Share by which rows on a level may differ: a thousand roundings of the terms they sum."""
 
 SAME_ROW = 1e-9
-"""rad; an even row this close to a corner stands for it: no plot and no workshop tells them apart."""
+"""rad; a regular row this close to a corner replaces it: no plot and no workshop resolves the difference."""
 
 STEPS = 720
 FORCE: Formula = operator.attrgetter("force")
@@ -53,7 +53,7 @@ class Columns(NamedTuple):
     motion: column name with unit → formula; from name_1, name_2 … with respect to φ follow name_t, name_tt … with
     respect to time, where the speed is known. force: column of the output force, and the quantity (of which sign) that
     it is; torque: likewise of the crank. unit: of the output's terms; the drive's are torques. checks: unit of each
-    check's quantity. after: what stands after torque and power. also: crank angles, rad, that are rows too. closed:
+    check's quantity. after: columns after torque and power. also: crank angles, rad, that are rows too. closed:
     whether the row at 2π is one.
     """
 

@@ -271,7 +271,7 @@ class Family(NamedTuple):
 
 
 def standing_for(program: Program, name: str) -> frozenset[str]:
-    """Variables of a program that stand for a number of the design: itself, or the variables in its limits."""
+    """Variables of a program for a number of the design: itself, or the variables in its limits."""
     if any(variable.name == name for variable in program.variables):
         return frozenset({name})
     return frozenset(limit.row for limit in program.limits if limit.name == name and limit.is_of_variable)
@@ -289,7 +289,7 @@ def together(programs: Sequence[Program], separate: Collection[str], combine: Co
 
 
 UNLIKE = 1e-3
-"""Share of its bounds by which one member's own variable stands beside another's, to see what that moves."""
+"""Share of its bounds by which a variable of one member is moved from another's, to see what changes."""
 
 
 class _Combining:

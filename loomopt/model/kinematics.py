@@ -18,10 +18,10 @@ from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN
 
 NEARLY_SINGULAR = 5e-4
-"""Share by which a dyad's triangle closes, below which peaks stand so close that even samples miss them."""
+"""Share by which a dyad's triangle closes, below which peaks are so narrow that equidistant samples miss them."""
 
 SINGULAR_SAMPLES, WORTH_A_LOOK = 361, 10
-"""Samples of one turn between which the closest position of a triangle is sought, and how many times NEARLY_SINGULAR
+"""Samples of one turn between which the closest position of a triangle is located, and how many times NEARLY_SINGULAR
 its share may be there: between samples a degree apart a top stands at most 4e-5 of its curvature higher."""
 
 OfPhi = Callable[[Maths, Given, Number, Callable[[], Any]], Number]
@@ -87,7 +87,7 @@ class DerivedChain(NamedTuple):
 
 
 class Arcs(NamedTuple):
-    """Stretches of the cycle that limits speak of; switch: as a load's, of its own corners' angles, rad."""
+    """Stretches of the cycle with limits; switch: as a load's, from the angles of its own corners, rad."""
 
     name: str
     corners: Callable[[Maths, Given], tuple[Number, ...]]

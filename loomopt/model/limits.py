@@ -1,7 +1,7 @@
 """Limits of a design task: a class for each kind, with the excess of a design and the nodes where it is active.
 
 A limit is one row of the design, read in any number system, or it holds over the whole cycle, at the extremes of a
-quantity. What solves, proves or reports asks for no more than that: a new kind of either is a class of its own.
+quantity. Solvers, proofs and reports use nothing else, so a new kind of limit or objective is one class.
 """
 
 import abc

@@ -132,7 +132,7 @@ class DesignRow(NamedTuple):
     needs: tuple[str, ...] = ()
     event: str = ""
     loaded: bool = True
-    """Whether one at an event reads the sum of the loads on the output: without any there is none."""
+    """Whether a row at an event reads the sum of the loads on the output; without a load it does not exist."""
     structure: Hashable = None
     """Key that distinguishes formulas of one name."""
 
@@ -814,7 +814,7 @@ class JobModel:
 
 
 RESOLVED = 95
-"""Samples, of those a state asks for, that the rule of a mean resolves to rounding (4 swings of the state's own)."""
+"""Share of a state's samples that suffices for a mean to rounding (4 oscillations of the state)."""
 Word = tuple[str, str, str]
 
 

@@ -68,7 +68,7 @@ class Move(abc.ABC):
     bounds: Mapping[str, tuple[float, float]]
 
     is_apart: ClassVar[bool]
-    """Whether each variable changes by itself."""
+    """Whether each variable changes alone."""
 
     def wished(self, values: Numbers) -> Preference | None:
         """First wish that is valid at these values (SI)."""

@@ -242,7 +242,7 @@ def quadrature(cycle: Cycle, integral: Integral) -> tuple[Pieces, Floats, Floats
 class Rows(abc.ABC):
     """Rows of one design in one number system; subclasses define means over the cycle.
 
-    given: the scene's numbers in that system; stills: the switches just before each event that a row stands at.
+    given: the scene's numbers in that system; stills: switches just before each event at which a row is read.
     """
 
     def __init__(self, model: JobModel, maths: Maths, given: Given, stills: Stills) -> None:
@@ -367,11 +367,11 @@ class BatchReading(Reading):
         self._looked = pieces, self.quantities(names, self.node(pieces, u))
 
     def looked(self, name: str) -> Number:
-        """Quantity at the nodes looked at, (nodes, designs)."""
+        """Quantity at the given nodes, (nodes, designs)."""
         return self._looked[1][name]
 
     def highest(self, name: str, where: Where | None = None) -> Number:
-        """Largest |quantity| (of a signed one, value) of each design at the nodes looked at, (designs,)."""
+        """Largest |quantity| (of a signed one, value) of each design at the given nodes, (designs,)."""
         pieces, values, signed = self._looked[0], self.looked(name), name in self.model.signed
         on = np.flatnonzero(self.model.counted(self.cycle, name, where)[pieces])
         known = plain(values)[on]

@@ -3,7 +3,7 @@
     Q = Σ output terms                 force or torque the mechanism must supply at its output q
     crank torque = Q q' + Σ drive terms        power balance; positive = the motor drives
 
-Only loads that stand in the scene are in the sums. Each term is written in its effect's own file.
+Only loads of the scene are in the sums. Each term is written in its effect's own file.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -61,7 +61,7 @@ class Given(NamedTuple):
 def terms(
     maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values, gone: Collection[str] = ()
 ) -> Iterator[tuple[Acting, Number]]:
-    """Yield each load with its term, but those `gone`; switch: by a load's name, which of its formulas holds.
+    """Yield each load with its term, except those in `gone`; switch: name of a load → number of its valid formula.
 
     See `Load.switch`.
     """

@@ -66,7 +66,7 @@ class Cycle:
         return np.isin(self.switches[:, self.names.index(where[0])], where[1])
 
     def stretch(self, where: Where | None) -> tuple[float, float]:
-        """Crank angles, rad, where a stretch of the cycle that is meant begins and ends."""
+        """Crank angles, rad, at the begin and the end of a stretch of the cycle."""
         on = self.on(where)
         begins, ends = on & ~np.roll(on, 1), on & ~np.roll(on, -1)
         if not begins.any():

@@ -25,7 +25,7 @@ class TargetTable(Table):
 
 
 DIGITS = "decimals of the table's values; by default those printed"
-"""What the key `digits` beside a table is: for cut zeros, or where more are printed than are known."""
+"""Description of the key `digits` of a table: for cut zeros, or for more printed digits than are known."""
 
 Values = Mapping[str, Number]
 """Scene numbers by name, in one number system: `l1`, `M0`, `today.l1`, …"""

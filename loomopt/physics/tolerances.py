@@ -1,13 +1,13 @@
 """Numerical tolerances that several files share, with their origin and use.
 
-Those of one file alone stand in it, a job's own in the job's.
+Tolerances that only one file uses are in that file, those of a job in the job's folder.
 """
 
 ASSEMBLY_MARGIN = 1.001
 """Factor to spare by which every dyad's triangle must close at both ends (assembly margins of all jobs)."""
 
 NO_MASS = 1e-9
-"""Share of the largest counterweight below which there is none: IPOPT stops this far inside its bounds (beatup)."""
+"""Share of the largest counterweight below which it counts as none: IPOPT stops this far inside its bounds (beatup)."""
 
 
 # Sampling and reading

@@ -41,7 +41,7 @@ Piece = tuple[Expression, tuple[Expression, Expression]]
 
 
 MOTION = frozenset({"phi", "theta", "omega", "omega_dot", "q", "beta"})
-"""Symbols of the motion that terms read, beside those of the scene's numbers."""
+"""Symbols of the motion that terms read, in addition to those of the scene's numbers."""
 
 
 def given(model: JobModel, values: Values) -> Given:
@@ -58,7 +58,7 @@ def given(model: JobModel, values: Values) -> Given:
     asks = asks or (has_labels and any(isinstance(load, Load) and load.inside for load in model.loads))
     if not asks:
         return Given(values, symbols_of_effects)
-    # Where a formula asks whether a number is given, those are that the scene gives.
+    # A formula that tests whether a number is given sees the numbers of the scene.
     there = {
         owned(effect, key): value for effect in model.effects for key, value in symbols_of_effects[effect.name].items()
     }

@@ -24,8 +24,8 @@ _GREEK = {"alpha", "beta", "gamma", "delta", "theta", "phi", "psi", "chi", "omeg
 class Equation:
     """Equation: its name, its plain text, and its LaTeX.
 
-    written: its LaTeX, or what writes that when it is first asked for. form: its rows of expressions, signs and words,
-    for other ways to write it; of several the first is the left side.
+    written: its LaTeX, or a function that writes it when it is first read. form: its rows of expressions, signs and
+    words, for other ways to write it; of several the first is the left side.
     """
 
     name: str

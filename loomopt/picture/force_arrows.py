@@ -21,7 +21,7 @@ LAYER, PREFIX = "forces", "force_"
 LONGEST, HEAD = 14.0, 1.2
 """Length of the largest force's arrow, and of its head, in text heights."""
 LEAST = 0.1
-"""Share of the largest force below which an arrow would be no longer than its head: its number alone is told."""
+"""Share of the largest force below which an arrow would be no longer than its head: only its number is printed."""
 
 
 NOWHERE: Mapping[str, str] = Frozen()

@@ -37,7 +37,7 @@ class MechanismDrawing(ABC):
 
     @abstractmethod
     def labels(self, units: Units) -> Sequence[Label]:
-        """Names of joints and links; those first that must stand closest."""
+        """Names of joints and links; joints first, because they must be closest."""
 
     @abstractmethod
     def legend(self, units: Units) -> tuple[tuple[str, str], ...]:
@@ -48,7 +48,7 @@ class MechanismDrawing(ABC):
         return ()
 
     def measures(self) -> tuple[Measure, ...]:
-        """Lengths that stand in the drawing."""
+        """Lengths that are written in the drawing."""
         return ()
 
     @property

@@ -166,7 +166,7 @@ def single_panels(columns: Sequence[str]) -> tuple[Panel, ...]:
 MOST_TWIST = 0.1
 """Share of the output's travel from which on a load can no longer be taken for a function of the crank angle."""
 TWIST_SAMPLES = 3600
-"""Of one turn: a largest value is right to a few digits, as it is told."""
+"""Samples of one turn: enough for the few printed digits of a largest value."""
 
 
 def twist_remarks(scene: Scene, sampler: Sampler) -> tuple[str, ...]:

@@ -39,7 +39,7 @@ WHOLE = 0.5
 LONGEST_TEXT = 20
 """Characters of a cell that a message repeats: a file that is no table may hold what is not to be shown."""
 FIRST_ROWS = 20
-"""Rows among which the heading is looked for: a title may stand above it."""
+"""Number of first rows that may have the heading: a title may be above it."""
 POINT, COMMA = ".", ","
 _HEADINGS = tuple(
     map(re.compile, (r"(.+?)\s*\[(.*)\]", r"(.+?)\s*\((.*)\)", r"(\S+)\s*/\s*(\S+)", r"(\S+)\s+in\s+(\S+)"))
@@ -141,7 +141,7 @@ def read(
 
     given: the file as the scene names it, under `key`; kinds: column name → kind of quantity; marks: columns without a
     unit that may be there, 1 (or x) in the rows that are meant, 0 in all without one; fewest: rows there must be;
-    twice: whether an angle may stand in two rows, for both sides of a corner; digits: decimals of what is no angle, in
+    twice: whether an angle may be in two rows, for both sides of a corner; digits: decimals of what is no angle, in
     place of those printed. Angles that fall are turned round.
     """
     return _table(
@@ -282,7 +282,7 @@ def _split_heading(cells: Cells, kinds: Mapping[str, str]) -> tuple[Row, Sequenc
 
 
 def _find_columns(head: Row, rows: Sequence[Row], kinds: Mapping[str, str], origin: str) -> tuple[list[_Column], int]:
-    """Columns that a heading names, and how many rows of units stand below it, 0 or 1. Raises BadInput."""
+    """Columns that a heading names, and the number of rows of units below it, 0 or 1. Raises BadInput."""
     places = {name: _places(head, name) for name in kinds}
     below = 0
     columns = []
@@ -348,7 +348,7 @@ def _number_and_unit(cell: str, kind: str) -> tuple[str, str] | None:
 
 
 def _without_units(row: Row, columns: Sequence[_Column], origin: str) -> Row:
-    """Row without the units that stand in its cells. Raises BadInput for another unit than the column's."""
+    """Row without the units in its cells. Raises BadInput for another unit than the column's."""
     values = list(row.cells)
     for column in columns:
         number = _number_and_unit(row.cell(column.place), column.kind)

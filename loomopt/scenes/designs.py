@@ -21,7 +21,7 @@ LONGEST = 1000
 LARGEST = 1e60
 """SI; fourth powers of it are still numbers."""
 OUTGROWN = 10.0
-"""Factor on a machine's longest length beyond which a bare number is none in metres: one in mm is off by 1000."""
+"""Factor on a machine's longest length above which a bare number is not in metres: one in mm differs by 1000."""
 MEANT = {"length": "metres", "angle": "radians"}
 """Unit that a user may mean by a bare number, by kind of quantity."""
 Design = Mapping[str, float | Sequence[float]]

@@ -32,9 +32,9 @@ def current_key(key: str, former: Mapping[str, str]) -> str:
 
 
 def current_document(document: Mapping[str, Any], former: Mapping[str, str], origin: str) -> Mapping[str, Any]:
-    """Tables of a scene with today's names of figures; the same object where no former name stands in them.
+    """Tables of a scene with today's names of figures; the same object if they have no former name.
 
-    Raises BadInput where a figure stands under both names.
+    Raises BadInput if a figure has both names.
     """
     tables = {name: _keys(document[name], former, origin, name) for name in TABLES if name in document}
     if isinstance(targets := document.get("targets"), Mapping):

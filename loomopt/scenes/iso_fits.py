@@ -71,7 +71,7 @@ DELTA = {
 }
 """Grade → what is added to the upper deviation of holes K M N (to IT8) and P R S (to IT7), µm."""
 HOLE_M6 = {(250, 315): -9}
-"""Upper deviation of M6, µm, of the one range of sizes, mm, where it is told apart."""
+"""Upper deviation of M6, µm, in the one range of sizes, mm, for which the standard lists it separately."""
 LEAST_GRADE, MOST_GRADE = 5, 11
 SHAFTS = (*ABOVE, "js", *BELOW, *FINE)
 LETTERS = (*SHAFTS, *(letter.upper() for letter in SHAFTS))
@@ -82,7 +82,7 @@ _CLASS = re.compile(r"([A-Za-z]{1,2})([0-9]{1,2})")
 
 
 def split_class(name: str) -> tuple[str, int] | None:
-    """Letter and grade of a tolerance class, None where it is none of the tables."""
+    """Letter and grade of a tolerance class; None if the tables do not have it."""
     match = _CLASS.fullmatch(name)
     if match is None or match[1] not in LETTERS:
         return None

@@ -27,7 +27,7 @@ def _folder(name: str) -> Path:
 
 
 def scenes(folder: Path) -> dict[str, Path]:
-    """Files of the scenes in a folder by name, in alphabetical order; none where there is no such folder."""
+    """Files of the scenes in a folder by name, in alphabetical order; empty without the folder."""
     return dict(sorted((path.stem, path) for path in folder.glob("*.toml")))
 
 
@@ -47,7 +47,7 @@ class Head(NamedTuple):
 
 
 def head(path: Path) -> Head:
-    """Head of a packaged scene, nothing else of which is looked at. Raises BadInput."""
+    """Head of a packaged scene; the rest is not read. Raises BadInput."""
     document = read_document(path)
     title, job, source = (str(looked_up(document, ("problem", key)) or "") for key in ("title", "job", "source"))
     targets = looked_up(document, ("targets",))

@@ -671,7 +671,7 @@ def _build_scene(
     call: Call | None = None,
     before: Scene | None = None,
 ) -> Scene:
-    """Scene that raw tables describe, which nobody else changes.
+    """Scene of raw tables, which no other code changes.
 
     before: a scene whose tables are read again where these are not the very same.
     """

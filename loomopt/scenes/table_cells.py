@@ -12,9 +12,9 @@ from loomopt.base.errors import BadInput, refusal, shown
 from loomopt.scenes.cursor import LARGEST_FILE
 
 ENDINGS = (".csv", ".tsv", ".tab", ".txt", ".xlsx", ".parquet")
-"""Endings of files that are tables; what a file is, its first bytes tell."""
+"""Endings of files that are tables; the first bytes of a file decide its format."""
 MOST_ROWS, MOST_COLUMNS = 2500, 256
-"""Rows and columns of a sheet that are looked at."""
+"""Largest number of rows and columns of a sheet that are read."""
 SEPARATORS = "\t;,|"
 """Separators of cells, the rarer inside a cell first."""
 WORKBOOK, OLD_WORKBOOK, PARQUET = b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1"
@@ -57,7 +57,7 @@ class Cells(NamedTuple):
 def read(raw: bytes, origin: str) -> Iterator[Cells]:
     """Yield the cells of a file for each possible separator; at least once. Raises BadInput.
 
-    raw: what stands in the file; origin: what messages call it.
+    raw: contents of the file; origin: its name in messages.
     """
     if len(raw) > LARGEST_FILE:
         raise refusal("the table is too large", origin, allowed="up to 1 MB", remedy="Thin it out")

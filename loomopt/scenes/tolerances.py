@@ -12,7 +12,7 @@ from loomopt.scenes.cursor import Cursor
 from loomopt.scenes.tables import Place, SceneSchema, label_entries, number_or_waiting
 
 SIGMAS = 3.0
-"""Standard deviations that a plus_minus is worth where nothing is said."""
+"""Standard deviations in a plus_minus by default."""
 SPREADS = ("normal", "uniform")
 FORMS = ("plus_minus", "plus", "class", "fit")
 KEYS = ("plus_minus", "plus", "minus", "class", "fit", "sigmas", "spread", "group", "correlation")
@@ -88,7 +88,7 @@ def read(cursor: Cursor, schema: SceneSchema, known: Sequence[Place]) -> tuple[T
 
 
 def bands(cursor: Cursor, schema: SceneSchema) -> dict[str, float]:
-    """Table [accept]: half the band around an equality or a goal by which machines are judged, SI, by figure."""
+    """Table [accept]: half the band around an equality or a goal within which machines are accepted, SI, by figure."""
     bands: dict[str, float] = {}
     with cursor.faults:
         inner = label_entries(cursor, schema.figures)

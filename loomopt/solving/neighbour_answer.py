@@ -50,7 +50,7 @@ def figure_peaks(scene: Scene, job: Job, program: Program) -> tuple[str, ...]:
 
 @working()
 def evaluated(scene: Scene, search: Search) -> Evaluated | None:
-    """Figures of a search that ended beside its neighbours; None where they do not show it admissible."""
+    """Figures of a search between neighbours; None if they do not show that its design is admissible."""
     best = search.best
     assert best is not None
     result = report.evaluation(scene, search.job, search.program, search.job.design(search.program, best.x), every=True)
@@ -59,7 +59,7 @@ def evaluated(scene: Scene, search: Search) -> Evaluated | None:
 
 @working()
 def answer_of_search(scene: Scene, target: str, search: Search) -> Solution:
-    """Answer of a search that ended beside its neighbours."""
+    """Answer of a search between neighbours."""
     clock = Clock()
     with clock.measure("report"):
         answer = report.answer(scene, target, search, Clash())

@@ -32,7 +32,7 @@ from loomopt.interface.cli.shell import (
 )
 
 HEADER = Path("include", "coin-or", "IpoptConfig.h")
-"""Header with the version of IPOPT: in CasADi's wheel beside its library, else below the prefix of a separate build."""
+"""Header with IPOPT's version: next to its library in CasADi's wheel, else below the prefix of a separate build."""
 UNTOLD = "of a version that it does not tell"
 _VERSION = r'^#define IPOPT_VERSION "(.+)"'
 
@@ -291,7 +291,7 @@ def run(arguments: list[str] | None = None) -> int:
         return BAD_INPUT
     except (KeyboardInterrupt, typer.Abort):
         status = interrupts.INTERRUPTED
-    except BrokenPipeError:  # nobody reads on
+    except BrokenPipeError:  # the reader has closed the pipe
         return 0
     except OSError as error:
         blame = blamed(error)
@@ -300,7 +300,7 @@ def run(arguments: list[str] | None = None) -> int:
         return BAD_INPUT
     except BaseException as error:
         if isinstance(error, SystemExit) and isinstance(error.__context__, BrokenPipeError):
-            return 0  # so Click leaves where nobody reads on
+            return 0  # Click's exit status if the reader has closed the pipe
         from concurrent.futures import BrokenExecutor
 
         if isinstance(error, BrokenExecutor):

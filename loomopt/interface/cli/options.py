@@ -101,7 +101,7 @@ class ComputerOptions(Options):
 
     @contextlib.contextmanager
     def executor(self) -> "Iterator[Executor | None]":
-        """Executor of a Dask cluster, where one is named. Raises BadInput beside a number of workers."""
+        """Executor of a Dask cluster, if one is named. Raises BadInput if a number of workers is given too."""
         if self.dask is None:
             yield None
             return

@@ -145,7 +145,7 @@ def remark(text: str) -> None:
 
 @contextlib.contextmanager
 def former_names_as_remarks() -> Iterator[None]:
-    """Context in which each former name that a scene or an option uses is remarked upon once."""
+    """Context that prints one remark for each former name that a scene or an option uses."""
     reported = set[str]()
 
     def show(

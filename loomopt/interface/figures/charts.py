@@ -1,4 +1,4 @@
-"""The charts of a study as one figure: panels one above the other, their key, drawings of designs beside them."""
+"""The charts of a study as one figure: panels one above the other, their key, and drawings of designs at their side."""
 
 import math
 import textwrap
@@ -25,7 +25,7 @@ from loomopt.picture.shapes import Drawing, extent, plain
 from loomopt.picture.table import restore_spaces
 
 ONE_COLUMN = 5
-"""Panels that stand one below the other; more stand in two columns."""
+"""Largest number of panels in one column; more panels are in two columns."""
 WIDTH, MORE, SKETCH, DIAGRAM, ACROSS = 7.0, 3.6, 3.2, 3.0, 3
 """Inches: of the panels, more of two columns, of the column of designs; of a diagram with equal scales, and how many of
 these stand side by side."""
@@ -96,7 +96,7 @@ def draw(charts: Charts, drawings: Sequence[tuple[str, Drawing]] = ()) -> Any:
             last = not charts.shared or row == rows - 1 or place == len(shown) - 1
             axes.tick_params(labelbottom=last or _is_wide(chart))
             axes.set_xlabel(plain(chart.x.name) if last else "", parse_math=False, fontsize=9)
-            if alone:  # what is drawn stands beside its axis
+            if alone:  # points and their axis
                 axes.set_ylabel("\n".join(textwrap.wrap(plain(chart.title), NAMED)), parse_math=False, fontsize=9)
             panels.append(axes)
         if notes:

@@ -38,13 +38,13 @@ _STYLE = {
     "pdf.fonttype": 42,
     "font.size": 9.0,
     "axes.titlesize": 9.0,
-    # A factor common to an axis would stand where the names above it do.
+    # The common factor of an axis would overlap the names above it.
     "axes.formatter.limits": (-5, 8),
     "axes.formatter.useoffset": False,
 }
 COLOURS = ("#1d4ed8", "#c2410c", "#047857", "#7c3aed", "#b91c1c", "#0e7490", "#a16207")
 STYLES = ("-", (0, (1, 1)), (0, (6, 1.5, 1, 1.5)), (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 3)))
-"""Of curves that stand together: the first of both, the second of both, and so on."""
+"""Lines of several charts in the order of a common key: the first of each, the second of each, and so on."""
 
 
 def draw(drawing: Drawing, path: Path) -> None:
@@ -173,7 +173,7 @@ HEAD_SIZE, TITLE_SIZE = 8.0, 9.0
 HEAD_GAP = 4.0
 """Between rows, pt."""
 ROOMY = 0.95
-"""Share of a width that a legend of several columns may take: numbers beside axes may get wider."""
+"""Share of a width that a legend of several columns may take: the numbers of axes may get wider."""
 HEAD_COLOUR = "#374151"
 HEAD_LEGEND: dict[str, Any] = {"frameon": False, "borderpad": 0.0, "labelspacing": 0.25}
 HEAD_LEGEND |= {"columnspacing": 1.4, "handlelength": 2.6}

@@ -1,4 +1,4 @@
-"""The designs beside the charts of a front or a sweep: at both ends and in the middle, each with its letter."""
+"""Drawings of designs at the charts of a front or a sweep: at both ends and in the middle, each with its letter."""
 
 import textwrap
 from collections.abc import Sequence

@@ -48,7 +48,7 @@ class StoredAnswer(NamedTuple):
 
 
 def read_answer(path: Path) -> StoredAnswer:
-    """Answer in a JSON file, judged in its own scene. Raises BadInput."""
+    """Answer in a JSON file, evaluated in its own scene. Raises BadInput."""
     scene, handed = registry.answered(path)
     evaluation = results.evaluate_design(scene, designs.checked(handed.design, scene, scene.origin), None)
     document = designs.loaded(path)
@@ -65,7 +65,7 @@ def read_answer(path: Path) -> StoredAnswer:
 def _answer(document: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> Answer:
     """Answer of a file, with figures computed anew. A damaged file raises KeyError, TypeError or ValueError."""
     target, limits = document.get("target"), evaluation.limits
-    if target is None or not _of_target(document, evaluation, scene):  # a point of a front, of which its message tells
+    if target is None or not _of_target(document, evaluation, scene):  # a point of a front; its message names the axes
         target = None
         named = {str(limit["name"]) for limit in document["limits"]}
         limits = tuple(limit for limit in limits if limit.name in named)

@@ -107,7 +107,7 @@ def _add_dimensions(document: Any, space: Any, drawing: Drawing) -> list[tuple[f
     ends = [point for measure in drawing.measures for point in (measure.first, measure.second)]
     middle = [sum(axis) / len(ends) for axis in zip(*ends, strict=True)]
     for name, *both, band in drawing.measures:
-        first, second = sorted(both)  # from left to right, so that no text stands on its head
+        first, second = sorted(both)  # from left to right, so that no text is upside down
         across = (second.x - first.x) * (middle[1] - first.y) - (second.y - first.y) * (middle[0] - first.x)
         made = space.add_aligned_dim(
             first,
@@ -154,7 +154,7 @@ def _append(space: Any, primitive: Primitive, text_height: float, version: str) 
         case Line(_, (start, end), False):
             space.add_line(start, end, dxfattribs=layer)
         case Line(_, points, closed, bulges):
-            # Of a polyline each point tells the bulge of the stretch that begins there.
+            # Each point of a polyline has the bulge of the stretch that begins there.
             add = space.add_polyline2d if version == R12 else space.add_lwpolyline
             bent = [(*point, bulge) for point, bulge in zip(points, bulges or (0.0,) * len(points), strict=True)]
             add(bent, format="xyb", close=closed, dxfattribs=layer)

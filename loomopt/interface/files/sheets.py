@@ -25,7 +25,7 @@ DECIMALS = {"point": False, "comma": True}
 """Value of `--decimal` → whether numbers have a decimal comma and cells are separated by semicolons."""
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 WIDEST, ABOUT = 40, "about"
-"""Characters of the widest column; the sheet that tells where all the others come from."""
+"""Characters of the widest column; name of the sheet with the provenance of the others."""
 MADE = datetime.datetime(2000, 1, 1)
 """When a workbook says it was made: the same tables give the same cells and dates."""
 
@@ -120,7 +120,7 @@ def _cell(value: object) -> object:
     if isinstance(value, tuple | list):
         return "; ".join(map(str, value))
     try:
-        number = float(value)  # type: ignore[arg-type]  # what is no number says so
+        number = float(value)  # type: ignore[arg-type]  # raises for a text
     except (TypeError, ValueError):
         return None
     if not math.isfinite(number):

@@ -31,7 +31,7 @@ ENDINGS = (".html", ".gif", ".mp4")
 FILE = "a path that ends in .html, .gif or .mp4", "Name a file, or leave it out"
 """Allowed files of an animation, and the remedy for others."""
 EVERY, RATE = 3, 20
-"""Of GIF and MP4: every so many poses a frame; frames a second."""
+"""Poses per frame of a GIF or an MP4; frames per second."""
 SIZE, FINE = 640, 2
 """Width of a frame, pixels; how many times finer it is drawn, so that lines are smooth."""
 COLOURS = 32

@@ -292,4 +292,4 @@ PARTS: tuple[Callable[[Subject], Iterator[Part]], ...] = (
 )
 """Parts of a page on a design, in order."""
 ONE_MACHINE = (_moving, _curves, _forces, _remarks, _sketch)
-"""Of them those on a machine by itself, which a family has for each of its members."""
+"""Parts on a single machine; a family has them for each of its members."""

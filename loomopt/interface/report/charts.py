@@ -1,4 +1,4 @@
-"""Charts of a page as SVG: curves with a cursor, points, bars; names stand below, where none hides a curve."""
+"""Charts of a page as SVG: curves with a cursor, points, bars; names are below the chart."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

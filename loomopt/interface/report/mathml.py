@@ -9,7 +9,7 @@ from html import escape, unescape
 from loomopt.picture.equations import Equation, Expression, name_parts, sympy
 
 LONG = {" longest": 260, " longer": 170, " long": 115}
-"""Classes of style of equations whose text has more than so many characters: on paper they are set smaller."""
+"""Number of characters of an equation → class of style for longer ones, which are printed smaller."""
 ENTITY = re.compile("&(?!(?:lt|gt|amp|quot);)[A-Za-z]+;")
 """Named entities of HTML that XML lacks."""
 SIGNS = {"<=": "≤", ">=": "≥", "=": "="}

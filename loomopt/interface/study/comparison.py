@@ -117,7 +117,7 @@ class Comparison(Presentation):
         ]
 
     def charts(self) -> Charts:
-        """Curves over the cycle of all designs laid over each other, a chart for each."""
+        """Curves of all designs over the cycle, one chart for each quantity."""
         return _overlaid([(design.name, design.evaluation.scene, design.evaluation.design) for design in self.designs])
 
     def as_dict(self) -> dict[str, object]:

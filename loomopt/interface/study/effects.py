@@ -81,7 +81,7 @@ class EffectsStudy(Presentation):
         return [*lines, *table, *verdict(result), *_notes(result)]
 
     def charts(self) -> Charts:
-        """Bars of shift and regret for each objective beside the tolerance, and of limits where any is exceeded."""
+        """Bars of shift and regret of each objective, with the tolerance, and of the excess of limits."""
         result = self.result
         shown = [_bars(result, name) for name in result.reference.scales] if result.rows else []
         excesses = [row.excess for row in result.rows]
@@ -215,7 +215,7 @@ def _end(share: float | None, signed: bool) -> float | None:
 
 
 def _number(share: float | None) -> str:
-    """Share as the number beside a bar."""
+    """Share as the number at a bar."""
     if share is None:
         return "none"
     return "0" if abs(share) <= SHOWN_AS_ZERO else f"{100 * share:+.3g} %"

@@ -102,7 +102,7 @@ def _bounds(schema: SceneSchema) -> Json:
 
 
 def _by_number(schema: SceneSchema, made: Callable[[Quantity], Json]) -> Json:
-    """A table with a key for every number; made: what stands there, of what the number may be."""
+    """A table with a key for every number; made(quantity): schema of its value."""
     kinds: dict[str, list[Quantity]] = {}
     effects = [effect for effect in schema.effects.values() if not effect.many]
     for model in (schema.mechanism, schema.operation, *(effect.table for effect in effects)):
@@ -220,7 +220,7 @@ def _scene_targets(schema: SceneSchema) -> Json:
 
 
 def _closed_table(properties: Mapping[str, Json], required: list[str] | None = None) -> Json:
-    """A table that holds nothing else."""
+    """A table without further keys."""
     table: Json = {"type": "object", "additionalProperties": False, "properties": dict(properties)}
     return table | ({"required": required} if required else {})
 
@@ -265,7 +265,7 @@ def _without_null(part: Json) -> Json:
 def _hoist_quantities(whole: Json) -> Json:
     """Schema with a single definition of each kind of quantity, in $defs; the keys have their descriptions.
 
-    Defaults are SI numbers inside, where a scene has text with a unit: they are not told.
+    Defaults are left out: they are SI numbers, and a scene has text with a unit.
     """
     kinds: dict[str, Json] = {}
 

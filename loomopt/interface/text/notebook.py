@@ -78,7 +78,7 @@ def _draw(scene: Scene, design: Design, subject: outputs.DrawnSubject | None = N
 
 
 def _on_page(size: re.Match[str]) -> str:
-    """A drawing's size as one that a page takes; letters, as large as the drawing asks, go with it."""
+    """Size of a drawing on a page; its letters are scaled with it."""
     sides = [float(side) for side in size.groups()]
     width, height = (round(PAGE * side / max(sides)) for side in sides)
     return f'width="{width}" height="{height}"'

@@ -67,7 +67,7 @@ class CrankRockerDrawing(MechanismDrawing):
 
     @property
     def radii(self) -> tuple[float, float]:
-        """The radii, m, at which β and the swing are drawn, the first beside the crank's circle."""
+        """Radii, m, at which β and the swing are drawn; the first is next to the crank's circle."""
         return self.lengths.l1 + 2.5 * self.height, 0.5 * self.lengths.l3
 
     @property
@@ -114,7 +114,7 @@ def of(design: Mapping[str, float]) -> CrankRockerDrawing:
 
 
 def _labels(drawing: CrankRockerDrawing, units: Units) -> list[Label]:
-    """Name joints, links with lengths, angles in degrees, masses; joints first: they must stand closest."""
+    """Names of joints, links with lengths, angles in degrees, masses; joints first, because they must be closest."""
     sides, centres, (beta, swing) = drawing.lengths, drawing.centres, drawing.radii
     at, line, quarter, fell = drawing.skeleton.at(FRONT), centres.beta, math.pi / 2, drawing.toward_fell
     a, b, c, d = (at[name] for name in "ABCD")

@@ -103,7 +103,7 @@ class Beatup(Job):
         return {name: values[name] for name in (*VARIABLES, *extra)}
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
-        """NLP's variables, SI, of a design; a counterweight without mass stands at its largest radius.
+        """NLP's variables, SI, of a design; a counterweight without mass is at its largest radius.
 
         Where m4e = 0 the radius has no effect, unless it is limited, and r4e = 0 would hide how s = m4e r4e² can grow.
         """
@@ -169,7 +169,7 @@ class Beatup(Job):
     def say_together(self, members: Sequence[tuple[Scene, Numbers, Figures]], member_numbers: frozenset[str]) -> str:
         """Sentence on the M0/ω² that one ψ'' balances with the counterweights, and on those that it cannot.
 
-        M3 = M0 − J ψ'' ω² there, so that a member balances for J = (M0/ω²)/ψ''; said where nothing else acts.
+        M3 = M0 − J ψ'' ω² there, so that a member balances for J = (M0/ω²)/ψ''; "" if another load acts.
         """
         if not member_numbers.isdisjoint(LENGTHS):
             return ""

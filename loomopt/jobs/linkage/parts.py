@@ -1,7 +1,7 @@
 """The table [parts] of a linkage scene: read into parts, so that a part depends only on those before it.
 
 A number of a part is the name of one in [mechanism], its opposite ("-d"), a multiple ("2 * d", "d / 3"), or a literal
-with its unit; what kind of quantity a name stands for follows from its uses.
+with its unit; the kind of quantity of a name follows from its uses.
 """
 
 import math
@@ -23,7 +23,7 @@ Json = dict[str, Any]
 Kind = Any
 """Type of a number: an annotated float of `base.quantities`."""
 Used = dict[str, tuple[Kind, str]]
-"""Numbers of [mechanism] by name, in the order of their first use: what each may be, and what it is in words."""
+"""Numbers of [mechanism] by name, in the order of their first use: kind and description of each."""
 
 MOST_PARTS, LONGEST_NAME = 100, 40
 """Parts of a linkage that is still one, and letters of a name that fits a table."""
@@ -36,7 +36,7 @@ _MULTIPLE = re.compile(rf"(-?)\s*(?:({_FACTOR})\s*\*\s*)?([^\W\d_]\w*)(?:\s*/\s*
 class NumberKey(NamedTuple):
     """Number of a table; kind: kind of quantity; needed: whether it is required.
 
-    text: what it is in words, {} for the table's name, {key} for another word of the table.
+    text: description, with {} for the table's name and {key} for another word of the table.
     """
 
     kind: Kind

@@ -206,7 +206,7 @@ def _carrier(linked: Chain, form: str, name: str) -> str:
 
 
 def _checked_name(cursor: Cursor, known: Iterable[str], sort: str) -> str:
-    """Name of one of those that are known. Raises BadInput."""
+    """Name after a check that it is known. Raises BadInput."""
     return cursor.word(sorted(known), sort)
 
 
@@ -764,7 +764,7 @@ def _check_windows(scene: Scene, known: LinkageScene) -> None:
 
 
 def _check_output(scene: Scene, linkage: Linkage) -> None:
-    """Raise BadInput for an output that stands still, or an angle that jumps at its cut."""
+    """Raise BadInput for an output that does not move, or an angle that jumps at its cut."""
     phi = np.linspace(0.0, 2 * math.pi, SCAN + 1)
     given = Given(dict(scene.mechanism), {})
     node = Node(phi, linkage.chain.switch(scene.mechanism, phi))
@@ -809,7 +809,7 @@ def _check_events(scene: Scene, linkage: Linkage) -> None:
 
 
 def ambiguity(scene: Scene, turns: Sequence[Turn], place: EventRule) -> str:
-    """Sentence on an extreme that other turns equal within `LEVEL` of the swing; "" for one that stands alone."""
+    """Sentence on an extreme that other turning points equal within `LEVEL` of the swing; "" for a single one."""
     choice = extreme_turn(tuple(turns), place)
     swing = max(turn.q for turn in turns) - min(turn.q for turn in turns)
     equal = [turn for turn in turns if turn.extreme == place.extreme and abs(turn.q - choice.q) <= LEVEL * swing]

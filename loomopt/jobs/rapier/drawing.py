@@ -170,7 +170,7 @@ def _labels(drive: Drive, units: Units) -> list[Label]:
 
 
 def _joints(drive: Drive) -> list[Label]:
-    """Name the joints; those that stand closer together than texts are high share one label."""
+    """Names of the joints; joints that are closer than the height of a text share one label."""
     skeleton, pivots = drive.skeleton, {"A0": 0.0, "B0": math.pi, "C0": 0.0}
     labels = [Label("frame", skeleton.pivots[name], side, name) for name, side in pivots.items()]
     sides = {"A": math.pi / 4, "B1": math.pi / 2, "B2": math.pi, "C": -math.pi / 2, "D": math.pi}

@@ -31,7 +31,7 @@ class Rapier(Job):
     """A five-bar rapier drive on the sley of a four-bar, with one 2:1 gear."""
 
     name = "rapier"
-    # Its table is read with the design: by the time somebody asks for the figure the file may be another.
+    # Its table is read with the design, because the file may change before the figure is read.
     at_once = ("match_rms",)
     own_schema = SCHEMA
     task = RapierTask

@@ -139,7 +139,7 @@ class RapierDrive:
         return DriveLinkage(dimensions, rapier_drive.Sley(maths, dimensions).centres)
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
-        """Sley's stand, the driving link's direction at front dead centre, and the turns if called in."""
+        """Sley's stand, the driving link's direction at front dead centre, and the turning points if requested."""
         values, centres = given.values, shared_linkage(given).centres
         quantities = {"beta": centres.beta, "frame_angle": values["phi30"] - centres.psi_front}
         stand = rapier_drive.Stand(quantities["beta"], quantities["frame_angle"])
@@ -269,7 +269,7 @@ def model(
     arcs: tuple[tuple[float, str], ...] = (),
     means: tuple[Integral, ...] = (),
 ) -> JobModel:
-    """Drive with effects; arcs: the dwells that limits speak of; means: those that a target reads."""
+    """Drive with effects; arcs: dwells with limits; means: means that a target reads."""
     driven = drive.quantities(effects, known)
     quantities = QUANTITIES | (TAPE_FORCE if driven else {}) | driven
     stretches = (dwells(arcs),) if arcs else ()

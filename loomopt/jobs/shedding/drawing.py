@@ -1,6 +1,6 @@
-"""The cam with its roller follower at full scale, the return spring beside it; the profile as a table.
+"""The cam with its roller follower and the return spring at full scale; the profile as a table.
 
-The cam stands still as it is at the beginning of the rise, and the arm goes round it, which shows the same contact.
+The cam is drawn at the beginning of the rise, and the arm moves round it, which shows the same contact.
 """
 
 import functools
@@ -80,7 +80,7 @@ def deviation(curves: Callable[[Pieces, Floats], Sequence[Floats]], pieces: Piec
 
 
 def _divided(pieces: Pieces, left: Floats, right: Floats, parts: NDArray[np.int_]) -> tuple[Pieces, Floats, Floats]:
-    """Intervals [left, right] of pieces, each divided into so many equal parts."""
+    """Intervals [left, right] of pieces, each divided into a number of equal parts."""
     which = np.repeat(np.arange(len(parts)), parts)
     place = np.arange(len(which)) - np.repeat(np.cumsum(parts) - parts, parts)
     low, high, share = left[which], right[which], parts[which]
@@ -286,7 +286,7 @@ class Picture:
 
     @property
     def spring(self) -> ReturnSpring:
-        """The return spring, with the heald frame beside the cam."""
+        """The return spring and the heald frame, at the side of the cam."""
         top = Point(float(self.cam.follower.centre_distance) + 24 * self.height, 0.0)
         return self.cam.spring(top, self.height)
 
@@ -321,7 +321,7 @@ OUTLINE = 180
 
 
 def motion(cam: CamDrawing, angles: Floats) -> MechanismMotion:
-    """Cam turning at cam angles, rad, under its arm, and the frame with its spring beside it.
+    """Cam at cam angles, rad, under its arm, and the frame with its spring at its side.
 
     An output that leaves the cam is shown on it.
     """
@@ -407,7 +407,7 @@ def _frame(drawn: Picture) -> list[Primitive]:
 
 
 def _labels(drawn: Picture, units: Units) -> list[Label]:
-    """Name shaft, joints, sizes and the cam's segments in degrees; joints first: they must stand closest."""
+    """Name shaft, joints, sizes and the cam's segments in degrees; joints first, because they must be closest."""
     cam, shaft, near = drawn.cam, drawn.skeleton.pivots["A"], drawn.skeleton.joints[NEAR]
     labels = [Label("frame", shaft, -math.pi / 4, "A")]
     for name, theta in drawn.theta.items():
@@ -475,8 +475,8 @@ def _law(scene: Scene, cam: CamDrawing) -> str:
 def joints_csv(scene: Scene, cam: CamDrawing) -> str:
     """Profile as CSV: cam angle, X, both curves in the cam's frame, pressure angle, curvature.
 
-    Digits round-trip. Rows stand every half degree and at every corner of the law, from 0 to 360 deg; where the
-    curvature jumps, the angle stands twice, with both one-sided values.
+    Digits round-trip. There are rows every half degree and at every corner of the law, from 0 to 360 deg; where the
+    curvature jumps, there are two rows with both one-sided values.
     """
     import pandas as pd
 

@@ -90,7 +90,7 @@ class Shedding(Job):
     task = SheddingTask
 
     def check(self, scene: Scene) -> None:
-        """Raise BadInput when the cam does not close, its law is none, or the follower cannot work."""
+        """Raise BadInput if the cam does not close, its law is invalid, or the follower cannot work."""
         check_motion(scene)
         several = scene.table(HealdFrame).segments
         angles = [piece.angle for piece in several] if several else [scene.mechanism[name] for name in SEGMENTS]
@@ -277,7 +277,7 @@ class Shedding(Job):
         known, law, model = scene.mechanism, scene.table(LawTarget), self.model(scene)
         free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
         alike = known["rise"] == known["return"] and not free and not law.symmetric
-        # A curve over the cam angle is no force that position and motion tell.
+        # A curve over the cam angle is not a function of position and motion.
         if curves(scene) or scene.table(HealdFrame).segments:
             return None
         if not alike or set(scene.limits) - {LIMIT} or model.known_in or model.demands:
@@ -307,7 +307,7 @@ def _least(extremes: list[Extreme], sampled: Sampler) -> tuple[float, float]:
 
 
 def contact_dwells(model: JobModel) -> str:
-    """Dwells, in words, that the cam force is judged in; "" where it is known all round."""
+    """Dwells, in words, in which the cam force is checked; "" if it is known for the whole turn."""
     names = [SEGMENTS[k] for k in frame(model).segments if (SEGMENT, float(k)) in model.known_in]
     known = [name.replace("_", " ") for name in names]
     return "both dwells" if len(known) > 1 else f"the {known[0]}" if known else ""

@@ -29,7 +29,7 @@ from loomopt.physics.schema import Table, Values
 
 FOLLOWER = ("arm", "centre_distance", "base_radius", "roller_radius", "arm_swing")
 RISE, FAR_DWELL, RETURN, NEAR_DWELL = range(4)
-"""The cam's segments in order, as the numbers that stand for them."""
+"""Numbers of the cam's segments in order."""
 DWELLS = FAR_DWELL, NEAR_DWELL
 LEAST, MOST = -1, 1
 """End of the range of forces in a dwell that are not determined: the least cam force, or the largest."""
@@ -139,7 +139,7 @@ class CamFrame:
 
     @property
     def groups(self) -> Mapping[str, Group]:
-        """None: a cam has no singular position that its follower's check lets pass."""
+        """None: a cam that passes its follower's check has no singular position."""
         return {}
 
     @lazy
@@ -254,7 +254,7 @@ class Segment(NamedTuple):
 
 
 def height(k: int) -> str:
-    """Name of X, m, at the end of segment k; that of the last stands at the beginning too."""
+    """Name of X, m, at the end of segment k; the last one is also that at the beginning."""
     return f"segments.{k + 1}.to"
 
 

@@ -308,7 +308,7 @@ class SheddingTask(Task):
             return AT_REST, FASTEST
         if not self.minima:
             return ()
-        # At its own speed the frame is judged anyway: the same row twice would have no price.
+        # The row at the frame's own speed exists already; the same row twice would have no price.
         least = self.scene.limits[CONTACT_SPEED].min
         is_checked = self.varies_speed or ("speed" not in self.limited and self.known["speed"] == least)
         return (AT_REST,) if is_checked else (AT_REST, FASTEST)

@@ -40,7 +40,7 @@ from loomopt.scenes.tables import SceneSchema
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 CYCLOID = 2 * math.pi
-"""Peak s'' of the cycloidal law, which bounds a free law where the scene says nothing else."""
+"""Peak s'' of the cycloidal law, the default bound of a free law."""
 NAMED_LAW = Literal[
     "cycloidal",
     "harmonic",
@@ -174,7 +174,7 @@ TARGETS = {
 
 
 def has_dwells(mechanism: Mapping[str, Any]) -> tuple[bool, bool]:
-    """Whether there is a far dwell, and a near one in the rest of the turn; a rest that is rounding is none."""
+    """Whether there is a far dwell, and a near one in the rest of the turn; a dwell of the size of rounding is none."""
     rise, far, turn, near = (float(mechanism[name]) for name in SEGMENTS)
     return far > SAME_ANGLE, min(near, 2 * math.pi - (rise + far + turn)) > SAME_ANGLE
 
@@ -270,7 +270,10 @@ def cam_law(scene: Scene) -> CamLaw:
 
 
 def check_known(scene: Scene, there: Collection[Where], called: str) -> None:
-    """Raise BadInput where a load is known on pieces of the cycle only, and none of them is there; called: these."""
+    """Raise BadInput if a load is known on some pieces of the cycle only, and the motion has none of them.
+
+    called: names of the pieces.
+    """
     for effect in (effect for effect in scene.active if isinstance(effect, Load)):
         effect_words = {key: word for name, key, word in words(scene) if name == effect.name}
         places = effect.known_in(effect_words)
@@ -285,7 +288,7 @@ def check_known(scene: Scene, there: Collection[Where], called: str) -> None:
 
 
 def check_law(scene: Scene) -> None:
-    """Raise BadInput where the scene's cam law is none."""
+    """Raise BadInput if the cam law of the scene is invalid."""
     name = scene.table(HealdFrame).law
     for key, of in (("law_coefficients", "spline"), ("law_table", "table")):
         if getattr(scene.table(HealdFrame), key) is not None and name != of:
@@ -308,7 +311,7 @@ def _coefficients(scene: Scene) -> tuple[float, ...]:
 
 
 UNCLEAR = 0.1
-"""Share of its peak to which a table must tell s'' where accelerations are read."""
+"""Share of its peak to which s'' of a table must be known if accelerations are read."""
 FINER, CLOSER = (1, 2, 3, 4), (2, 4)
 """More digits that may help where a table is unclear, and how many times more rows."""
 LAW_TABLE = "mechanism.law_table"
@@ -366,7 +369,7 @@ class LawRead(NamedTuple):
 
 
 def refuse_unclear(scene: Scene, reads_accelerations: bool) -> None:
-    """Raise BadInput where the digits of the law's table cannot tell the accelerations that are read."""
+    """Raise BadInput if the digits of the law's table are too few for the accelerations that are read."""
     if scene.table(HealdFrame).law != "table" or not reads_accelerations:
         return
     reading = read_law(scene)

@@ -1,4 +1,4 @@
-"""Kinds of effects. Every job accepts every kind, or refuses it by name; nothing else knows an effect's name.
+"""Kinds of effects. Every job accepts every kind, or refuses it by name; no other code knows an effect's name.
 
 An effect that is absent from a scene is absent from its equations.
 """
@@ -198,7 +198,7 @@ class Effect:
     models : needs of each word of the key `model`.
     many : whether the table holds one table for each of several instances.
     kind, instance : of an instance, its effect and its own name.
-    alone : effect whose values may stand in the table of several instances directly; None where that is a mistake.
+    alone : effect whose values may be directly in the table of several instances; None where that is a mistake.
     of_masses : what the effect reports that depends on where masses move, in words; "" for nothing.
     """
 
@@ -233,7 +233,7 @@ class LoadTable(NamedTuple):
     """A curve of one's own that a load may be: the key of its table that names a CSV file over the crank angle.
 
     column, kind: what of the file is the curve, and its kind of quantity; angle: what its angles count from, in words.
-    instead: keys of the effect's table that it stands for; needless: of what the effect needs, what it does without.
+    instead: keys of the effect's table that it replaces; needless: needs of the effect that do not apply with it.
     second_column: another column of the file, of the same kind, with which the first one makes a vector.
     Its words (`own[key]` of the formulas) are the curve itself, a `PeriodicCubic`, or the vector's `PeriodicCubics`.
     """

@@ -269,7 +269,7 @@ class OnGuide:
 
     @property
     def spans(self) -> Mapping[str, Callable[[], Number]]:
-        """Singular where the link stands across the guide."""
+        """Singular where the link is perpendicular to the guide."""
         return {"span": lambda: dyad.square(self.height / self.r)}
 
     def across(self) -> Number:
@@ -366,7 +366,7 @@ class Slotted:
 
     @property
     def spans(self) -> Mapping[str, Callable[[], Number]]:
-        """Singular where the joint stands beside the pivot on the line's normal; without an offset, at the pivot."""
+        """Singular where the joint is on the normal of the line through the pivot; without an offset, at the pivot."""
         offset = self.offset
         if offset is None:
             return {"span_pass": lambda: passing(self._base, self._base_1)}

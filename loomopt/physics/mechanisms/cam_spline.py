@@ -29,7 +29,7 @@ FALLS = 1e-9
 FEWEST, MOST = 4, 256
 """Intervals of a spline law."""
 DIP = 5e-3
-"""How far below 0 a table's slope (1 on average) may fall: what few digits, or wide steps, leave beside a dwell."""
+"""How far below 0 a table's slope (1 on average) may fall: the error of few digits, or wide steps, next to a dwell."""
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ class Ref(NamedTuple):
     value: float = 0.0
 
     def of(self, values: Values) -> Number:
-        """Number that a name stands for, SI."""
+        """Number of a name, SI."""
         value = values[self.name]
         if self.factor in (1, -1):
             return value if self.factor > 0 else -value

@@ -1,6 +1,6 @@
 """Points and links that move with the crank angle φ: positions and their derivatives up to the third.
 
-Lengths in m, angles in rad, derivatives with respect to φ. What nobody reads is not computed. None stands for what is
+Lengths in m, angles in rad, derivatives with respect to φ. Only what is read is computed. None stands for what is
 zero by construction, such as the velocity of a pivot: it is in no formula. Directions are unit vectors, never angles,
 so that nothing here has a branch cut. What belongs to one position is no frozen record: that takes twice as long to
 make, and positions are made by the million.

@@ -16,7 +16,7 @@ from loomopt.physics.motion.free import Body, FreePiece, Moving, bound, safe, un
 
 TURN = 2 * math.pi
 CHATTER = 1e-6
-"""Share of the cam's largest speed below which a rebound is none: the hops of 1e-9 sink below the rounding of x."""
+"""Share of the cam's largest speed below which there is no rebound: hops of 1e-9 are below the rounding of x."""
 REPEATED = 1e-9
 """Share of the stroke, and of the stroke times the cam's speed, by which two states may differ and be one."""
 LEAST_STEP = 1e-15

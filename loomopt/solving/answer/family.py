@@ -18,7 +18,7 @@ Evaluation = Callable[[Scene, Job, Program, Mapping[str, float]], Evaluated]
 
 
 def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float], alone: Evaluation) -> Evaluated:
-    """Evaluation of a family's design, with each member by itself; alone: evaluates one machine.
+    """Evaluation of a family's design and of each member; alone: evaluates one machine.
 
     A figure that is equal for all members is the family's; otherwise each member has its own. An objective has also the
     value of the member that decides it.

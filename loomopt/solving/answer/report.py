@@ -63,9 +63,9 @@ def evaluated(scene: Scene, job: Job, target: str, design: Mapping[str, float]) 
 
 @working()
 def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float], every: bool = False) -> Evaluated:
-    """A design's figures and limits, each limit judged from the figures alone.
+    """Figures and limits of a design; each limit is checked from the figures alone.
 
-    every: whether all extremes that are figures are looked for at once, as where all figures are read.
+    every: whether all extremes that are figures are computed in one batch, as if all figures are read.
     """
     if job.members:
         from loomopt.solving.answer import family
@@ -99,11 +99,11 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
 def _findings(
     program: Program, figures: Mapping[str, float | None], design: Mapping[str, float], sampler: Sampler
 ) -> tuple[Finding, ...]:
-    """All limits with their values, the tightest of each side, judged to 1e-9 of their scales."""
+    """All limits with their values, the tightest of each side, checked to 1e-9 of their scales."""
     sides: dict[tuple[str, bool], dict[int, float]] = {}
     sizes: dict[tuple[str, bool], float] = {}
     peaks: dict[str, float] = {}
-    # Figures that no limit speaks of are left to whoever reads them.
+    # Figures without a limit are computed when they are read.
     sources = (peaks, sampler.static, figures, design)
     for limit in program.limits:
         if limit.hidden:

@@ -257,7 +257,7 @@ class Evaluated:
     terms: Terms | None = field(default=None, kw_only=True, repr=False, compare=False)
     """Terms of its judgement; None for its target alone."""
     members: tuple["Evaluated", ...] = field(default=(), kw_only=True, repr=False)
-    """Machines of a family, each by itself."""
+    """Machines of a family."""
     change: Mapping[str, Any] = field(default_factory=dict, kw_only=True, repr=False)
     """Changes of the scene by a member of a family: dotted key → value."""
 

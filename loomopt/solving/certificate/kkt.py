@@ -91,7 +91,7 @@ def _pieces(sampler: Sampler, place: int, objective: Objective) -> list[ActiveRo
 
 
 def move_rows(rows: Sequence[ActiveRow], sampler: Sampler) -> tuple[ActiveRow, ...] | None:
-    """Rows with their extremes at another design; None if an extreme is gone."""
+    """Rows with their extremes at another design; None if an extreme no longer exists."""
     ends = _values_at_ends(rows, sampler)
     moved_rows = list[ActiveRow]()
     for k, row in enumerate(rows):
@@ -119,7 +119,7 @@ def _values_at_ends(rows: Sequence[ActiveRow], sampler: Sampler) -> dict[int, fl
 
 
 def _move_extreme(node: Extreme, extremes: Sequence[Extreme]) -> Extreme | None:
-    """Extreme into which a node has moved; None if it is gone."""
+    """Extreme into which a node has moved; None if it no longer exists."""
     candidates = [
         extreme for extreme in extremes if extreme.piece == node.piece and abs(extreme.u - node.u) <= FARTHEST_MOVE
     ]

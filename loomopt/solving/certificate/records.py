@@ -152,7 +152,7 @@ class Certificate:
 class GlobalLevel(NamedTuple):
     """Bound of one objective over all admissible designs that are as good at the levels before it.
 
-    objective: its figure; sense: whether the least or the most is sought; best: value of the answer, SI; bound: bound
+    objective: its figure; sense: whether it is minimised or maximised; best: value of the answer, SI; bound: bound
     of all designs, SI; gap: between the two, relative; band: by how much a design may be worse than `best` and still
     count at later levels, SI; proven: whether the gap is small enough.
     """

@@ -92,7 +92,7 @@ class ClosedDirections:
         return np.asarray(SLOPE_ERROR * size / self.bends)
 
     def step(self, x: Mapping[str, float]) -> Floats | None:
-        """Step (c,) along the directions from a design (SI) to the valley; None where a row is gone."""
+        """Step (c,) along the directions from a design (SI) to the valley; None if a row no longer exists."""
         sampler = sampler_at(self.program, x)
         rows = move_rows(self.rows, sampler) if sampler else None
         if sampler is None or rows is None:
@@ -350,7 +350,7 @@ class FeasibleCurve:
         }
 
     def _values(self, sampler: Sampler) -> Floats | None:
-        """Every row at a design, scaled, with moving extremes; None where an extreme is gone."""
+        """Every row at a design, scaled, with moving extremes; None if an extreme no longer exists."""
         rows = move_rows(self.rows, sampler)
         return None if rows is None else np.array([_value(row, sampler) for row in rows])
 

@@ -187,7 +187,7 @@ class Boxes(Reading):
         if name in self._together and box not in self._shared and len(self._shared) < SHARED_BOXES:
             try:
                 self._shared[box] = self._middles[piece, centre] = self._centred_series(self._together, *box)
-            except (ValueError, ZeroDivisionError):  # of one of them: each is read by itself
+            except (ValueError, ZeroDivisionError):  # one of them fails: each is read alone
                 self._shared[box] = {}
         known = self._shared.get(box, {})
         value = known[name] if name in known else self._centred_series((name,), *box)[name]

@@ -260,7 +260,7 @@ class _Choices:
 class Expressions(NamedTuple):
     """x: variables of design and extra ones, scaled; p: parameters; f: objective; g: rows, each ≤ 0 or = 0.
 
-    lifts: the lifted variables, which rows read beside x.
+    lifts: the lifted variables, which rows read in addition to x.
     """
 
     x: Any

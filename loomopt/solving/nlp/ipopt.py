@@ -37,11 +37,12 @@ a front of ten in an optimum that is 1.8 % worse.
 """
 
 SLOTS_WITH_STATIONS = 2, 1
-"""Both numbers where rows stand at corners from the first. None of 28 free cam laws of 16 and 64 intervals, with every
-effect, ends with a node other than its knots, and each node with room adds a twentieth to the time of building."""
+"""Both numbers if there are rows at corners from the first solve on. None of 28 free cam laws of 16 and 64 intervals,
+with every effect, ends with a node other than its knots, and each node with room adds a twentieth to the time of
+building."""
 
 FIRST_SHARE, FIRST_ROOM = 1.01, 0.01
-"""Factor and room by which a first epigraph variable stands above its rows: inside, so that IPOPT need not move it."""
+"""Factor and room by which a first epigraph variable is above its rows: inside, so that IPOPT need not move it."""
 
 ELASTIC_SHARE = 1e-3
 """Share of a positive lower bound below which no relaxation goes: lengths stay positive."""
@@ -256,7 +257,7 @@ class Calls:
 STOPPED = frozenset({"NonIpopt_Exception_Thrown", "User_Requested_Stop"})
 """Statuses of IPOPT after its callback raised an error or requested a stop."""
 WARNING, ON_CTRL_C = "CasADi - ", "KeyboardInterruptException"
-"""Prefix of CasADi's warnings, and the warning on Ctrl-C, which tells the user nothing new."""
+"""Prefix of CasADi's warnings, and the warning on Ctrl-C, which is not news to the user."""
 
 
 class IpoptAnswer(NamedTuple):

@@ -1,7 +1,7 @@
 """Order of an NLP's variables and rows; multipliers are read by variable, limit and row family, never by index.
 
 Rows: limits that are a row each; smooth pieces below epigraph variables; whole-cycle rows at stations, family by
-family; whole-cycle rows at nodes, so many slots of each family; behind all these the definitions of lifted variables.
+family; whole-cycle rows at nodes, in the slots of each family; then the definitions of lifted variables.
 Variables: the design's; the extra ones, which are epigraph variables, or excesses of an elastic NLP; the lifted ones.
 """
 

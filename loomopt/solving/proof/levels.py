@@ -30,7 +30,7 @@ LEAST_SIZE = 1e-3
 """Share of its scale below which an optimum is as good as 0: the gap is then relative to that share."""
 
 LOOKED_AT = 16
-"""Promising middles of a batch that are judged as designs, each of which takes a millisecond."""
+"""Number of promising middles of a batch that are evaluated as designs, a millisecond each."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Levels:
         except OpenError as error:
             self.why = str(error)
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
-            # A formula that decides by a value, or raises to a power that is no whole number, is none for boxes.
+            # Boxes cannot run a formula that branches on a value, or has a power that is not a whole number.
             self._levels, self.why = [], "a formula of this scene does not run in intervals"
 
     def run(self, until: float, say: Callable[[str], None]) -> LevelOutcome:

@@ -198,7 +198,7 @@ class BoxRow(NamedTuple):
 
     of: its level, or LIMIT; row: what it reads; sign, scale: row = sign · value / scale; single: reads a value of the
     design, None for a whole-cycle row, which is above its bound on the pieces `where`, with extremes of the answer
-    beside the worst node of each box; placed: whether it depends on the order of corners.
+    in addition to the worst node of each box; placed: whether it depends on the order of corners.
     """
 
     of: int
@@ -362,7 +362,7 @@ class _EventError(Exception):
 
 
 class _Nowhere(dict[str, Values]):
-    """Switches of no event: a row that asks for those of one raises _EventError."""
+    """Switches without events: a row that reads those of an event raises _EventError."""
 
     def get(self, event: str, default: Values) -> Values:  # type: ignore[override]
         """Default for rows of the design alone."""

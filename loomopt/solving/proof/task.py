@@ -112,7 +112,7 @@ def _added(values: Interval, count: int) -> Interval:
 class Scale:
     """Scale of similar designs: one length is fixed at its upper bound, the others are relative to it.
 
-    bounds: of all lengths, SI; still: the one that stands.
+    bounds: of all lengths, SI; still: the fixed one.
     """
 
     bounds: Mapping[str, tuple[float, float]]

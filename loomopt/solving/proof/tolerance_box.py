@@ -33,7 +33,7 @@ BATCH = 256
 MOST_PARTS = 6000
 """Parts after which a claim is undecided: those of packaged scenes take 2400 at most, with links of ISO 2768-m."""
 FIRST_PARTS = 32
-"""Parts of a piece of the cycle to begin with: the whole piece tells nothing."""
+"""Number of first parts of a piece of the cycle: bounds over the whole piece are too wide."""
 SHARES = 16
 """Parts of 1 by which two nodes are weighted."""
 ROOM = 1e-13

@@ -83,7 +83,7 @@ BATCH = 2048
 NARROWED = 0.6
 """Share of a box's width that is left of one side when it is read again before it is halved."""
 SMALLEST = 1e-12
-"""Share of the whole box below which a box is not halved any more: floats would not tell its middle."""
+"""Share of the whole box below which a box is not halved any more: floats would not resolve its middle."""
 STEEP = 1e3
 """What a slope without bound counts for where the side to halve is chosen."""
 ROOM = 1e-14

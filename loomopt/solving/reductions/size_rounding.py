@@ -41,7 +41,7 @@ MOST_POINTS, BLOCK = 10_000_000, 2**16
 MOST_BOXES = 600
 """Boxes of sizes that are solved at most."""
 AFFINE = 1e-9
-"""Scale of a level within which it is zero where a straight line says so."""
+"""Largest value, scaled, of a level that counts as zero at the root of its straight line."""
 AGREES = 1e-7
 """Share of its scale by which a level read on the lattice and as solved may differ."""
 
@@ -56,7 +56,7 @@ class SizeRounding:
     steps: Mapping[str, object] | None = None
 
     def apply(self, task: Task) -> Task:
-        """Task without sizes. Raises BadInput for sizes that are none."""
+        """Task without sizes. Raises BadInput for invalid sizes."""
         if task.global_proof:
             remedy = "Leave out --global: a rounded answer reports what was checked on the lattice"
             raise refusal("--global cannot be combined with --round", "", "round_to", remedy=remedy)
@@ -206,7 +206,7 @@ def _agree(lattice: Lattice, answer: Solution, best: Best) -> bool:
 
 
 def _read_lattice(lattice: Lattice, nominal: Solution) -> Best | None:
-    """Best point of the whole lattice; None where more than one number is free beside the sizes."""
+    """Best point of the whole lattice; None if more than one number without sizes is free."""
     program, job = lattice.program, lattice.job
     assert nominal.point is not None
     names = {lattice.scene.full(name): grid for name, grid in lattice.sizes.items()}

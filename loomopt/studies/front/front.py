@@ -26,7 +26,7 @@ FEWEST = 3
 ENDS = "LO:HI UNIT as text, or both ends as numbers in SI"
 """How a range is given."""
 LIMITING_SIDE: Mapping[Sense, str] = {"least": "min", "most": "max"}
-"""End of an axis to reach → side of a limit that stands in its way."""
+"""Sense of an axis → side of a limit that excludes the end of its front."""
 NONE = "none"
 """What is given in place of a target, where the scene's limits alone hold."""
 Ranges = Mapping[str, tuple[float, float]]

@@ -421,7 +421,7 @@ def _upright(left: Spot, right: Spot) -> bool:
 
 
 def _best(rows: Mapping[int, Row], end: int, name: str, sign: int) -> Row:
-    """Row of an end: the best of the rows that were solved for it."""
+    """Row of an end: the best of its solved rows."""
     again = [row for row in rows.values() if row.certified and row.warm["again"] == end and not row.place]
     return min((rows[end], *again), key=lambda row: sign * value(row, name))
 

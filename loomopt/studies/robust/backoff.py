@@ -484,7 +484,7 @@ def _not_optimal(request: Request, answer: Solution, sigmas: float) -> Solution:
 
 
 def _uncertified(request: Request, answer: Solution, status: str, problem: str) -> Solution:
-    """Answer without a certificate, judged by the limits of the scene; problem: the reason, as a sentence."""
+    """Answer without a certificate, with the limits of the scene; problem: the reason, as a sentence."""
     return replace(
         answer,
         status=status,
@@ -498,7 +498,7 @@ def _uncertified(request: Request, answer: Solution, status: str, problem: str) 
 
 
 def _limits(request: Request, answer: Solution) -> tuple[Finding, ...]:
-    """Limits of the scene, judged at an answer's design."""
+    """Limits of the scene, evaluated at an answer's design."""
     design = {request.scene.full(name): value for name, value in designs.flat(answer.design).items()}
     return report.evaluated(request.scene, registry.of(request.scene), request.task.target, design).limits
 

@@ -134,7 +134,7 @@ def _for_children() -> Iterator[None]:
     if masked:
         from multiprocessing import resource_tracker
 
-        resource_tracker.ensure_running()  # which would let Ctrl-C through again when it starts
+        resource_tracker.ensure_running()  # which would accept Ctrl-C again when it starts
         first_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     first_values = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))

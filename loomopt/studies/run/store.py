@@ -26,7 +26,7 @@ STATUSES = frozenset({"optimal", "infeasible", "uncertified", "failed", "interru
 LARGEST_WHOLE = 2**53
 """Whole number that a float holds."""
 STEPS = 1_000_000
-"""Instructions of SQLite after which Ctrl-C is looked for: some milliseconds."""
+"""Instructions of SQLite between two checks for Ctrl-C: some milliseconds."""
 TABLES = {
     "study": "CREATE TABLE study (key TEXT PRIMARY KEY, told TEXT NOT NULL)",
     "row": f"CREATE TABLE row (study TEXT NOT NULL REFERENCES study (key), {', '.join(COLUMNS)},"
@@ -80,7 +80,7 @@ class Store:
     """A file of studies; every column of a row is JSON text, its point apart, which is a number, and its checksum."""
 
     def __init__(self, path: Path) -> None:
-        """Open the file, or make it. Raises BadInput where it is none of a study, cannot be written, or is in use."""
+        """Open the file, or make it. Raises BadInput if it is not a store, cannot be written, or is in use."""
         self.path = path
         files.check(path)
         with self._plain_errors():
@@ -188,7 +188,7 @@ class Store:
 
 
 def _read_description(text: object) -> dict[str, Any]:
-    """Description of a study; {} where it is not as it was written."""
+    """Description of a study; {} if it was changed since it was written."""
     with contextlib.suppress(ValueError, RecursionError):
         content = json.loads(text) if isinstance(text, str) else {}
         return content if isinstance(content, dict) else {}

@@ -1,7 +1,7 @@
 """Forces of the unbalanced reed system on its bearings and on the frame: figures only, no part in M3.
 
 reed_centrifugal F4 = (m4 + m4e) ψ˙² r [Yuan24, eq 11], r = (m4⁰ r4⁰ − m4e r4e)/(m4⁰ + m4e): the centrifugal part of the
-reed alone, not what the bearing carries (effect joint_forces tells that);
+reed alone, not the force in the bearing (effect joint_forces has that);
 shaking_force = |Σ m a_S| of all that moves: with the reed alone (m4 + m4e) |r| sqrt(ψ˙⁴ + ψ¨²).
 """
 

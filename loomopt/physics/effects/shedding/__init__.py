@@ -22,7 +22,7 @@ class FramePose(Protocol):
 
     @property
     def worst(self) -> Number:
-        """End of the range that is meant, where the value is not determined."""
+        """End of the range of a value that is not determined."""
 
     @property
     def direction(self) -> Number:

@@ -84,7 +84,7 @@ class Coil:
 
     @property
     def body_turns(self) -> Number:
-        """Turns of the body N_b = n − G/E: loops give way like G/E turns [Shigley, eq 10-40]; n beside free hooks."""
+        """Turns of the body N_b = n − G/E: loops deflect like G/E turns [Shigley, eq 10-40]; n with free hooks."""
         if self.hook_length is not None:
             return self.turns
         return self.turns - self.shear_modulus / self.elasticity

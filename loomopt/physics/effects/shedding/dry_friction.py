@@ -1,7 +1,7 @@
 """Coulomb friction of the heald frame in its guides: output term F sgn X˙ [Qiu21, eq 4].
 
 It jumps where the frame starts and stops. In a dwell it is any value in [−F, F]: `pose.worst` says which end is meant,
-−1 for the least cam force, by which contact is judged, +1 for the largest.
+−1 for the least cam force, which decides contact, +1 for the largest.
 """
 
 from pydantic import Field
