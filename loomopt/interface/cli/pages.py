@@ -116,6 +116,10 @@ def _checked_input(
             ),
             stored.evaluation.scene,
         )
+    if Path(thing).suffix not in ("", ".toml"):
+        problem = "it is no scene, answer or store" if Path(thing).is_file() else "the file does not exist"
+        allowed = "a scene's name or TOML file, the JSON of `loomopt solve --json`, a file of --store"
+        raise refusal(problem, thing, allowed=allowed, remedy="Name one of these")
     scene = changes.scene(thing)
     _check_studies(scene, target, studies)
     return Input(lambda say: _solve(scene, target, prove, studies, say), scene)

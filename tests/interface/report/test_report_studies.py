@@ -198,3 +198,17 @@ def test_all_inputs_are_checked_before_anything_is_computed(files, inputs, repor
     assert run(["report", *inputs, "--out", str(tmp_path / "page.html")]) == 2
     assert report in capsys.readouterr().err
     assert not (tmp_path / "page.html").exists()
+
+
+@pytest.mark.parametrize("name", ["front.db", "curves.csv", "page.html", "empty.sqlite"])
+@pytest.mark.parametrize("there", [True, False])
+def test_a_file_that_is_no_scene_answer_or_store_is_named(tmp_path, capsys, name, there):
+    path = tmp_path / name
+    if there:
+        path.write_text("no store" if name != "empty.sqlite" else "", encoding="utf-8")
+    assert run(["report", str(path), "--out", str(tmp_path / "r.html")]) == 2
+    report = capsys.readouterr()
+    assert report.out == ""
+    assert report.err.count("\n") == 1
+    assert name in report.err
+    assert ("it is no scene, answer or store" if there else "the file does not exist") in report.err
