@@ -35,6 +35,8 @@ BRANCH = 0.5
 SHORT = 16
 """Most steps in which a design is moved to a neighbour's place when the rows do not suffice to locate a change: in one
 step it may leave its basin."""
+UNCERTIFIED = "uncertified", "failed"
+"""Statuses of rows that show neither a design nor that there is none."""
 MOST_MORE = 3
 """Most rows as a multiple of the requested points, with those that locate changes and those that were dominated."""
 
@@ -171,7 +173,7 @@ def following(rows: Sequence[Row], scale: FrontScale, points: int) -> list[Next]
     """Next batch: dominated rows again, the widest gaps until there are enough points, then changes.
 
     Before changes are located, and after that, each row is solved again from the designs of both neighbours until none
-    improves: a neighbour's basin may be the better one there.
+    improves: a neighbour's basin may be the better one there. At last, rows without a certificate are tried once more.
     """
     front, dominated = spots(rows, scale)
     by_point = {row.point: row for row in rows}
@@ -203,7 +205,28 @@ def following(rows: Sequence[Row], scale: FrontScale, points: int) -> list[Next]
     if narrowed and any(row.warm.get("fine") for row in rows):
         return narrowed
     next_points = _trials(front, by_point, 1, scale)
-    return next_points or narrowed or _trials(front, by_point, SHORT, scale)
+    return next_points or narrowed or _trials(front, by_point, SHORT, scale) or _retries(front, rows, scale)
+
+
+def _retries(front: Sequence[Spot], rows: Sequence[Row], scale: FrontScale) -> list[Next]:
+    """Rows without a certificate that are solved once more, from neighbours that are nearer now.
+
+    The neighbours from which such a row was first solved may lie across a jump; later rows locate it.
+    """
+    redone_points = {point for point, _ in _redone(rows)}
+    retries = []
+    for row in rows:
+        if row.status not in UNCERTIFIED or not row.warm.get("near") or row.point in redone_points:
+            continue
+        if row.warm.get("again") is not None or not row.place:
+            continue
+        b = scale.position(1, row.place[scale.names[1]])
+        left = max((spot for spot in front if spot.b <= b), key=lambda spot: spot.b, default=None)
+        right = min((spot for spot in front if spot.b > b), key=lambda spot: spot.b, default=None)
+        near = tuple(spot.point for spot in (left, right) if spot)
+        if near and not set(near) <= set(row.warm["near"]):
+            retries.append(Next(b, near, row.point, fine=bool(row.warm.get("fine"))))
+    return retries[:BATCH]
 
 
 def _trials(front: Sequence[Spot], rows: Mapping[int, Row], steps: int, scale: FrontScale) -> list[Next]:

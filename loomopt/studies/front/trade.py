@@ -27,7 +27,7 @@ from loomopt.studies.front.plan import ENDS, FrontScale, Next
 from loomopt.studies.front.solver import Moved, Reached, Solver, Subproblem
 from loomopt.studies.run.rows import Findings, Row, StudyTask, enough_together, written
 
-PLAN = 7
+PLAN = 8
 """Version of the plan and of a row's content: it is increased with every change of them."""
 POINTS = 40
 SEARCHED = 1
@@ -503,7 +503,10 @@ UNSEEN = 1e-6
 def read_front(study: "Trade", rows: Sequence[Row]) -> Findings:
     """Front of finished rows: in the order of the second axis, then rows without a design."""
     by_point = {row.point: row for row in rows}
-    failed = tuple(row for row in rows if not row.certified and not _stood(study, row, by_point))
+    replaced = {row.warm["again"] for row in rows if row.certified}
+    failed = tuple(
+        row for row in rows if not row.certified and row.point not in replaced and not _stood(study, row, by_point)
+    )
     if not all(end in by_point for end in ENDS):
         return Findings(tuple(rows), "No front yet: an end is not solved.")
     if not all(by_point[end].certified for end in ENDS):
@@ -522,16 +525,18 @@ def read_front(study: "Trade", rows: Sequence[Row]) -> Findings:
     # In the order of the figure itself, for both senses.
     order = sorted(best, key=lambda row: plan.value(row, study.axes[1]))
     changes.sort(key=lambda change: change.at or 0.0)
-    bettered = sum(row.warm["again"] is not None for row in best)
+    bettered = sum(again is not None and by_point[again].certified for again in (row.warm["again"] for row in best))
     return Findings((*order, *failed), message, tuple(changes), tuple(sorted(gaps)), bettered)
 
 
 def _stood(study: "Trade", row: Row, rows: Mapping[int, Row]) -> bool:
-    """Whether the row that another row redoes is certified, and the repetition is no better."""
+    """Whether the row that another one redoes remains: it is certified and the repetition no better, or both fail."""
     again = row.warm.get("again")
     first_row = None if again is None else rows.get(again)
-    if first_row is None or not first_row.certified:
+    if first_row is None:
         return False
+    if not first_row.certified:
+        return True
     first, axes = study.solver.axes[0], row.warm.get("axes", {})
     repeated = first.value(axes[study.axes[0]]) if axes else math.inf
     return repeated >= first.value(plan.value(first_row, study.axes[0])) - plan.ALIKE * first.objective.scale

@@ -87,6 +87,28 @@ def test_a_point_that_was_missed_is_not_asked_for_again():
     assert planned(rows, points=4) == [0.25]
 
 
+def test_a_row_without_a_certificate_is_solved_once_more_from_nearer_neighbours():
+    active = [("l1 min",), ("l2 max",)]
+    rows = [row(0, 1.0, 0.0, 0.0, active[1]), row(1, 0.0, 1.0, active=active[0])]
+    rows += [row(2, 0.5, 0.5, certified=False, near=[0, 1])]
+    while batch := plan.following(rows, SCALE, 6):
+        retries = [item for item in batch if item.again == 2]
+        for item in batch:
+            more = {"again": item.again, "fine": item.fine, "parent": item.near[0], "steps": item.steps}
+            touched, near = active[item.b > 0.4], list(item.near)
+            certified = not item.steps
+            position = {"b": item.b, "a": 1 - item.b, "request": item.b}
+            rows.append(row(len(rows), **position, active=touched, certified=certified, near=near, **more))
+        if retries:
+            break
+    (retry,) = retries
+    left, right = (plan.value(rows[point], "b") for point in retry.near)
+    assert left < retry.b == 0.5 < right
+    assert right - left < 0.5
+    assert all(item.again != 2 for item in plan.following(rows, SCALE, 6))
+    assert retry.near[0] in [spot.point for spot in plan.spots(rows, SCALE)[0]]
+
+
 def test_both_neighbours_lend_their_designs_where_they_touch_others():
     rows = [*ENDS, row(2, 0.5, 0.5, active=("l2 max",)), row(3, 0.25, 0.75)]
     near = {item.b: item.near for item in plan.following(rows, SCALE, 8)}

@@ -72,8 +72,8 @@ def test_killed_after_some_rows_and_resumed_by_two_processes_it_has_the_same_dig
     assert again.digest == serial.digest
     assert {row.point: row.seconds for row in rows}.items() <= {row.point: row.seconds for row in again.solved}.items()
     texts = [json.loads(text) for text in stored(store)]
-    assert {data["study"] for data in texts} == {"sweep 5", "pareto 7"}, "a sweep and a front share the file"
-    (values,) = (data for data in texts if data["study"] == "pareto 7")
+    assert {data["study"] for data in texts} == {"sweep 5", "pareto 8"}, "a sweep and a front share the file"
+    (values,) = (data for data in texts if data["study"] == "pareto 8")
     assert made_again(values).key == serial.study.key
 
 
