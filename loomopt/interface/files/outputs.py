@@ -102,7 +102,7 @@ def answer(folder: Path, solution: Solution, scene: Scene, comma: bool = False) 
     """
     from loomopt.interface.files import svg
 
-    if _is_workbook(folder):
+    if folder.suffix.lower() == WORKBOOK and not folder.is_dir():
         sheets.write(folder, answer_sheets(solution, scene))
         return [folder]
     shown = tables.meaningful(answer_table.frame(solution, scene))
@@ -129,10 +129,6 @@ def answer(folder: Path, solution: Solution, scene: Scene, comma: bool = False) 
 
 
 WORKBOOK = ".xlsx"
-
-
-def _is_workbook(path: Path) -> bool:
-    return path.suffix.lower() == WORKBOOK and not path.is_dir()
 
 
 def answer_sheets(solution: Solution, scene: Scene) -> "dict[str, pd.DataFrame]":

@@ -236,7 +236,8 @@ def verdict(result: EffectsResult) -> list[str]:
     sentence = f"{list_text(result.left_out)} may be left out" if result.left_out else "no effect may be left out"
     lines = [f"At {share}, {sentence}{': ' if solve else ''}{solve}"]
     if result.together and result.largest_omission:
-        change = _change_text(result.together.largest_change)
+        largest = result.together.largest_change
+        change = f"at most {_change(*largest)}" if abs(largest[2]) > SHOWN_AS_ZERO else "nothing changes"
         lines.append(f"Without these effects, evaluated with all effects: {change}.")
         if len(result.left_out) > 1 and abs(result.largest_omission.value) > SHOWN_AS_ZERO:
             by, of, value = result.largest_omission.by, result.largest_omission.of, result.largest_omission.value
@@ -271,11 +272,6 @@ def omission_sentences(result: EffectsResult) -> list[str]:
     read = [name for name in names if name in result.reference.reads]
     which = f"reads {list_text(read)} of them" if read else "reads none of these figures"
     return [f"Of the other figures: {'; '.join(sentences)}. Target {result.target} {which}."]
-
-
-def _change_text(largest: tuple[str, str, float]) -> str:
-    """The largest change in words."""
-    return f"at most {_change(*largest)}" if abs(largest[2]) > SHOWN_AS_ZERO else "nothing changes"
 
 
 def _change(by: str, of: str, value: float) -> str:
