@@ -215,7 +215,8 @@ class Study:
     def change(self, key: str, value: float) -> tuple[Scene, Program]:
         """Scene with one number changed, to a value in SI, and its design task. Raises BadInput."""
         unit = SI_UNIT[self.numbers[key].quantity.kind]
-        scene = self.scene.update({key: value if unit == "1" else f"{value!r} {unit}"})
+        number = float(value)
+        scene = self.scene.update({key: number if unit == "1" else f"{number!r} {unit}"})
         return scene, self.job.program(scene, self.target)
 
     def step(self, key: str) -> float:
@@ -684,7 +685,8 @@ def _follow(
             return start, math.inf, error.problem.partition(" (")[0]
         except (ContinuationError, np.linalg.LinAlgError):
             return start, math.inf, "the optimum cannot be followed farther"
-        return PathPlace(there.x, there.evaluation.rows), *max((there.excess, there.reason), change)
+        excess, why = max((there.excess, there.reason), change)
+        return PathPlace(there.x, there.evaluation.rows), float(excess), why
 
     low, step, at, below = 0.0, FIRST_STEP * scale, PathPlace(optimum.x), -PRICE_CHANGE
     for _ in range(MOST_RESTARTS):
