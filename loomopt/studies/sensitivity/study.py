@@ -53,9 +53,14 @@ PERCENT = 0.01
 """Share by which a number without a tolerance is changed."""
 PRICE_CHANGE = 0.1
 """Share by which a price changes at the end of its range."""
-FIRST_STEP, GROWTH, MOST_STEPS, CLOSE = 1e-7, 4.0, 80, 1e-9
-"""First step along a range, in scales of its limit; ratio of two successive steps; most secants and halvings of the
-last step; relative accuracy of the end of a range."""
+FIRST_STEP, SECOND_STEP, GROWTH, MOST_STEPS, CLOSE = 1e-7, 1e-3, 4.0, 80, 1e-9
+"""First and second step along a range, in scales of its limit; ratio of two successive steps after them; most secants
+and halvings of the last step; relative accuracy of the end of a range."""
+BEYOND_END, MOST_GROWTH = 1.02, 32.0
+"""Share of the end that a straight line through two points gives at which the next point is tried, and most ratio of
+two steps for it."""
+KNOWN_PLACES = 4
+"""Nearest places of a path through which a polynomial predicts the next one."""
 NO_SHIFT, MOST_RESTARTS = 1e-11, 20
 """Shift of a limit, in scales, that counts as none; most restarts of a path after a step that was too long."""
 NEWTON_STEPS, CONVERGED = 24, 1e-11
@@ -651,13 +656,86 @@ class PathPoint(NamedTuple):
     multipliers: Floats
     reason: str
     excess: float
+    bends: tuple[Floats, Floats] | None = None
 
 
 class PathPlace(NamedTuple):
-    """Start of a Newton iteration on a path: variables, SI, and the rows there, None at the optimum."""
+    """Start of a Newton iteration on a path: variables, SI, and the rows there, None at the optimum.
+
+    bends: basis of the null space of the rows' slopes, and the Hessian times it, as they were last computed.
+    """
 
     x: Mapping[str, float]
     rows: tuple[ActiveRow, ...] | None = None
+    bends: tuple[Floats, Floats] | None = None
+
+
+class Excess(NamedTuple):
+    """Excesses at a shift of a number, SI: of rows and multipliers, and of the criterion; what the larger one means."""
+
+    shift: float
+    rows: float
+    change: float
+    why: str
+
+    @property
+    def worst(self) -> float:
+        """Larger excess, positive beyond the range."""
+        return max(self.rows, self.change)
+
+
+class Path:
+    """Optima of a working set along one side of a number: places by shift, SI, from which the next is predicted.
+
+    criterion(point): excess of what must not change too much, with its meaning.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        working_set: WorkingSet,
+        key: str,
+        sign: float,
+        criterion: Callable[[PathPoint], tuple[float, str]] | None,
+    ) -> None:
+        self.study, self.working_set, self.key, self.sign, self.criterion = study, working_set, key, sign, criterion
+        self.places = {0.0: PathPlace(study.optimum.x)}
+
+    def excess(self, shift: float) -> "Excess":
+        """Excess at a shift of the number, which is negative inside the range, and what it means."""
+        study = self.study
+        try:
+            program = study.change(self.key, study.value(self.key) + self.sign * shift)[1]
+            there = self._point(program, shift)
+            change = self.criterion(there) if self.criterion else (-math.inf, "")
+        except BadInput as error:
+            # The numbers in brackets are those of a trial.
+            return Excess(shift, math.inf, math.inf, error.problem.partition(" (")[0])
+        except (ContinuationError, np.linalg.LinAlgError):
+            return Excess(shift, math.inf, math.inf, "the optimum cannot be followed farther")
+        _, why = max((there.excess, there.reason), change)
+        excess = Excess(shift, float(there.excess), float(change[0]), why)
+        if excess.worst <= 0.0:
+            self.places[shift] = PathPlace(there.x, there.evaluation.rows, there.bends)
+        return excess
+
+    def _point(self, program: Program, shift: float) -> PathPoint:
+        """Optimum at a shift, from what neighbours predict, or else from the last place."""
+        near = sorted(self.places, key=lambda known: abs(known - shift))[:KNOWN_PLACES]
+        start = self.places[near[0]]
+        with contextlib.suppress(ContinuationError, np.linalg.LinAlgError):
+            return _newton(self.study.optimum, self.working_set, program, self._predict(near, shift))
+        return _newton(self.study.optimum, self.working_set, program, start)
+
+    def _predict(self, near: Sequence[float], shift: float) -> PathPlace:
+        """Place at a shift by the polynomial through known ones, with the rows of the nearest."""
+        weights = [
+            math.prod((shift - other) / (known - other) for other in near if other != known) for known in near
+        ]
+        names = self.study.optimum.names
+        start = self.places[near[0]]
+        moved = {name: sum(w * self.places[k].x[name] for w, k in zip(weights, near, strict=True)) for name in names}
+        return start._replace(x={**start.x, **moved})
 
 
 def _follow(
@@ -673,57 +751,71 @@ def _follow(
     scale: of the number. sign: of the side. criterion(point): excess of a quantity that must not change too much, and
     what it means.
     """
-    optimum, here = study.optimum, study.value(key)
-
-    def evaluate(shift: float, start: PathPlace) -> tuple[PathPlace, float, str]:
-        """PathPlace at a shift of the number, its excess, which is negative inside the range, and the reason."""
-        try:
-            there = _newton(optimum, working_set, study.change(key, here + sign * shift)[1], start)
-            change = criterion(there) if criterion else (-math.inf, "")
-        except BadInput as error:
-            # The numbers in brackets are those of a trial.
-            return start, math.inf, error.problem.partition(" (")[0]
-        except (ContinuationError, np.linalg.LinAlgError):
-            return start, math.inf, "the optimum cannot be followed farther"
-        excess, why = max((there.excess, there.reason), change)
-        return PathPlace(there.x, there.evaluation.rows), float(excess), why
-
-    low, step, at, below = 0.0, FIRST_STEP * scale, PathPlace(optimum.x), -PRICE_CHANGE
+    path = Path(study, working_set, key, sign, criterion)
+    inside, step = Excess(0.0, -math.inf, -PRICE_CHANGE, ""), FIRST_STEP * scale
     for _ in range(MOST_RESTARTS):
         while True:
-            high = low + step
-            there, above, why = evaluate(high, at)
-            if above > 0.0:
+            there = path.excess(inside.shift + step)
+            if there.worst > 0.0:
                 break
-            low, at, below, step = high, there, above, step * GROWTH
-            if low > FARTHEST * scale:
+            step = max(GROWTH * step, SECOND_STEP * scale)
+            end = min(_line_end(inside.rows, there.rows), _line_end(inside.change, there.change))
+            if math.isfinite(end):
+                step = min(max(BEYOND_END * end * (there.shift - inside.shift), step), MOST_GROWTH * step)
+            inside = there
+            if inside.shift > FARTHEST * scale:
                 return math.inf, f"no end within {FARTHEST:g} times its scale"
-        for turn in range(MOST_STEPS):
-            if high - low <= CLOSE * high or high <= NO_SHIFT * scale:
-                break
-            secant = low - below * (high - low) / (above - below) if math.isfinite(above - below) else math.nan
-            # Every third step halves the interval: secants alone may stay on one side.
-            middle = secant if turn % 3 < 2 and low < secant < high else (low + high) / 2
-            there, value, reason = evaluate(middle, at)
-            # The value at the end that stays is halved [the Illinois method: Dowell and Jarratt, BIT 11 (1971)].
-            if value > 0.0:
-                high, above, why, below = middle, value, reason, below / 2
-            else:
-                low, at, below, above = middle, there, value, above / 2
-        if high <= NO_SHIFT * scale:
-            return 0.0, why
+        inside, outside = _bracket_end(path, inside, there, scale)
+        if outside.shift <= NO_SHIFT * scale:
+            return 0.0, outside.why
         # A step that was too long may have failed where a short one succeeds.
-        step = max(2 * CLOSE * high, FIRST_STEP * scale)
-        there, value, _ = evaluate(high + step, at)
-        if value > 0.0:
+        step = max(2 * CLOSE * outside.shift, FIRST_STEP * scale)
+        there = path.excess(outside.shift + step)
+        if there.worst > 0.0:
             break
-        low, at, below = high + step, there, value
-    return (low + high) / 2, why
+        inside = there
+    return (inside.shift + outside.shift) / 2, outside.why
+
+
+def _line_end(before: float, here: float) -> float:
+    """Steps from the second of two points, one step apart, to the 0 of a line through their values, infinite without.
+
+    Both values are negative.
+    """
+    return -here / (here - before) if here > before > -math.inf else math.inf
+
+
+def _bracket_end(path: Path, inside: Excess, outside: Excess, scale: float) -> tuple[Excess, Excess]:
+    """Points just inside and just outside the end of a range; the given ones are such points farther apart."""
+    width, halves, shares, last = 0.0, True, [1.0, 1.0], None
+    for turn in range(MOST_STEPS):
+        low, high = inside.shift, outside.shift
+        if high - low <= CLOSE * high or high <= NO_SHIFT * scale:
+            break
+        if turn % 3 == 0:
+            halves, width = turn > 0 and high - low > width / 4, high - low
+        # The line is that of the excess which ends the range, as far as it was before.
+        below, above = (e.change if outside.change >= outside.rows else e.rows for e in (inside, outside))
+        below, above = below * shares[0], above * shares[1]
+        # Every third step halves an interval that lines did not shorten.
+        middle = (low + high) / 2
+        if math.isfinite(above - below) and not (turn % 3 == 2 and halves):
+            line = low - below * (high - low) / (above - below)
+            middle = min(max(line, low + CLOSE * high / 4), high - CLOSE * high / 4)
+        there = path.excess(middle)
+        is_outside = there.worst > 0.0
+        # The value at an end that stays twice is halved [the Illinois method: Dowell and Jarratt, BIT 11 (1971)].
+        shares = [0.5 * shares[0], 1.0] if is_outside else [1.0, 0.5 * shares[1]]
+        if is_outside is not last:
+            shares = [1.0, 1.0]
+        last = is_outside
+        inside, outside = (inside, there) if is_outside else (there, outside)
+    return inside, outside
 
 
 def _newton(optimum: Optimum, working_set: WorkingSet, program: Program, start: PathPlace) -> PathPoint:
     """Optimum of a working set in a task, by Newton's method from a start nearby. Raises ContinuationError."""
-    here, rows, product, before, length = dict(start.x), start.rows, None, math.inf, 0.0
+    here, rows, bends, before, length = dict(start.x), start.rows, start.bends, math.inf, math.inf
     for _ in range(NEWTON_STEPS):
         evaluation = optimum.evaluate(program, here, working_set, rows)
         rows = evaluation.rows
@@ -732,8 +824,10 @@ def _newton(optimum: Optimum, working_set: WorkingSet, program: Program, start: 
         basis = optimum.null_space(slopes)
         weights, _ = optimum.estimate_multipliers(evaluation, working_set)
         if basis.shape[1]:
-            if product is None or product.shape[1] != basis.shape[1] or length > SLOW * before:
-                product = optimum.hessian_product(program, here, working_set, weights, basis, rows)
+            if bends is None or bends[0].shape != basis.shape or length > SLOW * before:
+                bends = basis, optimum.hessian_product(program, here, working_set, weights, basis, rows)
+            # The basis turns from place to place: the product is that of its part in the basis of the Hessian.
+            product = bends[1] @ (bends[0].T @ basis)
             step = _tangent_step(step, basis, product, product.T @ step + basis.T @ (weights @ evaluation.slopes))
         here = optimum.move(here, step)
         before, length = length, float(np.abs(step).max(initial=0.0))
@@ -741,8 +835,6 @@ def _newton(optimum: Optimum, working_set: WorkingSet, program: Program, start: 
             break
     else:
         raise ContinuationError("Newton's method does not converge")
-    evaluation = optimum.evaluate(program, here, working_set, rows)
-    weights, _ = optimum.estimate_multipliers(evaluation, working_set)
     multipliers = working_set.multipliers
     excesses = [
         (-float(w) / max(1.0, abs(float(multipliers[k]))), f"{optimum.rows[k].name}'s price is 0")
@@ -752,7 +844,7 @@ def _newton(optimum: Optimum, working_set: WorkingSet, program: Program, start: 
     excesses += _limit_excesses(optimum, working_set, program, evaluation)
     excesses += _piece_excesses(optimum, working_set, evaluation)
     excess, reason = max(excesses, default=(-math.inf, ""))
-    return PathPoint(program, here, evaluation, weights, reason, excess)
+    return PathPoint(program, here, evaluation, weights, reason, excess, bends)
 
 
 def _limit_excesses(
